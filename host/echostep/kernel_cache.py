@@ -60,13 +60,13 @@ def _base(package: Path, root: Path) -> Path:
 
 def _digest(source: str) -> str:
     """A digest of the file and of all files of the known packages that it imports, directly or not."""
-    found, waiting = {source}, [source]
+    sources, waiting = {source}, [source]
     while waiting:
-        new = _read(waiting.pop())[1] - found
-        found |= new
+        new = _read(waiting.pop())[1] - sources
+        sources |= new
         waiting += new
     states = hashlib.sha256()
-    for name, path in sorted((_name_of(path), path) for path in found):
+    for name, path in sorted((_name_of(path), path) for path in sources):
         states.update(b"%b %b\n" % (os.fsencode(name), _read(path)[0]))
     return states.hexdigest()[:DIGITS]
 

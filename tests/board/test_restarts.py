@@ -10,7 +10,7 @@ from echostep.board import messages as m
 from echostep.board.faults.findings import BoardReports
 from echostep.board.faults.health import board_findings
 from echostep.board.frames import encode
-from echostep.board.subscription import SUBSCRIBE, Subscription
+from echostep.board.subscription import SUBSCRIBE, BoardSubscription
 from echostep.commissioning.diagnosis import Diagnosis, judge_board
 from echostep.commissioning.probe import ProbeResult
 
@@ -46,7 +46,7 @@ def test_a_supply_that_sags(least_mv: int, words: str) -> None:
 
 
 def test_a_board_is_asked_once_and_again_after_a_restart() -> None:
-    subscription = Subscription()
+    subscription = BoardSubscription()
     streamed: list[m.Message] = [
         IDENTITY,
         HEALTH,
@@ -63,7 +63,7 @@ def test_a_board_is_asked_once_and_again_after_a_restart() -> None:
 
 def test_older_firmware_is_not_asked_and_the_doctor_says_what_to_do() -> None:
     old = IDENTITY._replace(version_minor=1)
-    assert not Subscription().is_due(old)
+    assert not BoardSubscription().is_due(old)
     reports = BoardReports()
     reports.add(old)
     report = Diagnosis()
@@ -73,7 +73,7 @@ def test_older_firmware_is_not_asked_and_the_doctor_says_what_to_do() -> None:
 
 @needs_twin
 def test_a_host_that_follows_the_rule_keeps_its_subscription_over_a_crash() -> None:
-    bench, subscription = Bench(), Subscription()
+    bench, subscription = Bench(), BoardSubscription()
     try:
         for ms in range(0, 5_000, 50):
             if ms == 2_000:

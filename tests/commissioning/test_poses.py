@@ -27,7 +27,7 @@ from echostep.board import messages as m
 from echostep.board.calibration import ICM20649_M_S2, ImuSettings
 from echostep.board.foot_board import FootBoardReader
 from echostep.board.frames import encode
-from echostep.board.imu_errors import POSES, Pose, check_unlike, fit_errors, pose_of
+from echostep.board.imu_errors import POSES, RestPose, check_unlike, fit_errors, pose_of
 from echostep.board.subscription import SUBSCRIBE
 from echostep.commissioning import calibrate
 from echostep.commissioning.poses import TRIES, measure_poses
@@ -54,7 +54,7 @@ def text_of(shown: Console) -> str:
     return shown.file.getvalue()
 
 
-def lying(up: np.ndarray, offset: np.ndarray, gain: np.ndarray, rng: np.random.Generator) -> Pose:
+def lying(up: np.ndarray, offset: np.ndarray, gain: np.ndarray, rng: np.random.Generator) -> RestPose:
     """What a part with these errors measures when `up` points up in it, three degrees off."""
     leaning = up + 0.05 * rng.standard_normal(3)
     true = G * leaning / np.linalg.norm(leaning)
@@ -89,10 +89,12 @@ def test_too_few_and_too_alike_poses_are_refused() -> None:
     with pytest.raises(ValueError, match=r"lies as in pose 3, \d+ degrees from it"):
         check_unlike(lying(SIDES[2], np.zeros(3), np.ones(3), rng), poses[:5])
     check_unlike(poses[5], poses[:5])
-    ring = [Pose(G * np.array([math.cos(a), math.sin(a), 0.3]) / math.hypot(1.0, 0.3), np.zeros(3)) for a in range(6)]
+    ring = [
+        RestPose(G * np.array([math.cos(a), math.sin(a), 0.3]) / math.hypot(1.0, 0.3), np.zeros(3)) for a in range(6)
+    ]
     with pytest.raises(ValueError, match="six sides"):
         fit_errors(ring, G, 24.0)
-    half = [Pose(G * np.array(up) / np.linalg.norm(up), np.zeros(3))
+    half = [RestPose(G * np.array(up) / np.linalg.norm(up), np.zeros(3))
             for up in ((1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, -1, 0), (1, 1, 1), (-1, 0, 1))]  # fmt: skip
     with pytest.raises(ValueError, match=r"error of its z axis uncertain by 0\.\d m/s2"):
         fit_errors(half, G, 24.0)
@@ -242,7 +244,7 @@ def test_the_command_writes_settings_that_the_tracker_reads(tmp_path: Path, monk
 @settings(max_examples=60, deadline=None)
 def test_any_forces_give_errors_of_a_part_or_words(forces: np.ndarray) -> None:
     """Warnings are errors in the tests: no division by zero, nothing that is not a number."""
-    poses = [Pose(force, np.zeros(3)) for force in forces if np.linalg.norm(force) > 5.0]
+    poses = [RestPose(force, np.zeros(3)) for force in forces if np.linalg.norm(force) > 5.0]
     with suppress(ValueError):
         found = fit_errors(poses, G, 24.0)
         assert np.isfinite([found.offset, found.scale]).all()

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep_studies.simulation.rolling_foot import MANNERS, Course, Manner, course, felt, pitched, samples
+from echostep_studies.simulation.rolling_foot import MANNERS, Course, FootManner, course, felt, pitched, samples
 
-__all__ = ["MANNERS", "Course", "Manner", "any_rotation", "course", "felt", "pitched", "samples"]
+__all__ = ["MANNERS", "Course", "FootManner", "any_rotation", "course", "felt", "pitched", "samples"]
 
 
 def any_rotation(rng: np.random.Generator) -> Floats:

@@ -74,7 +74,7 @@ def test_mounting_does_not_matter() -> None:
 
 def test_height_of_the_sensor_is_what_it_says() -> None:
     """A foot that rolls slowly under a sensor 15 cm up: told so, steps are right; told 0, every step is short."""
-    manner = fw.Manner(height_m=0.15, stance_s=0.9, roll_s=0.4, toe_off_rad=0.6)
+    manner = fw.FootManner(height_m=0.15, stance_s=0.9, roll_s=0.4, toe_off_rad=0.6)
     course = fw.course(manner, 10)
     samples = fw.samples(course, 200)
     off = {h: float(np.hypot(*moves(walk_track(*samples, FootSettings(h)))[:, :2].T).mean()) - 1.3 for h in (0.0, 0.15)}

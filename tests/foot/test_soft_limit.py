@@ -17,7 +17,7 @@ from foot import foot_walks as fw
 from needs_data import needs_data
 from places import DATA
 
-QUICK_LAPS = fw.Manner((1.2, 0.0, 0.0), turn_rad=0.35, swing_s=0.55, stance_s=0.22, toe_off_rad=1.0, roll_s=0.09)
+QUICK_LAPS = fw.FootManner((1.2, 0.0, 0.0), turn_rad=0.35, swing_s=0.55, stance_s=0.22, toe_off_rad=1.0, roll_s=0.09)
 STEPS = 40
 
 

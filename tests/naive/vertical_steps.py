@@ -157,7 +157,7 @@ class VerticalFilter:
         for level, height in enumerate(self.heights_m.tolist()):
             share, arrived = ends * slow, stopped
             if not self.free:
-                width = math.hypot(model.STOREY_M, model.SCALE * (height - self.heights_m[here.level]))
+                width = math.hypot(model.LEVEL_SD_M, model.SCALE * (height - self.heights_m[here.level]))
                 if abs(g.mean[HEIGHT] - height) > 5.0 * math.sqrt(g.cov[HEIGHT, HEIGHT] + width**2):
                     continue
                 close, arrived = near(stopped, HEIGHT, height, width)
@@ -181,7 +181,7 @@ class VerticalFilter:
             for target, share, ground in self._grounds(level, stays, air):
                 found.append(Successor(target, CALM, ON, probability * share, ground))
         low, high = self.heights_m[0], self.heights_m[-1]
-        middle, wide = 0.5 * (low + high), 0.5 * (high - low) + model.STOREY_M
+        middle, wide = 0.5 * (low + high), 0.5 * (high - low) + model.LEVEL_SD_M
         if self.free:
             middle, wide = before.mean[HEIGHT], model.WANDERED_M
         for target in (*STAIRS, *LIFTS):

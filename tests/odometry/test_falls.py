@@ -11,7 +11,7 @@ import pytest
 from echostep.odometry.incapacity.falls import FRESH_S, Fall
 from echostep.odometry.incapacity.wearer_signs import Sign, WearerSigns
 from echostep_studies.incapacity.falls import message_index, signs_of
-from echostep_studies.simulation.body_motion import ICM20649, MTX, Samples
+from echostep_studies.simulation.body_motion import ICM20649, MTX, MotionSamples
 from echostep_studies.simulation.falling import (
     FALLS,
     NO_FALLS,
@@ -58,7 +58,7 @@ def test_all_fours_are_told_from_lying_by_the_thigh_alone() -> None:
     taken = 0
     for seed in range(8):
         samples = run(all_fours, seed)
-        blind = samples._replace(thigh=Samples(*(np.full_like(x, np.nan) for x in samples.thigh)))
+        blind = samples._replace(thigh=MotionSamples(*(np.full_like(x, np.nan) for x in samples.thigh)))
         assert not falls(signs_of(samples, belt=True))
         taken += bool(falls(signs_of(blind, belt=True)))
     assert taken  # the limit of a belt without a thigh

@@ -19,7 +19,7 @@ from echostep.plan.model import load_plan
 from echostep.session.team import mark_feed
 from echostep.session.team.mark_feed import MarkFeed
 from echostep.team.endpoint import parse_endpoint, parse_outlet
-from echostep.team.inbox import Inbox, Receiver
+from echostep.team.inbox import Inbox, ListenerThread
 from echostep.team.messages.marks import ALL
 from echostep.team.messages.report import ReportedAlarm
 from echostep.team.mqtt.publisher import Listener
@@ -41,7 +41,7 @@ class Commander:
     def __init__(self, url: str) -> None:
         self.operation, self._inbox = Operation(load_plan(PLAN)), Inbox()
         self.page = TablePage(self.operation, "Simulated operation", Address(port=0))
-        self.receiver = Receiver(Listener(parse_endpoint(url), ["echostep/+/+/+", ALL], self._inbox.put), print)
+        self.receiver = ListenerThread(Listener(parse_endpoint(url), ["echostep/+/+/+", ALL], self._inbox.put), print)
         self.page.feed.send = self.receiver.send
         self._restorer = Restorer()
 

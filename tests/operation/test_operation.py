@@ -92,7 +92,7 @@ def test_trails_hold_the_last_minutes_and_are_sent_once(monkeypatch: pytest.Monk
         team.pass_time(1.0)
     raw, end = team.operation.trail(0, team.now_s)
     x_m = columns(raw, 5)[:, 1]
-    assert np.all(np.diff(x_m) >= trails.STEP_M - 1e-6)
+    assert np.all(np.diff(x_m) >= trails.POINT_M - 1e-6)
     assert team.operation.trail(end, team.now_s) == (b"", end)
     monkeypatch.setattr(trails, "MOST_POINTS", 3)
     team.hear("Kim", place(TOWER, 9.0, 2.0, 0))

@@ -25,7 +25,7 @@ from echostep.session.team import teammate_feed
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import demo_scenario
 from echostep.team.endpoint import parse_endpoint, parse_outlet
-from echostep.team.inbox import Receiver
+from echostep.team.inbox import ListenerThread
 from echostep.team.messages.shared_drawings import MOST_BYTES, checked_drawing, drawing_topic
 from echostep.team.mqtt.publisher import Listener
 from echostep.team.wearer_plan import plan_file
@@ -48,7 +48,7 @@ class Kept:
     def __init__(self, url: str, name: str) -> None:
         self.plan: Plan | None = None
         broker = parse_endpoint(url)
-        self.receiver = Receiver(Listener(broker, [drawing_topic("red", name)], self._put, MOST_BYTES), print)
+        self.receiver = ListenerThread(Listener(broker, [drawing_topic("red", name)], self._put, MOST_BYTES), print)
 
     def is_drawn(self) -> bool:
         return self.plan is not None and length_m(self.plan) > LEAST_M

@@ -23,7 +23,7 @@ from echostep_studies.anywhere import amcl, kidnaps, plan_changes
 from echostep_studies.bench import echo_changes, sites, walks
 from echostep_studies.bench.columns import JudgedRow, JudgedSummary, run_row, summaries
 from echostep_studies.bench.filtering import Claim, FilterRun
-from echostep_studies.bench.judgement import JudgedRun, Truth, judge, true_levels
+from echostep_studies.bench.judgement import JudgedRun, TruePlaces, judge, true_levels
 from echostep_studies.bench.walks import SimulatedWalk
 from echostep_studies.frame.report import as_dict
 
@@ -88,7 +88,7 @@ def claim(t_s: float, x_m: float, status: TrackStatus = TRACKING, plan_fits: flo
 def test_a_wrong_floor_is_a_storey_off() -> None:
     claims = [claim(0.0, 0.0), claim(1.0, 0.0), claim(2.0, 6.0)]
     right = np.array([[True, False], [False, True], [False, True]])
-    run = judge(claims, Truth(np.zeros((3, 2)), right), np.zeros(3))
+    run = judge(claims, TruePlaces(np.zeros((3, 2)), right), np.zeros(3))
     assert run.error_m.tolist() == [0.0, 3.5, 6.0]
 
 
@@ -119,7 +119,7 @@ def test_a_summary_by_hand() -> None:
     good = FilterRun((claim(0.0, 0.1), claim(3600.0, 0.3)), 100, 36.0)
     bad = FilterRun((claim(0.0, 4.0), claim(3600.0, 4.0, plan_fits=0.2)), 300, 36.0)
     walked = np.array([0.0, 50.0])
-    truth = Truth(np.zeros((2, 2)), np.ones((2, 1), np.bool_))
+    truth = TruePlaces(np.zeros((2, 2)), np.ones((2, 1), np.bool_))
     judged = [judge(run.claims, truth, walked) for run in (good, bad)]
     rows = [run_row("a", seed, j, run) for seed, (j, run) in enumerate(zip(judged, (good, bad), strict=True))]
     assert [msgspec.convert(json.loads(json.dumps(as_dict(row))), JudgedRow) for row in rows] == rows
@@ -140,7 +140,7 @@ def test_a_run_without_a_place_on_the_plan_has_a_verdict_only() -> None:
 
 
 def test_a_hypothesis_on_the_right_floor_lists_the_place() -> None:
-    truth = Truth(np.zeros((1, 2)), np.array([[True, False]]))
+    truth = TruePlaces(np.zeros((1, 2)), np.array([[True, False]]))
 
     def is_listed(x_m: float, level: int) -> bool:
         return judge([replace(claim(0.0, 9.0), places=((9.0, 0.0, 0), (x_m, 0.0, level)))], truth, np.zeros(1)).listed

@@ -18,7 +18,7 @@ import pytest
 from command_line import echostep
 from echostep.foot.ins import Noise
 from echostep_studies.bench.recordings.feet import SETS, FootRecording
-from echostep_studies.bench.recordings.foot_metrics import Figure, align, places, rmse
+from echostep_studies.bench.recordings.foot_metrics import FootFigure, align, places, rmse
 from echostep_studies.feet import leave_one_out
 from echostep_studies.feet.rows import FigureRow
 from echostep_studies.feet.study import track_of
@@ -204,8 +204,8 @@ def test_a_set_that_is_left_out_has_no_say_in_the_choice(monkeypatch: pytest.Mon
     best = {"a": 0.5, "b": 2.0, "c": 2.0}
 
     def recording(group: str) -> FootRecording:
-        def judge(track: Any) -> list[Figure]:
-            return [Figure("error", 0.01 + abs(math.log(track / Noise().lever_m / best[group])))]
+        def judge(track: Any) -> list[FootFigure]:
+            return [FootFigure("error", 0.01 + abs(math.log(track / Noise().lever_m / best[group])))]
 
         empty = np.empty((0, 3))
         return FootRecording(group, "1", empty[:, 0], empty, empty, judge)

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from echostep.errors import EchostepError
 from echostep.plan.model import load_plan
 from echostep.team.endpoint import parse_endpoint
-from echostep.team.inbox import Inbox, Receiver
+from echostep.team.inbox import Inbox, ListenerThread
 from echostep.team.mesh import mesh
 from echostep.team.mesh.airtime import INTERVAL_S, MOST_USED, PRESETS, airtime_s, interval_s
 from echostep.team.mesh.mesh import POSITION_EVERY, MeshListener, MeshNode, MeshTransport
@@ -226,7 +226,7 @@ def test_a_report_goes_from_node_to_node(air: Air) -> None:
     inbox = Inbox()
     listener = MeshListener(parse_endpoint(f"mesh://{theirs.port}"), "red", DEMO, inbox.put)
     words: list[str] = []
-    with closing(Receiver(listener, words.append)) as receiver:
+    with closing(ListenerThread(listener, words.append)) as receiver:
         assert until(lambda: receiver.connected), words
         box = Outbox(
             MeshTransport(parse_endpoint(f"mesh://{mine.port}"), ("red", "kim"), words.append), "mesh", words.append
@@ -259,7 +259,7 @@ def test_twenty_wearers_on_pseudo_terminals(air: Air) -> None:
     endpoints = [parse_endpoint(f"mesh://{air.node().port}?wearers={WEARERS}") for _ in range(WEARERS)]
     wearers = [MeshTransport(endpoint, ("red", f"w{k}"), words.append) for k, endpoint in enumerate(endpoints)]
     with ExitStack() as opened:
-        receiver = opened.enter_context(closing(Receiver(listener, words.append)))
+        receiver = opened.enter_context(closing(ListenerThread(listener, words.append)))
         with ThreadPoolExecutor(WEARERS) as pool:
             list(pool.map(lambda wearer: wearer.open(), wearers))
         for wearer in wearers:

@@ -22,7 +22,7 @@ from echostep.errors import EchostepError
 from echostep.team import outbox
 from echostep.team.commander import update_roster
 from echostep.team.endpoint import parse_endpoint
-from echostep.team.inbox import Inbox, Receiver
+from echostep.team.inbox import Inbox, ListenerThread
 from echostep.team.messages.report import encode
 from echostep.team.mqtt.publisher import Listener, MqttTransport
 from echostep.team.roster import Member, MemberState, Roster
@@ -43,7 +43,7 @@ class Ear:
     def __init__(self, url: str) -> None:
         self.inbox, self.roster, self.times = Inbox(), Roster(), list[float]()
         self.words: list[str] = []
-        self.reception = Receiver(Listener(parse_endpoint(url), ["echostep/+/+/+"], self.hear), self.words.append)
+        self.reception = ListenerThread(Listener(parse_endpoint(url), ["echostep/+/+/+"], self.hear), self.words.append)
 
     def hear(self, topic: str | None, payload: bytes, retained: bool) -> None:
         self.inbox.put(topic, payload, retained)

@@ -13,7 +13,7 @@ from echostep.ports.chunks import BOARD, MTX
 from echostep.recording.reading import open_recording
 from echostep.simulation.devices.board import PythonBoard
 from reliability import faults
-from reliability.fault_outcomes import NORMAL_S, Outcome, judge_streams, table
+from reliability.fault_outcomes import NORMAL_S, FaultOutcome, judge_streams, table
 from twin.host_faults import kill, plug_mtx, unplug_mtx
 from twin.live_walk import HostFault, LiveWalk
 
@@ -46,7 +46,7 @@ def test_gaps_are_judged() -> None:
     regular = [begin_s + 0.1 * k for k in range(round(10 * (end_s - begin_s)))]
     times_s = {name: [t for t in regular if not begin_s + 2.0 < t < begin_s + 5.0] for name in NORMAL_S}
     dense = dict.fromkeys(("thigh", "calf", "belt", "sync", "foot"), _dense(begin_s, end_s))
-    outcome = Outcome("x=y")
+    outcome = FaultOutcome("x=y")
     judge_streams(outcome, times_s | dense, begin_s, end_s)
     assert set(outcome.silent_s) == {"left", "right", "pressure", "compass"}
     assert outcome.whole_s is not None
@@ -58,7 +58,7 @@ def test_gaps_are_judged() -> None:
 
 @pytest.mark.long
 def test_a_computer_that_sleeps_leaves_a_gap_and_no_false_claim() -> None:
-    asleep = faults.Fault((), (), 10.0, (BOARD, MTX), "the computer sleeps")
+    asleep = faults.TwinFault((), (), 10.0, (BOARD, MTX), "the computer sleeps")
     outcome = faults.run(asleep, PythonBoard(1))
     assert all(9.9 < seconds < 10.5 for seconds in outcome.silent_s.values())
     assert len(outcome.silent_s) == len(NORMAL_S)

@@ -17,7 +17,7 @@ from docs.pages import hardware
 from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC
 from hardware.lanes import lanes
 from hardware.nets import problems
-from hardware.wiring import Board, Device, boards, pins
+from hardware.wiring import Device, WiredBoard, boards, pins
 from players import twin_board
 
 FIRMWARE = ROOT / "firmware"
@@ -29,7 +29,7 @@ ON_MICRO = {  # Arduino's pin-out of the Micro, of 23 March 2020
 }  # fmt: skip
 
 
-def board(name: str) -> Board:
+def board(name: str) -> WiredBoard:
     return next(one for one in boards() if one.name == name)
 
 
@@ -37,7 +37,7 @@ def device(of: str, name: str) -> Device:
     return next(one for one in board(of).devices if one.name == name)
 
 
-def with_device(name: str, new: Device) -> Board:
+def with_device(name: str, new: Device) -> WiredBoard:
     old = board(name)
     return replace(old, devices=tuple(new if one.name == new.name else one for one in old.devices))
 

@@ -9,13 +9,13 @@ from typing import Any
 import pytest
 
 from board_runs import ROOT
-from hardware.wiring import POWER, Board, boards
+from hardware.wiring import POWER, WiredBoard, boards
 
 BOARDS = pytest.mark.parametrize("board", boards(), ids=lambda board: board.name)
 TOKENS = re.compile(r'\(|\)|"(?:[^"\\]|\\.)*"|[^\s()]+')
 
 
-def parsed(board: Board) -> list[Any]:
+def parsed(board: WiredBoard) -> list[Any]:
     """The file's S-expression as nested lists of words."""
     text = (ROOT / f"firmware/hardware/schematic/{board.name}.kicad_sch").read_text()
     stack: list[list[Any]] = [[]]
@@ -63,7 +63,7 @@ def pins_on_the_sheet(root: list[Any]) -> dict[tuple[float, float], tuple[str, s
 
 
 @BOARDS
-def test_each_pin_has_a_label_or_a_cross_and_nothing_hangs_in_the_air(board: Board) -> None:
+def test_each_pin_has_a_label_or_a_cross_and_nothing_hangs_in_the_air(board: WiredBoard) -> None:
     root = parsed(board)
     ends = [place(node) for name in ("global_label", "no_connect") for node in all_of(root, name)]
     assert sorted(ends) == sorted(pins_on_the_sheet(root))
@@ -71,7 +71,7 @@ def test_each_pin_has_a_label_or_a_cross_and_nothing_hangs_in_the_air(board: Boa
 
 
 @BOARDS
-def test_the_nets_are_those_of_the_wiring(board: Board) -> None:
+def test_the_nets_are_those_of_the_wiring(board: WiredBoard) -> None:
     root = parsed(board)
     at = pins_on_the_sheet(root)
     nets: dict[str, list[str]] = {}
@@ -85,7 +85,7 @@ def test_the_nets_are_those_of_the_wiring(board: Board) -> None:
 
 
 @BOARDS
-def test_identifiers_and_references_are_unique(board: Board) -> None:
+def test_identifiers_and_references_are_unique(board: WiredBoard) -> None:
     text = (ROOT / f"firmware/hardware/schematic/{board.name}.kicad_sch").read_text()
     identifiers = re.findall(r"\(uuid ([0-9a-f-]{36})\)", text)
     assert len(identifiers) == len(set(identifiers)) > 10

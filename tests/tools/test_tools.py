@@ -19,7 +19,7 @@ from echostep.recording.recorder import Recorder
 from echostep_studies.speed import stages
 from release import same_bits, tested_versions
 from reliability import campaign, faults
-from reliability.fault_outcomes import Outcome
+from reliability.fault_outcomes import FaultOutcome
 from reliability.fuzz import codec, host
 from team.team_broker import needs_broker
 from walks import walk_chunks
@@ -126,14 +126,14 @@ def test_same_bits_are_digests(
 def test_faults_go_on_where_they_stopped(
     tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    journal, played = campaign.Journal(tmp_path / "faults.jsonl"), list[str]()
+    journal, played = campaign.CampaignJournal(tmp_path / "faults.jsonl"), list[str]()
     names = [name for name, _ in faults._matrix(tmp_path)]
     for name in names[1:]:
-        journal.add(asdict(Outcome(name, lost_frames=7)))
+        journal.add(asdict(FaultOutcome(name, lost_frames=7)))
 
-    def play(fault: faults.Fault) -> Outcome:
+    def play(fault: faults.TwinFault) -> FaultOutcome:
         played.append(fault.name)
-        return Outcome(fault.name, wrongly_sure=len(played))
+        return FaultOutcome(fault.name, wrongly_sure=len(played))
 
     monkeypatch.setattr(faults, "run", play)
     for status in (1, 1):

@@ -31,7 +31,7 @@ def pages() -> dict[Path, str]:
 
 
 def main() -> int:
-    """Write the files, or say which are stale."""
+    """Write the files, or report which are stale."""
     parser = argparse.ArgumentParser(description="make the reference pages")
     parser.add_argument("--check", action="store_true", help="write nothing; exit 1 when a page is stale")
     check, stale = parser.parse_args().check, False

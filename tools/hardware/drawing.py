@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The wiring drawing of a board, from its nets: the processor board in the middle, parts left and right, a vertical lane for each net.
 
-In: a `Board`. Out: SVG. Each wire is labelled at both ends, so that colours are an aid only; they are near those of Okabe and Ito, which differ
+In: a `WiredBoard`. Out: SVG. Each wire is labelled at both ends, so that colours are an aid only; they are near those of Okabe and Ito, which differ
 for all kinds of colour vision. Owns the layout: ends of parts lie half a row beside those of the processor, so that no two wires lie on each
 other.
 """
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from hardware.lanes import lanes
 from hardware.pen import SOFT, Pen
-from hardware.wiring import POWER, Board, Device
+from hardware.wiring import POWER, Device, WiredBoard
 
 ROW, LANE = 24.0, 18.0  # pixels
 TOP, HEAD, FOOT, GAP = (
@@ -49,7 +49,7 @@ class Column:
         return self.edge_x + self.sign * LANE * (self.lane_of[net] + 1.5)
 
 
-def drawing(board: Board) -> str:
+def drawing(board: WiredBoard) -> str:
     """The SVG of a board's wiring."""
     sides = {side: tuple(d for d in board.devices if d.side == side) for side in ("left", "right")}
     left_x = MARGIN + (PART if sides["left"] else 0.0)
@@ -92,7 +92,7 @@ def _processor_bottom(left: Column, right: Column) -> float:
     return max([TOP + 200.0, *left.processor_y.values(), *right.processor_y.values()]) + 2.5 * ROW
 
 
-def _column(board: Board, parts: tuple[Device, ...], start_x: float, sign: float) -> Column:
+def _column(board: WiredBoard, parts: tuple[Device, ...], start_x: float, sign: float) -> Column:
     """Lay out one side. `start_x` is the edge of the parts on the left side, of the processor on the right one."""
     y, device_y = TOP, {}
     for part in parts:
@@ -113,7 +113,7 @@ def _column(board: Board, parts: tuple[Device, ...], start_x: float, sign: float
     return Column(parts, edge_x, parts_x, processor_y, device_y, lane_of)
 
 
-def _processor(pen: Pen, board: Board, x: float, bottom: float) -> None:
+def _processor(pen: Pen, board: WiredBoard, x: float, bottom: float) -> None:
     pen.box(x, TOP, PROCESSOR, bottom - TOP, "#e8f1fb")
     middle = x + PROCESSOR / 2
     pen.label(middle, TOP + 24, "Arduino Micro", 16, "middle", bold=True)
@@ -128,7 +128,7 @@ def _style(column: Column, net: str) -> tuple[str, str]:
     return INKS[order % len(INKS)], DASHES[order // len(INKS) % len(DASHES)]
 
 
-def _wires(pen: Pen, board: Board, column: Column) -> None:
+def _wires(pen: Pen, board: WiredBoard, column: Column) -> None:
     for net in sorted(column.lane_of):
         ink, dash = _style(column, net)
         x = column.lane_x(net)

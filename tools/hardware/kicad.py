@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The schematic of a board for KiCad 6 or newer, from its nets.
 
-In: a `Board`. Out: the text of a .kicad_sch [file format of KiCad 6, version 20211123]: a box for the processor board and for each part, with a
+In: a `WiredBoard`. Out: the text of a .kicad_sch [file format of KiCad 6, version 20211123]: a box for the processor board and for each part, with a
 global label at each wired pin and a cross at each open one. Nothing is random: identifiers are made from names. Owns the layout, mm.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from uuid import NAMESPACE_URL, uuid5
 
-from hardware.wiring import POWER, Board
+from hardware.wiring import POWER, WiredBoard
 
 GRID, STUB, BODY = 2.54, 2.54, 25.4  # of the sheet; length of a pin; width of a box
 COLUMN, TOP, BOTTOM = 96.52, 35.56, 200.0  # between two columns; first and last place on the sheet (A3)
@@ -39,7 +39,7 @@ class Box:
         return GRID * (len(self.kinds) + 1)
 
 
-def schematic(board: Board) -> str:
+def schematic(board: WiredBoard) -> str:
     """The text of the file."""
     boxes = _boxes(board)
     places = _places(boxes)
@@ -66,11 +66,11 @@ def schematic(board: Board) -> str:
     return "\n".join([*lines, f"  (symbol_instances{instances}\n  )", ")"]) + "\n"
 
 
-def _identifier(board: Board, *of: str) -> str:
+def _identifier(board: WiredBoard, *of: str) -> str:
     return str(uuid5(NAMESPACE_URL, "/".join(("echostep", board.name, *of))))
 
 
-def _boxes(board: Board) -> list[Box]:
+def _boxes(board: WiredBoard) -> list[Box]:
     """The processor board first; its supply pins are the sources."""
     kinds = {f"{pin.board} {pin.port}": pin.direction for pin in board.pins.values()}
     nets = {f"{pin.board} {pin.port}": net for net, pin in board.pins.items()}
@@ -128,7 +128,7 @@ def _library_symbol(box: Box) -> str:
     )
 
 
-def _ends(board: Board, box: Box, x: float, y: float) -> list[str]:
+def _ends(board: WiredBoard, box: Box, x: float, y: float) -> list[str]:
     """A label at each wired pin, a cross at each open one."""
     made = []
     for row, (pin, kind) in enumerate(box.kinds.items()):
@@ -145,7 +145,7 @@ def _ends(board: Board, box: Box, x: float, y: float) -> list[str]:
     return made
 
 
-def _instance(board: Board, box: Box, x: float, y: float) -> str:
+def _instance(board: WiredBoard, box: Box, x: float, y: float) -> str:
     texts = (
         ("Reference", box.reference, x, y - 3 * GRID, False), ("Value", box.value, x, y - 2 * GRID, False),
         ("Footprint", "", x, y, True), ("Datasheet", "", x, y, True), ("Place", box.note, x, y - GRID, False),

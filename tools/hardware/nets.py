@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Electrical checks of a board's nets, the simple part of what KiCad calls ERC.
 
-In: a `Board`. Out: problems in words; an empty list says that every pin is wired or meant to be open, every net has one driver or parts that take
+In: a `WiredBoard`. Out: problems in words; none when every pin is wired or meant to be open, every net has one driver or parts that take
 turns, supplies are in range, and no level exceeds what an input withstands. Currents and rise times are not checked. Owns nothing.
 """
 
@@ -9,19 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hardware.wiring import POWER, Board, Device
+from hardware.wiring import POWER, Device, WiredBoard
 
 DRIVERS = ("out", "tri")
 PROCESSOR_V = 5.0  # level of its outputs
 
 
-def problems(board: Board) -> list[str]:
+def problems(board: WiredBoard) -> list[str]:
     """All problems of a board."""
-    found = [f"{board.name}, {device.name}: {text}" for device in board.devices for text in _of_device(device)]
-    return found + [f"{board.name}, net {net}: {text}" for net in sorted(_nets(board)) for text in _of_net(board, net)]
+    texts = [f"{board.name}, {device.name}: {text}" for device in board.devices for text in _of_device(device)]
+    return texts + [f"{board.name}, net {net}: {text}" for net in sorted(_nets(board)) for text in _of_net(board, net)]
 
 
-def _nets(board: Board) -> set[str]:
+def _nets(board: WiredBoard) -> set[str]:
     return {net for device in board.devices for net in device.wires().values()}
 
 
@@ -43,7 +43,7 @@ def _of_device(device: Device) -> Iterator[str]:
                 yield f"supply pin {pin} is wired to {net}: needs {low:g} to {high:g} V"
 
 
-def _of_net(board: Board, net: str) -> Iterator[str]:
+def _of_net(board: WiredBoard, net: str) -> Iterator[str]:
     ends = [(d, pin, d.symbol.pins.get(pin, "open")) for d in board.devices for pin, at in d.pins.items() if at == net]
     processor = board.pins.get(net)
     if len(ends) + (processor is not None) < 2:

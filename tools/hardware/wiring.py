@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The wiring of the three processor boards, read from wiring.toml.
 
-In: firmware/hardware/wiring.toml. Out: `Board`s with their devices, and the pins of the processor. Owns nothing; `nets` checks it.
+In: firmware/hardware/wiring.toml. Out: `WiredBoard`s with their devices, and the pins of the processor. Owns nothing; `nets` checks it.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Device:
 
 
 @dataclass(frozen=True, slots=True)
-class Board:
+class WiredBoard:
     """A processor board with all that is wired to it."""
 
     name: str
@@ -75,7 +75,7 @@ def pins() -> tuple[Pin, ...]:
 
 
 @cache
-def boards() -> tuple[Board, ...]:
+def boards() -> tuple[WiredBoard, ...]:
     """The three boards."""
     table = _table()
     symbols = {name: Symbol(**{**row, "supply_v": tuple(row["supply_v"])}) for name, row in table["symbol"].items()}
@@ -84,7 +84,7 @@ def boards() -> tuple[Board, ...]:
         devices = tuple(Device(**{**device, "symbol": symbols[device["symbol"]]}) for device in row["device"])
         wired = {net for device in devices for net in device.pins.values()}
         used = {net: pin for pin in pins() for net in pin.nets if net in wired}
-        made.append(Board(row["name"], row["title"], devices, used))
+        made.append(WiredBoard(row["name"], row["title"], devices, used))
     return tuple(made)
 
 

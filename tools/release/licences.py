@@ -21,7 +21,7 @@ LONGEST = 80  # characters; a longer `License` field is the licence's text
 
 def needed(name: str, extras: Iterable[str] = ()) -> dict[str, Distribution]:
     """Installed packages that a package with these extras needs, itself excluded, by name."""
-    found: dict[str, Distribution] = {}
+    packages: dict[str, Distribution] = {}
     seen: set[tuple[str, str]] = set()
     waiting = [(name, extra) for extra in ("", *extras)]
     while waiting:
@@ -30,19 +30,19 @@ def needed(name: str, extras: Iterable[str] = ()) -> dict[str, Distribution]:
             continue
         seen.add((package, extra))
         try:
-            found[package] = distribution(package)
+            packages[package] = distribution(package)
         except PackageNotFoundError:
             continue  # an optional one of another system or of an extra that is not installed
-        for requirement in map(Requirement, found[package].requires or ()):
+        for requirement in map(Requirement, packages[package].requires or ()):
             if requirement.marker is None or requirement.marker.evaluate({"extra": extra}):
                 waiting += [(canonicalize_name(requirement.name), other) for other in ("", *requirement.extras)]
-    return {key: found[key] for key in sorted(found) if key != name}
+    return {key: packages[key] for key in sorted(packages) if key != name}
 
 
 def for_developers() -> dict[str, Distribution]:
     """Installed packages that echostep, its extras, its tests or its studies need, by name."""
-    found = needed("echostep", ("dev",)) | needed("echostep-studies", ("cluster",))
-    return {key: found[key] for key in sorted(found) if key != "echostep"}
+    packages = needed("echostep", ("dev",)) | needed("echostep-studies", ("cluster",))
+    return {key: packages[key] for key in sorted(packages) if key != "echostep"}
 
 
 def licence(package: Distribution) -> str:

@@ -54,17 +54,17 @@ def demo(out: Path) -> Iterator[tuple[str, str]]:
         return
     for seed in (1, 2, 3):
         folder = out / f"demo{seed}"
-        said = echostep(
+        output = echostep(
             "demo", "--headless", "--no-page", "--seed", seed, "--out", folder, "--board-command", " ".join(TWIN)
         )
-        yield f"demo/{seed}/estimates", said.split("sha256 ")[1].split()[0].rstrip(";")
+        yield f"demo/{seed}/estimates", output.split("sha256 ")[1].split()[0].rstrip(";")
         yield f"demo/{seed}/track", sha256((folder / "track.csv").read_bytes())
 
 
 def real(out: Path) -> Iterator[tuple[str, str]]:
     """Estimates of the recorded foot on the plan drawn around its path."""
-    said = run(sys.executable, "-m", "echostep_studies.figures.real_walk", "--out", out / "real")
-    yield "real/estimates", said.split("sha256 ")[1].split()[0]
+    output = run(sys.executable, "-m", "echostep_studies.figures.real_walk", "--out", out / "real")
+    yield "real/estimates", output.split("sha256 ")[1].split()[0]
 
 
 def captures() -> Iterator[tuple[str, str]]:
@@ -100,12 +100,12 @@ def studies(out: Path, runs: int, chosen: list[str] | None) -> Iterator[tuple[st
         words += ["--data", DATA] if study in WITH_DATA else []
         echostep("evaluate", study, *words, "--out", folder, "--json", folder / "rows.json")
         rows = json.loads((folder / "rows.json").read_text())["rows"]
-        kept = [
+        recorded = [
             {k: v for k, v in row.items() if not TIMING.search(k)}
             for row in rows
             if not TIMING.search(str(row.get("metric")))
         ]
-        for k, row in enumerate(kept):
+        for k, row in enumerate(recorded):
             yield (
                 f"study/{study}/{k}",
                 sha256(json.dumps(row, sort_keys=True))[:16] + " " + json.dumps(row, sort_keys=True),

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What all campaigns share: options, a journal of what is done already, a progress bar, figures with their limits.
+"""Common parts of the campaigns: options, a journal of finished runs, a progress bar, figures with their limits.
 
-In: defaults, rows, figures. Out: what was asked for; JSON lines; a table on stdout and the exit status. Owns the form of a journal.
+In: defaults, rows, figures. Out: the options; JSON lines; a table on stdout and the exit status. Owns the form of a journal.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-__all__ = ["Figure", "Journal", "none", "options", "report", "track"]
+__all__ = ["CampaignJournal", "Figure", "none", "options", "report", "track"]
 
 
 class Figure(NamedTuple):
@@ -28,7 +28,7 @@ class Figure(NamedTuple):
     passed: bool | None = None
 
 
-class Journal:
+class CampaignJournal:
     """Rows of a file, a JSON line each: the next run goes on behind them."""
 
     def __init__(self, path: Path) -> None:
@@ -44,7 +44,7 @@ class Journal:
 
 
 def options(doc: str | None, **known: tuple[Any, str]) -> argparse.Namespace:
-    """What was asked for: of each known option its default, which gives the type, and its help. The first line of `doc` says what it is all about."""
+    """Values of the options; `known`: default, which gives the type, and help of each. The first line of `doc` is the program's description."""
     parser = argparse.ArgumentParser(description=(doc or "").partition("\n")[0])
     for name, (default, text) in known.items():
         if isinstance(default, bool):

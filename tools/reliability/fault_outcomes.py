@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What a fault did to a walk: streams that were silent, estimates that claimed too much, and the table of it.
+"""Effect of a fault on a walk: silent streams, estimates beyond their stated error, and the table of both.
 
-In: arrival times of valid measurements, estimates, the true path. Out: an `Outcome`, rows of a Markdown table. Owns what is normal for each stream.
+In: arrival times of valid measurements, estimates, the true path. Out: a `FaultOutcome`, rows of a Markdown table. Owns each stream's normal gap.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ NORMAL_S = {name: stream.normal_s for name, stream in STREAMS.items()} | {FOOT: 
 
 
 @dataclass
-class Outcome:
+class FaultOutcome:
     """What a fault did. `silent_s`: by stream, time in too wide gaps. `whole_s`: from the begin to the end of the last gap; None: never."""
 
     name: str
@@ -79,7 +79,7 @@ def heard(
 
 
 def judge_streams(
-    outcome: Outcome, times_s: dict[str, list[float]], begin_s: float, end_s: float, least_s: float = 0.0
+    outcome: FaultOutcome, times_s: dict[str, list[float]], begin_s: float, end_s: float, least_s: float = 0.0
 ) -> None:
     """Find the gaps of each stream from the fault's begin on; one of `least_s` or less is none."""
     for name, normal_s in NORMAL_S.items():
@@ -94,7 +94,7 @@ def judge_streams(
             outcome.whole_s = None if whole_s is None else max(outcome.whole_s, whole_s)
 
 
-def judge_estimates(outcome: Outcome, t_s: Floats, xy_m: Floats, sure: Bools, truth: Floats) -> None:
+def judge_estimates(outcome: FaultOutcome, t_s: Floats, xy_m: Floats, sure: Bools, truth: Floats) -> None:
     """Compare estimates (n,), (n, 2), `sure` those with the status `tracking`, with the true path (k, 3): t_s, x, y."""
     if not len(t_s):
         return
@@ -106,7 +106,7 @@ def judge_estimates(outcome: Outcome, t_s: Floats, xy_m: Floats, sure: Bools, tr
     outcome.worst_m = float(off_m.max())
 
 
-def _silent(outcome: Outcome) -> str:
+def _silent(outcome: FaultOutcome) -> str:
     """What was missing, streams of equal time together."""
     groups: dict[str, list[str]] = {}
     for name, seconds in outcome.silent_s.items():
@@ -116,7 +116,7 @@ def _silent(outcome: Outcome) -> str:
     return "; ".join(f"{', '.join(names)} {seconds}" for seconds, names in groups.items()) or "nothing"
 
 
-def table(outcomes: list[Outcome]) -> str:
+def table(outcomes: list[FaultOutcome]) -> str:
     """The outcomes as a Markdown table."""
     lines = [
         "| fault | frames lost | silent | whole after | share of `tracking` | worst while `tracking` "

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Each fault of the twin and of the host during one simulated walk: what was lost, how long until the streams were whole, what the tracker claimed.
+"""Each fault of the twin and of the host during one simulated walk: losses, time until the streams are complete again, and the tracker's claims.
 
 In: the ELF and the twin. Out: one JSON line per fault in the output file, and their table on stdout; with `--page`, in host/docs/faults.md
 too. Faults that the file has already are not run again. Owns the list of the twin's faults; those of the host are in twin/host_faults.py.
@@ -25,8 +25,8 @@ from echostep.simulation.devices.board import Board, BoardProcess
 from echostep.simulation.scenario import START_NS, Scenario, demo_scenario
 from echostep.tracker import Tracker
 from places import OUT, PLAN, ROOT, TWIN
-from reliability.campaign import Journal, options
-from reliability.fault_outcomes import NORMAL_S, Outcome, heard, judge_estimates, judge_streams, table
+from reliability.campaign import CampaignJournal, options
+from reliability.fault_outcomes import NORMAL_S, FaultOutcome, heard, judge_estimates, judge_streams, table
 from twin.host_faults import HOST_FAULTS
 from twin.live_walk import BEGIN_S, END_S, HostFault, LiveWalk
 
@@ -37,7 +37,7 @@ LATE_S = 1.0  # of a walk in real time that still counts; assumed
 PORTION = 50  # chunks that are tracked together
 
 
-class Fault(NamedTuple):
+class TwinFault(NamedTuple):
     """Switches of the twin at BEGIN_S, and `seconds` later those that end it (none: it stays); meanwhile chunks of the ports in `lost` are lost."""
 
     switches: tuple[str, ...]
@@ -52,7 +52,7 @@ class Fault(NamedTuple):
         return (self.title or ", ".join(self.switches) or "none") + (f" for {self.seconds:g} s" if self.end else "")
 
 
-def _device_faults() -> Iterator[Fault]:
+def _device_faults() -> Iterator[TwinFault]:
     for name, values in (
         ("srf_left", ("absent", "mute", "deaf")),
         ("srf_right", ("nack", "stretch")),
@@ -62,53 +62,53 @@ def _device_faults() -> Iterator[Fault]:
         ("scp1000", ("absent", "drdy_stuck", "no_eeprom")),
     ):
         for value in values:
-            yield Fault((f"{name}={value}",), (f"{name}=ok",))
+            yield TwinFault((f"{name}={value}",), (f"{name}=ok",))
 
 
-def _kit_faults() -> Iterator[Fault]:
+def _kit_faults() -> Iterator[TwinFault]:
     """Parts of the kit of 2026, and MaxSonars, that are plugged in instead of the papers' ones, and that then fail."""
     for part, papers in (("thigh=lsm6dso", "adis16100"), ("compass=lis3mdl", "cmps10"), ("pressure=bmp390", "scp1000")):
-        yield Fault((f"part_{part}",), (f"part_{part.split('=')[0]}={papers}",))
+        yield TwinFault((f"part_{part}",), (f"part_{part.split('=')[0]}={papers}",))
     rangers = ("part_ranger_left", "part_ranger_right")
     back = tuple(f"{each}=srf02" for each in rangers)
     maxsonars = tuple(f"{each}=maxsonar" for each in rangers)
-    yield Fault(tuple(f"{each}=pulse" for each in rangers), back)
-    yield Fault(maxsonars, back)
-    yield Fault((*maxsonars, "maxsonar_left=deaf"), ("maxsonar_left=ok", *back))
+    yield TwinFault(tuple(f"{each}=pulse" for each in rangers), back)
+    yield TwinFault(maxsonars, back)
+    yield TwinFault((*maxsonars, "maxsonar_left=deaf"), ("maxsonar_left=ok", *back))
     for fault in ("pulse_left=deaf", "imu_thigh=absent", "bmp390=absent", "lis3mdl=nack"):
-        yield Fault(("kit=2026", fault), (f"{fault.split('=')[0]}=ok", "kit=papers"))
+        yield TwinFault(("kit=2026", fault), (f"{fault.split('=')[0]}=ok", "kit=papers"))
 
 
 FAULTS = (
-    Fault(()),
+    TwinFault(()),
     *_device_faults(),
     *_kit_faults(),
-    Fault(("sda=stuck",)),
-    Fault(("sda=stuck_forever",), ("sda=ok",)),
-    Fault(("scl=stuck",), ("scl=ok",)),
-    Fault(("usb=reset",)),
-    Fault(("usb=configure",)),
-    Fault(("usb=suspend",), ("usb=resume",)),
-    Fault(("usb=unplug",), ("usb=plug",)),
-    Fault(("usb_errors=100",)),
-    Fault(("host=stall",), ("host=read",)),
-    Fault(("reset=watchdog",)),
-    Fault(("cpu=hang_deaf",)),
-    Fault(("reset=external",)),
-    Fault(("bootloader=none", "reset=external")),
-    Fault(("supply=4500",), ("supply=5000",)),
-    Fault(("supply=3000",), ("supply=5000",), 0.3),
-    Fault(("supply=2500",), ("supply=5000",), 0.3),
-    Fault(("bootloader=none", "supply=2500"), ("supply=5000",), 0.3),
-    Fault(("swapped=rangers",)),
-    Fault(("swapped=thigh_calf",)),
-    Fault(("crystal=drift",)),
-    Fault(("crystal=resonator",)),
-    Fault(("usb=suspend",), ("usb=resume",), 10.0, (MTX,), "the computer sleeps"),
+    TwinFault(("sda=stuck",)),
+    TwinFault(("sda=stuck_forever",), ("sda=ok",)),
+    TwinFault(("scl=stuck",), ("scl=ok",)),
+    TwinFault(("usb=reset",)),
+    TwinFault(("usb=configure",)),
+    TwinFault(("usb=suspend",), ("usb=resume",)),
+    TwinFault(("usb=unplug",), ("usb=plug",)),
+    TwinFault(("usb_errors=100",)),
+    TwinFault(("host=stall",), ("host=read",)),
+    TwinFault(("reset=watchdog",)),
+    TwinFault(("cpu=hang_deaf",)),
+    TwinFault(("reset=external",)),
+    TwinFault(("bootloader=none", "reset=external")),
+    TwinFault(("supply=4500",), ("supply=5000",)),
+    TwinFault(("supply=3000",), ("supply=5000",), 0.3),
+    TwinFault(("supply=2500",), ("supply=5000",), 0.3),
+    TwinFault(("bootloader=none", "supply=2500"), ("supply=5000",), 0.3),
+    TwinFault(("swapped=rangers",)),
+    TwinFault(("swapped=thigh_calf",)),
+    TwinFault(("crystal=drift",)),
+    TwinFault(("crystal=resonator",)),
+    TwinFault(("usb=suspend",), ("usb=resume",), 10.0, (MTX,), "the computer sleeps"),
 )
 
 
-def _with_fault(scenario: Scenario, board: Board, fault: Fault) -> Iterator[Chunk]:
+def _with_fault(scenario: Scenario, board: Board, fault: TwinFault) -> Iterator[Chunk]:
     """The chunks of the walk up to END_S, the fault in it."""
     due = [(BEGIN_S, fault.switches), (BEGIN_S + fault.seconds, fault.end)]
     for chunk in scenario.chunks():
@@ -127,7 +127,7 @@ def walk_s(t_arrival_ns: int) -> float:
     return (t_arrival_ns - START_NS) * 1e-9
 
 
-def run(fault: Fault, board: Board | None = None) -> Outcome:
+def run(fault: TwinFault, board: Board | None = None) -> FaultOutcome:
     """One walk with this fault, as fast as it can be computed; with the real firmware unless another board is given."""
     plan = load_plan(PLAN)
     board = board or BoardProcess([*TWIN, "--seed", str(SEED)])
@@ -141,7 +141,7 @@ def run(fault: Fault, board: Board | None = None) -> Outcome:
             estimates += tracker.take(portion)
     finally:
         scenario.close()
-    outcome = Outcome(fault.name, reader.counts.lost + reader.counts.rejected)
+    outcome = FaultOutcome(fault.name, reader.counts.lost + reader.counts.rejected)
     judge_streams(outcome, times_s, BEGIN_S, END_S)
     judged = [e for e in estimates if e.t_s >= BEGIN_S]
     xy_m = np.array([(e.x_m, e.y_m) for e in judged])
@@ -150,7 +150,7 @@ def run(fault: Fault, board: Board | None = None) -> Outcome:
     return outcome
 
 
-def _matrix(folder: Path) -> Iterator[tuple[str, Callable[[], Outcome]]]:
+def _matrix(folder: Path) -> Iterator[tuple[str, Callable[[], FaultOutcome]]]:
     """Name of each fault, and the function that runs it; live runs keep their files in `folder`."""
     for fault in FAULTS:
         yield fault.name, partial(run, fault)
@@ -158,7 +158,7 @@ def _matrix(folder: Path) -> Iterator[tuple[str, Callable[[], Outcome]]]:
         yield host_fault.title, partial(run_live, host_fault, folder)
 
 
-def run_live(fault: HostFault, folder: Path) -> Outcome:
+def run_live(fault: HostFault, folder: Path) -> FaultOutcome:
     """One walk with a fault of the host, in real time, through `echostep live` on the twin's ports; ends the program when that was too slow."""
     with LiveWalk(folder / fault.slug, fault) as walk:
         outcome = walk.play()
@@ -175,12 +175,12 @@ def main() -> int:
         out=(OUT / "faults.jsonl", "outcomes so far; they are not run again"),
         page=(False, "write the table into host/docs/faults.md"),
     )
-    journal, matrix = Journal(asked.out), dict(_matrix(asked.out.with_suffix("")))
+    journal, matrix = CampaignJournal(asked.out), dict(_matrix(asked.out.with_suffix("")))
     for name, play in matrix.items():
         if name not in {row["name"] for row in journal.rows}:
             journal.add(asdict(play()))
-            print(table([Outcome(**journal.rows[-1])]).splitlines()[-1], flush=True)
-    outcomes = {row["name"]: Outcome(**row) for row in journal.rows}
+            print(table([FaultOutcome(**journal.rows[-1])]).splitlines()[-1], flush=True)
+    outcomes = {row["name"]: FaultOutcome(**row) for row in journal.rows}
     done = [outcomes[name] for name in matrix]
     if asked.page:
         head, _, rest = PAGE.read_text().partition(MARKS[0])

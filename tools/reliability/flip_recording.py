@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Flips one random bit of a recording at a time, and replays it: what became of the track, and whether the replay said that something was wrong.
+"""Flips one random bit of a recording at a time, and replays it: the effect on the track, and whether the replay reported it.
 
 In: options, optionally a recording and its plan; without one the first seconds of the demo are simulated. Out: counts by result, each bad flip;
 exit status 1 when a track ended early or went astray without a word, or when the repaired file does not replay in full. Owns nothing.
@@ -39,7 +39,7 @@ EARLY_S = 1.0  # before the end of the undamaged track: two estimates
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """Estimates of a replay and what it said; no estimates and the error's text when it refused the file."""
+    """Estimates of a replay and its messages; no estimates and the error's text when the file is refused."""
 
     estimates: Sequence[Estimate]
     said: Sequence[str]
@@ -47,7 +47,7 @@ class Replayed:
 
 @dataclass(frozen=True, slots=True)
 class Flip:
-    """One flip: result of the replay, whether something was said, and the result of the repaired file."""
+    """One flip: result of the replay, whether a message was printed, and the result of the repaired file."""
 
     offset: int
     bit: int
@@ -74,17 +74,17 @@ def replay(path: Path, plan: Plan) -> Replayed:
     return Replayed(estimates, skipped(recording, tracker.streams))
 
 
-def compare(found: Replayed, expected: Sequence[Estimate]) -> str:
+def compare(replayed: Replayed, expected: Sequence[Estimate]) -> str:
     """Same | near | astray | early | refused: a track beside the undamaged one."""
-    if not found.estimates:
+    if not replayed.estimates:
         return "refused"
-    times = [e.t_s for e in found.estimates]
+    times = [e.t_s for e in replayed.estimates]
     if any(b < a for a, b in zip(times, times[1:], strict=False)):
         return "back in time"
-    if list(found.estimates) == list(expected):
+    if list(replayed.estimates) == list(expected):
         return "same"
-    end, last = found.estimates[-1], expected[-1]
-    if len(found.estimates) < len(expected) - 2 or end.t_s < last.t_s - EARLY_S:
+    end, last = replayed.estimates[-1], expected[-1]
+    if len(replayed.estimates) < len(expected) - 2 or end.t_s < last.t_s - EARLY_S:
         return "early"
     return "astray" if math.hypot(end.x_m - last.x_m, end.y_m - last.y_m) > ASTRAY_M else "near"
 
@@ -107,14 +107,14 @@ def flip_once(content: bytes, where: tuple[int, int], plan: Plan, expected: Sequ
     flipped[offset] ^= 1 << bit
     damaged, whole = folder / "flipped.mcap", folder / "repaired.mcap"
     damaged.write_bytes(flipped)
-    found = replay(damaged, plan)
+    replayed = replay(damaged, plan)
     whole.unlink(missing_ok=True)
     try:
         repair(damaged, whole)
         repaired = compare(replay(whole, plan), expected)
     except EchostepError:
         repaired = "refused"
-    return Flip(offset, bit, compare(found, expected), bool(found.said), repaired)
+    return Flip(offset, bit, compare(replayed, expected), bool(replayed.said), repaired)
 
 
 def draw_flips(content: bytes, count: int, seed: int) -> list[tuple[int, int]]:

@@ -65,9 +65,9 @@ class LongTour:
         self._rows = scenario.sensors.rows(CUT_MS, end)
         self._truth = scenario.truth[:, :3] - [1e-3 * CUT_MS, 0.0, 0.0]
         first = int(np.searchsorted(scenario.mtx.t_s, 1e-3 * CUT_MS))
-        kept = slice(first, first + self._sample_count)
-        self._arrival_ns = START_NS + np.rint(1e9 * scenario.mtx.arrival_s[kept]).astype(np.int64) - CUT_MS * 1_000_000
-        self._samples: list[MtSample] = MtxReader().feed(b"".join(scenario.mtx.frames))[kept]
+        span = slice(first, first + self._sample_count)
+        self._arrival_ns = START_NS + np.rint(1e9 * scenario.mtx.arrival_s[span]).astype(np.int64) - CUT_MS * 1_000_000
+        self._samples: list[MtSample] = MtxReader().feed(b"".join(scenario.mtx.frames))[span]
         assert len(self._samples) == self._sample_count
         assert FIRST_S < 1e-3 * CUT_MS
 

@@ -92,7 +92,7 @@ class Measured:
 
 
 class TourPorts:
-    """What `live` asks of its ports: the tour's chunks up to a time, and a way to the board; each minute of the tour it looks at the memory."""
+    """The ports as `live` uses them: the tour's chunks up to a time, and a way to the board; memory is measured once a minute of the tour."""
 
     names = (BOARD,)  # the MTx is set up already
 
@@ -207,17 +207,17 @@ def figures(measured: Measured) -> list[tuple[str, str, str, bool | None]]:
     """(what, measured, limit, passed) for every figure."""
     t_s, host, twin = np.array(measured.memory).T
     settled = t_s >= min(SETTLED_S, measured.seconds / 2.0)
-    found: list[tuple[str, str, str, bool | None]] = []
+    results: list[tuple[str, str, str, bool | None]] = []
     for name, mb, most in (("host", host[settled], HOST_MB_H), ("twin", twin[settled], TWIN_MB_H)):
         growth = slope_mb_h(t_s[settled], mb)
         text = f"{mb[0]:.1f} MB after {t_s[settled][0] / 60:.0f} min, {mb[-1]:.1f} MB at the end, {growth:+.2f} MB/h"
-        found.append((f"memory of the {name}", text, f"<= {most:g} MB/h", growth <= most))
+        results.append((f"memory of the {name}", text, f"<= {most:g} MB/h", growth <= most))
     first_s, first_ticks = measured.first or (0.0, 0)
     wraps = (first_ticks + round((t_s[-1] - first_s) * TICKS_S)) // WRAP
     lost = {name: count for name, count in measured.losses.items() if count}
     speed, shown = measured.seconds / measured.wall_s, measured.seconds / FRAME_S
     return [
-        *found,
+        *results,
         ("wraps of the board's clock", f"{measured.wraps}", f"{wraps}", measured.wraps == wraps),
         ("lost or dropped, anywhere", str(lost or 0), "0", not lost),
         ("replay is the live track", "yes" if measured.replays else "no", "yes", measured.replays),

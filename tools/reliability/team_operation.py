@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""An operation: a team on one broker, one of it lost, one fallen, one rescuer guided to the fallen one, and a commander.
+"""An operation: a team on one broker with a commander; one wearer is lost, one has fallen, and a rescuer is guided to the fallen one.
 
 In: number of wearers, speed; the twin for those with the real firmware. Out: figures on the terminal. Owns the broker and all processes. The fallen
-wearer and the rescuer are simulated walks through the whole tracker, each in a process of its own, the others simulated reports; the rescuer sets out
-when the mayday has come. Exit status 1 when something of this did not happen.
+wearer and the rescuer are simulated walks through the whole tracker, each in a process of its own, the others simulated reports; the rescuer starts
+after the mayday. Exit status 1 when one of these events is missing.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from echostep.simulation.people.walker import Waypoint
 from echostep.simulation.scenario import Scenario
 from echostep.team.commander import update_roster
 from echostep.team.endpoint import parse_endpoint, parse_outlet
-from echostep.team.inbox import Inbox, Receiver
+from echostep.team.inbox import Inbox, ListenerThread
 from echostep.team.mqtt.publisher import Listener, MqttTransport
 from echostep.team.outbox import Outbox
 from echostep.team.publish import empty_report
@@ -103,11 +103,11 @@ class Crowd:
 
 
 class Listening:
-    """What a commander hears, for the figures."""
+    """Messages that a commander receives, for the figures."""
 
     def __init__(self, url: str) -> None:
         self.roster, self._inbox = Roster(), Inbox()
-        self.receiver = Receiver(Listener(parse_endpoint(url), ["echostep/+/+/+"], self._inbox.put), print)
+        self.receiver = ListenerThread(Listener(parse_endpoint(url), ["echostep/+/+/+"], self._inbox.put), print)
 
     def member(self, name: str) -> Member | None:
         """The newest of a wearer."""
@@ -115,7 +115,7 @@ class Listening:
         return next((m for m in self.roster.members(time.monotonic()) if m.report.name == name), None)
 
     def mayday_s(self) -> float | None:
-        """How long the fallen wearer had not moved when the mayday came; None: it has not come."""
+        """Time without movement of the fallen wearer at its mayday (s); None without a mayday."""
         m = self.member("fallen")
         alarm = m.report.alarm if m else None
         return alarm.age_s if m and alarm and m.state(time.monotonic()) is MemberState.MAYDAY else None
@@ -208,11 +208,11 @@ def _end(running: subprocess.Popen[str]) -> None:
         running.communicate()
 
 
-def _wait(found: object) -> float | None:
+def _wait(condition: object) -> float | None:
     """The first value that is not None, within LONGEST_S."""
     end_s = time.monotonic() + LONGEST_S
     while time.monotonic() < end_s:
-        if (value := found()) is not None:  # type: ignore[operator]
+        if (value := condition()) is not None:  # type: ignore[operator]
             return float(value)
         time.sleep(0.1)
     return None

@@ -30,7 +30,7 @@ from echostep.recording.reading import open_recording
 from echostep.simulation.scenario import demo_scenario
 from echostep.simulation.stimulus import BoardSensors
 from places import PLAN
-from reliability.fault_outcomes import NORMAL_S, Outcome, heard, judge_estimates, judge_streams
+from reliability.fault_outcomes import NORMAL_S, FaultOutcome, heard, judge_estimates, judge_streams
 from twin.run import PtyBoard, PtyMtx, playing, wait_for_opening
 
 SEED = 1
@@ -127,7 +127,7 @@ class LiveWalk:
         assert self.live is not None
         return self.live
 
-    def play(self) -> Outcome:
+    def play(self) -> FaultOutcome:
         """Walk up to the end, and judge."""
         scenario = demo_scenario(load_plan(PLAN), SEED, self.board)
         scenario.sensors = cast("BoardSensors", KnownRows(scenario.sensors.rows(0, len(scenario.walk.t_s))))
@@ -156,9 +156,9 @@ class LiveWalk:
         recorded = self.runs[-1] / "walk.mcap"
         return self.process.poll() is not None or (recorded.exists() and recorded.stat().st_size > LEAST_BYTES)
 
-    def _outcome(self, truth: Floats, fault_s: float) -> Outcome:
+    def _outcome(self, truth: Floats, fault_s: float) -> FaultOutcome:
         """Judge the recordings of all runs, and their tracks; that of a killed run is its replay."""
-        outcome, times_s = Outcome(self.fault.title), {name: list[float]() for name in NORMAL_S}
+        outcome, times_s = FaultOutcome(self.fault.title), {name: list[float]() for name in NORMAL_S}
         tracks: list[Floats] = []
         for run in self.runs:
             reader = BoardReader()

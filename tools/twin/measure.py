@@ -91,10 +91,10 @@ def add_message(result: RunResult, message: m.Message, t_ns: int) -> None:
 def stamp_errors(stamps: list[int], truth_ns: list[int]) -> tuple[float, float]:
     """Largest absolute value and sd of stamp minus truth (us), without its median; each stamp is compared with the nearest event."""
     events = np.array(truth_ns) / 1e3
-    found = np.array(stamps) * TICK_US
-    after = np.clip(np.searchsorted(events, found), 1, len(events) - 1)
-    nearest = np.where(found - events[after - 1] < events[after] - found, events[after - 1], events[after])
-    error = found - nearest
+    stamps_us = np.array(stamps) * TICK_US
+    after = np.clip(np.searchsorted(events, stamps_us), 1, len(events) - 1)
+    nearest = np.where(stamps_us - events[after - 1] < events[after] - stamps_us, events[after - 1], events[after])
+    error = stamps_us - nearest
     error -= np.median(error)
     return float(np.abs(error).max()), float(error.std())
 

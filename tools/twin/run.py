@@ -4,7 +4,7 @@
 In: the ELF and the twin; the MTx begins with its factory settings and accepts its configuration. Out: two ports for `echostep live`, and the
 true path in out/twin/truth.csv. The walk begins when the board's port is opened, and is repeated until Ctrl-C. With
 `--beacons udp://127.0.0.1:9000` a simulated gateway sends the readings of beacons along the walk to that port. With `--still`
-the wearer acts what `echostep calibrate` asks for, with the kit of 2026 the boxes lie as `calibrate accelerometers` asks. Owns both pseudo terminals.
+the wearer moves as `echostep calibrate` requests; boxes of the kit of 2026 lie as `calibrate accelerometers` requests. Owns both pseudo terminals.
 """
 
 from __future__ import annotations
@@ -66,10 +66,10 @@ class PtyBoard:
 
     def _told_port(self) -> str:
         """The name of the pseudo terminal, which the twin prints when it makes one."""
-        found = re.match(rb"board port: (\S+)", self._log.readline())
-        if not found:
+        match = re.match(rb"board port: (\S+)", self._log.readline())
+        if not match:
             raise SystemExit("the twin made no port")
-        return found[1].decode()
+        return match[1].decode()
 
     def advance(self, rows: NDArray[Any]) -> Sent:
         """Run the firmware for one millisecond per row. The list is empty: the bytes go to the terminal."""
@@ -234,7 +234,7 @@ def run_2026(seed: int, out: Path, *, once: bool) -> int:
 
 
 def rehearse(rehearsal: Rehearsal, board: PtyBoard, mtx: PtyMtx) -> None:
-    """Act what `echostep calibrate` asks for, the next act at each opening of the board's port, in real time, until Ctrl-C."""
+    """Play the poses and movements of `echostep calibrate` in real time, the next one at each opening of the board's port, until Ctrl-C."""
     act, at_ms, was_open = Act.WALK, 0, False
     due_s = time.monotonic()
     while True:

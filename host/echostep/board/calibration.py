@@ -116,13 +116,13 @@ class ImuSettings:
 
     def true_forces(self, measured: Floats) -> Floats:
         """Specific forces (n, 3) in m/s2 without the part's errors."""
-        found: Floats = (measured - self.offset) * self.scale
-        return found
+        forces: Floats = (measured - self.offset) * self.scale
+        return forces
 
     def true_rates(self, measured: Floats) -> Floats:
         """Rates (n, 3) in rad/s without the part's errors."""
-        found: Floats = measured - self.bias
-        return found
+        rates: Floats = measured - self.bias
+        return rates
 
 
 class Imus(NamedTuple):

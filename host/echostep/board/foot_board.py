@@ -49,11 +49,11 @@ class FootBoardReader:
         frames = self.reader.frames(received)
         for report in frames.each(_REPORTS):
             self.reports.add(report)
-        frame_row, found = frames.rows(Foot)
-        self.samples += len(found)
-        rates, forces = foot_axes(found)
+        frame_row, samples = frames.rows(Foot)
+        self.samples += len(samples)
+        rates, forces = foot_axes(samples)
         return FootFrames(
-            found["ticks"].astype(np.int64),
+            samples["ticks"].astype(np.int64),
             self._errors.true_forces(forces),
             self._errors.true_rates(rates),
             frames.end[frame_row],

@@ -17,7 +17,7 @@ from echostep.board.messages import BEACON_BEARING_INVALID, BEACON_RANGE_MM_INVA
 MOST_BEACONS = 64  # assumed: more than a team drops
 NEAREST_M, FURTHEST_M = 0.0, 30.0  # limits of a range: ultrasound does not reach farther
 OLDEST_S = 1.0  # greatest age of a reading; assumed
-GAP_S = 0.045  # least time between two readings of a beacon: a beacon measures at most 20 times a second
+LEAST_INTERVAL_S = 0.045  # least time between two readings of a beacon: a beacon measures at most 20 times a second
 CLOCK_S = 1.0  # largest jump of the gateway's clock relative to the tracker's between two messages; assumed
 CLOCK_GAIN = 0.05  # of a message in the running mean of the gateway's clock offset; assumed
 NEW_CLOCK_MESSAGES = 10  # consecutive messages that agree on a new clock offset before it is accepted; assumed
@@ -25,7 +25,7 @@ FEW_READINGS, FEW_S = (
     5,
     60.0,
 )  # a beacon of so few readings gives up its slot after so long without one: invented numbers
-SILENT_S = 1800.0  # any beacon does after so long: it is out of power or out of the building
+FORGOTTEN_S = 1800.0  # any beacon does after so long: it is out of power or out of the building
 LARGEST_BEARING_DEG = 180.0
 
 
@@ -141,7 +141,7 @@ class Gateway:
             self._slots[beacon.number], self._units[beacon.number] = slot, beacon.unit
             self.numbers[slot:] = [beacon.number, *self.numbers[slot + 1 :]]
         slot = self._slots[beacon.number]
-        if abs(reading.t_s - self._last_s.get(slot, -math.inf)) < GAP_S:
+        if abs(reading.t_s - self._last_s.get(slot, -math.inf)) < LEAST_INTERVAL_S:
             counts.flood += 1
             return None
         self._last_s[slot] = reading.t_s
@@ -154,7 +154,7 @@ class Gateway:
         if len(self.numbers) < MOST_BEACONS:
             return len(self.numbers)
         waits_s = {
-            slot: last_s + (FEW_S if self._readings[slot] <= FEW_READINGS else SILENT_S)
+            slot: last_s + (FEW_S if self._readings[slot] <= FEW_READINGS else FORGOTTEN_S)
             for slot, last_s in self._last_s.items()
         }
         slot = min(waits_s, key=lambda slot: waits_s[slot])

@@ -31,14 +31,14 @@ OFFSET_SD_M_S2 = 0.06  # largest sd that the poses may leave, three times that o
 TURNS = 8  # of Gauss and Newton; errors of 5 % need three
 
 
-class Pose(NamedTuple):
+class RestPose(NamedTuple):
     """Means of a part at rest: `force` (3,) m/s2, `rate` (3,) rad/s."""
 
     force: Floats
     rate: Floats
 
 
-def pose_of(forces: Floats, rates: Floats) -> Pose:
+def pose_of(forces: Floats, rates: Floats) -> RestPose:
     """Means of samples (n, 3); raises ValueError when there are few, or when the part moved."""
     if len(forces) < LEAST_SAMPLES:
         raise ValueError("gives too few values: run echostep doctor")
@@ -46,19 +46,19 @@ def pose_of(forces: Floats, rates: Floats) -> Pose:
     drift = np.abs(forces[:half].mean(axis=0) - forces[half:].mean(axis=0))
     if (forces.std(axis=0) > STILL_M_S2).any() or (rates.std(axis=0) > STILL_RAD_S).any() or (drift > DRIFT_M_S2).any():
         raise ValueError("moved: let go of it, and do it again")
-    pose = Pose(forces.mean(axis=0), rates.mean(axis=0))
+    pose = RestPose(forces.mean(axis=0), rates.mean(axis=0))
     if (size := float(np.linalg.norm(pose.force))) < LEAST_M_S2:
         raise ValueError(f"measures {size:.1f} m/s2 at rest: it is damaged; run echostep doctor")
     return pose
 
 
-def angle_rad(a: Pose, b: Pose) -> float:
+def angle_rad(a: RestPose, b: RestPose) -> float:
     """Angle between the measured forces of two poses."""
     cosine = a.force @ b.force / (np.linalg.norm(a.force) * np.linalg.norm(b.force))
     return math.acos(float(np.clip(cosine, -1.0, 1.0)))
 
 
-def check_unlike(pose: Pose, earlier: Sequence[Pose]) -> None:
+def check_unlike(pose: RestPose, earlier: Sequence[RestPose]) -> None:
     """Raise ValueError when the part lies as in an earlier pose."""
     for k, other in enumerate(earlier):
         if (angle := angle_rad(pose, other)) < ALIKE_RAD:
@@ -67,7 +67,7 @@ def check_unlike(pose: Pose, earlier: Sequence[Pose]) -> None:
             )
 
 
-def fit_errors(poses: Sequence[Pose], gravity_m_s2: float, celsius: float) -> ImuSettings:
+def fit_errors(poses: Sequence[RestPose], gravity_m_s2: float, celsius: float) -> ImuSettings:
     """Offset and scale of each axis, and the gyros' biases; raises ValueError when the poses do not determine them, or for a damaged part."""
     if len(poses) < POSES:
         raise ValueError(f"{len(poses)} poses are too few: {POSES} are needed")

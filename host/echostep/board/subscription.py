@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Which boards are asked for their optional messages, and when.
 
-In: the board's messages in order. Out: whether to send `SUBSCRIBE` now. Owns whether the board has answered. A board that has restarted, or whose
+In: the board's messages in order. Out: whether to send `SUBSCRIBE` now. Owns the state of the request. A board that has restarted, or whose
 port was opened anew, must be asked again; one of older firmware would count the request as damaged.
 """
 
@@ -18,7 +18,7 @@ def knows_subscriptions(identity: Identity) -> bool:
     return (identity.version_major, identity.version_minor) >= FIRST_VERSION
 
 
-class Subscription:
+class BoardSubscription:
     """Call `is_due` with every message of the board. A subscribed board sends both `Identity` and `BoardHealth` once a second."""
 
     def __init__(self) -> None:

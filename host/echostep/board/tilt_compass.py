@@ -57,15 +57,15 @@ class TiltCompass:
         magnetic_row, fields = frames.rows(Magnetic)
         forces = np.column_stack([*(motions[name] for name in _FORCES), np.ones(len(motions))]).astype(np.int64)
         forces[(forces == MOTION_INVALID).any(axis=1)] = 0
-        found = np.full(len(magnetic_row), np.nan)
+        heading_rad = np.full(len(magnetic_row), np.nan)
         begin = 0
         for k, end in enumerate(np.searchsorted(motion_row, magnetic_row).tolist()):
             self._sums.append(self._sum + forces[begin:end].sum(axis=0))
             self._sum = np.zeros_like(self._sum)
             begin = end
-            found[k] = self._heading(np.array([fields[axis][k] for axis in "xyz"], np.float64))
+            heading_rad[k] = self._heading(np.array([fields[axis][k] for axis in "xyz"], np.float64))
         self._sum = self._sum + forces[begin:].sum(axis=0)
-        return magnetic_row, found
+        return magnetic_row, heading_rad
 
     def _heading(self, counts: Floats) -> float:
         if (counts == MAGNETIC_INVALID).any() or (np.abs(counts) >= FULL_SCALE).any():

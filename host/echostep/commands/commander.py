@@ -70,8 +70,6 @@ def _plan_file(plan: Path, url: str, team: str | None, folder: Path) -> Path:
     if drawing_wearer(plan) is None:
         return plan
     broker = parse_endpoint(url) if url.startswith(tuple(f"{scheme}://" for scheme in BROKERS)) else None
-    found = plan_file(
-        plan, broker, checked_name("--team", team) if team else "+", folder, partial(typer.echo, err=True)
-    )
-    assert found is not None
-    return found
+    path = plan_file(plan, broker, checked_name("--team", team) if team else "+", folder, partial(typer.echo, err=True))
+    assert path is not None
+    return path

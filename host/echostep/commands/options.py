@@ -32,7 +32,7 @@ def needs(package: str) -> Callable[[typer.CallbackParam, Value], Value]:
 
 
 def page_address(page: bool | None, host: str, port: int | None) -> Address | None:
-    """Where to serve the page; None: no page. One that cannot be served is an error where it was asked for, and said where it is the default."""
+    """Where to serve the page; None: no page. An address that cannot be served is an error if given, a notice if it is the default."""
     if page:
         require("--page", *PAGE)
     if page is False:

@@ -230,12 +230,12 @@ def _ports(board: str | None, mtx: str | None, foot: str | None) -> tuple[str, s
         return board, mtx, foot
     from echostep.commissioning.port_search import find_ports
 
-    found = find_ports(mtx, foot)
-    options = {"board": found.board, "mtx": found.mtx, "foot": found.foot}
+    ports = find_ports(mtx, foot)
+    options = {"board": ports.board, "mtx": ports.mtx, "foot": ports.foot}
     typer.echo("Ports: " + " ".join(f"--{name} {path}" for name, path in options.items() if path))
-    if not found.mtx and not found.foot:
+    if not ports.mtx and not ports.foot:
         typer.echo("Neither an MTx nor a foot board was found.")
-    return found.board, found.mtx, found.foot
+    return ports.board, ports.mtx, ports.foot
 
 
 def _page_address(headless: bool, page: bool | None, host: str, port: int | None) -> Address | None:

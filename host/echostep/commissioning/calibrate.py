@@ -57,7 +57,7 @@ class Wearer:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class Calibration:
     """One calibration: instruction to the wearer, duration, and the fit by what is known. Parts with equal instructions share one measurement."""
 
     name: str
@@ -68,15 +68,15 @@ class Part:
 
 _TURN = "Turn: once round on the spot, slowly, and a little further."
 PARTS = (
-    Part(
+    Calibration(
         "gyros",
         "Gyros: stand still, or lay everything on a table.",
         STILL_S,
         lambda probed, _known, _wearer: fit_gyros(probed),
     ),
-    Part("mounting", _TURN, TURN_S, lambda probed, known, _wearer: fit_mounting(probed, known)),
-    Part("compass", _TURN, TURN_S, lambda probed, known, _wearer: fit_compass(probed, known)),
-    Part(
+    Calibration("mounting", _TURN, TURN_S, lambda probed, known, _wearer: fit_mounting(probed, known)),
+    Calibration("compass", _TURN, TURN_S, lambda probed, known, _wearer: fit_compass(probed, known)),
+    Calibration(
         "legs",
         "Legs: stand for two seconds, walk {walked_m:g} m straight on, and stand again.",
         WALK_S,
@@ -127,7 +127,7 @@ def _calibrate_accelerometers(ports: list[str], out: Path, sections: Sections, c
     _write(out, sections)
 
 
-def _chosen_parts(names: list[str]) -> list[Part]:
+def _chosen_parts(names: list[str]) -> list[Calibration]:
     """The parts that are worn; all of them without a name."""
     known = [part.name for part in PARTS]
     for name in names:
@@ -150,7 +150,7 @@ def _wait(console: Console) -> None:
 
 
 def _probe(port: str, seconds: float, text: str, console: Console) -> ProbeResult:
-    """What the board at this port says, with `text` at a bar that fills meanwhile."""
+    """The `ProbeResult` of the board at this port; a progress bar shows `text` meanwhile."""
     with listening_bar(text, seconds, console):
         probed = probe({BOARD: port}, seconds)
     if probed.stale_firmware:

@@ -55,9 +55,9 @@ class Diagnosis:
 def judge_board(report: Diagnosis, probed: ProbeResult, port: str) -> None:
     """Add facts and findings on the board at this port."""
     reports = probed.reports
-    found = stale_firmware(probed, port, "board") or silence(probed, port, "board")
-    if found is not None or reports.identity is None:
-        report.findings += [found] if found else []
+    finding = stale_firmware(probed, port, "board") or silence(probed, port, "board")
+    if finding is not None or reports.identity is None:
+        report.findings += [finding] if finding else []
         return
     report.lines += board_lines("board", probed, port) + _device_lines(probed) + _rate_lines(probed)
     report.findings += board_findings(reports) + _stream_findings(probed) + _version_findings(reports.identity, port)
@@ -115,7 +115,7 @@ def _version_findings(identity: Identity, port: str) -> list[Finding]:
 
 
 def silence(probed: ProbeResult, port: str, subject: str) -> Finding | None:
-    """A finding on a board that has not said who it is."""
+    """A finding on a board that has not answered the request for its identity."""
     if probed.reports.identity is not None:
         return None
     if not probed.bytes_of[BOARD]:

@@ -84,10 +84,10 @@ def still_bias(t_s: Floats, rate: Floats) -> tuple[float, float]:
     pieces = [rate[valid][piece == k] for k in range(piece[-1] + 1) if (piece == k).sum() >= LEAST_PIECE_SAMPLES]
     quiet = [values for values in pieces if values.std() <= STILL_SD_RAD_S]
     means = np.array([values.mean() for values in quiet])
-    kept = [v for v, mean in zip(quiet, means, strict=True) if abs(mean - np.median(means)) <= STILL_SPREAD_RAD_S]
-    if len(kept) < LEAST_STILL * len(pieces):
+    calm = [v for v, mean in zip(quiet, means, strict=True) if abs(mean - np.median(means)) <= STILL_SPREAD_RAD_S]
+    if len(calm) < LEAST_STILL * len(pieces):
         raise ValueError("it moved: stand still, or lay the board down, and do it again")
-    still = np.concatenate(kept)
+    still = np.concatenate(calm)
     if abs(still.mean()) > BIAS_MAX_RAD_S:
         raise ValueError(
             f"{math.degrees(still.mean()):.0f} degrees/s at rest: it turned evenly, or the gyro is damaged"

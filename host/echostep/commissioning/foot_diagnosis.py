@@ -28,9 +28,9 @@ LEAST_SAMPLES = 100
 def judge_foot_board(report: Diagnosis, probed: ProbeResult, port: str) -> None:
     """Add facts and findings on the foot board at this port."""
     subject, reports = "foot board", probed.reports
-    found = stale_firmware(probed, port, subject) or silence(probed, port, subject)
-    if found is not None:
-        report.findings.append(found)
+    finding = stale_firmware(probed, port, subject) or silence(probed, port, subject)
+    if finding is not None:
+        report.findings.append(finding)
         return
     report.lines += board_lines(subject, probed, port)
     if reports.foot is None:

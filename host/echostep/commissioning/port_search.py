@@ -33,26 +33,26 @@ class FoundPorts:
 def find_ports(mtx: str | None = None, foot: str | None = None) -> FoundPorts:
     """The board's port and, unless it is given, that of what is on the foot; raises EchostepError without a board, or with two of a kind."""
     seen = [port for port in list_seen() if port.path not in (mtx, foot)]
-    found, notes = listen([port.path for port in seen])
+    roles, notes = listen([port.path for port in seen])
     for port in seen:
-        if port.path not in found and port.path not in notes and port.role in ROLES:
-            found[port.path] = ROLES[port.role]
-    boards, mtxs, feet = ([path for path, device in found.items() if device == kind] for kind in (BOARD, MTX, FOOT))
+        if port.path not in roles and port.path not in notes and port.role in ROLES:
+            roles[port.path] = ROLES[port.role]
+    boards, mtxs, feet = ([path for path, device in roles.items() if device == kind] for kind in (BOARD, MTX, FOOT))
     if len(boards) != 1:
         what = "several boards are plugged in" if boards else "no sensor board was found"
-        raise EchostepError(f"{what}{_listed(seen, found, notes)}: name its port with --board; see echostep doctor")
+        raise EchostepError(f"{what}{_listed(seen, roles, notes)}: name its port with --board; see echostep doctor")
     if mtx is not None or foot is not None:
         return FoundPorts(boards[0], mtx, foot)
     if len(mtxs) + len(feet) > 1:
         what = "several MTx" if not feet else "several foot boards" if not mtxs else "an MTx and a foot board"
         raise EchostepError(
-            f"{what}{_listed(seen, found, notes)}: name the port of the one on the foot with --mtx or --foot"
+            f"{what}{_listed(seen, roles, notes)}: name the port of the one on the foot with --mtx or --foot"
         )
     return FoundPorts(boards[0], mtxs[0] if mtxs else None, feet[0] if feet else None)
 
 
 def find_boards(seen: list[PortSeen], board: str | None, foot: str | None) -> tuple[str | None, str | None]:
-    """The ports of belt board and foot board among those seen; several boards are told apart by what comes from them."""
+    """The ports of belt board and foot board among those seen; several boards are distinguished by the messages that they send."""
     paths = [port.path for port in seen if port.role is Role.BOARD and port.path not in (board, foot)]
     if len(paths) + (board is not None) + (foot is not None) < 2 or not paths:
         return board or find([port for port in seen if port.path != foot], Role.BOARD, BOARD_NAME), foot
@@ -64,7 +64,7 @@ def find_boards(seen: list[PortSeen], board: str | None, foot: str | None) -> tu
 def listen(paths: list[str]) -> tuple[dict[str, str], dict[str, str]]:
     """Which device each port has, by its bytes; and why a port could not be opened."""
     opened: list[SerialPorts] = []
-    found: dict[str, str] = {}
+    roles: dict[str, str] = {}
     notes: dict[str, str] = {}
     try:
         for path in paths:
@@ -74,26 +74,26 @@ def listen(paths: list[str]) -> tuple[dict[str, str], dict[str, str]]:
                 notes[path] = str(error)
         received = {path: b"" for path in paths if path not in notes}
         end_s = time.monotonic() + SEARCH_S
-        while time.monotonic() < end_s and len(found) < len(received):
+        while time.monotonic() < end_s and len(roles) < len(received):
             for ports in opened:
                 chunk = next(ports.chunks())
-                if chunk is None or chunk.port in found or len(received[chunk.port]) > LISTENED_BYTES:
+                if chunk is None or chunk.port in roles or len(received[chunk.port]) > LISTENED_BYTES:
                     continue
                 received[chunk.port] += chunk.data
                 if device := sender(received[chunk.port]):
-                    found[chunk.port] = device
+                    roles[chunk.port] = device
     finally:
         for ports in opened:
             ports.close()
-    return found, notes
+    return roles, notes
 
 
-def _listed(seen: list[PortSeen], found: dict[str, str], notes: dict[str, str]) -> str:
+def _listed(seen: list[PortSeen], roles: dict[str, str], notes: dict[str, str]) -> str:
     """What each port is, in brackets."""
     if not seen:
         return " (no USB serial port is plugged in)"
     words = {BOARD: "a board", MTX: "an MTx", FOOT: "a foot board"}
     listed = [
-        f"{port.name}: {notes.get(port.path) or words.get(found.get(port.path, ''), 'something else')}" for port in seen
+        f"{port.name}: {notes.get(port.path) or words.get(roles.get(port.path, ''), 'something else')}" for port in seen
     ]
     return f" ({'; '.join(listed)})"

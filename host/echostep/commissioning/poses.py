@@ -16,7 +16,7 @@ from rich.console import Console
 from echostep.arrays import Bools, Floats
 from echostep.board.calibration import GYROS, ImuSettings, foot_axes, six_axes
 from echostep.board.faults.device_faults import foot_celsius, gyro_celsius
-from echostep.board.imu_errors import POSES, Pose, check_unlike, fit_errors, pose_of
+from echostep.board.imu_errors import POSES, RestPose, check_unlike, fit_errors, pose_of
 from echostep.board.messages import FOOT_HEALTH_TEMPERATURE_INVALID, ROWS, Foot, Gyro, Motion
 from echostep.commissioning.probe import SETTLED_S, TICKS_PER_S, ProbeResult
 from echostep.errors import EchostepError
@@ -40,7 +40,7 @@ class Lying(NamedTuple):
 
 def parts_of(probed: ProbeResult) -> dict[str, Lying]:
     """The six-axis parts that gave values, by place."""
-    found = {}
+    parts = {}
     if motions := [message for message in probed.axes if isinstance(message, Motion)]:
         rows = np.array(motions, ROWS[motions[0].id])
         for place in GYROS:
@@ -48,7 +48,7 @@ def parts_of(probed: ProbeResult) -> dict[str, Lying]:
             valid = np.isfinite(forces).all(axis=1) & np.isfinite(rates).all(axis=1) & _settled(probed, Motion)
             gyro = probed.reports.gyros.get(Gyro[place.upper()])
             if valid.any():
-                found[place] = Lying(forces[valid], rates[valid], 0.0 if gyro is None else gyro_celsius(gyro))
+                parts[place] = Lying(forces[valid], rates[valid], 0.0 if gyro is None else gyro_celsius(gyro))
     if probed.foot:
         rows = np.array(probed.foot, ROWS[probed.foot[0].id])
         rates, forces = foot_axes(rows)
@@ -56,8 +56,8 @@ def parts_of(probed: ProbeResult) -> dict[str, Lying]:
         health = probed.reports.foot
         counts = FOOT_HEALTH_TEMPERATURE_INVALID if health is None else health.temperature
         celsius = 0.0 if counts == FOOT_HEALTH_TEMPERATURE_INVALID else foot_celsius(counts)
-        found[FOOT_PLACE] = Lying(forces[late], rates[late], celsius)
-    return found
+        parts[FOOT_PLACE] = Lying(forces[late], rates[late], celsius)
+    return parts
 
 
 def _settled(probed: ProbeResult, kind: type[Motion | Foot]) -> Bools:
@@ -67,7 +67,7 @@ def _settled(probed: ProbeResult, kind: type[Motion | Foot]) -> Bools:
 
 def measure_poses(listen: Listen, console: Console) -> dict[str, ImuSettings]:
     """Errors of each part, by place; raises EchostepError with what to repeat."""
-    poses: dict[str, list[Pose]] = {}
+    poses: dict[str, list[RestPose]] = {}
     celsius: dict[str, list[float]] = {}
     for number in range(1, POSES + 1):
         parts = _listed(list(poses)) if poses else EVERYTHING
@@ -75,27 +75,27 @@ def measure_poses(listen: Listen, console: Console) -> dict[str, ImuSettings]:
         for place, (pose, warm) in _one_pose(listen, poses, f"Pose {number} of {POSES}", console).items():
             poses.setdefault(place, []).append(pose)
             celsius.setdefault(place, []).append(warm)
-    found = {}
+    settings = {}
     for place, lay in poses.items():
         try:
-            found[place] = fit_errors(lay, GRAVITY_M_S2, float(np.mean(celsius[place])))
+            settings[place] = fit_errors(lay, GRAVITY_M_S2, float(np.mean(celsius[place])))
         except ValueError as error:
             raise EchostepError(f"{place}: {error}") from error
-    return found
+    return settings
 
 
 def _one_pose(
-    listen: Listen, earlier: dict[str, list[Pose]], text: str, console: Console
-) -> dict[str, tuple[Pose, float]]:
+    listen: Listen, earlier: dict[str, list[RestPose]], text: str, console: Console
+) -> dict[str, tuple[RestPose, float]]:
     """The pose and temperature of each part, asked for again while one of them moved or lies as before."""
     for tries_left in reversed(range(TRIES)):
-        heard = {place: lying for probed in listen(text) for place, lying in parts_of(probed).items()}
-        if not heard:
+        measured = {place: lying for probed in listen(text) for place, lying in parts_of(probed).items()}
+        if not measured:
             raise EchostepError(
                 "no part with an accelerometer answers: an LSM6DSO, or an ICM-20649 on a foot board (--foot); run echostep doctor"
             )
         try:
-            return _checked(heard, earlier)
+            return _checked(measured, earlier)
         except ValueError as error:
             if not tries_left:
                 raise EchostepError(str(error)) from error
@@ -103,19 +103,19 @@ def _one_pose(
     raise AssertionError
 
 
-def _checked(heard: dict[str, Lying], earlier: dict[str, list[Pose]]) -> dict[str, tuple[Pose, float]]:
+def _checked(measured: dict[str, Lying], earlier: dict[str, list[RestPose]]) -> dict[str, tuple[RestPose, float]]:
     """Poses and temperatures by place; raises ValueError that names the part."""
-    found = {}
-    for place in earlier or heard:
-        if place not in heard:
+    poses = {}
+    for place in earlier or measured:
+        if place not in measured:
             raise ValueError(f"{place}: gives no values: check its plug")
         try:
-            pose = pose_of(heard[place].forces, heard[place].rates)
+            pose = pose_of(measured[place].forces, measured[place].rates)
             check_unlike(pose, earlier.get(place, []))
         except ValueError as error:
             raise ValueError(f"{place}: {error}") from error
-        found[place] = pose, heard[place].celsius
-    return found
+        poses[place] = pose, measured[place].celsius
+    return poses
 
 
 def described(place: str, errors: ImuSettings) -> str:

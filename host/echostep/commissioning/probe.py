@@ -30,7 +30,7 @@ from echostep.board.messages import (
     SelfTest,
     Sync,
 )
-from echostep.board.subscription import SUBSCRIBE, Subscription
+from echostep.board.subscription import SUBSCRIBE, BoardSubscription
 from echostep.errors import EchostepError
 from echostep.ports.arrival_clock import now_s as clock_s
 from echostep.ports.chunks import BOARD, MTX, Chunk
@@ -139,7 +139,7 @@ class _Probe:
         self.result = ProbeResult()
         self._ports, self._names, self._check_gyros = ports, names, check_gyros
         self._board, self._mtx = BoardReader(), MtxReader()
-        self._subscription = Subscription()
+        self._subscription = BoardSubscription()
         self._start = MtxStart(MtxTiming().rate_hz, lambda sent: ports.send(MTX, sent), self.result.mtx_messages.append)
         self._start_s = clock_s()
         self._sequence = 0

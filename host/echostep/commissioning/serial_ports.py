@@ -119,12 +119,12 @@ def rules_text() -> str:
 
 def rules_findings(folders: tuple[Path, ...] = RULE_FOLDERS) -> list[Finding]:
     """Whether the udev rules of this version are installed."""
-    found = next((folder / RULES for folder in folders if (folder / RULES).exists()), None)
+    rules = next((folder / RULES for folder in folders if (folder / RULES).exists()), None)
     remedy = f"echostep doctor --udev | sudo tee /etc/udev/rules.d/{RULES} && sudo udevadm control --reload && sudo udevadm trigger"
-    if found is None:
+    if rules is None:
         what = "are not installed: no stable names (/dev/echostep, /dev/echostep-mtx), no low latency for the MTx"
         return [Finding(Severity.NOTE, "udev rules", what, remedy)]
     with contextlib.suppress(OSError, UnicodeDecodeError):
-        if found.read_text().strip() == rules_text().strip():
+        if rules.read_text().strip() == rules_text().strip():
             return []
-    return [Finding(Severity.NOTE, "udev rules", f"{found} is of another version", remedy)]
+    return [Finding(Severity.NOTE, "udev rules", f"{rules} is of another version", remedy)]

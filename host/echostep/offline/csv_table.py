@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """One reader for CSV files of samples: named columns of numbers, in any of three dialects.
 
-In: a text file from anybody, whose first line names the columns, separated by comma, semicolon (then with decimal commas) or tab. Out: `CsvTable`
+In: a text file of any origin, whose first line names the columns, separated by comma, semicolon (then with decimal commas) or tab. Out: `CsvTable`
 with the wanted columns, NaN where there is no number; ValueError for a file that is not such a table, or a line that is too long. Owns nothing.
 """
 

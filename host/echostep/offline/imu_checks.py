@@ -133,21 +133,21 @@ def _resting_force(table: Floats) -> float:
 
 def notes(table: Floats, columns: Sequence[str]) -> tuple[str, ...]:
     """Faults of the samples that make the track less certain, a line each."""
-    found = []
+    remarks = []
     steps = np.diff(table[:, TIME])
     if repeated := int((steps == 0.0).sum()):
-        found.append(f"{repeated} rows repeat the time before them: skipped")
+        remarks.append(f"{repeated} rows repeat the time before them: skipped")
     if back := int((steps < 0.0).sum()):
-        found.append(f"t_s goes back {back} times: was the clock set?")
+        remarks.append(f"t_s goes back {back} times: was the clock set?")
     if (missing := missing_share(steps)) > MISSING_SHARE:
-        found.append(f"{100 * missing:.0f} % of the samples are missing: the track is less certain")
+        remarks.append(f"{100 * missing:.0f} % of the samples are missing: the track is less certain")
     for k, name in enumerate(columns[1:SENSOR_COLUMNS], start=1):
         if clipped := _clipped(table[:, k], STEEP[0] if k < RATE.start else STEEP[1]):
             limit, share = clipped
-            found.append(
+            remarks.append(
                 f"{name} is cut off at {limit:.4g} in {100 * share:.1f} % of the rows: the sensor's range is too small, the track is less certain"
             )
-    return tuple(found)
+    return tuple(remarks)
 
 
 def missing_share(steps: Floats) -> float:

@@ -114,22 +114,22 @@ def _table(file: TextIO, prefix: str) -> tuple[Floats, tuple[str, ...]]:
     wanted = [name for source in sources for name in source]
     columns = [header.index(name) if name in header else -1 for name in (*wanted, *OPTIONAL)]
     values = read_rows(lines_of(file, CsvLimits(), first=2), separator, columns, len(wanted), CsvLimits()).values
-    found, notes, at = [], [], 0
+    series, notes, at = [], [], 0
     for name, source in zip(COLUMNS, sources, strict=True):
         rates = values[:, at : at + len(source)]
         at += len(source)
         if len(source) == 1:
-            found.append(rates[:, 0])
+            series.append(rates[:, 0])
             continue
         column, note = _about_walking_axis(name, values[:, TIME], rates)
-        found.append(column)
+        series.append(column)
         notes.append(note)
-    return np.column_stack([*found, values[:, at:]]), tuple(notes)
+    return np.column_stack([*series, values[:, at:]]), tuple(notes)
 
 
 def _about_walking_axis(name: str, t_s: Floats, rates: Floats) -> tuple[Floats, str]:
     """Rates (n,) about the axis of walking of a sensor with rates (n, 3), peaks repaired, and a note; NaN where a number is missing."""
-    part, found = name.split("_", maxsplit=1)[0], np.full(len(t_s), np.nan)
+    part, pitch_rate = name.split("_", maxsplit=1)[0], np.full(len(t_s), np.nan)
     whole = np.flatnonzero(
         np.isfinite(rates).all(axis=1) & np.isfinite(t_s) & (np.abs(rates).max(axis=1) < LARGEST_NUMBER)
     )
@@ -138,15 +138,15 @@ def _about_walking_axis(name: str, t_s: Floats, rates: Floats) -> tuple[Floats, 
         raise ValueError(f"{part}_x, {part}_y, {part}_z: too few rows with numbers to find the axis of walking")
     repaired = repair_clipping(t_s[order], rates[order])
     mounting = walking_axis(t_s[order], repaired)
-    found[order] = repaired @ mounting.axis
+    pitch_rate[order] = repaired @ mounting.axis
     if not mounting.clear:
         return (
-            found,
+            pitch_rate,
             f"{part}: no axis of walking stands out, the one turned about most is taken: the track is less certain",
         )
     off = math.degrees(math.acos(min(float(np.abs(mounting.axis).max()), 1.0)))
     axis = "xyz"[int(np.argmax(np.abs(mounting.axis)))]
-    return found, f"{part}: the axis of walking is {off:.0f} degrees from the sensor's {axis}"
+    return pitch_rate, f"{part}: the axis of walking is {off:.0f} degrees from the sensor's {axis}"
 
 
 def _unit_hint(header: list[str]) -> str:

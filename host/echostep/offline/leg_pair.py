@@ -52,8 +52,8 @@ def track_pair(
         raise EchostepError("the two legs have no time in common: their times must be of the same clock")
     trunk = first if first.has_heading else other
     first, other = (_with_belt(leg, trunk) for leg in (first, other))
-    found = [leg_strides(leg, settings) for leg in (first, other)]
-    legs = found[0][0], found[1][0]
+    estimates = [leg_strides(leg, settings) for leg in (first, other)]
+    legs = estimates[0][0], estimates[1][0]
     t_s = np.union1d(first.t_s, other.t_s)
     moves = np.array([np.diff(distance_at(t_s, strides)) for strides in legs])
     seen = np.array([_seen(t_s, leg, strides) for leg, strides in zip((first, other), legs, strict=True)])
@@ -69,7 +69,7 @@ def track_pair(
         f"the sensors of {name} leg rest during a walk: are they worn?" for name in np.array(NAMES)[idle.any(axis=1)]
     )
     notes = (*notes, *loose, *heading_notes, *doubts(strides))
-    counts = LegCounts(*(getattr(found[0][1], k) + getattr(found[1][1], k) for k in LegCounts.__slots__))
+    counts = LegCounts(*(getattr(estimates[0][1], k) + getattr(estimates[1][1], k) for k in LegCounts.__slots__))
     return LegTrack(path_rows(t_s, distance, heading), strides, counts, source_of(trunk), float(angles[-1, 1]), notes)
 
 
@@ -165,8 +165,8 @@ def _in_order(first: tuple[Stride, ...], other: tuple[Stride, ...]) -> tuple[Str
 
 def _between(times: Floats, t_s: Floats, grown: Floats) -> Floats:
     """By how much a quantity (n,) at `t_s` (n,) grows between pairs of times (m, 2)."""
-    found: Floats = np.diff(np.interp(times, t_s, grown), axis=1)[:, 0]
-    return found
+    differences: Floats = np.diff(np.interp(times, t_s, grown), axis=1)[:, 0]
+    return differences
 
 
 def _summed(pieces: Floats) -> Floats:

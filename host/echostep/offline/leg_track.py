@@ -77,7 +77,7 @@ def fused_heading(
 ) -> tuple[Floats, tuple[str, ...]]:
     """Heading of the trunk and its sd (n, 2), and notes; 0 without belt and compass.
 
-    A second pass knows from the first one the gyro's bias and the iron beside the compass.
+    The first pass estimates the gyro's bias and the compass's deviation by iron; the second pass starts from them.
     """
     if not samples.has_heading:
         return np.zeros((len(samples.t_s), 2)), ()

@@ -29,7 +29,7 @@ from echostep.page.protocol import FRAME_S
 from echostep.plan.model import Plan, load_plan
 from echostep.team.commander import table
 from echostep.team.endpoint import Endpoint, parse_endpoint
-from echostep.team.inbox import Inbox, ReceivedMessage, Receiver
+from echostep.team.inbox import Inbox, ListenerThread, ReceivedMessage
 from echostep.team.messages.marks import ALL, is_shared
 from echostep.team.messages.report import checked_name
 from echostep.team.restorer import Restorer
@@ -75,13 +75,13 @@ class _Run:
 
     operation: Operation
     inbox: Inbox
-    receiver: Receiver
+    receiver: ListenerThread
     recorder: OperationRecorder
     tape: Tape
     restorer: Restorer | None
 
     def look(self, now_s: float) -> None:
-        """Take what was heard, record it, and give back to the broker what it has lost."""
+        """Empty the inbox, record its messages, and send the broker those shared messages again that it has lost."""
         unix_s, connected = time.time(), self.receiver.connected
         believed = self.operation.update(self.inbox, now_s, unix_s)
         if self.restorer:
@@ -94,11 +94,11 @@ class _Run:
 
 
 def restore(
-    restorer: Restorer, operation: Operation, receiver: Receiver, believed: list[ReceivedMessage], now_s: float
+    restorer: Restorer, operation: Operation, receiver: ListenerThread, believed: list[ReceivedMessage], now_s: float
 ) -> None:
     """Send marks and acknowledgements again that the broker has lost or replaced; `believed`: messages since the last call."""
-    heard = [m.topic for m in believed if m.topic and is_shared(m.topic)]
-    lost = restorer.look(receiver.connected, heard, lambda: operation.shared, now_s)
+    topics = [m.topic for m in believed if m.topic and is_shared(m.topic)]
+    lost = restorer.look(receiver.connected, topics, lambda: operation.shared, now_s)
     for topic, payload in lost + operation.take_answers():
         receiver.send(topic, payload)
 
@@ -111,17 +111,17 @@ def _end_recording(recorder: OperationRecorder, console: Console) -> None:
 
 def _receiver(
     endpoint: Endpoint, team: str | None, plan: Plan, inbox: Inbox, print_line: Callable[[str], None]
-) -> Receiver:
+) -> ListenerThread:
     """A subscription to the reports of a team, or of all teams: at a broker, or over a Meshtastic node."""
     if endpoint.scheme == "mesh":
         from echostep.team.mesh.mesh import MeshListener
 
         listener = MeshListener(endpoint, team, plan, inbox.put)
-        return Receiver(listener, lambda text: print_line(f"{endpoint}: {text}"))
+        return ListenerThread(listener, lambda text: print_line(f"{endpoint}: {text}"))
     from echostep.team.mqtt.publisher import Listener
 
     topics = [f"echostep/{team or '+'}/+/+", ALL]
-    return Receiver(Listener(endpoint, topics, inbox.put), lambda text: print_line(f"{endpoint}: {text}"))
+    return ListenerThread(Listener(endpoint, topics, inbox.put), lambda text: print_line(f"{endpoint}: {text}"))
 
 
 def _follow(run: _Run, page: TablePage | None, console: Console, seconds: float, views: Views) -> None:

@@ -48,7 +48,7 @@ Key = tuple[str, str, str]  # team, name, run
 class TableScene:
     """One moment. `places`: rows of float32, one for each wearer on this plan (`Operation.scene`). `rows`: the list, the most urgent first.
 
-    `summary`: numbers of each state; `refused`: what was not believed, in words.
+    `summary`: number of members in each state; `refused`: rejected messages, in words.
     """
 
     t_s: float
@@ -87,7 +87,7 @@ class Operation:
         self._changed = False
 
     def copy(self) -> Operation:
-        """An operation of the same state that goes on by itself; it shares nothing that changes."""
+        """An independent operation with the same state; no mutable state is shared."""
         made = Operation(self.plan)
         with self._lock:
             made.roster, made._board, made._trails = self.roster.copy(), self._board.copy(), self._trails.copy()
@@ -99,14 +99,14 @@ class Operation:
         return made
 
     def update(self, inbox: Inbox, now_s: float, unix_s: float) -> list[ReceivedMessage]:
-        """Take all messages of an inbox, and note what has changed since the last call; returns those that were believed."""
+        """Take all messages of an inbox, and note what has changed since the last call; returns the accepted ones."""
         messages, dropped = inbox.take_all()
         return self.receive(messages, dropped, now_s, unix_s)
 
     def receive(
         self, messages: Sequence[ReceivedMessage], dropped: Mapping[str, int], now_s: float, unix_s: float
     ) -> list[ReceivedMessage]:
-        """Take messages, and counts of dropped ones by reason; returns the messages that were believed."""
+        """Take messages, and counts of dropped ones by reason; returns the accepted messages."""
         with self._lock:
             believed = take_messages([m for m in messages if not is_shared(m.topic)], dropped, self.roster)
             believed += [m for m in messages if is_shared(m.topic) and self._receive_shared(m.topic or "", m.payload)]
@@ -114,7 +114,7 @@ class Operation:
         return believed
 
     def set_counts(self, received: int, rejected: Mapping[str, int]) -> None:
-        """Counts of messages heard and rejected, of a recorded operation, in which the rejected ones themselves are missing."""
+        """Set the counts of received and rejected messages of a recorded operation, which does not hold the rejected ones."""
         with self._lock:
             self.roster.received, self.roster.rejected = received, Counter(rejected)
 
@@ -129,7 +129,7 @@ class Operation:
         return True
 
     def act(self, request: requests.Action, unix_s: float, now_s: float) -> tuple[str, bytes] | str:
-        """The message that carries out what a page asks for, or why there is none."""
+        """The message that carries out a page's request, or the reason why there is none."""
         with self._lock:
             match request:
                 case requests.SetMark() if request.level < len(self.plan.levels):
@@ -145,7 +145,7 @@ class Operation:
 
     @property
     def shared(self) -> tuple[tuple[str, bytes], ...]:
-        """Messages that tell all that the commanders share: marks and acknowledgements."""
+        """Messages with the whole shared state of the commanders: marks and acknowledgements."""
         with self._lock:
             return tuple(self._board.messages)
 
@@ -189,7 +189,7 @@ class Operation:
         return None
 
     def _follow(self, now_s: float, unix_s: float) -> None:
-        """Extend trails and histories; forget members that the roster has removed."""
+        """Extend trails and histories; drop those of members that the roster has removed."""
         members = {m.key: m for m in self.roster.members(now_s)}
         gone = [key for key in self._followed if key not in members]
         self._trails.forget({self._followed.pop(key).number for key in gone})

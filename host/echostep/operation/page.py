@@ -16,7 +16,7 @@ from starlette.websockets import WebSocket
 from echostep.operation.operation import Operation, TableScene
 from echostep.operation.recorded.tape import Tape
 from echostep.operation.session import TableFeed, TableSession
-from echostep.page.server import STATIC, Address, Site, SocketServer
+from echostep.page.server import STATIC, Address, PageSite, SocketServer
 from echostep.page.shared import PageCounts
 from echostep.page.web.faults import Faults
 
@@ -35,7 +35,7 @@ class TablePage:
             return TableSession(socket, feed, faults, counts)
 
         folders = {"static": STATIC, "table": TABLE}
-        site = Site("echostep table", operation.plan, TABLE / "index.html", folders, session, faults, counts)
+        site = PageSite("echostep table", operation.plan, TABLE / "index.html", folders, session, faults, counts)
         self.server = SocketServer(site, address)
 
     @property

@@ -39,7 +39,7 @@ class TableFeed:
         self.send: Callable[[str, bytes], bool] | None = None  # topic and payload, to the broker
 
     def act(self, request: requests.Action) -> str:
-        """Send what a page asks for to the broker, from which it comes back to all commanders; returns why not, or nothing."""
+        """Send a page's request to the broker, which distributes it to all commanders; returns the reason of a refusal, or nothing."""
         message = self.operation.act(request, time.time(), time.monotonic())
         if isinstance(message, str):
             return message
@@ -122,7 +122,7 @@ class TableSession(GuardedSocket):
         return self._feed.operation, self._feed.latest
 
     def _is_due(self) -> bool:
-        """Whether the page needs a frame of the scene that it has: it asked for one, or the time bar has grown."""
+        """Whether the page gets a frame although the scene is unchanged: it requested one, or the time bar has grown."""
         is_past = self._view is not None and self._view.is_past
         return self._due or (is_past and time.monotonic() - self._sent_s >= BAR_S)
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from echostep.team.messages.report import Position
 
 TRAIL_S = 180.0  # the way of some minutes shows where a wearer came from
-STEP_M = 0.7  # least distance between two points: about a step
+POINT_M = 0.7  # least distance between two points: about a step
 MOST_POINTS = 40_000  # of all wearers: 200 of them walk 3 min at 0.8 m/s
 
 
@@ -51,7 +51,7 @@ class Trails:
     def add(self, wearer: int, p: Position, t_s: float) -> None:
         """Add a position, if the wearer has moved since the last one."""
         last = self._last.get(wearer)
-        near = last is not None and last.level == p.floor and math.hypot(p.x_m - last.x_m, p.y_m - last.y_m) < STEP_M
+        near = last is not None and last.level == p.floor and math.hypot(p.x_m - last.x_m, p.y_m - last.y_m) < POINT_M
         if near:
             return
         point = self._last[wearer] = TrailPoint(wearer, p.x_m, p.y_m, p.floor, t_s)
@@ -61,7 +61,7 @@ class Trails:
             self._first += 1
 
     def forget(self, wearers: set[int]) -> None:
-        """Wearers who are not followed any more."""
+        """Drop the trails of these wearers."""
         for wearer in wearers:
             self._last.pop(wearer, None)
 

@@ -122,7 +122,7 @@ def place_words(p: Position) -> tuple[str, str, str]:
 
 
 def heard_words(silent_s: float) -> str:
-    """How long ago a member was heard."""
+    """Time since a member's last report, in words."""
     if silent_s < 1.5:
         return "heard now"
     return f"heard {silent_s:.0f} s ago" if silent_s < 120.0 else f"heard {silent_s / 60.0:.0f} min ago"
@@ -136,7 +136,7 @@ def metres(m: float) -> str:
 def shown_details(
     number: int, m: Member, plan: Plan, now_s: float, history: tuple[ShownEvent, ...], duplicates: set[tuple[str, str]]
 ) -> ShownDetails:
-    """Everything that the last report says, in words."""
+    """All fields of the last report, in words."""
     r, p = m.report, m.position(now_s)
     rows = [("alarm", alarm_words(replace(r.alarm, age_s=r.alarm.age_s + m.silent_s(now_s))))] if r.alarm else []
     rows += [("state", m.state(now_s).value), ("heard", heard_words(m.silent_s(now_s)).removeprefix("heard "))]

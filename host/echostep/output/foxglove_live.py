@@ -103,10 +103,10 @@ def _channel(topic: Topic, context: Any) -> Channel:
 def _listener(server: FoxgloveServer) -> Any:
     from foxglove.websocket import ChannelView, Client, ServerListener
 
-    class Listener(ServerListener):
-        """Tells the server who has come."""
+    class ViewerListener(ServerListener):
+        """Reports new viewers to the server."""
 
         def on_subscribe(self, client: Client, channel: ChannelView) -> None:  # noqa: ARG002
             server.subscribed(channel.topic)
 
-    return Listener()
+    return ViewerListener()

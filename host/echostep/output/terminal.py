@@ -174,11 +174,11 @@ def health(tracker: Tracker) -> str:
     dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
     sync = "SyncOut" if streams.synchronised else "arrival times"
     foot = f"{streams.foot_name} on {sync}"
-    heard = f"   {tracker.gateway.describe()}" if tracker.gateway.counts.words or tracker.gateway.numbers else ""
-    return f"board: {board.good} frames, {board.rejected} bad, {board.lost} lost, {dropped} dropped   {foot}{heard}"
+    gateway = f"   {tracker.gateway.describe()}" if tracker.gateway.counts.words or tracker.gateway.numbers else ""
+    return f"board: {board.good} frames, {board.rejected} bad, {board.lost} lost, {dropped} dropped   {foot}{gateway}"
 
 
 def findings(tracker: Tracker) -> list[Finding]:
     """The most severe findings on the board, at most MAX_FINDINGS."""
-    found = tracker.streams.findings
-    return [finding for finding in found if finding.severity > Severity.NOTE][:MAX_FINDINGS]
+    all_findings = tracker.streams.findings
+    return [finding for finding in all_findings if finding.severity > Severity.NOTE][:MAX_FINDINGS]

@@ -48,7 +48,7 @@ class GuardedSocket(ABC):
         self._news.set()
 
     async def run(self) -> None:
-        """Serve until the page disconnects or sends too many requests; a fault is logged, and told to the page."""
+        """Serve until the page disconnects or sends too many requests; a fault is logged and sent to the page."""
         tasks: list[asyncio.Task[None]] = []
         try:
             await self._greet()
@@ -66,7 +66,7 @@ class GuardedSocket(ABC):
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _fail(self, error: Exception) -> None:
-        """Log a fault, tell it to the page, close the socket."""
+        """Log a fault, send it to the page, close the socket."""
         text = self._faults.note(error)
         with contextlib.suppress(WebSocketDisconnect):
             await self.tell(protocol.encode(protocol.Failed(text)))

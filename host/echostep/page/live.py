@@ -39,11 +39,11 @@ from echostep.ports.chunks import BOARD, FOOT, MTX, Portion
 from echostep.tracker import Tracker
 
 # Assumed, all of them:
-STEP_M = 0.02  # the trail gets a point when x or y has changed by this much
+TRAIL_STEP_M = 0.02  # the trail gets a point when x or y has changed by this much
 RATES_NS = 250_000_000  # time between two measurements of the stream rates
-SILENT_S = 2.0  # without bytes of the MTx and the board: the position is lost
+LOST_AFTER_S = 2.0  # without bytes of the MTx and the board: the position is lost
 STEPLESS_S = 6.0  # with bytes but without an estimate: the same; longer than the delay of the first steps
-STALE_S = 1.5  # an echo line is shown for this long
+SHOWN_S = 1.5  # an echo line is shown for this long
 OPENING_S = 5.0  # longest wait for a browser that was started
 OPENING_POLL_S = 0.05
 MOST_KEPT = 2000  # particles in each scene of a replay
@@ -74,7 +74,9 @@ class LivePage:
         self._mailbox = Mailbox(tracker.plan, title, replay=replay, keeps=keeps)
         self.truth: TruePath | None = None  # shown beside the estimates
         self.has_team = False  # the run's reports go somewhere
-        self.acknowledged_by: Callable[[int], str | None] | None = None  # the commander who has, by the alarm's number
+        self.acknowledged_by: Callable[[int], str | None] | None = (
+            None  # name of the acknowledging commander, by the alarm's number
+        )
         self.server = PageServer(self._mailbox, address)
         self._model = echo_model(tracker.settings.echo)
         self._rate_meter = StreamRateMeter()
@@ -146,7 +148,7 @@ class LivePage:
             time.sleep(OPENING_POLL_S)
 
     def end(self, summary: str) -> None:
-        """The run is over: pages say so and how well it went; a run whose scenes were kept can be played again."""
+        """End the run: pages show its end and its summary; a run with stored scenes can be replayed."""
         self._mailbox.end(summary)
 
     def pop_check_ins(self) -> Iterator[bytes]:
@@ -155,7 +157,7 @@ class LivePage:
             yield check_in.encode()
 
     def pop_meetings(self) -> Iterator[str]:
-        """Names of the teammates whom the wearer has met since the last call, by the pages."""
+        """Names of the teammates that the pages have reported as met since the last call."""
         return self._mailbox.pop_meetings()
 
     def note_arrival(self) -> None:
@@ -233,7 +235,7 @@ class LivePage:
         if scene.estimate is None:
             return replace(scene, status_text=status_text(None, needs_start=self._tracker.state.waits_for_start))
         age_s = (self._arrived_ns - self._estimate_ns) * 1e-9
-        silent = self._arrived_ns - self._sensors_ns >= SILENT_S * 1e9
+        silent = self._arrived_ns - self._sensors_ns >= LOST_AFTER_S * 1e9
         if not silent and age_s < STEPLESS_S:
             return scene
         reason = "nothing from the foot" if silent else "no step of the foot"
@@ -272,7 +274,7 @@ class LivePage:
         """Append the estimate to the trail when it has moved; a check-in or its undoing breaks the line."""
         end, trail = self._trail_end, self._mailbox.trail
         moved_m = max(abs(estimate.x_m - end.x_m), abs(estimate.y_m - end.y_m)) if end is not None else math.inf
-        if end is not None and estimate.level == end.level and moved_m <= STEP_M:
+        if end is not None and estimate.level == end.level and moved_m <= TRAIL_STEP_M:
             return
         state = self._tracker.state
         check_ins = state.check_ins, state.undone
@@ -282,14 +284,14 @@ class LivePage:
         trail.add(estimate.x_m, estimate.y_m, estimate.level)
 
     def _echo_lines(self, measured: MeasuredSegment | None, estimate: Estimate) -> tuple[EchoLine, ...]:
-        """The newest line of each ranger that is not older than `STALE_S`."""
+        """The newest line of each ranger that is not older than `SHOWN_S`."""
         lines = self._scene.echo_lines
         if measured is not None:
             laid_out = self._tracker.laid_out
             east_m = estimate.level * laid_out.sheet.pitch_m
             new = last_echo_lines(measured, estimate, east_m, laid_out.walls.index, self._model)
             lines = (*(old for old in lines if old.ranger not in [line.ranger for line in new]), *new)
-        return tuple(sorted((line for line in lines if estimate.t_s - line.t_s < STALE_S), key=attrgetter("ranger")))
+        return tuple(sorted((line for line in lines if estimate.t_s - line.t_s < SHOWN_S), key=attrgetter("ranger")))
 
     def _guidance(self, estimate: Estimate) -> ShownGuidance | None:
         if self._guided and self._guided.cue:

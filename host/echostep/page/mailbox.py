@@ -27,7 +27,7 @@ T = TypeVar("T")
 
 
 class PageTrail:
-    """The walked path as points. Points are only appended, so any thread may read the points that it knows to exist."""
+    """The walked path as points. Points are only appended, so any thread may read the points up to a length that it has read before."""
 
     def __init__(self) -> None:
         self._rows = array("f")
@@ -124,7 +124,7 @@ class Mailbox:
         return drawings[count - 1] if count else None
 
     def set_team(self, names: tuple[str, ...]) -> None:
-        """Replace the teammates who can be met and call `on_publish`."""
+        """Replace the list of teammates for meetings and call `on_publish`."""
         self.team = names
         self._announce()
 
@@ -152,14 +152,14 @@ class Mailbox:
         return self._put(self._met, name)
 
     def pop_meetings(self) -> Iterator[str]:
-        """Remove and yield the names of those who were met; never waits."""
+        """Remove and yield the names of teammates reported as met; never blocks."""
         return _popped(self._met)
 
-    def _put(self, waiting: queue.Queue[T], told: T) -> bool:
+    def _put(self, waiting: queue.Queue[T], item: T) -> bool:
         if self.replay:
             return False
         try:
-            waiting.put_nowait(told)
+            waiting.put_nowait(item)
         except queue.Full:
             return False
         return True

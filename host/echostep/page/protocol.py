@@ -163,7 +163,7 @@ class CloudGrid:
 class FrameHeader:
     """One moment. `seq`: the page returns it when the frame is drawn. `goal`: the destination that was chosen on a page of this run.
 
-    `team`: names of the teammates who can be met, when they have changed; `met`: what the newest meeting did.
+    `team`: names of the teammates for meetings, when they have changed; `met`: result of the newest meeting.
     """
 
     seq: int

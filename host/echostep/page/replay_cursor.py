@@ -36,7 +36,7 @@ class ReplayCursor:
         self._now_s = 0.0
 
     def handle(self, request: Request) -> None:
-        """Change position or speed as a page asks; stepping pauses the replay, playing at the end starts again from the beginning."""
+        """Change position or speed as requested by a page; `step` pauses the replay, `play` at the end starts from the beginning."""
         match request:
             case SetPlaying(playing):
                 self.playing = playing

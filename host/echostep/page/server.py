@@ -70,7 +70,7 @@ S = TypeVar("S", bound=SocketSession)
 
 
 @dataclass(frozen=True, slots=True)
-class Site(Generic[S]):
+class PageSite(Generic[S]):
     """What a server serves: the page `index`, files of `folders` by the first part of their path, walls of `plan`, a session for each socket."""
 
     name: str
@@ -85,7 +85,7 @@ class Site(Generic[S]):
 class SocketServer(Generic[S]):
     """Serves a site until it is closed; raises EchostepError when it cannot listen at the address."""
 
-    def __init__(self, site: Site[S], address: Address = Address()) -> None:
+    def __init__(self, site: PageSite[S], address: Address = Address()) -> None:
         self.sessions: set[S] = set()
         self._site = site
         self._listener = open_listener(address)
@@ -196,7 +196,7 @@ class PageServer(SocketServer[PageSession]):
 
         folders = {"static": STATIC}
         index = STATIC / "index.html"
-        site = Site("echostep page", mailbox.plan, index, folders, session, shared.faults, shared.counts)
+        site = PageSite("echostep page", mailbox.plan, index, folders, session, shared.faults, shared.counts)
         super().__init__(site, address)
 
     def __enter__(self) -> Self:
@@ -229,8 +229,8 @@ def open_listener(address: Address) -> socket.socket:
 
 
 def _bind(host: str, port: int) -> socket.socket:
-    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-    family, kind, ip_protocol, _, address = found[0]
+    addresses = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    family, kind, ip_protocol, _, address = addresses[0]
     listener = socket.socket(family, kind, ip_protocol)
     try:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

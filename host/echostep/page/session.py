@@ -100,7 +100,7 @@ class PageSession(GuardedSocket):
         self._news.set()
 
     async def _take(self, request: CheckIn | Undo | Call, refusal: str) -> None:
-        """Pass a check-in, its undoing or a call on to the tracker, or tell the page why not."""
+        """Pass a check-in, its undoing or a call on to the tracker, or send the page the reason of a refusal."""
         if not refusal and not self._mailbox.add_check_in(request):
             refusal = "Not accepted: this is a replay, or the tracker is too busy."
         if refusal:
@@ -108,7 +108,7 @@ class PageSession(GuardedSocket):
             await self.tell(protocol.encode(protocol.Refused(refusal)))
 
     async def _meet(self, name: str) -> None:
-        """Pass a meeting with a teammate on to the tracker, or tell the page why not."""
+        """Pass a meeting with a teammate on to the tracker, or send the page the reason of a refusal."""
         is_heard = name in self._mailbox.team
         if is_heard and self._mailbox.add_meeting(name):
             return

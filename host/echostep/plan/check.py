@@ -120,8 +120,8 @@ def _doors(level: Level, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]
 
 def _distance(tree: shapely.STRtree, point: shapely.Point) -> float:
     """Distance to the nearest wall; infinity when it is more than 1 m."""
-    found = tree.query_nearest(point, max_distance=1.0, return_distance=True, all_matches=False)[1]
-    return float(found[0]) if len(found) else float("inf")
+    distances = tree.query_nearest(point, max_distance=1.0, return_distance=True, all_matches=False)[1]
+    return float(distances[0]) if len(distances) else float("inf")
 
 
 def _open_rooms(level: Level, faces: Faces, i: int) -> Iterator[PlanFinding]:

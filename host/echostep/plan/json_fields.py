@@ -59,8 +59,8 @@ def outline(value: Any, where: str) -> Floats:
     rows = typed(value, where, list)
     if len(rows) > MOST_CORNERS:
         raise ValueError(f"{where}: {len(rows)} corners, expected {MOST_CORNERS} at most")
-    found = [point(row, f"{where}[{i}]") for i, row in enumerate(rows)]
-    corners = [corner for corner, _ in groupby(found)]
+    points = [point(row, f"{where}[{i}]") for i, row in enumerate(rows)]
+    corners = [corner for corner, _ in groupby(points)]
     if len(corners) > 1 and corners[0] == corners[-1]:
         corners.pop()
     if len(set(corners)) < 3:
@@ -82,11 +82,11 @@ def _all_valid(rows: list[Any]) -> Floats | None:
     if not set(map(type, chain.from_iterable(rows))) <= {int, float}:
         return None
     try:
-        found = np.array(rows, dtype=np.float64)
+        values = np.array(rows, dtype=np.float64)
     except OverflowError:
         return None
-    within = (np.abs(found) <= LIMIT_M).all() and (found[:, :2] != found[:, 2:]).any(1).all()
-    return found if within else None
+    within = (np.abs(values) <= LIMIT_M).all() and (values[:, :2] != values[:, 2:]).any(1).all()
+    return values if within else None
 
 
 def _checked(rows: list[Any], where: str) -> Floats:

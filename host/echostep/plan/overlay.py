@@ -47,15 +47,15 @@ def write_overlays(plan: Plan, out: Path) -> list[Overlay]:
     """Write the KMZ file; returns what is in it. Raises EchostepError without a georeference, and when the file cannot be written."""
     if out.suffix.casefold() != ".kmz":
         raise EchostepError(f"{out}: give a name that ends in .kmz")
-    found = overlays(plan)
+    pictures = overlays(plan)
     try:
         with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr(zipfile.ZipInfo("doc.kml", EPOCH), _document(plan, found))
-            for k, overlay in enumerate(found):
+            archive.writestr(zipfile.ZipInfo("doc.kml", EPOCH), _document(plan, pictures))
+            for k, overlay in enumerate(pictures):
                 archive.writestr(zipfile.ZipInfo(_file_name(k), EPOCH), overlay.png)
     except OSError as error:
         raise EchostepError(f"{out}: cannot write the overlay: {error.strerror or error}") from error
-    return found
+    return pictures
 
 
 def overlays(plan: Plan) -> list[Overlay]:
@@ -139,14 +139,14 @@ def _overlay(plan: Plan, level: int, earth: EarthTransform) -> Overlay:
     return Overlay(plan.levels[level].name, file.getvalue(), north, south, east, west)
 
 
-def _document(plan: Plan, found: list[Overlay]) -> bytes:
+def _document(plan: Plan, pictures: list[Overlay]) -> bytes:
     ET.register_namespace("", KML)
     root = ET.Element(f"{{{KML}}}kml")
     document = _element(root, "Document")
     _element(document, "name", plan.name)
-    for k, overlay in enumerate(found):
+    for k, overlay in enumerate(pictures):
         ground = _element(document, "GroundOverlay")
-        _element(ground, "name", f"{plan.name}: {overlay.name}" if len(found) > 1 else plan.name)
+        _element(ground, "name", f"{plan.name}: {overlay.name}" if len(pictures) > 1 else plan.name)
         _element(ground, "visibility", str(int(k == 0)))
         _element(ground, "drawOrder", str(k))
         _element(_element(ground, "Icon"), "href", _file_name(k))

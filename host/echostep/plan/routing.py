@@ -24,7 +24,7 @@ from echostep.plan.polyline import way_m
 CELL_M = 0.15  # side of a grid cell
 BODY_M = 0.25  # half a person's width: shortest distance of a route from a wall
 MARGIN_M = 1.5  # of the grid around the walls
-ASIDE_M = 2.0  # start and destination are moved to the nearest free cell, at most so far
+MOVED_M = 2.0  # start and destination are moved to the nearest free cell, at most so far
 MOST_TRIED = 60  # nearest free cells that are tried for one without a wall before it
 MOST_CELLS = 60_000_000  # on all levels together
 CLIMB = 3.0  # cost of a metre of height by stairs, in metres of level walk
@@ -121,8 +121,8 @@ class Routes:
             part, level = trail[first:beyond], int(trail[first, 0])
             if len(part) == 1 and first > 0 and beyond < len(trail):
                 continue  # a level that the connector only passes
-            kept = _straighten(self._blocked[level] | self._tight[level], part[:, 1:])
-            line = self._low + (part[kept][:, [2, 1]] + 0.5) * CELL_M
+            corners = _straighten(self._blocked[level] | self._tight[level], part[:, 1:])
+            line = self._low + (part[corners][:, [2, 1]] + 0.5) * CELL_M
             by = ""
             if beyond < len(trail):
                 connector = self._plan.connectors[int(self._connector[level, part[-1, 1], part[-1, 2]])]
@@ -149,7 +149,7 @@ class Routes:
         if not (0 <= place.level < levels and math.isfinite(place.x_m) and math.isfinite(place.y_m)):
             raise EchostepError(f"{what} is on level {place.level}, the plan has {levels}, counted from 0")
         c, r = (np.array([place.x_m, place.y_m]) - self._low) / CELL_M
-        reach = int(ASIDE_M / CELL_M)
+        reach = int(MOVED_M / CELL_M)
         near = np.argwhere(
             ~self._blocked[
                 place.level,
@@ -255,8 +255,8 @@ def _trace(before: Ints, first: int, last: int, rows: int, columns: int) -> Ints
 @kernel
 def _straighten(blocked: Bools, trail: Ints) -> Ints:
     """Indices of the cells (k, 2) at which the straightened trail bends: after each, the furthest visible cell."""
-    kept = np.empty(len(trail), np.int64)
-    kept[0] = 0
+    corners = np.empty(len(trail), np.int64)
+    corners[0] = 0
     n, here = 1, 0
     while here < len(trail) - 1:
         there = here + 1
@@ -264,12 +264,12 @@ def _straighten(blocked: Bools, trail: Ints) -> Ints:
             if _sees(blocked, trail[here], trail[k]):
                 there = k
                 break
-        kept[n] = there
+        corners[n] = there
         n, here = n + 1, there
     if n == 1:
-        kept = np.append(kept[:1], len(trail) - 1)
+        corners = np.append(corners[:1], len(trail) - 1)
         n = 2
-    return kept[:n]
+    return corners[:n]
 
 
 @kernel

@@ -85,8 +85,8 @@ def _georeference(georeference: Georeference) -> dict[str, Any]:
 
 
 def _corners(corners: Floats) -> list[list[float]]:
-    found: list[list[float]] = corners.tolist()
-    return found
+    rows: list[list[float]] = corners.tolist()
+    return rows
 
 
 def _degrees(angle_rad: float) -> float:
@@ -94,7 +94,7 @@ def _degrees(angle_rad: float) -> float:
     angle = math.degrees(angle_rad)
     below, above = math.nextafter(angle, -math.inf), math.nextafter(angle, math.inf)
     tried = [*(round(angle, digits) for digits in range(16)), angle, below, above]
-    return next((found for found in tried if math.radians(found) == angle_rad), angle)
+    return next((degrees for degrees in tried if math.radians(degrees) == angle_rad), angle)
 
 
 def _lines(tree: Any, depth: int = 0) -> str:

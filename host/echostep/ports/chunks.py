@@ -79,9 +79,9 @@ class Portion:
 
     def rows(self, begin: int, end: int) -> Portion:
         """The chunks from row `begin` up to row `end`."""
-        kept = slice(begin, end)
+        part = slice(begin, end)
         return Portion(
-            self.ports, self.port[kept], self.t_arrival_ns[kept], self.start[kept], self.end[kept], self.received
+            self.ports, self.port[part], self.t_arrival_ns[part], self.start[part], self.end[part], self.received
         )
 
     def cut_after(self, *names: str) -> Iterator[Portion]:
@@ -151,7 +151,7 @@ class ChunkQueue:
             self._changed.notify()
 
     def get(self, timeout_s: float) -> Chunk | None:
-        """The oldest chunk; None when none comes in time."""
+        """The oldest chunk; None after the timeout."""
         with self._changed:
             if not self._chunks and not self._changed.wait_for(lambda: bool(self._chunks), timeout_s):
                 return None

@@ -59,7 +59,7 @@ class BackgroundWriter:
         return len(data)
 
     def tell(self) -> int:
-        """Bytes accepted so far: the position in the file, as the MCAP writer asks for it."""
+        """Bytes accepted so far: the position in the file, which the MCAP writer requires."""
         return self._length
 
     def wait_until_written(self) -> None:

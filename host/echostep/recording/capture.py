@@ -116,7 +116,7 @@ def as_json(message: Message | MtMessage) -> dict[str, Any]:
 
 
 def _finite(value: Any) -> Any:
-    """The value with None in place of what JSON cannot say: not a number, infinite."""
+    """The value with None in place of NaN and infinity, which JSON lacks."""
     if isinstance(value, dict):
         return {key: _finite(part) for key, part in value.items()}
     if isinstance(value, tuple | list):

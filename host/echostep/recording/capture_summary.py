@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a capture held, in sentences.
+"""Summary of a capture's contents, in sentences.
 
 In: a `Decoder` after the last byte. Out: lines of text. Owns nothing.
 """
@@ -74,13 +74,13 @@ def _frames_line(reader: MessageReader) -> str:
 
 def _format_lines(reader: MessageReader) -> Iterator[str]:
     """How legacy data were read."""
-    for (bus, length), found in sorted(reader.formats.found.items()):
+    for (bus, length), format_ in sorted(reader.formats.found.items()):
         where = "" if bus == BUS_ID else f" from bus {bus}"
-        if found is None:
+        if format_ is None:
             yield f"MT: MTData of {length} bytes{where}: no output mode fits; give its mode and settings with --output-mode and --output-settings."
         else:
-            told = f"output mode 0x{found.output.mode:04X}, output settings 0x{found.output.settings:08X}"
-            yield f"MT: MTData of {length} bytes{where}: {told}, {found.how}."
+            settings = f"output mode 0x{format_.output.mode:04X}, output settings 0x{format_.output.settings:08X}"
+            yield f"MT: MTData of {length} bytes{where}: {settings}, {format_.how}."
 
 
 def _gap_lines(reader: MessageReader) -> Iterator[str]:

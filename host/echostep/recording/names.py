@@ -96,7 +96,7 @@ def _numbered(wanted: Path) -> list[tuple[int, Path]]:
         paths = list(wanted.parent.iterdir())
     except OSError:
         return []
-    return [(int(found[1]), path) for path in paths if (found := pattern.fullmatch(path.name))]
+    return [(int(match[1]), path) for path in paths if (match := pattern.fullmatch(path.name))]
 
 
 def _is_being_written(path: Path) -> bool:

@@ -29,7 +29,7 @@ from echostep.recording.scan import checksum_differs, map_file, next_valid_run, 
 class Recording:
     """A recording on disk. What is wrong with it is known once its portions were iterated.
 
-    `truncated`: it ends without a footer, in the middle of a walk. `altered`: its checksum says that bytes have changed since it was written.
+    `truncated`: it ends without a footer, in the middle of a walk. `altered`: its bytes do not match the checksum written with them.
     """
 
     path: Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Opens the page in a browser, where there is one.
+"""Opens the page in a browser, if one is available.
 
 In: a URL. Out: whether a browser was started. Owns nothing.
 """

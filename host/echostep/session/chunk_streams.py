@@ -51,14 +51,14 @@ def with_check_ins(
 
 
 def with_team(chunks: Iterable[Chunk | None], feed: TeamFeed | None, arrival_ns: ArrivalNs) -> Iterator[Chunk | None]:
-    """Insert what is heard of another wearer."""
+    """Insert the newest place of another wearer."""
     return _with(chunks, TEAM, feed.pop if feed else tuple, arrival_ns)
 
 
 def with_teammates(
     chunks: Iterable[Chunk | None], page: LivePage | None, feed: TeammateFeed | None, arrival_ns: ArrivalNs
 ) -> Iterator[Chunk | None]:
-    """Insert each meeting that a page tells, with the teammate's newest report, and the beacons that teammates share."""
+    """Insert each meeting entered on a page, with the teammate's newest report, and the beacons shared by teammates."""
 
     def told() -> Iterator[bytes]:
         for name in page.pop_meetings() if page and feed else ():
@@ -72,7 +72,7 @@ def with_teammates(
 def _with(
     chunks: Iterable[Chunk | None], port: str, pop: Callable[[], Iterable[bytes]], arrival_ns: ArrivalNs
 ) -> Iterator[Chunk | None]:
-    """Insert what was told since the chunk before, as chunks of a port behind the chunk after which it was told."""
+    """Insert payloads that arrived since the previous chunk, as chunks of a port after that chunk."""
     for chunk in chunks:
         yield chunk
         for payload in pop():

@@ -34,7 +34,7 @@ GIVE = "give a start with --start X,Y,DEG, a room, or ?"
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """What the file says: the place, when (UTC), on which plan, with which board (its USB serial number; empty: it has none)."""
+    """Contents of the file: the place, when (UTC), on which plan, with which board (its USB serial number; empty: it has none)."""
 
     place: LastPlace
     utc: datetime
@@ -58,10 +58,10 @@ class PlaceKeeper:
         if place is None:
             return
         self._kept_s = estimate.t_s
-        kept = {"utc": datetime.now(UTC).isoformat(), "plan_sha256": self._tracker.plan.digest, "board": self._board}
+        fields = {"utc": datetime.now(UTC).isoformat(), "plan_sha256": self._tracker.plan.digest, "board": self._board}
         written = self._path.with_suffix(".new")
         try:
-            written.write_text(json.dumps(kept | {"place": asdict(place)}))
+            written.write_text(json.dumps(fields | {"place": asdict(place)}))
             written.replace(self._path)
         except OSError:
             return
@@ -93,24 +93,24 @@ def read_kept(folder: Path) -> Kept:
         raise EchostepError(f"--start {LAST}: {path} cannot be used: {GIVE}") from error
 
 
-def start_last(kept: Kept, plan: Plan, board: str, climbing: ClimbSettings, now: datetime) -> tuple[Start, str]:
+def start_last(last: Kept, plan: Plan, board: str, climbing: ClimbSettings, now: datetime) -> tuple[Start, str]:
     """The start of a run where the last one ended, and words about it; raises EchostepError on another plan.
 
     The pressure is carried over only with the same board: another barometer may differ by storeys. It is not where the clock went back.
     """
-    if kept.plan_sha256 != plan.digest or kept.place.level >= len(plan.levels):
+    if last.plan_sha256 != plan.digest or last.place.level >= len(plan.levels):
         raise EchostepError(f"--start {LAST}: the last run was on another plan: {GIVE}")
-    away_s, place = (now - kept.utc).total_seconds(), kept.place
-    is_same = bool(board) and board == kept.board and away_s >= 0.0
+    away_s, place = (now - last.utc).total_seconds(), last.place
+    is_same = bool(board) and board == last.board and away_s >= 0.0
     start = start_after(
         place if is_same else LastPlace(place.x_m, place.y_m, place.sd_m, place.level), away_s, climbing
     )
     words = f"Start: where the last run ended, {away_s:.0f} s ago: {place.x_m:.1f}, {place.y_m:.1f}"
     if len(plan.levels) > 1:
-        told = (
+        remark = (
             "the pressure tells the storey"
             if start.air
             else "the pressure does not tell the storey (not the same board)"
         )
-        words += f" on {plan.levels[place.level].name}; {told}"
+        words += f" on {plan.levels[place.level].name}; {remark}"
     return start, f"{words}. The building is searched too: after a walk meanwhile the echoes find the place."

@@ -138,7 +138,7 @@ def start_given(tracking: TrackingOptions, plan: Plan) -> Pose | Start | None:
 
 
 def air_of(tree: Any) -> Air | None:
-    """What JSON says of the heights by pressure; raises ValueError, TypeError or KeyError when it is damaged."""
+    """The heights by pressure in a JSON object; raises ValueError, TypeError or KeyError when it is damaged."""
     if tree is None:
         return None
     (zero_m,) = bounded([float(tree["zero_m"])])
@@ -148,10 +148,10 @@ def air_of(tree: Any) -> Air | None:
 
 def bounded(values: Iterable[float], least: float = -START_LIMIT_M) -> list[float]:
     """The values (m or rad); raises ValueError for one that is not finite, or out of bounds."""
-    found = list(values)
-    if not all(least <= value < START_LIMIT_M for value in found):
+    numbers = list(values)
+    if not all(least <= value < START_LIMIT_M for value in numbers):
         raise ValueError
-    return found
+    return numbers
 
 
 def parse_start(text: str, spread: str | None, plan: Plan) -> Pose | Start:

@@ -21,7 +21,7 @@ Item = TypeVar("Item")
 
 @contextmanager
 def progress_line(text: str) -> Iterator[None]:
-    """Say what is done while the block runs."""
+    """Show what is being done while the block runs."""
     if not console.is_terminal:
         timer = Timer(SHOWN_AFTER_S, console.print, [f"{text} ..."])
         timer.daemon = True

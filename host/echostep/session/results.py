@@ -24,7 +24,7 @@ from echostep.tracker import Tracker
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What a run gave: `estimates`, the true path to compare with, the computing time where it is worth printing, and how much was lost."""
+    """Results of a run: `estimates`, the true path to compare with, the computing time where it is worth printing, and how much was lost."""
 
     title: str
     estimates: Sequence[Estimate]

@@ -63,7 +63,7 @@ class Session:
         guide_to: str | None = None,
         recorded: Recording | None = None,
     ) -> None:
-        """`source`: origin of the estimates, as a commander is told; `recorded`: what is replayed.
+        """`source`: origin of the estimates, as stated in reports to commanders; `recorded`: the recording that is replayed.
 
         `guide_to`: the destination as given. Raises EchostepError for one that there is not.
         """
@@ -171,7 +171,7 @@ class Session:
         console.print(f"Foxglove: open connection, Foxglove WebSocket, {self._foxglove.url}", highlight=False)
 
     def _open_feed(self, opened: ExitStack) -> None:
-        """A rescuer's live run listens to the other wearer; a replay has in its recording what was heard."""
+        """Subscribe to the other wearer in a rescuer's live run; in a replay the received places are in the recording."""
         if self.recorded is not None or not isinstance(self.guided, GuidedRescue):
             return
         from echostep.session.team.team_feed import TeamFeed
@@ -181,7 +181,7 @@ class Session:
         opened.callback(self.feed.close)
 
     def _open_marks(self, opened: ExitStack) -> None:
-        """By the first broker of a live run beacons and drawings are shared; its page shows what commanders say, and offers meetings."""
+        """A live run shares beacons and drawings through its first broker; its page shows the commanders' marks, and offers meetings."""
         outlet, publishing, broker = self.output.outlet, self._publishing, self._broker
         if outlet is None or publishing is None or broker is None or self.recorded is not None:
             return
@@ -262,7 +262,7 @@ class Session:
     def finish(self, title: str, truth: Truth | None = None, elapsed_s: float | None = None) -> None:
         """Write track.csv, track.png and cues.csv and print a summary; raises EchostepError when a file cannot be written.
 
-        The page is told that the run has ended, and how well it went.
+        The page shows the end of the run, and its summary.
         """
         if self.page:
             self.page.end(summary_words(self.estimates, truth))

@@ -80,8 +80,8 @@ class BoardSensors:
             one = slice(begin, end)
             walls = self._walls[self._level[at[begin]]]
             asked = None if ranging is None else ranging[one]
-            heard = echoes(trunk[one], heading[one], walls, self._range_bias_m, self._echo_rng, self._acoustics, asked)
-            rows["own_us"][one], rows["cross_us"][one] = heard.own_us, heard.cross_us
+            sound = echoes(trunk[one], heading[one], walls, self._range_bias_m, self._echo_rng, self._acoustics, asked)
+            rows["own_us"][one], rows["cross_us"][one] = sound.own_us, sound.cross_us
             begin = end
         rows["bearing"] = self._compass.bearings(trunk, heading)
         air = None if self._air_pa is None else self._air_pa[at]
@@ -90,8 +90,8 @@ class BoardSensors:
         return rows
 
     def _edges(self, start: int, stop: int) -> NDArray[np.uint16]:
-        found = np.full(stop - start, NO_SYNC, np.uint16)
+        offsets_us = np.full(stop - start, NO_SYNC, np.uint16)
         first, last = np.searchsorted(self._sync_us, (start * 1000, stop * 1000))
         edges = self._sync_us[first:last]
-        found[edges // 1000 - start] = edges % 1000
-        return found
+        offsets_us[edges // 1000 - start] = edges % 1000
+        return offsets_us

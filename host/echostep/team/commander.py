@@ -21,7 +21,7 @@ from echostep.plan.model import Plan
 from echostep.team.cot import alarm_words
 from echostep.team.inbox import Inbox, ReceivedMessage
 from echostep.team.messages.report import WITHOUT_PLAN
-from echostep.team.roster import CLOCK_OFF_S, STILL_S, Member, MemberState, Roster, nearest
+from echostep.team.roster import CLOCK_OFF_S, NO_STEP_S, Member, MemberState, Roster, nearest
 
 ALL_COLUMNS_WIDTH = 136  # characters; a narrower terminal shows fewer columns
 MAX_COLUMN_WIDTH = 24  # characters
@@ -48,7 +48,7 @@ def update_roster(inbox: Inbox, roster: Roster) -> None:
 def take_messages(
     messages: Sequence[ReceivedMessage], dropped: Mapping[str, int], roster: Roster
 ) -> list[ReceivedMessage]:
-    """Put messages into the roster, and counts of dropped ones by reason; returns those that were believed."""
+    """Put messages into the roster, and counts of dropped ones by reason; returns the accepted ones."""
     believed = [message for message in messages if roster.receive(*message)]
     for reason, count in dropped.items():
         roster.received += count
@@ -144,7 +144,7 @@ def notes(m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]])
         remarks.append(alarm_words(replace(r.alarm, age_s=r.alarm.age_s + m.silent_s(now_s))))
     if m.presence == "broken":
         remarks.append("connection broke")
-    if r.motion and r.motion.still_s > STILL_S:
+    if r.motion and r.motion.still_s > NO_STEP_S:
         remarks.append(f"still for {r.motion.still_s:.0f} s")
     if r.source != "live":
         remarks.append(r.source)

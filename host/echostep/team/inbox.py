@@ -62,8 +62,8 @@ class Inbox:
         with self._lock:
             messages, self._messages = self._messages, {}
             dropped, self._dropped = self._dropped, Counter()
-        kept = [message for of_topic in messages.values() for message in of_topic]
-        return sorted(kept, key=lambda message: message.received_s), dropped
+        waiting = [message for of_topic in messages.values() for message in of_topic]
+        return sorted(waiting, key=lambda message: message.received_s), dropped
 
 
 class Subscription(Protocol):
@@ -82,7 +82,7 @@ class Subscription(Protocol):
         """Disconnect; raises nothing."""
 
 
-class Receiver:
+class ListenerThread:
     """Runs a listener in a thread until `close`, and connects again after each break."""
 
     def __init__(self, listener: Subscription, print_line: Callable[[str], None]) -> None:

@@ -23,7 +23,7 @@ from echostep.team.messages.report import Position, Report, moment
 
 # After so long without a new estimate the last one is sent again, with its age and a larger covariance
 HEARTBEAT_S = 2.0
-STALE_S = 10.0  # a report is valid for so long
+VALID_S = 10.0  # a report is valid for so long
 MAX_QUEUED = 1024  # reports
 FRESH_S = 1.0  # a report that has waited longer is dropped when a newer one waits too
 SETTLED_S = 2.0  # largest normal age of an estimate: the tracker gives two a second, or one per stride
@@ -187,7 +187,7 @@ def stamped(report: Report, sequence: int, unix_s: float, age_s: float, overtake
         report,
         sequence=sequence,
         time=moment(unix_s),
-        stale=moment(unix_s + STALE_S),
+        stale=moment(unix_s + VALID_S),
         superseded=overtaken,
         position=position,
         status=report.status if position is None or position.age_s <= SETTLED_S else trust(position.radius95_m).value,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The restorer: after a new connection, what the commanders share is sent again where the broker has lost it.
 
-In: the state of the connection, topics that were heard, what is known. Out: messages to send, a few at a time. Owns the topics heard since then.
+In: the state of the connection, received topics, the known messages. Out: messages to send, a few at a time. Owns the topics received since then.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ class Restorer:
     def __init__(self) -> None:
         self._connected = False
         self._due_s = math.inf
-        self._heard: set[str] = set()
+        self._received: set[str] = set()
         self._missing: deque[Message] = deque()
 
     def look(
-        self, connected: bool, heard: Iterable[str], known: Callable[[], Iterable[Message]], now_s: float
+        self, connected: bool, received: Iterable[str], known: Callable[[], Iterable[Message]], now_s: float
     ) -> list[Message]:
-        """Messages of `known` whose topic the broker has not sent since it was connected; `heard`: topics since the last call."""
+        """Messages of `known` whose topic the broker has not sent since the connection; `received`: topics since the last call."""
         if connected != self._connected:
             self._connected, self._due_s = connected, now_s + RETAINED_S if connected else math.inf
-            self._heard.clear()
+            self._received.clear()
             self._missing.clear()
         if not connected:
             return []
         if self._due_s < math.inf:
-            self._heard.update(heard)
+            self._received.update(received)
         if now_s >= self._due_s:
             self._due_s = math.inf
-            self._missing.extend(message for message in known() if message[0] not in self._heard)
-            self._heard.clear()
+            self._missing.extend(message for message in known() if message[0] not in self._received)
+            self._received.clear()
         return [self._missing.popleft() for _ in range(min(AT_ONCE, len(self._missing)))]

@@ -16,7 +16,7 @@ from pathlib import Path
 from echostep.errors import EchostepError
 from echostep.plan.model import Plan
 from echostep.team.endpoint import Endpoint
-from echostep.team.inbox import Receiver
+from echostep.team.inbox import ListenerThread
 from echostep.team.messages.report import checked_name
 from echostep.team.messages.shared_drawings import MOST_BYTES, checked_drawing, drawing_topic
 
@@ -61,13 +61,13 @@ def _fetched(broker: Endpoint, topic: str, print_line: PrintLine) -> bytes | Non
     """The first payload on a topic that is not empty; None after WAIT_S."""
     from echostep.team.mqtt.publisher import Listener
 
-    heard = queue.SimpleQueue[bytes]()
-    listener = Listener(broker, [topic], lambda _topic, payload, _retained: heard.put(payload), MOST_BYTES + 1024)
-    receiver = Receiver(listener, lambda text: print_line(f"{broker}: {text}"))
+    payloads = queue.SimpleQueue[bytes]()
+    listener = Listener(broker, [topic], lambda _topic, payload, _retained: payloads.put(payload), MOST_BYTES + 1024)
+    receiver = ListenerThread(listener, lambda text: print_line(f"{broker}: {text}"))
     end_s = time.monotonic() + WAIT_S
     try:
         while (left_s := end_s - time.monotonic()) > 0.0:
-            if payload := heard.get(timeout=left_s):
+            if payload := payloads.get(timeout=left_s):
                 return payload
     except queue.Empty:
         pass

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The gates that a measurement passes before the tracker uses it, and its counter's.
+"""The gates on a measurement's values and on its counter, applied before the tracker uses it.
 
 In: decoded messages, limits, the state of the gates. Out: which messages are samples. The caller owns the state and the tally.
 """
@@ -63,7 +63,7 @@ def apply_gates(messages: Messages, limits: Floats, state: Ints, tally: Ints) ->
     because the checksum has 8 bits: one damaged frame in 256 passes it.
     """
     values, counter, sent, bus, end = messages
-    kept = np.zeros(len(values), np.bool_)
+    passed = np.zeros(len(values), np.bool_)
     waits = -1
     for k in range(len(values)):
         result = _sample_gate(values[k], counter[k], sent[k], bus[k], state, limits)
@@ -82,12 +82,12 @@ def apply_gates(messages: Messages, limits: Floats, state: Ints, tally: Ints) ->
             confirmed = ((counter[k] - state[ACCEPTED]) & 0xFFFF) > MAX_GAP  # else it follows the last accepted one
             tally[GOOD if confirmed else BAD_COUNTER] += 1
             if confirmed:
-                kept[waits], end[waits] = True, end[k]
+                passed[waits], end[waits] = True, end[k]
                 _accept(counter[waits], bus[waits], state, tally)
             waits = -1
-        kept[k] = True
+        passed[k] = True
         _accept(counter[k], bus[k], state, tally)
-    return kept, waits
+    return passed, waits
 
 
 @kernel

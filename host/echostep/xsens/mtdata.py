@@ -139,13 +139,13 @@ def rest_of(payload: bytes, output: OutputFormat) -> dict[str, list[int] | int]:
     """What a payload has besides `Decoded`, as sent: `raw` (accel, gyro, mag, temperature), `analog` (one or two inputs), `status`."""
     if output.mode & RAW:
         return {"raw": list(struct.unpack_from(">10H", payload))}
-    found: dict[str, list[int] | int] = {}
+    fields: dict[str, list[int] | int] = {}
     begin = 4 * output.numbers
     if output.analog_inputs:
-        found["analog"] = list(struct.unpack_from(f">{output.analog_inputs}H", payload, begin))
+        fields["analog"] = list(struct.unpack_from(f">{output.analog_inputs}H", payload, begin))
     if output.mode & STATUS:
-        found["status"] = payload[begin + 2 * output.analog_inputs]
-    return found
+        fields["status"] = payload[begin + 2 * output.analog_inputs]
+    return fields
 
 
 def _quaternions(orientation: Floats) -> Floats:

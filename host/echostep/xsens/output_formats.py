@@ -79,20 +79,20 @@ class OutputFormats:
 
     def learn(self, frames: list[Frame]) -> None:
         """Find the formats of these frames' MTData, where they are not found yet."""
-        found: dict[tuple[int, int], list[bytes]] = {}
+        by_key: dict[tuple[int, int], list[bytes]] = {}
         for frame in frames:
             self._listen(frame)
             key = frame.bus, len(frame.payload)
-            if frame.mid == MTDATA and key not in self.found and len(found.setdefault(key, [])) < MOST_ROWS:
-                found[key].append(frame.payload)
-        for key, payloads in found.items():
+            if frame.mid == MTDATA and key not in self.found and len(by_key.setdefault(key, [])) < MOST_ROWS:
+                by_key[key].append(frame.payload)
+        for key, payloads in by_key.items():
             rows = np.frombuffer(b"".join(payloads), np.uint8).reshape(len(payloads), key[1])
             self.found[key] = self._find(key[0], rows)
 
     def of(self, bus: int, length: int) -> OutputFormat | None:
         """The format of MTData of this length; None where it is not known."""
-        found = self.found.get((bus, length))
-        return None if found is None else found.output
+        known = self.found.get((bus, length))
+        return None if known is None else known.output
 
     def _listen(self, frame: Frame) -> None:
         """Keep mode and settings from a configuration message."""
@@ -110,8 +110,8 @@ class OutputFormats:
         if self.mode is not None or self.settings is not None:
             return _first(self.mode, self.settings, rows, GIVEN)
         told_mode, told_settings = self._told.get(bus, (None, None))
-        told = None if told_mode is None else _first(told_mode, told_settings, rows, CONFIGURED)
-        return told or _first(None, None, rows, BY_LENGTH)
+        configured = None if told_mode is None else _first(told_mode, told_settings, rows, CONFIGURED)
+        return configured or _first(None, None, rows, BY_LENGTH)
 
 
 def configured_devices(payload: bytes) -> list[tuple[int, int, int, int]]:
@@ -162,12 +162,12 @@ def _formats(length: int) -> tuple[OutputFormat, ...]:
         absent,
         (0, NO_ANALOG_1, NO_ANALOG_2),
     )
-    found = set()
+    formats = set()
     for mode, form, counter, orientation, missing, analog in choices:
         used = ((orientation, ORIENTATION), (missing, CALIBRATED), (analog, AUXILIARY))
-        found.add(OutputFormat(mode, form | counter | sum(bits for bits, sent in used if mode & sent)))
-    found |= {OutputFormat(RAW, counter) for counter in (SAMPLE_COUNTER, 0)}
-    fits = [output for output in found if output.length == length]
+        formats.add(OutputFormat(mode, form | counter | sum(bits for bits, sent in used if mode & sent)))
+    formats |= {OutputFormat(RAW, counter) for counter in (SAMPLE_COUNTER, 0)}
+    fits = [output for output in formats if output.length == length]
     return tuple(sorted(fits, key=_complexity))
 
 

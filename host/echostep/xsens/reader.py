@@ -166,9 +166,9 @@ class MtxReader:
         if not len(frames.mid):
             return EMPTY
         messages = joined(self._waiting, self._decode(frames))
-        kept, waits = apply_gates(messages, self._limits, self._state, self._tally)
+        passed, waits = apply_gates(messages, self._limits, self._state, self._tally)
         self._waiting = messages.at(np.arange(waits, waits + 1)) if waits >= 0 else NO_MESSAGES
-        values, counter, _, _, end = messages if kept.all() else messages.at(np.flatnonzero(kept))
+        values, counter, _, _, end = messages if passed.all() else messages.at(np.flatnonzero(passed))
         return MtBatch(
             counter, values[:, ACCEL], values[:, GYRO], values[:, MAG], values[:, ATTITUDE], values[:, CELSIUS], end
         )

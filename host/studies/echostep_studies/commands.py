@@ -88,7 +88,7 @@ STUDIES = (
     ),
     StudyCommand(
         "echoes",
-        "What simulated rangers hear, and how well the tracker's likelihood expects it.",
+        "Echoes of simulated rangers, and how well the tracker's likelihood predicts them.",
         (SEED, JSON, _out("echoes"), _option("fit", bool, False, "Fit the likelihood's settings to simulated pings (minutes).")),
         lambda _request, given: _of("echoes.study").echoes_study(fit=given["fit"]),
     ),

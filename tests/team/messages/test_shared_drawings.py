@@ -20,7 +20,7 @@ from echostep.operation.operation import Operation
 from echostep.plan.model import load_plan
 from echostep.team import inbox, wearer_plan
 from echostep.team.endpoint import parse_endpoint
-from echostep.team.inbox import MOST_TRIES, Receiver
+from echostep.team.inbox import MOST_TRIES, ListenerThread
 from echostep.team.messages.report import WITHOUT_PLAN
 from echostep.team.messages.shared_drawings import MOST_BYTES, MOST_STOREYS, MOST_WALLS, checked_drawing, drawing_topic
 from echostep.team.mqtt.publisher import Listener
@@ -219,7 +219,7 @@ def test_a_message_that_breaks_the_connection_every_time_is_given_up(monkeypatch
     """Those behind it come through."""
     monkeypatch.setattr(inbox, "RETRY_PAUSES_S", (0.0,))
     broker, said = Refusing(b"too large"), list[str]()
-    receiver = Receiver(broker, said.append)
+    receiver = ListenerThread(broker, said.append)
     assert receiver.sent_all
     receiver.send("drawing", b"too large")
     receiver.send("mark", b"small")

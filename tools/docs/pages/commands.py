@@ -47,7 +47,7 @@ def commands(name: str, group: typer.Typer) -> Iterator[tuple[str, Callable[...,
 
 
 def _row(name: str, hint: Any, default: Any) -> str:
-    """A parameter in the table: how it is written, its default, what it means."""
+    """A row of the table: a parameter's syntax, default and meaning."""
     plain, info = (hint.__origin__, hint.__metadata__[0]) if hasattr(hint, "__metadata__") else (hint, None)
     if isinstance(info, typer.models.ArgumentInfo):
         written = f"`{info.metavar or name.upper()}`"

@@ -15,7 +15,7 @@ from hardware import HARDWARE
 from hardware.drawing import drawing
 from hardware.kicad import schematic
 from hardware.wearing import wearing
-from hardware.wiring import POWER, Board, boards
+from hardware.wiring import POWER, WiredBoard, boards
 
 README = HARDWARE.parent / "README.md"
 KITS = {"papers": "parts of the papers", "2026": "parts of 2026"}
@@ -77,7 +77,7 @@ def reasons_table(kit: str) -> str:
     )
 
 
-def wires_table(board: Board) -> str:
+def wires_table(board: WiredBoard) -> str:
     """All wires of a board: each net, the processor's pin, and the pins of the parts."""
     ends: dict[str, list[str]] = {}
     for device in board.devices:

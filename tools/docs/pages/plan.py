@@ -59,7 +59,7 @@ def kind(schema: dict[str, Any], node: dict[str, Any]) -> str:
         return str(node["const"])
     if "oneOf" in node:
         return " or ".join(kind(schema, one) for one in node["oneOf"] if one.get("type") != "null")
-    found = node["type"] if isinstance(node["type"], str) else next(one for one in node["type"] if one != "null")
-    if found == "array" and isinstance(node.get("items"), dict):
+    json_type = node["type"] if isinstance(node["type"], str) else next(one for one in node["type"] if one != "null")
+    if json_type == "array" and isinstance(node.get("items"), dict):
         return f"list of {kind(schema, node['items'])}"
-    return {"object": "object", "array": "list"}.get(found, found)
+    return {"object": "object", "array": "list"}.get(json_type, json_type)

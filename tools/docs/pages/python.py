@@ -103,7 +103,7 @@ def _annotation(value: Any) -> str:
 
 def public_names() -> list[str]:
     """Every public name with its package."""
-    found = [f"echostep.{name}" for name in echostep.__all__]
+    names = [f"echostep.{name}" for name in echostep.__all__]
     for package in ("echostep.plan", "echostep.foot", "echostep.xsens"):
-        found += [f"{package}.{name}" for name in importlib.import_module(package).__all__]
-    return found
+        names += [f"{package}.{name}" for name in importlib.import_module(package).__all__]
+    return names

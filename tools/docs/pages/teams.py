@@ -44,7 +44,7 @@ def kind(row: dict[str, Any]) -> str:
 def limits(row: dict[str, Any]) -> str:
     """The range of a number, the length of a text."""
     if "anyOf" in row:
-        return next((found for part in row["anyOf"] if (found := limits(part))), "")
+        return next((limit for part in row["anyOf"] if (limit := limits(part))), "")
     low, high = row.get("minimum"), row.get("maximum")
     if low is not None:
         return f"{low:g} to {'2^53' if high == 2**53 else f'{high:g}'}"
@@ -57,15 +57,15 @@ def limits(row: dict[str, Any]) -> str:
 
 
 def meaning(row: dict[str, Any]) -> str:
-    """What a field's description says."""
+    """A field's description."""
     parts = [row, *row.get("anyOf", [])]
     return next((str(part["description"]) for part in parts if "description" in part), "")
 
 
 def tree() -> dict[str, Any]:
     """The schema as objects."""
-    found: dict[str, Any] = json.loads(schema())
-    return found
+    parsed: dict[str, Any] = json.loads(schema())
+    return parsed
 
 
 def page() -> str:

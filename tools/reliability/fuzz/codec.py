@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from places import OUT, ROOT
-from reliability.campaign import Figure, Journal, options, report
+from reliability.campaign import CampaignJournal, Figure, options, report
 
 FIRMWARE = ROOT / "firmware"
 SOURCES = [
@@ -59,13 +59,13 @@ def fuzz(program: Path, corpus: Path, shard: int, *limits: str) -> subprocess.Co
 
 def executions(log: str) -> int:
     """Executions of a run, from its log."""
-    found = re.search(r"stat::number_of_executed_units:\s+(\d+)", log)
-    return int(found[1]) if found else 0
+    match = re.search(r"stat::number_of_executed_units:\s+(\d+)", log)
+    return int(match[1]) if match else 0
 
 
 def main() -> int:
     seconds = options(__doc__, seconds=(60, "of this run")).seconds
-    journal = Journal(FOLDER / "codec.jsonl")
+    journal = CampaignJournal(FOLDER / "codec.jsonl")
     shard = len(journal.rows) + 1
     with tempfile.TemporaryDirectory() as temporary:
         program = build(Path(temporary) / "fuzz")

@@ -22,7 +22,7 @@ from types import FrameType
 
 from echostep.errors import EchostepError
 from places import OUT, ROOT
-from reliability.campaign import Figure, Journal, none, options, report
+from reliability.campaign import CampaignJournal, Figure, none, options, report
 from reliability.fuzz.targets import ALLOWED, TARGETS
 
 KEPT = ROOT / "tests/hostile_inputs.jsonl"
@@ -98,7 +98,7 @@ def fault(name: str, data: bytes) -> str:
 
 def kept_inputs() -> Iterator[tuple[str, bytes]]:
     """Inputs that once were faults."""
-    for row in Journal(KEPT).rows:
+    for row in CampaignJournal(KEPT).rows:
         yield row["target"], bytes.fromhex(row["hex"])
 
 
@@ -120,8 +120,8 @@ def run_shard(name: str, shard: int, seconds: float, most: int = sys.maxsize) ->
         if count >= most or time.monotonic() > end_s:
             break
         count += 1
-        if found := fault(name, data):
-            return count, data, found
+        if problem := fault(name, data):
+            return count, data, problem
     return count, b"", ""
 
 
@@ -133,7 +133,7 @@ def main() -> int:
     """Replay the kept inputs, then fuzz all targets in turn."""
     asked = options(__doc__, seconds=(60.0, "of this run"), targets=(sorted(TARGETS), "only these"))
     signal.signal(signal.SIGALRM, too_slow)
-    journal, kept = Journal(LOG), Journal(KEPT)
+    journal, inputs = CampaignJournal(LOG), CampaignJournal(KEPT)
     shard, done = len(journal.rows) + 1, Counter[str]()
     failures = [(name, text) for name, data in kept_inputs() if (text := fault(name, data))]
     end_s, turn = time.monotonic() + asked.seconds, 0
@@ -143,7 +143,7 @@ def main() -> int:
         done[name], turn = done[name] + count, turn + 1
         if text:
             failures.append((name, text))
-            kept.add({"target": name, "hex": data.hex()})
+            inputs.add({"target": name, "hex": data.hex()})
     journal.add({"shard": shard, "executions": done})
     for name, text in failures:
         print(f"{name}: {text}")

@@ -109,9 +109,9 @@ def fuzz(count: int, seed: int) -> Counter[str]:
         total += min(BLOCK, count)
     counts = reader.counts
     assert counts.good == passed, "counts"
-    found = Counter({name: getattr(counts, name) for name in counts.__dataclass_fields__})
-    found["frames"], found["bytes"] = total, fed
-    return found
+    totals = Counter({name: getattr(counts, name) for name in counts.__dataclass_fields__})
+    totals["frames"], totals["bytes"] = total, fed
+    return totals
 
 
 def feed_setup(stream: bytes) -> None:
@@ -129,15 +129,15 @@ def main() -> int:
     asked = options(__doc__, frames=(200_000, "mutated ones"), seed=(1, "of the mutations"))
     fuzz(2_000, 0)  # compiles the kernels
     began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    found = fuzz(asked.frames, asked.seed)
+    totals = fuzz(asked.frames, asked.seed)
     elapsed_s = time.perf_counter() - began
     grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
     return report(
-        f"{found['frames']} mutated frames, no exception",
+        f"{totals['frames']} mutated frames, no exception",
         [
-            Figure("frames/s", f"{found['frames'] / elapsed_s:.0f}"),
+            Figure("frames/s", f"{totals['frames'] / elapsed_s:.0f}"),
             Figure("growth of the peak memory", f"{grown:.0f} MB"),
-            *(Figure(name, f"{count}") for name, count in found.items()),
+            *(Figure(name, f"{count}") for name, count in totals.items()),
         ],
     )
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The ways by which bytes come into the host, for `host.py`: for each a valid input, and what takes it.
+"""Entry points for bytes into the host, for `host.py`: for each a valid input, and the function that takes it.
 
 In: nothing. Out: `TARGETS`. Owns nothing. A target may raise EchostepError, and ValueError where its docstring says so; anything else is a fault.
 """

@@ -9,7 +9,7 @@
 
 enum { TAKE_RANGE = 81, UNLOCK_1 = 170, UNLOCK_2 = 165 };
 #define DEFAULT_ADDRESS 0x70
-#define OVERHEAD_US 22000u /* of a ranging, beside the time of flight; by reason, from the two durations */
+#define OVERHEAD_US 22000u /* of a ranging, beside the time of flight; assumed from the two durations */
 #define SPREAD_US 1000u    /* random part of it */
 #define LEAST_US 1450u     /* 25 cm, out and back */
 #define WINDOW_US 44370u   /* 765 cm */
@@ -17,7 +17,7 @@ enum { TAKE_RANGE = 81, UNLOCK_1 = 170, UNLOCK_2 = 165 };
 #define NO_ECHO_CM 765u
 #define PART_INFORMATION 0x2A2Au /* before the first ranging; the data sheet does not give the bytes */
 #define MISREAD 0x8000u    /* as if the first bit were taken too early: seen where a master ignored the stretching */
-#define STRETCH US(20)     /* after each byte; by reason */
+#define STRETCH US(20)     /* after each byte; assumed */
 #define LONG_STRETCH US(500)
 #define NEVER UINT64_MAX
 

@@ -128,8 +128,8 @@ class BoardReports:
 
 def part_in(reports: BoardReports, device: Healthy) -> Part:
     """The part that the board has found in a place; `Part.NONE` before its report, and for a part that this host does not know."""
-    found = 0 if reports.parts is None else getattr(reports.parts, f"part_{field_suffix(device)}")
-    return Part(found) if found in tuple(Part) else Part.NONE
+    number = 0 if reports.parts is None else getattr(reports.parts, f"part_{field_suffix(device)}")
+    return Part(number) if number in tuple(Part) else Part.NONE
 
 
 def identity_in(reports: BoardReports, device: Healthy) -> int:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Plays a beacon gateway: what beacons along a walk measure, as frames over UDP or a serial port, in real time.
+"""Simulates a beacon gateway: measurements of beacons along a walk, as frames over UDP or a serial port, in real time.
 
 In: plan, true path of the wearer (CSV). Out: `beacon` frames. Owns the socket or the port that it sends from.
 """

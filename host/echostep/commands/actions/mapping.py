@@ -41,7 +41,7 @@ WALK_START = "0,0,90"  # of the walk that is drawn: the recorded start moves the
 def map_recordings(paths: Sequence[Path], plan_path: Path | None, out: Path, picture: Path | None) -> None:
     """Draw the building of recorded walks, or complete a plan of it; raises EchostepError.
 
-    When one is no walk, has no certain place on the others or on the plan, or no wall was heard.
+    Raised when a recording is no walk, cannot be placed on the others or on the plan, or has no echo of a wall.
     """
     _check_files(paths, out, picture)
     known = None if plan_path is None else open_limited(plan_path)
@@ -92,9 +92,9 @@ def _completed(known: Plan, name: str, walks: Walks) -> Result:
             continue
         done = complete(level, mapped.graph, mapped.pings, mapped.drawing)
         levels = tuple(done.level if i == k else other for i, other in enumerate(known.levels))
-        found = f"{name}, {level.name}: {done.new_m:.0f} m of wall added, {done.doubtful_m:.0f} m doubtful: echoes passed them"
+        summary = f"{name}, {level.name}: {done.new_m:.0f} m of wall added, {done.doubtful_m:.0f} m doubtful: echoes passed them"
         walked_m = tuple(mapped.drawing.paths_m if i == k else () for i in range(len(levels)))
-        return replace(known, levels=levels), walked_m, [found, *(_join_line(join) for join in joins)]
+        return replace(known, levels=levels), walked_m, [summary, *(_join_line(join) for join in joins)]
     raise refused[0]
 
 

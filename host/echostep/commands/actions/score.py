@@ -58,8 +58,8 @@ def _table(report: ScoreReport) -> Table:
         for metric in METRICS
     ]
     names = {f"track {k}": escape(name) for k, name in enumerate(report.names)}
-    said = [escape(line) for one in report.scored for line in notes(one.card)]
-    return Table(escape(report.title), rows, {"metric": "", **names, "source": "defined in"}, said)
+    footnotes = [escape(line) for one in report.scored for line in notes(one.card)]
+    return Table(escape(report.title), rows, {"metric": "", **names, "source": "defined in"}, footnotes)
 
 
 def _tree(report: ScoreReport, truth: Path) -> dict[str, object]:

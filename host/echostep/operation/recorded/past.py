@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which moment of an operation one page shows: now, or one of the past.
+"""The moment of an operation that one page shows: the present or a past one.
 
 In: requests to seek, play and return; the tape. Out: the scene of that moment, and the state of the time bar. Owns the position and a player.
 """
@@ -46,7 +46,7 @@ class PastView:
         self._scene: TableScene | None = None
 
     def handle(self, request: requests.TimeRequest) -> None:
-        """Change position or speed as a page asks; playing at the end of a finished operation begins again."""
+        """Change position or speed as requested by a page; `play` at the end of a finished operation starts from the beginning."""
         match request:
             case requests.Seek(t_s):
                 self.is_past, self._asked_s = True, t_s

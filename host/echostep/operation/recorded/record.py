@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The recording of an operation: every message that was believed, and what was rejected as counts.
+"""The recording of an operation: every accepted message, and the counts of rejected ones.
 
 In: messages as an inbox received them, the state of the connection. Out: chunks of the port `OPERATION` of an MCAP file; records from such chunks,
 which may be damaged or hostile. Owns the open file. Rejected messages are counted, not kept: a flood of them fills no disk.
@@ -40,7 +40,7 @@ Seconds = Annotated[float, Meta(ge=-1e10, le=1e11)]
 
 
 class Heard(msgspec.Struct, frozen=True, array_like=True, tag="heard"):
-    """A message that was believed."""
+    """An accepted message."""
 
     unix_s: Seconds
     retained: bool
@@ -105,7 +105,7 @@ class OperationRecorder:
         return self._recorder.offset
 
     def add(self, messages: Sequence[ReceivedMessage]) -> None:
-        """Record messages that were believed."""
+        """Record accepted messages."""
         for m in sorted(messages, key=lambda message: message.received_s):
             self._write(m.received_s, Heard(m.unix_s, m.retained, m.topic or "", m.payload))
 

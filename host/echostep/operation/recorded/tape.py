@@ -41,7 +41,7 @@ class Keyframe:
 
 
 class Tape:
-    """`keep` remembers a state; `player` gives a player at a time. `grows`: the file is being written. Any thread may ask."""
+    """`keep` stores a keyframe; `player` returns a player at a time. `grows`: the file is being written. Thread-safe."""
 
     def __init__(self, path: Path, *, grows: bool) -> None:
         self.path, self.grows = path, grows

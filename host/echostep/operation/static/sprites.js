@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Small pictures that are drawn often: each is painted once and then copied, on whole pixels of the device.
 
-const MOST = 1024;  // pictures that are kept, by reason: 200 names, and signs with 72 headings
+const MOST = 1024;  // pictures that are kept: 200 names, and signs with 72 headings
 
 export class Sprites {
   constructor() { Object.assign(this, { made: new Map(), sharp: 1 }); }

@@ -5,8 +5,8 @@
 import { TRAIL } from './wire.js';
 
 const KEPT_S = 180;  // a point that is older is dropped
-const AGAIN_MS = 5000;  // between two paintings of one view: trails end so much later than they would, by reason
-const SLICE = 1500;  // points painted with a frame, by reason: about 2 ms
+const AGAIN_MS = 5000;  // between two paintings of one view: trails end at most this much late; assumed
+const SLICE = 1500;  // points painted with a frame: about 2 ms
 const FAR_M = 15;  // a longer gap between two points is not drawn: the wearer was lost in between
 const WIDTH_PX = 1.5;
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from echostep.odometry.incapacity.alarm import AlarmKind, AlarmReason
 from echostep.tracker import Tracker
 
-AGAIN_S = 5.0  # between two times that a sentence is spoken; assumed
+REPEAT_S = 5.0  # between two times that a sentence is spoken; assumed
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,17 +31,17 @@ def shown_alarm(
 ) -> ShownAlarm | None:
     """The present alarm; None while all is well. `has_team`: the run's reports go somewhere.
 
-    `acknowledged_by`: the commander who has acknowledged the alarm of a number.
+    `acknowledged_by`: name of the commander that acknowledged the alarm with a given number.
     """
     alarm = tracker.alarm.alarm
     if alarm is None:
         return None
     age_s = tracker.front_end.newest_s - alarm.since_s
     age_s = 0.0 if math.isnan(age_s) else max(age_s, 0.0)
-    times = 1000 * alarm.number + int(age_s / AGAIN_S)
-    told = "Your team has been alarmed." if has_team else "No team is connected: only this page says so."
+    times = 1000 * alarm.number + int(age_s / REPEAT_S)
+    receipt = "Your team has been alarmed." if has_team else "No team is connected: only this page says so."
     if acknowledged_by and (commander := acknowledged_by(alarm.number)):
-        told = f"{commander} has acknowledged it."
+        receipt = f"{commander} has acknowledged it."
     left_s = max(math.ceil((alarm.mayday_s or alarm.since_s) - alarm.since_s - age_s), 0)
     match alarm.kind, alarm.reason:
         case AlarmKind.ASKING, reason:
@@ -52,9 +52,9 @@ def shown_alarm(
             )
             return ShownAlarm(alarm.kind.value, f"{asks} In {left_s} s it is a mayday.", asks, times)
         case AlarmKind.MAYDAY, AlarmReason.HELP:
-            return ShownAlarm(alarm.kind.value, f"Mayday: you asked for help. {told}", f"Mayday. {told}", times)
+            return ShownAlarm(alarm.kind.value, f"Mayday: you asked for help. {receipt}", f"Mayday. {receipt}", times)
         case AlarmKind.MAYDAY, reason:
             why = f"a fall {age_s:.0f} s ago" if reason is AlarmReason.FALL else f"no motion for {age_s:.0f} s"
-            text = f"Mayday: {why}. {told}"
-            return ShownAlarm(alarm.kind.value, text, f"Mayday. {told} Walk, or tap, if you are all right.", times)
+            text = f"Mayday: {why}. {receipt}"
+            return ShownAlarm(alarm.kind.value, text, f"Mayday. {receipt} Walk, or tap, if you are all right.", times)
     return ShownAlarm(alarm.kind.value, "The mayday is over.", "The mayday is over.", 1000 * alarm.number)

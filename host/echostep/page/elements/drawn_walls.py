@@ -26,8 +26,8 @@ MOST_WALLS, MOST_POINTS = 2000, 4000  # in a message; of more walls those neares
 
 @dataclass(frozen=True, slots=True)
 class WalkDrawing:
-    """The newest storey in the frame of the walk: `walls` (n, 5) of x0, y0, x1, y1 and the standard deviation across, `path_m` (k, 2), NaN where it
-    leaves the storey, the last `pose` (3,) of the walk.
+    """The newest level in the frame of the walk: `walls` (n, 5) of x0, y0, x1, y1 and the standard deviation across, `path_m` (k, 2), NaN where it
+    leaves the level, the last `pose` (3,) of the walk.
     """
 
     walls: Floats
@@ -49,16 +49,16 @@ NO_DRAWING = ShownDrawing(0.0, np.zeros((0, 5), np.float32), np.zeros((0, 2), np
 
 
 def walk_drawing(mapped: Mapped) -> WalkDrawing:
-    """What a page can show of a drawing."""
+    """The part of a drawing that a page shows."""
     pose = mapped.graph.pose
-    storey = mapped.graph.storey_of(np.arange(len(pose)))
-    newest = int(storey[storey != BETWEEN][-1])
+    level = mapped.graph.storey_of(np.arange(len(pose)))
+    newest = int(level[level != BETWEEN][-1])
     drawing = mapped.drawings[newest]
     walls = np.column_stack([drawing.walls, drawing.sd_m])
     middle = 0.5 * (walls[:, 0:2] + walls[:, 2:4]) - pose[-1, :2]
     nearest = np.argsort(np.hypot(*middle.T), kind="stable")[:MOST_WALLS]
     thinned = np.linspace(0, len(pose) - 1, min(len(pose), MOST_POINTS)).round().astype(np.int64)
-    path = np.where((storey == newest)[thinned, None], pose[thinned, :2], np.nan)
+    path = np.where((level == newest)[thinned, None], pose[thinned, :2], np.nan)
     return WalkDrawing(walls[np.sort(nearest)], path, pose[-1].copy())
 
 
@@ -69,8 +69,8 @@ def shown_drawing(drawing: WalkDrawing, estimate: Estimate, trail_count: int) ->
     turned, place = np.array([[c, s], [-s, c]]), np.array([estimate.x_m, estimate.y_m])
 
     def moved(points: Floats) -> Floats:
-        found: Floats = (points - drawing.pose[:2]) @ turned + place
-        return found
+        moved_m: Floats = (points - drawing.pose[:2]) @ turned + place
+        return moved_m
 
     ends = moved(drawing.walls[:, :4].reshape(-1, 2)).reshape(-1, 4)
     walls = np.column_stack([ends, drawing.walls[:, 4]]).astype(np.float32)

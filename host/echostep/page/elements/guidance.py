@@ -20,7 +20,7 @@ from echostep.plan.model import Plan
 from echostep.plan.polyline import along, way_m
 from echostep.plan.routing import Route, RoutePlace, Routes
 
-AGAIN_S = 5.0  # shortest time between two searches for a route, in data time
+SEARCH_INTERVAL_S = 5.0  # shortest time between two searches for a route, in data time
 ON_THE_WAY = (CueKind.AHEAD, CueKind.TURN, CueKind.CHANGE, CueKind.OFF)
 LOOKING, NO_ROUTE = "looking", "none"  # kinds of a guidance without a route
 
@@ -59,8 +59,8 @@ class ShownGuidance:
 
 def guidance_of_cue(cue: Cue, route: Route | None, level: int, before: ShownGuidance | None) -> ShownGuidance:
     """A cue as it is shown on a level. `before`: the guidance shown until now; its sentence stays while the cue has no new one."""
-    kept = (before.spoken, before.spoken_s) if before else ("", cue.t_s)
-    spoken = (cue.spoken, cue.t_s) if cue.spoken else kept
+    previous = (before.spoken, before.spoken_s) if before else ("", cue.t_s)
+    spoken = (cue.spoken, cue.t_s) if cue.spoken else previous
     path = () if route is None or math.isnan(cue.left_m) else remaining_path(route, level, cue.left_m)
     left_m = cue.left_m if cue.kind in ON_THE_WAY else None
     return ShownGuidance(cue.kind.value, cue.text, cue.aim_rad, left_m, path, *spoken)
@@ -114,11 +114,11 @@ class Destination:
         return not self.searching and estimate.t_s >= self._search_again_s
 
     def set_route(self, route: Route | None, reason: str, estimate: Estimate) -> None:
-        """The result of a search from an estimate: a route, or None and the reason. Without a route the search is repeated after `AGAIN_S`."""
+        """The result of a search from an estimate: a route, or None and the reason. Without a route it is repeated after `SEARCH_INTERVAL_S`."""
         self.searching = False
         self._guide = Guide(route) if route is not None and route.stretches else None
         self._reason, self._last = reason, None
-        self._search_again_s = math.inf if self._guide else estimate.t_s + AGAIN_S
+        self._search_again_s = math.inf if self._guide else estimate.t_s + SEARCH_INTERVAL_S
 
     def guidance_at(self, estimate: Estimate) -> ShownGuidance:
         """The guidance at an estimate; the same object while the estimate is the same."""
@@ -141,8 +141,8 @@ def without_route(goal: RoutePlace, estimate: Estimate, reason: str) -> ShownGui
 
     `reason`: why there is none, empty while it is searched for.
     """
-    floors = goal.level - estimate.level
-    climb = f", {abs(floors)} floor{'s' if abs(floors) > 1 else ''} {'up' if floors > 0 else 'down'}" if floors else ""
+    levels = goal.level - estimate.level
+    climb = f", {abs(levels)} floor{'s' if abs(levels) > 1 else ''} {'up' if levels > 0 else 'down'}" if levels else ""
     if not reason:
         return ShownGuidance(LOOKING, f"Looking for a way{climb}", None, None, ())
     return ShownGuidance(NO_ROUTE, f"No way was found{climb}: {reason}", None, None, (), "No way was found.")

@@ -16,7 +16,7 @@ from echostep.ports.people.team_beacons import MOST_SHARED
 from echostep.tracker import Tracker
 
 # A beacon counts as heard this long after its last reading: longer than a step, at whose end readings are used
-HEARD_S = 1.5
+RECENT_S = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class BeaconMark:
     """A beacon by its number, at the mean of its position over the particles. The field names are keys of the frame's JSON.
 
     `radius95_m`: radius of a circle with the beacon's spread, scaled as a 95 % ellipse. `state`: value of a `BeaconState`.
-    `heard`: whether a reading came within the last `HEARD_S`. `by`: the teammate that placed it; None: this wearer.
+    `heard`: whether a reading came within the last `RECENT_S`. `by`: the teammate who has placed it; None: this wearer.
     """
 
     number: int
@@ -56,15 +56,15 @@ def beacon_marks(tracker: Tracker, t_s: float) -> tuple[BeaconMark, ...]:
     own = tuple(
         BeaconMark(
             numbers[b.slot], b.x_m, b.y_m, math.sqrt(CHI2_95) * b.sd_m, b.level, b.state.value,
-            t_s - b.heard_s < HEARD_S,
+            t_s - b.heard_s < RECENT_S,
         )
         for b in tracker.beacon_places(t_s)
     )  # fmt: skip
     known = {mark.number for mark in own}
-    told = {b.number: (name, b) for name, beacons in state.team_beacons.items() for b in beacons}
+    shared = {b.number: (name, b) for name, beacons in state.team_beacons.items() for b in beacons}
     return own + tuple(
         BeaconMark(
             number, b.x_m, b.y_m, ellipse95(b.xx_m2, b.xy_m2, b.yy_m2).major_m, b.level, BeaconState.WELL.value, heard=False, by=name
         )
-        for number, (name, b) in islice(told.items(), MOST_SHARED) if number not in known
+        for number, (name, b) in islice(shared.items(), MOST_SHARED) if number not in known
     )  # fmt: skip

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the newest meeting with a teammate did, as pages say it.
+"""Effect of the newest meeting with a teammate, in words for pages.
 
 In: the tracker's state. Out: `ShownMeeting`. Owns the words.
 """

@@ -27,7 +27,7 @@ KNOWN_HEADING_RAD = 1.0  # above this standard deviation the page draws a circle
 MOST_SHOWN = 10_000  # particles in a frame
 
 
-STOREY_M = 1.5  # least height against the start that is said: half a storey
+SHOWN_HEIGHT_M = 1.5  # least height against the start that a page shows: half a storey
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ def status_text(
 ) -> str:
     """Status and accuracy in words.
 
-    `no_plan`: the height against the start is said, there are no floors. `needs_start`: the tracker waits for a check-in that gives the start.
+    `no_plan`: no floors; the page shows the height against the start. `needs_start`: the tracker waits for a check-in that gives the start.
     `accepts_taps`: the page takes check-ins (not so in a replay).
     """
     tap = " or tap where you are" if accepts_taps else ""
@@ -101,7 +101,7 @@ def status_text(
 
 def _height_words(z_m: float) -> str:
     """A height against the start, where it is about a storey."""
-    return "" if abs(z_m) < STOREY_M else f", {abs(z_m):.0f} m {'above' if z_m > 0.0 else 'below'} the start"
+    return "" if abs(z_m) < SHOWN_HEIGHT_M else f", {abs(z_m):.0f} m {'above' if z_m > 0.0 else 'below'} the start"
 
 
 def format_metres(distance_m: float) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Taps: what a check-in would do, before it is made.
+"""Taps: the preview of a check-in's effect.
 
 In: a plan; a check-in that a page considers, and the scene that it was shown. Out: `Considered`: plain data. Owns what is known of the plan's spaces.
 One thread asks at a time.
@@ -19,7 +19,7 @@ from echostep.plan.places.standing import StandingGround
 from echostep.plan.places.whereabouts import Whereabouts
 from echostep.ports.people.check_in import CheckIn
 
-ASIDE_M = 1.0  # a check-in that is farther than this outside the ellipse of a fitting place is doubted; assumed
+DOUBTED_M = 1.0  # a check-in that is farther than this outside the ellipse of a fitting place is doubted; assumed
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Taps:
         self._last: tuple[Estimate | None, str, tuple[str, ...]] = (None, "", ())
 
     def where(self, estimate: Estimate) -> str:
-        """The place of an estimate in words; all pages of a live run ask for the same one."""
+        """The place of an estimate in words; cached, for all pages of a live run show the same one."""
         return self._words(estimate)[0]
 
     def places(self, estimate: Estimate) -> tuple[str, ...]:
@@ -103,7 +103,7 @@ class Taps:
         if scene is None or estimate is None:
             return [heading]
         away_m = math.dist((x_m, y_m), (estimate.x_m, estimate.y_m))
-        moved = estimate.level != check_in.level or away_m > estimate.ellipse95.major_m + ASIDE_M
+        moved = estimate.level != check_in.level or away_m > estimate.ellipse95.major_m + DOUBTED_M
         changes = [f"{format_metres(away_m)} from the estimate."] if estimate.level == check_in.level else []
         if moved and scene.echoes_fit and estimate.status is TrackStatus.TRACKING:
             changes.append("The echoes fit the estimate: are you sure?")

@@ -151,5 +151,5 @@ def _segments(lines: Iterable[BaseGeometry]) -> Floats:
     for line in pieces(lines):
         points = np.asarray(line.simplify(FLAT_M).coords)[:, :2].round(3)
         rows.append(np.concatenate((points[:-1], points[1:]), axis=1))
-    found = np.concatenate(rows)
-    return found[(found[:, :2] != found[:, 2:]).any(1)]
+    segments = np.concatenate(rows)
+    return segments[(segments[:, :2] != segments[:, 2:]).any(1)]

@@ -73,10 +73,10 @@ def _polygon(rings: Any, where: str, earth: EarthTransform) -> Polygon:
     rings = [_metres(corners, where, earth) for corners in typed(rings, where, list)]
     if not rings or any(len(corners) < 4 for corners in rings):
         raise ValueError(f"{where}: a polygon needs rings of four positions or more")
-    found = Polygon(rings[0], rings[1:])
-    if found.is_valid:
-        return found
-    parts = [part for part in shapely.get_parts(shapely.make_valid(found)) if isinstance(part, Polygon)]
+    polygon = Polygon(rings[0], rings[1:])
+    if polygon.is_valid:
+        return polygon
+    parts = [part for part in shapely.get_parts(shapely.make_valid(polygon)) if isinstance(part, Polygon)]
     return max(parts, key=lambda part: part.area, default=Polygon())
 
 

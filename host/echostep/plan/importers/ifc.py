@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Building models (IFC; needs `pip install echostep[ifc]`) -> `Plan`.
 
-In: an .ifc file. Out: `Plan`. Owns nothing. Each storey is cut by a horizontal plane one metre above its floor: the sections of walls, columns and
+In: an .ifc file. Out: `Plan`. Owns nothing. Each level is cut by a horizontal plane one metre above its floor: the sections of walls, columns and
 curtain walls become walls, so that doors are gaps. Windows, doors, stairs and lifts are rectangles, seen from above.
 """
 
@@ -36,7 +36,7 @@ SEEN = (*WALLS, *CONNECTOR_KINDS, "IfcWindow", "IfcDoor", "IfcSpace")
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class SolidBody:
     """An element as triangles: corners (n, 3) in metres, faces (m, 3) as indices of corners."""
 
     element: Any
@@ -67,8 +67,8 @@ class Body:
 def import_ifc(path: Path) -> Plan:
     """Import the building of a model; raises EchostepError that names the file and the element."""
     model = _open(path)
-    floors = _floors(model, path)
-    drawn_levels = [DrawnLevel(name, height) for name, height in floors]
+    levels = _level_heights(model, path)
+    drawn_levels = [DrawnLevel(name, height) for name, height in levels]
     count = 0
     for body in _bodies(model, path):
         count += 1
@@ -97,25 +97,25 @@ def _open(path: Path) -> Any:
         raise EchostepError(f"{path}: not an IFC file: {' '.join(str(error).split())[:200]}") from error
 
 
-def _floors(model: Any, path: Path) -> list[tuple[str, float]]:
-    """Names and heights (m) of the model's storeys, from the lowest."""
+def _level_heights(model: Any, path: Path) -> list[tuple[str, float]]:
+    """Names and heights (m) of the model's levels, from the lowest."""
     elevation: Any = import_module("ifcopenshell.util.placement").get_storey_elevation
     try:
         scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
-        found = [
+        levels = [
             (str(s.LongName or s.Name or "storey")[:80], float(elevation(s)) * scale_m)
             for s in model.by_type("IfcBuildingStorey")
         ]
     except Exception as error:
         raise EchostepError(f"{path}: its storeys cannot be read: {' '.join(str(error).split())[:200]}") from error
-    if not found or not all(abs(height) <= LIMIT_M for _, height in found):
+    if not levels or not all(abs(height) <= LIMIT_M for _, height in levels):
         raise EchostepError(
-            f"{path}: {'a storey has no sane height' if found else 'no IfcBuildingStorey'}: export the model with its storeys"
+            f"{path}: {'a storey has no sane height' if levels else 'no IfcBuildingStorey'}: export the model with its storeys"
         )
-    return sorted(((name, round(height, 6)) for name, height in found), key=lambda floor: floor[1])
+    return sorted(((name, round(height, 6)) for name, height in levels), key=lambda level: level[1])
 
 
-def _bodies(model: Any, path: Path) -> Iterator[Body]:
+def _bodies(model: Any, path: Path) -> Iterator[SolidBody]:
     """All elements that a plan shows, in the model's world coordinates in metres; elements without a usable shape are left out."""
     geometry: Any = import_module("ifcopenshell.geom")
     settings = geometry.settings()
@@ -135,10 +135,10 @@ def _bodies(model: Any, path: Path) -> Iterator[Body]:
             raise EchostepError(
                 f"{path}: {element.is_a()} #{element.id()}: further than {LIMIT_M / 1000:.0f} km from the origin"
             )
-        yield Body(element, corners, faces)
+        yield SolidBody(element, corners, faces)
 
 
-def _place(drawn_levels: list[DrawnLevel], body: Body) -> None:
+def _place(drawn_levels: list[DrawnLevel], body: SolidBody) -> None:
     kind = next(kind for kind in SEEN if body.element.is_a(kind))
     low, high = body.z_m
     name = str(getattr(body.element, "LongName", None) or getattr(body.element, "Name", None) or "")[:80]
@@ -159,7 +159,7 @@ def _place(drawn_levels: list[DrawnLevel], body: Body) -> None:
             drawn.rooms += [room(name or "room", area) for area in body.cut(z)]
 
 
-def _place_way(drawn_levels: list[DrawnLevel], body: Body, kind: ConnectorKind, name: str) -> None:
+def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorKind, name: str) -> None:
     """Add stairs, a ramp or a lift to all levels between its lowest and its highest corner."""
     if kind == "lift" and str(getattr(body.element, "PredefinedType", "ELEVATOR")) not in (
         "ELEVATOR",
@@ -181,8 +181,8 @@ def _crossings(three: Floats, z_m: float) -> Floats:
     tip = three[rows, alone]
     others = np.stack((three[rows, (alone + 1) % 3], three[rows, (alone + 2) % 3]), axis=1)
     part = (z_m - tip[:, None, 2]) / (others[:, :, 2] - tip[:, None, 2])
-    found: Floats = tip[:, None, :2] + part[:, :, None] * (others[:, :, :2] - tip[:, None, :2])
-    return found
+    crossings: Floats = tip[:, None, :2] + part[:, :, None] * (others[:, :, :2] - tip[:, None, :2])
+    return crossings
 
 
 def _georeference(model: Any) -> Georeference | None:

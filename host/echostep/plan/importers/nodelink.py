@@ -38,10 +38,10 @@ class Node(NamedTuple):
 def import_nodelink(core: Path) -> Plan:
     """Import the building of a core.txt; raises EchostepError that names the file and the line."""
     settings = {row[0]: row[1:] for _, row in _rows(core, 1)}
-    floors = int(_setting(core, settings, "floor", MOST_FLOORS))
+    levels = int(_setting(core, settings, "floor", MOST_FLOORS))
     height_m = _setting(core, settings, "height", 100.0)
-    nodes = _nodes(_beside(core, settings, "node"), floors, _setting(core, settings, "scale", 1000.0))
-    drawn_levels = [DrawnLevel(f"floor {i}", i * height_m) for i in range(floors)]
+    nodes = _nodes(_beside(core, settings, "node"), levels, _setting(core, settings, "scale", 1000.0))
+    drawn_levels = [DrawnLevel(f"floor {i}", i * height_m) for i in range(levels)]
     for where, row in _rows(_beside(core, settings, "link"), 4, skip=1):
         a, b = (_node(nodes, text, where) for text in row[2:4])
         if a.layer != b.layer:
@@ -52,13 +52,13 @@ def import_nodelink(core: Path) -> Plan:
     return Plan(core.parent.name, tuple(s.level() for s in drawn_levels), None, "", join_connectors(drawn_levels))
 
 
-def _nodes(path: Path, floors: int, scale_m: float) -> dict[str, Node]:
+def _nodes(path: Path, levels: int, scale_m: float) -> dict[str, Node]:
     """All nodes in metres; y points up and is 0 at the lowest node."""
     nodes = {}
     for where, row in _rows(path, 4, skip=1):
         layer, x, y = (_number(text, where) for text in row[1:4])
-        if layer not in range(floors):
-            raise EchostepError(f"{where}: floor {row[1]} of {floors}")
+        if layer not in range(levels):
+            raise EchostepError(f"{where}: floor {row[1]} of {levels}")
         if max(abs(x), abs(y)) * scale_m > LIMIT_M / 2:
             raise EchostepError(f"{where}: further than {LIMIT_M / 2000:.0f} km from the origin")
         nodes[row[0]] = Node(int(layer), round(x * scale_m, 3), -y * scale_m)

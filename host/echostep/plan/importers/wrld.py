@@ -32,21 +32,21 @@ def import_wrld(path: Path, storey_height_m: float) -> Plan:
     try:
         tree = typed(tree, "the file", dict)
         georeference = _georeference(tree)
-        floors = sorted(
+        levels = sorted(
             (
                 _floor(row, f"levels[{i}]", path.parent)
                 for i, row in enumerate(typed(tree.get("levels"), "levels", list))
             ),
-            key=lambda floor: floor[0],
+            key=lambda level: level[0],
         )
-        if not floors:
+        if not levels:
             raise ValueError("levels: a plan needs at least one level")
         name = text(tree.get("name", path.parent.name), "name")
     except ValueError as error:
         raise EchostepError(f"{path}: {error}") from error
     earth = EarthTransform(georeference)
-    drawn_levels = [_storey(file, floor_name, round(z * storey_height_m, 6), earth) for z, floor_name, file in floors]
-    _open_floors(drawn_levels)
+    drawn_levels = [_level(file, level_name, round(z * storey_height_m, 6), earth) for z, level_name, file in levels]
+    _open_levels(drawn_levels)
     return Plan(
         name, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels), georeference
     )
@@ -70,7 +70,7 @@ def _floor(row: Any, where: str, folder: Path) -> tuple[int, str, Path]:
     return int(number(row.get("z_order"), f"{where}.z_order", 1000, "floors")), name, folder / file
 
 
-def _storey(file: Path, name: str, height_m: float, earth: EarthTransform) -> DrawnLevel:
+def _level(file: Path, name: str, height_m: float, earth: EarthTransform) -> DrawnLevel:
     drawn = DrawnLevel(name, height_m)
     tree = parse_json(read_text(file), str(file))
     try:
@@ -83,9 +83,9 @@ def _storey(file: Path, name: str, height_m: float, earth: EarthTransform) -> Dr
     return drawn
 
 
-def _place(drawn: DrawnLevel, kind: str, name: str, found: BaseGeometry) -> None:
+def _place(drawn: DrawnLevel, kind: str, name: str, shape: BaseGeometry) -> None:
     """Add a feature to a level; kinds that plans do not have (outlines, landscaping) are left out."""
-    for area in areas([found]):
+    for area in areas([shape]):
         if kind == "wall":
             drawn.walls.append(area)
         elif kind == "window":
@@ -102,7 +102,7 @@ def _place(drawn: DrawnLevel, kind: str, name: str, found: BaseGeometry) -> None
             drawn.rooms.append(room(name or kind.replace("_", " ").capitalize(), area))
 
 
-def _open_floors(drawn_levels: list[DrawnLevel]) -> None:
+def _open_levels(drawn_levels: list[DrawnLevel]) -> None:
     """An opening in the floor above stairs is their upper end; any other opening cannot be walked on."""
     for below, drawn in pairwise([DrawnLevel("", 0.0), *drawn_levels]):
         for area in drawn.openings:

@@ -36,14 +36,14 @@ class Faces:
 
     def indices_of(self, points: Floats) -> NDArray[np.intp]:
         """Points (n, 2) in metres -> (n,) index of the face around each, OUTSIDE where there is none."""
-        found = np.full(len(points), OUTSIDE, dtype=np.intp)
+        indices = np.full(len(points), OUTSIDE, dtype=np.intp)
         which, face = (
             self.tree.query(shapely.points(points), predicate="intersects")
             if len(points)
             else np.zeros((2, 0), dtype=np.intp)
         )
-        found[which] = face
-        return found
+        indices[which] = face
+        return indices
 
 
 def find_faces(level: Level) -> Faces:
@@ -95,8 +95,8 @@ def _join(leader: dict[Face, Face], one: Face, other: Face) -> None:
 def door_faces(doors: Sequence[Door], faces: Faces) -> list[tuple[int, int]]:
     """The two faces that each door separates."""
     sides = np.array([_beside(door) for door in doors]).reshape(-1, 2)
-    found = faces.indices_of(sides).reshape(-1, 2)
-    return [(int(a), int(b)) for a, b in found]
+    pairs = faces.indices_of(sides).reshape(-1, 2)
+    return [(int(a), int(b)) for a, b in pairs]
 
 
 def _beside(door: Door) -> tuple[tuple[float, float], tuple[float, float]]:

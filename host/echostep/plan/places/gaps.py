@@ -15,7 +15,7 @@ from echostep.plan.model import Door, Level
 
 # Assumed:
 NARROWEST_M, WIDEST_M = 0.5, 1.6  # of an opening that a door could close
-JAMB_M = 0.3  # a shorter wall at the end of another one is a jamb: the longer one still ends free
+LONGEST_JAMB_M = 0.3  # a shorter wall at the end of another one is a jamb: the longer one still ends free
 TOUCH_M = 0.02  # walls with a smaller distance touch
 THICKNESS_M = 0.05  # an opening ends at this distance from its own wall's end at the earliest
 
@@ -37,14 +37,14 @@ def door_gaps(level: Level) -> tuple[Door, ...]:
     nearest_m = np.full(len(begin), np.inf)
     np.minimum.at(nearest_m, ray, reach_m)
     fits = (nearest_m >= NARROWEST_M) & np.isfinite(nearest_m)
-    found = np.concatenate((begin[fits], (begin + np.where(fits, nearest_m, 0.0)[:, None] * outward)[fits]), axis=1)
-    return tuple(Door((float(a), float(b), float(c), float(d))) for a, b, c, d in _once(found))
+    gaps = np.concatenate((begin[fits], (begin + np.where(fits, nearest_m, 0.0)[:, None] * outward)[fits]), axis=1)
+    return tuple(Door((float(a), float(b), float(c), float(d))) for a, b, c, d in _once(gaps))
 
 
 def _free_ends(walls: Floats, lines: Floats, level: Level) -> tuple[Floats, Floats]:
     """Ends (k, 2) of walls that touch neither a longer wall than a jamb nor a listed door, and the direction (k, 2) in which their wall points."""
     length = np.hypot(*(walls[:, 2:] - walls[:, :2]).T)
-    long = length > JAMB_M
+    long = length > LONGEST_JAMB_M
     ends = walls[long].reshape(-1, 2)
     along = (walls[long, 2:] - walls[long, :2]) / length[long, None]
     outward = np.stack((-along, along), axis=1).reshape(-1, 2)
@@ -54,14 +54,14 @@ def _free_ends(walls: Floats, lines: Floats, level: Level) -> tuple[Floats, Floa
     free[end[end // 2 != other]] = False
     if level.doors:
         doors = shapely.linestrings(np.array([door.line for door in level.doors]).reshape(-1, 2, 2))
-        free[shapely.STRtree(doors).query(points, predicate="dwithin", distance=JAMB_M)[0]] = False
+        free[shapely.STRtree(doors).query(points, predicate="dwithin", distance=LONGEST_JAMB_M)[0]] = False
     return ends[free], outward[free]
 
 
 def _once(gaps: Floats) -> list[list[float]]:
     """Gaps (n, 4) without those that were found from their other end too."""
-    kept: dict[tuple[float, float], list[float]] = {}
+    unique: dict[tuple[float, float], list[float]] = {}
     for row in gaps.tolist():
         middle = round((row[0] + row[2]) / 2, 1), round((row[1] + row[3]) / 2, 1)
-        kept.setdefault(middle, row)
-    return list(kept.values())
+        unique.setdefault(middle, row)
+    return list(unique.values())

@@ -25,7 +25,7 @@ def narrowest_opening(segments: Floats, at_m: tuple[float, float]) -> tuple[floa
     walls = shapely.union_all(shapely.linestrings(within(segments, window.bounds).reshape(-1, 2, 2)))
     if walls.is_empty or walls.distance(Point(at_m)) < WIDTHS_M[0]:
         return None
-    low, high, found = 0, len(WIDTHS_M) - 1, None
+    low, high, opening = 0, len(WIDTHS_M) - 1, None
     while low <= high:  # bisection for the smallest thickness that closes the room
         middle = (low + high) // 2
         free = _free(window, walls, at_m, WIDTHS_M[middle])
@@ -33,13 +33,13 @@ def narrowest_opening(segments: Floats, at_m: tuple[float, float]) -> tuple[floa
             low = middle + 1
         else:
             high = middle - 1
-            found = (free, WIDTHS_M[middle])
-    if found is None or found[0] is None:
+            opening = (free, WIDTHS_M[middle])
+    if opening is None or opening[0] is None:
         return None
     across = shapely.shortest_line(
-        *found[0]
+        *opening[0]
     )  # from the room to the outside: through the opening that the thickness has closed
-    return None if across.intersects(walls) else (float(across.centroid.x), float(across.centroid.y), found[1])
+    return None if across.intersects(walls) else (float(across.centroid.x), float(across.centroid.y), opening[1])
 
 
 def _free(

@@ -15,7 +15,7 @@ from echostep.plan.findings import PlanFinding
 from echostep.plan.model import Level, Plan, Room
 from echostep.plan.places.faces import OUTSIDE, Face, Faces, connected_groups, door_faces, leader_of
 
-MANY_CLOSED = 5  # from so many rooms without a door on a level, their cause is told once; assumed
+MANY_CLOSED = 5  # from so many rooms without a door on a level, their cause is reported once; assumed
 
 
 def unreachable_rooms(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFinding]:

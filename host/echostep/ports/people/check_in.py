@@ -50,7 +50,7 @@ class Undo:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """The wearer asks for help (`help` True), or says that all is well."""
+    """The wearer asks for help (`help` True), or withdraws the call."""
 
     help: bool
 
@@ -73,7 +73,7 @@ def parse_person(payload: bytes) -> CheckIn | Undo | Call | None:
 
 
 def call_of(tree: Any) -> Call | None:
-    """The call in a JSON object; None when it says neither."""
+    """The call in a JSON object; None when it is none."""
     wanted = tree.get("help") if isinstance(tree, dict) else None
     return Call(wanted) if isinstance(wanted, bool) else None
 

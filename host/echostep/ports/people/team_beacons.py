@@ -52,8 +52,8 @@ _DECODER = msgspec.json.Decoder(TeamBeacons)
 
 def parse_team_beacons(payload: bytes) -> TeamBeacons | None:
     """The message in a chunk; None when the bytes are none, name a beacon twice, or hold no covariance."""
-    told = decoded(payload, _DECODER, MOST_BYTES)
-    if told is None:
+    message = decoded(payload, _DECODER, MOST_BYTES)
+    if message is None:
         return None
-    is_unique = len({b.number for b in told.beacons}) == len(told.beacons)
-    return told if is_unique and all(has_covariance(b) for b in told.beacons) else None
+    is_unique = len({b.number for b in message.beacons}) == len(message.beacons)
+    return message if is_unique and all(has_covariance(b) for b in message.beacons) else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Teammate: where another wearer is, as a chunk of the port `TEAM`, so that a rescuer's recording holds what the guidance was told.
+"""Teammate: where another wearer is, as a chunk of the port `TEAM`, so that a rescuer's recording holds the places that its guidance used.
 
 In: a position from a team report. Out: the bytes of a chunk, and a `Teammate` from such bytes, which may be damaged or hostile. Owns the limits.
 """

@@ -26,7 +26,7 @@ MESSAGES_PER_UPDATE = 5000  # of the progress bar
 LONGEST_LINE = 4000  # characters
 LONGEST_VALUE = 100  # characters of a metadata value on the line of its key
 DECODED_AT_ONCE = 1 << 16  # bytes of one port
-GAP_S = 1.0  # a longer time between two chunks of a port is counted as a gap
+COUNTED_GAP_S = 1.0  # a longer time between two chunks of a port is counted as a gap
 
 
 @dataclass
@@ -37,13 +37,13 @@ class PortContents:
     received: int = 0  # bytes
     last_ns: int = 0  # arrival of the newest chunk
     longest_gap_s: float = 0.0
-    gaps: int = 0  # longer than `GAP_S`
+    gaps: int = 0  # longer than `COUNTED_GAP_S`
 
     def add(self, message: RecordedMessage) -> None:
         """Count one chunk."""
         gap_s = (message.t_ns - self.last_ns) * 1e-9 if self.chunks else 0.0
         self.longest_gap_s = max(self.longest_gap_s, gap_s)
-        self.gaps += gap_s > GAP_S
+        self.gaps += gap_s > COUNTED_GAP_S
         self.chunks += 1
         self.received += len(message.body)
         self.last_ns = message.t_ns

@@ -54,20 +54,20 @@ def cut(path: Path, begin_s: float, end_s: float, out: Path) -> list[str]:
     begin_ns = first_ns + round(begin_s * 1e9)
     end_ns = first_ns + round(end_s * 1e9) if math.isfinite(end_s) else AFTER_ALL_NS
     start = _start_at(path, begin_ns) if begin_s > 0.0 else None
-    recovery, kept = Recovery(path), Contents()
+    recovery, contents = Recovery(path), Contents()
 
     def metadata() -> Metadata:
         new_start = {} if begin_s == 0.0 else {START: start or "unknown"}
         return {**recovery.metadata, **new_start, "cut": f"{begin_s:g} to {end_s:g} s of {path.name}"}
 
     with RewrittenRecording(out, path, recovery.schemas) as rewritten:
-        messages = (m for m in with_progress(recovery, kept, f"cutting {path.name}") if begin_ns <= m.t_ns < end_ns)
-        _copy(messages, rewritten, kept, metadata)
-        if not kept.ports:
+        messages = (m for m in with_progress(recovery, contents, f"cutting {path.name}") if begin_ns <= m.t_ns < end_ns)
+        _copy(messages, rewritten, contents, metadata)
+        if not contents.ports:
             raise EchostepError(
                 f"{path}: nothing was recorded from {begin_s:g} to {end_s:g} s; see echostep info {path}"
             )
-    lines = [f"{out}: {kept.chunks} chunks, {kept.seconds:.1f} s"]
+    lines = [f"{out}: {contents.chunks} chunks, {contents.seconds:.1f} s"]
     if begin_s > 0.0 and start is None:
         lines.append("The position at the start of the piece is not recorded: replay it with --start X,Y,DEG")
     return lines

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from echostep.board.frames import BoardReader, StaleFirmwareError, encode
 from echostep.board.messages import Identify
-from echostep.board.subscription import SUBSCRIBE, Subscription
+from echostep.board.subscription import SUBSCRIBE, BoardSubscription
 from echostep.errors import EchostepError
 from echostep.interruption import holding_signals, raise_held
 from echostep.localization.particles.start import Start
@@ -71,7 +71,7 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -
 
 
 def _last_start(folder: Path, plan: Plan, board: str, settings: Settings) -> Start:
-    """The start where the last run in a folder ended, told on the terminal."""
+    """The start where the last run in a folder ended; it is printed."""
     start, words = start_last(read_kept(folder), plan, board, settings.climb, datetime.now(UTC))
     console.print(words, markup=False, highlight=False)
     return start
@@ -107,7 +107,7 @@ def _passed(seconds: float | None) -> Callable[[], float | None]:
 
 
 def _identify(ports: SerialPorts) -> None:
-    """Ask each board who it is."""
+    """Request each board's identity."""
     for name in (BOARD, FOOT):
         if name in ports.names:
             ports.send(name, encode(Identify(), 0))
@@ -127,7 +127,7 @@ def _recorded_chunks(
     seconds: float | None,
     session: Session | None = None,
 ) -> Iterator[Chunk | None]:
-    """Chunks of the ports, check-ins and meetings of the page, what teammates tell, each recorded before anything sees it; the MTx is set up."""
+    """Chunks of the ports, check-ins and meetings of the page, messages of teammates, each recorded before it is used; the MTx is set up."""
     chunks = _chunks_for(ports, seconds)
     if session is not None:
         chunks = with_check_ins(chunks, session.page, lambda _: now_ns())
@@ -152,7 +152,7 @@ def _chunks_for(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk | N
 
 def _with_subscription(chunks: Iterable[Chunk | None], ports: SerialPorts) -> Iterator[Chunk | None]:
     """The same chunks, while each board is asked for its optional messages at the start and whenever it has restarted."""
-    boards = {name: (BoardReader(), Subscription()) for name in (BOARD, FOOT)}
+    boards = {name: (BoardReader(), BoardSubscription()) for name in (BOARD, FOOT)}
     for chunk in chunks:
         if chunk is not None and chunk.port in boards:
             board, subscription = boards[chunk.port]

@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 from echostep.page.elements.marks import ShownMark
 from echostep.team.endpoint import Endpoint, Outlet
-from echostep.team.inbox import Inbox, Receiver
+from echostep.team.inbox import Inbox, ListenerThread
 from echostep.team.messages.marks import MARKS, MarkBoard, acks_of
 from echostep.team.messages.report import BadReportError
 from echostep.team.mqtt.publisher import Listener
@@ -23,7 +23,7 @@ LOOK_S = 0.5  # between two looks at what was heard; assumed
 
 
 class MarkFeed:
-    """`news` gives the marks when they have changed; messages that are not believed are counted in `rejected`."""
+    """`news` gives the marks when they have changed; rejected messages are counted in `rejected`."""
 
     def __init__(
         self, broker: Endpoint, outlet: Outlet, run: str, plan_sha256: str, print_line: Callable[[str], None]
@@ -35,7 +35,7 @@ class MarkFeed:
         self._inbox, self._board = Inbox(), MarkBoard()
         self._shown: tuple[ShownMark, ...] = ()
         self._looked_s = -math.inf
-        self._receiver = Receiver(
+        self._receiver = ListenerThread(
             Listener(broker, [MARKS, acks_of(outlet.team, outlet.name)], self._inbox.put),
             lambda text: print_line(f"{broker}: marks: {text}"),
         )
@@ -61,7 +61,7 @@ class MarkFeed:
         return shown
 
     def acknowledged_by(self, number: int) -> str | None:
-        """The commander who has acknowledged the alarm of this number; of what the last `news` has heard."""
+        """The commander that acknowledged the alarm of this number, as of the last call of `news`."""
         ack = self._board.acks.get((self._team, self._name, f"{self._run}-{number}"))
         return ack.by if ack else None
 

@@ -2,7 +2,7 @@
 """The team feed: the newest place of one other wearer, from the broker that a run publishes to.
 
 In: reports of all teams on the broker. Out: payloads of chunks of the port `TEAM`, at most one a second. Owns the subscription, its thread and the
-roster of what was heard; the tracker never waits for it.
+roster of received reports; the tracker never waits for it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from echostep.plan.model import Plan
 from echostep.ports.people.teammate import Teammate
 from echostep.team.commander import update_roster
 from echostep.team.endpoint import Outlet
-from echostep.team.inbox import Inbox, Receiver
+from echostep.team.inbox import Inbox, ListenerThread
 from echostep.team.mqtt.publisher import Listener
 from echostep.team.roster import Member, MemberState, Roster
 
@@ -38,7 +38,7 @@ class TeamFeed:
         self._looked_s = self._told_s = -math.inf
         self._warned = False
         listener = Listener(broker, [f"echostep/+/{name}/+"], self._inbox.put)
-        self._receiver = Receiver(listener, lambda text: print_line(f"{broker}: {text}"))
+        self._receiver = ListenerThread(listener, lambda text: print_line(f"{broker}: {text}"))
 
     def pop(self) -> Iterator[bytes]:
         """The wearer's place as the bytes of a chunk, when it is new; never waits."""
@@ -65,7 +65,7 @@ class TeamFeed:
         ))  # fmt: skip
 
     def _place(self, m: Member, now_s: float) -> Teammate | None:
-        """Where a member is on this plan; None when it is tracked on another one, which is said once."""
+        """Where a member is on this plan; None when it is tracked on another one, which is reported once."""
         p = m.position(now_s)
         if p is None or m.report.plan_sha256 != self._plan.digest or not 0 <= p.floor < len(self._plan.levels):
             if not self._warned:
@@ -73,7 +73,7 @@ class TeamFeed:
                 self._print_line(f"{self._name} is tracked on another plan ({m.report.plan}): no way can be found")
             return None
         words = ", ".join(filter(None, (f"on {p.floor_name}" if p.floor_name else "", p.where)))
-        # Centimetres: the same place is told once
+        # Rounded to centimetres: an unchanged place is passed on once
         return Teammate(
             m.report.name, round(p.x_m, 2), round(p.y_m, 2), p.floor, round(min(p.radius95_m, 1e7), 1), words
         )

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The teammate feed: teammates whom the wearer may have met, from the broker that a run publishes to.
 
-In: messages of the own team; the beacons that this wearer has placed, and what its walk has drawn. Out: names of teammates who are heard on this
+In: messages of the own team; the beacons that this wearer has placed, and what its walk has drawn. Out: names of teammates with reports on this
 plan, when they change; the bytes of a `Meeting` with one of them, and of the beacons that they share; this wearer's own and its drawing for the
-broker. Owns the subscription, its thread and the roster of what was heard; the tracker never waits for it.
+broker. Owns the subscription, its thread and the roster of received reports; the tracker never waits for it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from echostep.plan.model import Plan
 from echostep.ports.people.team_beacons import SharedBeacon, TeamBeacons, parse_team_beacons
 from echostep.team.commander import take_messages
 from echostep.team.endpoint import Endpoint, Outlet
-from echostep.team.inbox import Inbox, Receiver
+from echostep.team.inbox import Inbox, ListenerThread
 from echostep.team.messages.meeting import meeting_with
 from echostep.team.messages.shared_beacons import BEACONS, SHARE_S, beacons_message
 from echostep.team.messages.shared_drawings import drawing_topic
@@ -27,16 +27,16 @@ from echostep.team.mqtt.publisher import Listener
 from echostep.team.roster import Member, MemberState, Roster
 
 LOOK_S = 0.5  # between two looks at what was heard; assumed
-HEARD_S = 60.0  # after a longer silence a teammate is not listed; assumed
+LISTED_S = 60.0  # a teammate without a report for longer is not listed; assumed
 
 
 class TeammateFeed:
-    """`news` gives the names when they have changed, `meeting` the bytes of a chunk; reports that are not believed are counted in `rejected`."""
+    """`news` gives the names when they have changed, `meeting` the bytes of a chunk; rejected reports are counted in `rejected`."""
 
     def __init__(
         self, broker: Endpoint, outlet: Outlet, run: str, plan: Plan, print_line: Callable[[str], None]
     ) -> None:
-        """`run`: of this wearer; what an earlier run under the same name has placed is heard like a teammate's."""
+        """`run`: of this wearer; beacons placed by an earlier run under the same name are taken like a teammate's."""
         self._own, self._run, self._plan = (outlet.team, outlet.name), run, plan
         self._inbox, self._roster = Inbox(), Roster()
         self.rejected = self._roster.rejected
@@ -46,7 +46,7 @@ class TeammateFeed:
         self._taken: dict[str, tuple[float, bytes]] = {}  # those that were taken, and when
         self._shared = b""
         listener = Listener(broker, [f"echostep/{outlet.team}/+/+"], self._inbox.put)
-        self._receiver = Receiver(listener, lambda text: print_line(f"{broker}: teammates: {text}"))
+        self._receiver = ListenerThread(listener, lambda text: print_line(f"{broker}: teammates: {text}"))
 
     def news(self) -> tuple[str, ...] | None:
         """Names of the teammates, sorted; None when they are the same as before. Never waits."""
@@ -60,7 +60,7 @@ class TeammateFeed:
         return names
 
     def meeting(self, name: str) -> bytes | None:
-        """A meeting with a teammate now, by the newest report; None when none is heard by this name."""
+        """A meeting with a teammate now, by the newest report; None when there is no report under this name."""
         now_s = time.monotonic()
         member = self._members(now_s).get(name)
         position = None if member is None else member.position(now_s)
@@ -80,17 +80,17 @@ class TeammateFeed:
         return [self._placed.pop(name) for name in due]
 
     def share(self, own_beacons: Callable[[], tuple[SharedBeacon, ...] | None]) -> None:
-        """Tell the team the beacons that this wearer has placed, every SHARE_S when they have changed; None: nothing is known of them now."""
+        """Publish the beacons that this wearer has placed, every SHARE_S when they have changed; None: they are unknown at present."""
         now_s = time.monotonic()
         if now_s - self._shared_s < SHARE_S or (beacons := own_beacons()) is None:
             return
-        told = TeamBeacons(1, self._own[1], self._run, self._plan.digest, beacons)
-        topic, payload = beacons_message(self._own[0], told)
+        message = TeamBeacons(1, self._own[1], self._run, self._plan.digest, beacons)
+        topic, payload = beacons_message(self._own[0], message)
         if payload != self._shared and (beacons or self._shared) and self._receiver.send(topic, payload):
             self._shared, self._shared_s = payload, now_s
 
     def share_drawing(self, drawing: SharedDrawing) -> None:
-        """Tell the team the newest drawing, every SHARE_S when there is a newer one and the last one has been sent."""
+        """Publish the newest drawing, every SHARE_S when there is a newer one and the last one has been sent."""
         now_s = time.monotonic()
         if now_s - self._drawing_s < SHARE_S or not self._receiver.sent_all:
             return
@@ -103,29 +103,29 @@ class TeammateFeed:
         self._receiver.close()
 
     def _members(self, now_s: float) -> dict[str, Member]:
-        """The latest heard run of each teammate who has a position on this plan, by name."""
+        """The run with the newest report of each teammate with a position on this plan, by name."""
         self._look(now_s)
-        heard = [
+        members = [
             m for m in self._roster.members(now_s)
             if (m.report.team, m.report.name) != self._own and m.report.position is not None
-            and m.report.plan_sha256 == self._plan.digest and m.silent_s(now_s) < HEARD_S
+            and m.report.plan_sha256 == self._plan.digest and m.silent_s(now_s) < LISTED_S
             and m.state(now_s) is not MemberState.ENDED
         ]  # fmt: skip
-        return {m.report.name: m for m in sorted(heard, key=lambda m: -m.silent_s(now_s))}
+        return {m.report.name: m for m in sorted(members, key=lambda m: -m.silent_s(now_s))}
 
     def _look(self, now_s: float) -> None:
-        """Move what was heard into the roster, and note the beacons."""
+        """Move received messages into the roster, and note the beacons."""
         self._looked_s = now_s
         for message in take_messages(*self._inbox.take_all(), self._roster):
             if message.topic is not None and message.topic.endswith(f"/{BEACONS}"):
                 self._note_beacons(message.payload)
 
     def _note_beacons(self, payload: bytes) -> None:
-        told = parse_team_beacons(payload)
-        if told is None or told.run == self._run or told.plan_sha256 != self._plan.digest:
+        message = parse_team_beacons(payload)
+        if message is None or message.run == self._run or message.plan_sha256 != self._plan.digest:
             return
         names = self._placed.keys() | self._taken.keys()
-        if told.name not in names and len(names) >= MOST_TEAMMATES:
+        if message.name not in names and len(names) >= MOST_TEAMMATES:
             self._roster.count_rejected(f"beacons of more than {MOST_TEAMMATES} wearers")
-        elif payload != self._taken.get(told.name, (0.0, b""))[1]:
-            self._placed[told.name] = payload
+        elif payload != self._taken.get(message.name, (0.0, b""))[1]:
+            self._placed[message.name] = payload

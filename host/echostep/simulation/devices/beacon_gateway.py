@@ -53,7 +53,7 @@ def lay_beacons(path_m: Floats, spacing_m: float, rng: np.random.Generator) -> F
 def heard_at(
     world: BeaconWorld, x_m: float, y_m: float, rng: np.random.Generator
 ) -> Iterator[tuple[int, float, float]]:
-    """Beacon, range (m) and bearing (rad) of all that hear a boot there."""
+    """Beacon, range (m) and bearing (rad) of all beacons that detect a boot there."""
     for k, (bx, by, axis) in enumerate(world.places.tolist()):
         distance = math.hypot(x_m - bx, y_m - by)
         if distance > world.reach_m or _hidden(world.walls, bx, by, x_m, y_m):
@@ -64,7 +64,7 @@ def heard_at(
 
 
 def message(number: int, range_m: float, bearing_rad: float, gateway_s: float) -> Beacon:
-    """What the gateway says of one measurement; the unit is the number's own."""
+    """The gateway's message of one measurement; each number has a unit of its own."""
     return Beacon(
         gateway_ms=round(1e3 * gateway_s) & 0xFFFFFFFF,
         unit=0xBEAC0000 + number,

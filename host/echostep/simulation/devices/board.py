@@ -36,7 +36,7 @@ PRESSURE_US = {m.PressureMode.HIGH_SPEED: 1e6 / 9.0, m.PressureMode.HIGH_RESOLUT
 
 
 class Board(Protocol):
-    """What the simulation asks of a board."""
+    """Interface of a simulated board."""
 
     def advance(self, rows: NDArray[Any]) -> Sent:
         """Let n milliseconds pass; bytes that left the board meanwhile."""
@@ -67,13 +67,13 @@ class PythonBoard:
     def advance(self, rows: NDArray[Any]) -> Sent:
         """Let n milliseconds pass."""
         start_us = 1000 * self._ms
-        found: list[tuple[int, m.Message]] = [(start_us, answer) for answer in self._answers]
+        messages: list[tuple[int, m.Message]] = [(start_us, answer) for answer in self._answers]
         self._answers = []
-        found += self._reports(rows) + self._edges(rows) + self._samples(rows)
-        found += self._rangers.advance(start_us, rows, self._configuration.sensors)
-        found.sort(key=itemgetter(0))
+        messages += self._reports(rows) + self._edges(rows) + self._samples(rows)
+        messages += self._rangers.advance(start_us, rows, self._configuration.sensors)
+        messages.sort(key=itemgetter(0))
         self._ms += len(rows)
-        return [self._sent(us, message) for us, message in found]
+        return [self._sent(us, message) for us, message in messages]
 
     def may_range(self, count: int) -> NDArray[np.bool_]:
         """Of the next `count` milliseconds those whose echoes may be looked at; orders in between may change them."""
@@ -90,7 +90,7 @@ class PythonBoard:
                 self._configure(message)
 
     def fault(self, text: str) -> None:
-        """The Python board knows no faults."""
+        """Ignored: the Python board has no faults."""
         raise EchostepError(f"{text}: the Python board has no fault switches; build the twin (make demo)")
 
     def close(self) -> None:
@@ -118,15 +118,15 @@ class PythonBoard:
 
     def _reports(self, rows: NDArray[Any]) -> list[tuple[int, m.Message]]:
         """Identification at the start; identification and state once a second."""
-        found: list[tuple[int, m.Message]] = []
+        messages: list[tuple[int, m.Message]] = []
         for ms in range(self._ms, self._ms + len(rows)):
             if ms == 0:
-                found += [(0, message) for message in self._introduction(0)]
+                messages += [(0, message) for message in self._introduction(0)]
             elif ms % 1000 == 0:
                 us = 1000 * ms
-                found += [(us, self._introduction(us)[0]), (us, self._status(us))]
-                found += self._gyro_health(us, rows[ms - self._ms])
-        return found
+                messages += [(us, self._introduction(us)[0]), (us, self._status(us))]
+                messages += self._gyro_health(us, rows[ms - self._ms])
+        return messages
 
     def _status(self, us: int) -> m.Status:
         bad = self._inbox.counts.rejected & 0xFFFF
@@ -143,32 +143,32 @@ class PythonBoard:
         ]
 
     def _edges(self, rows: NDArray[Any]) -> list[tuple[int, m.Message]]:
-        found: list[tuple[int, m.Message]] = []
+        messages: list[tuple[int, m.Message]] = []
         if self._configuration.sensors & m.Sensors.SYNC:
             for k in np.flatnonzero(rows["sync_us"] != NO_SYNC).tolist():
                 us = 1000 * (self._ms + k) + int(rows["sync_us"][k])
-                found.append((us, m.Sync(_ticks(us), self._edge & 0xFFFF)))
+                messages.append((us, m.Sync(_ticks(us), self._edge & 0xFFFF)))
                 self._edge += 1
-        return found
+        return messages
 
     def _samples(self, rows: NDArray[Any]) -> list[tuple[int, m.Message]]:
         """Gyros, compass and barometer, each at its own rate."""
         c = self._configuration
         on = [bool(c.sensors & one) for one in (m.Sensors.THIGH, m.Sensors.CALF, m.Sensors.BELT)]
-        found: list[tuple[int, m.Message]] = []
+        messages: list[tuple[int, m.Message]] = []
         for us, row in self._due(rows, 1e6 / c.gyro_rate_hz) if any(on) else ():
             rates = [
                 int(row[name]) if there and us >= SELF_TEST_US else m.GYROS_INVALID
                 for name, there in zip(GYROS, on, strict=True)
             ]
-            found.append((us, m.Gyros(_ticks(us), *rates)))
+            messages.append((us, m.Gyros(_ticks(us), *rates)))
         for us, row in self._due(rows, 1e6 / c.compass_rate_hz) if c.sensors & m.Sensors.COMPASS else ():
-            found.append((us, m.Compass(_ticks(us), int(row["bearing"]))))
+            messages.append((us, m.Compass(_ticks(us), int(row["bearing"]))))
         for us, row in (
             self._due(rows, PRESSURE_US[m.PressureMode(c.pressure_mode)]) if c.sensors & m.Sensors.PRESSURE else ()
         ):
-            found.append((us, m.Pressure(_ticks(us), int(row["pressure"]), int(row["temperature"]))))
-        return found
+            messages.append((us, m.Pressure(_ticks(us), int(row["pressure"]), int(row["temperature"]))))
+        return messages
 
     def _due(self, rows: NDArray[Any], period_us: float) -> Iterator[tuple[int, Any]]:
         """Times on a grid from the start of the sensors that fall into these rows, and the row of each."""
@@ -229,7 +229,7 @@ class BoardProcess:
         self._write(b"F", text.encode())
 
     def close(self) -> None:
-        """Ask the child to end; make it, if it does not."""
+        """Request the child's end; kill it after the timeout."""
         with contextlib.suppress(EchostepError):
             self._write(b"Q", b"")
         with contextlib.suppress(OSError):

@@ -21,7 +21,7 @@ GYRO_NOISE_RAD_S = math.radians(0.5)  # rms in its 40 Hz
 GYRO_BIAS_RAD_S = math.radians(1.0)
 JITTER_SMOOTH_MS = 401  # the trunk's angle to the feet changes within a step
 
-PRESSURE_PA = 101_325.0  # at height 0
+GROUND_PRESSURE_PA = 101_325.0  # at height 0
 Mode = Literal["high-speed", "high-resolution"]
 PRESSURE_NOISE_PA: dict[Mode, float] = {
     "high-speed": 3.0,
@@ -61,19 +61,19 @@ class WornGyro:
         wander = _correlated(n, self.wander_rad_s, self.wander_s * rate_hz, rng)
         jitter = _correlated(n, self.jitter_rad, self.jitter_s * rate_hz, rng)
         shaken = np.convolve(np.where(moving, jitter, 0.0), np.ones(JITTER_SMOOTH_MS) / JITTER_SMOOTH_MS, "same")
-        found: Floats = (1.0 + scale) * rate_rad_s + walking * moving + wander + np.gradient(shaken) * rate_hz
-        return found
+        measured: Floats = (1.0 + scale) * rate_rad_s + walking * moving + wander + np.gradient(shaken) * rate_hz
+        return measured
 
 
 def _correlated(n: int, sd: float, over: float, rng: np.random.Generator) -> Floats:
     """A Gauss-Markov series (n,) of a standard deviation, correlated over so many samples."""
     from scipy.signal import lfilter
 
-    kept = math.exp(-1.0 / over)
-    drawn = sd * math.sqrt(1.0 - kept * kept) * rng.standard_normal(n)
+    correlation = math.exp(-1.0 / over)
+    drawn = sd * math.sqrt(1.0 - correlation * correlation) * rng.standard_normal(n)
     drawn[0] = sd * rng.standard_normal()
-    found: Floats = lfilter([1.0], [1.0, -kept], drawn)
-    return found
+    noise: Floats = lfilter([1.0], [1.0, -correlation], drawn)
+    return noise
 
 
 class Adis16100Model:
@@ -108,7 +108,7 @@ class Scp1000Model:
         drawn = self._rng.standard_normal((n, 3))
         drift = self._drift_pa + PRESSURE_DRIFT_PA * math.sqrt(1e-3) * np.cumsum(drawn[:, 0])
         self._drift_pa = float(drift[-1])
-        true = PRESSURE_PA * (1.0 - 2.25577e-5 * height_m) ** 5.25588 + drift if air_pa is None else air_pa
+        true = GROUND_PRESSURE_PA * (1.0 - 2.25577e-5 * height_m) ** 5.25588 + drift if air_pa is None else air_pa
         pressure = true + self._noise_pa * drawn[:, 1]
         temperature = temperature_c + TEMPERATURE_NOISE_C * drawn[:, 2]
         return np.rint(4.0 * pressure).astype(np.int64), np.rint(20.0 * temperature).astype(np.int64)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A foot board: the ICM-20649 on the foot, what it feels, as rows for a board of its own; it was not built yet.
+"""A foot board: the ICM-20649 on the foot, its inputs as rows for a board of its own; it was not built yet.
 
 In: a walk, a seeded generator, a board. Out: extended rows whose first place is the foot, in counts of the ICM-20649; the chunks of the board's port.
 Owns the part's constant errors, and the board.
@@ -85,14 +85,14 @@ def measure_foot(
     t_s: Floats = np.arange(10.0 * m.period_s, walk.t_s[-1] - 0.05, m.period_s)
     mounting = rotations(np.array([m.mounting_rpy_rad]))[0]
     force, rate = (means(v, t_s, m.period_s) for v in specific_force_and_rate(walk, mounting))
-    found = []
+    measured = []
     for true, bias, noise, unit, limit in (
         (force, biases[0], m.accel_noise_m_s2, ICM20649_M_S2, m.force_limit_counts),
         (rate, biases[1], m.gyro_noise_rad_s, ICM20649_RAD_S, m.rate_limit_counts),
     ):
         noisy = true + bias + noise * rng.standard_normal(true.shape)
-        found.append(unit * np.clip(np.rint(noisy / unit), -limit, limit))
-    return t_s, found[0], found[1]
+        measured.append(unit * np.clip(np.rint(noisy / unit), -limit, limit))
+    return t_s, measured[0], measured[1]
 
 
 class FootBoardPort:

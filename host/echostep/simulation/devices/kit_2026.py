@@ -31,7 +31,7 @@ FORCE_M_S2 = 0.244e-3 * 9.80665  # per count, 8 g [table 2]
 FORCE_NOISE_M_S2 = 0.02  # rms, 80 ug per root Hz [table 2]
 FORCE_BIAS_M_S2 = 0.2  # zero-g level, typical [table 2]
 FULL_SCALE = 32_767
-GRAVITY_M_S2 = 9.80665
+G0_M_S2 = 9.80665  # standard gravity
 BELT_TILT_RAD = math.radians(4.0)  # sd of roll and pitch; assumed
 SPREAD_MS = 20  # of the second difference of the trunk's path: the path is piecewise smooth
 FIELD_COUNTS = EARTH_T * 1e4 * 6842.0  # per earth field [LIS3MDL data sheet, table 2: 6842 per gauss]
@@ -81,17 +81,17 @@ class Kit2026Sensors:
         """True specific forces (n, 3 places, 3 axes)."""
         forces = np.zeros((len(at), 3, 3))
         for k, angle in enumerate(self._angles):
-            forces[:, k, 0] = GRAVITY_M_S2 * np.sin(angle[at])
-            forces[:, k, 1] = GRAVITY_M_S2 * np.cos(angle[at])
-        level = np.column_stack([self._ahead_left(self._trunk_m_s2[at], at), np.full(len(at), GRAVITY_M_S2)])
+            forces[:, k, 0] = G0_M_S2 * np.sin(angle[at])
+            forces[:, k, 1] = G0_M_S2 * np.cos(angle[at])
+        level = np.column_stack([self._ahead_left(self._trunk_m_s2[at], at), np.full(len(at), G0_M_S2)])
         forces[:, 2] = level @ self._tilt
         return forces
 
     def _field(self, at: Ints) -> Floats:
         """True field (n, 3) at the belt in its axes, in earth fields."""
         field = self._magnetism.field(self._walk.trunk_m[at]) if self._magnetism else np.tile(EARTH, (len(at), 1))
-        found: Floats = np.column_stack([self._ahead_left(field[:, :2], at), field[:, 2]]) @ self._tilt
-        return found
+        tilted: Floats = np.column_stack([self._ahead_left(field[:, :2], at), field[:, 2]]) @ self._tilt
+        return tilted
 
     def _ahead_left(self, map_xy: Floats, at: Ints) -> Floats:
         """Map vectors (n, 2) in the trunk's axes, ahead and left."""
@@ -101,10 +101,10 @@ class Kit2026Sensors:
 
 def _accelerations(path_m: Floats) -> Floats:
     """Accelerations (n, 2) along a path (n, 2) at 1 kHz."""
-    found = np.zeros_like(path_m)
+    accelerations = np.zeros_like(path_m)
     k = SPREAD_MS
-    found[k:-k] = (path_m[2 * k :] - 2.0 * path_m[k:-k] + path_m[: -2 * k]) * (RATE_HZ / k) ** 2
-    return found
+    accelerations[k:-k] = (path_m[2 * k :] - 2.0 * path_m[k:-k] + path_m[: -2 * k]) * (RATE_HZ / k) ** 2
+    return accelerations
 
 
 def _counts(true: Floats, bias: Floats, noise: float, unit: float, rng: np.random.Generator) -> Floats:

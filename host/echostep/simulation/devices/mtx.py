@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An Xsens MTx on the foot: what it feels, as the bytes that it would send.
+"""An Xsens MTx on the foot: its motion -> the bytes that it would send.
 
 In: a walk, a seeded generator. Out: samples at its own rate: when taken, and the MTData frames. Owns the sensor's constant errors.
 The versions for 18 g and 1200 deg/s, which a foot needs [Xsens MT0100P, 4.1 and 4.4].
@@ -26,7 +26,7 @@ GRAVITY_M_S2 = 9.81
 ACCEL_LIMIT_M_S2, GYRO_LIMIT_RAD_S = 180.0, math.radians(1200.0)
 FIRST_S = 0.05  # when the first sample's interval begins
 COMPUTING_S = 0.002  # from the sample to the first byte
-TURN_S, LEAN_S = 5.0, 10.0  # how slowly the orientation filter follows the field, and forgets its tilt error
+FOLLOW_S, LEAN_S = 5.0, 10.0  # how slowly the orientation filter follows the field, and forgets its tilt error
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,10 +97,10 @@ def specific_force_and_rate(walk: Walk, mounting: Floats | None = None) -> tuple
 
 def stream(walk: Walk, model: MtxModel, rng: np.random.Generator, magnetism: MagneticField | None = None) -> MtxStream:
     """All samples of a walk, each the mean over its interval, as an MTx gives them."""
-    found = measure(walk, model, rng, magnetism)
-    t, q = found.t_s, quaternions(found.orientation)
+    imu = measure(walk, model, rng, magnetism)
+    t, q = imu.t_s, quaternions(imu.orientation)
     counters = ((model.first_counter + np.arange(len(t))) & 0xFFFF).tolist()
-    rows = zip(counters, found.accel.tolist(), found.gyro.tolist(), found.mag.tolist(), q.tolist(), strict=True)
+    rows = zip(counters, imu.accel.tolist(), imu.gyro.tolist(), imu.mag.tolist(), q.tolist(), strict=True)
     frames = [encode_frame(MTDATA, pack_mtdata(MtSample(*row))) for row in rows]
     begin_s = t + COMPUTING_S + model.jitter_s * rng.exponential(size=len(t))
     portion_s, portions, arrival_s = deliver(frames, begin_s, model.baud, model.timer_s, rng)
@@ -148,23 +148,23 @@ def measure(
 
 
 def _believed(r: Floats, field: Floats, model: MtxModel, period: float, rng: np.random.Generator) -> Floats:
-    """The attitude that the sensor believes in: its heading follows the disturbed field, its tilt wanders [MT0100P: 0.5 deg]."""
+    """The attitude that the sensor reports: its heading follows the disturbed field, its tilt wanders [MT0100P: 0.5 deg]."""
     error = np.zeros((len(r), 3))
-    kept = math.exp(-period / LEAN_S)
-    lean = model.lean_rad * math.sqrt(1.0 - kept * kept) * rng.standard_normal((len(r), 2))
-    error[:, :2] = np.column_stack([_followed(lean[:, k] / (1.0 - kept), kept, 0.0) for k in (0, 1)])
+    decay = math.exp(-period / LEAN_S)
+    lean = model.lean_rad * math.sqrt(1.0 - decay * decay) * rng.standard_normal((len(r), 2))
+    error[:, :2] = np.column_stack([_followed(lean[:, k] / (1.0 - decay), decay, 0.0) for k in (0, 1)])
     north = np.arctan2(field[:, 0], field[:, 1])
-    error[:, 2] = _followed(north, math.exp(-period / TURN_S), float(north[0]))
+    error[:, 2] = _followed(north, math.exp(-period / FOLLOW_S), float(north[0]))
     return rotations(error) @ r
 
 
-def _followed(wanted: Floats, kept: float, value: float) -> Floats:
+def _followed(wanted: Floats, decay: float, value: float) -> Floats:
     """What a filter of first order makes of a series, beginning with a value."""
-    found = np.empty(len(wanted))
+    values = np.empty(len(wanted))
     for k, aim in enumerate(wanted.tolist()):
-        value = aim + kept * (value - aim)
-        found[k] = value
-    return found
+        value = aim + decay * (value - aim)
+        values[k] = value
+    return values
 
 
 def means(values: Floats, t: NDArray[Any], period: float) -> Floats:

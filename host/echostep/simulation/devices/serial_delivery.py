@@ -35,15 +35,15 @@ def deliver(
 @kernel
 def _byte_times(begin_s: Floats, lengths: Ints, byte_s: float) -> Floats:
     """When each byte has come over the line; a frame waits for the one before it."""
-    found = np.zeros(lengths.sum())
+    times_s = np.zeros(lengths.sum())
     at, free_s = 0, 0.0
     for k in range(len(lengths)):
         free_s = max(free_s, begin_s[k])
         for _ in range(lengths[k]):
             free_s += byte_s
-            found[at] = free_s
+            times_s[at] = free_s
             at += 1
-    return found
+    return times_s
 
 
 @kernel

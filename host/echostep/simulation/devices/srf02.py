@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The two SRF02 of the Python board: when they fire, and what they hear.
+"""The two SRF02 of the Python board: their schedule and their echoes.
 
 In: rows of one millisecond. Out: pings, with the time at which each is read. Owns the schedule, which is the firmware's (firmware/ranger.h).
 """
@@ -77,15 +77,15 @@ class Rangers:
         """
         if 1000 * count > RANGING_US:
             return np.ones(count, bool)  # a ranger may fire twice
-        found = np.zeros(count, bool)
+        possible = np.zeros(count, bool)
         for ranger in self._both:
             due_us = ranger.due_us, ranger.due_us
             if ranger.reads_us is not None:
                 slot_us = self._slot_after(ranger, ranger.reads_us)
                 due_us = max(slot_us, ranger.reads_us), max(slot_us + self._jitter_us, ranger.reads_us)
             first, last = ((max(us, start_us) - start_us) // 1000 for us in due_us)
-            found[first : last + 1] = True
-        return found
+            possible[first : last + 1] = True
+        return possible
 
     def _next_us(self, index: int) -> int:
         ranger = self._both[index]
@@ -103,9 +103,9 @@ class Rangers:
         fired_us = ranger.triggers[-1][0]
         came = [ranger.own_us] if ranger.own_us else []
         came += [at - fired_us + cross for at, cross in self._both[1 - index].triggers if cross]
-        heard = [us for us in came if FIRST_US <= us <= LAST_US]
-        outcome = Outcome.ECHO if heard else Outcome.NO_ECHO
-        return Ping((fired_us * TICKS_US) & 0xFFFFFFFF, Ranger(index), outcome, min(heard, default=0))
+        echoes_us = [us for us in came if FIRST_US <= us <= LAST_US]
+        outcome = Outcome.ECHO if echoes_us else Outcome.NO_ECHO
+        return Ping((fired_us * TICKS_US) & 0xFFFFFFFF, Ranger(index), outcome, min(echoes_us, default=0))
 
     def _next_slot(self, ranger: _Ranger, now_us: int) -> None:
         ranger.slot_us = self._slot_after(ranger, now_us)

@@ -31,10 +31,10 @@ def turns(r: Floats) -> Floats:
         [step[:, 2, 1] - step[:, 1, 2], step[:, 0, 2] - step[:, 2, 0], step[:, 1, 0] - step[:, 0, 1]], 1
     )
     size = np.linalg.norm(sine, axis=1)
-    found: Floats = (
+    vectors: Floats = (
         sine * np.where(size < 1e-9, 1.0, np.arcsin(np.minimum(size, 1.0)) / np.maximum(size, 1e-9))[:, None]
     )
-    return found
+    return vectors
 
 
 def quaternions(r: Floats) -> Floats:
@@ -52,5 +52,5 @@ def quaternions(r: Floats) -> Floats:
         ],
         axis=1,
     )
-    found = columns[np.arange(len(r)), squares.argmax(1)]
-    return found / np.linalg.norm(found, axis=1, keepdims=True)
+    wxyz = columns[np.arange(len(r)), squares.argmax(1)]
+    return wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True)

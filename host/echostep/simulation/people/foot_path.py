@@ -56,15 +56,15 @@ class Strides:
     def phase(self, t_s: Floats) -> Floats:
         """Phase of the gait cycle, 0 at heel strike, 1 at the next one."""
         k, share = self.at(t_s)
-        found: Floats = (k + share + 1.0 - HEEL_STRIKE) % 1.0
-        return found
+        phases: Floats = (k + share + 1.0 - HEEL_STRIKE) % 1.0
+        return phases
 
     def effort(self, t_s: Floats, usual_m: float) -> Floats:
         """Length of the stride at each time against a usual one; 0 when standing, a little when turning on the spot."""
         k, _ = self.at(t_s)
         lengths = np.hypot(*np.diff(self.trunk_m, axis=0).T) / usual_m
-        found: Floats = np.where(self.moves, np.clip(lengths, 0.25, 1.3), 0.0)[k]
-        return found
+        efforts: Floats = np.where(self.moves, np.clip(lengths, 0.25, 1.3), 0.0)[k]
+        return efforts
 
 
 def foot_path(t_s: Floats, strides: Strides, foot: FootPath, height_m: Floats) -> tuple[Floats, Floats, Bools]:
@@ -98,26 +98,26 @@ def _roll_over(share: Floats, rpy: Floats) -> Floats:
     late = _ease(share, TOE_OFF, HEEL_STRIKE)[:, None]
     lever = -(BALL + late * (HEEL - BALL))
     upright = np.column_stack([np.zeros((len(rpy), 2)), rpy[:, 2]])
-    found: Floats = np.einsum("nij,nj->ni", rotations(rpy) - rotations(upright), lever)
-    return found
+    shift_m: Floats = np.einsum("nij,nj->ni", rotations(rpy) - rotations(upright), lever)
+    return shift_m
 
 
 def _knock(share: Floats, span_s: Floats) -> Floats:
     """The sole gives a little at heel strike, over before the foot is flat."""
     since_s = np.clip(share - HEEL_STRIKE, 0.0, None) * span_s
-    found: Floats = KNOCK_M * _bump(share, HEEL_STRIKE, FLAT) * np.sin(2.0 * np.pi * KNOCK_HZ * since_s)
-    return found
+    shift_m: Floats = KNOCK_M * _bump(share, HEEL_STRIKE, FLAT) * np.sin(2.0 * np.pi * KNOCK_HZ * since_s)
+    return shift_m
 
 
 def _ease(share: Floats, start: float, end: float) -> Floats:
     """From 0 to 1 with the least jerk [Flash and Hogan 1985]."""
     v = np.clip((share - start) / (end - start), 0.0, 1.0)
-    found: Floats = v**3 * (10.0 - 15.0 * v + 6.0 * v**2)
-    return found
+    eased: Floats = v**3 * (10.0 - 15.0 * v + 6.0 * v**2)
+    return eased
 
 
 def _bump(share: Floats, start: float, end: float) -> Floats:
     """A smooth rise to 1 and back, with two vanishing derivatives at either end."""
     v = np.clip((share - start) / (end - start), 0.0, 1.0)
-    found: Floats = 64.0 * v**3 * (1.0 - v) ** 3
-    return found
+    bump: Floats = 64.0 * v**3 * (1.0 - v) ** 3
+    return bump

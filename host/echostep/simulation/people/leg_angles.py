@@ -104,7 +104,7 @@ def sway(phase: Floats, effort: Floats) -> tuple[Floats, Floats]:
 def series(degrees: tuple[int, ...], phase: Floats) -> Floats:
     """The curve in radians, by its first terms."""
     c = np.fft.rfft(np.radians(degrees)) / len(degrees)
-    found = np.full(len(phase), c[0].real)
+    angles = np.full(len(phase), c[0].real)
     for k in range(1, TERMS + 1):
-        found += 2.0 * (c[k].real * np.cos(2.0 * np.pi * k * phase) - c[k].imag * np.sin(2.0 * np.pi * k * phase))
-    return found
+        angles += 2.0 * (c[k].real * np.cos(2.0 * np.pi * k * phase) - c[k].imag * np.sin(2.0 * np.pi * k * phase))
+    return angles

@@ -84,18 +84,18 @@ def _places(plan: Plan, level: int) -> list[RoutePlace]:
 
 def waypoints(plan: Plan, route: Route) -> list[Waypoint]:
     """Along one route."""
-    found: list[Waypoint] = []
+    points: list[Waypoint] = []
     for k, stretch in enumerate(route.stretches):
         z = plan.levels[stretch.level].height_m
-        found += [(x, y, 0.0, z) for x, y in stretch.line_m.tolist()]
+        points += [(x, y, 0.0, z) for x, y in stretch.line_m.tolist()]
         if k + 1 < len(route.stretches):
             to = route.stretches[k + 1]
             here = (stretch.level, to.level)
             connector = next(
                 c for c in plan.connectors if stretch.by in (c.name, c.kind) and set(here) <= set(c.levels)
             )
-            found += _between(plan, connector, *here, stretch.line_m[-1])
-    return found
+            points += _between(plan, connector, *here, stretch.line_m[-1])
+    return points
 
 
 def _between(plan: Plan, connector: Connector, level: int, to: int, entered_m: Floats) -> list[Waypoint]:
@@ -105,15 +105,15 @@ def _between(plan: Plan, connector: Connector, level: int, to: int, entered_m: F
         x, y = connector.outline_m.mean(axis=0).tolist()
         return [(x, y, 0.0, heights[level]), (x, y, 0.0, heights[to])]
     near, far, aside = _flights(connector.outline_m, entered_m)
-    found: list[Waypoint] = []
+    points: list[Waypoint] = []
     up = 1 if to > level else -1
     for k in range(level, to, up):
         half = 0.5 * (heights[k] + heights[k + up])
         corners = (
             (near - aside, heights[k]), (far - aside, half), (far + aside, half), (near + aside, heights[k + up])
         )  # fmt: skip
-        found += [(float(p[0]), float(p[1]), 0.0, z) for p, z in corners]
-    return found
+        points += [(float(p[0]), float(p[1]), 0.0, z) for p, z in corners]
+    return points
 
 
 def _flights(outline_m: Floats, entered_m: Floats) -> tuple[Floats, Floats, Floats]:
@@ -130,10 +130,10 @@ def _flights(outline_m: Floats, entered_m: Floats) -> tuple[Floats, Floats, Floa
 
 def _spaced(way: list[Waypoint]) -> list[Waypoint]:
     """Without waypoints upon the ones before, but for a lift's."""
-    found = way[:1]
+    points = way[:1]
     for w in way[1:]:
-        last = found[-1]
+        last = points[-1]
         same = np.hypot(w[0] - last[0], w[1] - last[1]) < SHORTEST_M
         if not same or (w[:2] == last[:2] and w[-1] != last[-1]):
-            found.append(w)
-    return found
+            points.append(w)
+    return points

@@ -26,7 +26,7 @@ Waypoint = (  # x, y, how long to pause there (s), height (m; 0 when not given)
 )
 
 RATE_HZ = 1000
-SPACING_M = 0.01
+PATH_STEP_M = 0.01
 SHARP_RAD = math.radians(100.0)  # sharper corners are turned on the spot; assumed
 TURN_STRIDE_RAD = math.radians(75.0)  # per stride when turning on the spot
 SMOOTH_MS = 301
@@ -110,7 +110,7 @@ def round_corners(points: Floats, radius_m: float) -> Floats:
         pieces.append((1 - u) ** 2 * start + 2 * u * (1 - u) * corner + u**2 * end)
     corners = np.vstack([*pieces, points[-1:]])
     along = _along(corners)
-    even = np.linspace(0.0, along[-1], max(3, int(along[-1] / SPACING_M)))
+    even = np.linspace(0.0, along[-1], max(3, int(along[-1] / PATH_STEP_M)))
     return np.column_stack([np.interp(even, along, corners[:, k]) for k in range(points.shape[1])])
 
 
@@ -313,8 +313,8 @@ def _ridden(t_s: Floats, way_m: float) -> Floats:
     speed = np.clip(np.minimum(t_s, end_s - t_s) / ramp_s, 0.0, 1.0)
     speed = speed**2 * (3.0 - 2.0 * speed)
     gone = np.cumsum(speed)
-    found: Floats = way_m * gone / gone[-1]
-    return found
+    ridden_m: Floats = way_m * gone / gone[-1]
+    return ridden_m
 
 
 def _hermite(t: Floats, knots: Floats, values: Floats) -> Floats:
@@ -326,8 +326,8 @@ def _hermite(t: Floats, knots: Floats, values: Floats) -> Floats:
     u = np.clip((t - knots[k]) / span, 0.0, 1.0)
     a, b = values[k], values[k + 1]
     cubic = a * (1 + 2 * u) * (1 - u) ** 2 + b * u**2 * (3 - 2 * u)
-    found: Floats = cubic + span * (slopes[k] * u * (1 - u) ** 2 - slopes[k + 1] * u**2 * (1 - u))
-    return found
+    interpolated: Floats = cubic + span * (slopes[k] * u * (1 - u) ** 2 - slopes[k + 1] * u**2 * (1 - u))
+    return interpolated
 
 
 def _smooth(values: Floats, width_ms: int = SMOOTH_MS) -> Floats:

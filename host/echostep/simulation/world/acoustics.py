@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How loud an echo is, in dB against a wall straight ahead at one metre, and whether an SRF02 notices.
+"""Sound level of an echo, in dB against a wall straight ahead at one metre, and whether an SRF02 detects it.
 
 In: the geometry of one echo. Out: its level. Owns the one table of acoustic constants, `Acoustics`; the tracker's likelihood shares nothing with it.
 

@@ -70,9 +70,9 @@ def echoes(
     wanted = np.arange(n) if asked is None else np.flatnonzero(asked)
     for start in range(0, len(wanted), CHUNK_POSES):
         poses = wanted[start : start + CHUNK_POSES]
-        near, found = _near_walls(trunk_m[poses], walls, acoustics.maximum_m), np.zeros((len(poses), 2, 2))
-        _nearest_echoes(trunk_m[poses], heading_rad[poses], near, wall_edges(near), noise[poses], acoustics, found)
-        range_m[poses] = found
+        near, nearest_m = _near_walls(trunk_m[poses], walls, acoustics.maximum_m), np.zeros((len(poses), 2, 2))
+        _nearest_echoes(trunk_m[poses], heading_rad[poses], near, wall_edges(near), noise[poses], acoustics, nearest_m)
+        range_m[poses] = nearest_m
     own = range_m[..., OWN]
     range_m[..., OWN] = np.where(own > 0.0, np.maximum(own + bias_m, acoustics.minimum_m), 0.0)
     us = np.rint(range_m * (2e6 / acoustics.speed_m_s)).astype(np.uint16)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Plane geometry of sound rays: mirror images, crossings, what stands in the way.
+"""Plane geometry of sound rays: mirror images, intersections, occlusion.
 
 In: points and wall segments (4,) x0 y0 x1 y1, metres. Out: numbers. Owns nothing.
 """

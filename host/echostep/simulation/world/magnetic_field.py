@@ -47,10 +47,10 @@ class MagneticField:
 
     def field(self, xy_m: Floats, height_m: float = 0.1) -> Floats:
         """Field (n, 3) east, north, up at places (n, 2), at one height above the floor."""
-        found: Floats = EARTH + np.sin(xy_m @ self._waves + self._phase) @ self._size
+        vectors: Floats = EARTH + np.sin(xy_m @ self._waves + self._phase) @ self._size
         for machine in self._machines:
-            found += dipole(np.column_stack([xy_m, np.full(len(xy_m), height_m)]), machine)
-        return found
+            vectors += dipole(np.column_stack([xy_m, np.full(len(xy_m), height_m)]), machine)
+        return vectors
 
 
 def dipole(places_m: Floats, machine: MagneticDipole) -> Floats:
@@ -58,7 +58,7 @@ def dipole(places_m: Floats, machine: MagneticDipole) -> Floats:
     away = places_m - np.array(machine.at_m)
     distance = np.maximum(np.linalg.norm(away, axis=1), SIZE_M)[:, None]
     moment = np.array(machine.moment_a_m2)
-    found: Floats = (
+    vectors: Floats = (
         DIPOLE_T_M3_A_M2 / EARTH_T * (3.0 * away * (away @ moment)[:, None] / distance**2 - moment) / distance**3
     )
-    return found
+    return vectors

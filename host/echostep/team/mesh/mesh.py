@@ -77,7 +77,7 @@ class MeshNode:
         self.send(position.SerializeToString(), PortNum.POSITION_APP)
 
     def receive(self, timeout_s: float) -> bytes | None:
-        """The next payload of another node; None when none comes in time."""
+        """The next payload of another node; None after the timeout."""
         try:
             return self._packets.get(timeout=timeout_s)
         except queue.Empty:

@@ -18,7 +18,7 @@ from echostep.team.georeference import GroundPlane
 from echostep.team.messages.report import Motion, Position, Report, ReportedAlarm, moment, printable
 
 VERSION = 1
-STALE_S = 30.0  # a position is late after three intervals; assumed
+LATE_AFTER_S = 30.0  # a position is late after three intervals; assumed
 HEAD = struct.Struct("<B4s4sdHBB")  # version, run, first bytes of the plan's digest, Unix time, number, flags, battery
 BODY = struct.Struct("<iieeeheebBeeHHB")  # as in `_packed`
 ALARM = struct.Struct("<BHH")  # kind and reason, number, age in s
@@ -47,10 +47,10 @@ def pack(report: Report, number: int, unix_s: float) -> bytes:
     )
     names = b"".join(bytes([len(part)]) + part for part in (report.team.encode(), report.name.encode()))
     alarm = report.alarm
-    told = b"" if alarm is None else ALARM.pack(
+    packed_alarm = b"" if alarm is None else ALARM.pack(
         KINDS.index(alarm.kind) | REASONS.index(alarm.reason) << 4, alarm.number & 0xFFFF, min(round(alarm.age_s), 0xFFFF)
     )  # fmt: skip
-    return head + names + told + (_packed(report.position, report.motion) if report.position else b"")
+    return head + names + packed_alarm + (_packed(report.position, report.motion) if report.position else b"")
 
 
 def _packed(p: Position, motion: Motion | None) -> bytes:
@@ -92,7 +92,7 @@ class Unpacker:
         name, at = _text(payload, at)
         same = self._plan.digest.startswith(digest.hex())
         report = Report(
-            1, team, name, run.hex(), number, moment(unix_s), moment(unix_s + STALE_S), SOURCES[flags >> 2 & 3], STATUSES[flags & 3],  # type: ignore[arg-type]
+            1, team, name, run.hex(), number, moment(unix_s), moment(unix_s + LATE_AFTER_S), SOURCES[flags >> 2 & 3], STATUSES[flags & 3],  # type: ignore[arg-type]
             None, None, None, None, printable(self._plan.name, 64) if same else "", self._plan.digest if same else digest.hex().ljust(64, "0"),
             "", None if battery == NO_BATTERY else min(battery, 100), 0,
         )  # fmt: skip

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""What commanders share: marks on the plan, and who has acknowledged which alarm. The broker keeps it, so all commanders have one state.
+"""Shared state of the commanders: marks on the plan, and acknowledgements of alarms. The broker retains it, so it is the same for all.
 
 In: retained messages from untrusted senders, on `echostep-table/mark/<id>` and `echostep-table/ack/<team>/<wearer>/<run>-<number>`; an empty one
 removes. Out: `Mark`s and `Ack`s, and the messages for new ones. Owns those that are known; their number is bounded.
 
-A mark that a commander removes stays as a message that says so: the state of a mark only goes from set to removed; of several acknowledgements
-the earliest counts. So what each commander knows can be sent again in any order, also to a broker that has lost its memory (`Restorer`), and all
-come to one state: a message behind what is known is answered with what is known, for the broker keeps the last one.
+The removal of a mark stays as a retained message: the state of a mark only goes from set to removed; of several acknowledgements
+the earliest counts. So what each commander knows can be sent again in any order, also to a broker that has lost its messages (`Restorer`), and all
+come to one state: an outdated message is answered with the newer state, for the broker keeps the last one.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class MarkBoard:
             yield ack_message(key, ack.by, ack.unix_s)
 
     def receive(self, topic: str, payload: bytes) -> None:
-        """Take one message; raises BadReportError with the reason why it is not believed."""
+        """Take one message; raises BadReportError with the reason of its rejection."""
         parts = topic.split("/")
         match parts[1:]:
             case ["mark", identity]:

@@ -23,7 +23,7 @@ def meeting_with(
     name: str, status: str, position: Position,
     measured: tuple[float, float] | None = None,
 ) -> Meeting | None:  # fmt: skip
-    """A meeting with a teammate who reported this; None on a floor that no plan has. `measured`: a radio range and its standard deviation (m)."""
+    """A meeting with a teammate, from its report; None on a floor that no plan has. `measured`: a radio range and its standard deviation (m)."""
     p = position
     if not 0 <= p.floor < MOST_LEVELS:
         return None

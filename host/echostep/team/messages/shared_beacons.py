@@ -13,18 +13,18 @@ BEACONS = "beacons"  # last part of the topic
 SHARE_S = 5.0  # between two messages of a wearer, at least; assumed
 
 
-def beacons_message(team: str, told: TeamBeacons) -> tuple[str, bytes]:
+def beacons_message(team: str, message: TeamBeacons) -> tuple[str, bytes]:
     """Topic and payload."""
-    return f"echostep/{team}/{told.name}/{BEACONS}", told.encode()
+    return f"echostep/{team}/{message.name}/{BEACONS}", message.encode()
 
 
 def decode_beacons(name: str, payload: bytes) -> TeamBeacons:
-    """The message in a payload on the topic of this wearer; raises BadReportError with the reason why it is not believed."""
-    told = parse_team_beacons(payload)
-    if told is None:
+    """The message in a payload on the topic of this wearer; raises BadReportError with the reason of its rejection."""
+    message = parse_team_beacons(payload)
+    if message is None:
         raise BadReportError("not valid beacons")
-    if told.name != name:
+    if message.name != name:
         raise BadReportError("beacons and topic contradict each other")
-    if not is_printable(told.name):
+    if not is_printable(message.name):
         raise BadReportError("unprintable text")
-    return told
+    return message

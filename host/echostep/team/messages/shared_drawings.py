@@ -47,11 +47,11 @@ def _check_size(plan: Plan) -> None:
     walls = np.concatenate([level.solid for level in plan.levels])
     length_m = float(np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum())
     extent_m = float(np.ptp(walls.reshape(-1, 2), axis=0).max())
-    for found, most, what in (
+    for size, most, what in (
         (len(plan.levels), MOST_STOREYS, "storeys"),
         (len(walls), MOST_WALLS, "walls"),
         (length_m, MOST_LENGTH_M, "m of wall"),
         (extent_m, MOST_EXTENT_M, "m from end to end"),
     ):
-        if found > most:
-            raise EchostepError(f"it has {found:.0f} {what}, more than {most:.0f}")
+        if size > most:
+            raise EchostepError(f"it has {size:.0f} {what}, more than {most:.0f}")

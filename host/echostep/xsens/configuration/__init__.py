@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
 """The dialogue that configures an MTx or MTi.
 
-In: answers of the device. Out: requests, and what the device said of itself. Owns the order of the dialogue.
+In: answers of the device. Out: requests, and the device's identity and settings. Owns the order of the dialogue.
 """

@@ -28,8 +28,8 @@ def firmware_text(answer: bytes) -> str:
 
 def force_range_g(product: str) -> float | None:
     """Largest force in g of an MTi by its product code, as `MTi-3-8A7G6`; None where it is not known."""
-    found = re.match(r"MTi-(\d+)", product)
-    if found is None:
+    match = re.match(r"MTi-(\d+)", product)
+    if match is None:
         return None
-    number = int(found[1])
+    number = int(match[1])
     return FORCE_RANGE_G.get("1" if number < 10 else "600" if 600 <= number < 700 else "")

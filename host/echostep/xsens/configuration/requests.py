@@ -35,7 +35,7 @@ class Request:
     """A message to the MT, and the payload `answer` of its acknowledgement (None: any).
 
     `optional`: the setup goes on when it is refused. `instead`: when it is refused, these take the place of it and of all that follow, and
-    `remark` is said. `rates`: the answer lists at least these outputs at these rates (Hz), by identifier.
+    `remark` is printed. `rates`: the answer lists at least these outputs at these rates (Hz), by identifier.
     """
 
     name: str
@@ -148,13 +148,13 @@ def _output_configuration(outputs: tuple[int, ...], rate: int) -> Request:
 
 def _rate_fault(wanted: dict[int, int], answer: bytes) -> str:
     """Outputs that a SetOutputConfigurationAck lacks or has at another rate, as text. `WITH_EACH` is any rate."""
-    told = dict(struct.iter_unpack(">HH", answer[: len(answer) // 4 * 4]))
+    rates = dict(struct.iter_unpack(">HH", answer[: len(answer) // 4 * 4]))
     faults = [
-        f"{OUTPUTS[identifier]} at {told[identifier]} Hz instead of {rate}"
-        if identifier in told
+        f"{OUTPUTS[identifier]} at {rates[identifier]} Hz instead of {rate}"
+        if identifier in rates
         else f"no {OUTPUTS[identifier]}"
         for identifier, rate in wanted.items()
-        if told.get(identifier) not in (rate, WITH_EACH)
+        if rates.get(identifier) not in (rate, WITH_EACH)
     ]
     return f"it would send {', '.join(faults)}" if faults else ""
 

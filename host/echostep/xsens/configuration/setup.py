@@ -179,7 +179,7 @@ class MtxSetup:
         self._tries, self._deadline_s = 0, now_s
 
     def _conclude_unanswered(self) -> None:
-        """Final state when GoToConfig or GoToMeasurement got no answer, by the measurements that came."""
+        """Final state when GoToConfig or GoToMeasurement got no answer, by the received measurements."""
         if self._acknowledged:
             self.state = State.WRONG_MODE
         elif not self._measurements:
@@ -188,7 +188,7 @@ class MtxSetup:
             self.state = State.UNANSWERED if not self._stream_fault() else State.WRONG_MODE
 
     def _stream_fault(self) -> str:
-        """Wrong length or rate of the measurements that came, as text; "" if both are right."""
+        """Wrong length or rate of the received measurements, as text; "" if both are right."""
         newest = self._measurements[-1]
         if newest.mid == MTDATA and newest.length != PROJECT.length:
             return f"MTData of {newest.length} bytes instead of {PROJECT.length}"
@@ -202,7 +202,7 @@ class MtxSetup:
 
     @property
     def product(self) -> str:
-        """Product code of the device; "" as long as it has not told it."""
+        """Product code of the device; "" until it is received."""
         return product_text(self._answers.get(REQUEST_PRODUCT.name, b""))
 
     @property

@@ -30,11 +30,11 @@ class MtxStart:
 
     @property
     def product(self) -> str:
-        """Product code of the device; "" as long as it has not told it."""
+        """Product code of the device; "" until it is received."""
         return self._setup.product
 
     def advance(self, chunk: Chunk | None) -> None:
-        """Process the next chunk of any port; None when nothing came, so that timeouts are checked."""
+        """Process the next chunk of any port; None when nothing was received, so that timeouts are checked."""
         was_busy = not self._setup.finished
         wake_ups = self._setup.wake_ups
         now_s = clock_s()

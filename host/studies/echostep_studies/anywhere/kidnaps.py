@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What takes the wearer away from where the filter believes the wearer to be.
+"""Kidnaps: displacements of the wearer that the filter does not measure.
 
-In: a `SimulatedWalk`. Out: the segments that are left, and the time from which the filter can find the wearer again. Owns nothing.
+In: a `SimulatedWalk`. Out: the remaining segments, and the time from which the filter can recover. Owns nothing.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Plans that are not quite, or not at all, those of the building.
+"""Plans that differ from the building in part or entirely.
 
 In: a plan of one level, a way through it, a seeded generator. Out: another plan. Owns nothing.
 """

@@ -18,7 +18,7 @@ from echostep_studies.anywhere.amcl import track_by_amcl
 from echostep_studies.anywhere.trials import NEEDS_DATA, PEERED, TRIALS, Trial, Walks
 from echostep_studies.bench.columns import ClaimsRow, ClaimsSummary, JudgedRow, run_row, summaries, tables
 from echostep_studies.bench.filtering import FilterRun, track
-from echostep_studies.bench.judgement import SEARCH_M, JudgedRun, Truth, judge, true_levels
+from echostep_studies.bench.judgement import SEARCH_M, JudgedRun, TruePlaces, judge, true_levels
 from echostep_studies.bench.stanford import draw_stanford
 from echostep_studies.bench.walks import T, X, Y, Z
 from echostep_studies.frame.study import Study, StudyRequest
@@ -44,7 +44,7 @@ def _judged(trial: Trial, run: FilterRun) -> JudgedRun:
     x, y, z = (np.interp(t_s, walk.truth[:, T], walk.truth[:, k]) for k in (X, Y, Z))
     place = np.column_stack([x, y])
     walked_m = walk.walked_m(t_s) - walk.walked_m(np.array([trial.from_s]))
-    return judge(claims, Truth(place, true_levels(place, z, trial.plan)), walked_m)
+    return judge(claims, TruePlaces(place, true_levels(place, z, trial.plan)), walked_m)
 
 
 def anywhere_study(data: Path | None, rows: str = "*") -> Study[ClaimsRow, ClaimsSummary]:

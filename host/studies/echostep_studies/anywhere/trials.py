@@ -112,8 +112,8 @@ def _off(walks: Walks, off_m: float, off_deg: float, *, stated: bool = False) ->
     way, side = rng.uniform(0.0, 2.0 * math.pi), rng.choice([-1.0, 1.0])
     x, y = pose.x_m + off_m * math.cos(way), pose.y_m + off_m * math.sin(way)
     start = Pose(x, y, pose.heading_rad + side * math.radians(off_deg), pose.level)
-    told = Start(start, off_m / math.sqrt(2.0), math.radians(off_deg)) if stated else Start(start)
-    return Trial(walks.office, walks.office.built, told)
+    stated_start = Start(start, off_m / math.sqrt(2.0), math.radians(off_deg)) if stated else Start(start)
+    return Trial(walks.office, walks.office.built, stated_start)
 
 
 def _from_start(walk: SimulatedWalk, plan: Plan | None = None) -> Trial:

@@ -28,7 +28,7 @@ LAST_T, LAST_PA, HEIGHT_M, AIR_C = range(
     4
 )  # state of `AirColumn`: last sample's time and pressure, claimed height, temperature
 
-AIR_J_KG_K, GRAVITY_M_S2, ZERO_C_K = 287.053, 9.80665, 273.15
+AIR_J_KG_K, G0_M_S2, ZERO_C_K = 287.053, 9.80665, 273.15
 INDOORS_C, COLDEST_C, WARMEST_C = 20.0, -30.0, 45.0
 SCALE_SD = 0.015  # of a rise, by the air's temperature
 RESOLUTION_M = 0.1
@@ -96,8 +96,8 @@ class AirColumn:
         seen = np.full((n, 9), np.nan)
         used = np.zeros(n, np.bool_)
         _claim(samples.t_s, samples.pressure_pa, temperature, self._settings.air_c is not None, self._state, seen, used)
-        for column, found in ((vertical.GAIT, samples.gait), (vertical.PLACE, samples.place)):
-            seen[:, column] = 0 if found is None else found
+        for column, values in ((vertical.GAIT, samples.gait), (vertical.PLACE, samples.place)):
+            seen[:, column] = 0 if values is None else values
         if samples.foot_m_s is not None and samples.foot_sd_m_s is not None:
             seen[:, vertical.FOOT], seen[:, vertical.FOOT_SD] = samples.foot_m_s, samples.foot_sd_m_s
         seen[:, vertical.NOISE] *= self._settings.noise_pa
@@ -115,8 +115,8 @@ class Altitude:
     def feed(self, samples: Pressures) -> Heights:
         """Heights at the samples that could be used; what is no pressure, or not later than the sample before, is left out."""
         seen, used = self._column.rows(samples)
-        found = self._hypotheses.filter(seen)
-        return _heights(samples.t_s[used], found, found[:, :, vertical.RESULT_WEIGHT])
+        states = self._hypotheses.filter(seen)
+        return _heights(samples.t_s[used], states, states[:, :, vertical.RESULT_WEIGHT])
 
     def smooth(self, samples: Pressures) -> Heights:
         """Heights at the samples of a whole record: motion is judged by all samples; the last call on an `Altitude`."""
@@ -132,11 +132,11 @@ def noise_of(pressure_pa: Floats) -> float:
     return max(QUIETEST_PA, 1.4826 * float(np.median(np.abs(off))) / math.sqrt(1.5))
 
 
-def _heights(t_s: Floats, found: Floats, w: Floats) -> Heights:
+def _heights(t_s: Floats, states: Floats, w: Floats) -> Heights:
     """Mean and variance over the hypotheses."""
-    h, v = found[:, :, vertical.RESULT_HEIGHT], found[:, :, vertical.RESULT_RATE]
+    h, v = states[:, :, vertical.RESULT_HEIGHT], states[:, :, vertical.RESULT_RATE]
     mean = (w * h).sum(axis=1)
-    variance = (w * (found[:, :, vertical.RESULT_VARIANCE] + (h - mean[:, None]) ** 2)).sum(axis=1)
+    variance = (w * (states[:, :, vertical.RESULT_VARIANCE] + (h - mean[:, None]) ** 2)).sum(axis=1)
     moving = w * (np.arange(vertical.MODES) % vertical.WAYS != vertical.ON)
     speed = (moving * v).sum(axis=1)
     return Heights(t_s, mean, variance, speed, moving.sum(axis=1))
@@ -165,7 +165,7 @@ def _claim(
             state[AIR_C] = INDOORS_C + (warm if known or warm < 0.0 else 0.5 * warm)
         elif state[AIR_C] != state[AIR_C]:
             state[AIR_C] = INDOORS_C
-        metres = AIR_J_KG_K * (state[AIR_C] + ZERO_C_K) / GRAVITY_M_S2
+        metres = AIR_J_KG_K * (state[AIR_C] + ZERO_C_K) / G0_M_S2
         first = state[LAST_T] != state[LAST_T]
         if not first:
             state[HEIGHT_M] -= metres * math.log(pressure_pa[i] / state[LAST_PA])

@@ -54,14 +54,14 @@ class FloorFilter:
     def feed(self, samples: Pressures) -> Floors:
         """Floors at the samples that could be used, each by what was known then."""
         seen, used = self._column.rows(samples)
-        found = self._hypotheses.filter(seen)
-        return _floors(samples.t_s[used], self.heights_m, found, found[:, :, vertical.RESULT_WEIGHT])
+        states = self._hypotheses.filter(seen)
+        return _floors(samples.t_s[used], self.heights_m, states, states[:, :, vertical.RESULT_WEIGHT])
 
     def smooth(self, samples: Pressures) -> Floors:
         """Floors at the samples of a whole record, each by all of it; a filter can do so once."""
         seen, used = self._column.rows(samples)
-        found, weight = self._hypotheses.smooth(seen)
-        return _floors(samples.t_s[used], self.heights_m, found, weight)
+        states, weight = self._hypotheses.smooth(seen)
+        return _floors(samples.t_s[used], self.heights_m, states, weight)
 
 
 def checked_heights(heights_m: Floats) -> Floats:
@@ -80,13 +80,13 @@ def checked_heights(heights_m: Floats) -> Floats:
     return heights
 
 
-def _floors(t_s: Floats, heights_m: Floats, found: Floats, weight: Floats) -> Floors:
+def _floors(t_s: Floats, heights_m: Floats, states: Floats, weight: Floats) -> Floors:
     """Floors by weights (n, 15 k): the hypothesis' level when on one, the nearest levels by its height otherwise."""
-    n, count = len(found), len(heights_m)
+    n, count = len(states), len(heights_m)
     middles = 0.5 * (heights_m[1:] + heights_m[:-1])
     probability = np.zeros((n, count))
-    height = found[:, :, vertical.RESULT_HEIGHT]
-    sd = np.sqrt(np.maximum(found[:, :, vertical.RESULT_VARIANCE], 1e-6))
+    height = states[:, :, vertical.RESULT_HEIGHT]
+    sd = np.sqrt(np.maximum(states[:, :, vertical.RESULT_VARIANCE], 1e-6))
     for k in range(count):
         for mode in range(vertical.MODES):
             s = k * vertical.MODES + mode

@@ -70,14 +70,14 @@ def noise_of_record(samples: Pressures, few: Pressures) -> float:
     """
     steps = np.diff(np.unique(samples.pressure_pa))
     steps = steps[steps > SMOOTH_PA]
-    found = max(noise_of(few.pressure_pa), 0.5 * float(np.median(steps)) if len(steps) else 0.0)
+    noise_pa = max(noise_of(few.pressure_pa), 0.5 * float(np.median(steps)) if len(steps) else 0.0)
     rate = 1.0 / float(np.median(np.diff(few.t_s)))
     for seconds in NOISE_TIMES_S:
         many = round(seconds * rate)
         whole = len(few.t_s) // many * many if many > 1 else 0
         if whole >= FEWEST_MEANS * many > 0:
-            found = max(found, math.sqrt(many) * noise_of(few.pressure_pa[:whole].reshape(-1, many).mean(axis=1)))
-    return found
+            noise_pa = max(noise_pa, math.sqrt(many) * noise_of(few.pressure_pa[:whole].reshape(-1, many).mean(axis=1)))
+    return noise_pa
 
 
 def find_storeys(samples: Pressures, settings: BarometerSettings) -> Floats:
@@ -168,11 +168,11 @@ def _fitted(changes: list[Change], before_m: Floats) -> Floats:
 
 def _apart(heights_m: Floats) -> Floats:
     """The heights (sorted) that are CLOSEST_M or more above the kept one below; the lowest is 0."""
-    kept = [0.0]
+    separate = [0.0]
     for height in heights_m.tolist():
-        if height - kept[-1] >= CLOSEST_M:
-            kept.append(height)
-    return np.array(kept)
+        if height - separate[-1] >= CLOSEST_M:
+            separate.append(height)
+    return np.array(separate)
 
 
 def _rises(heights: Heights) -> list[float]:
@@ -196,17 +196,17 @@ def _rises(heights: Heights) -> list[float]:
 def stays(floors: Floors, shortest_s: float = SHORTEST_STAY_S, moving_p: float = MOVING_P) -> list[Stay]:
     """Stays in order of time: stretches of one floor, shorter ones left out except at the ends; neighbouring stays on the same floor are one."""
     still = floors.up + floors.down < moving_p
-    found: list[Stay] = []
+    merged: list[Stay] = []
     floor_or_none = np.where(still, floors.floor, -1)
     edges = np.flatnonzero(np.diff(floor_or_none, prepend=-2, append=-2))
     for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         floor, t0, t1 = int(floor_or_none[a]), float(floors.t_s[a]), float(floors.t_s[b - 1])
         if floor < 0 or (t1 - t0 < shortest_s and a > 0 and b < len(floor_or_none)):
             continue
-        if found and found[-1].floor == floor:
-            t0 = found.pop().from_s
-        found.append(Stay(floor, t0, t1))
-    return found
+        if merged and merged[-1].floor == floor:
+            t0 = merged.pop().from_s
+        merged.append(Stay(floor, t0, t1))
+    return merged
 
 
 def visits(floors: Floors) -> list[Stay]:
@@ -215,19 +215,19 @@ def visits(floors: Floors) -> list[Stay]:
     Floors that are only passed, or named for less than SHORTEST_STAY_S, are left out. So the rises between visits are those of `floors.floor`.
     """
     edges = np.flatnonzero(np.diff(floors.floor, prepend=-1, append=-1)).tolist()
-    found: list[tuple[Stay, bool]] = []  # and whether it is a stay
+    raw: list[tuple[Stay, bool]] = []  # and whether it is a stay
     for a, b in zip(edges[:-1], edges[1:], strict=True):
         floor, ends = int(floors.floor[a]), a == 0 or b == edges[-1]
         if still := _still(floors, a, b, SHORTEST_END_S if ends else SHORTEST_STAY_S):
-            found.append((Stay(floor, *still), True))
+            raw.append((Stay(floor, *still), True))
         elif floors.t_s[b - 1] - floors.t_s[a] >= SHORTEST_STAY_S:
-            found.append((Stay(floor, float(floors.t_s[a]), float(floors.t_s[b - 1])), False))
-    kept: list[Stay] = []
-    for k, (visit, stayed) in enumerate(found):
-        around = (kept[-1].floor if kept else visit.floor, found[k + 1][0].floor if k + 1 < len(found) else visit.floor)
+            raw.append((Stay(floor, float(floors.t_s[a]), float(floors.t_s[b - 1])), False))
+    merged: list[Stay] = []
+    for k, (visit, stayed) in enumerate(raw):
+        around = (merged[-1].floor if merged else visit.floor, raw[k + 1][0].floor if k + 1 < len(raw) else visit.floor)
         if stayed or not min(around) < visit.floor < max(around):
-            kept.append(visit)
-    return kept
+            merged.append(visit)
+    return merged
 
 
 def _still(floors: Floors, begin: int, end: int, shortest_s: float) -> tuple[float, float] | None:

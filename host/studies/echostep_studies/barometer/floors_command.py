@@ -32,14 +32,14 @@ def floors(path: Path, heights: str, out: Path, start: int | None, *, plot: bool
     record = load_pressures(path)
     for note in record.notes:
         console.print(f"{path}: {note}", markup=False)
-    found = _floors_of(path, record.samples, given_m, start)
-    write_floors(out, found)
+    floors_ = _floors_of(path, record.samples, given_m, start)
+    write_floors(out, floors_)
     if given_m is None:
-        console.print("floors found: --heights " + ",".join(f"{h:g}" for h in found.heights_m))
-    console.print(describe(found), markup=False)
+        console.print("floors found: --heights " + ",".join(f"{h:g}" for h in floors_.heights_m))
+    console.print(describe(floors_), markup=False)
     if plot:
         picture = out.with_suffix(".png")
-        draw_floors(picture, found, path.name)
+        draw_floors(picture, floors_, path.name)
         console.print(f"{out} and {picture} written", markup=False)
 
 
@@ -47,9 +47,9 @@ def record_floors(samples: Pressures, heights_m: Floats, start: int | None = Non
     """Floors at all samples (n,), each by the whole record: smoothed at about 10 Hz, with the noise measured on the record."""
     few, group = thinned(samples)
     prior = np.ones(len(heights_m)) if start is None else np.eye(len(heights_m))[start]
-    found = FloorFilter(heights_m, BarometerSettings(noise_of_record(samples, few)), prior).smooth(few)
+    whole = FloorFilter(heights_m, BarometerSettings(noise_of_record(samples, few)), prior).smooth(few)
     return Floors(
-        samples.t_s, found.heights_m, found.floor[group], found.probability[group], found.height_m[group], found.up[group], found.down[group]
+        samples.t_s, whole.heights_m, whole.floor[group], whole.probability[group], whole.height_m[group], whole.up[group], whole.down[group]
     )  # fmt: skip
 
 
@@ -67,12 +67,12 @@ def _floors_of(path: Path, samples: Pressures, heights_m: Floats | None, start: 
 def parse_heights(text: str) -> Floats:
     """Heights (k,) of the floors from text such as "0,3.5,7"; raises EchostepError."""
     try:
-        found = [float(cell) for cell in text.split(",")]
+        heights = [float(cell) for cell in text.split(",")]
     except ValueError as error:
         raise EchostepError(
             f"--heights {text}: metres with commas between are expected, as 0,3.5,7, or auto"
         ) from error
-    return checked_heights(np.array(found))
+    return checked_heights(np.array(heights))
 
 
 def draw_floors(path: Path, floors: Floors, title: str) -> None:

@@ -30,12 +30,12 @@ class Hypotheses:
 
     def smooth(self, seen: Floats) -> tuple[Floats, Floats]:
         """As `filter`, and the weights (n, 15 k) given all samples of the record; the last call on these hypotheses."""
-        found = np.zeros((len(seen), len(self._heights_m) * vertical.MODES, 5))
+        filtered = np.zeros((len(seen), len(self._heights_m) * vertical.MODES, 5))
         states = []
         for block in _blocks(len(seen)):
             states.append(None if self._state is None else tuple(part.copy() for part in self._state))
-            found[block], _ = self._run(seen[block], joint=False)
-        smooth = found[:, :, vertical.RESULT_WEIGHT].copy()
+            filtered[block], _ = self._run(seen[block], joint=False)
+        smooth = filtered[:, :, vertical.RESULT_WEIGHT].copy()
         for block, state in zip(reversed(list(_blocks(len(seen)))), reversed(states), strict=True):
             self._state = state  # type: ignore[assignment]
             _, joint = self._run(seen[block], joint=True)
@@ -43,17 +43,17 @@ class Hypotheses:
             smooth[block.start : block.stop - 1] = before[1:]
             if block.start:
                 smooth[block.start - 1] = before[0]
-        return found, smooth
+        return filtered, smooth
 
     def _run(self, seen: Floats, *, joint: bool) -> tuple[Floats, Floats]:
         size = len(self._heights_m) * vertical.MODES
-        found, pairs = np.zeros((len(seen), size, 5)), np.zeros((len(seen) if joint else 0, size, size))
+        states, pairs = np.zeros((len(seen), size, 5)), np.zeros((len(seen) if joint else 0, size, size))
         if self._state is None and len(seen):
             first = seen[0]
             self._state = kernels.start(self._heights_m, self._prior, first[vertical.CLAIMED], first[vertical.NOISE])
         if self._state is not None:
-            kernels.filter_samples(self._state, self._heights_m, self._free, seen, found, pairs)
-        return found, pairs
+            kernels.filter_samples(self._state, self._heights_m, self._free, seen, states, pairs)
+        return states, pairs
 
 
 def _blocks(n: int) -> Iterator[slice]:

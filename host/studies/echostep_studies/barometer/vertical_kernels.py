@@ -45,6 +45,7 @@ from echostep_studies.barometer.vertical_model import (
     HEIGHT,
     HELD,
     HELD_FADES,
+    LEVEL_SD_M,
     LIFT_UP,
     LONGEST_STEP_S,
     MODES,
@@ -69,7 +70,6 @@ from echostep_studies.barometer.vertical_model import (
     SIZE,
     STAIRS_DOWN,
     STAIRS_UP,
-    STOREY_M,
     TINY,
     TREND_M_S,
     UNDER_WAY,
@@ -100,12 +100,12 @@ def start(heights_m: Floats, prior: Floats, claimed_m: float, noise_m: float) ->
 
 
 @kernel
-def filter_samples(state: State, heights_m: Floats, free: bool, seen: Floats, found: Floats, joint: Floats) -> None:
+def filter_samples(state: State, heights_m: Floats, free: bool, seen: Floats, states: Floats, joint: Floats) -> None:
     """All samples of a portion; `state` (weights, means, covariances) goes on from them.
 
     `seen`: (n, 9) time since the sample before (s), claimed height, its noise, gait, place, the foot's vertical speed and its sd over a
     second (NaN: unknown), lowest and highest level. `free`: level ground is anywhere.
-    Filled: `found` (n, 15 k, 5) with weight, h, v, d and the variance of h; `joint`
+    Filled: `states` (n, 15 k, 5) with weight, h, v, d and the variance of h; `joint`
     (n, 15 k, 15 k) with p(now, before) for `smooth_backward`, unless it has length 0.
     """
     size = len(state[0])
@@ -130,9 +130,9 @@ def filter_samples(state: State, heights_m: Floats, free: bool, seen: Floats, fo
             if len(joint):
                 chain = merged[3].copy() if part == 0 else _chain_joint(merged[3], chain)
         for s in range(size):
-            found[i, s, RESULT_WEIGHT] = state[0][s]
-            found[i, s, RESULT_HEIGHT:RESULT_VARIANCE] = state[1][s, :GUST]
-            found[i, s, RESULT_VARIANCE] = state[2][s, HEIGHT, HEIGHT]
+            states[i, s, RESULT_WEIGHT] = state[0][s]
+            states[i, s, RESULT_HEIGHT:RESULT_VARIANCE] = state[1][s, :GUST]
+            states[i, s, RESULT_VARIANCE] = state[2][s, HEIGHT, HEIGHT]
         if len(joint):
             joint[i] = chain
 
@@ -152,7 +152,7 @@ def _chain_joint(later: Floats, earlier: Floats) -> Floats:
 def smooth_backward(joint: Floats, last: Floats) -> Floats:
     """Probabilities (n, 15 k) at the samples *before* those of `joint`, given all samples, and `last` (15 k,) at its last one [Kim 1994]."""
     n, size = len(joint), len(last)
-    found = np.zeros((n, size))
+    smoothed = np.zeros((n, size))
     later = last.copy()
     for i in range(n - 1, -1, -1):
         for s in range(size):
@@ -160,10 +160,10 @@ def smooth_backward(joint: Floats, last: Floats) -> Floats:
                 continue
             total = joint[i, s].sum()
             if total > 0.0:
-                found[i] += later[s] / total * joint[i, s]
-        later = found[i] / found[i].sum()
-        found[i] = later
-    return found
+                smoothed[i] += later[s] / total * joint[i, s]
+        later = smoothed[i] / smoothed[i].sum()
+        smoothed[i] = later
+    return smoothed
 
 
 @kernel
@@ -299,7 +299,7 @@ def _arrivals(state: State, s: int, heights_m: Floats, free: bool, dt: float, se
     stairs = way < LIFT_UP
     ends = weights[s] * probability_within(CLIMB_ENDS if stairs else RIDE_ENDS, dt)
     for j in range(len(heights_m)):
-        wide = math.hypot(STOREY_M, SCALE * (heights_m[j] - heights_m[s // MODES]))
+        wide = math.hypot(LEVEL_SD_M, SCALE * (heights_m[j] - heights_m[s // MODES]))
         if not free and abs(means[s, HEIGHT] - heights_m[j]) > 5.0 * math.sqrt(
             covariances[s, HEIGHT, HEIGHT] + wide**2
         ):
@@ -345,7 +345,7 @@ def _reinitialise_after_gap(
             )
     for target in range(STAIRS_UP, WAYS):
         x, c = _after_gap(state, s, dt, False, merged)
-        wide = WANDERED_M if free else 0.5 * (heights_m[count - 1] - heights_m[0]) + STOREY_M
+        wide = WANDERED_M if free else 0.5 * (heights_m[count - 1] - heights_m[0]) + LEVEL_SD_M
         reset_component(x, c, HEIGHT, wide)
         x[HEIGHT] = state[1][s, HEIGHT] if free else 0.5 * (heights_m[count - 1] + heights_m[0])
         stairs = target < LIFT_UP

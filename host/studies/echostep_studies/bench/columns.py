@@ -134,26 +134,26 @@ def summaries(rows: Sequence[ClaimsRow]) -> list[ClaimsSummary]:
 
 def _summary(runs: Sequence[ClaimsRow]) -> ClaimsSummary:
     claims = sum(r.claims for r in runs)
-    found = ClaimsSummary(
+    summary = ClaimsSummary(
         name=runs[0].name, runs=len(runs), named=_rounded(float(np.mean([r.named for r in runs]))),
         tracking=_rounded(sum(r.tracking * r.claims for r in runs) / claims),
         most_particles=max(r.most_particles for r in runs),
         times_real_time=_rounded(sum(r.span_s for r in runs) / max(sum(r.cpu_s for r in runs), 1e-9)),
     )  # fmt: skip
     judged = [r for r in runs if isinstance(r, JudgedRow)]
-    return _judged_summary(found, judged) if judged else found
+    return _judged_summary(summary, judged) if judged else summary
 
 
 def _judged_summary(summary: ClaimsSummary, runs: Sequence[JudgedRow]) -> JudgedSummary:
     claims = sum(len(r.error_m) for r in runs)
-    found = [r.found_m for r in runs if r.found_m is not None]
+    distances_m = [r.found_m for r in runs if r.found_m is not None]
     after = [e for r in runs for e in r.found_errors_m]
     delays = [s for r in runs for s in r.alarms_s]
     hours = sum(r.judged_span_s for r in runs) / 3600.0
     return JudgedSummary(
         **as_dict(summary),
-        found=_rounded(len(found) / len(runs)),
-        found_m=_rounded(float(np.mean(found))) if found else None,
+        found=_rounded(len(distances_m) / len(runs)),
+        found_m=_rounded(float(np.mean(distances_m))) if distances_m else None,
         listed=_rounded(float(np.mean([r.listed for r in runs]))),
         mean_m=_rounded(float(np.mean(after))) if after else None,
         ce95_m=_rounded(float(np.quantile(after, 0.95))) if after else None,

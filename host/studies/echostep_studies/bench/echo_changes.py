@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a walk's echoes may be like: people that answer first, silence, one ranger alone, panes of glass that no plan has.
+"""Disturbances of a walk's echoes: people in front of walls, silence, one ranger alone, panes of glass that the plan lacks.
 
 In: a `SimulatedWalk` and a seeded generator. Out: the same walk with other pings. Owns nothing. The path is the same in all of them.
 """
@@ -55,8 +55,8 @@ def one_ranger(walk: SimulatedWalk, ranger: int = LEFT) -> SimulatedWalk:
     """The pings of the other ranger are missing."""
     segments = []
     for s in walk.segments:
-        kept = s.ranger == ranger
-        segments.append(replace(s, t_s=s.t_s[kept], ranger=s.ranger[kept], range_m=s.range_m[kept]))
+        own = s.ranger == ranger
+        segments.append(replace(s, t_s=s.t_s[own], ranger=s.ranger[own], range_m=s.range_m[own]))
     return replace(walk, segments=tuple(segments))
 
 

@@ -26,7 +26,7 @@ WARM_UP = 3  # segments for which a throw-away filter runs first, so that no com
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """What a method says at a time: a position with status and protection radius, how probable it is that the plan fits, and other `places`.
+    """Claim of a method at a time: a position with status and protection radius, how probable it is that the plan fits, and other `places`.
 
     `places`: x, y (m), level of each hypothesis that is listed.
     """

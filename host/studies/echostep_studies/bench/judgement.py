@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the claims of one run are worth against the truth.
+"""Evaluation of the claims of one run against the truth.
 
 In: claims, true places. Out: `JudgedRun`: arrays of one entry a claim, and the questions that the columns ask. Owns the definitions.
 
@@ -34,7 +34,7 @@ CODES = {TrackStatus.TRACKING: TRACKING, TrackStatus.UNCERTAIN: UNCERTAIN, Track
 
 
 @dataclass(frozen=True, slots=True)
-class Truth:
+class TruePlaces:
     """True places `xy_m` (n, 2), and which levels are right there, `level_right` (n, levels)."""
 
     xy_m: Floats
@@ -84,17 +84,17 @@ class JudgedRun:
     def alarm_delays_s(self) -> list[float]:
         """For each time that the error exceeds ALARM_M: how long until a claim does not say "tracking", or the error is small again."""
         delays, since_s, flagged = [], None, False
-        for t_s, off, said in zip(
+        for t_s, off, claims_tracking in zip(
             self.t_s.tolist(), (self.error_m > ALARM_M).tolist(), (self.status != TRACKING).tolist(), strict=True
         ):
-            if since_s is not None and not flagged and (said or not off):
+            if since_s is not None and not flagged and (claims_tracking or not off):
                 delays.append(t_s - since_s)
                 flagged = True
             if not off:
                 since_s, flagged = None, False
             elif since_s is None:
                 since_s = t_s
-                if said:
+                if claims_tracking:
                     delays.append(0.0)
                     flagged = True
         if since_s is not None and not flagged:
@@ -137,7 +137,7 @@ def _nearest(away_m: Floats) -> Bools:
     return np.asarray(away_m <= away_m.min(1, keepdims=True) + 2.0 * TIE_M)
 
 
-def errors_m(place_m: Floats, level: Ints, true: Truth) -> Floats:
+def errors_m(place_m: Floats, level: Ints, true: TruePlaces) -> Floats:
     """Errors (n,) of places (n, 2) on levels (n,); on a wrong floor at least FLOOR_M."""
     away = place_m - true.xy_m
     error_m = np.hypot(away[:, 0], away[:, 1])
@@ -145,7 +145,7 @@ def errors_m(place_m: Floats, level: Ints, true: Truth) -> Floats:
     return np.asarray(np.where(right, error_m, np.maximum(error_m, FLOOR_M)))
 
 
-def judge(claims: Sequence[Claim], true: Truth, walked_m: Floats, search_m: float = SEARCH_M) -> JudgedRun:
+def judge(claims: Sequence[Claim], true: TruePlaces, walked_m: Floats, search_m: float = SEARCH_M) -> JudgedRun:
     """Claims (n,) against the truth at their times; `walked_m` (n,) since the search began."""
     place = np.array([(c.x_m, c.y_m) for c in claims]).reshape(-1, 2)
     error_m = errors_m(place, np.array([c.level for c in claims]), true)
@@ -155,7 +155,7 @@ def judge(claims: Sequence[Claim], true: Truth, walked_m: Floats, search_m: floa
     )  # fmt: skip
 
 
-def _listed(claim: Claim, error_m: float, true: Truth) -> bool:
+def _listed(claim: Claim, error_m: float, true: TruePlaces) -> bool:
     """Whether the true place is a claim's own or one of its hypotheses."""
     x, y = true.xy_m[-1].tolist()
     near = any(math.hypot(px - x, py - y) < LISTED_M and true.level_right[-1, level] for px, py, level in claim.places)

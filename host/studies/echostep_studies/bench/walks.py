@@ -70,8 +70,8 @@ def simulate_with_gap(site: Site, seed: int, from_m: float, gap_s: float) -> tup
     chunks, truth = _chunks(site, seed)
     begin_s = walk_of(site.built, (), truth).time_at(from_m)
     gap_ns = [START_NS + int(1e9 * t_s) for t_s in (begin_s, begin_s + gap_s)]
-    heard = [c for c in chunks if not gap_ns[0] <= c.t_arrival_ns < gap_ns[1]]
-    return walk_of(site.built, heard, truth), begin_s + gap_s
+    remaining = [c for c in chunks if not gap_ns[0] <= c.t_arrival_ns < gap_ns[1]]
+    return walk_of(site.built, remaining, truth), begin_s + gap_s
 
 
 def _chunks(

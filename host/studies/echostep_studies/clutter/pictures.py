@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A picture of each log's plans with its path, to see whether they look like the building.
 
-In: a `Building`. Out: NAME.png. Owns nothing.
+In: a `LogBuilding`. Out: NAME.png. Owns nothing.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from pathlib import Path
 
 from matplotlib.collections import LineCollection
 
-from echostep_studies.bench.laser.building import Building
+from echostep_studies.bench.laser.building import LogBuilding
 from echostep_studies.frame.pictures import BLACK, BLUE, axes_of, save
 
 
-def draw_plans(folder: Path, building: Building) -> None:
+def draw_plans(folder: Path, building: LogBuilding) -> None:
     """Both plans side by side, and the way of the scans."""
     figure, axes = axes_of(1, len(building.plans), (8.0 * len(building.plans), 8.0))
     for ax, (name, plan) in zip(axes[0], building.plans.items(), strict=True):

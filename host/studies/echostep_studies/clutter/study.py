@@ -18,8 +18,8 @@ from echostep.localization.settings import CloudSettings
 from echostep.output.table import Table
 from echostep_studies.bench.columns import JudgedRow, JudgedSummary, run_row, summaries, tables
 from echostep_studies.bench.filtering import FilterRun, track
-from echostep_studies.bench.judgement import JudgedRun, Truth, judge
-from echostep_studies.bench.laser.building import Building, LogWalk, building_of, walk_from
+from echostep_studies.bench.judgement import JudgedRun, TruePlaces, judge
+from echostep_studies.bench.laser.building import LogBuilding, LogWalk, building_of, walk_from
 from echostep_studies.bench.laser.carmen_log import logs_in, read_log
 from echostep_studies.bench.stanford import draw_stanford
 from echostep_studies.clutter.pictures import draw_plans
@@ -57,14 +57,14 @@ def clutter_run(logs: tuple[Path, ...], starts: int, first_seed: int, number: in
     return [_row(building, name, "unknown", walk, Start(), number) for name in building.plans]
 
 
-def _unknown_scan(building: Building, number: int) -> int:
+def _unknown_scan(building: LogBuilding, number: int) -> int:
     """A random scan from which the log goes on for UNKNOWN_M; the first one where the log is shorter."""
     steps = np.hypot(*np.diff(building.log.pose[:, :2], axis=0).T)
     left_m = np.concatenate([np.cumsum(steps[::-1])[::-1], [0.0]])
     return int(np.random.default_rng([number, 62]).integers(max(int((left_m >= UNKNOWN_M).sum()), 1)))
 
 
-def _row(building: Building, plan: str, what: str, walk: LogWalk, start: Start, seed: int) -> LogRow:
+def _row(building: LogBuilding, plan: str, what: str, walk: LogWalk, start: Start, seed: int) -> LogRow:
     cloud = CloudSettings(start_veer_sd_deg=building.odometry.veer_sd_deg)
     run = track(walk.segments, building.plans[plan], start, seed, cloud)
     at_scans = FilterRun(tuple(run.claims[k] for k in walk.at_scan), run.most_particles, run.cpu_s)
@@ -73,7 +73,7 @@ def _row(building: Building, plan: str, what: str, walk: LogWalk, start: Start, 
 
 
 def _judged(walk: LogWalk, run: FilterRun) -> JudgedRun:
-    truth = Truth(walk.true[:, :2], np.ones((len(run.claims), 1), np.bool_))
+    truth = TruePlaces(walk.true[:, :2], np.ones((len(run.claims), 1), np.bool_))
     return judge(run.claims, truth, walk.walked_m, UNKNOWN_M)
 
 

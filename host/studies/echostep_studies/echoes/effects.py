@@ -31,7 +31,7 @@ class SimulatedEcho:
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """One effect: walls that are there, what was heard, and the walls that the plan has."""
+    """One effect: the true walls, the received echoes, and the walls of the plan."""
 
     name: str
     axis: str
@@ -57,11 +57,11 @@ def near_and_far(rng: np.random.Generator) -> Effect:
     """A post before a wall at 3 m: missed unless it is very near [Girard 2011, Figure 3a]."""
     wall = np.array([[-10.0, 3.0, 10.0, 3.0]])
     post = np.array([[0.0, 0.0, 0.0, 0.01]])  # no face toward the ranger: it echoes like a thin rod
-    heard = []
+    echoes = []
     for y in np.arange(0.2, 2.9, 0.15).tolist():
         built = np.vstack([wall, post + [0.0, y, 0.0, y]])
-        heard += _listen(built, [(y, (0.0, 0.0, 0.0))], rng)
-    return Effect("near and far", "distance of a thin post before a wall at 3 m, m", wall, heard)
+        echoes += _listen(built, [(y, (0.0, 0.0, 0.0))], rng)
+    return Effect("near and far", "distance of a thin post before a wall at 3 m, m", wall, echoes)
 
 
 def oblique(rng: np.random.Generator) -> Effect:
@@ -97,16 +97,16 @@ def _listen(
     built: Floats, poses: list[tuple[float, tuple[float, float, float]]], rng: np.random.Generator
 ) -> list[SimulatedEcho]:
     """Many pings of the left ranger at each pose."""
-    heard = []
+    pings = []
     for place, (x, y, heading) in poses:
         trunk, look = np.tile([x, y], (TRIES, 1)), np.full(TRIES, heading)
         us = echoes(trunk, look, built, np.zeros(2), rng).own_us[:, 0].astype(float)
-        heard.append(SimulatedEcho(place, (x, y, heading), np.where(us > 0, us * (0.5e-6 * SRF02.speed_m_s), np.nan)))
-    return heard
+        pings.append(SimulatedEcho(place, (x, y, heading), np.where(us > 0, us * (0.5e-6 * SRF02.speed_m_s), np.nan)))
+    return pings
 
 
 def pipe_range_m(off_axis_rad: float) -> float:
     """Farthest distance at which the 55 mm pipe is heard half of the time [Girard 2011, Figure 2a]."""
     away = np.arange(0.05, 6.0, 0.01)
-    heard = [rod_db(float(d), off_axis_rad, PIPE_RADIUS_M, SRF02) > SRF02.threshold_db for d in away]
-    return float(away[int(np.argmin(heard)) - 1]) if heard[0] else 0.0
+    is_loud = [rod_db(float(d), off_axis_rad, PIPE_RADIUS_M, SRF02) > SRF02.threshold_db for d in away]
+    return float(away[int(np.argmin(is_loud)) - 1]) if is_loud[0] else 0.0

@@ -33,8 +33,8 @@ def _detour(effect: Effect) -> str:
 
 
 def _limits(effect: Effect) -> str:
-    heard = [h for h in effect.heard if np.mean(~np.isnan(h.range_m)) > 0.5]
-    return f"between {np.nanmin(heard[0].range_m):.2f} m and {heard[-1].place:.2f} m"
+    received = [h for h in effect.heard if np.mean(~np.isnan(h.range_m)) > 0.5]
+    return f"between {np.nanmin(received[0].range_m):.2f} m and {received[-1].place:.2f} m"
 
 
 def _signature(effect: Effect) -> str:

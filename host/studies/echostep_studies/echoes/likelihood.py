@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the tracker's echo likelihood expects of simulated pings, and the settings under which it explains them best.
+"""Log-likelihood of simulated pings by the tracker's echo model, and the settings that maximise it.
 
 In: poses and ranges. Out: log-densities; fitted settings. Owns nothing.
 """
@@ -22,7 +22,7 @@ FITTED = ("sd_m", "slant_m", "rim_db", "soft_db", "edge_db", "corner_db", "stray
 
 
 def log_p(plan: Walls, pose: tuple[float, float, float], ranges_m: Floats, model: EchoModel) -> Floats:
-    """What the likelihood says of ranges (n,) of the left ranger at a pose."""
+    """Log-likelihood of ranges (n,) of the left ranger at a pose."""
     x, y, heading = pose
     away, off, kind = (np.empty(MOST_SOURCES) for _ in range(3))
     axis = heading + 0.5 * math.pi
@@ -54,11 +54,11 @@ def fitted(seed: int) -> list[SettingRow]:
         model = echo_model(replace(EchoSettings(), **chosen))
         return -float(np.mean([log_echo(z, n, d, off, kind, model) for z, n, d, off, kind in seen]))
 
-    found = minimize(cost, start, method="Nelder-Mead", options={"maxfev": 400, "xatol": 0.02, "fatol": 1e-4})
-    console.print(f"fit on {len(seen)} simulated pings: mean log p {-cost(start):.3f} as set, {-found.fun:.3f} fitted")
+    best = minimize(cost, start, method="Nelder-Mead", options={"maxfev": 400, "xatol": 0.02, "fatol": 1e-4})
+    console.print(f"fit on {len(seen)} simulated pings: mean log p {-cost(start):.3f} as set, {-best.fun:.3f} fitted")
     return [
         SettingRow(name=f"fit: {name}", set=getattr(EchoSettings(), name), fitted=round(value, 4))
-        for name, value in zip(FITTED, np.exp(found.x).tolist(), strict=True)
+        for name, value in zip(FITTED, np.exp(best.x).tolist(), strict=True)
     ]
 
 

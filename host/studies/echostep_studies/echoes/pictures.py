@@ -27,7 +27,7 @@ RANGES_M = np.arange(0.0, 6.02, 0.02)
 
 
 def draw_effects(path: Path, effects: Sequence[Effect]) -> None:
-    """Ranges heard (dots), what the likelihood expects (grey), and the share of pings that are heard (line)."""
+    """Received ranges (dots), predicted density (grey), and share of the pings with an echo (line)."""
     figure, axes = axes_of(4, 2, (13.0, 15.0))
     panels = [ax for row in axes for ax in row]
     _cone(panels[0], panels[1])
@@ -45,8 +45,8 @@ def _effect(ax: Axes, effect: Effect) -> None:
     expected = np.array([np.exp(log_p(plan, h.pose, RANGES_M[1:], model)) for h in effect.heard])
     ax.pcolormesh(places, RANGES_M[1:], np.sqrt(expected.T), cmap="Greys", shading="nearest", rasterized=True)
     for h in effect.heard:
-        heard = h.range_m[~np.isnan(h.range_m)][:20]
-        ax.plot(np.full(len(heard), h.place), heard, ".", color=BLUE, ms=2.5)
+        ranges_m = h.range_m[~np.isnan(h.range_m)][:20]
+        ax.plot(np.full(len(ranges_m), h.place), ranges_m, ".", color=BLUE, ms=2.5)
     ax.plot([], [], ".", color=BLUE, label="ranges heard")
     ax.plot([], [], "s", color="0.6", label="expected by the likelihood")
     top = 6.5 if max(np.nanmax(h.range_m, initial=0.0) for h in effect.heard) > 3.2 else 3.4

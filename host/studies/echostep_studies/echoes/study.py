@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What simulated rangers hear, effect by effect [Girard 2011, 2.6, Figures 1-5], and how well the tracker's likelihood expects it.
+"""Echoes of simulated rangers, effect by effect [Girard 2011, 2.6, Figures 1-5], and how well the tracker's likelihood predicts them.
 
 In: a seed. Out: rows, a picture of each effect, and on demand the settings that explain simulated pings best. The simulation and the likelihood share
 nothing but the plan: one computes levels of sound from mirror images, the other has a handful of numbers.
@@ -37,7 +37,7 @@ SETTINGS_COLUMNS = {"name": "setting", "set": "as set", "fitted": "fitted"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EchoRow:
-    """Pings that show one thing: how many, the share that was heard, how well they were expected; and what they show."""
+    """Pings of one effect: their number, the share with an echo, their mean log-likelihood, and a sentence about the effect."""
 
     name: str
     pings: int | UnsetType = UNSET
@@ -78,9 +78,9 @@ def draw_figures(folder: Path, seed: int, _rows: list[EchoesRow]) -> None:
 
 
 def _tables(rows: list[EchoesRow], _request: StudyRequest) -> list[Table]:
-    found = as_dicts(row for row in rows if isinstance(row, EchoRow))
+    effects = as_dicts(row for row in rows if isinstance(row, EchoRow))
     settings = as_dicts(row for row in rows if isinstance(row, SettingRow))
-    tables = [Table("Simulated pings, and how the likelihood expects them", found, COLUMNS)]
+    tables = [Table("Simulated pings, and how the likelihood expects them", effects, COLUMNS)]
     return [*tables, Table("Echo settings", settings, SETTINGS_COLUMNS)] if settings else tables
 
 

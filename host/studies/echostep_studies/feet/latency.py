@@ -33,9 +33,9 @@ def pace(recording: FootRecording) -> tuple[list[float], float]:
 def pace_rows(recordings: list[FootRecording]) -> list[FigureRow]:
     """Latency and cost over all recordings; the values are seconds and a share, as the metrics say."""
     pace(recordings[0])  # not counted: kernels compile
-    found = [pace(recording) for recording in recordings]
-    late = [seconds for part, _ in found for seconds in part]
-    cost = float(np.mean([seconds for _, seconds in found]))
+    paces = [pace(recording) for recording in recordings]
+    late = [seconds for part, _ in paces for seconds in part]
+    cost = float(np.mean([seconds for _, seconds in paces]))
     figures = {
         "step told after its stance began, median, s": float(np.median(late)),
         "step told after its stance began, worst, s": max(late),

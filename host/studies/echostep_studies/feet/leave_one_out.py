@@ -46,8 +46,8 @@ def describe(noise: Noise) -> str:
 
 def with_left_out(rows: list[FigureRow], chosen: dict[str, list[FigureRow]]) -> list[FigureRow]:
     """Each figure under the other sets' choice beside the figure of the one setting, as `left_out`."""
-    found = {(r.set, r.recording, r.metric): r.value for part in chosen.values() for r in part}
-    return [replace(row, left_out=found.get((row.set, row.recording, row.metric))) for row in rows]
+    values = {(r.set, r.recording, r.metric): r.value for part in chosen.values() for r in part}
+    return [replace(row, left_out=values.get((row.set, row.recording, row.metric))) for row in rows]
 
 
 def _scaled(factors: tuple[float, ...]) -> Noise:
@@ -57,11 +57,11 @@ def _scaled(factors: tuple[float, ...]) -> Noise:
 
 def _errors(recordings: list[FootRecording], noise: Noise, track_of: TrackOf) -> dict[str, list[float]]:
     """The first figure of each recording, by set."""
-    found: dict[str, list[float]] = {}
+    by_group: dict[str, list[float]] = {}
     for recording in recordings:
         first = recording.judge(track_of(recording, noise))[0]
-        found.setdefault(recording.group, []).append(abs(first.value))
-    return found
+        by_group.setdefault(recording.group, []).append(abs(first.value))
+    return by_group
 
 
 def _best(scores: list[dict[str, list[float]]], default: dict[str, list[float]], without: str) -> int:

@@ -17,7 +17,7 @@ from echostep.foot.ins import Noise
 from echostep.foot.steps import Track, walk_track
 from echostep.output.table import Table, console
 from echostep_studies.bench.recordings.feet import SETS, FootRecording
-from echostep_studies.bench.recordings.foot_metrics import Figure, way
+from echostep_studies.bench.recordings.foot_metrics import FootFigure, way
 from echostep_studies.feet.latency import LIVE, pace_rows
 from echostep_studies.feet.leave_one_out import describe, leave_one_out, with_left_out
 from echostep_studies.feet.pictures import draw_tracks
@@ -95,12 +95,12 @@ def rows_of(recording: FootRecording, track: Track) -> list[FigureRow]:
 
 def medians(rows: list[FigureRow]) -> list[FigureRow]:
     """The median of each metric of a set that has several recordings; of its size where it has a sign."""
-    found = []
+    median_rows = []
     for group, metric in dict.fromkeys((row.set, row.metric) for row in rows if row.set != "stairs"):
         same = [row for row in rows if (row.set, row.metric) == (group, metric)]
         if len(same) > 1:
-            middle = Figure(metric, median(abs(row.value) for row in same))
-            found.append(
+            middle = FootFigure(metric, median(abs(row.value) for row in same))
+            median_rows.append(
                 _row(
                     group,
                     f"median of {len(same)}",
@@ -108,10 +108,10 @@ def medians(rows: list[FigureRow]) -> list[FigureRow]:
                     median(row.distance_m for row in same if row.distance_m is not None),
                 )
             )
-    return found
+    return median_rows
 
 
-def _row(group: str, name: str, figure: Figure, way_m: float) -> FigureRow:
+def _row(group: str, name: str, figure: FootFigure, way_m: float) -> FigureRow:
     peer_name, peer = figure.peer or (None, None)
     return FigureRow(
         set=group,

@@ -59,18 +59,18 @@ def moments(scenario: Scenario, plan: Plan) -> list[Moment]:
     table = scenario.truth
     truth = Truth(table[:, 0], table[:, 1:3])
     tracker = Tracker(plan, scenario.start, seed=SEED)
-    found: list[Moment] = []
+    taken: list[Moment] = []
 
     def look(_segment: MeasuredSegment | None, estimate: Estimate) -> None:
         cloud = tracker.particles(MOST_PARTICLES)
         if cloud is not None:
             true_m = truth.at(np.array([estimate.t_s]))[0]
-            found.append(Moment(estimate, np.column_stack([cloud.x_m, cloud.y_m]), true_m))
+            taken.append(Moment(estimate, np.column_stack([cloud.x_m, cloud.y_m]), true_m))
 
     tracker.watchers.append(look)
     for chunk in scenario.chunks():
         tracker.take(portion_of([chunk]))
-    return found
+    return taken
 
 
 def frames(walk: Sequence[Moment], plan: Plan) -> list[Image]:

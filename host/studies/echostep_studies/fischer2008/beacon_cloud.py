@@ -84,13 +84,13 @@ def update_by_ultrasound(
     """
     _propagate(cloud, walker.moved_x, walker.moved_y, rng)
     walker.moved_x, walker.moved_y = 0.0, 0.0
-    heard = False
+    measured = False
     for k in order:
         if is_in_reach(world, k, walker.x, walker.y):
-            heard, cloud.heard_ticks[k] = True, tick
+            measured, cloud.heard_ticks[k] = True, tick
             range_m, bearing = measure(world, k, walker.x, walker.y, rng)
             _reweight(cloud, BeaconMeasurement(k, range_m, bearing), rng)
-    return heard
+    return measured
 
 
 @kernel

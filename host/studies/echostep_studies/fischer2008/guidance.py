@@ -47,10 +47,10 @@ def advise_by_fusion(fusion: Fusion, trail: Floats, walker: GuidedWalker) -> Adv
 
 
 @kernel
-def note_contact(contact: Contact, walker: GuidedWalker, tick: int, heard: bool) -> bool:
-    """Whether the walker is to go back; `heard`: a beacon measures now. Places are those of dead reckoning."""
+def note_contact(contact: Contact, walker: GuidedWalker, tick: int, measured: bool) -> bool:
+    """Whether the walker is to go back; `measured`: a beacon measures now. Places are those of dead reckoning."""
     t_s = tick * TICK_S
-    known_s = t_s if heard else contact.known_s
+    known_s = t_s if measured else contact.known_s
     return update_contact(contact, t_s, known_s, walker.path_x, walker.path_y, False, SILENCE_S)
 
 
@@ -76,14 +76,14 @@ def _mean_turn(
     `measured`: heading. Turns are averaged, not places: on maps that are bent differently a mean place has no meaning. On a learnt map a particle
     is looked for near the beacons that were heard at or after `since_tick`.
     """
-    particles, heard = cloud.particles, cloud.heard_ticks >= since_tick
+    particles, recent = cloud.particles, cloud.heard_ticks >= since_tick
     total, east, north, rest = 0.0, 0.0, 0.0, 0.0
     path, from_m, to_m = trail, 0.0, np.inf
     for i in range(len(particles.x_m)):
         w = math.exp(particles.log_weight[i])
         if deployed:
             path = believed_trail(cloud, i, trail[-1])
-            from_m, to_m = span_near_heard(path, heard)
+            from_m, to_m = span_near_heard(path, recent)
         turn, rest_m = _target(path, particles.x_m[i], particles.y_m[i], measured + particles.turn_rad[i], from_m, to_m)
         total += w
         east += w * math.cos(turn)

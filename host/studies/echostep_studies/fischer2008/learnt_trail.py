@@ -67,17 +67,17 @@ def believed_trail(cloud: BeaconCloud, i: int, exit_m: Floats) -> Floats:
 
 
 @kernel
-def span_near_heard(path: Floats, heard: Bools) -> tuple[float, float]:
+def span_near_heard(path: Floats, recent: Bools) -> tuple[float, float]:
     """Lengths (m) along a path (b + 1, 2) between which the walker must be: from one beacon before those heard (b,) to one behind.
 
     A bent map may pass the same place twice, but other beacons are heard there.
     """
     from_m, to_m, length_m, before_m, any_heard = 0.0, np.inf, 0.0, 0.0, False
-    for k in range(len(heard)):
-        if heard[k] and not any_heard:
+    for k in range(len(recent)):
+        if recent[k] and not any_heard:
             from_m, any_heard = before_m, True
         before_m = length_m
         length_m += math.hypot(path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1])
-        if heard[k]:
+        if recent[k]:
             to_m = length_m
     return from_m, to_m

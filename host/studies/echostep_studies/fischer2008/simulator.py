@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """One guided return: the event-based simulator of [Fischer 2008, 4.2] around the paper's fusion and around a particle filter with beacons.
 
-In: a `BeaconGround`, a system, how well the person obeys. Out: true and estimated places at each guidance, and whether the exit was reached. Owns the
+In: a `BeaconGround`, a system, the response to cues. Out: true and estimated places at each guidance, and whether the exit was reached. Owns the
 loop of events: inertial every 10 ms, ultrasound every 200 ms, guidance every 2 s. Everything here is simulated.
 """
 
@@ -144,8 +144,8 @@ def _measure(
 ) -> None:
     """One ultrasound event."""
     if rules.system == OURS:
-        heard = update_by_ultrasound(world, state.cloud, state.walker, tick, order, rng)
-        note_contact(state.contact, state.walker, tick, heard)
+        measured = update_by_ultrasound(world, state.cloud, state.walker, tick, order, rng)
+        note_contact(state.contact, state.walker, tick, measured)
     elif rules.system == PAPER:
         fuse_nearest(world, state.walker, state.fusion, rng)
 

@@ -151,10 +151,10 @@ def judge(plan: Plan, truth: Floats, estimates: Sequence[Estimate], name: str, s
     for t, good in zip(t_s.tolist(), right.tolist(), strict=True):
         since = None if good else t if since is None else since
         wrong_s = max(wrong_s, 0.0 if since is None else t - since)
-    found = error_statistics(error)
+    statistics = error_statistics(error)
     return StoreysRun(
-        name=name, profile="default", seed=seed, mean_m=found.mean_m, sd_m=found.sd_m, max_m=found.max_m,
-        min_m=found.min_m, ending_m=found.ending_m, ce95_m=found.p95_m,
+        name=name, profile="default", seed=seed, mean_m=statistics.mean_m, sd_m=statistics.sd_m, max_m=statistics.max_m,
+        min_m=statistics.min_m, ending_m=statistics.ending_m, ce95_m=statistics.p95_m,
         coverage95=float(np.mean([e.holds(px, py) for e, px, py, _ in places])),
         lost=int(error[-1] > LOST_M), said_lost=float(np.mean([e.status is TrackStatus.LOST for e in estimates])),
         floor_right=float(right.mean()), strict_right=float(strict.mean()), longest_wrong_s=wrong_s,

@@ -30,7 +30,7 @@ from echostep_studies.simulation.vertical_day import VerticalMove, climb
 
 STOREYS_M = (0.0, 3.5, 7.0, 10.5, 14.0)
 RUN_S = 1200.0
-TIE_M = 0.25
+LANDING_TIE_M = 0.25
 COUNTS_PA = 0.25
 MODE_HZ: dict[Mode, float] = {"high-speed": 9.0, "high-resolution": 1.8}
 
@@ -111,8 +111,8 @@ def _row(name: str, scene: FloorScene, seed: int) -> FloorRun:
     true = away.argmin(axis=1)
     prior = np.eye(len(heights))[true[0]] if scene.known_start else None
     filter_ = FloorFilter(heights, BarometerSettings(PRESSURE_NOISE_PA[scene.mode]), prior)
-    found = filter_.smooth(samples) if scene.whole else filter_.feed(samples)
-    return judge(found, away, name, seed)
+    floors = filter_.smooth(samples) if scene.whole else filter_.feed(samples)
+    return judge(floors, away, name, seed)
 
 
 def _measured(
@@ -128,15 +128,15 @@ def _measured(
     return at, Pressures(way.t_s[at], COUNTS_PA * np.rint(noisy / COUNTS_PA), np.rint(20.0 * device[at]) / 20.0, gait)
 
 
-def judge(found: Floors, away_m: Floats, name: str, seed: int) -> FloorRun:
+def judge(floors: Floors, away_m: Floats, name: str, seed: int) -> FloorRun:
     """The row of a run; `away_m`: (n, k) from each storey."""
-    n = np.arange(len(found.floor))
-    ties = away_m <= away_m.min(axis=1, keepdims=True) + 2.0 * TIE_M
-    wrong = ~ties[n, found.floor]
+    n = np.arange(len(floors.floor))
+    ties = away_m <= away_m.min(axis=1, keepdims=True) + 2.0 * LANDING_TIE_M
+    wrong = ~ties[n, floors.floor]
     true = away_m.argmin(axis=1)
     return FloorRun(
-        name=name, seed=seed, floor_right=float(1.0 - wrong.mean()), strict_right=float((found.floor == true).mean()),
-        longest_wrong_s=longest_s(found.t_s, wrong), changes=int(np.count_nonzero(np.diff(true))),
+        name=name, seed=seed, floor_right=float(1.0 - wrong.mean()), strict_right=float((floors.floor == true).mean()),
+        longest_wrong_s=longest_s(floors.t_s, wrong), changes=int(np.count_nonzero(np.diff(true))),
     )  # fmt: skip
 
 

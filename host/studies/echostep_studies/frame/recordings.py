@@ -22,7 +22,7 @@ Sets = Sequence[tuple[str, str, Callable[[Path], Iterable[Recording]]]]
 
 def read_sets(folder: Path, sets: Sets[Recording]) -> tuple[list[Recording], list[str]]:
     """All recordings in the folder, and a line about each set or file that was skipped."""
-    found: list[Recording] = []
+    recordings: list[Recording] = []
     skipped: list[str] = []
     for group, pattern, read in sets:
         paths = sorted(folder.glob(pattern))
@@ -30,10 +30,10 @@ def read_sets(folder: Path, sets: Sets[Recording]) -> tuple[list[Recording], lis
             skipped.append(f"{group}: skipped, no {pattern} in {folder}")
         for path in paths:
             try:
-                found += read(path)
+                recordings += read(path)
             except Exception as error:  # foreign files: a reader may raise any exception
                 skipped.append(f"{group}: {path} skipped, cannot read it: {error or type(error).__name__}")
-    return found, skipped
+    return recordings, skipped
 
 
 def recordings_in(folder: Path, sets: Sets[Recording]) -> list[Recording]:

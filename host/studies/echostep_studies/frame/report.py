@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a study puts out: rows as dictionaries, JSON and Parquet files.
+"""Output of a study: rows as dictionaries, JSON and Parquet files.
 
 In: rows, which are dataclasses: their fields are the columns, in this order; a field that is UNSET is a column that the row lacks. Out: files.
 Owns the conversion of rows to dictionaries.

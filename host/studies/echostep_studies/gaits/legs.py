@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Legs in manners of moving that two gyros in the plane of the leg do not show, or only in part.
 
-In: seeds. Out: a row a manner: true way forward and up, what the strides say, in units of what they state too, and how they are flagged. Owns the
+In: seeds. Out: a row a manner: true and estimated way forward and up, the error over its stated deviation, the strides' flags. Owns the
 manners: curves of thigh and knee, assumed where `leg_angles` has none. The signs of the gyros are known, as from a walk before.
 """
 
@@ -71,7 +71,7 @@ MANNERS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LegRun:
-    """One manner by a leg: the true way forward and what the strides say of it, the same upward, and how the strides are flagged."""
+    """One manner of moving, measured by a leg: true and estimated way forward and upward, and the flags of the strides."""
 
     name: str
     seed: int
@@ -96,10 +96,10 @@ def leg_row(name: str, manner: LegManner, seed: int) -> LegRun:
     strides = _strides(manner, rng)
     moved = [s for s in strides if Flag.STANDING not in s.flags]
     forward = CYCLES * manner.forward_m
-    found, sd = sum(s.length_m for s in strides), distance_sd_m(strides)
+    measured_m, sd = sum(s.length_m for s in strides), distance_sd_m(strides)
     return LegRun(
-        name=f"legs/{name}", seed=seed, forward_m=forward, found_m=found, sd_m=sd,
-        error_over_sd=(found - forward) / sd if sd > 0.0 else math.nan,
+        name=f"legs/{name}", seed=seed, forward_m=forward, found_m=measured_m, sd_m=sd,
+        error_over_sd=(measured_m - forward) / sd if sd > 0.0 else math.nan,
         up_m=CYCLES * manner.up_m, rise_m=sum(s.rise_m for s in strides),
         stairs_percent=_share(moved, STAIRS), blind_percent=_share(moved, BLIND),
     )  # fmt: skip
@@ -131,5 +131,5 @@ def _share(strides: list[Stride], flags: Flag) -> float:
 def _ease(share: Floats) -> Floats:
     """From 0 to 1 with the least jerk [Flash and Hogan 1985]."""
     v = np.clip(share, 0.0, 1.0)
-    found: Floats = v**3 * (10.0 - 15.0 * v + 6.0 * v**2)
-    return found
+    eased: Floats = v**3 * (10.0 - 15.0 * v + 6.0 * v**2)
+    return eased

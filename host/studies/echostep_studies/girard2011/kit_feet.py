@@ -41,14 +41,14 @@ class KitRun:
 
 def rows(seed: int) -> list[KitRun]:
     """Each device at each pace, on the same steps."""
-    found: list[KitRun] = []
+    runs: list[KitRun] = []
     waypoints = tuple((float(x), float(y)) for x, y in otb().route)
     for pace, person in PACES.items():
         walked = walk(waypoints, person, np.random.default_rng([seed, 11]))
         for name, (samples, noise) in devices(walked, seed).items():
             errors = errors_m(walked, samples, noise)
-            found.append(KitRun(name=f"foot alone, {pace}, {name}", seed=seed, errors_m=errors, inside95=[]))
-    return found
+            runs.append(KitRun(name=f"foot alone, {pace}, {name}", seed=seed, errors_m=errors, inside95=[]))
+    return runs
 
 
 def devices(walked: Walk, seed: int) -> dict[str, tuple[Samples, Noise]]:
@@ -65,7 +65,7 @@ def devices(walked: Walk, seed: int) -> dict[str, tuple[Samples, Noise]]:
 
 
 def calibrated(samples: Samples, walked: Walk, seed: int) -> Samples:
-    """The same samples less the errors that six poses of the same part tell; its temperature is that of the walk."""
+    """The same samples less the errors estimated from six poses of the same part; its temperature is that of the walk."""
     poses = []
     for side in SIDES_RPY_RAD:
         lying = replace(
@@ -87,7 +87,7 @@ def errors_m(walked: Walk, samples: Samples, noise: Noise) -> list[float]:
     at = np.searchsorted(track.t_s, ends).clip(max=len(track.t_s) - 1)
     yaw = walked.foot_rpy_rad[0, 2]
     c, s = np.cos(yaw), np.sin(yaw)
-    found = track.position_m[at, :2] @ np.array([[c, s], [-s, c]]) + walked.foot_m[0, :2]
+    estimated = track.position_m[at, :2] @ np.array([[c, s], [-s, c]]) + walked.foot_m[0, :2]
     true = walked.foot_m[(ends * RATE_HZ).astype(int).clip(max=len(walked.foot_m) - 1), :2]
-    errors: list[float] = np.hypot(*(found - true).T).tolist()
+    errors: list[float] = np.hypot(*(estimated - true).T).tolist()
     return errors

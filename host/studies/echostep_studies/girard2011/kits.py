@@ -43,7 +43,7 @@ class RangerKind:
 
 @cache
 def kinds() -> dict[str, RangerKind]:
-    """The kinds of rangers by the names of their rows; `pulse, as SRF02` is a pulse ranger whose settings were forgotten."""
+    """The kinds of rangers by the names of their rows; `pulse, as SRF02` is a pulse ranger with the settings of the SRF02."""
     echo, maxsonar = ECHO_OF[Part.PULSE], ECHO_OF[Part.MAXSONAR]
     paper = GirardSettings()
     narrow = replace(paper, aperture_rad=PULSE_CONE_RAD, maximum_m=echo.maximum_m)

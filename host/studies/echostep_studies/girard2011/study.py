@@ -175,10 +175,10 @@ def default(
         if turning is not None:
             map_filter.update(_measured_segment(turning, walk, since_s))
             since_s = turning.t1_s
-        found = map_filter.update(_measured_segment(step, walk, since_s))
+        estimate = map_filter.update(_measured_segment(step, walk, since_s))
         since_s = step.t1_s
         cloud = np.column_stack([map_filter.cloud.x_m, map_filter.cloud.y_m])
-        yield MethodOutput((found.x_m, found.y_m), found.holds(*walk.trunk_m[k + 1].tolist()), cloud)
+        yield MethodOutput((estimate.x_m, estimate.y_m), estimate.holds(*walk.trunk_m[k + 1].tolist()), cloud)
 
 
 SYSTEMS: dict[str, System] = {

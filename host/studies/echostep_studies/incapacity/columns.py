@@ -16,12 +16,12 @@ from echostep_studies.frame.report import as_dicts, rows_by_name
 from echostep_studies.frame.study import StudyRequest
 from echostep_studies.incapacity import falls
 
-TOLD_S = 35.0  # within which a wearer who cannot move is told
+TOLD_S = 35.0  # limit of the alarm's delay for an incapacitated wearer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LyingRun:
-    """A wearer who cannot move: after how long that was told, and whether within TOLD_S."""
+    """An incapacitated wearer: delay of the alarm, and whether it was at most TOLD_S."""
 
     name: str
     seed: int
@@ -42,7 +42,7 @@ class DayRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LyingSummary:
-    """All wearers who cannot move."""
+    """Summary of all incapacitated wearers."""
 
     name: str
     runs: int
@@ -77,8 +77,8 @@ def summarize(rows: Sequence[RunRow]) -> list[SummaryRow]:
 
 def _lying_summary(group: Sequence[LyingRun]) -> LyingSummary:
     told_s = [row.told_s for row in group]
-    told, median_s = sum(row.told for row in group), float(np.median(told_s))
-    return LyingSummary(name=group[0].name, runs=len(group), told=told, median_s=median_s, longest_s=max(told_s))
+    in_time, median_s = sum(row.told for row in group), float(np.median(told_s))
+    return LyingSummary(name=group[0].name, runs=len(group), told=in_time, median_s=median_s, longest_s=max(told_s))
 
 
 def _day_summary(group: Sequence[DayRun]) -> DaySummary:
@@ -90,9 +90,9 @@ def _day_summary(group: Sequence[DayRun]) -> DaySummary:
 
 
 def tables(rows: Sequence[SummaryRow], _: StudyRequest) -> list[Table]:
-    """Those who cannot move, those who can, falls."""
-    told = f"told within {TOLD_S:.0f} s"
-    lying = {"name": "", "runs": "wearers", "told": told, "median_s": "median s", "longest_s": "longest s"}
+    """Tables of incapacitated wearers, of false alarms, and of falls."""
+    in_time = f"told within {TOLD_S:.0f} s"
+    lying = {"name": "", "runs": "wearers", "told": in_time, "median_s": "median s", "longest_s": "longest s"}
     days = {
         "name": "",
         "runs": "runs",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The detection of falls, judged: which simulated falls are told, how soon, and what else is taken for one.
+"""Evaluation of the fall detection: share and delay of detected simulated falls, and false detections in other movements.
 
 In: seeds. Out: rows (recordings: `fall_recordings.py`). The samples are simulated (`studies/echostep_studies/simulation/falling.py`); from
 them on it is the tracker's own code. The wearer rests without a movement after everything that is no fall, which is harder than life.
@@ -20,7 +20,7 @@ from echostep.odometry.incapacity.wearer_signs import Sign, WearerSigns
 from echostep.output.table import Table
 from echostep.path import PathSegment
 from echostep_studies.frame.report import as_dicts, rows_by_name
-from echostep_studies.simulation.body_motion import ICM20649, MTX, Part
+from echostep_studies.simulation.body_motion import ICM20649, MTX, SensorPart
 from echostep_studies.simulation.falling import FALLS, NO_FALLS, STRIDE_M, BodySamples, walk_then
 
 KITS = ("belt", "foot board alone", "MTx alone")
@@ -50,7 +50,7 @@ class NoFallRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FallSummary:
-    """All falls of a kit and a manner; without a time where none was told."""
+    """All falls of a kit and a manner; no delay where none was detected."""
 
     name: str
     runs: int
@@ -91,7 +91,7 @@ def message_index(t_s: Floats) -> Ints:
 
 
 def fallen(seed: int) -> FallRun:
-    """A wearer who falls and stays: whether it is told, how soon after the fall began, and whether the walk before it was taken for one."""
+    """A fall of a wearer that stays down: whether it is detected, the delay from its beginning, and whether the walk before gave a false one."""
     kit, manner = _drawn(seed, list(FALLS))
     samples = walk_then(FALLS[manner], _foot(kit), np.random.default_rng([seed, 3]))
     signs = signs_of(samples, belt=kit == "belt")
@@ -108,7 +108,7 @@ def fallen(seed: int) -> FallRun:
 
 
 def not_fallen(seed: int) -> NoFallRun:
-    """A wearer who does something else that is sudden, and then rests: whether a fall was claimed."""
+    """Another sudden movement, followed by rest: whether a fall was detected."""
     kit, manner = _drawn(seed, list(NO_FALLS))
     samples = walk_then(NO_FALLS[manner], _foot(kit), np.random.default_rng([seed, 4]))
     claimed = sum(isinstance(sign, Fall) for sign in signs_of(samples, belt=kit == "belt"))
@@ -119,7 +119,7 @@ def _drawn(seed: int, manners: list[str]) -> tuple[str, str]:
     return KITS[seed % len(KITS)], manners[seed // len(KITS) % len(manners)]
 
 
-def _foot(kit: str) -> Part:
+def _foot(kit: str) -> SensorPart:
     return MTX if kit == "MTx alone" else ICM20649
 
 

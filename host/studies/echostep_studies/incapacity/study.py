@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The wearer's alarm, judged: how soon a wearer who cannot move is told, and how often one who can is.
+"""Evaluation of the wearer's alarm: delay for an incapacitated wearer, and rate of false alarms.
 
 In: seeds; public recordings of feet and legs where they are at hand. Out: rows. The samples of foot and leg sensors are simulated; windows and alarm
 are the tracker's own; the network is not part of it. How often people who wait or crouch move a foot is assumed (`PAUSES_S`), not measured: the
@@ -74,7 +74,7 @@ class SimulatedWearer:
         self._sway_rad_s = size * np.array(SWAY_RAD_S)[:, None] / math.sqrt(within.sum())
 
     def live(self, seconds: float, moves_s: Sequence[float], *, lies: bool = False, twitches: bool = False) -> None:
-        """So many seconds with movements at these times from now on; one who `lies` breathes and does not sway."""
+        """Add this many seconds with movements at these times; a wearer that `lies` breathes and does not sway."""
         t_s = self.t_s + np.arange(1, round(seconds * RATE_HZ) + 1) / RATE_HZ
         moved = np.zeros(len(t_s))
         sway = np.zeros((len(SWAY_RAD_S), len(t_s)))
@@ -192,7 +192,7 @@ DAYS: dict[str, Callable[[int], DayRun]] = {
 
 
 def one_run(days: int, data: Path, first: int, seed: int) -> list[RunRow]:
-    """A wearer who cannot move, one who falls, one who does not; with the first `days` seeds also working days, with the first one the recordings."""
+    """One incapacitated wearer, one fall and one other sudden movement; the first `days` seeds add a working day, the first one the recordings."""
     rows: list[RunRow] = [incapacitated(seed), falls.fallen(seed), falls.not_fallen(seed)]
     if seed - first < days:
         rows += [day(seed) for day in DAYS.values()]

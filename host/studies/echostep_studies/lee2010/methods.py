@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The methods that the study compares: that of [Lee 2010], the default by dead reckoning and on the plan; floors by pressure [Lee 2010].
 
-In: `Measured`, the start. Out: `MethodTrack`s, floors. Owns nothing.
+In: `MeasuredWalk`, the start. Out: `MethodTrack`s, floors. Owns nothing.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from echostep.ports.chunks import Chunk, portion_of
 from echostep.settings import Settings
 from echostep.simulation.people.walker import walk
 from echostep.tracker import Tracker
-from echostep_studies.lee2010.walks import STOREY_M, STOREYS, Measured, chunks_of, measure, person_of, storeys
+from echostep_studies.lee2010.walks import STOREY_M, STOREYS, MeasuredWalk, chunks_of, measure, person_of, storeys
 from echostep_studies.papers import lee2010
 
 CALIBRATION_M = 10.0
@@ -37,7 +37,7 @@ class MethodTrack:
     distance_m: float
 
 
-def by_lee(measured: Measured, start: tuple[float, float, float]) -> MethodTrack:
+def by_lee(measured: MeasuredWalk, start: tuple[float, float, float]) -> MethodTrack:
     """The paper's method: its equations at 10 Hz."""
     s = measured.samples
     settings = lee2010.LeeSettings(legs=lee2010.Lee2010Legs(measured.segments.thigh_m, measured.segments.shank_m))
@@ -47,7 +47,7 @@ def by_lee(measured: Measured, start: tuple[float, float, float]) -> MethodTrack
     return MethodTrack(np.column_stack([rows[:, 0], rows[:, 4] + start[0], rows[:, 5] + start[1]]), float(rows[-1, 1]))
 
 
-def by_default(measured: Measured, start: tuple[float, float, float]) -> MethodTrack:
+def by_default(measured: MeasuredWalk, start: tuple[float, float, float]) -> MethodTrack:
     """The default method: strides and fused heading by dead reckoning."""
     rows = track_default(measured.samples, StrideSettings(measured.segments), start[2]).rows[::20]
     return MethodTrack(np.column_stack([rows[:, 0], rows[:, 4] + start[0], rows[:, 5] + start[1]]), float(rows[-1, 1]))
@@ -61,7 +61,7 @@ def scale_of(segments: LegLengths, seed: int) -> float:
 
 
 def with_plan(
-    plan: Plan, chunks: Sequence[Chunk], measured: Measured, start: tuple[float, float, float], seed: int
+    plan: Plan, chunks: Sequence[Chunk], measured: MeasuredWalk, start: tuple[float, float, float], seed: int
 ) -> MethodTrack:
     """The default method on the plan: the tracker on the board's bytes, with legs and pings, without foot."""
     scale = scale_of(measured.segments, seed)

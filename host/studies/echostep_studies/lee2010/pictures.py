@@ -18,7 +18,7 @@ from echostep_studies.lee2010.methods import METHODS, MethodTrack, floors_of, wi
 from echostep_studies.lee2010.walks import (
     STOREY_M,
     STOREYS,
-    Measured,
+    MeasuredWalk,
     chunks_of,
     descent_of,
     lap_of,
@@ -58,7 +58,7 @@ def draw(folder: Path, seed: int) -> None:
         raise EchostepError(f"{folder}: cannot write the pictures: {error.strerror}") from error
 
 
-def _tracks(walked: Walk, measured: Measured) -> dict[str, MethodTrack]:
+def _tracks(walked: Walk, measured: MeasuredWalk) -> dict[str, MethodTrack]:
     return {name: method(measured, start_of(walked)) for name, method in METHODS.items()}
 
 
@@ -75,9 +75,9 @@ def _lap(path: Path, lap: Walk, tracks: dict[str, MethodTrack]) -> None:
     figure = _figure((8.0, 6.6))
     axes = figure.subplots()
     axes.plot(*lap.trunk_m[::50].T, **STYLES["truth"])
-    for name, found in tracks.items():
-        axes.plot(*found.track[:, 1:].T, **STYLES[name])
-        axes.plot(*found.track[-1, 1:], "o", color=STYLES[name]["color"])
+    for name, method in tracks.items():
+        axes.plot(*method.track[:, 1:].T, **STYLES[name])
+        axes.plot(*method.track[-1, 1:], "o", color=STYLES[name]["color"])
     axes.plot(*lap.trunk_m[0], "k^", label="start")
     axes.set(title="40 x 30 m (after Figure 6), simulated", xlabel="x / m", ylabel="y / m", aspect="equal")
     _finish(figure, axes, path)
@@ -107,9 +107,9 @@ def _three(path: Path, descent: Walk, tracks: dict[str, MethodTrack], floors: Fl
     figure = _figure((8.5, 6.5))
     axes = figure.add_subplot(projection="3d")
     axes.plot(*descent.trunk_m[::100].T, descent.height_m[::100] - (STOREYS - 1) * STOREY_M, **STYLES["truth"])
-    for name, found in tracks.items():
-        at = np.minimum(np.searchsorted(floors[:, 0], found.track[:, 0]), len(floors) - 1)
-        axes.plot(*found.track[:, 1:].T, (floors[at, 1] - (STOREYS - 1)) * STOREY_M, **STYLES[name])
+    for name, method in tracks.items():
+        at = np.minimum(np.searchsorted(floors[:, 0], method.track[:, 0]), len(floors) - 1)
+        axes.plot(*method.track[:, 1:].T, (floors[at, 1] - (STOREYS - 1)) * STOREY_M, **STYLES[name])
     axes.set(title="Place and floor (after Figure 8), simulated", xlabel="x / m", ylabel="y / m", zlabel="z / m")
     axes.set_box_aspect((4.0, 2.0, 2.0))
     _finish(figure, axes, path)

@@ -91,13 +91,13 @@ def one_run(seed: int) -> list[PersonRun]:
     return rows
 
 
-def _row(name: str, profile: str, seed: int, walked: Walk, found: MethodTrack) -> PersonRun:
-    truth = np.column_stack([np.interp(found.track[:, 0], walked.t_s, walked.trunk_m[:, k]) for k in (0, 1)])
-    off = np.hypot(*(found.track[:, 1:] - truth).T)
+def _row(name: str, profile: str, seed: int, walked: Walk, method: MethodTrack) -> PersonRun:
+    truth = np.column_stack([np.interp(method.track[:, 0], walked.t_s, walked.trunk_m[:, k]) for k in (0, 1)])
+    off = np.hypot(*(method.track[:, 1:] - truth).T)
     way = float(np.hypot(*np.diff(walked.foot_m[::50, :2], axis=0).T).sum())
     return PersonRun(
         name=name, profile=profile, seed=seed, ending_m=float(off[-1]), mean_m=float(off.mean()),
-        distance_error_percent=100.0 * (found.distance_m / way - 1.0),
+        distance_error_percent=100.0 * (method.distance_m / way - 1.0),
     )  # fmt: skip
 
 

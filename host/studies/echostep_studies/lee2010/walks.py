@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Simulated walks of the experiments of [Lee 2010], and what the host measures on them.
 
-In: a seed, which chooses the person. Out: `Walk`s, the bytes of the simulated board, `Measured`. Owns the routes. Frames, clock and counts are
+In: a seed, which chooses the person. Out: `Walk`s, the bytes of the simulated board, `MeasuredWalk`. Owns the routes. Frames, clock and counts are
 read as in a live run.
 """
 
@@ -39,7 +39,7 @@ TAPE_SD_M = 0.01  # of a thigh or a shank measured by tape
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class MeasuredWalk:
     """Host's data of a walk: `samples` of gyros and compass, `pressure` (n, 2) t_s and Pa, lengths of the leg `segments` as measured."""
 
     samples: LegSamples
@@ -123,7 +123,7 @@ def storeys() -> list[Level]:
     return [Level(str(k), k * STOREY_M, np.empty((0, 4))) for k in range(STOREYS)]
 
 
-def measure(chunks: Sequence[Chunk], seed: int) -> Measured:
+def measure(chunks: Sequence[Chunk], seed: int) -> MeasuredWalk:
     """What the host reads of the board's bytes, and the wearer's legs by tape."""
     leg = person_of(seed).leg
     tape = TAPE_SD_M * np.random.default_rng([seed, 33]).standard_normal(2)
@@ -131,7 +131,7 @@ def measure(chunks: Sequence[Chunk], seed: int) -> Measured:
     return replace(_read(b"".join(chunk.data for chunk in chunks)), segments=segments)
 
 
-def _read(received: bytes) -> Measured:
+def _read(received: bytes) -> MeasuredWalk:
     """Frames, one clock, SI units."""
     reader = BoardReader()
     frames = reader.frames(received)
@@ -151,7 +151,7 @@ def _read(received: bytes) -> Measured:
     ]
     whole = np.isfinite(t_s) & np.isfinite(thigh) & np.isfinite(calf) & np.isfinite(belt)
     samples = LegSamples(t_s[whole], thigh[whole], calf[whole], belt[whole], heading[whole])
-    return Measured(samples, table, LegLengths())
+    return MeasuredWalk(samples, table, LegLengths())
 
 
 def _timed(frames: Frames, kind: type[m.Message]) -> tuple[Floats, NDArray[np.void]]:

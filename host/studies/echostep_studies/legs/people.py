@@ -101,19 +101,19 @@ def one_run(seed: int) -> list[PersonRun]:
 
 def five_metres(person: JointGaitPerson, manner: WalkingPace, seed: int) -> SimulatedGait:
     """A walk from standing to standing, as near to 5 m as whole steps come."""
-    walk_s, found = 4.0, list[SimulatedGait]()
+    walk_s, gaits = 4.0, list[SimulatedGait]()
     for _ in range(TRIES):
         gait = simulate_gait(person, manner, walk_s, np.random.default_rng([seed, 51]), STAND_S)
-        found.append(gait)
+        gaits.append(gait)
         off = WAY_M - float(gait.way_m[-1])
         if abs(off) < NEAR_M:
             break
         walk_s = max(walk_s + off * walk_s / float(gait.way_m[-1]), 1.5)
-    return min(found, key=lambda g: abs(float(g.way_m[-1]) - WAY_M))
+    return min(gaits, key=lambda g: abs(float(g.way_m[-1]) - WAY_M))
 
 
 def measured_m(gait: SimulatedGait, person: JointGaitPerson, sensors: LegSensors, seed: int) -> float:
-    """What our method says of the way when these sensors are worn."""
+    """Distance (m) by our method, measured with these sensors."""
     rng = np.random.default_rng([seed, 52])
     moves = np.flatnonzero(np.abs(gait.shank_rad_s) > 0.0)
     begin, end = gait.t_s[moves[0]] - sensors.stand_s, gait.t_s[moves[-1]] + sensors.stand_s

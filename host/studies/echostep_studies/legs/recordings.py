@@ -104,9 +104,9 @@ def rows_of(*legs: LegRecording) -> list[LegRow]:
         known = strides_of(legs, StrideSettings(LegLengths(*np.mean(lengths, axis=0).tolist())))
         rows.append(_row(first, LENGTHS + words, known, begin_s, end_s))
     known_s = float(np.interp(first.walked_m(-math.inf, begin_s) + SCALE_M, first.way_m, first.way_s))
-    found = found_m(strides, begin_s, known_s)
-    if found > 0.0 and first.walked_m(known_s, end_s) > LEAST_REST_M:
-        scale = first.walked_m(begin_s, known_s) / found
+    measured_m = found_m(strides, begin_s, known_s)
+    if measured_m > 0.0 and first.walked_m(known_s, end_s) > LEAST_REST_M:
+        scale = first.walked_m(begin_s, known_s) / measured_m
         scaled = strides_of(legs, StrideSettings(LegLengths(scale=scale), calibrated=True))
         rows.append(_row(first, SCALE + words, scaled, known_s, end_s))
     if len(legs) > 1:
@@ -140,14 +140,14 @@ def _share(stride: Stride, begin_s: float, end_s: float) -> float:
 
 def _row(recording: LegRecording, known: str, strides: tuple[Stride, ...], begin_s: float, end_s: float) -> LegRow:
     inside = [s for s in strides if _share(s, begin_s, end_s) > 0.5]
-    walked, found, sd = recording.walked_m(begin_s, end_s), found_m(strides, begin_s, end_s), distance_sd_m(inside)
-    error = found - walked
+    walked, measured_m, sd = recording.walked_m(begin_s, end_s), found_m(strides, begin_s, end_s), distance_sd_m(inside)
+    error = measured_m - walked
     return LegRow(
         set=recording.group,
         recording=recording.name,
         known=known,
         walked_m=round(walked, 3),
-        found_m=round(found, 3),
+        found_m=round(measured_m, 3),
         error_m=round(error, 3),
         error_percent=round(100.0 * error / walked, 2),
         sd_m=round(sd, 3),
@@ -158,13 +158,13 @@ def _row(recording: LegRecording, known: str, strides: tuple[Stride, ...], begin
 
 def means(rows: list[LegRow]) -> list[LegMeans]:
     """The means of each method."""
-    found = []
+    mean_rows = []
     for known in (known + words for words in ("", BOTH) for known in (NOTHING, LENGTHS, SCALE)):
         same = [row for row in rows if row.known == known]
         if not same:
             continue
         ratios = [row.error_over_sd for row in same if row.error_over_sd is not None]
-        found.append(
+        mean_rows.append(
             LegMeans(
                 set="all",
                 recording=f"mean absolute of {len(same)}, rms of error / sd",
@@ -176,7 +176,7 @@ def means(rows: list[LegRow]) -> list[LegMeans]:
                 stairs=sum(row.stairs for row in same),
             )
         )
-    return found
+    return mean_rows
 
 
 def _tables(rows: list[LegRow | LegMeans], _request: StudyRequest) -> list[Table]:

@@ -33,7 +33,7 @@ WRONG_M = 0.5  # error of a closure along a direction that it claims to know
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class WalkFrame:
     """Rigid motion from the walk's own frame to the map: `turned` (2, 2), `moved` (2,)."""
 
     turned: Floats
@@ -41,8 +41,8 @@ class Frame:
 
     def to_map(self, points: Floats) -> Floats:
         """Points (n, 2) in the map."""
-        found: Floats = points @ self.turned.T + self.moved
-        return found
+        mapped: Floats = points @ self.turned.T + self.moved
+        return mapped
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,14 +87,14 @@ def true_path(walk: SimulatedWalk, t_s: Floats) -> Floats:
     return np.column_stack([np.interp(t_s, walk.truth[:, T], walk.truth[:, k]) for k in (X, Y)])
 
 
-def known_start(path: Floats, truth: Floats) -> Frame:
+def known_start(path: Floats, truth: Floats) -> WalkFrame:
     """The frame of a path (n, 2) whose start is known."""
     away_m = np.hypot(*(truth - truth[0]).T)
     k = int(np.argmax(away_m > min(COURSE_M, 0.9 * away_m.max())))
     (vx, vy), (ux, uy) = path[k] - path[0], truth[k] - truth[0]
     turn = math.atan2(uy, ux) - math.atan2(vy, vx)
     turned = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-    return Frame(turned, truth[0] - turned @ path[0])
+    return WalkFrame(turned, truth[0] - turned @ path[0])
 
 
 def path_columns(path: Floats, truth: Floats) -> PathColumns:
@@ -150,13 +150,13 @@ def wall_columns(drawn: Sequence[Floats], walk: SimulatedWalk) -> WallColumns:
     )
 
 
-def closure_columns(closures: list[Closure], pose: Floats, truth: Floats, frame: Frame) -> ClosureColumns:
+def closure_columns(closures: list[Closure], pose: Floats, truth: Floats, frame: WalkFrame) -> ClosureColumns:
     """Closures right and wrong: along each direction that one claims to know, within WRONG_M of the truth."""
     wrong = sum(_is_wrong(closure, truth, frame) for closure in closures)
     return ClosureColumns(closures=len(closures), wrong=wrong, nodes=len(pose))
 
 
-def _is_wrong(closure: Closure, truth: Floats, frame: Frame) -> bool:
+def _is_wrong(closure: Closure, truth: Floats, frame: WalkFrame) -> bool:
     apart = (truth[closure.new] - truth[closure.old]) @ frame.turned
     value, vector = np.linalg.eigh(closure.information[:2, :2])
     off = np.abs((closure.between[:2] - apart) @ vector)
@@ -179,9 +179,9 @@ def distances(places: Floats, walls: Floats) -> Floats:
         return np.full(len(places), np.inf)
     tree = shapely.STRtree(shapely.linestrings(walls.reshape(-1, 2, 2)))
     (which, _), away = tree.query_nearest(shapely.points(places), return_distance=True, all_matches=False)
-    found = np.full(len(places), np.inf)
-    found[which] = away
-    return found
+    away_m = np.full(len(places), np.inf)
+    away_m[which] = away
+    return away_m
 
 
 def in_sight(places: Floats, built: Floats, looks: Floats) -> Bools:

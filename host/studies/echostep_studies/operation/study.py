@@ -6,7 +6,7 @@ In: seeds. Out: a row of all points, and one of each part. Simulated. The scores
 `floor`: share of the points on the nearest floor; `floor_tied`: the same, where both floors are right within TIE_M of the middle between them, as in
 `bench.judgement.true_levels`. Estimates that say lost count in both, but not in the row `not lost`, of the points that availability
 counts too. `search_s`: from the change of the battery on, until the new tracker says `tracking`. The rows `resumed` have the estimates of the tracker
-that begins where the first one ended, the others those of the one that knows nothing.
+that begins where the first one ended, the others those of a tracker without a start.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def _rows(walk: OperationWalk, after: Sequence[Estimate], seed: int, parts: Part
     right = true_levels(at.true_xy_m, at.true_height_m, walk.plan)
     above_m, floors_off = at.height_m - at.true_height_m, np.abs(at.level - at.true_level)
     tied_right = right[np.arange(len(at.level)), at.level.astype(np.int64)]
-    found = [e.t_s for e in after if e.status is TrackStatus.TRACKING]
+    tracking_s = [e.t_s for e in after if e.status is TrackStatus.TRACKING]
     rows = []
     says = np.array([e.status.value for e in estimates])[at.row]
     for name, chosen in parts(walk, at.t_s, says).items():
@@ -117,7 +117,7 @@ def _rows(walk: OperationWalk, after: Sequence[Estimate], seed: int, parts: Part
         if name in (ALL, RESUMED):
             row = WholeRun(
                 **as_dict(row), zone=scored.card.zone_probability, available=scored.card.availability,
-                search_s=found[0] - walk.restart_s if found else None,
+                search_s=tracking_s[0] - walk.restart_s if tracking_s else None,
             )  # fmt: skip
         rows.append(row)
     return rows
@@ -149,9 +149,9 @@ def _summary(rows: Sequence[PartRun]) -> PartSummary:
         np.concatenate([np.asarray(getattr(row, key)) for row in rows])
         for key in ("error_m", "above_m", "floors_off", "tied_right")
     )
-    found = PartSummary(name=rows[0].name, runs=len(rows), points=len(error))
+    summary = PartSummary(name=rows[0].name, runs=len(rows), points=len(error))
     if not len(error):
-        return found
+        return summary
     statistics = error_statistics(error)
     whole = [row for row in rows if isinstance(row, WholeRun)]
     scores = {
@@ -162,7 +162,7 @@ def _summary(rows: Sequence[PartRun]) -> PartSummary:
         "available": _over(np.mean, (row.available for row in whole)), "search_s": _over(np.max, (row.search_s for row in whole)),
     }  # fmt: skip
     rounded: dict[str, Any] = {key: None if value is None else round(value, 4) for key, value in scores.items()}
-    return ScoredSummary(**as_dict(found), **rounded)
+    return ScoredSummary(**as_dict(summary), **rounded)
 
 
 def _over(how: Callable[[list[float]], Any], values: Iterable[float | None]) -> float | None:
@@ -173,8 +173,8 @@ def _over(how: Callable[[list[float]], Any], values: Iterable[float | None]) -> 
 
 def _tables(rows: list[PartSummary], request: StudyRequest) -> list[Table]:
     shown = [{key: 100.0 * value if key in PERCENT else value for key, value in row.items()} for row in as_dicts(rows)]
-    told = [_told(row) for row in rows if isinstance(row, ScoredSummary) and row.name in (ALL, RESUMED)]
-    return [Table(f"Operations of twenty minutes on three storeys, {request.runs} simulated", shown, COLUMNS, told)]
+    remarks = [_told(row) for row in rows if isinstance(row, ScoredSummary) and row.name in (ALL, RESUMED)]
+    return [Table(f"Operations of twenty minutes on three storeys, {request.runs} simulated", shown, COLUMNS, remarks)]
 
 
 def _told(row: ScoredSummary) -> str:

@@ -3,8 +3,8 @@
 
 In: a seed. Out: `OperationWalk`. Owns the manners of moving. Simulated; the whole tracker runs, from the bytes of the simulated board and MTx.
 
-[ISO/IEC 18305:2016, annex on scenarios] has people walk, run, climb stairs, ride lifts, walk backward, sidestep and crawl. Strides by reason, from
-what people do indoors: runs at 3 m/s, crawls at 0.5 m/s. The simulated body stays upright and its foot stands in every stride: a run has a stance of
+[ISO/IEC 18305:2016, annex on scenarios] has people walk, run, climb stairs, ride lifts, walk backward, sidestep and crawl. Strides are assumed from
+indoor habits: runs at 3 m/s, crawls at 0.5 m/s. The simulated body stays upright and its foot stands in every stride: a run has a stance of
 0.3 s, a crawl is a walk in very short strides.
 """
 

@@ -62,14 +62,14 @@ def walk_track(
 
 def world_acceleration(orientation: Floats, accel: Floats) -> Floats:
     """x_w = R_GS x_s, without gravity [Fischer 2008, Figure 1]: (n, 3) m/s2 in the MTx world."""
-    found: Floats = np.einsum("nij,nj->ni", orientation, accel) - np.array([0.0, 0.0, GRAVITY_M_S2])
-    return found
+    acceleration: Floats = np.einsum("nij,nj->ni", orientation, accel) - np.array([0.0, 0.0, GRAVITY_M_S2])
+    return acceleration
 
 
 def product(accel: Floats, gyro: Floats) -> Floats:
     """Norm of the acceleration times norm of the rate of turn, (n,) m/s2 rad/s [Fischer 2008, 3.1; Beauregard 2007]."""
-    found: Floats = np.linalg.norm(accel, axis=1) * np.linalg.norm(gyro, axis=1)
-    return found
+    products: Floats = np.linalg.norm(accel, axis=1) * np.linalg.norm(gyro, axis=1)
+    return products
 
 
 def stances(t_s: Floats, norms: Floats, settings: Fischer2008) -> Bools:
@@ -82,8 +82,8 @@ def stances(t_s: Floats, norms: Floats, settings: Fischer2008) -> Bools:
         np.where(broken, index, 0)
     )  # the sample with which the present run below begins, or breaks
     since = np.where(below[since], since, np.minimum(since + 1, len(t_s) - 1))
-    found: Bools = below & (t_s - t_s[since] > settings.stance_s)
-    return found
+    is_stance: Bools = below & (t_s - t_s[since] > settings.stance_s)
+    return is_stance
 
 
 def velocities(t_s: Floats, accel_w: Floats, stance: Bools) -> Floats:
@@ -91,8 +91,8 @@ def velocities(t_s: Floats, accel_w: Floats, stance: Bools) -> Floats:
     total = _integral(t_s, accel_w)
     reset = np.concatenate([[True], _gap(t_s)]) | stance
     last = np.maximum.accumulate(np.where(reset, np.arange(len(t_s)), 0))
-    found: Floats = total - total[last]
-    return found
+    corrected: Floats = total - total[last]
+    return corrected
 
 
 def positions(t_s: Floats, velocity: Floats) -> Floats:
@@ -104,23 +104,23 @@ def headings(orientation: Floats, level: Floats) -> Floats:
     """How far the sensor has turned about the vertical since `level` (3, 3): (n,) rad, whatever the mounting."""
     cosine = np.einsum("nk,k->n", orientation[:, 0], level[0]) + np.einsum("nk,k->n", orientation[:, 1], level[1])
     sine = np.einsum("nk,k->n", orientation[:, 1], level[0]) - np.einsum("nk,k->n", orientation[:, 0], level[1])
-    found: Floats = np.arctan2(sine, cosine)
-    return found
+    heading_rad: Floats = np.arctan2(sine, cosine)
+    return heading_rad
 
 
 def events(t_s: Floats, position: Floats, heading: Floats, stance: Bools) -> list[Step | Stance]:
     """The stances that ended, and the steps between the detection of one stance and of the next, in order of time."""
-    found: list[Step | Stance] = []
+    steps: list[Step | Stance] = []
     unknown = np.full((3, 3), np.nan)
     before: int | None = None
     for begin, end in spans(stance).tolist():
         if before is not None:
             x, y, z = (position[begin] - position[before]).tolist()
-            found.append(Step(float(t_s[before]), float(t_s[begin]), (x, y, z), unknown, float(heading[begin]), np.nan))
+            steps.append(Step(float(t_s[before]), float(t_s[begin]), (x, y, z), unknown, float(heading[begin]), np.nan))
         if end < len(t_s):
-            found.append(Stance(float(t_s[begin]), float(t_s[end - 1]), float(heading[end - 1])))
+            steps.append(Stance(float(t_s[begin]), float(t_s[end - 1]), float(heading[end - 1])))
         before = end - 1
-    return found
+    return steps
 
 
 def usable(t_s: Floats, accel: Floats, gyro: Floats, orientation: Floats | None = None) -> tuple[Bools, FootCounts]:
@@ -152,8 +152,8 @@ def _advancing(t_s: Floats, possible: Bools) -> Bools:
 def _gap(t_s: Floats) -> Bools:
     """Whether samples are missing, or the clock was set, before each but the first (n - 1,)."""
     steps = np.diff(t_s)
-    found: Bools = (steps > GAP_S) | (steps <= 0.0)
-    return found
+    is_gap: Bools = (steps > GAP_S) | (steps <= 0.0)
+    return is_gap
 
 
 def _integral(t_s: Floats, values: Floats) -> Floats:

@@ -65,8 +65,8 @@ class Girard:
         x, y, weight = merge(x, y, weight, s.tau_m)
         if ranges_m is not None:
             weight = self._reweight(x, y, heading_rad, ranges_m)
-        kept = np.argsort(-weight, kind="stable")[: s.nu]
-        self.x_m, self.y_m, self.weight = x[kept], y[kept], weight[kept]
+        heaviest = np.argsort(-weight, kind="stable")[: s.nu]
+        self.x_m, self.y_m, self.weight = x[heaviest], y[heaviest], weight[heaviest]
         return average(self.x_m, self.y_m, self.weight)
 
     def _propagate(self, vectors: Floats) -> tuple[Floats, Floats, Floats]:
@@ -140,7 +140,7 @@ def merge(x: Floats, y: Floats, weight: Floats, tau_m: float) -> tuple[Floats, F
     places, holder = np.full((side * side, 2), np.inf), np.empty(side * side, np.int32)
     kept_x, kept_y, total = np.empty(n), np.empty(n), np.empty(n)
     crowded = np.empty(n, np.int32)
-    kept, crowd = 0, 0
+    count, crowd = 0, 0
     per_m, tau2 = math.sqrt(2.0) / tau_m, tau_m * tau_m
     for i in range(n):
         column, row = math.floor(x[i] * per_m), math.floor(y[i] * per_m)
@@ -153,13 +153,13 @@ def merge(x: Floats, y: Floats, weight: Floats, tau_m: float) -> tuple[Floats, F
             continue
         cell = (row & (side - 1)) * side + (column & (side - 1))
         if places[cell, 0] < np.inf:
-            crowded[crowd] = kept
+            crowded[crowd] = count
             crowd += 1
         else:
-            places[cell, 0], places[cell, 1], holder[cell] = x[i], y[i], kept
-        kept_x[kept], kept_y[kept], total[kept] = x[i], y[i], weight[i]
-        kept += 1
-    return kept_x[:kept], kept_y[:kept], total[:kept]
+            places[cell, 0], places[cell, 1], holder[cell] = x[i], y[i], count
+        kept_x[count], kept_y[count], total[count] = x[i], y[i], weight[i]
+        count += 1
+    return kept_x[:count], kept_y[:count], total[:count]
 
 
 @kernel

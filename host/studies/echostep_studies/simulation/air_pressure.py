@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The air of a building: what a barometer is carried through.
+"""The air of a building, as a carried barometer measures it.
 
 In: times, true heights of the wearer, when in a stairwell or lift shaft, a seeded generator. Out: true pressures and the temperature that a
-worn device reads. Owns the constants of the air. Nothing here knows how anybody estimates heights from it.
+worn device reads. Owns the constants of the air. Nothing here depends on how heights are estimated from it.
 
 The column of air is hydrostatic at the building's own temperature [ISO 2533 with another temperature]. On top of it: weather (a trend and a random
 walk), doors (pulses of 5 to 50 Pa: the air swings and settles), a fan that goes on and off, shafts whose pressure differs from the floors' by the
@@ -19,7 +19,7 @@ import numpy as np
 from echostep.arrays import Bools, Floats
 
 SEA_LEVEL_PA = 101_325.0
-GRAVITY_M_S2, DRY_AIR_J_KG_K, ZERO_C_K = 9.80665, 287.053, 273.15
+G0_M_S2, DRY_AIR_J_KG_K, ZERO_C_K = 9.80665, 287.053, 273.15
 STACK_PA_M_K = 0.04
 LEAKY = 0.3  # share of the stack effect that falls on the shaft's doors
 PISTON_PA = 1.0  # in a lift at 1 m/s, growing with its square; assumed: the car is open to the air before and behind it
@@ -46,7 +46,7 @@ class Weather:
 
 def pressures(t_s: Floats, height_m: Floats, in_shaft: Bools, weather: Weather, rng: np.random.Generator) -> Floats:
     """True pressures (n,) in Pa at times and heights (n,) above the entrance, the neutral plane in the middle of the heights."""
-    column = GRAVITY_M_S2 / (DRY_AIR_J_KG_K * (weather.air_c + ZERO_C_K))
+    column = G0_M_S2 / (DRY_AIR_J_KG_K * (weather.air_c + ZERO_C_K))
     steps = np.diff(t_s, prepend=t_s[0])
     wander = np.cumsum(weather.wander_pa * np.sqrt(steps) * rng.standard_normal(len(t_s)))
     trend = weather.trend_pa_h / 3600.0 * (t_s - t_s[0])
@@ -62,8 +62,8 @@ def pressures(t_s: Floats, height_m: Floats, in_shaft: Bools, weather: Weather, 
     stack = LEAKY * STACK_PA_M_K * weather.colder_k * (height_m - neutral) * _soft(t_s, in_shaft)
     speed = np.gradient(height_m, t_s) if len(t_s) > 1 else np.zeros(1)
     piston = PISTON_PA * np.where(np.abs(speed) > 0.6, speed * np.abs(speed), 0.0)
-    found: Floats = ground * np.exp(-column * height_m) + stack + piston
-    return found
+    pressure_pa: Floats = ground * np.exp(-column * height_m) + stack + piston
+    return pressure_pa
 
 
 def device_temperatures(t_s: Floats, air_c: float, rng: np.random.Generator) -> Floats:
@@ -74,7 +74,7 @@ def device_temperatures(t_s: Floats, air_c: float, rng: np.random.Generator) -> 
 
 def _doors(t_s: Floats, weather: Weather, rng: np.random.Generator) -> Floats:
     """Pulses: a push of some tenths of a second to some seconds, then the air settles, at times swinging back."""
-    found = np.zeros_like(t_s)
+    pulses_pa = np.zeros_like(t_s)
     at = float(t_s[0])
     while math.isfinite(weather.doors_s):
         at += rng.exponential(weather.doors_s)
@@ -86,13 +86,13 @@ def _doors(t_s: Floats, weather: Weather, rng: np.random.Generator) -> Floats:
         since = t_s[near] - at
         after = np.maximum(since - rise - held, 0.0)
         swing = np.cos(2.0 * np.pi * after / 3.0) if rng.random() < 0.3 else 1.0
-        found[near] += size * np.minimum(since / rise, 1.0) * np.exp(-after / fall) * swing
-    return found
+        pulses_pa[near] += size * np.minimum(since / rise, 1.0) * np.exp(-after / fall) * swing
+    return pulses_pa
 
 
 def _fan(t_s: Floats, weather: Weather, rng: np.random.Generator) -> Floats:
     """A fan that presses the building on and off, with a time constant of some seconds."""
-    found = np.zeros_like(t_s)
+    pressure_pa = np.zeros_like(t_s)
     at, on, sign = float(t_s[0]), False, rng.choice((-1.0, 1.0))
     while math.isfinite(weather.fan_s):
         at += rng.exponential(weather.fan_s)
@@ -100,8 +100,8 @@ def _fan(t_s: Floats, weather: Weather, rng: np.random.Generator) -> Floats:
             break
         on = not on
         after = np.maximum(t_s - at, 0.0)
-        found += (1.0 if on else -1.0) * sign * weather.fan_pa * (1.0 - np.exp(-after / rng.uniform(1.0, 6.0)))
-    return found
+        pressure_pa += (1.0 if on else -1.0) * sign * weather.fan_pa * (1.0 - np.exp(-after / rng.uniform(1.0, 6.0)))
+    return pressure_pa
 
 
 def _soft(t_s: Floats, in_shaft: Bools) -> Floats:

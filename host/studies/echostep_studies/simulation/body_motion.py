@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The motion of one place of a body, composed of turns, moves, drops and stops, and what a sensor there measures.
 
-In: movements with their times. Out: `Samples`. Owns acceleration and attitude at 1 kHz; the specific force follows from them. A drop is a free fall
+In: movements with their times. Out: `MotionSamples`. Owns acceleration and attitude at 1 kHz, which give the specific force. A drop is a free fall
 by a share of gravity, stopped over a floor's, a knee's or a pad's time. World: x ahead, y left, z up.
 """
 
@@ -16,11 +16,11 @@ from echostep.arrays import Floats
 from echostep.simulation.people.attitude import rotations, turns
 
 RATE_HZ = 1000
-GRAVITY_M_S2 = 9.80665
+G0_M_S2 = 9.80665  # standard gravity
 DEGREE = math.radians(1.0)
 
 
-class Part(NamedTuple):
+class SensorPart(NamedTuple):
     """A sensor: samples a second, full scales (m/s2, rad/s), noise (sd), bias (sd)."""
 
     rate_hz: float
@@ -30,12 +30,15 @@ class Part(NamedTuple):
     bias: tuple[float, float]
 
 
-LSM6DSO = Part(200.0, 8.0 * GRAVITY_M_S2, math.radians(1000.0), (0.02, 0.0006), (0.2, 0.017))  # [data sheet, table 2]
-MTX = Part(100.0, 50.0, math.radians(1200.0), (0.04, 0.017), (0.02, 0.005))  # [manual]
-ICM20649 = Part(225.0, 30.0 * GRAVITY_M_S2, math.radians(4000.0), (0.05, 0.003), (0.3, 0.05))  # [DS-000192]
+# [data sheet, table 2]
+LSM6DSO = SensorPart(200.0, 8.0 * G0_M_S2, math.radians(1000.0), (0.02, 0.0006), (0.2, 0.017))
+# [manual]
+MTX = SensorPart(100.0, 50.0, math.radians(1200.0), (0.04, 0.017), (0.02, 0.005))
+# [DS-000192]
+ICM20649 = SensorPart(225.0, 30.0 * G0_M_S2, math.radians(4000.0), (0.05, 0.003), (0.3, 0.05))
 
 
-class Samples(NamedTuple):
+class MotionSamples(NamedTuple):
     """Of one sensor: t_s (n,), force (n, 3) m/s2, rate (n, 3) rad/s, in axes that are mounted at random."""
 
     t_s: Floats
@@ -69,10 +72,10 @@ class BodyMotion:
 
     def drop(self, begin_s: float, fall_m: float, share: float, stop_s: float) -> float:
         """Fall with a share of gravity and be stopped within `stop_s`; returns when the floor was met."""
-        fall_s = math.sqrt(2.0 * fall_m / (share * GRAVITY_M_S2))
+        fall_s = math.sqrt(2.0 * fall_m / (share * G0_M_S2))
         met_s = begin_s + fall_s
-        self.accel[(self.t_s >= begin_s) & (self.t_s < met_s), 2] -= share * GRAVITY_M_S2
-        self.stop(met_s, share * GRAVITY_M_S2 * fall_s, stop_s)
+        self.accel[(self.t_s >= begin_s) & (self.t_s < met_s), 2] -= share * G0_M_S2
+        self.stop(met_s, share * G0_M_S2 * fall_s, stop_s)
         return met_s
 
     def stop(self, begin_s: float, speed_m_s: float, seconds: float, axis: int = 2) -> None:
@@ -81,12 +84,12 @@ class BodyMotion:
         wave = np.where((u > 0.0) & (u < 1.0), np.sin(math.pi * np.clip(u, 0.0, 1.0)), 0.0)
         self.accel[:, axis] += (1.0 if axis == 2 else -1.0) * speed_m_s * 0.5 * math.pi / seconds * wave
 
-    def samples(self, part: Part, rng: np.random.Generator) -> Samples:
+    def samples(self, part: SensorPart, rng: np.random.Generator) -> MotionSamples:
         """What a part measures, mounted at random."""
         mounting = rotations(rng.uniform(-math.pi, math.pi, (1, 3)) * [1.0, 0.5, 1.0])[0]
         pitched, rolled = (rotations(self.rpy * axis) for axis in ([0.0, 1.0, 0.0], [1.0, 0.0, 0.0]))
         attitude = rolled @ pitched @ mounting
-        force = np.einsum("nji,nj->ni", attitude, self.accel + [0.0, 0.0, GRAVITY_M_S2])
+        force = np.einsum("nji,nj->ni", attitude, self.accel + [0.0, 0.0, G0_M_S2])
         rate = np.zeros_like(force)
         rate[1:] = turns(attitude) * RATE_HZ
         width = round(RATE_HZ / part.rate_hz)  # the part's filter
@@ -97,10 +100,10 @@ class BodyMotion:
             mean = (sums[ends] - sums[ends - width]) / width
             noisy = mean + bias * rng.standard_normal(3) + noise * rng.standard_normal(mean.shape)
             measured.append(np.clip(noisy, -most, most))
-        return Samples(self.t_s[ends - 1], measured[0], measured[1])
+        return MotionSamples(self.t_s[ends - 1], measured[0], measured[1])
 
 
 def _smooth(u: Floats) -> Floats:
     u = np.clip(u, 0.0, 1.0)
-    found: Floats = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-    return found
+    smoothed: Floats = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    return smoothed

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep_studies.simulation.body_motion import GRAVITY_M_S2, LSM6DSO, BodyMotion, Part, Samples
+from echostep_studies.simulation.body_motion import G0_M_S2, LSM6DSO, BodyMotion, MotionSamples, SensorPart
 
 STRIDE_S, STRIDE_M = 1.1, 1.4
 SETTLED_S = 16.0  # of rest after the movement
@@ -26,9 +26,9 @@ BREATH_HZ, BREATH_RAD = 0.3, 0.012  # of the belt of a wearer at rest
 class BodySamples(NamedTuple):
     """Samples of a run; `strides` (k, 2): their begin and end; `event_s`: when the movement after the walk begins."""
 
-    belt: Samples
-    thigh: Samples
-    foot: Samples
+    belt: MotionSamples
+    thigh: MotionSamples
+    foot: MotionSamples
     strides: Floats
     event_s: float
 
@@ -53,7 +53,7 @@ class Body(NamedTuple):
 Manner = Callable[[Body, float], None]  # adds its movement from that time on
 
 
-def walk_then(manner: Manner, foot: Part, rng: np.random.Generator, walk_s: float = 8.0) -> BodySamples:
+def walk_then(manner: Manner, foot: SensorPart, rng: np.random.Generator, walk_s: float = 8.0) -> BodySamples:
     """A walk, a second or two of standing, then the manner, then rest."""
     strides = round(walk_s / STRIDE_S)
     end_s = strides * STRIDE_S
@@ -145,7 +145,7 @@ def jump(body: Body, t_s: float) -> None:
     height_m = body.between(0.2, 0.8)
     for place, stop in ((body.belt, (0.08, 0.2)), (body.thigh, (0.08, 0.2)), (body.foot, (0.01, 0.04))):
         place.drop(t_s, height_m, 1.0, body.between(*stop))
-    met_s = t_s + math.sqrt(2.0 * height_m / GRAVITY_M_S2)
+    met_s = t_s + math.sqrt(2.0 * height_m / G0_M_S2)
     _bend(body, met_s, 0.3, body.between(10.0, 50.0), -body.between(20.0, 80.0))
     _bend(body, met_s + body.between(0.4, 2.0), 0.6, -30.0, 50.0)
 

@@ -27,7 +27,7 @@ STRIDE_M, STRIDE_S = (1.3, 0.08), (1.1, 0.05)  # mean and standard deviation ove
 
 @dataclass(frozen=True, slots=True)
 class Trail:
-    """A way from a start back to it. `printed`: what the paper says of it, in short; `printed_percent`: its distance error."""
+    """A way from a start back to it. `printed`: the paper's description, in short; `printed_percent`: its distance error."""
 
     name: str
     length_m: float

@@ -152,20 +152,20 @@ def _ankle(manner: WalkingPace, phase: Floats) -> Floats:
     part = phase % 1.0
     pushes = _ease((part - PUSHES[0]) / (PUSHES[1] - PUSHES[0])) * _ease((PUSHES[3] - part) / (PUSHES[3] - PUSHES[2]))
     curve = series(ANKLE_DEG, phase - manner.late * pushes)
-    found: Floats = np.where(curve < 0.0, curve * (1.0 + (manner.push - 1.0) * pushes), curve)
-    return found
+    angles: Floats = np.where(curve < 0.0, curve * (1.0 + (manner.push - 1.0) * pushes), curve)
+    return angles
 
 
 def _points(person: JointGaitPerson, angles: tuple[Floats, Floats, Floats]) -> Floats:
     """Heel and ball (n, 2, 2) from the hip, forward and up."""
     thigh, shank, foot = angles
-    leg, found = person.leg, []
+    leg, points = person.leg, []
     x = leg.thigh_m * np.sin(thigh) + leg.shank_m * np.sin(shank)
     z = -leg.thigh_m * np.cos(thigh) - leg.shank_m * np.cos(shank)
     c, s = np.cos(foot), np.sin(foot)
     for ahead in (-person.heel_m, person.ball_m):
-        found.append(np.stack([x + ahead * c + person.ankle_m * s, z + ahead * s - person.ankle_m * c], axis=1))
-    return np.stack(found, axis=1)
+        points.append(np.stack([x + ahead * c + person.ankle_m * s, z + ahead * s - person.ankle_m * c], axis=1))
+    return np.stack(points, axis=1)
 
 
 def _hip_step(points: Floats) -> Floats:
@@ -173,8 +173,8 @@ def _hip_step(points: Floats) -> Floats:
     low = points[:, :, 1] - points[:, :, 1].min(axis=1, keepdims=True)
     carry = np.exp(-low / CARRY_M)
     carry /= carry.sum(axis=1, keepdims=True)
-    found: Floats = -(carry * np.gradient(points[:, :, 0], axis=0)).sum(axis=1)
-    return found
+    steps_m: Floats = -(carry * np.gradient(points[:, :, 0], axis=0)).sum(axis=1)
+    return steps_m
 
 
 def _carried(phase: Floats) -> Floats:
@@ -186,5 +186,5 @@ def _carried(phase: Floats) -> Floats:
 def _ease(share: Floats) -> Floats:
     """From 0 to 1 with the least jerk [Flash and Hogan 1985]."""
     v = np.clip(share, 0.0, 1.0)
-    found: Floats = v**3 * (10.0 - 15.0 * v + 6.0 * v**2)
-    return found
+    eased: Floats = v**3 * (10.0 - 15.0 * v + 6.0 * v**2)
+    return eased

@@ -46,7 +46,7 @@ class ImuModel:
 
 
 @dataclass(frozen=True, slots=True)
-class Pings:
+class MarkerPings:
     """Each ping's trigger time (n,), ranger (n,) 0 left 1 right, and range (n,), nan when nothing was heard.
 
     Of the truth: `pose` (n, 3): x, y and the ranger's axis; `cross` (n,): whether it was the other ranger's sound.
@@ -75,7 +75,7 @@ class MarkerWalk:
     heading_rad: Floats
     turn_sd_rad: Floats
     pair_m: Floats
-    pings: Pings
+    pings: MarkerPings
 
 
 def lay_markers(route_m: Floats) -> Floats:
@@ -153,30 +153,32 @@ class _Body:
         return xy, heading + YAW_RAD * np.sin(math.pi * t_s + self._phase)
 
 
-def _ping(body: _Body, built: Floats, bias_m: Floats, offset_s: float, rng: np.random.Generator, a: Acoustics) -> Pings:
+def _ping(
+    body: _Body, built: Floats, bias_m: Floats, offset_s: float, rng: np.random.Generator, a: Acoustics
+) -> MarkerPings:
     """The rangers ping in turn, the right one `offset_s` after the left one; each takes the first sound to arrive, be it the other's."""
     period_s = 2.0 * max(offset_s, HALF_US[Schedule.CONCURRENT] * 1e-6)
     count = 2 * int(body.end_s / period_s)
     ranger = np.arange(count) % 2
     t_s = (np.arange(count) // 2) * period_s + ranger * offset_s + rng.uniform(0.0, JITTER_US * 1e-6, count)
     xy, heading = body.at(t_s)
-    heard = echoes(xy, heading, built, bias_m, rng, a)
+    simulated = echoes(xy, heading, built, bias_m, rng, a)
     came = np.zeros((count, 4))  # us after the trigger: own, and the other's last three pings about this one
-    came[:, 0] = heard.own_us[np.arange(count), ranger]
+    came[:, 0] = simulated.own_us[np.arange(count), ranger]
     for k, other in enumerate((-3, -1, 1), start=1):
         at = np.arange(count) + other * np.where(ranger == 1, 1, -1)
         there = (at >= 0) & (at < count)
         at = np.clip(at, 0, count - 1)
-        cross_us = heard.cross_us[at, ranger].astype(float)
+        cross_us = simulated.cross_us[at, ranger].astype(float)
         came[:, k] = np.where(there & (cross_us > 0), cross_us + (t_s[at] - t_s) * 1e6, 0.0)
     came[(came < FIRST_US) | (came > max(LAST_US, 2e6 * a.maximum_m / a.speed_m_s))] = np.inf
     first_us = came.min(1)
     range_m = np.where(np.isfinite(first_us), first_us * (0.5e-6 * a.speed_m_s), np.nan)
     axis = heading + np.where(ranger == 0, 0.5 * math.pi, -0.5 * math.pi)
-    return Pings(t_s, ranger, range_m, np.column_stack([xy, axis]), (came.argmin(1) > 0) & np.isfinite(first_us))
+    return MarkerPings(t_s, ranger, range_m, np.column_stack([xy, axis]), (came.argmin(1) > 0) & np.isfinite(first_us))
 
 
-def _pass(pings: Pings, share: float, rng: np.random.Generator) -> Pings:
+def _pass(pings: MarkerPings, share: float, rng: np.random.Generator) -> MarkerPings:
     """A passer-by on one side for about a second, at random times, nearer than the echo without the passer-by."""
     range_m = pings.range_m.copy()
     for side in (0, 1):

@@ -20,7 +20,7 @@ STAND_S = 2.0
 
 
 @dataclass(frozen=True)
-class Manner:
+class FootManner:
     """A step: `move_m` and `turn_rad` in the foot's own directions, how long it swings and stands, its pitch at toe-off and at heel strike.
 
     `rest_rad`: pitch of the foot at rest; a foot that lies on its toes behind a knee looks down.
@@ -39,17 +39,17 @@ class Manner:
 
 
 MANNERS = {
-    "walking": Manner(),
-    "strolling": Manner((0.9, 0.0, 0.0), swing_s=0.8, stance_s=0.9),
-    "running": Manner((2.4, 0.0, 0.0), swing_s=0.5, stance_s=0.25, toe_off_rad=1.2, clearance_m=0.25, roll_s=0.06),
-    "backward": Manner((-0.7, 0.0, 0.0), toe_off_rad=0.3, heel_strike_rad=0.2),
-    "sideways": Manner((0.0, 0.5, 0.0), toe_off_rad=0.3, heel_strike_rad=0.0),
-    "shuffling": Manner(
+    "walking": FootManner(),
+    "strolling": FootManner((0.9, 0.0, 0.0), swing_s=0.8, stance_s=0.9),
+    "running": FootManner((2.4, 0.0, 0.0), swing_s=0.5, stance_s=0.25, toe_off_rad=1.2, clearance_m=0.25, roll_s=0.06),
+    "backward": FootManner((-0.7, 0.0, 0.0), toe_off_rad=0.3, heel_strike_rad=0.2),
+    "sideways": FootManner((0.0, 0.5, 0.0), toe_off_rad=0.3, heel_strike_rad=0.0),
+    "shuffling": FootManner(
         (0.25, 0.0, 0.0), swing_s=0.4, stance_s=0.4, toe_off_rad=0.1, heel_strike_rad=0.0, clearance_m=0.02
     ),
-    "upstairs": Manner((0.56, 0.0, 0.34), swing_s=0.7, heel_strike_rad=0.0),
-    "downstairs": Manner((0.56, 0.0, -0.34), swing_s=0.6, heel_strike_rad=0.3),
-    "turning": Manner((0.8, 0.1, 0.0), turn_rad=0.6),
+    "upstairs": FootManner((0.56, 0.0, 0.34), swing_s=0.7, heel_strike_rad=0.0),
+    "downstairs": FootManner((0.56, 0.0, -0.34), swing_s=0.6, heel_strike_rad=0.3),
+    "turning": FootManner((0.8, 0.1, 0.0), turn_rad=0.6),
 }
 # Lengths and times of a step differ by so much from step to step, its direction by so much in rad [Winter 1991: 3 to 6 % in walking; more here].
 SCATTER, WANDER_RAD = 0.06, 0.05
@@ -73,7 +73,7 @@ def glide(t: Floats, begin: float, end: float) -> Floats:
     return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
 
 
-def course(manner: Manner, steps: int, rng: np.random.Generator | None = None) -> Course:
+def course(manner: FootManner, steps: int, rng: np.random.Generator | None = None) -> Course:
     """Stand, take so many steps, stand; the steps are equal, or given a generator differ by SCATTER and WANDER_RAD."""
     m = manner
     longer, slower, aside = np.zeros((3, steps)) if rng is None else rng.standard_normal((3, steps))

@@ -66,17 +66,17 @@ def _stairs(
     heights_m: Sequence[float], floor: int, to: int, rng: np.random.Generator
 ) -> list[tuple[Floats, bool, bool]]:
     """Flights and landings, and a few steps on each floor that is passed."""
-    way, found = (1 if to > floor else -1), []
+    way, parts = (1 if to > floor else -1), []
     speed = rng.uniform(0.2, 0.35) * (1.0 if way > 0 else 1.15)
     for k in range(floor, to, way):
         low, high = heights_m[k], heights_m[k + way]
         for flight in range(FLIGHTS):
             a, b = (low + (high - low) * (flight + end) / FLIGHTS for end in (0, 1))
             own = speed * rng.uniform(0.9, 1.1)
-            found.append((np.linspace(a, b, max(2, round(abs(b - a) / own * RATE_HZ))), True, True))
+            parts.append((np.linspace(a, b, max(2, round(abs(b - a) / own * RATE_HZ))), True, True))
             level = LANDING_S if flight < FLIGHTS - 1 else PASSED_FLOOR_S
-            found.append((np.full(round(rng.uniform(*level) * RATE_HZ), b), True, True))
-    return found
+            parts.append((np.full(round(rng.uniform(*level) * RATE_HZ), b), True, True))
+    return parts
 
 
 def _ride(a: float, b: float, rng: np.random.Generator) -> list[tuple[Floats, bool, bool]]:

@@ -117,10 +117,10 @@ def crossing(scale: Scale) -> Iterator[Row]:
 @kernel
 def crossings(x: Floats, y: Floats, to_x: Floats, to_y: Floats, index: WallIndex) -> int:
     """How many moves cross a wall."""
-    found = 0
+    count = 0
     for i in range(len(x)):
-        found += crosses_wall(x[i], y[i], to_x[i], to_y[i], index)
-    return found
+        count += crosses_wall(x[i], y[i], to_x[i], to_y[i], index)
+    return count
 
 
 def growing(scale: Scale) -> Iterator[Row]:

@@ -30,16 +30,16 @@ def rows(scale: Scale) -> Iterator[Row]:
         yield from part(scale)
 
 
-def picture(found: list[Row], path: Path) -> None:
+def picture(rows: list[Row], path: Path) -> None:
     """The ratios as bars, with what is promised."""
     import matplotlib as mpl
 
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(9, 0.45 * len(found) + 1.2), layout="constrained")
-    axes.barh([r.name for r in found], [r.ratio for r in found], color="#4477aa")
-    for k, row in enumerate(found):
+    figure, axes = plt.subplots(figsize=(9, 0.45 * len(rows) + 1.2), layout="constrained")
+    axes.barh([r.name for r in rows], [r.ratio for r in rows], color="#4477aa")
+    for k, row in enumerate(rows):
         if row.wanted is not None:
             axes.plot([row.wanted, row.wanted], [k - 0.4, k + 0.4], color="#cc3311")
     axes.set(xscale="log", xlabel="times longer; red: promised")
@@ -56,17 +56,17 @@ def main() -> None:
     options = parser.parse_args()
     scale = Scale(2, 200, 64, 2_000, 400) if options.tiny else Scale(options.rounds)
     table = Table("what; against what", "ours", "peer", "ratio", "promised", title="medians, rounds interleaved")
-    found = []
+    timed = []
     for row in rows(scale):
-        found.append(row)
+        timed.append(row)
         wanted = "" if row.wanted is None else f">= {row.wanted:g}"
         table.add_row(
             row.name, f"{1e3 * row.median_s:.3g} ms", f"{1e3 * row.peer_s:.3g} ms", f"{row.ratio:.3g}", wanted
         )
     options.out.mkdir(parents=True, exist_ok=True)
-    kept = [{k: v for k, v in asdict(row).items() if k != "wanted"} for row in found]
-    (options.out / "bench.json").write_text(json.dumps(kept, indent=1) + "\n")
-    picture(found, options.out / "bench.png")
+    fields = [{k: v for k, v in asdict(row).items() if k != "wanted"} for row in timed]
+    (options.out / "bench.json").write_text(json.dumps(fields, indent=1) + "\n")
+    picture(timed, options.out / "bench.png")
     table.caption = "\n".join(["not compared:", *MISSING.values()]) if MISSING else None
     Console(width=None if sys.stdout.isatty() else 150).print(table)
 

@@ -202,7 +202,7 @@ def particles_update(count: int) -> Callable[[], object]:
     from particles import distributions
     from particles import state_space_models as ssm
 
-    class Walk(ssm.StateSpaceModel):  # type: ignore[misc]
+    class PeerWalk(ssm.StateSpaceModel):  # type: ignore[misc]
         def PX0(self) -> Any:  # noqa: N802
             return distributions.IndepProd(distributions.Normal(), distributions.Normal())
 
@@ -212,7 +212,7 @@ def particles_update(count: int) -> Callable[[], object]:
         def PY(self, t: int, xp: Any, x: Any) -> Any:  # noqa: ARG002, N802
             return distributions.IndepProd(*(distributions.Normal(loc=x[:, k], scale=0.5) for k in range(2)))
 
-    feynman_kac = ssm.Bootstrap(ssm=Walk(), data=np.zeros((10_000, 2)))
+    feynman_kac = ssm.Bootstrap(ssm=PeerWalk(), data=np.zeros((10_000, 2)))
     filter_ = particles.SMC(fk=feynman_kac, N=count, resampling="systematic", ESSrmin=1.0)
     return lambda: next(filter_)
 

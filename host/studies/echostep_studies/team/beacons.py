@@ -59,15 +59,15 @@ def with_dropped_beacons(walks: TeamWalks, seed: int) -> TeamWalks:
 
 
 def dropped_on(truth: Floats, who: int, rng: np.random.Generator) -> list[Dropped]:
-    """The beacons of wearer `who`, beside its way, truth (n, 5)."""
+    """The beacons dropped by wearer `who` beside its true path (n, 5)."""
     way = way_m(truth)
     rows = [int(np.searchsorted(way, k * SPACING_M)) for k in range(MOST_EACH) if k * SPACING_M <= way[-1]]
-    found = []
+    drops = []
     for k, row in enumerate(rows):
         t_s, x, y, z = truth[row, [T, X, Y, Z]].tolist()
         aside_x, aside_y = (ASIDE_M * rng.uniform(-1.0, 1.0, 2)).tolist()
-        found.append(Dropped(who * MOST_EACH + k + 1, t_s, x + aside_x, y + aside_y, z, rng.uniform(-math.pi, math.pi)))
-    return found
+        drops.append(Dropped(who * MOST_EACH + k + 1, t_s, x + aside_x, y + aside_y, z, rng.uniform(-math.pi, math.pi)))
+    return drops
 
 
 def _heard(walks: TeamWalks, truth: Floats, beacons: Sequence[Dropped], rng: np.random.Generator) -> Iterator[Chunk]:

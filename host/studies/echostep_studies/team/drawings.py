@@ -22,7 +22,7 @@ from echostep_studies.team.walks import TeamWalks
 
 
 def drawing_by(walks: TeamWalks, who: int) -> Plan:
-    """What wearer `who` has drawn at the end of its way, as a teammate gets it."""
+    """The drawing of wearer `who` at the end of its walk, as a teammate receives it."""
     tracker, stretches, growing = Tracker(NO_PLAN, walks.starts[who]), Stretches(0.0), GrowingMap()
     mapped = None
 

@@ -3,7 +3,7 @@
 
 In: seeds. Out: rows `office/tap`, `tower/radio`, ... Owns the conditions. Simulated.
 
-All but the first wearer know their starts; the first is told a wrong one (`door`: all begin side by side, as teams go in; `tap`, `radio`: all begin
+All wearers but the first have their true starts; the first has a wrong one (`door`: all begin side by side, as teams go in; `tap`, `radio`: all begin
 apart; `beacons`: the same, each drops beacons, hears those of all and shares its own) or none (`unknown`, apart), or knows its own too and reports
 false places (`liar`: that wearer is left out of all columns). `drawing`: the first one walks without a plan, from a known start, then the others
 from theirs: `alone` without a plan, `together` on its drawing; the first one is left out. `ratio`: mean error of all wearers and runs together over
@@ -29,7 +29,7 @@ from echostep.output.table import Table
 from echostep.plan.model import NO_PLAN, Plan, Pose, load_plan
 from echostep.plan.routing import RoutePlace
 from echostep_studies.bench import judgement, sites
-from echostep_studies.bench.judgement import FALSE_TRACKING_M, Truth, true_levels
+from echostep_studies.bench.judgement import FALSE_TRACKING_M, TruePlaces, true_levels
 from echostep_studies.bench.tours import random_tour
 from echostep_studies.bench.walks import T, X, Y, Z
 from echostep_studies.frame.report import as_dicts, rows_by_name
@@ -126,10 +126,10 @@ def one_run(names: tuple[str, ...], length_m: float, seed: int) -> list[WearerRu
             if how == "beacons":
                 walks = with_dropped_beacons(walks, seed)
             kind = "wrong" if how in ("tap", "radio") else how
-            told = [_told(walks, begin, kind, seed), *walks.starts[1:]]
+            begins = [_told(walks, begin, kind, seed), *walks.starts[1:]]
             if kind not in alone:
-                alone[kind] = track_team(walks, told, None, seed), track_team(walks, told, None, seed + OTHER_DRAWS)
-            together = track_team(walks, told, HOWS[how], seed)
+                alone[kind] = track_team(walks, begins, None, seed), track_team(walks, begins, None, seed + OTHER_DRAWS)
+            together = track_team(walks, begins, HOWS[how], seed)
             rows += [_row(f"{building}/{how}", walks, k, [alone[kind][0][k], together[k], alone[kind][1][k]], seed)
                      for k in range(WEARERS) if not (how == "liar" and k == LIAR)]  # fmt: skip
     return rows + (_drawing_rows(length_m, seed) if DRAWING in names else [])
@@ -147,7 +147,7 @@ def _drawing_rows(length_m: float, seed: int) -> list[WearerRun]:
 
 
 def _told(walks: TeamWalks, begin: RoutePlace, kind: str, seed: int) -> Pose | Start:
-    """The start that the first wearer's tracker is told."""
+    """The start that is given to the first wearer's tracker."""
     true = walks.starts[FIRST]
     if kind not in ("wrong", "door", "beacons"):
         return Start() if kind == "unknown" else true
@@ -180,7 +180,7 @@ def errors_m(walks: TeamWalks, who: int, estimates: Sequence[Estimate]) -> Float
     t_s = np.array([e.t_s for e in estimates])
     x, y, z = (np.interp(t_s, truth[:, T], truth[:, k]) for k in (X, Y, Z))
     place = np.column_stack([x, y])
-    true = Truth(place, true_levels(place, z, walks.plan))
+    true = TruePlaces(place, true_levels(place, z, walks.plan))
     places = np.array([(e.x_m, e.y_m) for e in estimates]).reshape(-1, 2)
     return judgement.errors_m(places, np.array([e.level for e in estimates], np.int64), true)
 

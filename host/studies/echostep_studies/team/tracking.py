@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The trackers of a team: alone, or each told of its meetings.
+"""The trackers of a team, with or without meetings.
 
-In: `TeamWalks`, the starts that the trackers are told. Out: their estimates. Owns how two tap, how a radio measures, and what a liar reports.
+In: `TeamWalks`, the starts given to the trackers. Out: their estimates. Owns the models of a tap, of a radio range and of a false report.
 
-After an encounter both are told of each other at one moment, by the newest estimate of either tracker: as reports come, up to a second old. A tap
+After an encounter both trackers get each other's newest report at one moment; reports are up to a second old. A tap
 comes up to TAP_S after they were nearest, and they do not stop for it. Beacons are shared every SHARE_S, without taps.
 """
 
@@ -42,7 +42,7 @@ LIE_SD_M = 0.05
 
 
 class How(StrEnum):
-    """What an encounter tells: a tap, a radio range, a tap of a wearer whose report is false, or shared beacons instead."""
+    """Kind of measurement at an encounter: a tap, a radio range, a tap with a false report, or shared beacons instead."""
 
     TAP = "tap"
     RADIO = "radio"
@@ -50,9 +50,9 @@ class How(StrEnum):
     BEACONS = "beacons"
 
 
-def track_team(walks: TeamWalks, told: Sequence[Pose | Start], how: How | None, seed: int) -> list[list[Estimate]]:
-    """Estimates of all wearers; `told`: their starts; `how`: None for trackers that are told of no meeting."""
-    team = [_Wearer(walks, k, start, seed) for k, start in enumerate(told)]
+def track_team(walks: TeamWalks, starts: Sequence[Pose | Start], how: How | None, seed: int) -> list[list[Estimate]]:
+    """Estimates of all wearers; `starts`: their starts; `how`: None for trackers without meetings."""
+    team = [_Wearer(walks, k, start, seed) for k, start in enumerate(starts)]
     if how is How.BEACONS:
         _share_all(walks, team)
     elif how is not None:
@@ -63,7 +63,7 @@ def track_team(walks: TeamWalks, told: Sequence[Pose | Start], how: How | None, 
 
 
 def _meet_all(walks: TeamWalks, team: Sequence[_Wearer], how: How, seed: int) -> None:
-    """Tell both wearers of each encounter of each other."""
+    """Give both trackers of each encounter each other's report."""
     for encounter in _told_at(walks.encounters, how, np.random.default_rng([seed, 76])):
         rng = np.random.default_rng([seed, 77, int(1e3 * encounter.t_s)])
         reports = [_report(walks, team, who, encounter, how, rng) for who in encounter.who]
@@ -73,7 +73,7 @@ def _meet_all(walks: TeamWalks, team: Sequence[_Wearer], how: How, seed: int) ->
 
 
 def _share_all(walks: TeamWalks, team: Sequence[_Wearer]) -> None:
-    """Every SHARE_S tell each wearer the beacons that the others have placed."""
+    """Every SHARE_S give each tracker the beacons that the others have placed."""
     end_s = max(truth[-1, T] for truth in walks.truth)
     for t_s in np.arange(SHARE_S, end_s, SHARE_S).tolist():
         for wearer in team:
@@ -81,16 +81,16 @@ def _share_all(walks: TeamWalks, team: Sequence[_Wearer]) -> None:
         placed = [wearer.tracker.own_beacons() for wearer in team]
         for who, beacons in enumerate(placed):
             if beacons:
-                told = TeamBeacons(1, f"wearer {who}", f"{who:08x}", walks.plan.digest, beacons)
+                message = TeamBeacons(1, f"wearer {who}", f"{who:08x}", walks.plan.digest, beacons)
                 for other in (*team[:who], *team[who + 1 :]):
-                    other.hear(Chunk(TEAM_BEACONS, START_NS + int(1e9 * t_s), told.encode()))
+                    other.hear(Chunk(TEAM_BEACONS, START_NS + int(1e9 * t_s), message.encode()))
 
 
 def _told_at(encounters: Sequence[Encounter], how: How, rng: np.random.Generator) -> list[Encounter]:
-    """The encounters at the times at which the trackers are told, in order."""
+    """The encounters in order of the times at which the trackers get them."""
     late_s = np.zeros(len(encounters)) if how is How.RADIO else rng.uniform(0.0, TAP_S, len(encounters))
-    told = [replace(e, t_s=e.t_s + float(s)) for e, s in zip(encounters, late_s, strict=True)]
-    return sorted(told, key=lambda e: e.t_s)
+    delayed = [replace(e, t_s=e.t_s + float(s)) for e, s in zip(encounters, late_s, strict=True)]
+    return sorted(delayed, key=lambda e: e.t_s)
 
 
 class _Wearer:
@@ -113,7 +113,7 @@ class _Wearer:
                 return
 
     def meet(self, meeting: Meeting, t_s: float) -> None:
-        """Tell the tracker of a meeting now."""
+        """Give the tracker a meeting now."""
         self.hear(Chunk(MEETING, START_NS + int(1e9 * t_s), meeting.encode()))
 
     def hear(self, chunk: Chunk) -> None:
@@ -124,7 +124,7 @@ class _Wearer:
 def _report(
     walks: TeamWalks, team: Sequence[_Wearer], who: int, encounter: Encounter, how: How, rng: np.random.Generator
 ) -> Meeting | None:
-    """What the other one is told of this wearer."""
+    """The report about this wearer that the other tracker gets."""
     team[who].advance(encounter.t_s)
     estimate = team[who].tracker.state.estimate
     if estimate is None:

@@ -87,7 +87,7 @@ def _with_stops(tour: Sequence[Waypoint]) -> list[Waypoint]:
 
 def encounters(plan: Plan, truth: Sequence[Floats]) -> tuple[Encounter, ...]:
     """Every time that two wearers come within SIDE_M of each other on one floor without a wall between, at the moment when they are nearest."""
-    found = []
+    nearest = []
     for i, j in combinations(range(len(truth)), 2):
         rows = min(len(truth[i]), len(truth[j]))
         a, b = truth[i][:rows], truth[j][:rows]
@@ -99,8 +99,8 @@ def encounters(plan: Plan, truth: Sequence[Floats]) -> tuple[Encounter, ...]:
             k = first + int(away[first:end].argmin())
             if a[k, T] - last_s >= AGAIN_S:
                 last_s = float(a[k, T])
-                found.append(Encounter(last_s, (i, j), float(away[k])))
-    return tuple(sorted(found, key=lambda e: e.t_s))
+                nearest.append(Encounter(last_s, (i, j), float(away[k])))
+    return tuple(sorted(nearest, key=lambda e: e.t_s))
 
 
 def _walled(plan: Plan, a: Floats, b: Floats) -> Bools:

@@ -51,7 +51,7 @@ class TrailRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrintedRun(TrailRun):
-    """The same by the paper's method, with what the paper says of the trail."""
+    """The same by the paper's method, with the paper's figures of the trail."""
 
     printed: str
     printed_distance_error_percent: float | None
@@ -72,7 +72,7 @@ class TrailSummary(ErrorSummary):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrintedSummary(TrailSummary):
-    """The same by the paper's method, with what the paper says of the trail."""
+    """The same by the paper's method, with the paper's figures of the trail."""
 
     printed: str
     printed_distance_error_percent: float | None
@@ -114,7 +114,7 @@ def summaries(rows: Sequence[TrailRun]) -> list[TrailSummary]:
 def _summary(rows: list[TrailRun]) -> TrailSummary:
     first = rows[0]
     off = [row.distance_error_percent for row in rows]
-    found = TrailSummary(
+    common = TrailSummary(
         **as_dict(summary(first.name, first.profile, [row.errors_m for row in rows], [])),
         rate_hz=first.rate_hz,
         distance_m=round(sum(row.distance_m for row in rows) / len(rows), 2),
@@ -125,9 +125,9 @@ def _summary(rows: list[TrailRun]) -> TrailSummary:
         heading_max_deg=round(max(row.heading_max_deg for row in rows), 2),
     )
     if not isinstance(first, PrintedRun):
-        return found
+        return common
     percent = first.printed_distance_error_percent
-    return PrintedSummary(**as_dict(found), printed=first.printed, printed_distance_error_percent=percent)
+    return PrintedSummary(**as_dict(common), printed=first.printed, printed_distance_error_percent=percent)
 
 
 def _tables(rows: list[TrailSummary], request: StudyRequest) -> list[Table]:

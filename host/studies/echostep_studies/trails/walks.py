@@ -40,20 +40,20 @@ def track(samples: MtxSamples, profile: str) -> Track:
     return walk_track(samples.t_s, samples.accel, samples.gyro, mag=samples.mag)
 
 
-def judge(found: Track, walked: Walk) -> JudgedTrack:
+def judge(track: Track, walked: Walk) -> JudgedTrack:
     """Compare a track with the walk that it was made of."""
     leaves = np.flatnonzero(walked.flat[:-1] & ~walked.flat[1:])
-    leaves = np.append(leaves, int(found.t_s[-1] * RATE_HZ))
-    at = np.minimum(np.searchsorted(found.t_s, leaves / RATE_HZ), len(found.t_s) - 1)
+    leaves = np.append(leaves, int(track.t_s[-1] * RATE_HZ))
+    at = np.minimum(np.searchsorted(track.t_s, leaves / RATE_HZ), len(track.t_s) - 1)
     yaw = walked.foot_rpy_rad[:, 2]
     c, s = math.cos(yaw[0]), math.sin(yaw[0])
-    places = found.position_m[at, :2] @ np.array([[c, s], [-s, c]]) + walked.foot_m[0, :2]
+    places = track.position_m[at, :2] @ np.array([[c, s], [-s, c]]) + walked.foot_m[0, :2]
     true = walked.foot_m[leaves, :2]
-    turned = found.heading_rad[at] - (yaw[leaves] - yaw[0])
+    turned = track.heading_rad[at] - (yaw[leaves] - yaw[0])
     return JudgedTrack(
         places,
         np.hypot(*(places - true).T),
         np.abs(np.angle(np.exp(1j * turned))),
-        sum(math.hypot(*step.move_m[:2]) for step in found.steps),
+        sum(math.hypot(*step.move_m[:2]) for step in track.steps),
         float(np.hypot(*np.diff(true, axis=0).T).sum()),
     )

@@ -30,15 +30,15 @@ LEAF_M = 0.1  # greatest distance of a leaf's line from the hinge; assumed
 Line = tuple[float, float, float, float]
 
 
-def doors_of(found: Sequence[Any], walls: Sequence[BaseGeometry], frame: DrawingFrame, file: Path) -> list[Door]:
+def doors_of(entities: Sequence[Any], walls: Sequence[BaseGeometry], frame: DrawingFrame, file: Path) -> list[Door]:
     """Doors of blocks, then of swings outside blocks, then of other lines outside blocks that belong to no swing."""
     stone = shapely.STRtree(list(walls))
-    blocks = [entity for entity in found if entity.dxftype() == "INSERT"]
+    blocks = [entity for entity in entities if entity.dxftype() == "INSERT"]
     lines: list[Line] = []
     for block in blocks:
         swings, rest = _shapes(_drawn(block, file), frame, file)
         lines += _double(swings) or [_gap(swing, stone) for swing in swings] or _longest(rest, LEAF_M)
-    swings, rest = _shapes([entity for entity in found if entity.dxftype() != "INSERT"], frame, file)
+    swings, rest = _shapes([entity for entity in entities if entity.dxftype() != "INSERT"], frame, file)
     hinges = shapely.union_all([Point(swing[0]) for swing in swings])
     loose = [line for line in rest if hinges.is_empty or line.distance(hinges) > LEAF_M]
     lines += [_gap(swing, stone) for swing in swings] + _longest(loose, 0.01)
@@ -98,14 +98,14 @@ def _distance(point: tuple[float, float], stone: shapely.STRtree) -> float:
 def _longest(lines: list[LineString], join_m: float) -> list[Line]:
     """The centre line of each group of connected lines, along its longer side."""
     blots = shapely.get_parts(shapely.union_all([line.buffer(join_m) for line in lines]))
-    found = []
+    sides = []
     for blot in blots:
         x0, y0, x1, y1 = opening(blot)
         long_m = math.dist((x0, y0), (x1, y1))
         if long_m > 4 * join_m:  # the blot is wider than the drawing by join_m at each end
             x, y = (x1 - x0) * join_m / long_m, (y1 - y0) * join_m / long_m
-            found.append((round(x0 + x, 3), round(y0 + y, 3), round(x1 - x, 3), round(y1 - y, 3)))
-    return found
+            sides.append((round(x0 + x, 3), round(y0 + y, 3), round(x1 - x, 3), round(y1 - y, 3)))
+    return sides
 
 
 def _mm(point: Sequence[float]) -> tuple[float, float]:

@@ -34,7 +34,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "obstacles": ("*obstacle*", "*hindernis*"),
 }
 INSUNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m"}
-REACH_M = 0.3  # half the greatest distance between neighbouring lines of one staircase: a tread
+HALF_TREAD_M = 0.3  # half the greatest distance between neighbouring lines of one staircase: a tread
 
 
 def import_dxf(
@@ -45,29 +45,29 @@ def import_dxf(
     drawn_levels, frame = [], None
     for i, file in enumerate(files):
         drawing = read_drawing(file)
-        found = _sorted(drawing, patterns, file)
+        entities = _sorted(drawing, patterns, file)
         scale_m = METRES[units or _units(drawing, file)]
-        frame = replace(frame, scale_m=scale_m) if frame else DrawingFrame.about(found["walls"], scale_m)
-        drawn_levels.append(_storey(found, frame, DrawnLevel(file.stem, round(i * storey_height_m, 6)), file))
+        frame = replace(frame, scale_m=scale_m) if frame else DrawingFrame.about(entities["walls"], scale_m)
+        drawn_levels.append(_drawn_level(entities, frame, DrawnLevel(file.stem, round(i * storey_height_m, 6)), file))
     return Plan(files[0].stem, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels))
 
 
 def _sorted(drawing: Any, patterns: Mapping[str, Sequence[str]], file: Path) -> dict[str, list[Any]]:
     """Entities by the meaning of their layers; raises EchostepError when there are no walls."""
-    found: dict[str, list[Any]] = {kind: [] for kind in patterns}
+    by_kind: dict[str, list[Any]] = {kind: [] for kind in patterns}
     seen: dict[str, str | None] = {}
     for entity, layer in entities(drawing.modelspace(), file, lambda layer: meaning(layer, patterns) == "doors"):
         if layer not in seen:
             seen[layer] = meaning(layer, patterns)
         kind = seen[layer]
         if kind is not None:
-            found[kind].append(entity)
-    if not found["walls"]:
+            by_kind[kind].append(entity)
+    if not by_kind["walls"]:
         known = ", ".join(sorted(seen)[:20]) or "none"
         raise EchostepError(
             f"{file}: nothing on a layer named {' or '.join(patterns['walls'])}; give --layer walls=NAME; layers: {known[:400]}"
         )
-    return found
+    return by_kind
 
 
 def meaning(layer: str, patterns: Mapping[str, Sequence[str]]) -> str | None:
@@ -90,21 +90,21 @@ def _units(drawing: Any, file: Path) -> str:
     return INSUNITS[code]
 
 
-def _storey(found: Mapping[str, list[Any]], frame: DrawingFrame, drawn: DrawnLevel, file: Path) -> DrawnLevel:
+def _drawn_level(entities: Mapping[str, list[Any]], frame: DrawingFrame, drawn: DrawnLevel, file: Path) -> DrawnLevel:
     lines = {
-        kind: [line for entity in found[kind] if (line := frame.line(entity, file))]
-        for kind in found
+        kind: [line for entity in entities[kind] if (line := frame.line(entity, file))]
+        for kind in entities
         if kind not in ("doors", "rooms")
     }
     if not lines["walls"]:
         raise EchostepError(f"{file}: the layers of walls have no lines: give the right ones with --layer walls=NAME")
     drawn.walls, drawn.windows = list(lines["walls"]), list(lines["windows"])
-    drawn.doors = doors_of(found["doors"], [*drawn.walls, *drawn.windows], frame, file)
+    drawn.doors = doors_of(entities["doors"], [*drawn.walls, *drawn.windows], frame, file)
     drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(_noded(lines["obstacles"]))))
-    drawn.rooms = [room for entity in found["rooms"] if (room := _room(entity, frame))]
+    drawn.rooms = [room for entity in entities["rooms"] if (room := _room(entity, frame))]
     for kind, layer in (("stairs", "stairs"), ("lift", "lifts")):
-        blots = shapely.union_all([line.buffer(REACH_M) for line in lines[layer]])
-        hulls = [blot.convex_hull.buffer(-REACH_M) for blot in shapely.get_parts(blots)]
+        blots = shapely.union_all([line.buffer(HALF_TREAD_M) for line in lines[layer]])
+        hulls = [blot.convex_hull.buffer(-HALF_TREAD_M) for blot in shapely.get_parts(blots)]
         drawn.connectors += [ConnectorShape(cast(ConnectorKind, kind), "", area) for area in areas(hulls)]
     return drawn
 

@@ -19,7 +19,7 @@ from echostep.plan.model import Door
 
 ASSUMED = "assumed"  # name of such a door
 THICKEST_M = 0.6  # greatest distance of neighbours: the thickness of a wall; assumed
-JAMB_M = 0.05  # of wall left beside a door; assumed
+FLANK_M = 0.05  # of wall left beside a door; assumed
 ONE_LINE_M = 0.05  # nearer faces are one wall: half the width in which a door cuts a wall drawn as a line
 
 
@@ -27,19 +27,19 @@ def doors_of_rooms(
     rooms: Sequence[Polygon], ways: Sequence[Polygon], opened: Sequence[Polygon], width_m: float
 ) -> list[Door]:
     """Doors of `rooms` without an opening, to `ways` without walls or to rooms that have a door: `opened`, or a room before."""
-    found: list[Door] = []
-    closed = _with_doors(list(rooms), list(ways), {}, width_m, found)
+    doors: list[Door] = []
+    closed = _with_doors(list(rooms), list(ways), {}, width_m, doors)
     reached = [*opened, *(room for room in rooms if all(room is not other for other in closed))]
     while closed and reached:
         walls = {id(area): area.exterior for area in reached}
-        left = _with_doors(closed, reached, walls, width_m, found)
+        left = _with_doors(closed, reached, walls, width_m, doors)
         reached = [room for room in closed if all(room is not other for other in left)]
         closed = left
-    return found
+    return doors
 
 
 def _with_doors(
-    closed: list[Polygon], reached: list[Polygon], walls: dict[int, LineString], width_m: float, found: list[Door]
+    closed: list[Polygon], reached: list[Polygon], walls: dict[int, LineString], width_m: float, doors: list[Door]
 ) -> list[Polygon]:
     """Add a door to each closed room that shares enough wall with a reached area; returns the rooms that share none.
 
@@ -58,10 +58,10 @@ def _with_doors(
             continue
         piece, other = max(pieces, key=lambda pair: float(np.hypot(*(pair[0][2:] - pair[0][:2]))))
         middle = (piece[:2] + piece[2:]) / 2
-        found.append(_door(piece, middle, width_m))
+        doors.append(_door(piece, middle, width_m))
         wall = walls.get(id(other))
         if wall is not None and wall.distance(Point(middle)) > ONE_LINE_M:
-            found += _doors_at(Point(middle), [wall], width_m, THICKEST_M)
+            doors += _doors_at(Point(middle), [wall], width_m, THICKEST_M)
     return left
 
 
@@ -74,7 +74,7 @@ def doors_at(point: Point, walls: Sequence[LineString], width_m: float, within_m
 
 def _doors_at(point: Point, walls: Sequence[LineString], width_m: float, within_m: float) -> list[Door]:
     """A door in each wall, in the straight piece that is nearest to the point and long enough."""
-    found = []
+    doors = []
     for wall in walls:
         pieces = [piece for piece in _segments(np.asarray(wall.coords)) if _fits(piece, width_m)]
         lines = [LineString(piece.reshape(2, 2)) for piece in pieces]
@@ -82,8 +82,8 @@ def _doors_at(point: Point, walls: Sequence[LineString], width_m: float, within_
         if distances and min(distances) < within_m:
             nearest = int(np.argmin(distances))
             at = np.asarray(lines[nearest].interpolate(lines[nearest].project(point)).coords[0])
-            found.append(_door(pieces[nearest], at, width_m))
-    return found
+            doors.append(_door(pieces[nearest], at, width_m))
+    return doors
 
 
 def _straight(boundary: LineString, other: Polygon) -> Iterator[Floats]:
@@ -114,14 +114,14 @@ def _segments(points: Floats) -> Floats:
 
 
 def _fits(piece: Floats, width_m: float) -> bool:
-    return bool(np.hypot(*(piece[2:] - piece[:2])) >= width_m + 2 * JAMB_M)
+    return bool(np.hypot(*(piece[2:] - piece[:2])) >= width_m + 2 * FLANK_M)
 
 
 def _door(piece: Floats, at: Floats, width_m: float) -> Door:
     """A door in a straight piece (4,) of wall, as near to the point (2,) as its ends allow."""
     length = float(np.hypot(*(piece[2:] - piece[:2])))
     along = (piece[2:] - piece[:2]) / length
-    middle = min(max(float((at - piece[:2]) @ along), width_m / 2 + JAMB_M), length - width_m / 2 - JAMB_M)
+    middle = min(max(float((at - piece[:2]) @ along), width_m / 2 + FLANK_M), length - width_m / 2 - FLANK_M)
     (x0, y0), (x1, y1) = (piece[:2] + (middle + side * width_m / 2) * along for side in (-1, 1))
     return Door(
         (round(float(x0), 3), round(float(y0), 3), round(float(x1), 3), round(float(y1), 3)), "unknown", ASSUMED

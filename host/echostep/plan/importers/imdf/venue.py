@@ -151,15 +151,15 @@ def _origin(archive: Archive) -> Georeference:
     """The plan's origin: the first corner of the first level, rounded to 1e-5 degrees (about 1 m)."""
     name = _file(archive, "level")
     tree = parse_json(archive.text(name), archive.label(name))
-    found: Any = tree
+    node: Any = tree
     try:
         for where, feature in features(tree):
-            found = typed(feature.get("geometry"), f"{where}.geometry", dict).get("coordinates")
-            while isinstance(found, list) and found and isinstance(found[0], list):
-                found = found[0]
-            if not isinstance(found, list) or len(found) < 2:
+            node = typed(feature.get("geometry"), f"{where}.geometry", dict).get("coordinates")
+            while isinstance(node, list) and node and isinstance(node[0], list):
+                node = node[0]
+            if not isinstance(node, list) or len(node) < 2:
                 raise ValueError(f"{where}.geometry: no coordinates")
-            lon, lat = number(found[0], where, 180.0, "degrees"), number(found[1], where, 90.0, "degrees")
+            lon, lat = number(node[0], where, 180.0, "degrees"), number(node[1], where, 90.0, "degrees")
             return Georeference(round(lon, 5), round(lat, 5))
     except ValueError as error:
         raise EchostepError(f"{archive.label(name)}: {error}") from error
@@ -171,11 +171,11 @@ def _features(archive: Archive, kind: str, earth: EarthTransform) -> list[Featur
     name = _file(archive, kind)
     if not archive.has(name):
         return []
-    found = []
+    read = []
     try:
         for where, feature in features(parse_json(archive.text(name), archive.label(name))):
             place = f"{kind} {where}"
-            found.append(
+            read.append(
                 Feature(
                     place,
                     text(feature.get("id"), f"{where}.id"),
@@ -183,10 +183,10 @@ def _features(archive: Archive, kind: str, earth: EarthTransform) -> list[Featur
                     shape(feature, where, earth),
                 )
             )
-            _ = found[-1].category, found[-1].name
+            _ = read[-1].category, read[-1].name
     except ValueError as error:
         raise EchostepError(f"{archive.label(name)}: {error}") from error
-    return found
+    return read
 
 
 def _ordinal(level: Feature) -> float:
@@ -196,10 +196,10 @@ def _ordinal(level: Feature) -> float:
         raise EchostepError(f"level.geojson: {error}") from error
 
 
-def _by_level(found: list[Feature], drawn_levels: dict[str, DrawnLevel]) -> dict[str, list[Feature]]:
+def _by_level(features: list[Feature], drawn_levels: dict[str, DrawnLevel]) -> dict[str, list[Feature]]:
     """Features by the id of their level; raises EchostepError for an unknown level."""
     sorted_: dict[str, list[Feature]] = {key: [] for key in drawn_levels}
-    for feature in found:
+    for feature in features:
         try:
             sorted_[feature.level].append(feature)
         except KeyError as error:
@@ -215,13 +215,13 @@ def _doors(one: Feature) -> list[Door]:
     """An opening as a door from its first to its last point; without a door leaf its state is open."""
     about = one.about.get("door")
     state: DoorState = "unknown" if isinstance(about, dict) and about.get("type") not in (None, "open") else "open"
-    found = []
+    doors = []
     for line in pieces([one.shape]):
         if isinstance(line, LineString) and line.length > 0.1:
             (x0, y0), (x1, y1) = line.coords[0][:2], line.coords[-1][:2]
             if (round(x0, 3), round(y0, 3)) != (round(x1, 3), round(y1, 3)):
-                found.append(Door((round(x0, 3), round(y0, 3), round(x1, 3), round(y1, 3)), state, one.name))
-    return found
+                doors.append(Door((round(x0, 3), round(y0, 3), round(x1, 3), round(y1, 3)), state, one.name))
+    return doors
 
 
 def _outline(drawn: DrawnLevel, level: Feature) -> None:
@@ -280,10 +280,10 @@ def _relationships(
         between = one.about.get("intermediary")
         ends = [one.about.get("origin"), one.about.get("destination"), *(between if isinstance(between, list) else [])]
         keys = [str(end.get("id")) for end in ends if isinstance(end, dict)]
-        found = sorted({units[key][0] for key in keys if key in units})
+        levels = sorted({units[key][0] for key in keys if key in units})
         for key in keys:
-            if key in units and len(found) > 1:
+            if key in units and len(levels) > 1:
                 i, unit = units[key]
                 for way in drawn_levels[i].connectors:
                     if any(way.area.equals(area) for area in areas([unit.shape])):
-                        way.levels = tuple(found)
+                        way.levels = tuple(levels)

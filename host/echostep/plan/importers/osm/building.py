@@ -138,9 +138,9 @@ def _doors(site: OsmSite, elements: Elements) -> None:
         own = levels_of(tags, f"node {node}") or site.order
         for level in own:
             for line in site.walls_at.get((level, node), [])[:1]:
-                found = _gap(line, Point(elements.at_m[node]), _metres(tags, DOOR_M))
+                gap = _gap(line, Point(elements.at_m[node]), _metres(tags, DOOR_M))
                 site.drawn_levels[level].doors.append(
-                    Door(found, _state(tags), (tags.get("name") or tags.get("ref") or "")[:80])
+                    Door(gap, _state(tags), (tags.get("name") or tags.get("ref") or "")[:80])
                 )
 
 

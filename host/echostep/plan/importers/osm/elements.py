@@ -32,21 +32,21 @@ Tags = dict[str, str]
 def levels_of(tags: Mapping[str, str], where: str = "") -> list[float]:
     """The level numbers of an element; empty when no tag can be read. Raises EchostepError for an impossible range."""
     texts = f"{tags.get('level', '')};{tags.get('repeat_on', '')}".split(";")
-    found: set[float] = set()
+    levels: set[float] = set()
     for text in (text.strip() for text in texts):
         if match := RANGE.match(text):
             low, high = float(match[1]), float(match[2])
             if not 0 <= high - low <= MOST:
                 raise EchostepError(f"{where}: level {text[:40]!r} is no range of levels: expected LOW-HIGH, as 0-5")
-            found |= {low + step for step in range(int(high - low) + 1)}
+            levels |= {low + step for step in range(int(high - low) + 1)}
         else:
             try:
                 level = float(text)
             except ValueError:
                 continue
             if math.isfinite(level) and abs(level) <= MOST:
-                found.add(level)
-    return sorted(found)
+                levels.add(level)
+    return sorted(levels)
 
 
 @dataclass(slots=True)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A log as a building to be tracked in: two plans from its even scans, pings from its odd ones, and walks along its path.
 
-In: a log's file and a seed. Out: `Building`, `LogWalk`. Owns nothing.
+In: a log's file and a seed. Out: `LogBuilding`, `LogWalk`. Owns nothing.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ NO_PINGS: Pings = (np.empty(0), np.empty(0, np.int64), np.empty(0))
 
 
 @dataclass(frozen=True, slots=True)
-class Building:
+class LogBuilding:
     """A log, its plans by name (`full`: all that stands; `walls`: straight pieces of WALL_M), its odometry, and what is heard at each scan (k, 2)."""
 
     log: CarmenLog
@@ -59,8 +59,8 @@ class LogWalk:
 
 
 @lru_cache(maxsize=1)
-def building_of(path: Path, seed: int) -> Building:
-    """Read a log, draw its plans, hear its pings; raises EchostepError that names file and line."""
+def building_of(path: Path, seed: int) -> LogBuilding:
+    """Read a log, draw its plans, simulate its pings; raises EchostepError that names file and line."""
     log = read_log(path)
     scans = np.arange(len(log.pose))
     segments = wall_segments(standing_places(log, scans[::2]))
@@ -70,10 +70,10 @@ def building_of(path: Path, seed: int) -> Building:
         "full": plan_of(f"{log.name}/full", segments),
         "walls": plan_of(f"{log.name}/walls", straight_pieces(segments, WALL_M)),
     }
-    return Building(log, plans, odometry_of(log, np.random.default_rng([seed, 61])), heard_m)
+    return LogBuilding(log, plans, odometry_of(log, np.random.default_rng([seed, 61])), heard_m)
 
 
-def walk_from(building: Building, first: int, length_m: float = math.inf) -> LogWalk:
+def walk_from(building: LogBuilding, first: int, length_m: float = math.inf) -> LogWalk:
     """The path from scan `first` on, to the end of the log or the first scan after `length_m`. Each scan is a pause, with a ping pair at odd ones."""
     pose = building.log.pose
     walked_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pose[first:, :2], axis=0).T))])
@@ -89,7 +89,7 @@ def walk_from(building: Building, first: int, length_m: float = math.inf) -> Log
 class _SegmentBuilder:
     """Segments in a walk frame that begins with the trunk looking along x."""
 
-    def __init__(self, building: Building) -> None:
+    def __init__(self, building: LogBuilding) -> None:
         self.segments: list[MeasuredSegment] = []
         self._building = building
         self._t_s, self._heading = 0.0, 0.0

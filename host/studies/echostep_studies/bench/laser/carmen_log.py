@@ -53,14 +53,14 @@ def logs_in(folder: Path) -> list[Path]:
     """The logs of a folder by name; raises EchostepError where there are none."""
     if not folder.is_dir():
         raise EchostepError(f"{folder}: no such folder: --data names a folder of CARMEN logs (*.log, *.log.gz)")
-    found = sorted([*folder.glob("*.log"), *folder.glob("*.log.gz")])
-    if not found:
+    paths = sorted([*folder.glob("*.log"), *folder.glob("*.log.gz")])
+    if not paths:
         raise EchostepError(f"{folder}: no CARMEN log (*.log, *.log.gz) in there")
-    names = [name_of(path) for path in found]
-    for path, name in zip(found, names, strict=True):
+    names = [name_of(path) for path in paths]
+    for path, name in zip(paths, names, strict=True):
         if names.count(name) > 1:
             raise EchostepError(f"{path}: two logs are named {name}: rename one")
-    return found
+    return paths
 
 
 def name_of(path: Path) -> str:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Where laser beams ended and where they passed: counts on a grid, and the places that stand [the counting model of Haehnel 2003].
+"""Counts of laser beams that ended in or passed each cell of a grid, and the occupied places [the counting model of Haehnel 2003].
 
-In: scans with poses. Out: places (n, 2) of what stands, one a cell. Owns nothing. A cell stands where beams ended in it as often as it needs to be no
-passer-by: at least STANDING of the beams that came there.
+In: scans with poses. Out: occupied places (n, 2), one a cell. Owns nothing. A cell is occupied, and no
+passer-by, where at least STANDING of the beams that reached it ended in it.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Wall segments from places that stand: straight pieces first, the longest before the others, then what is left in small pieces.
+"""Wall segments from occupied places: straight pieces first, in order of decreasing length, then the rest in small pieces.
 
 In: places (n, 2). Out: segments (k, 4): x0, y0, x1, y1. Owns nothing. A straight piece is grown from a place whose neighbours lie on a line: the
 places near that line without a gap are fitted anew by least squares, until they stay the same.
@@ -67,10 +67,10 @@ def _grown(places: Floats, unused: Bools, seed: int, direction: Floats) -> Float
     """The longest piece through a place in about this direction, whose places are used up by it; None where it is too short."""
     middle, members = places[seed], np.zeros(0, np.int64)
     for _ in range(ROUNDS):
-        found = _run(places, unused, seed, middle, direction, ASIDE_M)
-        if len(found) < FEWEST or np.array_equal(found, members):
+        inliers = _run(places, unused, seed, middle, direction, ASIDE_M)
+        if len(inliers) < FEWEST or np.array_equal(inliers, members):
             break
-        members = found
+        members = inliers
         middle = places[members].mean(0)
         direction, _, _ = _line(places[members])
     if len(members) < FEWEST:

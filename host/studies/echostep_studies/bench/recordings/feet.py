@@ -18,7 +18,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.foot.steps import Track
-from echostep_studies.bench.recordings.foot_metrics import Figure, climb, closure, mocap, outbound, survey
+from echostep_studies.bench.recordings.foot_metrics import FootFigure, climb, closure, mocap, outbound, survey
 from echostep_studies.frame.recordings import Sets
 
 G_M_S2 = 9.80665
@@ -40,7 +40,7 @@ class FootRecording:
     t_s: Floats
     accel: Floats
     gyro: Floats
-    judge: Callable[[Track], list[Figure]]
+    judge: Callable[[Track], list[FootFigure]]
     mag: Floats | None = None
     truth_t_s: Floats | None = None
     truth_m: Floats | None = None

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What a foot's track is worth against a recording's truth, in that data set's own metric.
+"""Error of a foot's track against a recording's truth, in that data set's own metric.
 
-In: a `Track` and the truth. Out: `Figure`s. Owns nothing. Tracks and truth share no origin and no yaw: they are laid over each other by the rigid
+In: a `Track` and the truth. Out: `FootFigure`s. Owns nothing. Tracks and truth share no origin and no yaw: they are aligned by the rigid
 motion, without mirroring and without scale, that fits best over all points, which is how the peers' figures were taken.
 """
 
@@ -20,7 +20,7 @@ FROZEN_SAMPLES = 5  # motion capture that repeats itself for longer has lost its
 SURVEYED_31 = 29
 
 
-class Figure(NamedTuple):
+class FootFigure(NamedTuple):
     """A figure in metres, and the best that a peer, tuned for this set, has reached: (name, figure)."""
 
     metric: str
@@ -54,59 +54,61 @@ def way(track: Track) -> float:
 
 def mocap(
     track: Track, *, t_s: Floats, truth_m: Floats, at: NDArray[np.int_], peer: tuple[str, float] | None
-) -> list[Figure]:
+) -> list[FootFigure]:
     """Against motion capture truth_m (n, 2) at every t_s (n,); strides end at the samples `at`."""
     xy, moving = places(track, t_s), ~_frozen(truth_m)
     return [
-        Figure("2D RMSE", rmse(xy, truth_m), peer),
-        Figure("2D RMSE where the truth moves", rmse(xy[moving], truth_m[moving])),
-        Figure("stride length MAE", _stride_error(xy[at], truth_m[at]), peer and ("pyshoe", 0.029)),
+        FootFigure("2D RMSE", rmse(xy, truth_m), peer),
+        FootFigure("2D RMSE where the truth moves", rmse(xy[moving], truth_m[moving])),
+        FootFigure("stride length MAE", _stride_error(xy[at], truth_m[at]), peer and ("pyshoe", 0.029)),
     ]
 
 
-def survey(track: Track, *, name: str, t_s: Floats, truth_m: Floats, peer: tuple[str, float] | None) -> list[Figure]:
+def survey(
+    track: Track, *, name: str, t_s: Floats, truth_m: Floats, peer: tuple[str, float] | None
+) -> list[FootFigure]:
     """Against surveyed footprints truth_m (n, 2), reached at t_s (n,)."""
     xy = places(track, t_s)
-    found = [
-        Figure("2D RMSE at strides", rmse(xy, truth_m), peer),
-        Figure("stride length MAE", _stride_error(xy, truth_m)),
+    figures = [
+        FootFigure("2D RMSE at strides", rmse(xy, truth_m), peer),
+        FootFigure("stride length MAE", _stride_error(xy, truth_m)),
     ]
     if name == "31":
         part = f", first {SURVEYED_31} footprints"
         xy, truth_m = xy[:SURVEYED_31], truth_m[:SURVEYED_31]
-        found.append(Figure("2D RMSE at strides" + part, rmse(xy, truth_m)))
-        found.append(Figure("stride length MAE" + part, _stride_error(xy, truth_m)))
-    return found
+        figures.append(FootFigure("2D RMSE at strides" + part, rmse(xy, truth_m)))
+        figures.append(FootFigure("stride length MAE" + part, _stride_error(xy, truth_m)))
+    return figures
 
 
-def closure(track: Track, *, peer: tuple[str, float] | None, height_peer: tuple[str, float] | None) -> list[Figure]:
+def closure(track: Track, *, peer: tuple[str, float] | None, height_peer: tuple[str, float] | None) -> list[FootFigure]:
     """The end is the beginning."""
     x, y, z = track.position_m[-1] - track.position_m[0]
     return [
-        Figure("closure, 3D", float(np.linalg.norm([x, y, z])), peer if height_peer is None else None),
-        Figure("closure, horizontal", float(np.hypot(x, y)), None if height_peer is None else peer),
-        Figure("closure, height", float(z), height_peer),
+        FootFigure("closure, 3D", float(np.linalg.norm([x, y, z])), peer if height_peer is None else None),
+        FootFigure("closure, horizontal", float(np.hypot(x, y)), None if height_peer is None else peer),
+        FootFigure("closure, height", float(z), height_peer),
     ]
 
 
-def outbound(track: Track, *, start_s: float, turn_s: Floats) -> list[Figure]:
+def outbound(track: Track, *, start_s: float, turn_s: Floats) -> list[FootFigure]:
     """10 m out: how far out the turn is, halfway between the foot's places before and after it."""
     start, *turn = places(track, np.array([start_s, *turn_s]))
-    return [Figure("outbound, true 10.0", float(np.hypot(*(np.array(turn) - start).T).mean()))]
+    return [FootFigure("outbound, true 10.0", float(np.hypot(*(np.array(turn) - start).T).mean()))]
 
 
-def climb(track: Track) -> list[Figure]:
+def climb(track: Track) -> list[FootFigure]:
     """No truth but the other foot's."""
-    return [Figure("climb, no truth", float(track.position_m[-1, 2] - track.position_m[0, 2]))]
+    return [FootFigure("climb, no truth", float(track.position_m[-1, 2] - track.position_m[0, 2]))]
 
 
 def _frozen(truth: Floats) -> Bools:
     """Where motion capture (n, 2) has lost its markers and repeats itself for longer than 25 ms, before it jumps."""
     same = np.concatenate([[False], (np.diff(truth, axis=0) == 0.0).all(1)])
-    found = np.zeros(len(truth), bool)
+    frozen = np.zeros(len(truth), bool)
     for begin, end in spans(same):
-        found[begin:end] = end - begin > FROZEN_SAMPLES
-    return found
+        frozen[begin:end] = end - begin > FROZEN_SAMPLES
+    return frozen
 
 
 def _stride_error(track: Floats, truth: Floats) -> float:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the bench asks a simulated device and wearer: the dialogue that configures an MTx or MTi, and what `calibrate` asks for.
+"""Simulated device and wearer of the bench: the configuration dialogue of an MTx or MTi, and the movements for `calibrate`.
 
 In: requests, seeds. Out: answers, rows for the twin. Owns the state of each device.
 """

@@ -51,7 +51,7 @@ ACCEPTED = {
 
 
 class DeviceState(Enum):
-    """What it does."""
+    """State of the simulated device."""
 
     WAKING = "waking"
     CONFIG = "config"
@@ -59,7 +59,7 @@ class DeviceState(Enum):
 
 
 class MtxDevice:
-    """One MTx; `deaf` ones measure and hear nothing, as with a broken line to their input."""
+    """One MTx; a `deaf` one measures but receives nothing, as with a broken line to its input."""
 
     def __init__(self, output: OutputFormat = FACTORY, *, deaf: bool = False) -> None:
         self.output = output
@@ -81,12 +81,12 @@ class MtxDevice:
         return self.state is DeviceState.MEASURING and self.sync_out[0] & 0x0F == 2
 
     def power_on(self, now_s: float) -> bytes:
-        """It starts anew and says so."""
+        """Restart the device, which sends a WakeUp."""
         self.state, self._woken_s = DeviceState.WAKING, now_s
         return encode_frame(0x3E)
 
     def feed(self, received: bytes, now_s: float) -> bytes:
-        """What it answers to these bytes; b"" also lets its time pass."""
+        """Answer of the device to these bytes; b"" only advances its time."""
         if self.state is DeviceState.WAKING and now_s - self._woken_s >= WAKE_UP_S:
             self.state = DeviceState.MEASURING
         if self.deaf:
