@@ -21,12 +21,12 @@ static inline bool ticks_reached(uint32_t now, uint32_t due)
 }
 
 /* A rising edge of the SyncOut input, which on a foot board is the data-ready line of its part. */
-struct clock_edge {
+struct capture_edge {
 	uint32_t ticks;  /* captured by the timer itself */
 	uint16_t edge;   /* edges since the start */
 	uint16_t missed; /* edges since the previous call that this one has overwritten */
 };
-bool clock_take_edge(struct clock_edge *out); /* false: no edge since the last call */
+bool capture_take_edge(struct capture_edge *out); /* false: no edge since the last call */
 
 /* I2C at 100 kHz, one transfer at a time, carried out by interrupts. */
 enum twi_state { TWI_BUSY, TWI_DONE, TWI_NACK, TWI_FAILED };
@@ -74,15 +74,15 @@ bool usb_bootloader_wanted(void);                     /* whether the port was cl
 uint8_t usb_suspends(void);                           /* how often the host has suspended the bus since the start; wraps */
 
 /* The echo lines of pulse rangers, side 0 left, 1 right: both edges are captured by a timer each. The left line is also SyncOut: its
- * edges count as such except between echo_begin and echo_end, or the end of the pulse. */
-enum echo_state { ECHO_WAITING, ECHO_HIGH, ECHO_OVER };
+ * edges count as such except between capture_trigger and capture_end_pulse, or the end of the pulse. */
+enum capture_state { CAPTURE_WAITING, CAPTURE_HIGH, CAPTURE_OVER };
 
-struct echo_pulse {
+struct capture_pulse {
 	uint32_t rise, fall; /* ticks; fall is valid when the pulse is over */
 };
-bool echo_begin(uint8_t side); /* sends a trigger pulse (12 us); false: the line is high, or pulses without one */
-enum echo_state echo_take(uint8_t side, struct echo_pulse *out);
-void echo_end(uint8_t side);   /* gives up waiting */
+bool capture_trigger(uint8_t side);   /* sends a trigger pulse (12 us); false: the line is high, or pulses without one */
+enum capture_state capture_take_pulse(uint8_t side, struct capture_pulse *out);
+void capture_end_pulse(uint8_t side); /* gives up waiting */
 
 /* Supply voltage. */
 bool adc_take(uint16_t *reading); /* 1024 * 1.1 V / supply, and starts the next measurement (0.1 ms); false: not finished */

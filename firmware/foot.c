@@ -75,13 +75,13 @@ bool foot_run(uint32_t now)
 	return false;
 }
 
-static void send(const struct clock_edge *edge, const int16_t *a)
+static void send(const struct capture_edge *edge, const int16_t *a)
 {
 	struct msg_foot m = { edge->ticks, edge->edge, a[3], a[4], a[5], a[0], a[1], a[2] };
 	link_send(MSG_FOOT, msg_pack_foot(link_body(), &m));
 }
 
-bool foot_take(const struct clock_edge *edge)
+bool foot_take(const struct capture_edge *edge)
 {
 	struct icm20649_sample sample;
 	if (!is_foot_board())

@@ -6,13 +6,13 @@
 
 #include <stdbool.h>
 #include <stdint.h>
-#include "board.h" /* struct clock_edge */
+#include "board.h" /* struct capture_edge */
 
 /* Seeks, starts or watches the part when that is due (0.1 ms); true: it was found for the first time, and the configuration has changed. */
 bool foot_run(uint32_t now);
 
 /* Reads and sends the sample of a data-ready edge (0.1 ms); false: this is no foot board, the edge is not the part's. */
-bool foot_take(const struct clock_edge *edge);
+bool foot_take(const struct capture_edge *edge);
 
 /* Sends `foot_health`, if this is a foot board. */
 void foot_send_health(void);

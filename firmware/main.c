@@ -181,8 +181,8 @@ static void receive_commands(void)
 /* An edge is a sample of the foot's part, or a SyncOut pulse. */
 static void take_edge(void)
 {
-	struct clock_edge e;
-	if (!clock_take_edge(&e) || foot_take(&e) || !configuration_reads(SENSORS_SYNC))
+	struct capture_edge e;
+	if (!capture_take_edge(&e) || foot_take(&e) || !configuration_reads(SENSORS_SYNC))
 		return;
 	status.dropped_sync = (uint16_t)(status.dropped_sync + e.missed);
 	struct msg_sync m = { e.ticks, e.edge };

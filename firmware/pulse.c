@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "pulse.h"
-#include "board.h" /* echo_* */
+#include "board.h" /* capture_* */
 #include "parts.h" /* what was found */
 
 /* [HC-SR04 user guide: a pulse of 150 us to 25 ms, or of 38 ms without an echo; a new ping every 60 ms. RCWL-1601: the same at 3 to 5 V.]
@@ -14,10 +14,10 @@
 bool pulse_begin(uint8_t side, struct ranging *r)
 {
 	r->due = r->trigger; /* when the trigger pulse was sent */
-	return echo_begin(side);
+	return capture_trigger(side);
 }
 
-static enum ranging_state finish(uint8_t side, const struct echo_pulse *pulse, struct ranging *r)
+static enum ranging_state finish(uint8_t side, const struct capture_pulse *pulse, struct ranging *r)
 {
 	uint32_t length = pulse->fall - pulse->rise;
 	r->time_of_flight_us = length > ECHO_MAX_TICKS ? 0 : (uint16_t)(length / TICKS_PER_US);
@@ -27,20 +27,20 @@ static enum ranging_state finish(uint8_t side, const struct echo_pulse *pulse, s
 
 enum ranging_state pulse_run(uint8_t side, uint32_t now, struct ranging *r)
 {
-	struct echo_pulse pulse;
-	enum echo_state state = echo_take(side, &pulse);
+	struct capture_pulse pulse;
+	enum capture_state state = capture_take_pulse(side, &pulse);
 	uint32_t elapsed = now - r->due;
-	if (state != ECHO_WAITING)
+	if (state != CAPTURE_WAITING)
 		r->trigger = pulse.rise;
 	r->next = now + POLL_TICKS;
-	if (state == ECHO_OVER)
+	if (state == CAPTURE_OVER)
 		return finish(side, &pulse, r);
-	if (state == ECHO_WAITING && elapsed > ANSWER_MAX_TICKS) {
-		echo_end(side);
+	if (state == CAPTURE_WAITING && elapsed > ANSWER_MAX_TICKS) {
+		capture_end_pulse(side);
 		return RANGING_REFUSED;
 	}
 	if (elapsed > PULSE_MAX_TICKS) {
-		echo_end(side);
+		capture_end_pulse(side);
 		r->fault = FAULT_ALWAYS_READY;
 		return RANGING_FAILED;
 	}

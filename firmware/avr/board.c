@@ -37,6 +37,7 @@ void board_start(void)
 	ACSR = BIT(ACD);
 	SMCR = SLEEP_MODE_IDLE;
 	clock_start();
+	capture_start();
 	spi_start();
 	twi_start();
 	usb_start();

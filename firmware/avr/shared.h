@@ -14,8 +14,7 @@ extern volatile bool board_awake; /* set by an interrupt that needs the main loo
 void clock_start(void);
 void clock_alarm(uint32_t ticks); /* an interrupt at that time, which must be less than 32 ms away; call with interrupts off */
 uint32_t clock_at(uint16_t timer);         /* the time at which Timer1 had this value, less than 32 ms ago; call with interrupts off */
-bool clock_sync_pulses(void);              /* whether a SyncOut edge came in the last 50 ms */
-bool echo_capture_left(uint16_t timer);    /* an edge on the left line, which is also SyncOut; false: it is not awaited */
+void capture_start(void);
 void twi_start(void);
 void spi_start(void);
 void usb_start(void);

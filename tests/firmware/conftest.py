@@ -15,3 +15,4 @@ def bench() -> Iterator[Bench]:
     found = Bench()
     yield found
     found.board.close()
+    assert not [text for _, text in found.board.trace if text.startswith("contention")]

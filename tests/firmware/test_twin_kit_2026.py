@@ -276,6 +276,13 @@ def test_pulse_rangers_survive_a_reset_in_the_middle_of_a_ping(rangers: Bench) -
     assert {p.outcome for p in rangers.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
 
 
+def test_a_right_pulse_ranger_answers_after_the_bootloader(rangers: Bench) -> None:
+    """The bootloader leaves PC7, the pin of its LED and of the right echo line, as an output."""
+    rangers.fault("reset=external")
+    rangers.run(9_500)
+    assert {p.outcome for p in pings(rangers.run(1_000), m.Ranger.RIGHT)} == {m.Outcome.ECHO}
+
+
 PLACES = ("thigh", "calf", "belt")
 
 

@@ -53,7 +53,7 @@ def test_each_pin_is_the_firmwares() -> None:
 
 def test_the_firmware_uses_no_pin_that_is_not_in_the_table() -> None:
     """Every BIT(Pxn) of the drivers, but for SS, which is wired to nothing."""
-    sources = "".join((FIRMWARE / "avr" / name).read_text() for name in ("spi.c", "twi.c", "echo.c", "clock.c"))
+    sources = "".join((FIRMWARE / "avr" / name).read_text() for name in ("spi.c", "twi.c", "capture.c"))
     assert set(re.findall(r"BIT\((P[BCDEF]\d)\)", sources)) - {"PB0"} == {pin.port for pin in pins()}
 
 

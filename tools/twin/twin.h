@@ -52,7 +52,9 @@ uint32_t random_below(uint32_t limit);
 void fail(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2))); /* one line on stderr, exit status 2 */
 avr_int_vector_t *vector(int number);
 
-/* Sets the level that a chip drives onto an input pin; at most one such pin per port. */
+bool pin_is_output(char port, uint8_t pin);
+
+/* Sets the level that a chip drives onto a pin; at most one such pin per port. Against an output of the processor: trace `contention on`. */
 void drive_pin(char port, uint8_t pin, bool level);
 
 /* Replaces the functions that the program's reads and writes of a register call. */
@@ -223,6 +225,7 @@ void signature_init(void);
 
 /* timer_flags.c */
 void timer_flags_init(void);
+void timer_flags_left_over(void);
 
 /* watchdog.c */
 void watchdog_init(void);

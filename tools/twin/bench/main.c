@@ -55,7 +55,19 @@ avr_int_vector_t *vector(int number)
 	fail("this simavr has no interrupt vector %d", number);
 }
 
-/* The level is set in two ways: when the program writes to the port with the pull-up on, simavr keeps only an external level. */
+/* Data direction and output registers of a port, which lie behind each other. */
+static const uint8_t *port_registers(char port)
+{
+	return avr->data + 0x24 + 3 * (port - 'B');
+}
+
+bool pin_is_output(char port, uint8_t pin)
+{
+	return port_registers(port)[0] & (1u << pin);
+}
+
+/* The level is set in two ways: when the program writes to the port with the pull-up on, simavr keeps only an external level. A pin that the
+ * processor drives keeps the processor's level; two different ones are a short circuit through both. */
 void drive_pin(char port, uint8_t pin, bool level)
 {
 	avr_ioport_external_t outside = {
@@ -65,6 +77,11 @@ void drive_pin(char port, uint8_t pin, bool level)
 	};
 
 	avr_ioctl(avr, (uint32_t)AVR_IOCTL_IOPORT_SET_EXTERNAL(port), &outside);
+	if (pin_is_output(port, pin)) {
+		if (level != !!(port_registers(port)[1] & (1u << pin)))
+			bench_trace("contention on P%c%u", port, pin);
+		return;
+	}
 	avr_raise_irq(avr_io_getirq(avr, (uint32_t)AVR_IOCTL_IOPORT_GETIRQ(port), pin), level);
 }
 

@@ -2,12 +2,16 @@
  * Power and resets of the board, and what the bootloader Caterina does after a reset.
  *
  * Caterina [its source, Arduino 1.8] clears MCUSR and its key, starts the program at once after a loss of power, or after a watchdog reset
- * without the key, and else waits for 8 s as another USB device. Then it detaches, leaves the controller on, and jumps to the program. */
+ * without the key, and else waits for 8 s as another USB device. Then it detaches, leaves the controller on, and jumps to the program.
+ *
+ * What it leaves [Caterina.c, StartSketch and SetupHardware; Caterina.h of the boards Leonardo and Micro]: the LEDs of PB0 and PD5 off, so with a
+ * one in their ports; after a wait, those pins and PC7 are outputs, and Timer1, which ran with a falling edge for its capture, has left its flags. */
 #include <string.h>
 
 #include "twin.h"
 
 enum { MCUSR = 0x54, USBCON = 0xD8, USBE = 0x80 };
+enum { DDRB = 0x24, PORTB, DDRC = 0x27, DDRD = 0x2A, PORTD, RX_LED = 0x01, L_LED = 0x80, TX_LED = 0x20 };
 enum { POWER_ON = 1, EXTERNAL = 2, BROWN_OUT = 4, WATCHDOG = 8 };
 
 #define BOOTLOADER_MS 8000u
@@ -99,6 +103,10 @@ static void after_reset(avr_t *a)
 	bench_trace("reset %s", name_of(cause));
 	bench_reset();
 	bootloader_ms = with_bootloader && bootloader_stays(cause) ? BOOTLOADER_MS : 0;
+	if (with_bootloader) {
+		a->data[PORTB] |= RX_LED;
+		a->data[PORTD] |= TX_LED;
+	}
 	if (bootloader_ms)
 		bench_trace("bootloader waits");
 	start_program();
@@ -121,6 +129,10 @@ static void end_bootloader(void)
 {
 	start_program();
 	avr->data[USBCON] |= USBE; /* the bootloader leaves the controller on, detached */
+	avr->data[DDRB] |= RX_LED;
+	avr->data[DDRC] |= L_LED;
+	avr->data[DDRD] |= TX_LED;
+	timer_flags_left_over();
 	bench_trace("program starts");
 }
 
