@@ -26,6 +26,7 @@
 /* Shared with the capture interrupts: read with interrupts off. */
 static struct capture_edge edge;
 static bool edge_waiting;
+static volatile bool sync_pulses; /* an edge came in the last SYNC_PULSES_TICKS */
 static struct capture_pulse pulses[2];
 static volatile enum capture_state states[2] = { CAPTURE_OVER, CAPTURE_OVER }; /* over: no ping owns the line */
 
@@ -63,20 +64,9 @@ static void start_timer_3(void)
 	timer_3_runs = true;
 }
 
-static bool sync_pulses(void)
-{
-	bool pulse;
-	uint32_t now = clock_now();
-	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-	{
-		pulse = edge.edge && !ticks_reached(now, edge.ticks + SYNC_PULSES_TICKS);
-	}
-	return pulse;
-}
-
 static bool line_is_taken(uint8_t side)
 {
-	return side == LEFT ? (PIND & LINE_LEFT) || sync_pulses() : PINC & LINE_RIGHT;
+	return side == LEFT ? (PIND & LINE_LEFT) || sync_pulses : PINC & LINE_RIGHT;
 }
 
 bool capture_trigger(uint8_t side)
@@ -121,11 +111,14 @@ void capture_end_pulse(uint8_t side)
 	}
 }
 
+/* The main loop calls this every few ms, so that an edge is forgotten long before its ticks look recent again. */
 bool capture_take_edge(struct capture_edge *out)
 {
 	bool waiting;
 	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 	{
+		if (ticks_reached(clock_now(), edge.ticks + SYNC_PULSES_TICKS))
+			sync_pulses = false;
 		waiting = edge_waiting;
 		*out = edge;
 		edge.missed = 0;
@@ -159,7 +152,7 @@ ISR(TIMER1_CAPT_vect)
 	edge.edge++;
 	if (edge_waiting)
 		edge.missed++;
-	edge_waiting = true;
+	edge_waiting = sync_pulses = true;
 	board_awake = true;
 }
 

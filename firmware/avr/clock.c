@@ -10,7 +10,8 @@ static volatile uint16_t overflows;
 void clock_start(void)
 {
 	TCCR1A = 0;
-	TCCR1B = BIT(CS11); /* 16 MHz / 8 */
+	TCCR1B = BIT(CS11);                          /* 16 MHz / 8 */
+	TIFR1 = BIT(ICF1) | BIT(OCF1A) | BIT(TOV1); /* the bootloader leaves flags */
 	TIMSK1 = BIT(OCIE1A) | BIT(TOIE1);
 }
 

@@ -168,6 +168,7 @@ bool maxsonar_fault(const char *name, const char *value);
 void pulse_power(void);
 void pulse_resume(void);
 bool pulse_fault(const char *name, const char *value);
+bool pulse_glitch(const char *value);
 void lsm6dso_power(void);
 bool lsm6dso_fault(const char *name, const char *value);
 void lis3mdl_power(void);

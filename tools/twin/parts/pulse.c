@@ -16,6 +16,7 @@
 #define BLANKED_US 116u /* 2 cm, out and back */
 #define WINDOW_US 26200u /* 4.5 m */
 #define NO_ECHO_US 38000u
+#define GLITCH US(3000)
 #define LONG_US 200000u /* some modules hold the line so long */
 
 static struct ranger {
@@ -111,6 +112,20 @@ void pulse_power(void)
 void pulse_resume(void)
 {
 	pulse_power();
+}
+
+/* A disturbance of an echo line that is low: high for 3 ms. */
+bool pulse_glitch(const char *value)
+{
+	for (int k = 0; k < 2; k++)
+		if (!strcmp(value, rangers[k].name)) {
+			if (!rangers[k].line) {
+				drive_pin(rangers[k].echo_port, (uint8_t)rangers[k].echo_pin, true);
+				avr_cycle_timer_register(avr, GLITCH, fall, &rangers[k]);
+			}
+			return true;
+		}
+	return false;
 }
 
 bool pulse_fault(const char *name, const char *value)
