@@ -3,10 +3,9 @@
 #include "board.h" /* capture_* */
 #include "parts.h" /* what was found */
 
-/* [HC-SR04 user guide: a pulse of 150 us to 25 ms, or of 38 ms without an echo; a new ping every 60 ms. RCWL-1601: the same at 3 to 5 V.]
- * The JSN-SR04T answers only 12 ms after its trigger. */
+/* [HC-SR04 user guide: a pulse of 150 us to 25 ms, or of 38 ms without an echo; a new ping every 60 ms. RCWL-1601: the same at 3 to 5 V.
+ * Modules with 70 and 200 ms without an echo have been measured.] The JSN-SR04T answers only 12 ms after its trigger. */
 #define ANSWER_MAX_TICKS (20u * TICKS_PER_MS)         /* from the trigger to the rising edge */
-#define PULSE_MAX_TICKS (60u * TICKS_PER_MS)          /* a line that is high for longer is stuck */
 #define ECHO_MAX_TICKS (53u * TICKS_PER_MS / 2u)      /* 4.5 m, out and back: a longer pulse is one without an echo */
 #define TICKS_PER_US 2u
 #define POLL_TICKS TICKS_PER_MS
@@ -17,9 +16,9 @@ bool pulse_begin(uint8_t side, struct ranging *r)
 	return capture_trigger(side);
 }
 
-static enum ranging_state finish(uint8_t side, const struct capture_pulse *pulse, struct ranging *r)
+/* A rising edge is an answer, whatever becomes of the pulse. */
+static enum ranging_state finish(uint8_t side, uint32_t length, struct ranging *r)
 {
-	uint32_t length = pulse->fall - pulse->rise;
 	r->time_of_flight_us = length > ECHO_MAX_TICKS ? 0 : (uint16_t)(length / TICKS_PER_US);
 	parts_found(side, PART_PULSE, 0);
 	return RANGING_DONE;
@@ -34,15 +33,14 @@ enum ranging_state pulse_run(uint8_t side, uint32_t now, struct ranging *r)
 		r->trigger = pulse.rise;
 	r->next = now + POLL_TICKS;
 	if (state == CAPTURE_OVER)
-		return finish(side, &pulse, r);
+		return finish(side, pulse.fall - pulse.rise, r);
 	if (state == CAPTURE_WAITING && elapsed > ANSWER_MAX_TICKS) {
 		capture_end_pulse(side);
 		return RANGING_REFUSED;
 	}
-	if (elapsed > PULSE_MAX_TICKS) {
+	if (state == CAPTURE_HIGH && ticks_reached(now, pulse.rise + ECHO_MAX_TICKS + TICKS_PER_US)) {
 		capture_end_pulse(side);
-		r->fault = FAULT_ALWAYS_READY;
-		return RANGING_FAILED;
+		return finish(side, now - pulse.rise, r);
 	}
 	return RANGING_BUSY;
 }

@@ -5,10 +5,11 @@
 
 #include "ranger.h" /* struct ranging */
 
-/* Sends a trigger pulse (12 us); false: another device drives the echo line. */
+/* Sends a trigger pulse (12 us), at r->trigger; false: the echo line is high, or another device drives it. */
 bool pulse_begin(uint8_t side, struct ranging *r);
 
-/* Looks for the two edges of the answer. RANGING_REFUSED: no answer. */
+/* Looks for the two edges of the answer; a pulse that is longer than any echo ends the ranging while its line is still high.
+ * RANGING_REFUSED: no answer. */
 enum ranging_state pulse_run(uint8_t side, uint32_t now, struct ranging *r);
 
 #endif

@@ -14,6 +14,8 @@
 #define POLL_TICKS (TICKS_PER_MS / 2u)    /* between tries to get the bus */
 #define QUIET_TICKS (5u * TICKS_PER_MS / 4u) /* before a trigger the bus is kept free: longer than any other transfer, of 1.0 ms */
 #define START_TICKS (100u * TICKS_PER_MS) /* longer than a ranging cycle that began before a reset */
+#define HOLD_TICKS (5u * TICKS_PER_MS / 2u) /* between looks at an echo line that is high; longer than QUIET_TICKS: the bus gets its turns */
+#define HOLDS_MAX 120u                    /* 0.3 s: some modules hold their line for up to 0.25 s where there is no echo */
 #define MISSES_MAX 8u                     /* slots without an answer, half a second, after which any kind is sought again */
 
 /* Half periods of the two schedules: see ranger.h. Of a MaxSonar a new ranging is advised every 100 ms [MaxBotix PD11848]. */
@@ -36,6 +38,7 @@ static struct ranger {
 	enum kind pinged;  /* that was triggered in this slot */
 	uint8_t tries;     /* of the trigger in this slot */
 	uint8_t misses;    /* slots in a row without an answer */
+	uint8_t holds;     /* looks in a row at an echo line that is high */
 	uint32_t slot;     /* grid time of this ping, without the delay */
 	uint32_t due;      /* time of the trigger */
 	struct ranging ranging;
@@ -115,7 +118,7 @@ static void succeed(struct ranger *r, uint32_t now)
 	}
 	uint16_t time_of_flight_us = r->ranging.time_of_flight_us;
 	r->kind = r->pinged;
-	r->misses = 0;
+	r->misses = r->holds = 0;
 	if (other->kind > r->kind)
 		other->kind = UNKNOWN; /* its next answer is refused */
 	if (other->kind == r->kind)
@@ -123,6 +126,15 @@ static void succeed(struct ranger *r, uint32_t now)
 	status_ok((enum device)r->index);
 	report(r, time_of_flight_us ? OUTCOME_ECHO : OUTCOME_NO_ECHO, time_of_flight_us);
 	schedule_next(r, now);
+}
+
+static void miss(struct ranger *r, uint32_t now, uint8_t fault)
+{
+	if (r->kind != UNKNOWN && ++r->misses >= MISSES_MAX) {
+		r->kind = UNKNOWN;
+		r->misses = 0;
+	}
+	fail(r, now, fault);
 }
 
 /* The ranger has not accepted its trigger: another try, or another kind if it is not known, then the next slot. */
@@ -138,11 +150,18 @@ static void try_again(struct ranger *r, uint32_t now)
 		r->pinged++;
 		return;
 	}
-	if (r->kind != UNKNOWN && ++r->misses >= MISSES_MAX) {
-		r->kind = UNKNOWN;
-		r->misses = 0;
+	miss(r, now, FAULT_NO_ANSWER);
+}
+
+/* The echo line is high: held by a module that has heard no echo, pulled up because nothing is plugged in, or stuck. */
+static void hold(struct ranger *r, uint32_t now)
+{
+	if (r->kind == PULSE && r->holds < HOLDS_MAX) {
+		r->holds++;
+		r->due = now + HOLD_TICKS;
+		return;
 	}
-	fail(r, now, FAULT_NO_ANSWER);
+	miss(r, now, parts_in(r->index) == PART_PULSE ? FAULT_ALWAYS_READY : FAULT_NO_ANSWER);
 }
 
 static void trigger(struct ranger *r, uint32_t now)
@@ -155,10 +174,8 @@ static void trigger(struct ranger *r, uint32_t now)
 		r->pinging = srf02_begin(r->index, &r->ranging);
 	else if (pulse_begin(r->index, &r->ranging))
 		r->pinging = true;
-	else if (r->kind == PULSE)
-		fail(r, now, FAULT_ALWAYS_READY);
 	else
-		try_again(r, now);
+		hold(r, now);
 }
 
 static enum ranging_state run_driver(struct ranger *r, uint32_t now)

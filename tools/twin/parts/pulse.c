@@ -17,13 +17,14 @@
 #define WINDOW_US 26200u /* 4.5 m */
 #define NO_ECHO_US 38000u
 #define GLITCH US(3000)
+#define HELD_US 70000u /* measured at HC-SR04 modules [forum.arduino.cc 613370: "approximately 70000"] */
 #define LONG_US 200000u /* some modules hold the line so long */
 
 static struct ranger {
 	const char *name;
 	enum place place;
 	char echo_port, echo_pin;
-	enum fault { GOOD, ABSENT, STUCK_LOW, STUCK_HIGH, DEAF, LONG, FAULTS } fault;
+	enum fault { GOOD, ABSENT, STUCK_LOW, STUCK_HIGH, DEAF, HELD, LONG, FAULTS } fault;
 	bool trigger, line;
 	avr_cycle_count_t triggered_at;
 	struct bursts bursts;
@@ -31,7 +32,7 @@ static struct ranger {
 	{ .name = "left", .place = PLACE_RANGER_LEFT, .echo_port = 'D', .echo_pin = 4 },
 	{ .name = "right", .place = PLACE_RANGER_RIGHT, .echo_port = 'C', .echo_pin = 7 },
 };
-static const char *const fault_names[FAULTS] = { "ok", "absent", "stuck_low", "stuck_high", "deaf", "long" };
+static const char *const fault_names[FAULTS] = { "ok", "absent", "stuck_low", "stuck_high", "deaf", "held", "long" };
 
 static bool is_here(const struct ranger *r)
 {
@@ -63,7 +64,7 @@ static avr_cycle_count_t rise(avr_t *a, avr_cycle_count_t when, void *param)
 
 	bursts_add(&r->bursts, when, row.cross_us[r == rangers]);
 	if (!us)
-		us = r->fault == LONG ? LONG_US : NO_ECHO_US;
+		us = r->fault == LONG ? LONG_US : r->fault == HELD ? HELD_US : NO_ECHO_US;
 	set_line(r, true);
 	bench_trace("trigger %s", r->name);
 	avr_cycle_timer_register(a, US(us), fall, r);

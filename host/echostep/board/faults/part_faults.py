@@ -25,7 +25,7 @@ _PULSE = {
     ),
     Fault.ALWAYS_READY: (
         "its echo line stays high",
-        "check it for a short to 5 V (left D4, right D13); a module that holds it for 0.2 s without an echo is of another kind: replace it",
+        "check its plug, since the board pulls an open line up, and the line for a short to 5 V (left D4, right D13)",
     ),
 }
 _MAXSONAR = {
