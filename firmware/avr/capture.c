@@ -45,10 +45,12 @@ static void await_edge(uint8_t side, bool rising)
 	}
 }
 
-/* The bootloader leaves PC7, the pin of its LED, as an output. */
+/* The bootloader leaves PC7, the pin of its LED, as an output. Lines that nothing drives are pulled up, so that they do not follow the mains. */
 void capture_start(void)
 {
 	DDRC &= (uint8_t)~LINE_RIGHT;
+	PORTC |= LINE_RIGHT;
+	PORTD |= LINE_LEFT;
 	await_edge(LEFT, true);
 	TIMSK1 |= BIT(ICIE1);
 }

@@ -14,7 +14,7 @@ from echostep.board import messages as m
 from echostep.board.faults.findings import BoardReports, part_text_of
 from echostep.board.faults.health import board_findings, gyro_celsius
 from echostep.board.subscription import SUBSCRIBE
-from echostep.simulation.stimulus import EXTENDED_ROW
+from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC
 
 pytestmark = needs_twin
 
@@ -198,7 +198,7 @@ def test_a_pulse_ranger_hears_the_other_rangers_ping(rangers: Bench) -> None:
 @pytest.mark.parametrize(
     ("kind", "cause", "words"),
     [
-        ("absent", m.Fault.NO_ANSWER, "left ranger (pulse ranger): does not answer its trigger"),
+        ("absent", m.Fault.ALWAYS_READY, "left ranger (pulse ranger): its echo line stays high; check its plug"),
         ("stuck_low", m.Fault.NO_ANSWER, "left ranger (pulse ranger): does not answer its trigger"),
         ("stuck_high", m.Fault.ALWAYS_READY, "left ranger (pulse ranger): its echo line stays high"),
     ],
@@ -245,6 +245,21 @@ def test_a_module_of_70_ms_is_found_in_open_space(bench: Bench) -> None:
     found = bench.run(2_000, rows)
     assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.NO_ECHO}
     assert bench.parts.part_ranger_left == bench.parts.part_ranger_right == m.Part.PULSE
+
+
+@pytest.mark.parametrize("kit", ["2026", "papers"])
+def test_hum_on_open_echo_lines_is_no_ranger(bench: Bench, kit: str) -> None:
+    bench.fault(f"kit={kit}")
+    for side, _ in SIDES:
+        bench.fault(f"{'pulse' if kit == '2026' else 'srf'}_{side}=absent")
+    bench.fault("hum=50")
+    bench.ask(SUBSCRIBE)
+    rows = quiet_rows(3_000)
+    rows["sync_us"] = NO_SYNC
+    found = bench.run(3_000, rows)
+    assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.BUS_ERROR}
+    assert bench.parts.part_ranger_left == bench.parts.part_ranger_right == m.Part.NONE
+    assert kinds(found)["Sync"] <= 1
 
 
 def test_rangers_of_two_kinds_are_refused_in_words(bench: Bench) -> None:

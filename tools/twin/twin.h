@@ -53,6 +53,7 @@ void fail(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)
 avr_int_vector_t *vector(int number);
 
 bool pin_is_output(char port, uint8_t pin);
+bool pin_is_pulled_up(char port, uint8_t pin);
 
 /* Sets the level that a chip drives onto a pin; at most one such pin per port. Against an output of the processor: trace `contention on`. */
 void drive_pin(char port, uint8_t pin, bool level);
@@ -203,6 +204,11 @@ void board_reset(uint8_t cause); /* MCUSR bits */
 bool board_runs(void);           /* once a millisecond: whether the program runs; without power, and in the bootloader, it does not */
 void board_watchdog(void);
 bool board_fault(const char *name, const char *value);
+
+/* floating.c: the capture inputs while nothing drives them. */
+void floating_pin(char port, uint8_t pin, bool open);
+void floating_resume(void);
+bool floating_hum(const char *value);
 
 /* supply.c */
 void supply_init(void);

@@ -54,6 +54,8 @@ static bool other_fault(const char *name, const char *value)
 {
 	if (!strcmp(name, "crystal"))
 		return clock_fault(value);
+	if (!strcmp(name, "hum"))
+		return floating_hum(value);
 	if (!strcmp(name, "glitch"))
 		return pulse_glitch(value);
 	return !strcmp(name, "swapped") && bench_swap(value);

@@ -66,6 +66,11 @@ bool pin_is_output(char port, uint8_t pin)
 	return port_registers(port)[0] & (1u << pin);
 }
 
+bool pin_is_pulled_up(char port, uint8_t pin)
+{
+	return !pin_is_output(port, pin) && (port_registers(port)[1] & (1u << pin));
+}
+
 /* The level is set in two ways: when the program writes to the port with the pull-up on, simavr keeps only an external level. A pin that the
  * processor drives keeps the processor's level; two different ones are a short circuit through both. */
 void drive_pin(char port, uint8_t pin, bool level)
@@ -76,6 +81,7 @@ void drive_pin(char port, uint8_t pin, bool level)
 		.value = (uint8_t)((unsigned)level << pin),
 	};
 
+	floating_pin(port, pin, false);
 	avr_ioctl(avr, (uint32_t)AVR_IOCTL_IOPORT_SET_EXTERNAL(port), &outside);
 	if (pin_is_output(port, pin)) {
 		if (level != !!(port_registers(port)[1] & (1u << pin)))

@@ -83,6 +83,7 @@ static void start_program(void)
 	scp1000_resume();
 	bmp390_resume();
 	pulse_resume();
+	floating_resume();
 	icm20649_resume();
 	adis16100_resume();
 	usb_host_start();

@@ -43,8 +43,10 @@ static bool is_here(void)
 
 static void set_line(bool level)
 {
-	if (kit_has_foot())
-		drive_pin('D', 4, (level || fault == STUCK_READY) && fault != ABSENT);
+	if (kit_has_foot() && fault == ABSENT)
+		floating_pin('D', 4, true);
+	else if (kit_has_foot())
+		drive_pin('D', 4, level || fault == STUCK_READY);
 }
 
 static int between(int16_t before, int16_t now)

@@ -39,11 +39,14 @@ static bool is_here(const struct ranger *r)
 	return kit_of_2026(r->place) && r->fault != ABSENT;
 }
 
+/* Without a module the line is open, but for the left one's where SyncOut's buffer or a foot's part drives it. */
 static void set_line(struct ranger *r, bool level)
 {
 	r->line = level;
-	if (kit_of_2026(r->place))
-		drive_pin(r->echo_port, (uint8_t)r->echo_pin, is_here(r) && r->fault != STUCK_LOW && (level || r->fault == STUCK_HIGH));
+	if (is_here(r))
+		drive_pin(r->echo_port, (uint8_t)r->echo_pin, r->fault != STUCK_LOW && (level || r->fault == STUCK_HIGH));
+	else if (r->place == PLACE_RANGER_RIGHT || !(kit_of_papers(r->place) || kit_has_foot()))
+		floating_pin(r->echo_port, (uint8_t)r->echo_pin, true);
 }
 
 static avr_cycle_count_t fall(avr_t *a, avr_cycle_count_t when, void *param)
