@@ -138,11 +138,12 @@ void twi_add(struct twi_device *device);
 void twi_fault(enum twi_fault fault);
 
 /* spi.c */
+#define SPI_OPEN (-1)
 struct spi_device {
 	char port;
 	uint8_t pin; /* chip select, active low */
 	void (*select)(struct spi_device *self, bool on);
-	uint8_t (*exchange)(struct spi_device *self, uint8_t out);
+	int (*exchange)(struct spi_device *self, uint8_t out); /* SPI_OPEN: it does not drive MISO */
 	bool selected;
 	struct spi_device *next;
 };
@@ -151,6 +152,13 @@ void spi_reset(void); /* the chip selects */
 void spi_add(struct spi_device *device);
 unsigned spi_hertz(void);
 unsigned spi_mode(void);
+uint8_t spi_at_rising_edges(uint8_t out); /* what a part of modes 0 and 3 reads of a byte */
+int spi_answer(uint8_t answer);           /* what the processor reads of such a part's byte */
+bool spi_outruns(unsigned rise_ns);       /* half a bit is shorter than a level shifter's rise */
+
+/* miso.c: what the processor reads while no part drives MISO. */
+uint8_t miso_idle(void);
+bool miso_fault(const char *name, const char *value);
 
 /* The devices: power-up (a reset of the processor is none), and fault switches `name=value` (false: no such switch). */
 void srf02_power(void);
@@ -171,14 +179,17 @@ void pulse_resume(void);
 bool pulse_fault(const char *name, const char *value);
 bool pulse_glitch(const char *value);
 void lsm6dso_power(void);
+unsigned lsm6dso_plugged(void); /* how many */
 bool lsm6dso_fault(const char *name, const char *value);
 void lis3mdl_power(void);
 bool lis3mdl_fault(const char *name, const char *text);
 void icm20649_power(void);
 void icm20649_resume(void);
+unsigned icm20649_plugged(void);
 bool icm20649_fault(const char *name, const char *value);
 void bmp390_power(void);
 void bmp390_resume(void);
+bool bmp390_plugged(void);
 bool bmp390_fault(const char *name, const char *value);
 
 /* kit.c: which part is in which place. */

@@ -70,7 +70,7 @@ void switch_fault(char *text)
 	*value++ = 0;
 	bool (*const models[])(const char *, const char *) = {
 		usb_fault, host_fault, bus_fault, other_fault, board_fault, srf02_fault, adis16100_fault, scp1000_fault, compass_fault,
-		kit_fault, bmp390_fault, pulse_fault, maxsonar_fault, lsm6dso_fault, lis3mdl_fault, icm20649_fault,
+		kit_fault, bmp390_fault, pulse_fault, maxsonar_fault, lsm6dso_fault, lis3mdl_fault, icm20649_fault, miso_fault,
 	};
 	for (unsigned k = 0; k < sizeof models / sizeof *models; k++)
 		if (models[k](text, value))

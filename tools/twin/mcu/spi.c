@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * SPI master with the clock of SPCR and SPSR (in simavr a byte takes 100 us), and chip selects on port pins. */
+ * SPI master with the clock of SPCR and SPSR (in simavr a byte takes 100 us), and chip selects on port pins.
+ *
+ * In modes 1 and 2 the processor changes MOSI at the rising edge at which parts of modes 0 and 3 sample it. Their level shifters let lines fall
+ * fast and rise slowly, so that such a part reads a one only where the bit before and the bit after the edge are both ones, and its answers
+ * arrive one bit late. The bit behind a byte is assumed to be a zero. */
 #include <simavr/avr_ioport.h>
 #include <simavr/avr_spi.h>
 #include <simavr/sim_cycle_timers.h>
@@ -33,17 +37,42 @@ unsigned spi_mode(void)
 	return (avr->data[SPCR] >> 2) & 3;
 }
 
+static bool shifts_at_rising_edges(void)
+{
+	return spi_mode() == 1 || spi_mode() == 2;
+}
+
+uint8_t spi_at_rising_edges(uint8_t out)
+{
+	return shifts_at_rising_edges() ? out & (uint8_t)(out << 1) : out;
+}
+
+int spi_answer(uint8_t answer)
+{
+	return shifts_at_rising_edges() ? answer >> 1 : answer;
+}
+
+bool spi_outruns(unsigned rise_ns)
+{
+	return 500000000u / spi_hertz() < rise_ns;
+}
+
 static avr_cycle_count_t done(avr_t *a, avr_cycle_count_t when, void *param)
 {
-	uint8_t answer = 0xFF; /* MISO is pulled up */
+	int answer = SPI_OPEN;
 
 	(void)a;
 	(void)when;
 	(void)param;
-	for (struct spi_device *d = devices; d; d = d->next)
-		if (d->selected)
-			answer &= d->exchange(d, outgoing);
-	avr_raise_irq(input, answer);
+	for (struct spi_device *d = devices; d; d = d->next) {
+		int driven = d->selected ? d->exchange(d, outgoing) : SPI_OPEN;
+
+		if (driven != SPI_OPEN && answer != SPI_OPEN)
+			bench_trace("contention on MISO");
+		if (driven != SPI_OPEN)
+			answer = driven;
+	}
+	avr_raise_irq(input, answer == SPI_OPEN ? miso_idle() : (uint32_t)answer);
 	return 0;
 }
 

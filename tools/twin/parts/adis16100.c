@@ -113,7 +113,7 @@ static void on_select(struct spi_device *self, bool on)
 		bench_trace("adis16100 wrong mode");
 }
 
-static uint8_t on_exchange(struct spi_device *self, uint8_t out)
+static int on_exchange(struct spi_device *self, uint8_t out)
 {
 	struct gyro *g = (struct gyro *)self;
 	uint8_t in = (uint8_t)(g->count == 0 ? g->answer >> 8 : g->answer);
@@ -125,8 +125,8 @@ static uint8_t on_exchange(struct spi_device *self, uint8_t out)
 	g->incoming = (uint16_t)(g->incoming << 8 | out);
 	g->count++;
 	if (!kit_of_papers((enum place)(PLACE_THIGH + g->channel_of_row)))
-		return 0xFF;
-	return g->fault == ABSENT ? 0xFF : g->fault == ZEROS ? 0 : in;
+		return SPI_OPEN;
+	return g->fault == ABSENT ? SPI_OPEN : g->fault == ZEROS ? 0 : in;
 }
 
 void adis16100_power(void)

@@ -13,7 +13,7 @@ enum { INT2_CTRL = 0x0E, WHO_AM_I, CTRL1_XL, CTRL2_G, CTRL3_C, CTRL5_C = 0x14, S
 enum { RATE_READY = 2, FORCE_READY = 1 };
 #define IDENTITY 0x6C
 #define MAX_HERTZ 10000000u
-#define MISO_HIGH 0xFF
+#define RISE_NS 210u /* to 0.7 VDDIO, by 10 kohm and at most 50 pF behind the breakout's BSS138, computed */
 #define BOOT US(10000)
 #define GYROS_ON US(70000)
 #define FASTEST_READY US(600)
@@ -126,28 +126,32 @@ static void on_select(struct spi_device *self, bool on)
 	struct imu *u = (struct imu *)self;
 
 	u->count = 0;
-	if (on) /* frames for an ADIS16100, which the firmware sends where it knows none, are not understood */
-		u->garbled = spi_hertz() > MAX_HERTZ || (spi_mode() != 0 && spi_mode() != 3);
+	u->garbled = spi_hertz() > MAX_HERTZ || spi_outruns(RISE_NS);
+	if (on && u->garbled && kit_of_2026(u->place))
+		bench_trace("%s clock too fast", u->name);
 }
 
-static uint8_t on_exchange(struct spi_device *self, uint8_t out)
+static int on_exchange(struct spi_device *self, uint8_t byte)
 {
 	struct imu *u = (struct imu *)self;
+	uint8_t out = spi_at_rising_edges(byte);
 
 	if (u->fault == ZEROS && kit_of_2026(u->place))
 		return 0;
 	if (!is_here(u))
-		return MISO_HIGH;
+		return SPI_OPEN;
 	if (u->count++ == 0) {
 		u->reading = out & 0x80;
 		u->address = out & 0x7F;
-		return MISO_HIGH;
+		return SPI_OPEN;
 	}
 	u->count = 1;
 	if (u->reading)
-		return value_at(u, u->address++);
+		return spi_answer(value_at(u, u->address++));
+	if (spi_mode() != 0 && spi_mode() != 3)
+		bench_trace("%s misreads a frame: 0x%02x to register 0x%02x", u->name, out, u->address);
 	write_register(u, u->address++, out);
-	return MISO_HIGH;
+	return SPI_OPEN;
 }
 
 static void restart(struct imu *u)
@@ -172,6 +176,15 @@ void lsm6dso_power(void)
 		}
 		restart(u);
 	}
+}
+
+unsigned lsm6dso_plugged(void)
+{
+	unsigned count = 0;
+
+	for (int k = 0; k < 3; k++)
+		count += kit_of_2026(imus[k].place) && imus[k].fault != ABSENT;
+	return count;
 }
 
 bool lsm6dso_fault(const char *name, const char *value)

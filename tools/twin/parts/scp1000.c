@@ -92,12 +92,12 @@ static void restart(void)
 	set_ready(false);
 }
 
-static uint8_t exchange(uint8_t out)
+static int exchange(uint8_t out)
 {
 	if (!kit_of_papers(PLACE_PRESSURE))
-		return 0xFF;
+		return SPI_OPEN;
 	if (fault == ABSENT || fault == ZEROS)
-		return fault == ABSENT ? 0xFF : 0;
+		return fault == ABSENT ? SPI_OPEN : 0;
 	if (count++ == 0) {
 		command = out;
 		if (!(command & 2))
@@ -117,10 +117,12 @@ static uint8_t exchange(uint8_t out)
 	return count <= 3 ? answer[count - 2] : 0;
 }
 
-static uint8_t on_exchange(struct spi_device *self, uint8_t out)
+static int on_exchange(struct spi_device *self, uint8_t out)
 {
+	int in = exchange(garbled ? out >> 1 : out); /* all bits arrive one bit late */
+
 	(void)self;
-	return garbled ? (uint8_t)(exchange((uint8_t)(out >> 1)) >> 1) : exchange(out); /* all bits arrive one bit late */
+	return garbled && in != SPI_OPEN ? in >> 1 : in;
 }
 
 void scp1000_power(void)
