@@ -24,7 +24,7 @@ static const struct {
 } protocols[] = {
 	[SPI_ADIS16100] = { MASTER | GYRO_MODE, BIT(SPI2X) },
 	[SPI_SCP1000] = { MASTER | BIT(SPR1), 0 }, /* mode 0; 16 MHz / 64 = 250 kHz */
-	[SPI_MODE3] = { MASTER | BIT(CPOL) | BIT(CPHA) | BIT(SPR0), BIT(SPI2X) },
+	[SPI_MODE3] = { MASTER | BIT(CPOL) | BIT(CPHA) | BIT(SPR0), 0 },
 };
 
 void spi_start(void)
