@@ -9,7 +9,8 @@
 #define CHANNEL_RATE 0x0000u
 #define CHANNEL_TEMPERATURE 0x1000u
 #define CHANNEL_MASK 0xF000u /* both leading zeros and the channel */
-#define NO_REPLY 0xFFFFu     /* MISO is pulled up: an absent chip reads as ones */
+#define IDLE_HIGH 0xFFFFu    /* an absent chip reads as what MISO's pull-up, */
+#define IDLE_LOW 0x0000u     /* or the pull-downs of other boards make of it; also the proper reply of a rate of zero */
 #define VALUE_MASK 0x0FFFu
 #define SIGN_BIT 0x0800
 
@@ -26,7 +27,7 @@ static uint16_t exchange(enum chip chip, uint16_t command)
 static int16_t value_of(uint16_t reply, uint16_t channel, uint8_t *fault)
 {
 	if ((reply & CHANNEL_MASK) != channel) {
-		*fault = reply == NO_REPLY ? FAULT_NO_ANSWER : FAULT_WRONG_CHANNEL;
+		*fault = reply == IDLE_HIGH || reply == IDLE_LOW ? FAULT_NO_ANSWER : FAULT_WRONG_CHANNEL;
 		return MSG_GYROS_INVALID;
 	}
 	*fault = FAULT_NONE;

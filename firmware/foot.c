@@ -11,7 +11,7 @@
 #define RESET_TICKS (100u * TICKS_PER_MS)     /* start-up time [DS-000192, table 5] */
 #define FIRST_SAMPLE_TICKS (200u * TICKS_PER_MS) /* gyros need 35 ms */
 #define SILENT_TICKS (100u * TICKS_PER_MS)    /* 22 samples without an edge: the part has failed */
-#define NO_PART 0xFFu                         /* MISO is pulled up */
+#define IDLE_HIGH 0xFFu                       /* an absent part reads as ones, or as zeros */
 
 static struct msg_foot_health health = { .temperature = MSG_FOOT_HEALTH_TEMPERATURE_INVALID };
 static uint32_t due = SEEK_FIRST_TICKS; /* ticks */
@@ -30,23 +30,25 @@ static void fail(uint32_t now, uint8_t fault)
 	due = now + SEEK_TICKS;
 }
 
-/* A part at the thigh that answers is another one. */
+/* A gyro that has proven itself at the thigh is another part. */
 static bool may_be_here(void)
 {
-	return is_foot_board() || !(status.healthy & 1u << DEVICE_THIGH);
+	return is_foot_board() || parts_in(DEVICE_THIGH) == PART_NONE;
 }
 
 static bool seek(uint32_t now)
 {
-	bool first = !is_foot_board();
+	static bool gyros_sought; /* at the first search an ADIS16100 may be here, whose reply is not an identity */
+	bool first = !is_foot_board(), is_known = gyros_sought;
 	due = now + SEEK_TICKS;
+	gyros_sought = true;
 	if (!may_be_here())
 		return false;
 	if (!icm20649_answers(CHIP)) {
 		uint8_t identity = icm20649_identity(CHIP);
 		if (!first)
 			fail(now, FAULT_NO_ANSWER);
-		else if (identity && identity != NO_PART)
+		else if (is_known && identity && identity != IDLE_HIGH)
 			parts_found(PLACE_FOOT, PART_NONE, identity);
 		return false;
 	}

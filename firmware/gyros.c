@@ -2,15 +2,18 @@
 #include "gyros.h"
 #include "adis16100.h"     /* driver */
 #include "configuration.h" /* rate, enabled gyros */
+#include "icm20649.h"      /* identity of a foot's part */
 #include "link.h"          /* sending the messages */
 #include "lsm6dso.h"       /* driver */
 #include "parts.h"         /* what was found */
 #include "selftest.h"      /* receives the rates while a self-test runs */
 #include "status.h"        /* error counters */
 
-#define START_UP_TICKS (20u * TICKS_PER_MS) /* of parts that got their power together with the board: 10 ms [LSM6DSO] */
+#define START_UP_TICKS (20u * TICKS_PER_MS)   /* from a configuration to the first sample */
+#define POWER_UP_TICKS (100u * TICKS_PER_MS)  /* of parts that got their power together with the board: 10 ms [LSM6DSO], 100 ms [ICM-20649] */
 #define WARM_UP_SAMPLES 16u                 /* 80 ms: an LSM6DSO has rates after 70 ms */
 #define MISSES_MAX 40u                      /* samples in a row without a value after which the part is sought again: 0.2 s */
+#define TEMPERATURE_STEP_MAX 8              /* counts, 1.2 degC: between two readings one after the other, assumed */
 
 static const struct {
 	enum chip chip;
@@ -23,12 +26,12 @@ static const struct {
 };
 
 static struct {
-	bool sought;      /* whether the part is known; without an LSM6DSO an ADIS16100 is assumed */
-	bool six_axes;    /* an LSM6DSO */
+	enum { UNKNOWN, ADIS16100, LSM6DSO } kind; /* the part that has proven itself */
+	uint8_t fault;    /* of an unknown one */
 	uint8_t misses;   /* samples in a row without a value */
 	int16_t warmth;   /* newest temperature of an LSM6DSO */
 	int16_t axes[LSM6DSO_AXES]; /* of the newest sample instant, MSG_MOTION_INVALID without one */
-} gyros[GYROS];
+} gyros[GYROS] = { { .misses = MISSES_MAX }, { .misses = MISSES_MAX }, { .misses = MISSES_MAX } };
 
 static uint8_t warming; /* samples until an LSM6DSO that was switched on has rates: a self-test waits */
 /* Times in ticks of the board's clock. */
@@ -38,41 +41,51 @@ static uint32_t period;     /* between samples */
 
 void gyros_start(uint32_t now)
 {
-	due = now + START_UP_TICKS;
+	static bool again;
+	due = now + (again ? START_UP_TICKS : POWER_UP_TICKS);
+	again = true;
 	period = TICKS_PER_S / configuration.gyro_rate_hz;
 }
 
-/* An ADIS16100 in the place of an LSM6DSO must name its channel: a line that is held low reads as a rate of zero. */
-static bool is_six_axes(uint8_t gyro)
+/* A line that is held low reads as a rate of zero: an ADIS16100 must name the channel of its temperature, and give about the same value twice. */
+static bool is_adis16100(enum chip chip, uint8_t *fault)
 {
-	uint8_t fault = FAULT_NONE;
-	if (lsm6dso_answers(devices[gyro].chip)) {
-		parts_found(devices[gyro].device, PART_LSM6DSO, LSM6DSO_IDENTITY);
-		return true;
+	int16_t first = adis16100_temperature(chip, fault);
+	if (*fault == FAULT_NONE) {
+		int16_t step = (int16_t)(adis16100_temperature(chip, fault) - first);
+		if (step > TEMPERATURE_STEP_MAX || step < -TEMPERATURE_STEP_MAX)
+			*fault = FAULT_WRONG_CHANNEL;
 	}
-	if (gyros[gyro].six_axes)
-		(void)adis16100_temperature(devices[gyro].chip, &fault);
-	return fault != FAULT_NONE;
+	return *fault == FAULT_NONE;
 }
 
+/* Seeks a part. Those with an identity come first, since frames for an ADIS16100 write to their registers. */
 static void seek(uint8_t gyro)
 {
-	gyros[gyro].sought = true;
+	enum chip chip = devices[gyro].chip;
 	gyros[gyro].misses = 0;
-	gyros[gyro].six_axes = is_six_axes(gyro);
-	if (!gyros[gyro].six_axes)
-		return;
-	lsm6dso_start(devices[gyro].chip);
-	warming = WARM_UP_SAMPLES;
+	gyros[gyro].kind = UNKNOWN;
+	gyros[gyro].fault = FAULT_NO_ANSWER;
+	if (lsm6dso_answers(chip)) {
+		gyros[gyro].kind = LSM6DSO;
+		parts_found(devices[gyro].device, PART_LSM6DSO, LSM6DSO_IDENTITY);
+		lsm6dso_start(chip);
+		warming = WARM_UP_SAMPLES;
+	} else if (!icm20649_answers(chip) && is_adis16100(chip, &gyros[gyro].fault)) {
+		gyros[gyro].kind = ADIS16100;
+		parts_found(devices[gyro].device, PART_ADIS16100, 0);
+	} else if (parts_in(devices[gyro].device) != PART_ADIS16100) {
+		gyros[gyro].fault = FAULT_NO_ANSWER; /* what was read is an idle line's */
+	}
 }
 
 /* Seeks parts that are not known, and makes each ADIS16100 convert: the value of its previous conversion is a whole period old. */
 static void prepare(void)
 {
 	for (uint8_t k = 0; k < GYROS; k++) {
-		if (!gyros[k].sought || gyros[k].misses >= MISSES_MAX)
+		if (gyros[k].misses >= MISSES_MAX)
 			seek(k);
-		if (!gyros[k].six_axes)
+		if (gyros[k].kind == ADIS16100)
 			adis16100_convert(devices[k].chip);
 	}
 }
@@ -121,9 +134,12 @@ static int16_t rate(uint8_t gyro)
 	set_axes(gyro, 0);
 	if (!configuration_reads(devices[gyro].sensor))
 		return MSG_GYROS_INVALID;
-	if (gyros[gyro].six_axes)
+	if (gyros[gyro].kind == LSM6DSO)
 		return read_six_axes(gyro);
-	int16_t counts = adis16100_rate(devices[gyro].chip, &fault);
+	int16_t counts = MSG_GYROS_INVALID;
+	fault = gyros[gyro].fault;
+	if (gyros[gyro].kind == ADIS16100)
+		counts = adis16100_rate(devices[gyro].chip, &fault);
 	note(gyro, fault);
 	return counts;
 }
@@ -137,9 +153,10 @@ static void send_motion(uint32_t ticks)
 	link_send(MSG_MOTION, msg_pack_motion(link_body(), &m));
 }
 
+/* Also one that has failed since. */
 static bool any_six_axes(void)
 {
-	return gyros[GYRO_THIGH].six_axes || gyros[GYRO_CALF].six_axes || gyros[GYRO_BELT].six_axes;
+	return parts_in(DEVICE_THIGH) == PART_LSM6DSO || parts_in(DEVICE_CALF) == PART_LSM6DSO || parts_in(DEVICE_BELT) == PART_LSM6DSO;
 }
 
 static void sample(void)
@@ -166,14 +183,14 @@ static void sample(void)
 static int16_t temperature(uint8_t gyro)
 {
 	uint8_t fault;
-	if (gyros[gyro].six_axes && gyros[gyro].misses)
+	if (gyros[gyro].kind == UNKNOWN || (gyros[gyro].kind == LSM6DSO && gyros[gyro].misses))
 		return MSG_GYRO_HEALTH_INVALID;
-	if (gyros[gyro].six_axes)
+	if (gyros[gyro].kind == LSM6DSO)
 		return (int16_t)((int32_t)gyros[gyro].warmth * 55 / 2048);
 	int16_t counts = adis16100_temperature(devices[gyro].chip, &fault);
 	note(gyro, fault);
-	if (fault == FAULT_NONE)
-		parts_found(devices[gyro].device, PART_ADIS16100, 0);
+	if (fault != FAULT_NONE)
+		gyros[gyro].misses = MISSES_MAX; /* its rates may be those of a line that is held low: it must prove itself again */
 	return counts;
 }
 
@@ -193,7 +210,7 @@ void gyros_excite(enum excitation excitation)
 {
 	spi_excite_gyros(excitation);
 	for (uint8_t k = 0; k < GYROS; k++)
-		if (gyros[k].six_axes)
+		if (gyros[k].kind == LSM6DSO)
 			lsm6dso_excite(devices[k].chip, excitation);
 }
 

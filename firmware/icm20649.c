@@ -20,7 +20,7 @@
 #define BANK_2 0x20u
 #define SPI_ONLY 0x10u
 #define DEVICE_RESET 0x80u
-#define SLEEP 0x40u
+#define RESERVED 0x10u /* bit 4 of PWR_MGMT_1 */
 #define BEST_CLOCK 0x01u
 #define RAW_DATA_READY 0x01u      /* INT1 rises for 50 us with each sample */
 #define DIVIDER 4u                /* 1125 Hz / (1 + 4) = 225 Hz */
@@ -46,10 +46,11 @@ uint8_t icm20649_identity(enum chip chip)
 	return read8(chip, REGISTER_WHO_AM_I);
 }
 
-/* Two registers, since another part's reply may be like one of them by chance. */
+/* Two registers, since another part's reply may be like one of them by chance. Of the second one only the bits that are always zero count: a
+ * frame for another part may have written the rest. */
 bool icm20649_answers(enum chip chip)
 {
-	return icm20649_identity(chip) == ICM20649_IDENTITY && (read8(chip, REGISTER_PWR_MGMT_1) & (uint8_t)~SLEEP) == BEST_CLOCK;
+	return icm20649_identity(chip) == ICM20649_IDENTITY && !(read8(chip, REGISTER_PWR_MGMT_1) & (DEVICE_RESET | RESERVED));
 }
 
 void icm20649_reset(enum chip chip)

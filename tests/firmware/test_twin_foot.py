@@ -74,6 +74,18 @@ def test_the_part_is_found_and_the_board_becomes_a_foot_board(foot: Bench) -> No
     assert words(foot) == []
 
 
+@pytest.mark.parametrize("undefined", ["zeros", "ones", "noise"])
+def test_the_part_is_found_whatever_its_idle_line_reads(bench: Bench, undefined: str) -> None:
+    """Its board pulls MISO down against the processor's pull-up. No frame for another part may come before: it would write registers."""
+    bench.fault("kit=foot")
+    bench.fault(f"miso_undefined={undefined}")
+    run(bench, 300)
+    bench.ask(SUBSCRIBE)
+    run(bench, 1_000)
+    assert len(samples(run(bench, 1_000))) > 220
+    assert not [text for _, text in bench.board.trace if "misreads" in text]
+
+
 def test_every_sample_comes_and_is_stamped_within_the_limit(foot: Bench) -> None:
     found = samples(run(foot, 10_000))
     assert len(found) == pytest.approx(10 * RATE_HZ, rel=0.012)  # its own clock is 1 % off

@@ -378,7 +378,7 @@ def test_an_lsm6dso_without_a_self_test_is_named(imus: Bench) -> None:
     ("kind", "cause", "words"),
     [
         ("absent", m.Fault.NO_ANSWER, "calf gyro (LSM6DSO): does not answer"),
-        ("zeros", m.Fault.NEVER_READY, "calf gyro (LSM6DSO): has no new rates"),
+        ("zeros", m.Fault.NO_ANSWER, "calf gyro (LSM6DSO): does not answer"),
         ("never_ready", m.Fault.NEVER_READY, "calf gyro (LSM6DSO): has no new rates"),
     ],
 )
@@ -414,6 +414,28 @@ def test_old_and_new_gyros_may_be_mixed_and_swapped(imus: Bench) -> None:
     imus.run(2_500)
     assert {x[1:] for x in imus.run(500) if isinstance(x, m.Gyros)} == {(41, -82, 5)}
     assert imus.parts.part_calf == m.Part.LSM6DSO
+
+
+@pytest.mark.parametrize("undefined", ["zeros", "ones", "noise"])
+def test_an_imu_that_is_not_plugged_in_has_no_rate(bench: Bench, undefined: str) -> None:
+    """The boards of the others hold MISO between a zero and a one; 0x0000 would be a good rate of an ADIS16100."""
+    bench.fault("kit=2026")
+    bench.fault("imu_thigh=absent")
+    bench.fault(f"miso_undefined={undefined}")
+    bench.run(300, extended_rows(300))
+    bench.ask(SUBSCRIBE)
+    bench.run(1_000, extended_rows(1_000))
+    found = bench.run(2_000, extended_rows(2_000))
+    assert {x.thigh for x in found if isinstance(x, m.Gyros)} == {-32768}
+    assert all(x.calf == 29 and x.belt == 72 for x in found if isinstance(x, m.Gyros))
+    assert not any(x.healthy & m.Healthy.THIGH for x in found if isinstance(x, m.Status))
+    assert bench.parts.part_thigh == m.Part.NONE
+    (text,) = [str(f) for f in board_findings(reports(bench))]
+    assert text.startswith("thigh gyro: does not answer; check its SPI cable, 5 V and its chip select (D8)")
+    bench.fault("imu_thigh=ok")
+    bench.run(1_000, extended_rows(1_000))
+    assert {x.thigh for x in bench.run(500, extended_rows(500)) if isinstance(x, m.Gyros)} == {-14}
+    assert not [text for _, text in bench.board.trace if "misreads" in text]
 
 
 def test_a_part_that_is_neither_gyro_is_not_read(bench: Bench) -> None:
