@@ -34,6 +34,7 @@ static struct {
 } gyros[GYROS] = { { .misses = MISSES_MAX }, { .misses = MISSES_MAX }, { .misses = MISSES_MAX } };
 
 static uint8_t warming; /* samples until an LSM6DSO that was switched on has rates: a self-test waits */
+static bool excited;    /* by a self-test */
 /* Times in ticks of the board's clock. */
 static uint32_t due;        /* next sample */
 static uint32_t health_due; /* next `gyro_health` messages */
@@ -101,10 +102,11 @@ static void note(uint8_t gyro, uint8_t fault)
 	}
 }
 
-/* 0.035 deg/s -> 0.2439 deg/s, rounded. */
+/* 0.035 deg/s, or the double while they are excited -> 0.2439 deg/s, rounded. */
 static int16_t in_units_of_gyros(int16_t rate)
 {
-	return (int16_t)(((int32_t)rate * 18809 + 65536) >> 17);
+	int32_t scaled = (int32_t)rate * 18809;
+	return (int16_t)(((excited ? 2 * scaled : scaled) + 65536) >> 17);
 }
 
 static void set_axes(uint8_t gyro, const int16_t *values)
@@ -208,6 +210,7 @@ static void report_health(void)
 
 void gyros_excite(enum excitation excitation)
 {
+	excited = excitation != EXCITE_NONE;
 	spi_excite_gyros(excitation);
 	for (uint8_t k = 0; k < GYROS; k++)
 		if (gyros[k].kind == LSM6DSO)

@@ -5,6 +5,7 @@
 /* Registers and values [LSM6DSO data sheet DS12140, chapters 8 and 9]. */
 #define REGISTER_BEFORE_WHO_AM_I 0x0Eu /* INT2_CTRL, never written: 0 */
 #define REGISTER_CTRL1_XL 0x10u
+#define REGISTER_CTRL2_G 0x11u
 #define REGISTER_CTRL5_C 0x14u
 #define REGISTER_STATUS 0x1Eu /* then a reserved one, then temperature, gyros, accelerometers: 16 bits each, low byte first */
 #define READ_FLAG 0x80u
@@ -12,6 +13,7 @@
 #define NO_REPLY 0xFFu /* MISO is pulled up: an absent chip reads as ones */
 #define CTRL1_XL_1667_HZ_8_G 0x8Cu
 #define CTRL2_G_1667_HZ_1000_DPS 0x88u
+#define CTRL2_G_1667_HZ_2000_DPS 0x8Cu
 #define CTRL3_C_WHOLE_SAMPLES 0x44u /* BDU: no new value between the bytes of one; IF_INC: addresses count up */
 #define CTRL4_C_SPI_ONLY_FILTER 0x06u /* I2C off, low pass LPF1 of the gyros on */
 #define CTRL5_C_NEGATIVE 0x0Cu
@@ -62,5 +64,6 @@ uint8_t lsm6dso_read(enum chip chip, struct lsm6dso_sample *out)
 
 void lsm6dso_excite(enum chip chip, enum excitation excitation)
 {
+	spi_write(chip, SPI_MODE3, REGISTER_CTRL2_G, excitation == EXCITE_NONE ? CTRL2_G_1667_HZ_1000_DPS : CTRL2_G_1667_HZ_2000_DPS);
 	spi_write(chip, SPI_MODE3, REGISTER_CTRL5_C, excitation == EXCITE_ST1 ? CTRL5_C_NEGATIVE : excitation == EXCITE_ST2 ? CTRL5_C_POSITIVE : 0);
 }

@@ -426,7 +426,7 @@ struct msg_configure {
 };
 bool msg_unpack_configure(struct msg_configure *m, const uint8_t *in, uint8_t length);
 
-/* Start of the gyros' self-test: 0.56 s without rates, then the result in gyro_health. The wearer must stand still during the
+/* Start of the gyros' self-test: 0.72 s without rates, then the result in gyro_health. The wearer must stand still during the
  * test. */
 /* check_gyros has no fields. */
 

@@ -786,7 +786,7 @@ _CHECK_GYROS = struct.Struct("<")
 
 
 class CheckGyros(NamedTuple):
-    """Start of the gyros' self-test: 0.56 s without rates, then the result in gyro_health."""
+    """Start of the gyros' self-test: 0.72 s without rates, then the result in gyro_health."""
 
     @property
     def id(self) -> int:

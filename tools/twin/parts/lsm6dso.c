@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * Three LSM6DSO on the chip selects of the ADIS16100 [LSM6DSO data sheet DS12140]: SPI mode 0 or 3, at most 10 MHz, the address first, then
- * bytes whose addresses count up. Gyros of 1000 deg/s give 0.035 deg/s per count, accelerometers of 8 g 0.244 mg.
+ * bytes whose addresses count up. Gyros of 1000 deg/s give 0.035 deg/s per count, those of other ranges in proportion; accelerometers of 8 g
+ * 0.244 mg.
+ *
+ * The self-test changes the rate by 150 to 700 deg/s at 2000 deg/s and by 20 to 80 at 250 [page 10]; between them in proportion to the range.
  *
  * A rate is ready 70 ms after the gyros are switched on, then at the output rate, here always 1.67 kHz: what is read is the row under way.
  * The axes are those that the extended rows have; a plain row has the rate about z only, and a part that lies still otherwise. */
@@ -28,7 +31,7 @@ static struct imu {
 	uint8_t registers[REGISTERS], address, count, out[14];
 	bool reading, garbled;
 	avr_cycle_count_t up_at, rates_at, read_at;
-	double excited; /* counts added by the self-test at the time `excited_at` */
+	double excited; /* counts of 0.035 deg/s added by the self-test at the time `excited_at` */
 	avr_cycle_count_t excited_at;
 	int response;
 	struct axes kept; /* of a part that is stuck */
@@ -46,12 +49,20 @@ static bool is_here(const struct imu *u)
 	return kit_of_2026(u->place) && u->fault != ABSENT && avr->cycle >= u->up_at && !u->garbled;
 }
 
-/* Counts that the self-test adds in the end: ST_G 01 of positive, 11 of negative sign. */
+static double full_scale_dps(const struct imu *u)
+{
+	static const double by_code[4] = { 250.0, 500.0, 1000.0, 2000.0 };
+
+	return by_code[(u->registers[CTRL2_G] >> 2) & 3];
+}
+
+/* Counts of 0.035 deg/s that the self-test adds in the end: ST_G 01 of positive, 11 of negative sign. */
 static double target(const struct imu *u)
 {
 	unsigned mode = (u->registers[CTRL5_C] >> 2) & 3;
 	double response = u->fault == WEAK ? u->response * 0.05 : u->response;
 
+	response *= full_scale_dps(u) / 2000.0;
 	return mode == 1 ? response : mode == 3 ? -response : 0.0;
 }
 
@@ -79,7 +90,7 @@ static void sample(struct imu *u)
 	for (int k = 0; k < 3; k++) {
 		double rate = a->rate[k] + excitation(u);
 
-		put(u, 1 + k, u->registers[CTRL2_G] ? limited(u->fault == SATURATED ? 1e6 : rate) : 0);
+		put(u, 1 + k, u->registers[CTRL2_G] ? limited(u->fault == SATURATED ? 1e6 : rate * 1000.0 / full_scale_dps(u)) : 0);
 		put(u, 4 + k, u->registers[CTRL1_XL] ? a->force[k] : 0);
 	}
 }
@@ -114,7 +125,7 @@ static void write_register(struct imu *u, uint8_t at, uint8_t value)
 		return;
 	if (at == CTRL2_G && !(u->registers[at] >> 4) && value >> 4)
 		u->rates_at = avr->cycle + GYROS_ON;
-	if (at == CTRL5_C) {
+	if (at == CTRL5_C || at == CTRL2_G) {
 		u->excited = excitation(u);
 		u->excited_at = avr->cycle;
 	}
@@ -159,7 +170,7 @@ static void restart(struct imu *u)
 	memset(u->registers, 0, sizeof u->registers);
 	u->registers[CTRL3_C] = 0x04;
 	if (!u->response && kit_of_2026(u->place)) /* drawn when it is first plugged in: a board of the papers is the same with and without this model */
-		u->response = 10000 + (int)random_below(4000); /* 350 to 490 deg/s */
+		u->response = 4600 + (int)random_below(15000); /* 161 to 686 deg/s */
 	u->up_at = avr->cycle + BOOT;
 	u->excited = 0.0;
 	u->read_at = 0;
