@@ -70,7 +70,7 @@ bool usb_is_open(void);                               /* whether a host program 
 bool usb_take_opening(void);                          /* true once after each opening, which empties the buffers */
 bool usb_write(const uint8_t *bytes, uint8_t length); /* all bytes; false: no room, none was taken */
 int16_t usb_read(void);                               /* one byte, or -1 */
-bool usb_bootloader_wanted(void);                     /* whether the port was closed at 1200 Bd */
+bool usb_bootloader_wanted(void);                     /* whether the port has been closed at 1200 Bd for 0.12 s */
 uint8_t usb_suspends(void);                           /* how often the host has suspended the bus since the start; wraps */
 
 /* The echo lines of pulse rangers, side 0 left, 1 right: both edges are captured by a timer each. The left line is also SyncOut: its

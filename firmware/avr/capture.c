@@ -62,7 +62,10 @@ static void start_timer_3(void)
 	DDRF |= TRIGGER_LEFT | TRIGGER_RIGHT;
 	TCCR3A = 0;
 	TCCR3B = RISING_3;
-	timer_3_behind = (uint16_t)(TCNT1 - TCNT3);
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE) /* an interrupt between the two readings would shift all stamps of the right ranger */
+	{
+		timer_3_behind = (uint16_t)(TCNT1 - TCNT3);
+	}
 	timer_3_runs = true;
 }
 

@@ -8,6 +8,8 @@
 #define MEMORY_64 (BIT(EPSIZE1) | BIT(EPSIZE0) | BIT(ALLOC))
 #define BOOTLOADER_BAUD 1200u
 #define LINE_CODING_SIZE 7u
+#define DATA_INTERFACE 1u
+#define DTR_LOW_TICKS (120u * TICKS_PER_MS) /* most hosts let DTR fall for a moment [Arduino, cores/arduino/CDC.cpp] */
 
 enum { /* bRequest */
 	GET_STATUS = 0,
@@ -52,7 +54,8 @@ static bool dtr;
 static uint8_t line_coding[LINE_CODING_SIZE] = { 0x00, 0xC2, 0x01, 0x00, 0, 0, 8 }; /* 115200 8N1; has no effect */
 static bool opened;       /* since the last call of usb_take_opening */
 static bool reconfigured; /* since the host last set the line state */
-static bool bootloader_wanted;
+static bool bootloader_wanted; /* at this time: */
+static uint32_t bootloader_due;
 static struct {
 	const uint8_t *bytes; /* when REPLYING */
 	uint16_t descriptor;  /* when DESCRIBING: wValue of the request */
@@ -87,7 +90,7 @@ bool usb_take_opening(void)
 
 bool usb_bootloader_wanted(void)
 {
-	return bootloader_wanted && stage == IDLE; /* only after the host has its acknowledge */
+	return bootloader_wanted && ticks_reached(clock_now(), bootloader_due) && stage == IDLE; /* only after the host has its acknowledge */
 }
 
 static bool send(enum stage how, uint8_t length, uint16_t wanted)
@@ -137,6 +140,16 @@ static bool set_configuration(uint8_t value)
 	return acknowledge();
 }
 
+/* The only setting of an interface resets the data toggles of its endpoints [USB 2.0, 9.1.1.5]. */
+static bool set_interface(const struct setup *s)
+{
+	if (s->value != 0)
+		return false;
+	if (configured && s->index == DATA_INTERFACE)
+		usb_start_port();
+	return acknowledge();
+}
+
 /* The address and its bit ADDEN must not be written at once [data sheet, 22.7]; ADDEN follows after the status stage. */
 static bool set_address(uint8_t address)
 {
@@ -147,8 +160,10 @@ static bool set_address(uint8_t address)
 
 static void check_for_1200_baud(void)
 {
-	if (line_coding[0] == (BOOTLOADER_BAUD & 0xFFu) && line_coding[1] == BOOTLOADER_BAUD >> 8 && !line_coding[2] && !dtr)
-		bootloader_wanted = true;
+	bool wanted = line_coding[0] == (BOOTLOADER_BAUD & 0xFFu) && line_coding[1] == BOOTLOADER_BAUD >> 8 && !line_coding[2] && !dtr;
+	if (wanted && !bootloader_wanted)
+		bootloader_due = clock_now() + DTR_LOW_TICKS;
+	bootloader_wanted = wanted;
 }
 
 static bool set_line_state(bool new_dtr)
@@ -211,7 +226,7 @@ static bool handle_request(const struct setup *s)
 	case REQUEST(FROM_INTERFACE, GET_INTERFACE):
 		return send_answer(0, 1, s->length);
 	case REQUEST(TO_INTERFACE, SET_INTERFACE):
-		return s->value == 0 && acknowledge();
+		return set_interface(s);
 	case REQUEST(FROM_PORT, GET_LINE_CODING):
 		return send_bytes(line_coding, LINE_CODING_SIZE, s->length);
 	case REQUEST(TO_PORT, SET_LINE_CODING):

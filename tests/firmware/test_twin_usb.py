@@ -32,12 +32,13 @@ def test_windows_finds_its_driver_and_two_boards_differ() -> None:
     assert len(set(serials)) == 2
 
 
-def test_a_configuration_that_is_set_again_costs_no_command(bench: Bench) -> None:
+@pytest.mark.parametrize("request_again", ["configure", "interface"])
+def test_a_setting_that_is_set_again_costs_no_command(bench: Bench, request_again: str) -> None:
     bench.run(1_000)
     for token in range(12):  # with even and odd numbers of packets in between
         bench.ask(m.ClockQuery(token))
         bench.run(7 + token)
-        bench.fault("usb=configure")
+        bench.fault(f"usb={request_again}")
         bench.run(20)
     bench.ask(m.ClockQuery(12))
     found = bench.run(1_000)
@@ -89,7 +90,7 @@ def test_a_bus_hung_at_power_up(bench: Bench, line: str) -> None:
     else:
         assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.BUS_ERROR}
         assert bench.status.fault_compass == m.Fault.BUS_STUCK
-        assert kinds(found)["Gyros"] > 380
+        assert kinds(found)["Gyros"] > 370
         bench.fault("scl=ok")
     bench.run(500)
     assert {p.outcome for p in pings(bench.run(500), m.Ranger.LEFT)} == {m.Outcome.ECHO}
@@ -114,3 +115,19 @@ def test_a_crystal_is_off_by_its_temperature(bench: Bench, kind: str, degrees: i
     found = np.array([(x.edge, x.ticks) for x in bench.run(2_000, rows) if isinstance(x, m.Sync)])
     measured = np.polyfit(found[:, 0] * 20_000, found[:, 1], 1)[0] - 1.0
     assert measured * 1e6 == pytest.approx(ppm, abs=1.0)
+
+
+def test_a_touch_at_1200_baud_starts_the_bootloader(bench: Bench) -> None:
+    bench.run(1_000)
+    bench.fault("usb=touch")
+    bench.run(400)
+    assert traces(bench, "bootloader waits")
+
+
+def test_a_dtr_that_twiggles_does_not(bench: Bench) -> None:
+    """Most hosts let DTR fall and rise when a program opens the port at another rate [Arduino, cores/arduino/CDC.cpp]."""
+    bench.run(1_000)
+    bench.fault("usb=twiggle")
+    bench.run(400)
+    assert not traces(bench, "bootloader waits")
+    assert kinds(bench.run(1_000))["Ping"] >= 28

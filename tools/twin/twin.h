@@ -104,6 +104,8 @@ void usb_host_unplug(void);
 void usb_host_reset(void);   /* a bus reset: the device is enumerated again */
 void usb_host_suspend(bool on);
 void usb_host_configure(void); /* sets the configuration that is in force again */
+void usb_host_interface(void); /* selects the only setting of the data interface */
+void usb_host_touch(bool twiggle);
 void usb_host_stall(bool on); /* the program on the host does not read */
 void usb_host_open(bool on);  /* a program has the port open (DTR) */
 void usb_host_send(const uint8_t *bytes, unsigned length);

@@ -23,6 +23,10 @@ static bool usb_fault(const char *name, const char *value)
 		usb_host_suspend(false);
 	else if (!strcmp(value, "configure"))
 		usb_host_configure();
+	else if (!strcmp(value, "interface"))
+		usb_host_interface();
+	else if (!strcmp(value, "touch") || !strcmp(value, "twiggle"))
+		usb_host_touch(!strcmp(value, "twiggle"));
 	else
 		return false;
 	return true;

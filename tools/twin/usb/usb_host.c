@@ -15,6 +15,7 @@
 #define STAGE_LIMIT_MS 500   /* for each stage of a request */
 #define PACKETS_PER_FRAME 19 /* maximum of full speed */
 #define DTR_RTS 3
+#define TWIGGLE_MS 50
 
 static const uint8_t script[][16] = {
 	/* request, data stage out */
@@ -42,6 +43,9 @@ static bool requesting;
 static unsigned received, stage_ms, waited_ms;
 static uint8_t in_endpoint, out_endpoint;
 static bool stalled, wanted_open, is_open;
+static enum { NOT_CLOSING, CLOSE_RATE, CLOSE_PORT, CLOSED } closing;
+static bool closing_twiggles;
+static unsigned closed_ms;
 static uint16_t frame_number;
 static uint8_t outbox[1 << 16];
 static unsigned outbox_length;
@@ -97,7 +101,7 @@ static void apply_request(void)
 {
 	if (request[0] == 0 && request[1] == 5)
 		usb_target(request[2]);
-	if (request[0] == 0 && request[1] == 9)
+	if ((request[0] == 0 && request[1] == 9) || (request[0] == 1 && request[1] == 11))
 		usb_cable_reset_toggles();
 }
 
@@ -171,6 +175,23 @@ static bool advance_request(void)
 	return false;
 }
 
+static void close_at_1200_baud(void)
+{
+	static const uint8_t rate[16] = { 0x21, 0x20, 0, 0, 0, 0, 7, 0, 0xB0, 0x04, 0, 0, 0, 0, 8 };
+
+	if (closing == CLOSE_RATE) {
+		begin_request(rate);
+		closing = CLOSE_PORT;
+	} else if (closing == CLOSE_PORT) {
+		set_line_state(false);
+		closed_ms = 0;
+		closing = CLOSED;
+		wanted_open = closing_twiggles;
+	} else if (!closing_twiggles || ++closed_ms >= TWIGGLE_MS) {
+		closing = NOT_CLOSING;
+	}
+}
+
 static void move_bulk(void)
 {
 	uint8_t bytes[64];
@@ -236,7 +257,9 @@ static avr_cycle_count_t poll(avr_t *a, avr_cycle_count_t when, void *param)
 		if (state == ENUMERATING || state == RUNNING)
 			usb_frame(frame_number++);
 		if (state == RUNNING && !requesting) {
-			if (wanted_open != is_open)
+			if (closing)
+				close_at_1200_baud();
+			else if (wanted_open != is_open)
 				set_line_state(wanted_open);
 			else
 				move_bulk();
@@ -292,6 +315,22 @@ void usb_host_configure(void)
 
 	if (state == RUNNING && !requesting)
 		begin_request(again);
+}
+
+/* Some hosts choose the setting of an interface that has only one; it too resets the data toggles [USB 2.0, 9.1.1.5]. */
+void usb_host_interface(void)
+{
+	static const uint8_t data_interface[16] = { 0x01, 11, 0, 0, 1, 0, 0, 0 };
+
+	if (state == RUNNING && !requesting)
+		begin_request(data_interface);
+}
+
+/* A program sets 1200 Bd and closes the port; `twiggle`: DTR returns after 50 ms, as it does when some hosts change the rate. */
+void usb_host_touch(bool twiggle)
+{
+	closing = CLOSE_RATE;
+	closing_twiggles = twiggle;
 }
 
 void usb_host_stall(bool on)
