@@ -11,13 +11,14 @@
 #define READ_FLAG 0x80u
 #define STATUS_RATE_READY 0x02u
 #define NO_REPLY 0xFFu /* MISO is pulled up: an absent chip reads as ones */
-#define CTRL1_XL_1667_HZ_8_G 0x8Cu
+#define CTRL1_XL_1667_HZ_8_G 0x8Eu /* low pass LPF2 on */
 #define CTRL2_G_1667_HZ_1000_DPS 0x88u
 #define CTRL2_G_1667_HZ_2000_DPS 0x8Cu
 #define CTRL3_C_WHOLE_SAMPLES 0x44u /* BDU: no new value between the bytes of one; IF_INC: addresses count up */
 #define CTRL4_C_SPI_ONLY_FILTER 0x06u /* I2C off, low pass LPF1 of the gyros on */
 #define CTRL5_C_NEGATIVE 0x0Cu
 #define CTRL5_C_POSITIVE 0x04u
+#define CTRL8_XL_83_HZ 0x40u /* LPF2 at a twentieth of the rate: the part is polled at 200 Hz */
 #define CTRL6_C_50_HZ 0x05u /* LPF1 at this rate; the ADIS16100 has 40 Hz */
 
 #define SAMPLE_OFFSET 2u /* bytes of STATUS and of the reserved register */
@@ -36,6 +37,7 @@ void lsm6dso_start(enum chip chip)
 {
 	static const uint8_t settings[] = {
 		CTRL1_XL_1667_HZ_8_G, CTRL2_G_1667_HZ_1000_DPS, CTRL3_C_WHOLE_SAMPLES, CTRL4_C_SPI_ONLY_FILTER, 0, CTRL6_C_50_HZ,
+		0, CTRL8_XL_83_HZ,
 	};
 	(void)spi_begin(chip, SPI_MODE3, REGISTER_CTRL1_XL); /* the addresses count up from the start: the default of IF_INC */
 	for (uint8_t n = 0; n < sizeof settings; n++)

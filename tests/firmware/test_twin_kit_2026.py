@@ -358,6 +358,14 @@ def test_lsm6dso_reach_1000_degrees_a_second(imus: Bench) -> None:
     assert calf[-1] == 2_870
 
 
+def test_a_vibration_faster_than_the_samples_is_filtered(imus: Bench) -> None:
+    """Polled at 200 Hz, 400 Hz would look like a slow force of 2 g."""
+    imus.fault("imu_calf=vibrating")
+    found = imus.run(1_000, extended_rows(1_000))
+    forces = [x.calf_acceleration_z for x in found if isinstance(x, m.Motion)]
+    assert np.ptp(forces) < 0.2 / 0.244e-3
+
+
 def test_lsm6dso_test_themselves_at_the_start(imus: Bench) -> None:
     newest = {x.gyro: x for x in imus.messages if isinstance(x, m.GyroHealth)}
     assert {x.self_test for x in newest.values()} == {m.SelfTest.PASSED}

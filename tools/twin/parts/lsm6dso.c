@@ -12,7 +12,7 @@
 
 #include "twin.h"
 
-enum { INT2_CTRL = 0x0E, WHO_AM_I, CTRL1_XL, CTRL2_G, CTRL3_C, CTRL5_C = 0x14, STATUS = 0x1E, OUT_TEMP = 0x20, OUT_G = 0x22, OUT_A = 0x28, REGISTERS = 0x80 };
+enum { INT2_CTRL = 0x0E, WHO_AM_I, CTRL1_XL, CTRL2_G, CTRL3_C, CTRL5_C = 0x14, CTRL8_XL = 0x17, STATUS = 0x1E, OUT_TEMP = 0x20, OUT_G = 0x22, OUT_A = 0x28, REGISTERS = 0x80 };
 enum { RATE_READY = 2, FORCE_READY = 1 };
 #define IDENTITY 0x6C
 #define MAX_HERTZ 10000000u
@@ -22,12 +22,14 @@ enum { RATE_READY = 2, FORCE_READY = 1 };
 #define FASTEST_READY US(600)
 #define FILTER_S 0.0032 /* 50 Hz */
 #define FULL_SCALE 32767
+#define VIBRATION_HERTZ 400.0
+#define VIBRATION_COUNTS 8196.0 /* 2 g */
 
 static struct imu {
 	struct spi_device spi;
 	const char *name;
 	enum place place;
-	enum fault { GOOD, ABSENT, ZEROS, WRONG_IDENTITY, NEVER_READY, STUCK, SATURATED, WEAK, FAULTS } fault;
+	enum fault { GOOD, ABSENT, ZEROS, WRONG_IDENTITY, NEVER_READY, STUCK, SATURATED, WEAK, VIBRATING, FAULTS } fault;
 	uint8_t registers[REGISTERS], address, count, out[14];
 	bool reading, garbled;
 	avr_cycle_count_t up_at, rates_at, read_at;
@@ -41,7 +43,7 @@ static struct imu {
 	{ .name = "imu_belt", .place = PLACE_BELT },
 };
 static const char *const fault_names[FAULTS] = {
-	"ok", "absent", "zeros", "wrong_identity", "never_ready", "stuck", "saturated", "no_self_test",
+	"ok", "absent", "zeros", "wrong_identity", "never_ready", "stuck", "saturated", "no_self_test", "vibrating",
 };
 
 static bool is_here(const struct imu *u)
@@ -82,6 +84,18 @@ static void put(struct imu *u, int word, int value)
 	u->out[2 * word + 1] = (uint8_t)((unsigned)value >> 8);
 }
 
+/* A vibration above the rate at which the part is polled, behind the low pass of the accelerometers: half the output rate of 1667 Hz, or with LPF2
+ * its share by HPCF_XL [chapter 9, CTRL1_XL and CTRL8_XL; half the output rate from memory]. */
+static double vibration(const struct imu *u)
+{
+	static const double shares[8] = { 4.0, 10.0, 20.0, 45.0, 100.0, 200.0, 400.0, 800.0 };
+	double cut = 1667.0 / (u->registers[CTRL1_XL] & 2 ? shares[u->registers[CTRL8_XL] >> 5] : 2.0), r = VIBRATION_HERTZ / cut;
+
+	if (u->fault != VIBRATING)
+		return 0.0;
+	return VIBRATION_COUNTS / sqrt(1.0 + r * r * r * r) * sin(6.283185307 * VIBRATION_HERTZ * (double)avr->cycle / 16e6);
+}
+
 static void sample(struct imu *u)
 {
 	const struct axes *a = u->fault == STUCK ? &u->kept : &motion[u - imus];
@@ -91,7 +105,7 @@ static void sample(struct imu *u)
 		double rate = a->rate[k] + excitation(u);
 
 		put(u, 1 + k, u->registers[CTRL2_G] ? limited(u->fault == SATURATED ? 1e6 : rate * 1000.0 / full_scale_dps(u)) : 0);
-		put(u, 4 + k, u->registers[CTRL1_XL] ? a->force[k] : 0);
+		put(u, 4 + k, u->registers[CTRL1_XL] ? limited(a->force[k] + vibration(u)) : 0);
 	}
 }
 
