@@ -366,6 +366,15 @@ def test_a_vibration_faster_than_the_samples_is_filtered(imus: Bench) -> None:
     assert np.ptp(forces) < 0.2 / 0.244e-3
 
 
+def test_wrong_bits_from_an_lsm6dso_are_counted_and_named(imus: Bench) -> None:
+    """Its samples carry no checksum: once a second its identity is read again."""
+    imus.fault("spi_errors=100")
+    imus.run(12_000, extended_rows(12_000))
+    assert {m.Fault.BAD_VALUE} <= {x.fault_calf for x in imus.messages if isinstance(x, m.Status)}
+    words = "calf gyro (LSM6DSO): sent wrong bits"
+    assert [x for x in imus.all_findings if x.startswith(words) and "SPI cable" in x]
+
+
 def test_lsm6dso_test_themselves_at_the_start(imus: Bench) -> None:
     newest = {x.gyro: x for x in imus.messages if isinstance(x, m.GyroHealth)}
     assert {x.self_test for x in newest.values()} == {m.SelfTest.PASSED}

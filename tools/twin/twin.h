@@ -156,6 +156,7 @@ unsigned spi_hertz(void);
 unsigned spi_mode(void);
 uint8_t spi_at_rising_edges(uint8_t out); /* what a part of modes 0 and 3 reads of a byte */
 int spi_answer(uint8_t answer);           /* what the processor reads of such a part's byte */
+bool spi_errors(const char *value);
 bool spi_outruns(unsigned rise_ns);       /* half a bit is shorter than a level shifter's rise */
 
 /* miso.c: what the processor reads while no part drives MISO. */

@@ -58,6 +58,8 @@ static bool other_fault(const char *name, const char *value)
 {
 	if (!strcmp(name, "crystal"))
 		return clock_fault(value);
+	if (!strcmp(name, "spi_errors"))
+		return spi_errors(value);
 	if (!strcmp(name, "hum"))
 		return floating_hum(value);
 	if (!strcmp(name, "glitch"))

@@ -13,6 +13,7 @@ from dataclasses import replace
 from echostep.board.faults.device_faults import device_findings, foot_findings, gyro_celsius, gyro_findings
 from echostep.board.faults.findings import (
     DEVICES,
+    GYROS,
     NAMES,
     SELECTS,
     BoardReports,
@@ -124,13 +125,13 @@ def _intermittent_findings(reports: BoardReports) -> list[Finding]:
     findings = []
     for device in (d for d in Healthy if d & answering):
         if count := increase(status, previous, f"errors_{field_suffix(device)}"):
-            fault = Fault(status_field(status, "fault", device)).name.lower().replace("_", " ")
-            what = f"failed {count} times in the last {span_s(status, previous):.0f} s ({fault}), and answers again"
-            findings.append(
-                Finding(
-                    Severity.WARNING, name_of(reports, device), what, "a loose plug is likely: move the cable and watch"
-                )
-            )
+            fault, span = Fault(status_field(status, "fault", device)), f"in the last {span_s(status, previous):.0f} s"
+            what = f"failed {count} times {span} ({fault.name.lower().replace('_', ' ')}), and answers again"
+            remedy = "a loose plug is likely: move the cable and watch"
+            if fault is Fault.BAD_VALUE and device & GYROS:
+                what = f"sent wrong bits {count} times {span}"
+                remedy = "shorten its SPI cable, and put 100 ohm in series into SCK and MOSI at the board"
+            findings.append(Finding(Severity.WARNING, name_of(reports, device), what, remedy))
     return findings
 
 
