@@ -13,10 +13,7 @@
 #include "selftest.h"      /* carries out `check_gyros` */
 #include "status.h"        /* sent once a second */
 #include "supply.h"        /* voltage */
-
-#define VERSION_MAJOR 1
-#define VERSION_MINOR 5
-#define VERSION_PATCH 0
+#include "version.h"       /* sent in `identity` */
 
 #define SLEEP_MAX_TICKS (5u * TICKS_PER_MS) /* a stuck bus is noticed within this time */
 

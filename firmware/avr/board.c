@@ -26,10 +26,19 @@ static void paint_free_memory(void)
 		*p = PAINT;
 }
 
+/* A0 to A3 belong to JTAG where its fuse is set, until this bit is written twice within four cycles [data sheet, 26.5.1]. */
+static void free_analog_pins(void)
+{
+	uint8_t control = MCUCR | BIT(JTD);
+	MCUCR = control;
+	MCUCR = control;
+}
+
 void board_start(void)
 {
 	restart_begin(MCUSR, USBCON & BIT(USBE));
 	MCUSR = 0;
+	free_analog_pins();
 	paint_free_memory();
 	power_timer0_disable();
 	power_timer3_disable();

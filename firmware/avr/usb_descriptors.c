@@ -4,6 +4,7 @@
 #include <avr/boot.h>     /* signature row */
 #include <avr/pgmspace.h> /* PROGMEM */
 #include <util/atomic.h>  /* ATOMIC_BLOCK */
+#include "../version.h"   /* release number */
 #include "usb.h"
 
 /* pid.codes reserves 0x1209:0x0001 for tests. */
@@ -11,7 +12,8 @@ static const uint8_t device_descriptor[] PROGMEM = {
 	18, 1, 0x00, 0x02,      /* USB 2.0 */
 	2, 2, 0, EP_SIZE,       /* class and subclass by which Windows 10 and later load their driver, usbser.sys */
 	0x09, 0x12, 0x01, 0x00, /* vendor, product */
-	0x20, 0x01, 1, 2, 3, 1, /* release 1.2; strings of maker, product and serial number; one configuration */
+	VERSION_MINOR << 4 | VERSION_PATCH, VERSION_MAJOR, /* release, binary-coded decimal */
+	1, 2, 3, 1,             /* strings of maker, product and serial number; one configuration */
 };
 
 #define CONFIGURATION_SIZE 67

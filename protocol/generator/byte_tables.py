@@ -6,9 +6,12 @@ In: the messages, and the page as it is. Out: the page with fresh tables. Owns t
 
 from __future__ import annotations
 
-from generator.schema import Field, Message, crc_seed, schema_hash
+import binascii
+
+from generator.schema import FIXED_SEED, Field, Message, crc_seed, schema_hash
 
 BEGIN, END = "<!-- tables -->\n", "<!-- end of tables -->\n"
+CHECKED = b"123456789"  # as in catalogues of CRCs
 SENDERS = {"board": "board to host", "host": "host to board", "gateway": "beacon gateway to host"}
 
 
@@ -22,6 +25,8 @@ def readme(messages: list[Message], page: str) -> str:
 def _tables(messages: list[Message]) -> str:
     value = schema_hash(messages)
     lines = [f"Schema hash `0x{value:08X}`, CRC seed `0x{crc_seed(value):04X}`.", ""]
+    checks = [f"`0x{binascii.crc_hqx(CHECKED, seed):04X}`" for seed in (crc_seed(value), FIXED_SEED)]
+    lines += [f"CRC of the nine bytes `{CHECKED.decode()}`: {checks[0]} with this seed, {checks[1]} with the fixed one.", ""]
     for message in messages:
         lines += _table(message)
     return "\n".join(lines).rstrip() + "\n"

@@ -56,7 +56,7 @@ def test_what_is_wrong_is_said_in_words() -> None:
         "compass: does not answer at I2C address 0x60",
         "calf gyro: failed its self-test",
         "belt gyro: does not answer",
-        "firmware 1.5.0",
+        "firmware 1.6.0",
         "thigh gyro: answers, 20 degC, self-test passed",
         "belt gyro: FAILS",
     ):

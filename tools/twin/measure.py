@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.progress import track
 
 from echostep.board import messages as m
@@ -88,14 +89,18 @@ def add_message(result: RunResult, message: m.Message, t_ns: int) -> None:
         result.syncs.append(message.ticks)
 
 
-def stamp_errors(stamps: list[int], truth_ns: list[int]) -> tuple[float, float]:
-    """Largest absolute value and sd of stamp minus truth (us), without its median; each stamp is compared with the nearest event."""
+def stamp_offsets(stamps: list[int], truth_ns: list[int]) -> NDArray[np.float64]:
+    """Each stamp minus the time of the nearest event (us); the board's clock begins after the true one."""
     events = np.array(truth_ns) / 1e3
     stamps_us = np.array(stamps) * TICK_US
     after = np.clip(np.searchsorted(events, stamps_us), 1, len(events) - 1)
     nearest = np.where(stamps_us - events[after - 1] < events[after] - stamps_us, events[after - 1], events[after])
-    error = stamps_us - nearest
-    error -= np.median(error)
+    return np.asarray(stamps_us - nearest, np.float64)
+
+
+def stamp_errors(offsets: NDArray[np.float64], begin_us: float) -> tuple[float, float]:
+    """Largest absolute value and sd (us) of the errors of stamps, by the begin of the board's clock."""
+    error = offsets - begin_us
     return float(np.abs(error).max()), float(error.std())
 
 
@@ -108,7 +113,10 @@ def figures(seconds: int, kit: Kit) -> list[Figure]:
     dropped = {k: v for k, v in result.status._asdict().items() if k.startswith("dropped_") and v}
     pings, gyros = result.counts["Ping"] / span, result.counts["Gyros"] / span
     truth = {side: [t for t, text in trace if text == f"trigger {side}"] for side in ("left", "right")}
-    worst = [stamp_errors(result.triggers[k], truth[side]) for k, side in enumerate(("left", "right"))]
+    offsets = [stamp_offsets(result.triggers[k], truth[side]) for k, side in enumerate(("left", "right"))]
+    syncs = stamp_offsets(result.syncs, [t for t, text in trace if text == "sync"]) if result.syncs else offsets[0]
+    begin_us = float(np.median(syncs))  # by what Timer1 captures: SyncOut, or the left echo line
+    worst = [stamp_errors(each, begin_us) for each in offsets]
     trigger = max(w for w, _ in worst)
     return [
         ("pings/s, both rangers at once", f"{pings:.1f}", ">= 28", pings >= 28.0),
@@ -120,7 +128,7 @@ def figures(seconds: int, kit: Kit) -> list[Figure]:
         ),
         ("gyro samples/s", f"{gyros:.1f}", "200", abs(gyros - 200.0) < 1.0),
         ("worst trigger stamp", f"{trigger:.1f} us (sd {max(s for _, s in worst):.2f})", *_trigger_limit(trigger, kit)),
-        *(_of_the_papers(result, trace) if kit is Kit.PAPERS else _of_2026(result, span)),
+        *(_of_the_papers(*stamp_errors(syncs, begin_us)) if kit is Kit.PAPERS else _of_2026(result, span)),
         (f"frames lost in {seconds / 60:.0f} min", str(result.lost), "0", result.lost == 0),
         ("drops by stream", str(dropped or 0), "0", not dropped),
         (
@@ -138,8 +146,7 @@ def _trigger_limit(worst_us: float, kit: Kit) -> tuple[str, bool]:
     return f"<= {limit_us:g} us", worst_us <= limit_us
 
 
-def _of_the_papers(result: RunResult, trace: list[tuple[int, str]]) -> list[Figure]:
-    worst, sd = stamp_errors(result.syncs, [t for t, text in trace if text == "sync"])
+def _of_the_papers(worst: float, sd: float) -> list[Figure]:
     return [("worst SyncOut stamp", f"{worst:.1f} us (sd {sd:.2f})", "<= 20 us", worst <= 20.0)]
 
 
@@ -178,7 +185,8 @@ def foot_figures(seconds: int) -> list[Figure]:
                     stamps.append(message.ticks)
     board.close()
     assert result.status is not None
-    worst, sd = stamp_errors(stamps, [t for t, text in board.trace if text == "foot"])
+    offsets = stamp_offsets(stamps, [t for t, text in board.trace if text == "foot"])
+    worst, sd = stamp_errors(offsets, float(np.median(offsets)))  # a constant error would not be seen: there is no other stamp
     rate, lost, memory = len(stamps) / (seconds - SETTLED_S), reader.counts.lost, result.status.memory_used
     return [
         ("foot samples/s", f"{rate:.1f}", "225 within 1 %", abs(rate / 225.0 - 1.0) < 0.0105),
