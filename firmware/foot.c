@@ -14,8 +14,13 @@
 #define IDLE_HIGH 0xFFu                       /* an absent part reads as ones, or as zeros */
 
 static struct msg_foot_health health = { .temperature = MSG_FOOT_HEALTH_TEMPERATURE_INVALID };
-static uint32_t due = SEEK_FIRST_TICKS; /* ticks */
+static uint32_t due; /* ticks */
 static bool is_set;                     /* whether the part has its settings */
+
+void foot_start(uint32_t now)
+{
+	due = now + SEEK_FIRST_TICKS;
+}
 
 static bool is_foot_board(void)
 {

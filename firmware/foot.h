@@ -8,6 +8,9 @@
 #include <stdint.h>
 #include "board.h" /* struct capture_edge */
 
+/* Before the first foot_run. */
+void foot_start(uint32_t now);
+
 /* Seeks, starts or watches the part when that is due (0.1 ms); true: it was found for the first time, and the configuration has changed. */
 bool foot_run(uint32_t now);
 

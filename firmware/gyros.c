@@ -45,6 +45,7 @@ void gyros_start(uint32_t now)
 	static bool again;
 	due = now + (again ? START_UP_TICKS : POWER_UP_TICKS);
 	again = true;
+	health_due = due;
 	period = TICKS_PER_S / configuration.gyro_rate_hz;
 }
 

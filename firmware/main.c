@@ -186,17 +186,18 @@ static void take_edge(void)
 	link_send(MSG_SYNC, msg_pack_sync(link_body(), &m));
 }
 
+static uint32_t reports_due;
+
 /* Sends the reports of each second when due; returns the time of the next call. */
 static uint32_t send_each_second(uint32_t now)
 {
-	static uint32_t due;
-	if (!ticks_reached(now, due))
-		return due;
+	if (!ticks_reached(now, reports_due))
+		return reports_due;
 	send_identity();
 	send_status();
 	send_subscribed_reports();
-	due += TICKS_PER_S;
-	return due;
+	reports_due += TICKS_PER_S;
+	return reports_due;
 }
 
 /* The earlier of two times, which are less than 17.9 minutes apart. */
@@ -238,6 +239,8 @@ static bool was_started_on_purpose(void)
 int main(void)
 {
 	board_start();
+	reports_due = clock_now();
+	foot_start(reports_due);
 	start_sensors();
 	if (was_started_on_purpose())
 		selftest_begin();

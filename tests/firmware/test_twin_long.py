@@ -3,15 +3,53 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from board_runs import Bench, needs_twin, pings
+from board_runs import ROOT, TWIN, Bench, kinds, needs_twin, pings
 from echostep.board import messages as m
+from echostep.board.subscription import SUBSCRIBE
+from echostep.simulation.devices.board import BoardProcess
 from echostep.simulation.stimulus import NO_SYNC, ROW
+from waiting import PATIENCE_S
 
 pytestmark = needs_twin
 HALF_WRAP_S = 2**31 / 2e6  # after which a comparison of two times turns round [firmware/board.h]
+START_BEFORE_S = 4.0
+
+
+def firmware_whose_clock_starts_at(overflows: int, folder: Path) -> Path:
+    """The firmware with another first value of the upper half of its clock."""
+    if not shutil.which("avr-gcc"):
+        pytest.skip("avr-gcc is missing")
+    build = ["make", "-s", "-C", ROOT / "firmware", f"BUILD={folder}", f"CLOCK_START={overflows}u", folder / "echostep.elf"]
+    subprocess.run(list(map(str, build)), check=True, timeout=PATIENCE_S)
+    return folder / "echostep.elf"
+
+
+@pytest.mark.parametrize("wrap_s", [HALF_WRAP_S, 2 * HALF_WRAP_S])
+def test_nothing_happens_when_the_clock_wraps(tmp_path: Path, wrap_s: float) -> None:
+    """17.9 minutes after the start comparisons of times turn round, after 35.8 the clock itself."""
+    elf = firmware_whose_clock_starts_at(int((wrap_s - START_BEFORE_S) * 2e6) >> 16, tmp_path)
+    for kit in ("papers", "2026"):
+        bench = Bench(BoardProcess([str(TWIN), "--elf", str(elf)]))
+        bench.fault(f"kit={kit}")
+        bench.run(300)
+        bench.ask(SUBSCRIBE)
+        bench.run(1_500)
+        ticks = bench.status.ticks
+        rates = [kinds(bench.run(1_000)) for _ in range(4)]
+        bench.board.close()
+        assert (bench.status.ticks ^ ticks) >> 31  # the wrap lies between
+        assert min(rate["Ping"] for rate in rates) >= 29
+        assert {rate["Gyros"] for rate in rates} <= {199, 200, 201}
+        assert {rate["Status"] for rate in rates} == {1}
+        assert min(rate["Pressure"] for rate in rates) >= 8
+        assert not any(v for k, v in bench.status._asdict().items() if k.startswith(("dropped_", "errors_")))
 
 
 @pytest.mark.long
