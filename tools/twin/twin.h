@@ -98,6 +98,12 @@ int usb_cable_in(uint8_t endpoint, uint8_t *bytes);
 int usb_cable_out(uint8_t endpoint, const uint8_t *bytes, unsigned length);
 bool usb_cable_errors(const char *value);
 
+/* usb_systems.c: the requests of an operating system in its order; each step is a request, or begins with one of these: */
+enum { USB_STEPS_END = 0xFE, USB_STEP_BUS_RESET = 0xFF };
+const uint8_t *usb_system_step(unsigned step);
+int usb_system_first_size(void);
+bool usb_host_system(const char *value);
+
 /* usb_host.c: enumerates the device, opens the port, moves bytes. */
 void usb_host_start(void);   /* after power-up: registers its timer */
 void usb_host_unplug(void);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * The USB host: waits for a device, resets and enumerates it, configures the CDC-ACM port, then moves bulk data every millisecond. The
- * requests are those of a Linux host with its cdc_acm driver. */
+ * requests are those of a Linux host with its cdc_acm driver, or those of Windows or macOS. */
 #include <string.h>
 
 #include <simavr/sim_cycle_timers.h>
@@ -16,22 +16,6 @@
 #define PACKETS_PER_FRAME 19 /* maximum of full speed */
 #define DTR_RTS 3
 #define TWIGGLE_MS 50
-
-static const uint8_t script[][16] = {
-	/* request, data stage out */
-	{ 0x80, 6, 0, 1, 0, 0, 8, 0 },        /* start of the device descriptor, for the size of control packets */
-	{ 0x00, 5, 7, 0, 0, 0, 0, 0 },        /* address 7 */
-	{ 0x80, 6, 0, 1, 0, 0, 18, 0 },       /* device descriptor */
-	{ 0x80, 6, 0, 2, 0, 0, 9, 0 },        /* start of the configuration descriptor */
-	{ 0x80, 6, 0, 2, 0, 0, 255, 0 },      /* configuration descriptor */
-	{ 0x80, 6, 0, 3, 0, 0, 255, 0 },      /* languages */
-	{ 0x80, 6, 2, 3, 9, 4, 255, 0 },      /* product */
-	{ 0x80, 6, 3, 3, 9, 4, 255, 0 },      /* serial number */
-	{ 0x80, 6, 0, 6, 0, 0, 10, 0 },       /* device qualifier: a full-speed device stalls */
-	{ 0x00, 9, 1, 0, 0, 0, 0, 0 },        /* configuration 1 */
-	{ 0x21, 0x20, 0, 0, 0, 0, 7, 0, 0x00, 0xC2, 0x01, 0x00, 0, 0, 8 }, /* 115200 8N1 */
-};
-#define SCRIPT_LENGTH (sizeof script / sizeof *script)
 
 enum stage { SETUP, DATA_IN, DATA_OUT, STATUS_IN, STATUS_OUT };
 
@@ -115,7 +99,7 @@ static void finish_request(void)
 		control_size = descriptor[7];
 	if (request[0] == 0x80 && request[1] == 6 && request[3] == 2)
 		find_endpoints(received);
-	if (state == ENUMERATING && ++step == SCRIPT_LENGTH) {
+	if (state == ENUMERATING && usb_system_step(++step)[0] == USB_STEPS_END) {
 		state = RUNNING;
 		bench_trace("enumerated");
 	}
@@ -217,6 +201,24 @@ static void move_bulk(void)
 	}
 }
 
+static void reset_bus(void)
+{
+	usb_bus_reset();
+	usb_target(0);
+	usb_cable_reset_toggles();
+}
+
+static void next_step(void)
+{
+	if (usb_system_step(step)[0] == USB_STEP_BUS_RESET) {
+		reset_bus();
+		waited_ms = 0;
+		step++;
+	} else {
+		begin_request(usb_system_step(step));
+	}
+}
+
 /* Once a millisecond: follows attach and detach, and gives up requests without an answer. */
 static void watch(void)
 {
@@ -227,12 +229,10 @@ static void watch(void)
 		state = DEBOUNCING;
 		waited_ms = 0;
 	} else if (state == DEBOUNCING && ++waited_ms >= DEBOUNCE_MS) {
-		usb_bus_reset();
-		usb_target(0);
-		usb_cable_reset_toggles();
+		reset_bus();
 		state = ENUMERATING;
 		step = 0;
-		control_size = 8;
+		control_size = usb_system_first_size();
 		requesting = is_open = false;
 		waited_ms = 0;
 	}
@@ -265,7 +265,7 @@ static avr_cycle_count_t poll(avr_t *a, avr_cycle_count_t when, void *param)
 				move_bulk();
 		}
 		if (state == ENUMERATING && !requesting && ++waited_ms > 10)
-			begin_request(script[step]);
+			next_step();
 	}
 	if (requesting) {
 		advance_request();
