@@ -221,3 +221,16 @@ def test_every_fault_that_is_documented_exists(bench: Bench) -> None:
     for switch in switches:
         bench.fault(switch)
     bench.run(10)
+
+
+def test_wrong_bits_on_i2c_cost_pings_and_nothing_else(bench: Bench) -> None:
+    """Nothing on I2C has a checksum: an impossible reply costs its slot, a possible one is a wrong range; afterwards all is well."""
+    bench.run(1_000)
+    bench.fault("twi_errors=50")
+    found = bench.run(5_000)
+    assert 5 * 22 <= kinds(found)["Ping"] < 5 * 30
+    assert kinds(found)["Gyros"] >= 998
+    assert len({p.time_of_flight_us for p in pings(found, m.Ranger.LEFT)}) > 1
+    bench.fault("twi_errors=0")
+    bench.run(1_000)
+    assert {p.outcome for p in bench.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}

@@ -49,6 +49,8 @@ extern int16_t field[3];
 extern uint64_t random_state; /* for everything that varies from part to part */
 
 uint32_t random_below(uint32_t limit);
+uint8_t disturbed(uint8_t byte, unsigned errors); /* with one wrong bit in so many of 1000 cases */
+bool set_errors(unsigned *errors, const char *value);
 void fail(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2))); /* one line on stderr, exit status 2 */
 avr_int_vector_t *vector(int number);
 
@@ -144,6 +146,7 @@ void twi_init(void);
 void twi_reset(void);
 void twi_add(struct twi_device *device);
 void twi_fault(enum twi_fault fault);
+bool twi_errors(const char *value);
 
 /* spi.c */
 #define SPI_OPEN (-1)

@@ -62,6 +62,8 @@ static bool other_fault(const char *name, const char *value)
 		return clock_fault(value);
 	if (!strcmp(name, "spi_errors"))
 		return spi_errors(value);
+	if (!strcmp(name, "twi_errors"))
+		return twi_errors(value);
 	if (!strcmp(name, "hum"))
 		return floating_hum(value);
 	if (!strcmp(name, "glitch"))

@@ -47,6 +47,22 @@ uint32_t random_below(uint32_t limit)
 	return (uint32_t)((z ^ (z >> 31)) % limit);
 }
 
+uint8_t disturbed(uint8_t byte, unsigned errors)
+{
+	return errors && random_below(1000) < errors ? byte ^ (uint8_t)(1u << random_below(8)) : byte;
+}
+
+bool set_errors(unsigned *errors, const char *value)
+{
+	char *end;
+	unsigned long wanted = strtoul(value, &end, 10);
+
+	if (end == value || *end || wanted > 1000)
+		return false;
+	*errors = (unsigned)wanted;
+	return true;
+}
+
 avr_int_vector_t *vector(int number)
 {
 	for (int i = 0; i < avr->interrupts.vector_count; i++)

@@ -4,8 +4,6 @@
  * In modes 1 and 2 the processor changes MOSI at the rising edge at which parts of modes 0 and 3 sample it. Their level shifters let lines fall
  * fast and rise slowly, so that such a part reads a one only where the bit before and the bit after the edge are both ones, and its answers
  * arrive one bit late. The bit behind a byte is assumed to be a zero. */
-#include <stdlib.h>
-
 #include <simavr/avr_ioport.h>
 #include <simavr/avr_spi.h>
 #include <simavr/sim_cycle_timers.h>
@@ -75,8 +73,8 @@ static avr_cycle_count_t done(avr_t *a, avr_cycle_count_t when, void *param)
 		if (driven != SPI_OPEN)
 			answer = driven;
 	}
-	if (answer != SPI_OPEN && errors && random_below(1000) < errors)
-		answer ^= 1 << random_below(8);
+	if (answer != SPI_OPEN)
+		answer = disturbed((uint8_t)answer, errors);
 	avr_raise_irq(input, answer == SPI_OPEN ? miso_idle() : (uint32_t)answer);
 	return 0;
 }
@@ -107,13 +105,7 @@ static void select_changed(struct avr_irq_t *irq, uint32_t level, void *param)
 
 bool spi_errors(const char *value)
 {
-	char *end;
-	unsigned long wanted = strtoul(value, &end, 10);
-
-	if (end == value || *end || wanted > 1000)
-		return false;
-	errors = (unsigned)wanted;
-	return true;
+	return set_errors(&errors, value);
 }
 
 void spi_init(void)

@@ -29,6 +29,7 @@ enum { /* status codes [data sheet, tables 20-3 and 20-4] */
 #define CLOCKS_TO_FREE 9
 
 static struct twi_device *devices, *active, *stopping;
+static unsigned errors; /* bytes in 1000 that arrive with a wrong bit */
 static enum { IDLE, ADDRESS, WRITING, READING, REFUSED } phase;
 static bool owns_bus;    /* a start condition was sent */
 static uint8_t status;   /* at the end of the operation under way */
@@ -118,6 +119,11 @@ static void stop(void)
 	bus_free_at = avr->cycle + bit_cycles() + bit_cycles() / 2;
 }
 
+bool twi_errors(const char *value)
+{
+	return set_errors(&errors, value);
+}
+
 static void address(uint8_t byte)
 {
 	bool reading = byte & 1, ack = false;
@@ -157,9 +163,9 @@ static void transfer(uint8_t control)
 	}
 	switch (phase) {
 	case ADDRESS: address(byte); break;
-	case WRITING: operate(BITS_PER_BYTE, active->write(active, byte) ? STATUS_WRITE_ACK : STATUS_WRITE_NACK); break;
+	case WRITING: operate(BITS_PER_BYTE, active->write(active, disturbed(byte, errors)) ? STATUS_WRITE_ACK : STATUS_WRITE_NACK); break;
 	case READING:
-		read_byte = line == TWI_GOOD ? active->read(active) : 0;
+		read_byte = line == TWI_GOOD ? disturbed(active->read(active), errors) : 0;
 		operate(BITS_PER_BYTE, control & TWEA ? STATUS_READ_ACK : STATUS_READ_NACK);
 		break;
 	case REFUSED: operate(BITS_PER_BYTE, STATUS_WRITE_NACK); break;
