@@ -2,8 +2,8 @@
 #include "bmp390.h"
 #include "board.h"         /* spi_* */
 #include "configuration.h" /* mode */
+#include "messages.h"      /* FAULT_* */
 #include "parts.h"         /* what was found */
-#include "pressure.h"      /* the role */
 
 /* Registers, values and times [BST-BMP390-DS002, chapters 3 and 4]. */
 #define REGISTER_CHIP_ID 0x00u
@@ -32,7 +32,6 @@
 #define NO_REPLY 0xFFu       /* MISO is pulled up: an absent chip reads as ones */
 
 #define RESET_TICKS (10u * TICKS_PER_MS) /* start-up takes 2 ms */
-#define POLL_TICKS (5u * TICKS_PER_MS)
 #define SAMPLE_MIN_TICKS (50u * TICKS_PER_MS) /* the fast mode needs 80 ms per sample: one that is ready earlier is a stuck flag */
 #define SAMPLE_MAX_TICKS (2u * TICKS_PER_S)
 
@@ -142,20 +141,20 @@ static float pressure_of(uint32_t raw, float t)
 	return offset + r * (slope + r * (p9 + t * p10 + r * p11));
 }
 
-static uint32_t await_sample(uint32_t now)
+static uint8_t await_sample(uint32_t now)
 {
 	earliest = now + SAMPLE_MIN_TICKS;
 	deadline = now + SAMPLE_MAX_TICKS;
-	return now + POLL_TICKS;
+	return FAULT_NONE;
 }
 
-static uint32_t measure(uint32_t now)
+static uint8_t measure(uint32_t now)
 {
 	bool slow = configuration.pressure_mode == PRESSURE_MODE_HIGH_RESOLUTION;
 	if (read8(REGISTER_CHIP_ID) != CHIP_ID)
-		return pressure_failed(now, FAULT_NO_ANSWER);
+		return FAULT_NO_ANSWER;
 	if (!read_coefficients())
-		return pressure_failed(now, FAULT_EEPROM);
+		return FAULT_EEPROM;
 	write8(REGISTER_OSR, slow ? OSR_SLOW : OSR_FAST);
 	write8(REGISTER_ODR, slow ? ODR_SLOW : ODR_FAST);
 	write8(REGISTER_CONFIG, IIR_3);
@@ -169,31 +168,33 @@ static uint32_t raw_of(const uint8_t *bytes)
 	return (uint32_t)bytes[2] << 16 | (uint16_t)(bytes[1] << 8 | bytes[0]);
 }
 
-static uint32_t sample(uint32_t now)
+static uint8_t sample(uint32_t now, struct pressure_step *out)
 {
 	uint8_t d[DATA_SIZE];
 	read(REGISTER_DATA, d, sizeof d);
 	uint32_t raw_pressure = raw_of(d), raw_temperature = raw_of(d + 3);
 	if (raw_pressure == UNMEASURED || raw_temperature == UNMEASURED)
-		return pressure_failed(now, FAULT_BAD_VALUE);
+		return FAULT_BAD_VALUE;
 	float t = temperature_of(raw_temperature), pa = pressure_of(raw_pressure, t);
 	if (!(pa >= 30000.0f && pa <= 125000.0f && t >= -40.0f && t <= 85.0f)) /* measuring range [1] */
-		return pressure_failed(now, FAULT_BAD_VALUE);
-	pressure_report(now, (uint32_t)(pa * COUNTS_PER_PA + 0.5f), (int16_t)(t * COUNTS_PER_DEGREE));
+		return FAULT_BAD_VALUE;
+	out->pressure = (uint32_t)(pa * COUNTS_PER_PA + 0.5f);
+	out->temperature = (int16_t)(t * COUNTS_PER_DEGREE);
 	return await_sample(now);
 }
 
-uint32_t bmp390_run(uint32_t now)
+static uint8_t poll(uint32_t now, struct pressure_step *out)
 {
-	if (!measuring)
-		return measure(now);
 	uint8_t flags = read8(REGISTER_STATUS);
-	if (flags == NO_REPLY)
-		return pressure_failed(now, FAULT_NO_ANSWER);
 	bool ready = flags & STATUS_PRESSURE_READY;
-	if (ready && ticks_reached(now, earliest))
-		return sample(now);
-	if (ready || ticks_reached(now, deadline))
-		return pressure_failed(now, ready ? FAULT_ALWAYS_READY : FAULT_NEVER_READY);
-	return now + POLL_TICKS;
+	if (flags == NO_REPLY)
+		return FAULT_NO_ANSWER;
+	if (ready)
+		return ticks_reached(now, earliest) ? sample(now, out) : FAULT_ALWAYS_READY;
+	return ticks_reached(now, deadline) ? FAULT_NEVER_READY : FAULT_NONE;
+}
+
+void bmp390_run(uint32_t now, struct pressure_step *out)
+{
+	out->fault = measuring ? poll(now, out) : measure(now);
 }

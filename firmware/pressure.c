@@ -8,10 +8,11 @@
 #include "status.h"        /* error counter */
 
 #define RETRY_TICKS TICKS_PER_S          /* from a failure to the next search */
+#define POLL_TICKS (5u * TICKS_PER_MS)   /* between two steps of a driver */
 #define START_UP_TICKS (5u * TICKS_PER_MS) /* of a barometer that got its power together with the board: 2 ms [BMP390] */
 
 static enum { SEARCHING, RUNS_SCP1000, RUNS_BMP390 } state;
-static uint32_t due; /* next call of the driver, ticks */
+static uint32_t due; /* next step, ticks */
 
 /* The BMP390 is sought first: the SCP1000 takes its frames for reads, while some writes to an SCP1000 would reconfigure a BMP390. */
 static uint32_t search(uint32_t now)
@@ -30,18 +31,28 @@ void pressure_start(uint32_t now)
 	due = now + START_UP_TICKS;
 }
 
-uint32_t pressure_failed(uint32_t now, uint8_t fault)
+static void report(uint32_t now, const struct pressure_step *step)
 {
-	status_failed(DEVICE_PRESSURE, fault);
-	state = SEARCHING;
-	return now + RETRY_TICKS;
-}
-
-void pressure_report(uint32_t now, uint32_t pressure, int16_t temperature)
-{
-	struct msg_pressure m = { now, pressure, temperature };
+	struct msg_pressure m = { now, step->pressure, step->temperature };
 	status_ok(DEVICE_PRESSURE);
 	link_send(MSG_PRESSURE, msg_pack_pressure(link_body(), &m));
+}
+
+/* Runs the driver; returns the time of its next step, or of the next search. */
+static uint32_t advance(uint32_t now)
+{
+	struct pressure_step step = { .fault = FAULT_NONE };
+	if (state == RUNS_BMP390)
+		bmp390_run(now, &step);
+	else
+		scp1000_run(now, &step);
+	if (step.pressure)
+		report(now, &step);
+	if (step.fault == FAULT_NONE)
+		return now + POLL_TICKS;
+	status_failed(DEVICE_PRESSURE, step.fault);
+	state = SEARCHING;
+	return now + RETRY_TICKS;
 }
 
 uint32_t pressure_run(uint32_t now)
@@ -50,9 +61,6 @@ uint32_t pressure_run(uint32_t now)
 		due = now + RETRY_TICKS;
 	if (!ticks_reached(now, due))
 		return due;
-	if (state == SEARCHING)
-		due = search(now);
-	else
-		due = state == RUNS_BMP390 ? bmp390_run(now) : scp1000_run(now);
+	due = state == SEARCHING ? search(now) : advance(now);
 	return due;
 }

@@ -11,12 +11,11 @@ void pressure_start(uint32_t now);
 /* Does the next step of the start, or reads a sample that is ready (0.3 ms); returns the time of the next call. */
 uint32_t pressure_run(uint32_t now);
 
-/* For the drivers. */
-
-/* Sends a sample: counts of 0.25 Pa (not 0) and of 0.05 degC, measured at `now`. */
-void pressure_report(uint32_t now, uint32_t pressure, int16_t temperature);
-
-/* Counts the failure (FAULT_*); returns the time at which the barometer is sought anew. */
-uint32_t pressure_failed(uint32_t now, uint8_t fault);
+/* What a driver's step has come to. */
+struct pressure_step {
+	uint32_t pressure;   /* counts of 0.25 Pa; 0: this step has measured none */
+	int16_t temperature; /* counts of 0.05 degC */
+	uint8_t fault;       /* FAULT_*; not FAULT_NONE: the barometer must be sought anew */
+};
 
 #endif

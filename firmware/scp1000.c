@@ -2,8 +2,8 @@
 #include "scp1000.h"
 #include "board.h"         /* spi_* */
 #include "configuration.h" /* mode */
+#include "messages.h"      /* FAULT_* */
 #include "parts.h"         /* what was found */
-#include "pressure.h"      /* the role */
 
 /* Registers and start-up sequence [SCP1000-D01 datasheet]. */
 #define REGISTER_REVISION 0x00u /* never all zeros or ones */
@@ -27,8 +27,6 @@
 
 #define RESET_TICKS (60u * TICKS_PER_MS)         /* busy after a reset */
 #define STARTING_MAX_TICKS (150u * TICKS_PER_MS) /* after that: limit of the start */
-#define STARTING_POLL_TICKS (10u * TICKS_PER_MS)
-#define READY_POLL_TICKS (5u * TICKS_PER_MS)
 #define SAMPLE_MIN_TICKS (50u * TICKS_PER_MS) /* the fast mode needs 110 ms per sample: an earlier DRDY is a stuck line */
 #define SAMPLE_MAX_TICKS (2u * TICKS_PER_S)   /* the slow mode needs 560 ms per sample */
 
@@ -67,14 +65,14 @@ uint32_t scp1000_start(uint32_t now)
 	return now + RESET_TICKS;
 }
 
-static uint32_t await_sample(uint32_t now)
+static uint8_t await_sample(uint32_t now)
 {
 	earliest = now + SAMPLE_MIN_TICKS;
 	deadline = now + SAMPLE_MAX_TICKS;
-	return now + READY_POLL_TICKS;
+	return FAULT_NONE;
 }
 
-static uint32_t measure(uint32_t now)
+static uint8_t measure(uint32_t now)
 {
 	bool slow = configuration.pressure_mode == PRESSURE_MODE_HIGH_RESOLUTION;
 	write8(REGISTER_OPERATION, slow ? OPERATION_HIGH_RESOLUTION : OPERATION_HIGH_SPEED);
@@ -83,41 +81,42 @@ static uint32_t measure(uint32_t now)
 }
 
 /* Polls the start: a chip that answers has left STARTING and passed its EEPROM check before it may measure. */
-static uint32_t check_start(uint32_t now)
+static uint8_t check_start(uint32_t now)
 {
 	uint8_t revision = read8(REGISTER_REVISION);
 	if (revision == NO_REPLY || revision == HELD_LOW)
-		return pressure_failed(now, FAULT_NO_ANSWER);
+		return FAULT_NO_ANSWER;
 	if (!(read8(REGISTER_STATUS) & STATUS_STARTING)) {
 		if (!(read8(REGISTER_DATARD8) & EEPROM_OK))
-			return pressure_failed(now, FAULT_EEPROM);
+			return FAULT_EEPROM;
 		parts_found(DEVICE_PRESSURE, PART_SCP1000, revision);
 		return measure(now);
 	}
-	return ticks_reached(now, deadline) ? pressure_failed(now, FAULT_NEVER_STARTED) : now + STARTING_POLL_TICKS;
+	return ticks_reached(now, deadline) ? FAULT_NEVER_STARTED : FAULT_NONE;
 }
 
-static uint32_t sample(uint32_t now)
+static uint8_t sample(uint32_t now, struct pressure_step *out)
 {
 	uint16_t temperature = read16(REGISTER_TEMPOUT) & TEMPERATURE_MASK;
 	uint8_t high = read8(REGISTER_DATARD8);
 	uint32_t pressure = (uint32_t)(high & PRESSURE_HIGH_MASK) << 16 | read16(REGISTER_DATARD16);
 	if (high == NO_REPLY)
-		return pressure_failed(now, FAULT_NO_ANSWER);
+		return FAULT_NO_ANSWER;
 	if (pressure == MSG_PRESSURE_PRESSURE_INVALID)
-		return pressure_failed(now, FAULT_BAD_VALUE);
-	pressure_report(now, pressure, (int16_t)((int16_t)(temperature ^ TEMPERATURE_SIGN) - TEMPERATURE_SIGN));
+		return FAULT_BAD_VALUE;
+	out->pressure = pressure;
+	out->temperature = (int16_t)((int16_t)(temperature ^ TEMPERATURE_SIGN) - TEMPERATURE_SIGN);
 	return await_sample(now);
 }
 
-uint32_t scp1000_run(uint32_t now)
+static uint8_t poll(uint32_t now, struct pressure_step *out)
 {
-	if (!measuring)
-		return check_start(now);
-	bool ready = spi_pressure_ready();
-	if (ready && ticks_reached(now, earliest))
-		return sample(now);
-	if (ready || ticks_reached(now, deadline))
-		return pressure_failed(now, ready ? FAULT_ALWAYS_READY : FAULT_NEVER_READY);
-	return now + READY_POLL_TICKS;
+	if (spi_pressure_ready())
+		return ticks_reached(now, earliest) ? sample(now, out) : FAULT_ALWAYS_READY;
+	return ticks_reached(now, deadline) ? FAULT_NEVER_READY : FAULT_NONE;
+}
+
+void scp1000_run(uint32_t now, struct pressure_step *out)
+{
+	out->fault = measuring ? poll(now, out) : check_start(now);
 }
