@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "compass.h"
 #include "board.h"         /* twi_* */
+#include "bus.h"           /* it is kept free for triggers */
 #include "cmps10.h"        /* driver */
 #include "configuration.h" /* rate, whether it is enabled */
 #include "lis3mdl.h"       /* driver */
-#include "ranger.h"        /* ranger_quiet: the bus is kept free for triggers */
 #include "status.h"        /* error counter */
 
 #define RETRY_TICKS TICKS_PER_MS /* when the bus is in use, or a trigger is near */
@@ -108,7 +108,7 @@ uint32_t compass_run(uint32_t now)
 		due = now + period;
 		return due;
 	}
-	if (!reading && ticks_reached(now, due) && ranger_quiet(now))
+	if (!reading && ticks_reached(now, due) && bus_is_quiet(now))
 		begin(now);
 	return ticks_reached(now, due) ? now + RETRY_TICKS : due;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "maxsonar.h"
 #include "board.h" /* twi_* */
+#include "bus.h"   /* it is kept free for triggers */
 #include "parts.h" /* what was found */
 
 /* [MaxBotix PD11848, I2CXL-MaxSonar-EZ data sheet] One byte starts a ranging. While it lasts, at least 25 ms, communication is ignored; the
@@ -82,7 +83,7 @@ static enum ranging_state check(uint8_t side, uint32_t now, struct ranging *r, e
 enum ranging_state maxsonar_run(uint8_t side, uint32_t now, struct ranging *r)
 {
 	if (r->stage == BEFORE_PROBE || r->stage == BEFORE_READING) {
-		if (ticks_reached(now, r->due) && ranger_quiet(now))
+		if (ticks_reached(now, r->due) && bus_is_quiet(now))
 			request_result(r);
 		r->next = ticks_reached(now, r->due) ? now + POLL_TICKS : r->due;
 		return RANGING_BUSY;

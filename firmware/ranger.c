@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "ranger.h"
 #include "board.h"         /* ticks */
+#include "bus.h"           /* plan of the triggers */
 #include "configuration.h" /* schedule, enabled rangers */
 #include "link.h"          /* sending the messages */
 #include "maxsonar.h"      /* driver */
@@ -12,9 +13,8 @@
 #define TRIGGER_TRIES 3u
 #define RETRY_TICKS TICKS_PER_MS          /* between tries */
 #define POLL_TICKS (TICKS_PER_MS / 2u)    /* between tries to get the bus */
-#define QUIET_TICKS (5u * TICKS_PER_MS / 4u) /* before a trigger the bus is kept free: longer than any other transfer, of 1.0 ms */
 #define START_TICKS (100u * TICKS_PER_MS) /* longer than a ranging cycle that began before a reset */
-#define HOLD_TICKS (5u * TICKS_PER_MS / 2u) /* between looks at an echo line that is high; longer than QUIET_TICKS: the bus gets its turns */
+#define HOLD_TICKS (5u * TICKS_PER_MS / 2u) /* between looks at an echo line that is high; longer than a trigger keeps the bus free before it */
 #define HOLDS_MAX 120u                    /* 0.3 s: some modules hold their line for up to 0.25 s where there is no echo */
 #define MISSES_MAX 8u                     /* slots without an answer, half a second, after which any kind is sought again */
 
@@ -245,19 +245,19 @@ static void fit_grid(uint32_t now)
 	ranger_start(now);
 }
 
+static void plan_triggers(void)
+{
+	for (uint8_t side = 0; side < 2; side++)
+		bus_plan_trigger(side, may_trigger(&rangers[side]), rangers[side].due);
+}
+
 uint32_t ranger_run(uint32_t now)
 {
 	advance(&rangers[RANGER_LEFT], now);
+	plan_triggers();
 	advance(&rangers[RANGER_RIGHT], now);
 	fit_grid(now);
+	plan_triggers();
 	uint32_t left = wake_time(&rangers[RANGER_LEFT], now), right = wake_time(&rangers[RANGER_RIGHT], now);
 	return ticks_reached(left, right) ? right : left;
-}
-
-bool ranger_quiet(uint32_t now)
-{
-	for (uint8_t i = 0; i < 2; i++)
-		if (may_trigger(&rangers[i]) && ticks_reached(now + QUIET_TICKS, rangers[i].due))
-			return false;
-	return true;
 }

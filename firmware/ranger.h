@@ -10,7 +10,6 @@
 #ifndef ECHOSTEP_RANGER_H
 #define ECHOSTEP_RANGER_H
 
-#include <stdbool.h>
 #include <stdint.h>
 #include "board.h" /* struct twi_transfer */
 
@@ -19,9 +18,6 @@ void ranger_start(uint32_t now);
 
 /* Triggers and reads what is due; returns the time of the next call, unless an interrupt comes earlier. */
 uint32_t ranger_run(uint32_t now);
-
-/* Whether no trigger is due within the next 1.25 ms, which is longer than any other transfer takes. */
-bool ranger_quiet(uint32_t now);
 
 /* For the drivers. A side is RANGER_LEFT or RANGER_RIGHT, which are also its `enum device`. */
 enum ranging_state {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "srf02.h"
 #include "board.h" /* twi_* */
+#include "bus.h"   /* it is kept free for triggers */
 #include "parts.h" /* what was found */
 
 /* [Devantech, SRF02 technical specification] An SRF02 does not answer while it is ranging: at most 65 ms, in practice about 61 ms. */
@@ -86,7 +87,7 @@ enum ranging_state srf02_run(uint8_t side, uint32_t now, struct ranging *r)
 		state = check_trigger(r);
 	else if (r->stage == READING)
 		state = check_result(side, now, r);
-	if (r->stage == RANGING && ticks_reached(now, r->due) && ranger_quiet(now))
+	if (r->stage == RANGING && ticks_reached(now, r->due) && bus_is_quiet(now))
 		request_result(r);
 	r->next = r->stage != RANGING ? now + RANGER_IDLE_TICKS : ticks_reached(now, r->due) ? now + POLL_TICKS : r->due;
 	return state;

@@ -90,7 +90,7 @@ def gyro_health(found_all: list[m.Message]) -> dict[int, m.GyroHealth]:
 def test_the_gyros_test_themselves_at_the_start(bench: Bench) -> None:
     first = [g for g in bench.run(1_000) if isinstance(g, m.Gyros)]
     tested = [g for g in first if g.thigh == g.calf == g.belt == -32768]
-    assert 95 <= len(tested) <= 112  # half a second without rates
+    assert 139 <= len(tested) <= 156  # 0.72 s without rates
     assert not any(-32768 in g[1:] for g in first[len(tested) :])
     bench.run(1_000)
     found = gyro_health(bench.messages)
@@ -103,7 +103,7 @@ def test_the_gyros_test_themselves_at_the_start(bench: Bench) -> None:
     [
         ("absent", m.SelfTest.NO_ANSWER),
         ("wrong_channel", m.SelfTest.NO_ANSWER),
-        ("zeros", m.SelfTest.FAILED),
+        ("zeros", m.SelfTest.NO_ANSWER),
         ("stuck", m.SelfTest.FAILED),
         ("no_self_test", m.SelfTest.FAILED),
         ("ok", m.SelfTest.PASSED),
