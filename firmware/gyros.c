@@ -6,7 +6,7 @@
 #include "link.h"          /* sending the messages */
 #include "lsm6dso.h"       /* driver */
 #include "parts.h"         /* what was found */
-#include "selftest.h"      /* receives the rates while a self-test runs */
+#include "selftest.h"      /* receives the rates while a self-test runs, and says how to excite the parts */
 #include "status.h"        /* error counters */
 
 #define START_UP_TICKS (20u * TICKS_PER_MS)   /* from a configuration to the first sample */
@@ -34,7 +34,7 @@ static struct {
 } gyros[GYROS] = { { .misses = MISSES_MAX }, { .misses = MISSES_MAX }, { .misses = MISSES_MAX } };
 
 static uint8_t warming; /* samples until an LSM6DSO that was switched on has rates: a self-test waits */
-static bool excited;    /* by a self-test */
+static enum excitation excitation; /* in force */
 /* Times in ticks of the board's clock. */
 static uint32_t due;        /* next sample */
 static uint32_t health_due; /* next `gyro_health` messages */
@@ -107,7 +107,7 @@ static void note(uint8_t gyro, uint8_t fault)
 static int16_t in_units_of_gyros(int16_t rate)
 {
 	int32_t scaled = (int32_t)rate * 18809;
-	return (int16_t)(((excited ? 2 * scaled : scaled) + 65536) >> 17);
+	return (int16_t)(((excitation != EXCITE_NONE ? 2 * scaled : scaled) + 65536) >> 17);
 }
 
 static void set_axes(uint8_t gyro, const int16_t *values)
@@ -162,8 +162,21 @@ static bool any_six_axes(void)
 	return parts_in(DEVICE_THIGH) == PART_LSM6DSO || parts_in(DEVICE_CALF) == PART_LSM6DSO || parts_in(DEVICE_BELT) == PART_LSM6DSO;
 }
 
+/* Applies the self-test's excitation when it has changed. */
+static void excite(void)
+{
+	if (excitation == selftest_excitation())
+		return;
+	excitation = selftest_excitation();
+	spi_excite_gyros(excitation);
+	for (uint8_t k = 0; k < GYROS; k++)
+		if (gyros[k].kind == LSM6DSO)
+			lsm6dso_excite(devices[k].chip, excitation);
+}
+
 static void sample(void)
 {
+	excite();
 	prepare();
 	struct msg_gyros m = { clock_now(), MSG_GYROS_INVALID, MSG_GYROS_INVALID, MSG_GYROS_INVALID };
 	const int16_t rates[GYROS] = { rate(GYRO_THIGH), rate(GYRO_CALF), rate(GYRO_BELT) };
@@ -215,15 +228,6 @@ static void report_health(void)
 		struct msg_gyro_health m = { clock_now(), k, counts, test->outcome, test->response[0], test->response[1] };
 		link_send(MSG_GYRO_HEALTH, msg_pack_gyro_health(link_body(), &m));
 	}
-}
-
-void gyros_excite(enum excitation excitation)
-{
-	excited = excitation != EXCITE_NONE;
-	spi_excite_gyros(excitation);
-	for (uint8_t k = 0; k < GYROS; k++)
-		if (gyros[k].kind == LSM6DSO)
-			lsm6dso_excite(devices[k].chip, excitation);
 }
 
 uint32_t gyros_run(uint32_t now)

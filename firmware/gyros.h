@@ -5,7 +5,6 @@
 #define ECHOSTEP_GYROS_H
 
 #include <stdint.h>
-#include "board.h" /* enum excitation */
 
 #define GYROS 3u
 #define GYROS_RATE_MIN_HZ 10u
@@ -16,8 +15,5 @@ void gyros_start(uint32_t now);
 
 /* Samples when a sample is due (0.1 to 0.4 ms); returns the time of the next call. */
 uint32_t gyros_run(uint32_t now);
-
-/* For the self-test: its inputs of all gyros. */
-void gyros_excite(enum excitation excitation);
 
 #endif

@@ -52,7 +52,6 @@ static void enter(enum part next)
 	samples = 0;
 	for (uint8_t k = 0; k < GYROS; k++)
 		clear_window(&gyros[k]);
-	gyros_excite(next == DOWN ? EXCITE_ST1 : next == UP ? EXCITE_ST2 : EXCITE_NONE);
 }
 
 void selftest_begin(void)
@@ -65,6 +64,11 @@ void selftest_begin(void)
 		g->result.response[0] = g->result.response[1] = MSG_GYRO_HEALTH_INVALID;
 	}
 	enter(REST);
+}
+
+enum excitation selftest_excitation(void)
+{
+	return part == DOWN ? EXCITE_ST1 : part == UP ? EXCITE_ST2 : EXCITE_NONE;
 }
 
 bool selftest_running(void)

@@ -5,6 +5,7 @@
 
 #include <stdbool.h>
 #include <stdint.h>
+#include "board.h" /* enum excitation */
 #include "gyros.h" /* GYROS */
 
 /* Result of one gyro's last test. */
@@ -17,6 +18,9 @@ struct selftest_result {
 void selftest_begin(void);
 
 bool selftest_running(void);
+
+/* What the gyros' inputs must be now. */
+enum excitation selftest_excitation(void);
 
 /* Adds one sample of the three gyros (counts; MSG_GYROS_INVALID: no answer) to the running test, every 5 ms. The last one ends it. */
 void selftest_add_rates(const int16_t rate[GYROS]);
