@@ -129,15 +129,22 @@ def test_silence_makes_a_position_wide_and_lost() -> None:
     fresh = stamped(report(), 2, UNIX, 0.5, 0)
     silent = stamped(report(), 3, UNIX, 4.0, 0)
     assert fresh.position
-    assert silent.position
-    assert silent.place
+    assert silent.last_place
     assert (fresh.status, fresh.position.xx_m2) == ("tracking", POSITION.xx_m2)
-    assert (silent.status, silent.position.age_s) == ("lost", 4.0)
-    assert silent.position.xx_m2 == pytest.approx(POSITION.xx_m2 + 36.0)
-    assert silent.position.radius95_m > 14.0
-    assert silent.place.sd_m == pytest.approx(math.hypot(PLACE.sd_m, 6.0))
+    assert (silent.status, silent.position, silent.place, silent.last_place.age_s) == ("lost", None, None, 4.0)
+    assert silent.last_place.xx_m2 == pytest.approx(POSITION.xx_m2 + 36.0)
+    assert silent.last_place.radius95_m > 14.0
     assert aged(POSITION, 0.0) == POSITION
     decode(encode(silent))
+
+
+def test_a_position_is_known_until_it_is_older_than_an_estimate_can_be() -> None:
+    sharp = report(position=replace(POSITION, xx_m2=0.0, xy_m2=0.0, yy_m2=0.0, radius95_m=0.0))
+    assert stamped(sharp, 3, UNIX, 2.5, 0).status == "lost"  # 2.5 s at 1.5 m/s: 9 m
+    settled = stamped(sharp, 3, UNIX, 2.0, 0)
+    assert settled.position
+    assert settled.place
+    assert (settled.status, settled.place.sd_m, settled.last_place) == ("tracking", PLACE.sd_m, None)
 
 
 def test_a_heartbeat_repeats_the_last_report(monkeypatch: pytest.MonkeyPatch) -> None:

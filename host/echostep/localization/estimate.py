@@ -259,6 +259,14 @@ def _heights(cloud: Cloud, weight: Floats) -> tuple[tuple[float, ...], float, fl
     return tuple(share.tolist()), z, math.sqrt(float(weight @ (cloud.z_m - z) ** 2))
 
 
+def claims_place(status: str) -> bool:
+    """Whether a position of this status is a place that may be named, drawn or sent; a lost one may lie in none of the places that fit.
+
+    The one rule for page, terminal, reports, TAK, maps and the summary of a run. Without a plan only the page differs: it draws the end of the path.
+    """
+    return status != TrackStatus.LOST
+
+
 def unobserved(last: Estimate, t_s: float) -> Estimate:
     """An estimate carried on to `t_s` without measurements: the position spreads at WALKER_M_S, the heading is unknown."""
     more = (WALKER_M_S * max(t_s - last.t_s, 0.0)) ** 2

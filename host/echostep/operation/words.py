@@ -78,7 +78,7 @@ def summary_words(members: Sequence[Member], now_s: float) -> str:
 
 def level_on(plan: Plan, m: Member) -> int | None:
     """The plan's level that a member is on; None without a position, and when it was tracked on another plan."""
-    p = m.report.position
+    p = m.report.last_known
     if p is None or m.report.plan_sha256 != plan.digest or not 0 <= p.floor < len(plan.levels):
         return None
     return p.floor
@@ -102,7 +102,8 @@ def shown_wearer(
 ) -> ShownWearer:
     """The row of a member: "2nd floor, near stairs B, within 0.4 m, heard 2 s ago"."""
     state, p = m.state(now_s), m.position(now_s)
-    parts = [STATES[state], *(place_words(p) if p else ()), heard_words(m.silent_s(now_s))]
+    place = () if p is None else place_words(p) if m.report.position else last_place_words(p)
+    parts = [STATES[state], *place, heard_words(m.silent_s(now_s))]
     words = ", ".join(filter(None, parts))
     remarks, key = notes(m, plan, now_s, duplicates), alarm_key(m)
     ack = board.acks.get(key) if key else None
@@ -119,6 +120,11 @@ def place_words(p: Position) -> tuple[str, str, str]:
     if p.protection_m is not None:
         return p.floor_name, p.where, f"within {metres(p.protection_m)}"
     return p.floor_name, p.where, f"±{metres(p.radius95_m)}"
+
+
+def last_place_words(p: Position) -> tuple[str, ...]:
+    """Floor and place where a lost wearer was last known to be, and how long ago that was."""
+    return f"last known {p.age_s:.0f} s ago", p.floor_name, p.where
 
 
 def heard_words(silent_s: float) -> str:
@@ -140,7 +146,9 @@ def shown_details(
     r, p = m.report, m.position(now_s)
     rows = [("alarm", alarm_words(replace(r.alarm, age_s=r.alarm.age_s + m.silent_s(now_s))))] if r.alarm else []
     rows += [("state", m.state(now_s).value), ("heard", heard_words(m.silent_s(now_s)).removeprefix("heard "))]
-    if p:
+    if p and not r.position:
+        rows += [("place", "not known"), ("last known", ", ".join(filter(None, last_place_words(p))))]
+    elif p:
         rows += [("floor", f"{p.floor_name} ({100.0 * p.floor_probability:.0f} %)"), ("place", p.where or "not named")]
         rows += [("position", f"x {p.x_m:.1f}, y {p.y_m:.1f} m"), ("95 % within", metres(p.radius95_m))]
         rows += [("safe radius", metres(p.protection_m) if p.protection_m is not None else "none")]

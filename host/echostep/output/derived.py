@@ -25,7 +25,7 @@ from echostep.board.messages import (
 )
 from echostep.errors import EchostepError
 from echostep.extras import lacks
-from echostep.localization.estimate import Estimate
+from echostep.localization.estimate import Estimate, claims_place
 from echostep.output.foxglove import (
     ELLIPSE,
     LEFT_BEAM,
@@ -178,7 +178,7 @@ class Derived:
 
     def _location(self, e: Estimate, t_ns: int) -> list[DerivedMessage]:
         georeference = self._tracker.plan.georeference
-        if self._earth is None or georeference is None:
+        if self._earth is None or georeference is None or not claims_place(e.status):
             return []
         longitude, latitude = self._earth.degrees(np.array([[e.x_m, e.y_m]]))[0].tolist()
         ee, en, nn = east_north(georeference.rotation_rad, e.xx_m2, e.xy_m2, e.yy_m2)

@@ -41,12 +41,12 @@ INSERT INTO gpkg_spatial_ref_sys VALUES ('WGS 84', {WGS84}, 'EPSG', {WGS84}, '{_
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """A table of features: `kind` is POINT or LINESTRING; `columns` are names with SQL types; a row is a geometry and one value per column."""
+    """A table of features: `kind` is POINT or LINESTRING; `columns` are names with SQL types; a row: a geometry or None, and one value per column."""
 
     name: str
     kind: str
     columns: Sequence[tuple[str, str]]
-    rows: Sequence[tuple[BaseGeometry, tuple[float | int | str | None, ...]]]
+    rows: Sequence[tuple[BaseGeometry | None, tuple[float | int | str | None, ...]]]
 
 
 def write_geopackage(path: Path, layers: Sequence[Layer]) -> None:
@@ -67,7 +67,8 @@ def _write(connection: sqlite3.Connection, layer: Layer) -> None:
     connection.execute(
         f"CREATE TABLE {layer.name} (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom {layer.kind}{columns})"
     )
-    bounds = [float(v) for v in shapely.total_bounds([geometry for geometry, _ in layer.rows])]
+    known = [geometry for geometry, _ in layer.rows if geometry is not None]
+    bounds = [float(v) for v in shapely.total_bounds(known)] if known else [None] * 4
     connection.execute(
         "INSERT INTO gpkg_contents (table_name, data_type, identifier, min_x, min_y, max_x, max_y, srs_id) VALUES (?, 'features', ?, ?, ?, ?, ?, ?)",
         (layer.name, layer.name, *bounds, WGS84),
@@ -79,7 +80,7 @@ def _write(connection: sqlite3.Connection, layer: Layer) -> None:
     names = "".join(f", {name}" for name, _ in layer.columns)
     connection.executemany(
         f"INSERT INTO {layer.name} (geom{names}) VALUES ({marks})",
-        [(_blob(geometry), *values) for geometry, values in layer.rows],
+        [(None if geometry is None else _blob(geometry), *values) for geometry, values in layer.rows],
     )
 
 

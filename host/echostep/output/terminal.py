@@ -23,7 +23,7 @@ from rich.text import Text
 
 from echostep.arrays import Octets
 from echostep.board.faults.health import Finding, Severity
-from echostep.localization.estimate import Estimate
+from echostep.localization.estimate import Estimate, claims_place
 from echostep.plan.model import Level
 from echostep.tracker import Tracker
 
@@ -127,7 +127,7 @@ class TerminalView:
     def _level_text(self) -> str:
         """Name, probability and height of the level; empty when the plan has one level."""
         levels, here = self._tracker.plan.levels, self._last
-        if len(levels) < 2 or here is None:
+        if len(levels) < 2 or here is None or not claims_place(here.status):
             return ""
         return f"   level {levels[here.level].name} ({100 * here.levels[here.level]:.0f} %), {here.z_m:.1f} m"
 
@@ -147,7 +147,7 @@ class TerminalView:
         if self._fraction:
             self._progress.update(self._bar, completed=self._fraction())
         parts = [
-            self._canvas.render(self._last),
+            self._canvas.render(self._last if self._last and claims_place(self._last.status) else None),
             Text(describe(self._last) + self._level_text()),
             Text(health(self._tracker), style="grey62"),
             *(Text(str(finding), style="bold red") for finding in findings(self._tracker)),
@@ -161,6 +161,9 @@ def describe(e: Estimate | None) -> str:
     """The estimate as a line of text."""
     if e is None:
         return "waiting for the foot to stand still"
+    if not claims_place(e.status):
+        places = f", {len(e.hypotheses)} places fit" if len(e.hypotheses) > 1 else ""
+        return f"{e.status.value}: place not known{places}   step {e.step}   t {e.t_s:.1f} s"
     return (
         f"{e.status.value}, {e.ellipse95.major_m:.2f} m   x {e.x_m:.2f} m  y {e.y_m:.2f} m  "
         f"heading {math.degrees(e.heading_rad) % 360:.0f}°   step {e.step}   t {e.t_s:.1f} s"

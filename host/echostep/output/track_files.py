@@ -24,7 +24,7 @@ from rich.progress import Progress
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.extras import require
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization.estimate import Estimate, claims_place
 from echostep.output.derived import Derived, earth_of
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.importers.limited import open_limited
@@ -38,7 +38,7 @@ from echostep.tracker import Tracker
 Columns = dict[str, list[Any]]
 
 ELLIPSE_POINTS = 33
-GAP_S = 5.0  # without an estimate, after which a new stretch of a GPX track begins; assumed
+GAP_S = 5.0  # without an estimate, after which a new stretch of a track begins; assumed
 KML = "http://www.opengis.net/kml/2.2"
 COLORS = {"tracking": "ffff8020", "uncertain": "ff20a0ff", "lost": "ff2020ff"}  # alpha, blue, green, red
 
@@ -111,12 +111,13 @@ def with_progress(recording: Recording, title: str) -> Iterator[Portion]:
 
 
 def columns_of(estimates: list[Estimate], plan: Plan) -> Columns:
-    """The estimates' fields by name, and longitude and latitude where the plan has a georeference."""
+    """The estimates' fields by name, and longitude and latitude where the plan has a georeference and the estimate claims a place."""
     columns: Columns = {f.name: [getattr(e, f.name) for e in estimates] for f in fields(Estimate)}
     columns["status"] = [e.status.value for e in estimates]
     columns["hypotheses"] = [" ".join(map(str, e.hypotheses)) for e in estimates]
     if earth := earth_of(plan):
-        columns["longitude_deg"], columns["latitude_deg"] = _degrees(estimates, earth).T.tolist()
+        for name, degrees in zip(("longitude_deg", "latitude_deg"), _degrees(estimates, earth).T.tolist(), strict=True):
+            columns[name] = [v if claims_place(e.status) else None for v, e in zip(degrees, estimates, strict=True)]
     return columns
 
 
@@ -171,16 +172,16 @@ def _write_geopackage(out: Path, track: TrackOnPlan) -> None:
     longitude, latitude = columns.pop("longitude_deg"), columns.pop("latitude_deg")
     kinds = {float: "REAL", int: "INTEGER", str: "TEXT"}
     named = [(name, kinds.get(type(values[0]), "TEXT")) for name, values in columns.items()]
-    points = [shapely.Point(place) for place in zip(longitude, latitude, strict=True)]
+    points = [None if x is None else shapely.Point(x, y) for x, y in zip(longitude, latitude, strict=True)]
     layers = [Layer("estimates", "POINT", named, list(zip(points, zip(*columns.values(), strict=True), strict=True)))]
-    if len(points) > 1:
-        line = shapely.LineString(points)
-        layers.append(Layer("track", "LINESTRING", [("name", "TEXT")], [(line, (track.plan.name,))]))
+    lines = [shapely.LineString([(longitude[k], latitude[k]) for k in ks]) for ks in stretches(track) if len(ks) > 1]
+    if lines:
+        layers.append(Layer("track", "LINESTRING", [("name", "TEXT")], [(line, (track.plan.name,)) for line in lines]))
     write_geopackage(out, layers)
 
 
 def _write_kml(out: Path, track: TrackOnPlan) -> None:
-    """The track as a line, each estimate as a point with its 95 % ellipse."""
+    """The track as lines, each estimate that claims a place as a point with its 95 % ellipse."""
     earth = earth_of(track.plan)
     assert earth is not None
     estimates = track.estimates
@@ -204,15 +205,21 @@ def _write_kml(out: Path, track: TrackOnPlan) -> None:
     _element(span, "begin", moments[0])
     _element(span, "end", moments[-1])
     _element(line_mark, "styleUrl", "#tracking")
-    _element(_element(line_mark, "LineString"), "coordinates", _coordinates(degrees))
+    lines = _element(line_mark, "MultiGeometry")
+    for ks in stretches(track):
+        _element(_element(lines, "LineString"), "coordinates", _coordinates(degrees[ks]))
     folder = _element(document, "Folder")
     _element(folder, "name", "estimates")
     for k, e in enumerate(estimates):
         mark = _element(folder, "Placemark")
         _element(mark, "name", f"{e.t_s:.1f} s")
-        _element(mark, "description", f"step {e.step}, {e.status.value}, 95 % within {e.ellipse95.major_m:.2f} m")
+        placed = claims_place(e.status)
+        within = f"95 % within {e.ellipse95.major_m:.2f} m" if placed else "place not known"
+        _element(mark, "description", f"step {e.step}, {e.status.value}, {within}")
         _element(_element(mark, "TimeStamp"), "when", moments[k])
         _element(mark, "styleUrl", f"#{e.status.value}")
+        if not placed:
+            continue
         geometry = _element(mark, "MultiGeometry")
         _element(_element(geometry, "Point"), "coordinates", _coordinates(degrees[k : k + 1]))
         ring = _element(_element(_element(geometry, "Polygon"), "outerBoundaryIs"), "LinearRing")
@@ -222,20 +229,24 @@ def _write_kml(out: Path, track: TrackOnPlan) -> None:
 
 
 def _write_gpx(out: Path, track: TrackOnPlan) -> None:
-    """The track in stretches in which no estimate is lost and none is more than GAP_S after the one before."""
+    """The track in its stretches."""
     from echostep.output.gpx import write_gpx
 
     earth = earth_of(track.plan)
     assert earth is not None
-    known = [k for k, e in enumerate(track.estimates) if e.status is not TrackStatus.LOST]
-    t_s = np.array([track.estimates[k].t_s for k in known])
-    breaks = np.flatnonzero((np.diff(known) > 1) | (np.diff(t_s) > GAP_S)) + 1
-    stretches = [stretch.tolist() for stretch in np.split(np.array(known, dtype=int), breaks) if len(stretch)]
     rows = [
         (_degrees([track.estimates[k] for k in ks], earth), [track.moments[k] for k in ks] if track.moments else [])
-        for ks in stretches
+        for ks in stretches(track)
     ]
     write_gpx(out, track.plan.name, rows)
+
+
+def stretches(track: TrackOnPlan) -> list[list[int]]:
+    """Indices of the estimates in stretches in which each claims a place and none is more than GAP_S after the one before."""
+    known = [k for k, e in enumerate(track.estimates) if claims_place(e.status)]
+    t_s = np.array([track.estimates[k].t_s for k in known])
+    breaks = np.flatnonzero((np.diff(known) > 1) | (np.diff(t_s) > GAP_S)) + 1
+    return [stretch.tolist() for stretch in np.split(np.array(known, dtype=int), breaks) if len(stretch)]
 
 
 def _element(parent: ET.Element, name: str, text: str | None = None, **attributes: str) -> ET.Element:

@@ -111,12 +111,14 @@ class ShownEstimate:
     """The estimate as the page reads it: position, `where` in words, 95 % ellipse, heading, status, share of the particles on each level.
 
     `protection_m`: the error is beyond it at a risk of 1 in 1,000; None where no radius is that safe. `hypotheses`: while several places fit.
+    `placed`: it claims a place; otherwise no position is written or drawn.
     """
 
     x_m: float
     y_m: float
     level: int
     where: str
+    placed: bool
     major_m: float
     minor_m: float
     angle_rad: float
@@ -227,12 +229,14 @@ def walls(plan: Plan, level: int) -> bytes:
 class FrameParts:
     """What a frame has beside its scene, for one page.
 
-    `where`: of the estimate. `places`: of its hypotheses, in words. `trail`: float32 rows x, y, level, the first numbered `trail_from`.
+    `where`: of the estimate, which claims a place if `placed`. `places`: of its hypotheses, in words. `trail`: float32 rows x, y, level, the first
+    numbered `trail_from`.
     `particles`, `drawing`: None when the page has them already. `play`: state of a replay. `ended`: how well the run went, when this is its end.
     """
 
     seq: int
     where: str = ""
+    placed: bool = True
     places: tuple[str, ...] = ()
     trail: bytes = b""
     trail_from: int = 0
@@ -291,6 +295,7 @@ def _estimate(scene: PageScene, parts: FrameParts) -> ShownEstimate | None:
         y_m=e.y_m,
         level=e.level,
         where=parts.where,
+        placed=parts.placed,
         **e.ellipse95._asdict(),
         heading_rad=e.heading_rad,
         heading_sd_rad=min(e.heading_sd_rad, np.pi),

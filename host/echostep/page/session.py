@@ -15,7 +15,7 @@ from collections import deque
 from starlette.websockets import WebSocket
 
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate
+from echostep.localization.estimate import Estimate, claims_place
 from echostep.page import protocol, requests
 from echostep.page.elements.drawn_walls import NO_DRAWING, ShownDrawing
 from echostep.page.elements.guidance import Destination, ShownGuidance
@@ -161,6 +161,7 @@ class PageSession(GuardedSocket):
         parts = protocol.FrameParts(
             seq=self._seq,
             where=self._shared.taps.where(scene.estimate) if scene.estimate else "",
+            placed=self._is_placed(scene),
             places=self._shared.taps.places(scene.estimate) if scene.estimate else (),
             trail=self._mailbox.trail.part(begin, scene.trail_count),
             trail_from=begin,
@@ -176,6 +177,10 @@ class PageSession(GuardedSocket):
         self._marks, self._team, self._drawing = self._mailbox.marks, self._mailbox.team, drawing
         self._last, self._trail_count, self._particles = scene, scene.trail_count, scene.particles
         return protocol.frame(scene, parts)
+
+    def _is_placed(self, scene: PageScene) -> bool:
+        """Whether the estimate is shown as a place; without a plan it is the end of the drawn path in any case."""
+        return scene.estimate is not None and (claims_place(scene.estimate.status) or not self._mailbox.plan.is_drawn)
 
     def _guidance(self, scene: PageScene) -> ShownGuidance | None:
         """Guidance to the destination chosen on a page, else the run's; starts a search for a route when one is due."""

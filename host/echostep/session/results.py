@@ -13,7 +13,7 @@ from pathlib import Path
 from echostep.errors import EchostepError
 from echostep.extras import lacks
 from echostep.guidance.cue_list import CueList
-from echostep.localization.estimate import Estimate, digest
+from echostep.localization.estimate import Estimate, claims_place, digest
 from echostep.output.track_plot import draw_track, write_track
 from echostep.plan.model import Plan
 from echostep.plan.places.whereabouts import Whereabouts
@@ -113,7 +113,9 @@ def _print_summary(result: Result, plan: Plan, deviation: Errors | None) -> None
     estimates, end = result.estimates, result.estimates[-1]
     if result.losses:
         console.print(f"walk: {result.losses}", highlight=False)
-    if words := Whereabouts(plan).words(end.x_m, end.y_m, end.level):
+    if not claims_place(end.status):
+        console.print("end: place not known")
+    elif words := Whereabouts(plan).words(end.x_m, end.y_m, end.level):
         floor = f", {plan.levels[end.level].name}" if len(plan.levels) > 1 else ""
         console.print(f"end: {words}{floor}", markup=False, highlight=False)
     if result.elapsed_s:

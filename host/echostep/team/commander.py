@@ -117,7 +117,7 @@ def _cells(
         "x, y m": f"{p.x_m:.1f}, {p.y_m:.1f}" if p else "",
         "±95% m": f"{p.radius95_m:.1f}" if p else "",
         "floor": p.floor_name if p else "",
-        "where": p.where if p else "",
+        "where": "" if p is None else p.where if r.position else f"last: {p.where}" if p.where else "last",
         "to start": "" if from_start is None else f"{from_start:.0f} m",
         "looks": "" if p is None or p.heading_rad is None else f"{math.degrees(p.heading_rad) % 360:.0f}°",
         "nearest m": f"{near[0]:.1f} {near[1].report.name}" if near else "",
@@ -128,7 +128,7 @@ def _cells(
 
 def _state(m: Member, now_s: float) -> str:
     """State, and for how long no report or no estimate has come."""
-    state, silent_s, p = m.state(now_s), m.silent_s(now_s), m.report.position
+    state, silent_s, p = m.state(now_s), m.silent_s(now_s), m.report.last_known
     is_current = state not in (MemberState.STALE, MemberState.ENDED) and silent_s <= m.stale_after_s
     if is_current:
         return f"{state}, no estimate {p.age_s:.0f} s" if p and p.age_s > NO_ESTIMATE_S else state.value

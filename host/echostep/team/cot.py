@@ -24,7 +24,7 @@ from echostep.team.messages.report import Report, ReportedAlarm, ReportedPlace
 
 FRIEND_ON_FOOT = "a-f-G-U-C"  # friendly, ground, unit, combat
 EMERGENCY, EMERGENCY_OVER = "b-a-o-tbl", "b-a-o-can"  # alarm, other: ATAK's "911 Alert" and its cancelling
-UNKNOWN = "9999999.0"  # value of `hae` and `le` when they are not known [CoT Event 2.0 schema]
+UNKNOWN = "9999999.0"  # value of `hae`, `ce` and `le` when they are not known [CoT Event 2.0 schema]
 HOW = {"live": "m-f", "replay": "m-r", "simulated": "m-s"}  # made by a machine: fused now, relayed, simulated [schema]
 SOCKET_TIMEOUT_S = 3.0  # for connecting and for sending
 GROUPS = {
@@ -56,17 +56,17 @@ def event(report: Report) -> bytes | None:
 
 
 def events(report: Report) -> list[bytes]:
-    """The event of a report, and that of its emergency if there is one; empty without a position on Earth."""
+    """The event of a report, unless it has no position on Earth, and that of its emergency if there is one."""
     return [made for made in (event(report), emergency(report)) if made is not None]
 
 
 def emergency(report: Report) -> bytes | None:
-    """A mayday as TAK's emergency, or its end; None without a mayday or a position on Earth.
+    """A mayday as TAK's emergency, or its end; None without a mayday. It goes out without a position on Earth too: its point is then unknown.
 
     The form is that of ATAK: uid of the wearer and "-9-1-1", a link to the wearer, `emergency` in the detail.
     """
     alarm, place = report.alarm, report.place
-    if alarm is None or alarm.kind == "asking" or place is None or report.position is None:
+    if alarm is None or alarm.kind == "asking":
         return None
     over = alarm.kind == "over"
     of, kind = uid(report.team, report.name), EMERGENCY_OVER if over else EMERGENCY
@@ -87,15 +87,17 @@ def uid(team: str, name: str) -> str:
 
 
 def remarks(report: Report) -> str:
-    """Status, 95 % radius, room and floor, age, and other facts for which the event has no field."""
+    """Status, 95 % radius, room and floor (of a lost wearer the last known ones), age, and other facts for which the event has no field."""
     p = report.position
-    words = [f"{report.status}, 95 % within {p.radius95_m:.1f} m" if p else report.status]
+    words = [f"{report.status}, 95 % within {p.radius95_m:.1f} m" if p else f"{report.status}, place not known"]
     if report.alarm:
         words.insert(0, alarm_words(report.alarm))
     if p:
         words.append(", ".join(filter(None, (p.where, p.floor_name))))
         if p.age_s > 1.0:
             words.append(f"no estimate for {p.age_s:.0f} s")
+    elif last := report.last_place:
+        words.append(", ".join(filter(None, (f"last known {last.age_s:.0f} s ago", last.where, last.floor_name))))
     if report.motion:
         words.append(f"still for {report.motion.still_s:.0f} s")
     words.append(f"team {report.team}")
@@ -116,7 +118,7 @@ def alarm_words(alarm: ReportedAlarm) -> str:
     return f"{kind}: {why[alarm.reason]}"
 
 
-def _begun(report: Report, place: ReportedPlace, of: str, kind: str) -> ElementTree.Element:
+def _begun(report: Report, place: ReportedPlace | None, of: str, kind: str) -> ElementTree.Element:
     """An event of this uid and type with its times and its point."""
     top = ElementTree.Element("event", version="2.0", uid=of, type=kind)
     top.attrib |= {
@@ -129,8 +131,10 @@ def _begun(report: Report, place: ReportedPlace, of: str, kind: str) -> ElementT
     return top
 
 
-def _point(place: ReportedPlace) -> dict[str, str]:
-    """Attributes of a `point`."""
+def _point(place: ReportedPlace | None) -> dict[str, str]:
+    """Attributes of a `point`; None: one that is not known, as ATAK sends it without a fix."""
+    if place is None:
+        return {"lat": "0.0", "lon": "0.0", "hae": UNKNOWN, "ce": UNKNOWN, "le": UNKNOWN}
     hae, le = (UNKNOWN if v is None else f"{v:.2f}" for v in (place.hae_m, place.hae_sd_m))
     lat, lon = f"{place.lat_deg:.8f}", f"{place.lon_deg:.8f}"
     return {"lat": lat, "lon": lon, "hae": hae, "ce": _rounded_up(place.sd_m), "le": le}

@@ -18,7 +18,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from echostep.localization.estimate import RISK, WALKER_M_S, ellipse95, trust
+from echostep.localization.estimate import RISK, WALKER_M_S, claims_place, ellipse95, trust
 from echostep.team.messages.report import Position, Report, moment
 
 # After so long without a new estimate the last one is sent again, with its age and a larger covariance
@@ -181,20 +181,27 @@ def _reason(error: Exception) -> str:
 
 
 def stamped(report: Report, sequence: int, unix_s: float, age_s: float, overtaken: int) -> Report:
-    """The report with its number, the time of sending, and a covariance that grows with the age of its position."""
-    position = report.position and aged(report.position, max(age_s, 0.0))
-    return replace(
+    """The report with its number, the time of sending, and a covariance that grows with the age of its position, until that is lost."""
+    age_s, last, place = max(age_s, 0.0), report.last_place, report.place
+    position = report.position and aged(report.position, age_s)
+    status = report.status if position is None or age_s <= SETTLED_S else trust(position.radius95_m).value
+    last = position if position and not claims_place(status) else last and aged(last, last.age_s + age_s)
+    if position and place:
+        place = replace(place, sd_m=(place.sd_m**2 + _walk_variance_m2(age_s)) ** 0.5)
+    report = replace(
         report,
         sequence=sequence,
         time=moment(unix_s),
         stale=moment(unix_s + VALID_S),
         superseded=overtaken,
-        position=position,
-        status=report.status if position is None or position.age_s <= SETTLED_S else trust(position.radius95_m).value,
-        place=report.place if position is None or report.place is None else replace(
-            report.place, sd_m=(report.place.sd_m**2 + _walk_variance_m2(position.age_s)) ** 0.5
-        ),
-    )  # fmt: skip
+        status=status,
+    )
+    return without_place(report, last) if last else replace(report, position=position, place=place)
+
+
+def without_place(report: Report, last: Position | None) -> Report:
+    """The report of a lost wearer: without position and place on Earth, with the last position that was known."""
+    return replace(report, position=None, place=None, last_place=last)
 
 
 def aged(position: Position, age_s: float) -> Position:

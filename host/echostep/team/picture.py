@@ -29,8 +29,8 @@ def draw_team(path: Path, plan: Plan, members: Sequence[Member], now_s: float) -
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
-    placed = [m for m in members if m.report.position is not None and 0 <= m.report.position.floor < len(plan.levels)]
-    floors = sorted({m.report.position.floor for m in placed if m.report.position}) or [0]
+    placed = [m for m in members if (p := m.report.last_known) is not None and 0 <= p.floor < len(plan.levels)]
+    floors = sorted({p.floor for m in placed if (p := m.report.last_known)}) or [0]
     figure = Figure(figsize=(10, 6 * len(floors)), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     for k, floor in enumerate(floors):

@@ -19,7 +19,7 @@ from types import TracebackType
 from typing import Literal, Self
 
 from echostep.errors import EchostepError
-from echostep.localization.estimate import CHI2_95, Estimate, TrackStatus
+from echostep.localization.estimate import CHI2_95, Estimate, TrackStatus, claims_place
 from echostep.plan.model import Level, Plan
 from echostep.plan.places.whereabouts import Whereabouts
 from echostep.team.cot import StreamTransport, UdpTransport
@@ -35,7 +35,7 @@ from echostep.team.messages.report import (
     moment,
     printable,
 )
-from echostep.team.outbox import HEARTBEAT_S, Outbox, Transport
+from echostep.team.outbox import HEARTBEAT_S, Outbox, Transport, without_place
 from echostep.tracker import Tracker
 
 Source = Literal["live", "replay", "simulated"]
@@ -69,6 +69,7 @@ class Publishing:
         transports = [(_transport(e, tracker.plan, outlet, run, print_line), str(e)) for e in outlet.endpoints]
         self._outboxes = [Outbox(transport, name, print_line) for transport, name in transports]
         self._last = self._empty
+        self._known: Position | None = None  # the last position that was a place
         self._offer(self._empty)
 
     def publish(self, estimates: Sequence[Estimate]) -> None:
@@ -85,9 +86,18 @@ class Publishing:
             motion = self._history.motion(estimate)
             report = report_of(self._empty, self._levels, self._ground, estimate, motion, streams)
             assert report.position
-            position, recorded = replace(report.position, where=where), self._recorded_at(estimate.t_s)
-            tilt_deg = reported_tilt_deg(self._tracker)
-            self._offer(replace(report, position=position, recorded=recorded, alarm=alarm, trunk_tilt_deg=tilt_deg))
+            report = replace(report, position=replace(report.position, where=where))
+            if claims_place(report.status):
+                self._known = report.position
+            else:
+                report = without_place(report, self._last_place(estimate.t_s))
+            recorded, tilt_deg = self._recorded_at(estimate.t_s), reported_tilt_deg(self._tracker)
+            self._offer(replace(report, recorded=recorded, alarm=alarm, trunk_tilt_deg=tilt_deg))
+
+    def _last_place(self, t_s: float) -> Position | None:
+        """The last known position with its age; its covariance grows when it is sent."""
+        known = self._known
+        return None if known is None else replace(known, age_s=min(max(t_s - known.t_s, 0.0), 1e9))
 
     def _offer_alarm(self, alarm: ReportedAlarm | None) -> None:
         """Without an estimate, a change of the alarm is reported with the last position."""

@@ -80,8 +80,8 @@ class Member:
         return max(now_s - self.received_s, 0.0)
 
     def position(self, now_s: float) -> Position | None:
-        """Last position; once the report is stale, with a covariance that has grown by the time since then."""
-        p, silent_s = self.report.position, self.silent_s(now_s)
+        """The last known position; once the report is stale, with a covariance that has grown by the time since then."""
+        p, silent_s = self.report.last_known, self.silent_s(now_s)
         if p is None or self.presence == "ended" or silent_s <= self.stale_after_s:
             return p
         return replace(aged(p, silent_s), age_s=p.age_s + silent_s)

@@ -70,7 +70,10 @@ def test_its_end_cancels_the_emergency_and_a_question_is_none() -> None:
     assert cancel is not None
     assert cancel.get("cancel") == "true"
     assert len(events(report(alarm=replace(MAYDAY, kind="asking")))) == 1
-    assert not events(report(alarm=MAYDAY, place=None))
+    (unplaced,) = map(ElementTree.fromstring, events(report(alarm=MAYDAY, place=None)))
+    assert unplaced.get("type") == "b-a-o-tbl"
+    unknown = dict.fromkeys(("hae", "ce", "le"), "9999999.0")
+    assert unplaced.find("point").attrib == {"lat": "0.0", "lon": "0.0"} | unknown  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize(

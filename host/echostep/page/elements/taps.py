@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization.estimate import Estimate, TrackStatus, claims_place
 from echostep.page.elements.scene import KNOWN_HEADING_RAD, PageScene, format_metres
 from echostep.plan.model import Plan
 from echostep.plan.places.spaces import PlanSpaces
@@ -62,8 +62,7 @@ class Taps:
         if self._last[0] is not estimate:
             words = self.whereabouts.words
             places = tuple(words(h.x_m, h.y_m, h.level) for h in estimate.hypotheses)
-            is_anywhere = estimate.status is TrackStatus.LOST and len(places) > 1
-            where = "" if is_anywhere else words(estimate.x_m, estimate.y_m, estimate.level)
+            where = words(estimate.x_m, estimate.y_m, estimate.level) if claims_place(estimate.status) else ""
             self._last = estimate, where, places
         return self._last[1:]
 
@@ -100,7 +99,7 @@ class Taps:
             heading = "Your direction stays: drag to change it."
         else:
             heading = "Drag to where you look, or your direction is found while you walk."
-        if scene is None or estimate is None:
+        if scene is None or estimate is None or not claims_place(estimate.status):
             return [heading]
         away_m = math.dist((x_m, y_m), (estimate.x_m, estimate.y_m))
         moved = estimate.level != check_in.level or away_m > estimate.ellipse95.major_m + DOUBTED_M

@@ -59,7 +59,7 @@ class TeamFeed:
 
     def _member(self, now_s: float) -> Member | None:
         """The wearer of this name: of the own team before another's, running before ended, the latest heard."""
-        named = [m for m in self._roster.members(now_s) if m.report.position is not None]
+        named = [m for m in self._roster.members(now_s) if m.report.last_known is not None]
         return min(named, default=None, key=lambda m: (
             m.report.team != self._team, m.state(now_s) is MemberState.ENDED, m.silent_s(now_s),
         ))  # fmt: skip
@@ -72,7 +72,8 @@ class TeamFeed:
                 self._warned = True
                 self._print_line(f"{self._name} is tracked on another plan ({m.report.plan}): no way can be found")
             return None
-        words = ", ".join(filter(None, (f"on {p.floor_name}" if p.floor_name else "", p.where)))
+        last = "" if m.report.position else "last known"
+        words = ", ".join(filter(None, (last, f"on {p.floor_name}" if p.floor_name else "", p.where)))
         # Rounded to centimetres: an unchanged place is passed on once
         return Teammate(
             m.report.name, round(p.x_m, 2), round(p.y_m, 2), p.floor, round(min(p.radius95_m, 1e7), 1), words

@@ -143,7 +143,7 @@ class ReportedAlarm:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """All of it; `position` is missing until the tracker has its first estimate."""
+    """All of it; `position` is missing until the tracker has its first estimate, and while it is lost."""
 
     echostep_report: Annotated[Literal[1], Meta(description="version of this form")]
     team: Name
@@ -159,7 +159,7 @@ class Report:
             description="waiting: no estimate yet; uncertain: beyond 1 m of 95 % radius; lost: beyond 5 m, or the sensors are silent"
         ),
     ]
-    position: Annotated[Position | None, Meta(description="missing while waiting")]
+    position: Annotated[Position | None, Meta(description="missing while waiting and while lost")]
     motion: Annotated[Motion | None, Meta(description="missing while waiting")]
     place: Annotated[ReportedPlace | None, Meta(description="missing without a georeference")]
     streams: Annotated[StreamReport | None, Meta(description="missing until something is heard")]
@@ -182,6 +182,15 @@ class Report:
             description="angle of the trunk to its direction while walking; missing where the belt has no accelerometer"
         ),
     ] = None
+    last_place: Annotated[
+        Position | None,
+        Meta(description="while lost: the last position that was known, with its age; missing where there was none"),
+    ] = None
+
+    @property
+    def last_known(self) -> Position | None:
+        """The position, or while lost the last one that was known."""
+        return self.position or self.last_place
 
     @property
     def sent_s(self) -> float:
@@ -218,13 +227,17 @@ def decode(payload: bytes) -> Report:
     check_name(report.name)
     if not 0.0 <= report.stale_after_s <= 86_400.0:
         raise BadReportError("stale is not within a day after time")
-    p = report.position
-    if p is not None and p.xy_m2**2 > p.xx_m2 * p.yy_m2 * (1.0 + 1e-9) + 1e-12:
-        raise BadReportError("position: not a covariance")
-    if (p is None) != (report.status == "waiting"):
+    p, findings = report.position, report.streams.findings if report.streams else ()
+    if report.status != "lost" and (p is None) != (report.status == "waiting"):
         raise BadReportError("status and position contradict each other")
-    findings = report.streams.findings if report.streams else ()
-    for text in (report.plan, report.version, p.floor_name if p else "", p.where if p else "", *findings):
+    if report.status != "lost" and report.last_place is not None:
+        raise BadReportError("status and last place contradict each other")
+    texts = [report.plan, report.version, *findings]
+    for q in (p, report.last_place):
+        if q is not None and q.xy_m2**2 > q.xx_m2 * q.yy_m2 * (1.0 + 1e-9) + 1e-12:
+            raise BadReportError("position: not a covariance")
+        texts += [q.floor_name, q.where] if q else []
+    for text in texts:
         if not is_printable(text):
             raise BadReportError("unprintable text")
     return report

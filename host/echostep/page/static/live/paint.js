@@ -40,10 +40,11 @@ export class Painter {
     else if (path.length && !guidance.own) this.flag(view, path.at(-1));
     this.beacons(view, (scene.frame?.beacons ?? []).filter((beacon) => beacon.level === scene.level));
     if (estimate && estimate.level === scene.level) {
-      for (const line of scene.frame.beams) this.echoLine(view, line);
-      this.protection(view, estimate);
-      this.ellipse(view, estimate);
-      this.wearer(view, estimate);
+      // A lost wearer has no sign: only the ellipse about the last place, unless several places fit.
+      if (estimate.placed) for (const line of scene.frame.beams) this.echoLine(view, line);
+      if (estimate.placed) this.protection(view, estimate);
+      if (estimate.placed || !estimate.hypotheses.length) this.ellipse(view, estimate);
+      if (estimate.placed) this.wearer(view, estimate);
     }
     for (const place of estimate?.hypotheses ?? []) if (place.level === scene.level) this.hypothesis(view, place);
     const truth = scene.frame?.truth;

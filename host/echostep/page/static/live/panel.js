@@ -170,7 +170,7 @@ function placesText(estimate, levels) {
 }
 
 function positionText(estimate, levels) {
-  if (estimate.status === 'lost' && estimate.hypotheses.length > 1) return 'no position yet';
+  if (!estimate.placed) return 'no position';
   const degrees = ((estimate.heading_rad * 180) / Math.PI + 360) % 360, spread = Math.round((estimate.heading_sd_rad * 180) / Math.PI);
   const heading = estimate.heading_known ? `${COMPASS[Math.round(degrees / 45) % 8]} ${Math.round(degrees) % 360}° ±${spread}°` : 'heading unknown';
   const floor = levels.length > 1 ? levels[estimate.level].name : '';
