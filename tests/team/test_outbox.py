@@ -21,7 +21,7 @@ from echostep.team.cot import event, uid
 from echostep.team.endpoint import parse_endpoint
 from echostep.team.georeference import GroundPlane
 from echostep.team.messages.report import BadReportError, Report, check_name, decode, encode
-from echostep.team.outbox import Outbox, aged, stamped
+from echostep.team.outbox import Delivery, Outbox, aged, stamped
 from echostep.team.picture import draw_team
 from echostep.team.publish import ReportHistory
 from team.letters import NOW, UNIX, heard, said
@@ -44,11 +44,12 @@ class Recorded:
             raise ConnectionRefusedError("refused")
         self.opened += 1
 
-    def send(self, report: Report) -> None:
+    def send(self, report: Report) -> Delivery:
         self.hold.wait(2.0 * PATIENCE_S)
         if self.broken:
             raise BrokenPipeError("it broke")
         self.sent.append(report)
+        return Delivery.SENT
 
     def close(self, *, ended: bool) -> None:
         pass

@@ -73,7 +73,8 @@ class LivePage:
         self._shared = shared
         self._mailbox = Mailbox(tracker.plan, title, replay=replay, keeps=keeps)
         self.truth: TruePath | None = None  # shown beside the estimates
-        self.has_team = False  # the run's reports go somewhere
+        self.receipt_of: Callable[[int], str] | None = None  # delivery of a mayday; None: the run's reports go nowhere
+        self.team_fault: Callable[[], str] = str  # why reports do not go out at present
         self.acknowledged_by: Callable[[int], str | None] | None = (
             None  # name of the acknowledging commander, by the alarm's number
         )
@@ -190,10 +191,10 @@ class LivePage:
         """The fields of a scene that follow the tracker's state rather than an estimate."""
         state = self._tracker.state
         return {
-            "streams": self._rate_meter.measure(self._tracker, self._arrived_ns),
+            "streams": self._rate_meter.measure(self._tracker, self._arrived_ns, self.team_fault()),
             "undo": None if self._replay else self._undo_clock.offer(state, time.monotonic_ns()),
             "echoes_fit": echoes_fit(state),
-            "alarm": shown_alarm(self._tracker, has_team=self.has_team, acknowledged_by=self.acknowledged_by),
+            "alarm": shown_alarm(self._tracker, receipt_of=self.receipt_of, acknowledged_by=self.acknowledged_by),
             "met": shown_meeting(state),
         }
 

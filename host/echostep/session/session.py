@@ -160,7 +160,8 @@ class Session:
         publishing = Publishing(self.output.outlet, self.tracker, self.source, print_line, clock)
         self._publishing = opened.enter_context(publishing)
         if self.page:
-            self.page.has_team = True
+            self.page.receipt_of = self._publishing.receipt
+            self.page.team_fault = lambda: publishing.fault
 
     def _open_foxglove(self, opened: ExitStack) -> None:
         if self.output.foxglove is None:

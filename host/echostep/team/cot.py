@@ -21,6 +21,7 @@ from xml.etree import ElementTree
 
 from echostep.team.endpoint import Endpoint, tls_context
 from echostep.team.messages.report import Report, ReportedAlarm, ReportedPlace
+from echostep.team.outbox import Delivery
 
 FRIEND_ON_FOOT = "a-f-G-U-C"  # friendly, ground, unit, combat
 EMERGENCY, EMERGENCY_OVER = "b-a-o-tbl", "b-a-o-can"  # alarm, other: ATAK's "911 Alert" and its cancelling
@@ -166,13 +167,16 @@ class UdpTransport:
             self._socket.setsockopt(level, option, MULTICAST_HOPS)
         self._socket.connect(address)
 
-    def send(self, report: Report) -> None:
-        """Send a datagram for each event; an unreachable port is ignored, since the receiver may start later."""
+    def send(self, report: Report) -> Delivery:
+        """Send a datagram for each event; one to an unreachable port is left out, since the receiver may start later."""
         if self._socket is None:
-            return
+            raise ConnectionError("not connected")
+        delivery = Delivery.LEFT_OUT
         for made in events(report):
             with suppress(ConnectionRefusedError, BlockingIOError):
                 self._socket.send(made)
+                delivery = Delivery.SENT
+        return delivery
 
     def close(self, *, ended: bool) -> None:  # noqa: ARG002
         """Close the socket."""
@@ -202,13 +206,15 @@ class StreamTransport:
             plain.close()
             raise
 
-    def send(self, report: Report) -> None:
-        """Send the event; bytes from the server are read and discarded."""
+    def send(self, report: Report) -> Delivery:
+        """Send the events; bytes from the server are read and discarded."""
         if self._socket is None:
             raise ConnectionError("not connected")
         self._drain(self._socket)
         self._socket.settimeout(SOCKET_TIMEOUT_S)
-        self._socket.sendall(b"".join(made + b"\n" for made in events(report)))
+        lines = b"".join(made + b"\n" for made in events(report))
+        self._socket.sendall(lines)
+        return Delivery.SENT if lines else Delivery.LEFT_OUT
 
     def _drain(self, sock: socket.socket) -> None:
         sock.settimeout(0.0)

@@ -138,6 +138,10 @@ class ListenerThread:
         self._tries += 1
         try:
             self._listener.publish(topic, payload)
+        except PermissionError as error:
+            self._drop_first()
+            self._print_line(f"the broker does not accept what is sent on {topic} ({error}): check its access rules")
+            return
         except OSError:
             if self._tries >= MOST_TRIES:
                 self._drop_first()

@@ -16,10 +16,11 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Protocol
 
 from echostep.localization.estimate import RISK, WALKER_M_S, claims_place, ellipse95, trust
-from echostep.team.messages.report import Position, Report, moment
+from echostep.team.messages.report import Position, Report, ReportedAlarm, moment
 
 # After so long without a new estimate the last one is sent again, with its age and a larger covariance
 HEARTBEAT_S = 2.0
@@ -35,13 +36,21 @@ RETRY_PAUSES_S = (0.5, 1.0, 2.0, 4.0, 8.0)  # after the first, second, ... failu
 CLOSING_S = 3.0  # for sending the last reports at the end
 
 
+class Delivery(StrEnum):
+    """What became of a report: the receiver said that it has it; it went out; it did not go out, and a newer one may."""
+
+    ACKNOWLEDGED = "acknowledged"
+    SENT = "sent"
+    LEFT_OUT = "left out"
+
+
 class Transport(Protocol):
     """A connection that sends reports; `open` and `send` raise OSError when it is broken, and block for a few seconds at most."""
 
     def open(self) -> None:
         """Connect."""
 
-    def send(self, report: Report) -> None:
+    def send(self, report: Report) -> Delivery:
         """Send a report, and wait for its acknowledgement if the protocol has one."""
 
     def close(self, *, ended: bool) -> None:
@@ -50,21 +59,27 @@ class Transport(Protocol):
 
 @dataclass(slots=True)
 class OutboxCounts:
-    """Counts of reports; `offered` = `sent` + `overtaken` + those still in the queue."""
+    """Counts of reports; `offered` = `sent` + `left_out` + `overtaken` + those still in the queue."""
 
     offered: int = 0
     sent: int = 0  # without heartbeats
+    left_out: int = 0  # by the transport: no time in the air, no point for a map, nobody listens
     heartbeats: int = 0
     overtaken: int = 0
     breaks: int = 0
 
 
 class Outbox:
-    """`offer` never blocks; `close` sends the newest report before it ends, if the connection works."""
+    """`offer` never blocks; `close` sends the newest report before it ends, if the connection works.
+
+    `fault`: why reports do not go out at present; empty while they do. `delivered`: the newest alarm that went out, and how.
+    """
 
     def __init__(self, transport: Transport, name: str, print_line: Callable[[str], None]) -> None:
         self.counts = OutboxCounts()
-        self._transport, self._name, self._print_line = transport, name, print_line
+        self.fault = ""
+        self.delivered: tuple[ReportedAlarm, Delivery] | None = None
+        self._transport, self.name, self._print_line = transport, name, print_line
         self._queue: deque[tuple[float, Report]] = deque()
         self._last: tuple[float, Report] | None = None
         self._sequence = 0
@@ -96,10 +111,12 @@ class Outbox:
         self.begin_close()
         self._thread.join(CLOSING_S + 6.0)
         c = self.counts
-        unsent = c.offered - c.sent - c.overtaken
+        unsent = c.offered - c.sent - c.overtaken - c.left_out
+        left_out = f", {c.left_out} left out" if c.left_out else ""
+        last = f"; at the end: {self.fault}" if self.fault else ""
         return (
-            f"{self._name}: {c.sent} of {c.offered} reports sent, {c.overtaken} overtaken by newer ones, {unsent} unsent, "
-            f"{c.heartbeats} heartbeats, connection broken {c.breaks} times"
+            f"{self.name}: {c.sent} of {c.offered} reports sent, {c.overtaken} overtaken by newer ones, {unsent} unsent{left_out}, "
+            f"{c.heartbeats} heartbeats, connection broken {c.breaks} times{last}"
         )
 
     def _work(self) -> None:
@@ -123,14 +140,20 @@ class Outbox:
             return
         self._last = entry
         try:
-            self._transport.send(self._stamped(entry))
+            delivery = self._transport.send(self._stamped(entry))
         except OSError:
             if not heartbeat:
                 with self._changed:
                     self._queue.appendleft(entry)
             raise
+        self.fault = ""
+        alarm = entry[1].alarm
+        if alarm and delivery is not Delivery.LEFT_OUT:
+            self.delivered = alarm, delivery
         if heartbeat:
             self.counts.heartbeats += 1
+        elif delivery is Delivery.LEFT_OUT:
+            self.counts.left_out += 1
         else:
             self.counts.sent += 1
 
@@ -160,7 +183,7 @@ class Outbox:
 
     def _print_state(self, text: str) -> None:
         with suppress(OSError, ValueError):  # the terminal may be closed
-            self._print_line(f"{self._name}: {text}")
+            self._print_line(f"{self.name}: {text}")
 
     def _handle_break(self, error: Exception) -> None:
         """Close the connection and wait before the next try; the first failure of a series is printed."""
@@ -168,8 +191,9 @@ class Outbox:
         if self._open:
             self.counts.breaks += 1
         self._open = False
+        self.fault = _reason(error)
         if self._failures == 0:
-            self._print_state(f"{_reason(error)}; tracking goes on, trying again")
+            self._print_state(f"{self.fault}; tracking goes on, trying again")
         pause_s = RETRY_PAUSES_S[min(self._failures, len(RETRY_PAUSES_S) - 1)] * random.uniform(0.8, 1.2)
         self._failures += 1
         with self._changed:

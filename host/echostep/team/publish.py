@@ -35,7 +35,7 @@ from echostep.team.messages.report import (
     moment,
     printable,
 )
-from echostep.team.outbox import HEARTBEAT_S, Outbox, Transport, without_place
+from echostep.team.outbox import HEARTBEAT_S, Delivery, Outbox, Transport, without_place
 from echostep.tracker import Tracker
 
 Source = Literal["live", "replay", "simulated"]
@@ -99,6 +99,23 @@ class Publishing:
         known = self._known
         return None if known is None else replace(known, age_s=min(max(t_s - known.t_s, 0.0), 1e9))
 
+    @property
+    def fault(self) -> str:
+        """Why reports do not go out at present, in a sentence for each endpoint that fails; empty while they do."""
+        return "; ".join(f"{box.name}: {box.fault}" for box in self._outboxes if box.fault)
+
+    def receipt(self, number: int) -> str:
+        """What is known of the delivery of the mayday with this number, in a sentence."""
+        kinds = [
+            delivery for box in self._outboxes if box.delivered
+            for alarm, delivery in (box.delivered,) if (alarm.kind, alarm.number) == ("mayday", number)
+        ]  # fmt: skip
+        if Delivery.ACKNOWLEDGED in kinds:
+            return "The team's broker has it; no commander has acknowledged it yet."
+        if kinds:
+            return "It was sent; whether it has arrived is not known."
+        return f"It has not gone out: {self.fault}." if self.fault else "It is being sent."
+
     def _offer_alarm(self, alarm: ReportedAlarm | None) -> None:
         """Without an estimate, a change of the alarm is reported with the last position."""
         last = self._last.alarm
@@ -133,6 +150,9 @@ class Publishing:
             self._print_line(outbox.close())
 
     def _offer(self, report: Report) -> None:
+        last, alarm = self._last.alarm, report.alarm
+        if alarm and alarm.kind == "mayday" and (last is None or last.kind != "mayday") and self.fault:
+            self._print_line(f"MAYDAY has not gone out: {self.fault}")
         self._last = report
         for outbox in self._outboxes:
             outbox.offer(report)

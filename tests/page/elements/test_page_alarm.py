@@ -28,7 +28,7 @@ TEXT = "document.querySelector('#alarm-text').textContent"
     ("kind", "reason", "age_s", "has_team", "words"),
     [
         (AlarmKind.ASKING, AlarmReason.STILL, 21.4, True, "In 9 s it is a mayday."),
-        (AlarmKind.MAYDAY, AlarmReason.STILL, 40.0, True, "no motion for 40 s. Your team has been alarmed."),
+        (AlarmKind.MAYDAY, AlarmReason.STILL, 40.0, True, "no motion for 40 s. It is being sent."),
         (
             AlarmKind.ASKING,
             AlarmReason.FALL,
@@ -36,17 +36,18 @@ TEXT = "document.querySelector('#alarm-text').textContent"
             True,
             "A fall: are you all right? Walk, or tap. In 26 s it is a mayday.",
         ),
-        (AlarmKind.MAYDAY, AlarmReason.FALL, 14.0, True, "Mayday: a fall 14 s ago. Your team has been alarmed."),
+        (AlarmKind.MAYDAY, AlarmReason.FALL, 14.0, True, "Mayday: a fall 14 s ago. It is being sent."),
         (AlarmKind.MAYDAY, AlarmReason.HELP, 1.0, False, "you asked for help. No team is connected"),
         (AlarmKind.OVER, AlarmReason.HELP, 1.0, True, "The mayday is over."),
     ],
 )
 def test_an_alarm_in_words(kind: AlarmKind, reason: AlarmReason, age_s: float, has_team: bool, words: str) -> None:
     tracker = Tracker(PLAN)
-    assert shown_alarm(tracker, has_team=has_team) is None
+    receipt_of = (lambda _: "It is being sent.") if has_team else None
+    assert shown_alarm(tracker, receipt_of=receipt_of) is None
     tracker.front_end.newest_s = 100.0
     tracker.alarm.alarm = Alarm(kind, reason, 1, 100.0 - age_s, 130.0 - age_s)
-    shown = shown_alarm(tracker, has_team=has_team)
+    shown = shown_alarm(tracker, receipt_of=receipt_of)
     assert shown
     assert words in shown.text
     assert shown.spoken
@@ -56,7 +57,7 @@ def test_who_is_in_distress_is_told_who_knows_of_it() -> None:
     tracker = Tracker(PLAN)
     tracker.front_end.newest_s = 100.0
     tracker.alarm.alarm = Alarm(AlarmKind.MAYDAY, AlarmReason.HELP, 2, 90.0)
-    shown = shown_alarm(tracker, has_team=True, acknowledged_by={2: "Ann"}.get)
+    shown = shown_alarm(tracker, receipt_of=lambda _: "It is being sent.", acknowledged_by={2: "Ann"}.get)
     assert shown
     assert shown.text == "Mayday: you asked for help. Ann has acknowledged it."
     assert "Ann has acknowledged it." in shown.spoken

@@ -27,9 +27,12 @@ class ShownAlarm:
 
 
 def shown_alarm(
-    tracker: Tracker, *, has_team: bool, acknowledged_by: Callable[[int], str | None] | None = None
+    tracker: Tracker,
+    *,
+    receipt_of: Callable[[int], str] | None = None,
+    acknowledged_by: Callable[[int], str | None] | None = None,
 ) -> ShownAlarm | None:
-    """The present alarm; None while all is well. `has_team`: the run's reports go somewhere.
+    """The present alarm; None while all is well. `receipt_of`: what is known of the delivery of a mayday; None: the run's reports go nowhere.
 
     `acknowledged_by`: name of the commander that acknowledged the alarm with a given number.
     """
@@ -39,7 +42,7 @@ def shown_alarm(
     age_s = tracker.front_end.newest_s - alarm.since_s
     age_s = 0.0 if math.isnan(age_s) else max(age_s, 0.0)
     times = 1000 * alarm.number + int(age_s / REPEAT_S)
-    receipt = "Your team has been alarmed." if has_team else "No team is connected: only this page says so."
+    receipt = receipt_of(alarm.number) if receipt_of else "No team is connected: only this page says so."
     if acknowledged_by and (commander := acknowledged_by(alarm.number)):
         receipt = f"{commander} has acknowledged it."
     left_s = max(math.ceil((alarm.mayday_s or alarm.since_s) - alarm.since_s - age_s), 0)

@@ -22,7 +22,7 @@ class StreamRates:
     """Rates over the last two seconds (None: not known yet), and counts since the start. The field names are keys of the frame's JSON.
 
     `lost`: messages that did not arrive. `rejected`: bytes or messages with wrong contents. `late_pings`: pings that came after their segment.
-    `wrong`: what is wrong with the board or a stream and what to do, as text; empty when nothing is. `foot`: what is worn on the foot; its samples
+    `wrong`: what is wrong with the reports, the board or a stream and what to do, as text; empty when nothing is. `foot`: what is worn on the foot; its samples
     are counted in `mtx_hz`.
     """
 
@@ -43,8 +43,8 @@ class StreamRateMeter:
     def __init__(self) -> None:
         self._counts: deque[tuple[int, int, int]] = deque()  # time (ns), MTx samples, pings
 
-    def measure(self, tracker: Tracker, t_ns: int) -> StreamRates:
-        """Rates and counts at `t_ns` of the arrival clock, which must not go back."""
+    def measure(self, tracker: Tracker, t_ns: int, fault: str = "") -> StreamRates:
+        """Rates and counts at `t_ns` of the arrival clock, which must not go back; `fault`: what is wrong with the reports."""
         streams = tracker.streams
         board, mtx, status = streams.board, streams.mtx, streams.status
         mtx_hz, pings_hz = self._rates_hz(mtx.good, streams.pings, t_ns)
@@ -57,7 +57,7 @@ class StreamRateMeter:
             late_pings=streams.front_end.late_pings,
             synchronised=streams.synchronised,
             check_ins=tracker.state.check_ins,
-            wrong=_advice(streams, mtx_hz, pings_hz),
+            wrong=". ".join(filter(None, (fault, _advice(streams, mtx_hz, pings_hz)))),
             foot=streams.foot_name,
         )
 

@@ -25,6 +25,7 @@ from echostep.team.endpoint import Endpoint
 from echostep.team.mesh.airtime import INTERVAL_S, PRESETS, Modem, interval_s
 from echostep.team.mesh.mesh_report import MOST_NAMES, Unpacker, pack
 from echostep.team.messages.report import Report, ReportedPlace, encode
+from echostep.team.outbox import Delivery
 
 PRIVATE_APP = 256  # port of Meshtastic for applications of one's own
 POSITION_EVERY = 6  # of our packets goes out as a position of Meshtastic's too
@@ -126,15 +127,15 @@ class MeshTransport:
         """Connect to the node; raises OSError."""
         self._node = MeshNode(self._endpoint.host)
 
-    def send(self, report: Report) -> None:
-        """Send the report if a packet is due, or at once when it brings a new alarm."""
+    def send(self, report: Report) -> Delivery:
+        """Send the report if a packet is due, or at once when it brings a new alarm; otherwise it is left out."""
         node = self._node
         if node is None:
             raise ConnectionError("not connected")
         alarm = (report.alarm.number, report.alarm.kind) if report.alarm else (0, "")
         now_s = time.monotonic()
         if now_s < self._due_s and alarm == self._alarm:
-            return
+            return Delivery.LEFT_OUT
         payload = pack(report, self._number, time.time())
         wait_s = interval_s(node.modem, len(payload), self._endpoint.wearers or WEARERS)
         if self._number == 0 and wait_s > INTERVAL_S:
@@ -148,6 +149,7 @@ class MeshTransport:
             node.send_position(report.place, time.time())
         self._number, self._alarm = self._number + 1, alarm
         self._due_s = now_s + wait_s * random.uniform(1.0 - EARLY, 1.0)
+        return Delivery.SENT
 
     def close(self, *, ended: bool) -> None:  # noqa: ARG002
         """Close the port."""

@@ -39,6 +39,10 @@ class RefusedError(ConnectionError):
     """The host answers, but it is no broker of this MQTT version, or it refuses the connection."""
 
 
+class UnwantedError(PermissionError):
+    """The broker does not accept a message under this topic."""
+
+
 def make_client(endpoint: Endpoint, tls: Any, identity: str, *, newest: bool = False) -> paho.Client:
     """A client that is not connected yet: for MQTT 5 if `newest`, else for MQTT 3.1.1."""
     protocol = paho.MQTTv5 if newest else paho.MQTTv311
@@ -98,6 +102,24 @@ def run_once(client: paho.Client, timeout_s: float) -> None:
         raise ConnectionError(f"the broker sends a malformed packet: {error}") from error
     if code != paho.MQTT_ERR_SUCCESS:
         raise ConnectionError(f"the connection broke: {paho.error_string(code)}")
+
+
+def publish(client: paho.Client, topic: str, payload: bytes) -> bool:
+    """Publish a message that the broker keeps, and wait for its answer; returns whether the answer says that the message was accepted.
+
+    A broker of MQTT 3.1.1 cannot say so [MQTT 3.1.1, 3.3.5]. Raises OSError, which is an UnwantedError when the broker refuses the message.
+    """
+    answers: dict[int, Any] = {}
+    client.on_publish = lambda _client, _user, number, code, _properties: answers.update({number: code})
+    try:
+        info = client.publish(topic, payload, qos=1, retain=True)
+        run_until(client, info.is_published, "the broker does not acknowledge")
+    except (ValueError, RuntimeError) as error:
+        raise ConnectionError(f"cannot publish: {error}") from error
+    answer = answers.get(info.mid)
+    if answer is not None and answer.is_failure:
+        raise UnwantedError(f"{answer}")
+    return client.protocol == paho.MQTTv5
 
 
 def close_socket(client: paho.Client) -> None:

@@ -22,34 +22,43 @@ from echostep.team.mqtt.broker import (
     LOOP_S,
     MAX_PACKET,
     RefusedError,
+    UnwantedError,
     close_socket,
     connect,
     make_client,
+    publish,
     run_once,
     run_until,
 )
+from echostep.team.outbox import Delivery
 
 
 class MqttTransport:
     """A `Transport` to a broker; when the connection breaks, the broker publishes the presence `broken`."""
 
     def __init__(self, endpoint: Endpoint, team: str, name: str, run: str) -> None:
-        self._endpoint, self._run = endpoint, run
+        self._endpoint, self._run, self._team, self._name = endpoint, run, team, name
         self._topic = f"echostep/{team}/{name}"
+        self._use_mqtt5 = True
         self._tls = tls_context(endpoint) if endpoint.secure else None
         self._client: paho.Client | None = None
 
     def open(self) -> None:
-        """Connect; raises OSError with the broker's reason."""
-        client = make_client(self._endpoint, self._tls, f"echostep-{self._run}-{time.monotonic_ns() & 0xFFFFFF:06x}")
+        """Connect; raises OSError with the broker's reason. After a refusal the next call uses the other version of MQTT (5 or 3.1.1)."""
+        identity = f"echostep-{self._run}-{time.monotonic_ns() & 0xFFFFFF:06x}"
+        client = make_client(self._endpoint, self._tls, identity, newest=self._use_mqtt5)
         client.will_set(f"{self._topic}/presence", self._presence("broken"), qos=1, retain=True)
         self._client = client
-        connect(client, self._endpoint)
+        try:
+            connect(client, self._endpoint)
+        except RefusedError:
+            self._use_mqtt5 = not self._use_mqtt5
+            raise
         self._publish("presence", self._presence("online"))
 
-    def send(self, report: Report) -> None:
-        """Publish and wait for the broker's acknowledgement."""
-        self._publish("estimate", encode(report))
+    def send(self, report: Report) -> Delivery:
+        """Publish and wait for the broker's answer."""
+        return Delivery.ACKNOWLEDGED if self._publish("estimate", encode(report)) else Delivery.SENT
 
     def close(self, *, ended: bool) -> None:
         """Disconnect; unless the run has `ended`, the broker publishes the last will."""
@@ -71,15 +80,18 @@ class MqttTransport:
     def _presence(self, presence: Any) -> bytes:
         return encode(Presence(1, self._run, presence))
 
-    def _publish(self, leaf: str, payload: bytes) -> None:
-        client = self._client
-        if client is None:
+    def _publish(self, leaf: str, payload: bytes) -> bool:
+        """Publish below this wearer's topic; returns whether the broker says that it accepted the message."""
+        if self._client is None:
             raise ConnectionError("not connected")
         try:
-            info = client.publish(f"{self._topic}/{leaf}", payload, qos=1, retain=True)
-            run_until(client, info.is_published, "the broker does not acknowledge")
-        except (ValueError, RuntimeError) as error:
-            raise ConnectionError(f"cannot publish: {error}") from error
+            return publish(self._client, f"{self._topic}/{leaf}", payload)
+        except UnwantedError as error:
+            user = f"user {self._endpoint.user}" if self._endpoint.user else "a client without a user name"
+            raise UnwantedError(
+                f"the broker does not let {user} publish as {self._team}/{self._name} ({error}): "
+                "check --team, --name and the broker's access rules"
+            ) from error
 
 
 class Listener:
@@ -126,14 +138,10 @@ class Listener:
         run_once(self._client, timeout_s)
 
     def publish(self, topic: str, payload: bytes) -> None:
-        """Publish a message that the broker keeps, and wait for its acknowledgement; raises OSError."""
+        """Publish a message that the broker keeps, and wait for its answer; raises OSError."""
         if self._client is None:
             raise ConnectionError("not connected")
-        try:
-            info = self._client.publish(topic, payload, qos=1, retain=True)
-            run_until(self._client, info.is_published, "the broker does not acknowledge")
-        except (ValueError, RuntimeError) as error:
-            raise ConnectionError(f"cannot publish: {error}") from error
+        publish(self._client, topic, payload)
 
     def close(self) -> None:
         """Disconnect; raises nothing."""
