@@ -111,3 +111,50 @@ def test_help_is_called_for_and_taken_back(browser: Any) -> None:
         assert page.locator("#fine").is_hidden()
         assert not page.wrong
         page.context.close()
+
+
+UNSPOKEN = "document.querySelector('#unspoken')"
+
+
+def test_a_page_that_was_not_tapped_says_that_it_cannot_speak(browser: Any) -> None:
+    """The browser's own answer: it speaks, or the page says that it did not; in Chromium without a tap or a voice it does not."""
+    mailbox = Mailbox(PLAN, "test", replay=False)
+    asking = ShownAlarm("asking", "Are you all right? Move, or tap.", "Are you all right?", 1)
+    with PageServer(mailbox, LOCAL) as server:
+        mailbox.publish(scene())
+        page = looking(browser, server.url, "bright")
+        assert page.inner_text("#invitation") == "This page cannot speak before it is tapped: tap here"
+        mailbox.publish(replace(scene(), alarm=asking))
+        wait_for(page, f"{UNSPOKEN}.textContent.startsWith('Not spoken: ') || speechSynthesis.speaking")
+        page.click("#fine")
+        assert page.locator("#invitation").is_hidden()
+        page.context.close()
+
+
+def test_a_sentence_that_does_not_begin_is_reported_and_one_that_does_is_not(browser: Any) -> None:
+    """The engine is played: each sentence is begun, left alone, or ended with an error by the test."""
+    mailbox = Mailbox(PLAN, "test", replay=False)
+    with PageServer(mailbox, LOCAL) as server:
+        mailbox.publish(scene())
+        page = looking(browser, server.url, "bright")
+        page.evaluate("() => { window.said = []; speechSynthesis.speak = (sentence) => said.push(sentence); }")
+
+        def alarm(times: int) -> None:
+            mailbox.publish(replace(scene(), alarm=ShownAlarm("mayday", "Mayday.", f"Mayday {times}.", times)))
+            wait_for(page, f"said.at(-1)?.text === 'Mayday {times}.'")
+
+        alarm(1)
+        wait_for(page, f"{UNSPOKEN}.textContent.startsWith('Not spoken: the browser has not begun.')")
+        alarm(2)
+        page.evaluate("() => said.at(-1).onstart()")
+        assert page.locator("#unspoken").is_hidden()
+        alarm(3)
+        page.evaluate("() => said.at(-1).onerror({ error: 'synthesis-failed' })")
+        assert page.inner_text("#unspoken").startswith("Not spoken: the browser says synthesis-failed.")
+        page.evaluate("() => said.at(-1).onerror({ error: 'not-allowed' })")
+        assert page.inner_text("#unspoken").startswith("Not spoken: the browser forbids it before the first tap.")
+        page.evaluate("() => said[0].onerror({ error: 'interrupted' })")
+        alarm(4)
+        page.evaluate("() => said.at(-1).onstart()")
+        assert page.locator("#unspoken").is_hidden()
+        page.context.close()

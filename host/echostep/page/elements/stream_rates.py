@@ -22,8 +22,8 @@ class StreamRates:
     """Rates over the last two seconds (None: not known yet), and counts since the start. The field names are keys of the frame's JSON.
 
     `lost`: messages that did not arrive. `rejected`: bytes or messages with wrong contents. `late_pings`: pings that came after their segment.
-    `wrong`: what is wrong with the reports, the board or a stream and what to do, as text; empty when nothing is. `foot`: what is worn on the foot; its samples
-    are counted in `mtx_hz`.
+    `wrong`: what is wrong with the reports, the board or a stream and what to do, as text; empty when nothing is. `foot`: what is worn on the
+    foot; its samples are counted in `mtx_hz`.
     """
 
     mtx_hz: float | None

@@ -2,6 +2,7 @@
 // The live page: connects the link to the server, the map, the panel and the user's actions. *Level*: index into the plan's levels; *floor*: its name on the page.
 
 import { Gestures } from './gestures.js';
+import { stayAwake } from './live/awake.js';
 import { Link } from './link.js';
 import { Painter } from './live/paint.js';
 import { Panel } from './live/panel.js';
@@ -17,7 +18,7 @@ const $ = (id) => document.getElementById(id);
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas'));
 const panel = new Panel((level) => { setFollows(false); showLevel(level); });
 const scene = { frame: null, cloud: null, drawing: null, marks: [], trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0 };
-let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, metNumber = 0, invited = false, connected = false;
+let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, metNumber = 0, invited = false, connected = false, awake = false;
 
 const taps = new Taps(view, {
   send: (kind, fields) => link.send(kind, fields), changed: () => { scene.tapped = taps.ghost; dirty = true; }, mayCheckIn: () => !$('here').hidden,
@@ -26,7 +27,7 @@ const taps = new Taps(view, {
 const link = new Link({
   onHello: hello, onFrame: frame, onRefused: (reason) => hint(reason, 6000), onFailed: (reason) => panel.fault(reason), onConsidered: (answer) => taps.considered(answer), onState: connection,
 });
-const speech = new Speech($('speech'), $('sentence'));
+const speech = new Speech($('speech'), $('sentence'), $('invitation'), $('unspoken'));
 const replay = new Replay((kind, fields) => link.send(kind, fields));
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
@@ -47,6 +48,9 @@ async function hello(message) {
   }
   $('here').hidden = $('sheet-here').hidden = $('help').hidden = message.replay;
   if (message.replay) panel.team([]);
+  else if (!awake) stayAwake();
+  awake ||= !message.replay;
+  speech.invite(!message.replay);
   taps.reconnected();
   await showLevel(Math.min(scene.level, plan.levels.length - 1));
 }
