@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+import struct
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.xsens import PROJECT, MtxReader, OutputFormat, encode_frame
 from echostep.xsens.configuration.requests import project_requests, reset_heading, set_rate
-from echostep.xsens.configuration.setup import TIMEOUT_S, TRIES, MtxSetup, State
+from echostep.xsens.configuration.setup import FIRST_TRIES, TIMEOUT_S, MtxSetup, State
 from echostep_studies.simulation.devices.mtx_setup import FACTORY, DeviceState, MtxDevice
 from xsens.mt_lines import SAMPLE, STEP_S, Line
 
@@ -86,10 +88,55 @@ def test_silence_ends_after_its_tries_and_is_said() -> None:
     while not setup.finished and now_s < 10.0:
         sent.append(setup.advance(b"", now_s))
         now_s += STEP_S
-    assert [part for part in sent if part] == [encode_frame(0x30)] * TRIES
-    assert now_s == pytest.approx(TRIES * TIMEOUT_S, abs=0.05)
+    assert [part for part in sent if part] == [encode_frame(0x30)] * FIRST_TRIES
+    assert now_s == pytest.approx(FIRST_TRIES * TIMEOUT_S, abs=0.05)
     assert setup.state is State.SILENT
     assert "silent" in setup.verdict
+
+
+def mtdata2(*packets: bytes) -> bytes:
+    return encode_frame(0x36, b"".join(packets))
+
+
+def packet(identifier: int, layout: str, *values: float) -> bytes:
+    return struct.pack(">HB", identifier, struct.calcsize(">" + layout)) + struct.pack(">" + layout, *values)
+
+
+OUTPUTS = {  # of an MTi of the 600 series: as it is sold; increments only; everything that is needed
+    "euler": (packet(0x2030, "3f", 0.1, 0.2, 3.0), packet(0xE020, "I", 0)),
+    "sdi": (packet(0x4010, "3f", 0, 0, 0.1), packet(0x8030, "4f", 1, 0, 0, 0)),
+    "full": (packet(0x2010, "4f", 1, 0, 0, 0), packet(0x4020, "3f", 0, 0, 9.81), packet(0x8020, "3f", 0, 0, 0)),
+}
+
+
+def mti(outputs: str, seconds: float, answers_s: float = 1e9) -> MtxSetup:
+    """A setup that hears so many seconds of an MTi, which answers the first request after `answers_s`."""
+    setup, asked = MtxSetup(project_requests(100.0), 100.0), False
+    for k in range(round(seconds / STEP_S)):
+        received = mtdata2(packet(0x1020, "H", k & 0xFFFF), *OUTPUTS[outputs])
+        if asked and k * STEP_S >= answers_s:
+            received += encode_frame(0x31)
+            answers_s = 1e9
+        asked = bool(setup.advance(received, k * STEP_S)) or asked
+    return setup
+
+
+@pytest.mark.parametrize("outputs", ["euler", "sdi"])
+def test_a_stream_without_a_usable_sample_is_not_the_wanted_one(outputs: str) -> None:
+    setup = mti(outputs, 2.0)
+    assert setup.state is State.WRONG_MODE
+    assert (
+        "sends MTData2 without acceleration and rate of turn. Check the line from host to MTx (its RX)" in setup.verdict
+    )
+    assert "MT Manager" in setup.verdict
+
+
+def test_a_deaf_device_that_sends_what_is_needed_is_used_and_asked_again_until_it_answers() -> None:
+    assert mti("full", 2.0).state is State.UNANSWERED
+    assert mti("euler", 1.4, answers_s=1.3).state is State.BUSY  # the sixth request is answered: the setup goes on
+    again = mti("full", 3.1, answers_s=3.0)
+    assert again.state is State.BUSY  # begun again with the first answer
+    assert mti("full", 3.0, answers_s=3.0).state is State.UNANSWERED
 
 
 def test_a_device_that_hears_nothing_but_streams_the_right_mode_is_taken() -> None:
@@ -103,7 +150,7 @@ def test_a_device_that_hears_nothing_but_streams_the_right_mode_is_taken() -> No
 )
 def test_a_device_that_hears_nothing_in_a_wrong_mode_is_explained(output: OutputFormat, period: int, said: str) -> None:
     line = Line(MtxDevice(output, deaf=True))
-    for _ in range(150):
+    for _ in range(200):
         line.run(STEP_S)
         if period == 2304 and line.counter % 2:
             line._to_host = b""
@@ -191,6 +238,6 @@ def test_what_waited_in_the_system_is_no_rate() -> None:
     made = MtxDevice(PROJECT)
     waiting = b"".join(made.measure(SAMPLE._replace(counter=n)) for n in range(100))
     setup.advance(waiting, 1.0)
-    for k in range(150):
+    for k in range(200):
         setup.advance(made.measure(SAMPLE._replace(counter=100 + k)), 1.01 + k * STEP_S)
     assert setup.state is State.UNANSWERED

@@ -92,7 +92,7 @@ def test_record_goes_on_with_a_device_that_is_right_or_silent(
     with on_a_terminal(MtxDevice(output, deaf=True)) if output else mute_port() as mtx, mute_port() as board:
         done = echostep("record", "--board", board, "--mtx", mtx, "--out", tmp_path / "r.mcap", "--seconds", PATIENCE_S)
     assert done.returncode == 0, done.stderr
-    assert ("does not answer, but sends the wanted format" if output else "MTx: silent") in done.stdout
+    assert ("does not answer, but sends what is needed" if output else "MTx: silent") in done.stdout
 
 
 def test_a_rate_that_the_device_cannot_have_is_named(tmp_path: Path) -> None:

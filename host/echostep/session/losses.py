@@ -18,6 +18,7 @@ from echostep.tracker.state import StreamState, TrackerState
 
 ECHOLESS_S = 5.0  # without a ping for so long there are no echoes: ten pings of each ranger at the slowest
 LONGEST_S = 10.0  # between two estimates; a longer gap counts as so long: estimates come twice a second
+UNTRACKED_S = 5.0  # without an estimate, which is told: the first stride takes as long; assumed
 SILENT = "nothing came from the foot"
 UNFITTING = "the echoes did not fit the plan"
 ECHOLESS = "there were no echoes"
@@ -63,13 +64,16 @@ class Losses:
             return f"{UNFITTING} after the position was set by hand at {since[-1]:.0f} s" if since else UNFITTING
         return ECHOLESS if e.t_s - self._ping_s > ECHOLESS_S else SPREAD
 
-    def describe(self) -> str:
-        """The whole walk in a sentence: how long it was lost and uncertain, and the reasons with their times."""
+    def describe(self, worn_s: float = 0.0) -> str:
+        """The whole walk in a sentence: how long it was lost and uncertain, and the reasons with their times; how much of `worn_s` has estimates."""
         if self._last is None:
             return ""
         lost, uncertain = self._spent_s[TrackStatus.LOST], self._spent_s[TrackStatus.UNCERTAIN]
         walk = f"{self._walk_s:.0f} s"
+        untracked_s = worn_s - self._walk_s
         by_hand = _by_hand(self._tracker.state)
+        if untracked_s > UNTRACKED_S:
+            by_hand += f"; {untracked_s:.0f} s of the {worn_s:.0f} s that were worn have no estimate"
         if lost.total() < 0.5 and uncertain.total() < 0.5:
             return f"never lost in {walk}{by_hand}"
         parts = [f"lost for {lost.total():.0f} s of {walk}", f"uncertain for {uncertain.total():.0f} s"]

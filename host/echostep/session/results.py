@@ -24,13 +24,14 @@ from echostep.tracker import Tracker
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """Results of a run: `estimates`, the true path to compare with, the computing time where it is worth printing, and how much was lost."""
+    """Results of a run: `estimates`, the true path to compare with, the computing time where it is worth printing, how much was lost, silent ports."""
 
     title: str
     estimates: Sequence[Estimate]
     truth: Truth | None = None
     elapsed_s: float | None = None
     losses: str = ""
+    silent: Sequence[str] = ()
 
 
 def output_folder(path: Path) -> Path:
@@ -49,6 +50,8 @@ def write_results(folder: Path, tracker: Tracker, guided: CueList | None, result
     """
     deviation = errors(result.estimates, result.truth) if result.truth else None
     failure = _write_tables(folder, guided, result)
+    for line in result.silent:
+        console.print(line, markup=False, highlight=False)
     if result.estimates:
         _print_summary(result, tracker.plan, deviation)
     undrawn = lacks("a picture", "matplotlib")

@@ -30,6 +30,7 @@ from echostep.recording.clock import clock_of
 from echostep.recording.reading import Recording
 from echostep.recording.recorder import Recorder
 from echostep.scorecard.truth import Truth
+from echostep.session.arrivals import Arrivals
 from echostep.session.browser import open_browser
 from echostep.session.console import console, print_notices
 from echostep.session.losses import Losses
@@ -74,6 +75,7 @@ class Session:
         self.output = output
         self.guided = guidance_of(tracker, guide_to)
         self.losses = Losses(tracker)
+        self.arrivals = Arrivals()
         self.page: LivePage | None = None
         self.estimates: list[Estimate] = []
         self.feed: TeamFeed | None = None  # place of the wearer whom a rescuer is guided to
@@ -233,6 +235,7 @@ class Session:
         """Track one portion and publish its estimates."""
         if self.page:
             self.page.note_arrival()
+        self.arrivals.note(portion)
         estimates = self.tracker.take(portion)
         names = self.teammates.news() if self.teammates else None
         if self.teammates and estimates:
@@ -269,12 +272,9 @@ class Session:
             self.page.end(summary_words(self.estimates, truth))
         if self._drawing and self._drawing.too_long:
             console.print("The drawing became too large for the team: the broker keeps an earlier one")
-        write_results(
-            self.output.folder,
-            self.tracker,
-            self.guided,
-            Result(title, self.estimates, truth, elapsed_s, self.losses.describe()),
-        )
+        losses, silent = self.losses.describe(self.arrivals.worn_s), self.arrivals.silent()
+        result = Result(title, self.estimates, truth, elapsed_s, losses, silent)
+        write_results(self.output.folder, self.tracker, self.guided, result)
 
     def keep_page_open(self) -> None:
         """Serve the page after the run: while a browser shows it, or until Ctrl-C if that was asked for."""

@@ -7,11 +7,12 @@ In: the tracker's counters at arrival times. Out: `StreamRates`. Owns the counte
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from echostep.board.faults.health import Severity
 from echostep.tracker import Tracker
 from echostep.tracker.state import StreamState
+from echostep.xsens.reader import MtxCounts
 
 WINDOW_NS = 2_000_000_000  # over which rates are averaged
 SHORTEST_S = 0.5  # no rate is given for a shorter time
@@ -42,12 +43,15 @@ class StreamRateMeter:
 
     def __init__(self) -> None:
         self._counts: deque[tuple[int, int, int]] = deque()  # time (ns), MTx samples, pings
+        self._unused = 0  # messages of the MTx that are no samples, when its samples were last counted
 
     def measure(self, tracker: Tracker, t_ns: int, fault: str = "") -> StreamRates:
         """Rates and counts at `t_ns` of the arrival clock, which must not go back; `fault`: what is wrong with the reports."""
         streams = tracker.streams
         board, mtx, status = streams.board, streams.mtx, streams.status
         mtx_hz, pings_hz = self._rates_hz(mtx.good, streams.pings, t_ns)
+        if mtx_hz != 0.0:
+            self._unused = _unused(mtx)
         dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
         return StreamRates(
             mtx_hz=mtx_hz,
@@ -57,7 +61,7 @@ class StreamRateMeter:
             late_pings=streams.front_end.late_pings,
             synchronised=streams.synchronised,
             check_ins=tracker.state.check_ins,
-            wrong=". ".join(filter(None, (fault, _advice(streams, mtx_hz, pings_hz)))),
+            wrong=". ".join(filter(None, (fault, _advice(streams, mtx_hz, pings_hz, _unused(mtx) - self._unused)))),
             foot=streams.foot_name,
         )
 
@@ -74,8 +78,16 @@ class StreamRateMeter:
         return (samples - first_samples) / span_s, (pings - first_pings) / span_s
 
 
-def _advice(streams: StreamState, mtx_hz: float | None, pings_hz: float | None) -> str:
-    """The gravest finding and what to do about it."""
+def _unused(mtx: MtxCounts) -> int:
+    """Number of messages, or of bytes outside of messages, that came from the MTx and gave no sample."""
+    return sum(getattr(mtx, field.name) for field in fields(mtx) if field.name not in ("good", "lost"))
+
+
+def _advice(streams: StreamState, mtx_hz: float | None, pings_hz: float | None, unused: int) -> str:
+    """The gravest finding and what to do about it. `unused`: what has come from the foot since its last sample, which gave none."""
+    if mtx_hz == 0.0 and unused > 0:
+        incomplete = " (without counter, acceleration or rate of turn)" if streams.mtx.incomplete else ""
+        return f"the {streams.foot_name} sends no usable samples{incomplete}: look at its settings, its port and its RX line: echostep doctor"
     if mtx_hz == 0.0:
         return f"the {streams.foot_name} is silent: look at its plug and its power"
     findings = [finding for finding in streams.findings if finding.severity > Severity.NOTE]

@@ -62,6 +62,7 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -
     with closing(_open_ports(ports)) as opened:
         _identify(opened)
         metadata = run_metadata(plan, tracker.start, seed, "live", settings_toml) | clock_metadata()
+        session.arrivals.urls = opened.urls
         with session:
             with start_recording(folder / "walk.mcap", metadata, ports.keep) as recorder:
                 chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session)

@@ -5,10 +5,10 @@ In: bytes from the MT's port, and a clock in seconds. Out: bytes to send, and th
 
     GoToConfig -> requests -> GoToMeasurement      each until its acknowledgement, or TRIES times
     CONFIGURED     all acknowledged
-    UNANSWERED     no acknowledgement, and the stream has the wanted format
+    UNANSWERED     no acknowledgement, and samples with everything that is needed come at the wanted rate
     WRONG_MODE     a request failed, or the stream has another format
     SILENT         no acknowledgement and no measurement
-A WakeUp starts again at any time, and so does a measurement in SILENT.
+A WakeUp starts again at any time, and so does a measurement in SILENT. A device that never answered is asked for GoToConfig again until it does.
 
 An acknowledgement carries the identifier of its request plus one; an error message carries a code instead [Manual 5.3.1 and 5.3.2].
 """
@@ -31,8 +31,12 @@ from echostep.xsens.configuration.requests import (
 )
 from echostep.xsens.frames import ERROR, MTDATA, MTDATA2, WAKE_UP, Frame, FrameReader, encode_frame
 from echostep.xsens.mtdata import PROJECT
+from echostep.xsens.mtdata2 import missing_contents
+from echostep.xsens.reader import MtxReader
 
 TRIES = 4  # of each request: one more than Xsens' own library makes for GoToConfig [CMT]
+FIRST_TRIES = 7  # of GoToConfig: a device whose queue of samples is long answers after more than a second
+AGAIN_S = 1.0  # between two later requests to a device that has never answered; assumed
 TIMEOUT_S = 0.25  # for an acknowledgement: buffered measurements arrive before it
 MAX_WAKE_UPS = 20  # after more wake-ups the setup is not started again: the supply is bad
 RATE_ERROR = 0.3  # largest relative error of the measured rate: it is measured over a short time
@@ -48,16 +52,16 @@ class State(Enum):
 
     BUSY = "busy"
     CONFIGURED = "configured"  # every request was acknowledged
-    UNANSWERED = "unanswered"  # no acknowledgement, but the stream has the wanted format
+    UNANSWERED = "unanswered"  # no acknowledgement, but usable samples at the wanted rate
     WRONG_MODE = "wrong mode"  # a request failed, or no acknowledgement and the stream has another format
     SILENT = "silent"  # no acknowledgement and no measurement
 
 
 class _Measurement(NamedTuple):
-    """Identifier, length and arrival time of one measurement message."""
+    """Identifier, payload and arrival time of one measurement message."""
 
     mid: int
-    length: int
+    payload: bytes
     arrived_s: float
 
 
@@ -87,12 +91,13 @@ class MtxSetup:
         self._deadline_s = -float("inf") if now_s is None else now_s
         self._received = 0
         self._measurements: list[_Measurement] = []  # since the restart, at most MAX_MEASUREMENTS
+        self._reader = MtxReader()  # counts the usable ones
         self._acknowledged = False
         self._answers: dict[str, bytes] = {}  # by the request's name
 
     @property
     def finished(self) -> bool:
-        """Whether all requests are done; only a WakeUp, or a measurement in SILENT, starts again."""
+        """Whether all requests are done; only a WakeUp, a first answer, or a measurement in SILENT starts again."""
         return self.state is not State.BUSY
 
     def advance(self, received: bytes, now_s: float, arrived_s: float | None = None) -> bytes:
@@ -100,8 +105,13 @@ class MtxSetup:
         self._received += len(received)
         for frame in self._frames.feed(received):
             self._handle(frame, now_s, now_s if arrived_s is None else arrived_s)
-        if not self.finished and now_s >= self._deadline_s:
+        if not self.finished:
+            self._reader.feed_batch(received)
+        if now_s >= self._deadline_s and not self.finished:
             self._send_due(now_s)
+        elif now_s >= self._deadline_s and not self._acknowledged:
+            self._deadline_s = now_s + AGAIN_S
+            self._out.append(encode_frame(GO_TO_CONFIG.mid, GO_TO_CONFIG.payload))
         sent = b"".join(self._out)
         self._out.clear()
         return sent
@@ -114,8 +124,11 @@ class MtxSetup:
             if self.state is State.SILENT:
                 self._restart(now_s)
             if len(self._measurements) < MAX_MEASUREMENTS:
-                self._measurements.append(_Measurement(frame.mid, len(frame.payload), arrived_s))
-        elif not self.finished:
+                self._measurements.append(_Measurement(frame.mid, frame.payload, arrived_s))
+        elif self.finished:
+            if frame.mid == GO_TO_CONFIG.mid + 1 and not self._acknowledged:
+                self._restart(now_s)
+        else:
             request = self._queue[0]
             if frame.mid == ERROR and self._tries:
                 self._handle_refusal(request, error_text(frame.payload), now_s)
@@ -159,7 +172,7 @@ class MtxSetup:
     def _send_due(self, now_s: float) -> None:
         """Send the current request again after its timeout; after TRIES times it has failed."""
         request = self._queue[0]
-        if self._tries < TRIES:
+        if self._tries < (FIRST_TRIES if request is GO_TO_CONFIG else TRIES):
             self._tries += 1
             self._deadline_s = now_s + TIMEOUT_S
             self._out.append(encode_frame(request.mid, request.payload))
@@ -188,10 +201,15 @@ class MtxSetup:
             self.state = State.UNANSWERED if not self._stream_fault() else State.WRONG_MODE
 
     def _stream_fault(self) -> str:
-        """Wrong length or rate of the received measurements, as text; "" if both are right."""
+        """Wrong length, missing contents or wrong rate of the received measurements, as text; "" if usable samples come as wanted."""
         newest = self._measurements[-1]
-        if newest.mid == MTDATA and newest.length != PROJECT.length:
-            return f"MTData of {newest.length} bytes instead of {PROJECT.length}"
+        if newest.mid == MTDATA and len(newest.payload) != PROJECT.length:
+            return f"MTData of {len(newest.payload)} bytes instead of {PROJECT.length}"
+        if not self._reader.counts.good:
+            missing = missing_contents(newest.payload) if newest.mid == MTDATA2 else []
+            what = " and ".join([", ".join(missing[:-1]), missing[-1]] if len(missing) > 1 else missing)
+            kind = "MTData2" if newest.mid == MTDATA2 else "MTData"
+            return f"{kind} without {what}" if what else f"{kind} whose values are not possible"
         begin_s = self._measurements[0].arrived_s + BACKLOG_S
         times = [measurement.arrived_s for measurement in self._measurements if measurement.arrived_s > begin_s]
         span_s = times[-1] - times[0] if times else 0.0
@@ -219,7 +237,7 @@ class MtxSetup:
         if self.state is State.CONFIGURED:
             return f"MTx: configured{self._device_text}" + "".join(f"; {remark}" for remark in self.remarks)
         if self.state is State.UNANSWERED:
-            return "MTx: does not answer, but sends the wanted format: it is used as it is"
+            return "MTx: does not answer, but sends what is needed: it is used as it is, and asked again"
         if self.state is State.WRONG_MODE:
             fault = f", and sends {self._stream_fault()}" if self._measurements and self._stream_fault() else ""
             return f"MTx: {self._failure}{fault}. Check the line from host to MTx (its RX), or {by_hand}"
