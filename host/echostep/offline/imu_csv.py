@@ -19,6 +19,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.foot.steps import Track
+from echostep.offline.bursts import spread
 from echostep.offline.csv_table import CsvLimits, header_of, lines_of, number_of, open_samples, read_rows
 from echostep.offline.imu_checks import complaint, contradiction, end_sd_m, notes, sorted_by_time, whole_rows
 
@@ -52,9 +53,10 @@ def _mended_table(file: TextIO) -> tuple[Floats, tuple[str, ...]]:
     """Usable rows (n, 7) or (n, 10) in order of time, and notes on what was mended; raises ValueError for samples that cannot be used."""
     table, holes = whole_rows(_table(lines_of(file, CsvLimits())))
     table, mended = sorted_by_time(table)
+    table[:, 0], spreading = spread(table[:, 0])
     if wrong := complaint(table, COLUMNS):
         raise ValueError(wrong)
-    return table, (*holes, *mended)
+    return table, (*holes, *mended, *spreading)
 
 
 def _table(lines: Iterator[str]) -> Floats:

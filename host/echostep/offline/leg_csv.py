@@ -21,6 +21,7 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.legs.clipping import find_clipping_limits, repair_clipping
 from echostep.legs.mounting import walking_axis
+from echostep.offline.bursts import spread
 from echostep.offline.csv_table import (
     LONGEST_LINE,
     CsvLimits,
@@ -90,9 +91,10 @@ def _mended_table(file: TextIO, prefix: str) -> tuple[Floats, tuple[str, ...]]:
     whole = np.isfinite(table[:, : len(COLUMNS)]).all(axis=1)
     holes = () if whole.all() else (f"{int((~whole).sum())} rows without a number in some column: skipped",)
     table, mended = sorted_by_time(table[whole])
+    table[:, TIME], spreading = spread(table[:, TIME])
     if wrong := complaint(table):
         raise ValueError(wrong)
-    return table, (*holes, *mended, *mounted)
+    return table, (*holes, *mended, *spreading, *mounted)
 
 
 def _table(file: TextIO, prefix: str) -> tuple[Floats, tuple[str, ...]]:

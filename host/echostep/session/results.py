@@ -24,7 +24,7 @@ from echostep.tracker import Tracker
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """Results of a run: `estimates`, the true path to compare with, the computing time where it is worth printing, how much was lost, silent ports."""
+    """Results of a run: `estimates`, the true path, the computing time where it is worth printing, how much was lost, silent ports."""
 
     title: str
     estimates: Sequence[Estimate]

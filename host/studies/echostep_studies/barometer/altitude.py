@@ -24,9 +24,8 @@ from echostep_studies.barometer.vertical_filter import Hypotheses
 
 Codes = NDArray[np.int8]
 
-LAST_T, LAST_PA, HEIGHT_M, AIR_C = range(
-    4
-)  # state of `AirColumn`: last sample's time and pressure, claimed height, temperature
+# State of `AirColumn`: last sample's time and pressure, claimed height, temperature, number of samples.
+LAST_T, LAST_PA, HEIGHT_M, AIR_C, COUNT = range(5)
 
 AIR_J_KG_K, G0_M_S2, ZERO_C_K = 287.053, 9.80665, 273.15
 INDOORS_C, COLDEST_C, WARMEST_C = 20.0, -30.0, 45.0
@@ -35,6 +34,10 @@ RESOLUTION_M = 0.1
 HIGH_SPEED_PA = 3.0  # noise of the SCP1000's high-speed mode [SCP1000 data sheet]
 QUIETEST_PA = 0.2
 LOWEST_PA, HIGHEST_PA = 20_000.0, 120_000.0
+# A barometer's first readings may be its reset value, or of a filter that still settles: within so many samples, a step that no lift makes is no rise.
+SETTLING = 9  # samples: about a second of the SCP1000; assumed
+FASTEST_PA_S = 120.0  # an express lift, 10 m/s; assumed
+STEP_PA = 18.0  # that noise makes: six standard deviations of the high-speed mode
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +88,7 @@ class AirColumn:
     def __init__(self, settings: BarometerSettings, lowest_m: float = -math.inf, highest_m: float = math.inf) -> None:
         self._settings = settings
         self._range = lowest_m, highest_m
-        self._state = np.array([math.nan, math.nan, 0.0, math.nan])  # t_s, pressure, claimed height, temperature
+        self._state = np.array([math.nan, math.nan, 0.0, math.nan, 0.0])
 
     def rows(self, samples: Pressures) -> tuple[Floats, Bools]:
         """Rows (m, 9) for the kernel, and which of the n samples they are: those that are numbers, possible and later than the one before."""
@@ -167,10 +170,13 @@ def _claim(
             state[AIR_C] = INDOORS_C
         metres = AIR_J_KG_K * (state[AIR_C] + ZERO_C_K) / G0_M_S2
         first = state[LAST_T] != state[LAST_T]
-        if not first:
+        settles = not first and state[COUNT] < SETTLING
+        step_pa = abs(pressure_pa[i] - state[LAST_PA])
+        if not first and not (settles and step_pa > STEP_PA + FASTEST_PA_S * (t_s[i] - state[LAST_T])):
             state[HEIGHT_M] -= metres * math.log(pressure_pa[i] / state[LAST_PA])
         seen[i, vertical.DT] = 0.05 if first else t_s[i] - state[LAST_T]
         seen[i, vertical.CLAIMED] = state[HEIGHT_M]
         seen[i, vertical.NOISE] = metres / pressure_pa[i]
         state[LAST_T], state[LAST_PA] = t_s[i], pressure_pa[i]
+        state[COUNT] += 1.0
         used[i] = True

@@ -19,7 +19,16 @@ import numpy as np
 from echostep.arrays import Bools, Floats, Ints
 from echostep.errors import EchostepError
 from echostep.offline.csv_table import MOST_BAD, CsvLimits, header_of, lines_of, open_samples, rate_complaint, read_rows
-from echostep_studies.barometer.altitude import COLDEST_C, HIGHEST_PA, LOWEST_PA, WARMEST_C, Pressures
+from echostep_studies.barometer.altitude import (
+    COLDEST_C,
+    FASTEST_PA_S,
+    HIGHEST_PA,
+    LOWEST_PA,
+    SETTLING,
+    STEP_PA,
+    WARMEST_C,
+    Pressures,
+)
 from echostep_studies.barometer.floor_filter import Floors
 
 COLUMNS = ("t_s", "pressure_pa")
@@ -110,7 +119,22 @@ def _usable_rows(table: Floats, lines: Ints) -> tuple[Floats, Ints, tuple[str, .
         )
     later = np.concatenate([[True], table[1:, TIME] > np.maximum.accumulate(table[:, TIME])[:-1]])
     notes += _note(~later, lines, "not later than the row before: skipped")
-    return table[later], lines[later], notes
+    table, lines = table[later], lines[later]
+    early = np.arange(len(table)) < unsettled(table[:, TIME], table[:, PRESSURE])
+    notes += _note(early, lines, "before the barometer had settled, as its reset value: skipped")
+    return table[~early], lines[~early], notes
+
+
+def unsettled(t_s: Floats, pressure_pa: Floats) -> int:
+    """Number of first samples that are farther from the samples after them than any lift gets in that time; SETTLING / 2 at most."""
+    for k in range(SETTLING // 2 + 1):
+        after = slice(k + 1, k + 1 + SETTLING)
+        if len(t_s[after]) < SETTLING:
+            return k
+        off_pa = abs(pressure_pa[k] - float(np.median(pressure_pa[after])))
+        if off_pa <= STEP_PA + FASTEST_PA_S * (float(np.median(t_s[after])) - t_s[k]):
+            return k
+    return SETTLING // 2 + 1
 
 
 def _gap_notes(t_s: Floats, lines: Ints) -> tuple[str, ...]:

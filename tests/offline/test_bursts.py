@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: MIT
+"""Times that come in bursts are spread evenly and told; other times stay as they are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from echostep.arrays import Floats
+from echostep.offline.bursts import spread
+from echostep.offline.imu_csv import load_imu
+
+EVEN_S = np.arange(2487) * 0.01
+
+
+def stamped(burst: int, apart_s: float, t_s: Floats = EVEN_S) -> Floats:
+    """A queue of `burst` samples emptied when the last one has come, each stamped `apart_s` after the one before."""
+    k = np.arange(len(t_s))
+    last = t_s[np.minimum(k // burst * burst + burst - 1, len(t_s) - 1)]
+    return np.asarray(last + apart_s * (k % burst))
+
+
+@pytest.mark.parametrize("burst", [2, 3, 4, 8])
+@pytest.mark.parametrize("apart_s", [0.0, 0.0002])
+def test_bursts_are_spread_over_the_time_since_the_burst_before(burst: int, apart_s: float) -> None:
+    t_s, notes = spread(stamped(burst, apart_s))
+    assert np.abs(t_s - EVEN_S).max() < 0.01  # the last burst may be short: its stamp is that of its own last sample
+    assert np.abs(t_s - EVEN_S)[:-burst].max() < 1e-9
+    assert notes == (f"times come in bursts of {burst}: spread evenly, 100 samples a second",)
+
+
+def test_a_pause_stays_a_pause() -> None:
+    true_s = EVEN_S + 3.0 * (np.arange(len(EVEN_S)) >= 1000)
+    t_s, _ = spread(stamped(2, 0.0, true_s))
+    assert np.abs(t_s - true_s)[:-2].max() < 1e-9
+
+
+def test_even_and_jittered_times_are_left_alone() -> None:
+    jitter = np.abs(np.random.default_rng(5).normal(0, 0.003, len(EVEN_S)))
+    for t_s in (EVEN_S, EVEN_S[:4], np.round(EVEN_S / 2, 3), np.maximum.accumulate(EVEN_S / 2 + jitter), EVEN_S[::-1]):
+        same, notes = spread(t_s)
+        assert same is t_s
+        assert notes == ()
+
+
+@pytest.mark.parametrize("apart_s", [0.0, 0.0002])
+def test_a_file_with_bursts_is_used_whole_and_says_so(tmp_path: Path, apart_s: float) -> None:
+    rng = np.random.default_rng(1)
+    accel, gyro = rng.normal([0.0, 0.0, 9.81], 0.05, (2487, 3)), rng.normal(0.0, 0.02, (2487, 3))
+    table = np.column_stack([stamped(3, apart_s), accel, gyro])
+    np.savetxt(tmp_path / "f.csv", table, delimiter=",", header="t_s,ax,ay,az,gx,gy,gz", comments="", fmt="%.6f")
+    imu = load_imu(tmp_path / "f.csv")
+    assert len(imu.t_s) == 2487
+    assert imu.notes == ("times come in bursts of 3: spread evenly, 100 samples a second",)
