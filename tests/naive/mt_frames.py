@@ -28,4 +28,4 @@ def frame_size(head: bytes) -> int:
     if head[3] != 0xFF:
         return 5 + head[3]
     length = int.from_bytes(head[4:6], "big")
-    return 7 + length if len(head) == 6 and 255 <= length <= 2048 else 0
+    return 7 + length if len(head) == 6 and 255 <= length <= 65535 else 0

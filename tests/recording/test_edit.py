@@ -94,6 +94,29 @@ def test_a_whole_recording_is_described(tmp_path: Path) -> None:
     assert text.endswith("whole")
 
 
+def swapped(apart_ns: int, folder: Path) -> list[str]:
+    """`info` of a recording in which a chunk of the board stands behind one of the MTx that came so much later."""
+    with Recorder(folder / "a.mcap", {}) as recorder:
+        for k in range(1, 50):
+            t_ns = k * 1_000_000_000
+            recorder.write(Chunk("mtx", t_ns + apart_ns, b"x"))
+            recorder.write(Chunk("board", t_ns, b"x"))
+    return info(folder / "a.mcap")
+
+
+def test_some_milliseconds_between_two_ports_are_no_fault(tmp_path: Path) -> None:
+    assert swapped(20_000_000, tmp_path)[-1] == "  whole"
+
+
+def test_a_repair_is_offered_for_what_it_mends_alone(tmp_path: Path) -> None:
+    late = swapped(500_000_000, tmp_path)
+    assert late[-1] == "  49 chunks of one port came long after later ones of another: repair leaves them so"
+    (tmp_path / "cut.mcap").write_bytes(write(tmp_path / "b.mcap")[:-100])
+    assert info(tmp_path / "cut.mcap")[-1].endswith("makes a whole file of what is readable")
+    repair(tmp_path / "cut.mcap", tmp_path / "c.mcap")
+    assert info(tmp_path / "c.mcap")[-1] == "  whole"
+
+
 def test_no_terminal_obeys_a_strangers_recording(tmp_path: Path) -> None:
     with Recorder(tmp_path / "a.mcap", {"note": "\x1b]0;owned\x07" + "x" * 10_000}) as recorder:
         recorder.write(Chunk("bo\x1b[2Jard", 1, b"x"))

@@ -24,6 +24,7 @@ from echostep.xsens import (
     encode_frame,
     pack_mtdata,
 )
+from echostep.xsens.frames import LONGEST
 from echostep.xsens.mtdata import ACCEL, ATTITUDE, CELSIUS, GYRO, MAG, decode_mtdata
 from echostep_studies.simulation.devices.mtx_setup import pack
 from reliability.fuzz.mtx import fuzz
@@ -51,8 +52,19 @@ def test_lengths_normal_and_extended(length: int) -> None:
 
 
 def test_a_payload_that_is_too_long_is_refused() -> None:
-    with pytest.raises(ValueError, match="2049"):
-        encode_frame(0x12, bytes(2049))
+    with pytest.raises(ValueError, match="65536"):
+        encode_frame(0x12, bytes(65536))
+
+
+def test_long_frames_are_read_in_captures_and_hold_nothing_back_on_a_port() -> None:
+    settings = bytes(k % 251 for k in range(15_000))
+    stream = frame(1) + encode_frame(0x12, settings) + frame(2)
+    reader = FrameReader(LONGEST)
+    assert [f.payload == settings for f in reader.feed(stream)] == [False, True, False]
+    assert (reader.counts.skipped_bytes, reader.counts.bad_checksum) == (0, 0)
+    live = FrameReader()
+    assert len([f for f in live.feed(stream) if f.mid == MTDATA]) >= 2
+    assert live.counts.skipped_bytes >= 6
 
 
 @given(st.binary(max_size=300), st.lists(st.integers(0, 1500), max_size=8))

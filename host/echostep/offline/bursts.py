@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Times that come in bursts, spread evenly.
 
-In: times of samples (n,), s, ascending, as hosts stamp them: a driver that empties its queue gives all waiting samples one time, or times a fraction of
-a millisecond apart. Out: the same samples' times, evenly spaced from burst to burst, and a note. Owns nothing.
+In: times of samples (n,), s, ascending, as hosts stamp them: a driver that empties its queue gives all waiting samples one time, or times a fraction
+of a millisecond apart. Out: the same samples' times, evenly spaced from burst to burst, and a note. Owns nothing.
 
 The stamp of a burst is the time of its last sample; the samples before it were measured since the burst before.
 """

@@ -21,6 +21,7 @@ from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep.recording.mcap_records import MCAP_MAGIC
 from echostep.recording.reading import open_recording
 from echostep.xsens import FrameReader, MtMessage, MtxReader
+from echostep.xsens.frames import LONGEST
 from echostep.xsens.message import MessageReader, as_object
 
 READ_BYTES = 1 << 16  # of one read of the file: many frames, little memory
@@ -61,7 +62,7 @@ def read_capture(path: Path | str, decoder: Decoder | None = None) -> Iterator[M
     except OSError as error:
         raise EchostepError(f"{path}: cannot read the capture: {error.strerror}") from error
     port = "" if recorded else _port_of(path)
-    decoder.mt.formats.learn(FrameReader().feed(_head(_chunks(path, port)), ended=True))
+    decoder.mt.formats.learn(FrameReader(LONGEST).feed(_head(_chunks(path, port)), ended=True))
     for name, received in _chunks(path, port):
         yield from decoder.feed(name, received)
     yield from decoder.feed(MTX, b"", ended=True)
@@ -92,7 +93,7 @@ def _head(chunks: Iterable[tuple[str, bytes]]) -> bytes:
 
 def _port_of(path: Path) -> str:
     """The port whose reader understands more bytes of the first blocks in which one is understood; raises EchostepError when none is."""
-    board, mt = BoardReader(), FrameReader()
+    board, mt = BoardReader(), FrameReader(LONGEST)
     for received in _blocks(path):
         understood = {BOARD: BOARD_FRAME * len(board.feed(received)), MTX: _bytes_of_frames(mt, received)}
         if any(understood.values()):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Xsens frames: bytes -> message identifier and payload, in any split of the bytes.
 
-In: bytes of the port, in order. Out: position and length of each complete frame. Owns the unfinished frame (at most 2054 bytes) and the counts of
-rejected bytes.
+In: bytes of the port, in order. Out: position and length of each complete frame. Owns the unfinished frame (at most 2054 bytes, unless longer frames
+are asked for) and the counts of rejected bytes.
 
     FA | bus | message | length        | payload | checksum      length < FF
     FA | bus | message | FF | length, 2 | payload | checksum      extended
@@ -27,7 +27,8 @@ FIRST_BUS, LAST_BUS = 1, 32  # of the devices of a master; the last: more than a
 EXTENDED = 0xFF
 MTDATA, MTDATA2, WAKE_UP, ERROR = 0x32, 0x36, 0x3E, 0x42  # message identifiers [LLCP]
 CONFIGURATION, OUTPUT_MODE, OUTPUT_SETTINGS = 0x0D, 0xD1, 0xD3  # the same: answers to requests
-MAX_LENGTH = 2048  # bytes, longest payload that an MT sends [LLCP, extended length]
+MAX_LENGTH = 2048  # bytes, longest payload that an MT sends by itself [LLCP, extended length]
+LONGEST = 0xFFFF  # bytes, longest payload of an extended frame: in captures, loggers' settings have 15 kB
 SHORTEST = 5  # bytes of a frame without payload
 
 SKIPPED, BAD_CHECKSUM, _TALLY = range(3)  # entries of a tally, and its length
@@ -68,7 +69,7 @@ class MtFrameCounts:
 
 def encode_frame(mid: int, payload: bytes = b"", bus_id: int = BUS_ID) -> bytes:
     """One frame with its checksum; raises ValueError for a payload that is too long."""
-    if len(payload) > MAX_LENGTH:
+    if len(payload) > LONGEST:
         raise ValueError(f"{len(payload)} bytes do not fit an Xsens frame")
     length = bytes([len(payload)]) if len(payload) < EXTENDED else bytes([EXTENDED]) + len(payload).to_bytes(2, "big")
     body = bytes([bus_id, mid]) + length + payload
@@ -77,8 +78,12 @@ def encode_frame(mid: int, payload: bytes = b"", bus_id: int = BUS_ID) -> bytes:
 
 @dataclass(slots=True)
 class FrameReader:
-    """Frames of a byte stream. After a rejected frame, the next preamble is searched inside it."""
+    """Frames of a byte stream. After a rejected frame, the next preamble is searched inside it.
 
+    `longest`: payload of a frame, bytes. On a live port a short one: a false preamble must not hold back the samples that follow it.
+    """
+
+    longest: int = MAX_LENGTH
     counts: MtFrameCounts = field(default_factory=MtFrameCounts)
     _rest: bytes = b""
 
@@ -92,7 +97,7 @@ class FrameReader:
         stream = np.frombuffer(self._rest + received, np.uint8)
         rows = np.empty((len(stream) // SHORTEST, _COLUMNS), np.int64)
         tally = np.zeros(_TALLY, np.int64)
-        count, resume = _find_frames(stream, ended, rows, tally)
+        count, resume = _find_frames(stream, ended, self.longest, rows, tally)
         self.counts.skipped_bytes += int(tally[SKIPPED])
         self.counts.bad_checksum += int(tally[BAD_CHECKSUM])
         before = len(self._rest)
@@ -118,7 +123,7 @@ def copy_payloads(stream: Octets, begin: Ints, length: int) -> Octets:
 
 
 @kernel
-def _find_frames(stream: Octets, ended: bool, rows: Ints, tally: Ints) -> tuple[int, int]:
+def _find_frames(stream: Octets, ended: bool, longest: int, rows: Ints, tally: Ints) -> tuple[int, int]:
     """Fill `rows` (n, 5) with the columns `_BUS` to `_CERTAIN`; returns the number of frames, and where the unfinished frame begins.
 
     After a rejected frame the search goes on one byte later. Running sums make each checksum two look-ups, so noise full of preambles costs no
@@ -127,7 +132,7 @@ def _find_frames(stream: Octets, ended: bool, rows: Ints, tally: Ints) -> tuple[
     size, sums = len(stream), _running_sums(stream)
     count, begin, certain = 0, 0, 0
     while begin < size:
-        head, length = _header(stream, begin)
+        head, length = _header(stream, begin, longest)
         if head == _NO_HEADER:
             certain = max(certain, begin + length)
             tally[SKIPPED] += 1
@@ -166,7 +171,7 @@ def _running_sums(stream: Octets) -> Octets:
 
 
 @kernel
-def _header(stream: Octets, begin: int) -> tuple[int, int]:
+def _header(stream: Octets, begin: int, longest: int) -> tuple[int, int]:
     """Size of the header at `begin` and length of the payload; `_UNFINISHED` when bytes are missing.
 
     `_NO_HEADER` with the number of bytes that show it: no preamble, an impossible bus, or an impossible extended length.
@@ -184,4 +189,4 @@ def _header(stream: Octets, begin: int) -> tuple[int, int]:
     if have < 6:
         return _UNFINISHED, 0
     length = int(np.int64(stream[begin + 4]) << 8 | np.int64(stream[begin + 5]))
-    return (_NO_HEADER, 6) if length < EXTENDED or length > MAX_LENGTH else (6, length)
+    return (_NO_HEADER, 6) if length < EXTENDED or length > longest else (6, length)

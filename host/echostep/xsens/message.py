@@ -15,7 +15,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.xsens.axes import ENU, NED, NWU, from_euler, from_matrix
-from echostep.xsens.frames import BUS_ID, CONFIGURATION, MTDATA, MTDATA2, Frame, FrameReader, MtFrameCounts
+from echostep.xsens.frames import BUS_ID, CONFIGURATION, LONGEST, MTDATA, MTDATA2, Frame, FrameReader, MtFrameCounts
 from echostep.xsens.mtdata import ACCEL, ATTITUDE, CELSIUS, GYRO, MAG, decode_mtdata, rest_of
 from echostep.xsens.output_formats import OutputFormats, configured_devices
 from echostep.xsens.packets import Packet, read_packets
@@ -87,7 +87,7 @@ class MessageReader:
     names: Counter[tuple[int, str]] = field(default_factory=Counter)
     unread: int = 0
     gaps: dict[int, CounterGaps] = field(default_factory=dict)
-    _frames: FrameReader = field(default_factory=FrameReader)
+    _frames: FrameReader = field(default_factory=lambda: FrameReader(LONGEST))
 
     @property
     def counts(self) -> MtFrameCounts:

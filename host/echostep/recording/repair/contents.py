@@ -26,6 +26,7 @@ MESSAGES_PER_UPDATE = 5000  # of the progress bar
 LONGEST_LINE = 4000  # characters
 LONGEST_VALUE = 100  # characters of a metadata value on the line of its key
 DECODED_AT_ONCE = 1 << 16  # bytes of one port
+BETWEEN_PORTS_NS = 100_000_000  # two threads read two ports: so much between the times of their chunks is no fault
 COUNTED_GAP_S = 1.0  # a longer time between two chunks of a port is counted as a gap
 
 
@@ -57,7 +58,7 @@ class Contents:
     derived: dict[str, int] = field(default_factory=dict)
     first_ns: int = LATEST_NS  # earliest arrival
     last_ns: int = 0  # latest arrival
-    out_of_order: int = 0  # chunks that arrived before an earlier chunk of the file
+    out_of_order: int = 0  # chunks that arrived more than BETWEEN_PORTS_NS before an earlier chunk of another port
     order: ArrivalOrder = field(default_factory=ArrivalOrder)  # corrects what is counted here
     decoder: Decoder = field(default_factory=Decoder)
     errors: list[str] = field(default_factory=list)  # of the decoder
@@ -80,7 +81,7 @@ class Contents:
         if not port:
             self.derived[message.channel.topic] = self.derived.get(message.channel.topic, 0) + 1
             return
-        self.out_of_order += message.t_ns < self.last_ns
+        self.out_of_order += message.t_ns < self.last_ns - BETWEEN_PORTS_NS
         self.first_ns, self.last_ns = min(self.first_ns, message.t_ns), max(self.last_ns, message.t_ns)
         self.ports.setdefault(port, PortContents()).add(message)
         undecoded = self._undecoded.setdefault(port, bytearray())
@@ -123,7 +124,9 @@ def info(path: Path) -> list[str]:
     if not contents.ports and not contents.derived:
         raise EchostepError(f"{path}: no message in it can be read: is this an echostep recording (.mcap)?")
     problems = problems_of(recovery, contents)
-    condition = [*problems, f"  echostep repair {path} -o OUT makes a whole file of it"] if problems else ["  whole"]
+    condition = problems or ["  whole"]
+    if is_mended_by_repair(recovery, contents):
+        condition.append(f"  echostep repair {path} -o OUT makes a whole file of what is readable")
     return [printable(line) for line in [*_head(recovery, contents), *_port_lines(contents), *condition]]
 
 
@@ -185,11 +188,19 @@ def problems_of(recovery: Recovery, contents: Contents) -> list[str]:
     if recovery.altered:
         lines.append("  its checksum is wrong: bytes have changed since it was written")
     if contents.out_of_order:
-        lines.append(f"  {contents.out_of_order} chunks are out of time order")
+        lines.append(
+            f"  {contents.out_of_order} chunks of one port came long after later ones of another: repair leaves them so"
+        )
     if not recovery.has_footer:
         middle = ", in the middle of a record" if len(inside) < len(recovery.damaged) else ""
         lines.append(f"  the file ends too early{middle}: the recorder was stopped before it could close it")
     return lines
+
+
+def is_mended_by_repair(recovery: Recovery, contents: Contents) -> bool:
+    """Whether a repaired copy lacks a fault of this file; what the decoder could not read, and the order between ports, stay as they are."""
+    damaged = recovery.damaged or recovery.unreadable_chunks or recovery.altered or not recovery.has_footer
+    return bool(damaged or contents.order.corrected)
 
 
 def with_progress(recovery: Recovery, contents: Contents, title: str) -> Iterator[RecordedMessage]:
