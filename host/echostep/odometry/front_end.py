@@ -45,7 +45,6 @@ from echostep.odometry.foot_legs_handover import FootLegsHandover
 from echostep.odometry.foot_source import ICM20649_NOISE, FootSamples, FootSource
 from echostep.odometry.gyro_blocks import GyroBlocks
 from echostep.odometry.heading_fusion import HeadingFusion
-from echostep.odometry.incapacity.wearer_signs import WearerSigns
 from echostep.odometry.synchronizer import HEIGHT, PART, Synchronizer
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk, Portion, portion_of
@@ -54,6 +53,7 @@ from echostep.ports.people.meeting import MEETING
 from echostep.ports.people.team_beacons import TEAM_BEACONS
 from echostep.ports.people.teammate import TEAM
 from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
+from echostep.wearer.wearer_signs import WearerSigns
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
 
 _REPORTS = (Identity, Configuration, Status, GyroHealth, BoardHealth, Parts)

@@ -10,7 +10,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from echostep.odometry.incapacity.falls import LYING_RAD, UPRIGHT_RAD
 from echostep.page.elements.marks import ShownMark
 from echostep.plan.model import Plan
 from echostep.team.commander import notes
@@ -18,6 +17,7 @@ from echostep.team.cot import alarm_words
 from echostep.team.messages.marks import AlarmKey, Mark, MarkBoard
 from echostep.team.messages.report import Position
 from echostep.team.roster import Member, MemberState
+from echostep.wearer.falls import LYING_RAD, UPRIGHT_RAD
 
 STATES = {
     MemberState.MAYDAY: "mayday", MemberState.LOST: "lost", MemberState.STALE: "silent", MemberState.UNCERTAIN: "uncertain",
@@ -165,7 +165,7 @@ def shown_details(
 
 
 def tilt_words(tilt_deg: float) -> str:
-    """The trunk's tilt: upright (4°), bent (40°), lying (85°); the limits are those of `odometry/incapacity/falls.py`."""
+    """The trunk's tilt: upright (4°), bent (40°), lying (85°); the limits are those of `wearer/falls.py`."""
     tilt_rad = math.radians(tilt_deg)
     posture = "upright" if tilt_rad < UPRIGHT_RAD else "lying" if tilt_rad > LYING_RAD else "bent"
     return f"{posture} ({tilt_deg:.0f}°)"

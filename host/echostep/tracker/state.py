@@ -17,9 +17,9 @@ from echostep.board.messages import Identity, Status
 from echostep.localization.estimate import Estimate
 from echostep.localization.team.meetings import MeetingNews
 from echostep.odometry.front_end import FrontEndCounts
-from echostep.odometry.incapacity.alarm import Alarm
 from echostep.path import PathSegment
 from echostep.ports.people.team_beacons import SharedBeacon
+from echostep.wearer.alarm import Alarm
 from echostep.xsens.reader import MtxCounts
 
 

@@ -29,7 +29,6 @@ from echostep.localization.settings import FilterSettings
 from echostep.localization.team.meetings import MeetingEffect, MeetingQueue, carries_position, on_the_way, start_at
 from echostep.localization.team.shared_beacons import TeamBeaconMap, shared_beacons
 from echostep.odometry.front_end import FrontEnd
-from echostep.odometry.incapacity.alarm import WearerAlarm
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.ports.chunks import FOOT, GATEWAY, Chunk, Portion, portion_of
@@ -42,6 +41,7 @@ from echostep.tracker.before_check_in import BeforeCheckIn
 from echostep.tracker.last_place import LastPlace, last_place
 from echostep.tracker.state import ParticleSnapshot, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
+from echostep.wearer.alarm import WearerAlarm
 
 MAX_READINGS = 4096  # of beacons, that wait for their segment; beyond it the oldest are dropped, assumed
 LATE_S = 0.5  # behind a published time: an older estimate is outdated: half a stride, a third of the claimed 1 m

@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from echostep.odometry.incapacity.alarm import Alarm, AlarmKind, AlarmReason
 from echostep.page.elements.alarm import ShownAlarm, shown_alarm
 from echostep.page.mailbox import Mailbox
 from echostep.page.requests import parse_request
 from echostep.page.server import PageServer
 from echostep.ports.people.check_in import Call
 from echostep.tracker import Tracker
+from echostep.wearer.alarm import Alarm, AlarmKind, AlarmReason
 from page.browser import LOCAL, PLAN, Walk, looking, picture, wait_for
 from page.frames import scene
 from waiting import until

@@ -10,8 +10,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from echostep.odometry.incapacity.alarm import AlarmKind, AlarmReason
 from echostep.tracker import Tracker
+from echostep.wearer.alarm import AlarmKind, AlarmReason
 
 REPEAT_S = 5.0  # between two times that a sentence is spoken; assumed
 

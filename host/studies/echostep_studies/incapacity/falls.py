@@ -14,11 +14,11 @@ import numpy as np
 from msgspec import UNSET, UnsetType
 
 from echostep.arrays import Floats, Ints
-from echostep.odometry.incapacity.alarm import AlarmKind, AlarmReason, WearerAlarm
-from echostep.odometry.incapacity.falls import Fall
-from echostep.odometry.incapacity.wearer_signs import Sign, WearerSigns
 from echostep.output.table import Table
 from echostep.path import PathSegment
+from echostep.wearer.alarm import AlarmKind, AlarmReason, WearerAlarm
+from echostep.wearer.falls import Fall
+from echostep.wearer.wearer_signs import Sign, WearerSigns
 from echostep_studies.frame.report import as_dicts, rows_by_name
 from echostep_studies.simulation.body_motion import ICM20649, MTX, SensorPart
 from echostep_studies.simulation.falling import FALLS, NO_FALLS, STRIDE_M, BodySamples, walk_then

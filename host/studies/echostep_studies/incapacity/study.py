@@ -17,9 +17,9 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.legs.trunk_path import GyroBlock
-from echostep.odometry.incapacity.alarm import AlarmKind, WearerAlarm
-from echostep.odometry.incapacity.stillness import WINDOW_S, Stillness, Window
-from echostep.odometry.incapacity.wearer_signs import StepTaken
+from echostep.wearer.alarm import AlarmKind, WearerAlarm
+from echostep.wearer.stillness import WINDOW_S, Stillness, Window
+from echostep.wearer.wearer_signs import StepTaken
 from echostep_studies.bench.recordings.feet import SETS as FEET
 from echostep_studies.bench.recordings.legs import SETS as LEGS
 from echostep_studies.frame.recordings import DATA, read_sets

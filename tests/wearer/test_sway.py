@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.odometry.incapacity.alarm import ASK_S, SWAY_S, AlarmKind, WearerAlarm
-from echostep.odometry.incapacity.stillness import MotionWindows, Window
-from echostep.odometry.incapacity.wearer_signs import StepTaken
+from echostep.wearer.alarm import ASK_S, SWAY_S, AlarmKind, WearerAlarm
+from echostep.wearer.stillness import MotionWindows, Window
+from echostep.wearer.wearer_signs import StepTaken
 
 RATE_HZ, NOISE = 100.0, 0.005  # rad/s
 T_S: Floats = np.arange(6000) / RATE_HZ

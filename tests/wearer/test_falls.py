@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from echostep.odometry.incapacity.falls import FRESH_S, Fall
-from echostep.odometry.incapacity.wearer_signs import Sign, WearerSigns
+from echostep.wearer.falls import FRESH_S, Fall
+from echostep.wearer.wearer_signs import Sign, WearerSigns
 from echostep_studies.incapacity.falls import message_index, signs_of
 from echostep_studies.simulation.body_motion import ICM20649, MTX, MotionSamples
 from echostep_studies.simulation.falling import (

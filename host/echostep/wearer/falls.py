@@ -21,8 +21,8 @@ from collections import deque
 from typing import NamedTuple
 
 from echostep.foot.ins import GRAVITY_M_S2
-from echostep.odometry.incapacity.standing_direction import StandingDirection, Vector
-from echostep.odometry.incapacity.tenths import TENTH_S, Tenth
+from echostep.wearer.standing_direction import StandingDirection, Vector
+from echostep.wearer.tenths import TENTH_S, Tenth
 
 # Assumed, not measured, where no source is named.
 # A stride of a wearer on foot is longer and takes less time; on the knees it is half as long

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from board_runs import ROOT
-from echostep.odometry.incapacity.alarm import ANSWER_S, Alarm, AlarmKind, AlarmReason, WearerAlarm
-from echostep.odometry.incapacity.falls import Fall
-from echostep.odometry.incapacity.stillness import Window
-from echostep.odometry.incapacity.wearer_signs import StepTaken
 from echostep.plan.model import Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import PERSON, Call
 from echostep.tracker import Tracker
+from echostep.wearer.alarm import ANSWER_S, Alarm, AlarmKind, AlarmReason, WearerAlarm
+from echostep.wearer.falls import Fall
+from echostep.wearer.stillness import Window
+from echostep.wearer.wearer_signs import StepTaken
 from echostep_studies.simulation.body_motion import MTX
 from echostep_studies.simulation.falling import sideways, walk_then
-from odometry.fall_bytes import fall_chunks
+from wearer.fall_bytes import fall_chunks
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 ASKING, MAYDAY, OVER = AlarmKind.ASKING, AlarmKind.MAYDAY, AlarmKind.OVER

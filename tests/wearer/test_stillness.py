@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from echostep.arrays import Floats
 from echostep.legs.trunk_path import GyroBlock
-from echostep.odometry.incapacity.stillness import WINDOW_S, MotionWindows, Stillness, Window
+from echostep.wearer.stillness import WINDOW_S, MotionWindows, Stillness, Window
 
 
 def samples(seconds: float, moves_s: tuple[float, ...], seed: int = 0) -> tuple[Floats, Floats]:

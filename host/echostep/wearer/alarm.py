@@ -18,9 +18,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from echostep.odometry.incapacity.falls import Fall
-from echostep.odometry.incapacity.stillness import WINDOW_S, Window
-from echostep.odometry.incapacity.wearer_signs import Sign, StepTaken
+from echostep.wearer.falls import Fall
+from echostep.wearer.stillness import WINDOW_S, Window
+from echostep.wearer.wearer_signs import Sign, StepTaken
 
 ASK_S, MAYDAY_S = 20.0, 30.0  # without motion
 ANSWER_S = 10.0  # to answer after a fall: as long as between question and mayday for lack of motion

@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 from echostep.arrays import Floats, Ints
 from echostep.legs.trunk_path import GyroBlock
-from echostep.odometry.incapacity.falls import Fall, Falls
-from echostep.odometry.incapacity.stillness import Stillness, Window
-from echostep.odometry.incapacity.tenths import Tenth, Tenths
 from echostep.path import PathSegment
+from echostep.wearer.falls import Fall, Falls
+from echostep.wearer.stillness import Stillness, Window
+from echostep.wearer.tenths import Tenth, Tenths
 
 FOOT, BELT = "foot", "belt"
 MOST_SIGNS = 100_000  # that wait to be read, half a day; beyond it the oldest are dropped

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from board_runs import ROOT
-from echostep.odometry.incapacity.alarm import ASK_S, MAYDAY_S, OVER_S, Alarm, AlarmKind, AlarmReason, WearerAlarm
-from echostep.odometry.incapacity.stillness import Window
-from echostep.odometry.incapacity.wearer_signs import StepTaken
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import PERSON, Call, CheckIn
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker
+from echostep.wearer.alarm import ASK_S, MAYDAY_S, OVER_S, Alarm, AlarmKind, AlarmReason, WearerAlarm
+from echostep.wearer.stillness import Window
+from echostep.wearer.wearer_signs import StepTaken
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 END_STILL_S = 60.0

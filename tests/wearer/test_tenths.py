@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.arrays import Floats
-from echostep.odometry.incapacity.tenths import LEAST_SAMPLES, TENTH_S, Tenth, Tenths
+from echostep.wearer.tenths import LEAST_SAMPLES, TENTH_S, Tenth, Tenths
 
 
 def samples(seed: int, count: int = 400) -> tuple[Floats, Floats, Floats, Floats]:
