@@ -26,7 +26,14 @@ from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.kernels import systematic
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import FilterSettings
-from echostep.localization.team.meetings import MeetingEffect, MeetingQueue, carries_position, on_the_way, start_at
+from echostep.localization.team.meetings import (
+    MeetingEffect,
+    MeetingQueue,
+    TimedMeeting,
+    carries_position,
+    on_the_way,
+    start_at,
+)
 from echostep.localization.team.shared_beacons import TeamBeaconMap, shared_beacons
 from echostep.odometry.front_end import FrontEnd
 from echostep.path import MeasuredSegment, PathSegment
@@ -221,12 +228,11 @@ class Tracker:
         return estimates
 
     def _follow(self, measured: MeasuredSegment) -> list[Estimate]:
-        """Localization: propagate by the segment, reweight by pings and beacon readings. Of a segment before a check-in only the heading is used."""
+        """The estimate at the end of a new segment. Of a segment before a check-in only the heading is used."""
         segment = measured.segment
-        self._ranger_part = measured.ranger_part or self._ranger_part
-        self.filter = self.filter or self._first_filter(segment.heading0_rad)
         last, self._segment = self._segment, segment
-        if self.filter is None:
+        tracked = self._filter_from(measured)
+        if tracked is None:
             return []
         readings, meetings = self._pop_readings(segment.t1_s), self._meetings.pop(segment.t1_s)
         meetings += self._team_beacons.ranges(readings, self.gateway.numbers)
@@ -235,15 +241,31 @@ class Tracker:
         if segment.t0_s < self._check_in_s:
             last_rad = segment.heading0_rad if last is None else last.heading1_rad
             until_s = min(self._check_in_s, segment.t1_s)
-            self.filter.turn_walk_frame(wrap(last_rad - segment.heading_rad(until_s)))
+            tracked.turn_walk_frame(wrap(last_rad - segment.heading_rad(until_s)))
             if segment.t1_s <= self._check_in_s:
                 return []
             measured = measured.after(self._check_in_s)
-        self.filter.set_ranger_model(echo_of(self._ranger_part, self.settings.echo))
-        for t_s, meeting in meetings:
-            self._meetings.note(meeting, self.filter.meet(on_the_way(meeting, measured.segment, t_s)))
-        self._estimate = self.filter.update(measured, readings)
+        self._estimate, effects = self._step(tracked, measured, readings, meetings)
+        for (_, meeting), effect in zip(meetings, effects, strict=True):
+            self._meetings.note(meeting, effect)
         return [self._publish(measured, self._estimate)]
+
+    def _filter_from(self, measured: MeasuredSegment) -> MapFilter | None:
+        """The filter that a segment moves; None while neither a start nor a check-in is known."""
+        self._ranger_part = measured.ranger_part or self._ranger_part
+        self.filter = self.filter or self._first_filter(measured.segment.heading0_rad)
+        return self.filter
+
+    def _step(
+        self, tracked: MapFilter, measured: MeasuredSegment, readings: list[BeaconReading], meetings: list[TimedMeeting]
+    ) -> tuple[Estimate, list[MeetingEffect]]:
+        """Localization: reweight by meetings, propagate by the segment, reweight by its pings and beacon readings.
+
+        Returns the estimate at its end, and the effect of each meeting.
+        """
+        tracked.set_ranger_model(echo_of(self._ranger_part, self.settings.echo))
+        effects = [tracked.meet(on_the_way(meeting, measured.segment, t_s)) for t_s, meeting in meetings]
+        return tracked.update(measured, readings), effects
 
     def _pop_readings(self, t_s: float) -> list[BeaconReading]:
         """The waiting beacon readings up to a time."""
@@ -322,15 +344,11 @@ class Tracker:
         self._rng.bit_generator.state = before.random_state
         waiting: list[BeaconReading] = []
         for measured, readings, meetings in before.since:
-            self._ranger_part = measured.ranger_part or self._ranger_part
-            self.filter = self.filter or self._first_filter(measured.segment.heading0_rad)
-            if self.filter is None:
+            tracked = self._filter_from(measured)
+            if tracked is None:
                 waiting += readings
             else:
-                self.filter.set_ranger_model(echo_of(self._ranger_part, self.settings.echo))
-                for t_s, meeting in meetings:
-                    self.filter.meet(on_the_way(meeting, measured.segment, t_s))
-                self._estimate = self.filter.update(measured, readings)
+                self._estimate, _ = self._step(tracked, measured, readings, meetings)
         self._readings = (waiting + self._readings)[-MAX_READINGS:]
         if self._segment is None or self._estimate is None:
             return []
