@@ -17,6 +17,7 @@ Ints = NDArray[np.int64]
 Int32s = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 Octets = NDArray[np.uint8]
+Records = NDArray[np.void]
 
 _SCALARS = {"float": "f8", "int": "i8"}
 _ARRAYS = {"Floats": "f8", "Ints": "i8"}

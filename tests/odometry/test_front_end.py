@@ -23,7 +23,7 @@ from echostep.board.messages import ROWS, Outcome, Ping
 from echostep.foot.steps import FootSettings
 from echostep.foot.trunk_path import GaitSettings
 from echostep.odometry.front_end import FrontEnd
-from echostep.odometry.synchronizer import BLIND_S, MAX_WAITING, PING_AGE_S, SILENCE_S, Synchronizer
+from echostep.odometry.synchronizer import BLIND_S, MAX_WAITING, MEASUREMENT, PING_AGE_S, SILENCE_S, Synchronizer
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
@@ -229,7 +229,9 @@ def test_waiting_is_like_its_naive_twin(seed: int, cuts: list[int], age_s: float
     edges = sorted({0, n, *cuts})
     for a, b in zip(edges, edges[1:], strict=False):
         at = [k - a for k in range(a, b) for _ in pings[k]]
-        ours.add_pings(np.array(at, np.int64), np.array([p for k in range(a, b) for p in pings[k]]).reshape(-1, 3))
+        new = np.zeros(len(at), MEASUREMENT)
+        new[["t_s", "source", "value_m"]] = [p for k in range(a, b) for p in pings[k]]
+        ours.add_pings(np.array(at, np.int64), new)
         for k in range(a, b):
             ours.add_segments(k - a, legs[k])
         for piece in ours.pop_ready(board[a:b], mtx[a:b], mtx[a:b]):

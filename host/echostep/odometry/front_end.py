@@ -45,7 +45,7 @@ from echostep.odometry.foot_legs_handover import FootLegsHandover
 from echostep.odometry.foot_source import ICM20649_NOISE, FootSamples, FootSource
 from echostep.odometry.gyro_blocks import GyroBlocks
 from echostep.odometry.heading_fusion import HeadingFusion
-from echostep.odometry.synchronizer import HEIGHT, PART, Synchronizer
+from echostep.odometry.synchronizer import BAROMETER, MEASUREMENT, Synchronizer
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk, Portion, portion_of
 from echostep.ports.people.check_in import PERSON
@@ -192,21 +192,25 @@ class FrontEnd:
 
     def _collect_pings(self, frames: Frames, times: Times) -> None:
         """Hand pings without a bus error, and heights by pressure, to the synchronizer, in order of their messages."""
-        ping_row, pings = frames.rows(Ping)
+        ping_row, reports = frames.rows(Ping)
         self.pings += len(ping_row)
-        t_s = times.board_s[ping_row] + self._ranger.delay_s
-        usable = ~np.isnan(t_s) & (pings["outcome"] != Outcome.BUS_ERROR)
-        which = pings["ranger"] + PART * self._parts_of(frames, ping_row, pings["ranger"])
-        ping_values = np.column_stack([t_s, which, ranges(pings, self._ranger)])[usable]
+        pings = np.zeros(len(ping_row), MEASUREMENT)
+        pings["t_s"] = times.board_s[ping_row] + self._ranger.delay_s
+        pings["value_m"] = ranges(reports, self._ranger)
+        pings["source"] = reports["ranger"]
+        pings["ranger_part"] = self._parts_of(frames, ping_row, reports["ranger"])
+        usable = ~np.isnan(pings["t_s"]) & (reports["outcome"] != Outcome.BUS_ERROR)
         height_row, samples = frames.rows(Pressure)
-        height_m, height_s = heights(samples), times.board_s[height_row]
-        valid = ~np.isnan(height_s) & ~np.isnan(height_m)
-        kind = HEIGHT + PART * times.board_restarts[height_row]
-        height_values = np.column_stack([height_s, kind, height_m])[valid]
+        height = np.zeros(len(height_row), MEASUREMENT)
+        height["t_s"] = times.board_s[height_row]
+        height["value_m"] = heights(samples)
+        height["source"] = BAROMETER
+        height["board_restarts"] = times.board_restarts[height_row]
+        valid = ~np.isnan(height["t_s"]) & ~np.isnan(height["value_m"])
         frame_row = np.concatenate([ping_row[usable], height_row[valid]])
         order = np.argsort(frame_row, kind="stable")
-        values = np.concatenate([ping_values, height_values])[order]
-        self._synchronizer.add_pings(times.board_message_index[frame_row[order]], values)
+        measurements = np.concatenate([pings[usable], height[valid]])[order]
+        self._synchronizer.add_pings(times.board_message_index[frame_row[order]], measurements)
 
     def _watch_belt(self, frames: Frames, times: Times) -> None:
         """Hand samples of the belt's six axes, with the thigh's forces, to the signs of the wearer."""

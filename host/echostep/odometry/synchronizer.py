@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from echostep.arrays import Floats, Ints, record_dtype
+from echostep.arrays import Floats, Ints, Records, record_dtype
 from echostep.jit import kernel
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 
@@ -21,9 +21,19 @@ SILENCE_S = 0.5  # a port that lags the other one by more is not waited for, ass
 BLIND_S = 1.0  # time without any observation that makes a dropout: twice a standing segment [path.STANDING_PIECE_S]
 # Pings and heights that wait; beyond it the oldest are dropped and counted: nearly two minutes of both
 MAX_WAITING = 4096
-HEIGHT = 2  # in the ranger column of a ping: the value is a height by pressure, not a range
-PART = 4  # factor of the ranger's part in that column; of a height: of the number of the board's restarts before it
+BAROMETER = 2  # as the source of a measurement
 DROPOUT = -1  # in the segment column of the output: a dropout, no segment
+
+
+class _Measurement(Protocol):
+    t_s: float
+    value_m: float  # range of a ping, NaN without an echo, or height by pressure
+    source: int  # ranger of a ping (0 looks left, 1 right), or BAROMETER
+    ranger_part: int  # of a ping: kind of its ranger; 0: not named
+    board_restarts: int  # of a height: restarts of the board before it
+
+
+MEASUREMENT = record_dtype(_Measurement)
 
 
 class _State(Protocol):
@@ -39,10 +49,13 @@ _STATE = record_dtype(_State)
 
 
 class _NewPings(NamedTuple):
-    """Pings (k, 3) of t_s, ranger, range_m, and the index (k,) of the message that brought each."""
+    """Pings and heights (k,), and the index (k,) of the message that brought each."""
 
     message_index: Ints
-    row: Floats
+    measurement: Records
+
+
+NO_PINGS = _NewPings(np.empty(0, np.int64), np.empty(0, MEASUREMENT))
 
 
 class _WaitingSegments(NamedTuple):
@@ -61,9 +74,9 @@ class _Progress(NamedTuple):
 
 
 class _Popped(NamedTuple):
-    """Output columns: `ping` (3, k) of all popped pings; by segment or dropout: `segment`, `t_s`, `ping_end` (pings popped by then)."""
+    """Output: `measurement` (k,), all popped pings; columns by segment or dropout: `segment`, `t_s`, `ping_end` (pings popped by then)."""
 
-    ping: Floats
+    measurement: Records
     segment: Ints
     t_s: Floats
     ping_end: Ints
@@ -77,10 +90,10 @@ class Synchronizer:
         self._ahead_rad = ahead_rad
         self._state = np.zeros(1, _STATE)
         self._state["dropout_s"] = -math.inf
-        self._waiting = np.empty((MAX_WAITING + 1, 3))  # pings: t_s, ranger, range_m; oldest first
+        self._waiting = np.empty(MAX_WAITING + 1, MEASUREMENT)  # oldest first
         self._segments: list[PathSegment] = []
         self._completed_by: list[int] = []  # message index of each segment
-        self._new = _NewPings(np.empty(0, np.int64), np.empty((0, 3)))
+        self._new = NO_PINGS
 
     @property
     def late(self) -> int:
@@ -97,11 +110,8 @@ class Synchronizer:
         """Segments that wait for their pings, in order of time."""
         return tuple(self._segments)
 
-    def add_pings(self, message_index: Ints, pings: Floats) -> None:
-        """Pings (n, 3) of t_s, ranger + PART * its part, range_m, or of t_s, HEIGHT + PART * restarts of the board, height_m.
-
-        With the index (n,) of the message of each.
-        """
+    def add_pings(self, message_index: Ints, pings: Records) -> None:
+        """Pings and heights (n,), MEASUREMENT, with the index (n,) of the message of each."""
         self._new = _NewPings(message_index, pings)
 
     def add_segments(self, message_index: int, segments: list[PathSegment]) -> None:
@@ -118,7 +128,7 @@ class Synchronizer:
         """
         segments, most = self._segments, len(self._segments) + len(board_newest_s)
         popped = _Popped(
-            np.empty((3, int(self._state["pings"][0]) + len(self._new.row))),
+            np.empty(int(self._state["pings"][0]) + len(self._new.measurement), MEASUREMENT),
             np.empty(most, np.int64),
             np.empty(most),
             np.empty(most, np.int64),
@@ -130,7 +140,7 @@ class Synchronizer:
         count = _pop_ready(self._state[0], self._waiting, self._new, waiting, progress, popped)
         done = int(np.sum(popped.segment[:count] != DROPOUT))
         self._segments, self._completed_by = segments[done:], [-1] * (len(segments) - done)
-        self._new = _NewPings(np.empty(0, np.int64), np.empty((0, 3)))
+        self._new = NO_PINGS
         return _pieces(segments, popped, count, self._ahead_rad)
 
 
@@ -138,8 +148,6 @@ def _pieces(
     segments: list[PathSegment], popped: _Popped, count: int, ahead_rad: float
 ) -> list[MeasuredSegment | Dropout]:
     """The first `count` rows of the output columns as objects."""
-    pings = int(popped.ping_end[count - 1]) if count else 0
-    t_s, ranger, value_m = popped.ping[0], popped.ping[1, :pings].astype(np.int64), popped.ping[2]
     pieces: list[MeasuredSegment | Dropout] = []
     begin = 0
     columns = (popped.segment[:count].tolist(), popped.t_s[:count].tolist(), popped.ping_end[:count].tolist())
@@ -147,34 +155,39 @@ def _pieces(
         if segment == DROPOUT:
             pieces.append(Dropout(dropout_s))
         else:
-            measured = _measured(segments[segment], t_s[begin:end], ranger[begin:end], value_m[begin:end], ahead_rad)
-            pieces.append(measured)
+            pieces.append(_measured(segments[segment], popped.measurement[begin:end], ahead_rad))
             begin = end
     return pieces
 
 
-def _measured(segment: PathSegment, t_s: Floats, ranger: Ints, value_m: Floats, ahead_rad: float) -> MeasuredSegment:
+def _measured(segment: PathSegment, measurements: Records, ahead_rad: float) -> MeasuredSegment:
     """A segment with its pings, and apart from them the heights."""
-    is_ping = ranger % PART != HEIGHT
-    which, high = ranger[is_ping], ranger[~is_ping]
-    part, restarts = (int(kind[-1]) // PART if len(kind) else 0 for kind in (which, high))
+    is_ping = measurements["source"] != BAROMETER
+    ranger_part, restarts = measurements["ranger_part"][is_ping], measurements["board_restarts"][~is_ping]
     return MeasuredSegment(
-        segment, t_s[is_ping], which % PART, value_m[is_ping], value_m[~is_ping], part, restarts, ahead_rad
+        segment,
+        measurements["t_s"][is_ping],
+        measurements["source"][is_ping],
+        measurements["value_m"][is_ping],
+        measurements["value_m"][~is_ping],
+        int(ranger_part[-1]) if len(ranger_part) else 0,
+        int(restarts[-1]) if len(restarts) else 0,
+        ahead_rad,
     )
 
 
 @kernel
 def _pop_ready(
-    s: _State, waiting: Floats, new: _NewPings, segments: _WaitingSegments, progress: _Progress, popped: _Popped
+    s: _State, waiting: Records, new: _NewPings, segments: _WaitingSegments, progress: _Progress, popped: _Popped
 ) -> int:
     """Message by message: add its pings, pop every segment that is complete, report a dropout.
 
-    Fills the columns of `popped`; returns the number of segments and dropouts in it.
+    Fills `popped`; returns the number of segments and dropouts in it.
     """
     count = next_ping = next_segment = pings = 0
     for message_index in range(len(progress.board_s)):
         while next_ping < len(new.message_index) and new.message_index[next_ping] == message_index:
-            _push(s, waiting, new.row[next_ping])
+            _push(s, waiting, new.measurement[next_ping])
             next_ping += 1
         board, mtx = progress.board_s[message_index], progress.mtx_s[message_index]
         complete_s = -np.inf if np.isnan(board) else board - PING_AGE_S
@@ -185,7 +198,7 @@ def _pop_ready(
             and segments.end_s[next_segment] <= complete_s
         ):
             end_s = segments.end_s[next_segment]
-            pings = _pop(s, waiting, end_s, popped.ping, pings)
+            pings = _pop(s, waiting, end_s, popped.measurement, pings)
             s.popped += 1
             s.popped_s = max(s.popped_s, end_s)
             popped.segment[count], popped.t_s[count], popped.ping_end[count] = next_segment, end_s, pings
@@ -199,13 +212,13 @@ def _pop_ready(
 
 
 @kernel
-def _push(s: _State, waiting: Floats, ping: Floats) -> None:
+def _push(s: _State, waiting: Records, ping: _Measurement) -> None:
     """Insert a ping by time, after equal ones. A ping older than the last popped segment is late; beyond MAX_WAITING the oldest is dropped."""
-    if ping[0] < s.popped_s:
+    if ping.t_s < s.popped_s:
         s.late += 1
         return
     k = s.pings
-    while k > 0 and waiting[k - 1, 0] > ping[0]:
+    while k > 0 and waiting[k - 1].t_s > ping.t_s:
         waiting[k] = waiting[k - 1]
         k -= 1
     waiting[k] = ping
@@ -217,11 +230,11 @@ def _push(s: _State, waiting: Floats, ping: Floats) -> None:
 
 
 @kernel
-def _pop(s: _State, waiting: Floats, until_s: float, popped: Floats, count: int) -> int:
-    """Move the pings up to a time to the columns of `popped` (3, n) from `count` on; returns the new count."""
+def _pop(s: _State, waiting: Records, until_s: float, popped: Records, count: int) -> int:
+    """Move the pings up to a time to `popped` (n,) from `count` on; returns the new count."""
     n = 0
-    while n < s.pings and waiting[n, 0] <= until_s:
-        popped[:, count + n] = waiting[n]
+    while n < s.pings and waiting[n].t_s <= until_s:
+        popped[count + n] = waiting[n]
         n += 1
     for k in range(n, s.pings):
         waiting[k - n] = waiting[k]
