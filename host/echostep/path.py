@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The types that odometry and localization exchange: the trunk's path in pieces, and what was measured on each.
+"""The types that odometry and localization exchange: the trunk's path in pieces, and what was measured on each; the length of a path.
 
-In: nothing. Out: `PathSegment`, `MeasuredSegment`, `Dropout`. Owns nothing. Frame: walk (z up, origin and yaw arbitrary at the start).
+In: nothing. Out: `PathSegment`, `MeasuredSegment`, `Dropout`, `Odometer`. Owns nothing. Frame: walk (z up, origin and yaw arbitrary at the start).
 """
 
 from __future__ import annotations
@@ -27,6 +27,21 @@ UNOBSERVED_SD_M = 0.75  # a segment with a larger standard deviation was not obs
 def bend_of(turn_rad: float) -> float:
     """Bend of a way with this turn, as a share of its chord: BENT of an arc, whose height over the chord is chord / 2 * tan(turn / 4)."""
     return BENT * 2.0 * math.tan(0.25 * turn_rad)
+
+
+class Odometer:
+    """Length of a path so far. A mark on the path is the value of `path_m` there."""
+
+    def __init__(self) -> None:
+        self.path_m = 0.0
+
+    def add(self, length_m: float) -> None:
+        """Lengthen the path."""
+        self.path_m += length_m
+
+    def since_m(self, mark_m: float) -> float:
+        """Length of the path since a mark; infinite since -inf, a mark that was never taken."""
+        return self.path_m - mark_m
 
 
 class StanceHeadings(NamedTuple):

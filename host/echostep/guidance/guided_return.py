@@ -21,7 +21,7 @@ from echostep.guidance.cues import Cue, CueKind, Guide
 from echostep.guidance.own_way import OwnWay
 from echostep.guidance.target import turn_ahead
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.path import MeasuredSegment
+from echostep.path import MeasuredSegment, Odometer
 from echostep.plan.polyline import nearest, way_m
 from echostep.plan.routing import Route, RoutePlace, Stretch
 from echostep.tracker import Tracker
@@ -42,7 +42,7 @@ class GuidedReturn(CueList):
         self._tracker = tracker
         self._way = OwnWay()
         self._line = self._way.line_m()  # the way back from the far end of the way in
-        self._since_m = 0.0  # walked since that end was set
+        self._since_end = Odometer()
         self._least_m = math.inf  # least length of the way back since the return began
         self._guide: Guide | None = None  # of the return; None on the way in
         tracker.watchers.append(self._watch)
@@ -66,13 +66,13 @@ class GuidedReturn(CueList):
     def _cue_in(self, e: Estimate) -> Cue:
         """The cue on the way in: direction and length of the way back; that of the return when it begins here."""
         if e.status is not TrackStatus.LOST:
-            self._since_m += self._way.add(e.x_m, e.y_m, e.z_m)
+            self._since_end.add(self._way.add(e.x_m, e.y_m, e.z_m))
             progress_m, off_m = _nearest(self._line, e)
             if progress_m > TURN_M and off_m < _limit_m(e):
                 self._way.go_back_to(way_m(self._line) - progress_m)
                 return self._begin(e)
             is_ahead = progress_m == 0.0 and off_m > 0.5 * _limit_m(e)
-            if is_ahead or off_m > _limit_m(e) or self._since_m > progress_m + TURN_M:
+            if is_ahead or off_m > _limit_m(e) or self._since_end.path_m > progress_m + TURN_M:
                 self._set_end()
         return self._in(e)
 
@@ -107,7 +107,7 @@ class GuidedReturn(CueList):
 
     def _set_end(self) -> None:
         """The present position is the far end of the way in."""
-        self._line, self._since_m = self._way.line_m(), 0.0
+        self._line, self._since_end = self._way.line_m(), Odometer()
 
     def _in(self, e: Estimate, spoken: str = "") -> Cue:
         """The cue while going in: direction and length of the way back, from the place on it that is nearest."""

@@ -87,7 +87,7 @@ class MapFilter:
         prior = (STATED if stated else UNSTATED) if building.has_walls else BY_DEFINITION
         self.tracked = CloudHypothesis(cloud, Plausibility(prior), stated)
         self.search: CloudHypothesis | None = None
-        self._progress = SearchProgress(building.levels, self.tracked.plausibility.log_odds)
+        self._progress = SearchProgress(self._pings.odometer, building.levels, self.tracked.plausibility.log_odds)
         self._is_refuted = False  # whether the tracked cloud was as good as wrong since it was doubted
         self._is_elsewhere = False  # whether a gap may have led elsewhere since the tracked cloud was last confirmed
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
@@ -95,7 +95,7 @@ class MapFilter:
         self._way = RecentWay()  # since the last gap
         self._riding = RidingHeight(HEIGHT_SD_M)
         self._board_restarts = 0  # before the last height by pressure
-        self._met = MeetingMemory()
+        self._met = MeetingMemory(self._pings.odometer)
         self.beacon_map = BeaconMap(building.walls, self._settings.beacons, rng)
         if start.after_pause:
             self.tracked.plausibility.doubt(UNOBSERVED_DOUBT)
@@ -146,7 +146,7 @@ class MapFilter:
         teammates' beacons can begin a search.
         """
         area_m2 = self._building.floor.area_m2
-        refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._met.refusal(meeting, self._pings.path_m)
+        refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._met.refusal(meeting)
         if refusal is not None:
             return refusal
         fits = [weigh_by(each, meeting, area_m2) for each in self._clouds()]
@@ -157,7 +157,7 @@ class MapFilter:
             plausibility.raise_to(min(fits[0], 1.0 - wrong))
             self._met.agree()
             return MeetingEffect.USED
-        moved = moved_by(meeting, plausibility.probability, self._met.contradict(self._pings.path_m))
+        moved = moved_by(meeting, plausibility.probability, self._met.contradict())
         if moved is None:
             return MeetingEffect.CONTRADICTS
         self._met.agree()
@@ -315,7 +315,7 @@ class MapFilter:
         tracked, search = self.tracked, self.search
         self._is_refuted = self._is_refuted or tracked.plausibility.log_odds < REFUTED
         self._note_coarse()
-        if self._progress.is_astray(tracked.cloud, self._pings.path_m):
+        if self._progress.is_astray(tracked.cloud):
             self._plan.fail_search()
             self.tracked = self._new_search(Start(), walk_heading_rad)
         elif search is None:
@@ -324,7 +324,7 @@ class MapFilter:
             self._agree()
         elif search.plausibility.probability > FOUND and search.cloud.is_in_one_place and right < DOUBTED:
             self._follow_search(search)
-        elif self._progress.has_failed(search, self._pings.path_m):
+        elif self._progress.has_failed(search):
             self._plan.fail_search()
             start = Start() if self._is_elsewhere else self._nearby(walk_heading_rad)
             self.search = self._new_search(start, walk_heading_rad)
@@ -335,7 +335,7 @@ class MapFilter:
     def _agree(self) -> None:
         """End a search that agrees with the tracked cloud: that cloud was right, unless it was refuted and is now at the true place by chance."""
         if self._is_refuted:
-            self._plan.find(self._progress.length_m(self._pings.path_m), math.inf)
+            self._plan.find(self._progress.length_m, math.inf)
         else:
             self._plan.agree()
         self.search, self._is_elsewhere = None, False
@@ -344,12 +344,12 @@ class MapFilter:
         """Track the cloud of the search."""
         was = self._believed(0.0)
         self.tracked, self.search, self._is_elsewhere = search, None, False
-        self._plan.find(self._progress.length_m(self._pings.path_m), away_m(was, self._believed(0.0)))
+        self._plan.find(self._progress.length_m, away_m(was, self._believed(0.0)))
 
     def _note_coarse(self) -> None:
         """Count against the plan that a coarse search has no probable place at the end of the path within which one is usually found."""
         cloud = self._clouds()[-1].cloud
-        if cloud.is_coarse and self._progress.note_coarse(self._pings.path_m) and cloud.place_share < DOUBTED:
+        if cloud.is_coarse and self._progress.note_coarse() and cloud.place_share < DOUBTED:
             self._plan.fail_search()
 
     def _doubt(self, tracked: CloudHypothesis, walk_heading_rad: float) -> bool:
@@ -358,9 +358,9 @@ class MapFilter:
         if tracked.plausibility.probability >= least or tracked.cloud.is_coarse or not len(self._building.floor.x_m):
             return False
         if tracked.is_stated:
-            self._plan.reject_start(self._pings.path_m)
+            self._plan.reject_start(self._pings.odometer.path_m)
         else:
-            self._plan.reject_found(self._progress.length_m(self._pings.path_m) - self._progress.found_within_m)
+            self._plan.reject_found(self._progress.length_m - self._progress.found_within_m)
         self._is_refuted = False
         self.search = self._new_search(self._nearby(walk_heading_rad), walk_heading_rad)
         return True
@@ -370,7 +370,7 @@ class MapFilter:
         return Start(near=self._believed(walk_heading_rad), near_z_m=float(self.cloud.weight @ self.cloud.z_m))
 
     def _new_search(self, start: Start, walk_heading_rad: float) -> CloudHypothesis:
-        self._progress.begin(self._pings.path_m, self.tracked.plausibility.log_odds)
+        self._progress.begin(self.tracked.plausibility.log_odds)
         self._met.forget_beacons()
         return CloudHypothesis(self._new_cloud(start, walk_heading_rad), Plausibility(UNSTATED))
 

@@ -13,7 +13,7 @@ from statistics import median
 
 from echostep.localization.height.levels import HeightChange
 from echostep.localization.particle_arrays import Move
-from echostep.path import MeasuredSegment, PathSegment
+from echostep.path import MeasuredSegment, Odometer, PathSegment
 
 BESIDE_M = 0.05  # of the trunk from a foot on the floor: half of a step's width of 10 cm
 HEIGHT_SD_M = 0.3  # of one height by pressure: an SCP1000 in its fast mode, a little worse than in its data sheet
@@ -57,7 +57,7 @@ class Gaps:
         self.pause_s = 0.0  # between the last two segments
         self._end_s = math.inf  # of the last segment
         self._ping_s = math.inf  # of the last ping
-        self._path_m = 0.0  # since that ping
+        self._since_ping = Odometer()
 
     def ended(self, measured: MeasuredSegment) -> Gap | None:
         """The gap that this segment ends, or that is known by its end."""
@@ -75,11 +75,11 @@ class Gaps:
         """Whether the foot has stood for MUTE_S without a ping, once until the next one."""
         segment = measured.segment
         if len(measured.t_s):
-            is_mute = self._path_m < STANDING_M and measured.t_s[0] - self._ping_s > MUTE_S
-            self._ping_s, self._path_m = float(measured.t_s[-1]), 0.0
+            is_mute = self._since_ping.path_m < STANDING_M and measured.t_s[0] - self._ping_s > MUTE_S
+            self._ping_s, self._since_ping = float(measured.t_s[-1]), Odometer()
             return is_mute
-        self._path_m += math.hypot(segment.dx_m, segment.dy_m)
-        is_mute = self._path_m < STANDING_M and segment.t1_s - self._ping_s > MUTE_S
+        self._since_ping.add(math.hypot(segment.dx_m, segment.dy_m))
+        is_mute = self._since_ping.path_m < STANDING_M and segment.t1_s - self._ping_s > MUTE_S
         if is_mute:
             self._ping_s = math.inf
         return is_mute

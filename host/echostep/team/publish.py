@@ -20,6 +20,7 @@ from typing import Literal, Self
 
 from echostep.errors import EchostepError
 from echostep.localization.estimate import CHI2_95, Estimate, TrackStatus, claims_place
+from echostep.path import Odometer
 from echostep.plan.model import Level, Plan
 from echostep.plan.places.whereabouts import Whereabouts
 from echostep.team.cot import StreamTransport, UdpTransport
@@ -163,9 +164,9 @@ class ReportHistory:
 
     def __init__(self) -> None:
         self._last: Estimate | None = None
-        self._walked_m = 0.0
+        self._odometer = Odometer()
         self._last_step_s = math.nan
-        self._recent: deque[tuple[float, float]] = deque()  # t_s, walked_m
+        self._recent: deque[tuple[float, float]] = deque()  # t_s, mark on the path
         self._counts: deque[tuple[float, int, int]] = deque()  # t_s, samples, frames
 
     def motion(self, e: Estimate) -> Motion:
@@ -173,13 +174,13 @@ class ReportHistory:
         last, self._last = self._last, e
         if last is None or e.step != last.step:
             self._last_step_s = e.t_s
-            self._walked_m += 0.0 if last is None else math.hypot(e.x_m - last.x_m, e.y_m - last.y_m)
-        self._recent.append((e.t_s, self._walked_m))
+            self._odometer.add(0.0 if last is None else math.hypot(e.x_m - last.x_m, e.y_m - last.y_m))
+        self._recent.append((e.t_s, self._odometer.path_m))
         while self._recent[0][0] < e.t_s - AVERAGING_S:
             self._recent.popleft()
-        span_s, distance_m = e.t_s - self._recent[0][0], self._walked_m - self._recent[0][1]
+        span_s, distance_m = e.t_s - self._recent[0][0], self._odometer.since_m(self._recent[0][1])
         speed = min(distance_m / span_s, 100.0) if span_s > MIN_SPEED_SPAN_S else 0.0
-        return Motion(max(e.step, 0), min(self._walked_m, 1e9), speed, max(e.t_s - self._last_step_s, 0.0))
+        return Motion(max(e.step, 0), min(self._odometer.path_m, 1e9), speed, max(e.t_s - self._last_step_s, 0.0))
 
     def streams(self, tracker: Tracker, t_s: float) -> StreamReport:
         """Health of the input streams; rates over AVERAGING_S of the clock of `t_s`."""

@@ -78,7 +78,7 @@ def test_a_ping_knows_whether_that_before_it_was_silent() -> None:
         ping = used.take(pings(range_m, 1), 0, 0.0)
         assert ping is not None
         after.append(ping.after)
-        used.path_m += 1.0
+        used.odometer.add(1.0)
     assert after == [AFTER_SILENCE, AFTER_SILENCE, AFTER_ECHO, AFTER_SILENCE]
 
 

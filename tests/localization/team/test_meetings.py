@@ -36,7 +36,7 @@ from echostep.localization.team.meetings import (
     start_at,
     weigh,
 )
-from echostep.path import PathSegment
+from echostep.path import Odometer, PathSegment
 from echostep.plan.model import Plan, Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.meeting import MEETING, Meeting, parse_meeting
@@ -244,14 +244,17 @@ def test_a_teammate_without_a_place_says_nothing(met: Meeting) -> None:
 
 
 def test_the_same_teammate_counts_again_after_a_way() -> None:
-    memory = MeetingMemory()
-    assert memory.refusal(KIM, 0.0) is None
-    assert memory.refusal(KIM, 0.9 * RENEWED_M) is MeetingEffect.REPEATED
-    assert memory.refusal(FAR, 0.9 * RENEWED_M) is None
-    assert memory.refusal(KIM, 1.1 * RENEWED_M) is None  # since the one that counted, not since the one that did not
+    odometer = Odometer()
+    memory = MeetingMemory(odometer)
+    assert memory.refusal(KIM) is None
+    odometer.add(0.9 * RENEWED_M)
+    assert memory.refusal(KIM) is MeetingEffect.REPEATED
+    assert memory.refusal(FAR) is None
+    odometer.add(0.2 * RENEWED_M)
+    assert memory.refusal(KIM) is None  # since the one that counted, not since the one that did not
     for k in range(3 * MOST_NAMES):
-        memory.refusal(Meeting(str(k), "tracking", 0.0, 0.0, 0, 0.01, 0.0, 0.01), 20.0)
-    assert len(memory._path_m) == MOST_NAMES
+        memory.refusal(Meeting(str(k), "tracking", 0.0, 0.0, 0, 0.01, 0.0, 0.01))
+    assert len(memory._met_m) == MOST_NAMES
 
 
 def test_an_old_report_says_less() -> None:

@@ -24,6 +24,7 @@ from echostep.localization.particles.start import Start
 from echostep.localization.team.meetings import RENEWED_M, MeetingEffect, MeetingMemory, MeetingQueue
 from echostep.localization.team.shared_beacons import MOST_TEAMMATES, TeamBeaconMap
 from echostep.page.elements.marks import beacon_marks
+from echostep.path import Odometer
 from echostep.plan.model import Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.meeting import Meeting
@@ -112,21 +113,26 @@ def test_a_search_is_narrowed_by_ranges_of_two_beacons_that_it_fits_badly_at_fir
 
 
 def test_a_search_that_begins_later_is_weighed_by_the_same_beacons_again() -> None:
-    memory = MeetingMemory()
+    odometer = Odometer()
+    memory = MeetingMemory(odometer)
     tap = Meeting("kim", "tracking", 4.0, 7.5, 0, 0.01, 0.0, 0.01)
-    assert (memory.refusal(a_range(2.0), 0.0), memory.refusal(tap, 0.0)) == (None, None)
+    assert (memory.refusal(a_range(2.0)), memory.refusal(tap)) == (None, None)
     memory.forget_beacons()
-    assert memory.refusal(a_range(2.0), 1.0) is None
-    assert memory.refusal(tap, 1.0) is MeetingEffect.REPEATED
+    odometer.add(1.0)
+    assert memory.refusal(a_range(2.0)) is None
+    assert memory.refusal(tap) is MeetingEffect.REPEATED
 
 
 def test_a_beacon_counts_once_on_a_way_but_each_of_them_does() -> None:
-    memory = MeetingMemory()
-    assert memory.refusal(a_range(2.0), 0.0) is None
-    assert memory.refusal(a_range(2.0), 0.9 * RENEWED_M) is MeetingEffect.REPEATED
-    assert memory.refusal(a_range(2.0, number=8), 0.9 * RENEWED_M) is None
-    assert memory.refusal(a_range(2.0, name="bo"), 0.9 * RENEWED_M) is None
-    assert memory.refusal(a_range(2.0), 1.1 * RENEWED_M) is None
+    odometer = Odometer()
+    memory = MeetingMemory(odometer)
+    assert memory.refusal(a_range(2.0)) is None
+    odometer.add(0.9 * RENEWED_M)
+    assert memory.refusal(a_range(2.0)) is MeetingEffect.REPEATED
+    assert memory.refusal(a_range(2.0, number=8)) is None
+    assert memory.refusal(a_range(2.0, name="bo")) is None
+    odometer.add(0.2 * RENEWED_M)
+    assert memory.refusal(a_range(2.0)) is None
 
 
 def test_ranges_to_beacons_are_counted_but_are_no_news() -> None:

@@ -19,6 +19,7 @@ from echostep.arrays import Floats, Int32s
 from echostep.jit import allocating_kernel, inline_kernel, kernel, lean_kernel
 from echostep.localization.echoes.likelihood import SILENT_SHARE, EchoModel, detection, hidden_density
 from echostep.localization.particle_arrays import ParticleArrays, PingBatch
+from echostep.path import Odometer
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import CELL_M, Floor
 from echostep.walls.index import WallIndex
@@ -182,13 +183,13 @@ class CoarsePings:
     """The memory of both rangers since the cloud began."""
 
     def __init__(self) -> None:
-        self.path_m = 0.0
-        self._used_at_m = [-math.inf, -math.inf]  # path at the last ping of each ranger
+        self.odometer = Odometer()
+        self._used_at_m = [-math.inf, -math.inf]  # mark on the path at the last ping of each ranger
         self._after = [AFTER_SILENCE, AFTER_SILENCE]  # what that was
 
     def take(self, pings: PingBatch, k: int, way_m: float) -> CoarsePing | None:
-        """The k-th ping, `way_m` after `path_m`; None if it comes too soon after the last one of its ranger."""
-        ranger, at_m = int(pings.ranger[k]), self.path_m + way_m
+        """The k-th ping, `way_m` after the end of the path; None if it comes too soon after the last one of its ranger."""
+        ranger, at_m = int(pings.ranger[k]), self.odometer.path_m + way_m
         travel_m, after = at_m - self._used_at_m[ranger], self._after[ranger]
         if travel_m < USED_M:
             return None

@@ -23,7 +23,7 @@ from echostep.arrays import Floats, Ints
 from echostep.jit import kernel
 from echostep.localization.echoes.likelihood import EchoModel, EchoSettings, MissedEchoes, echo_density, normal
 from echostep.localization.particle_arrays import PingBatch
-from echostep.path import MeasuredSegment
+from echostep.path import MeasuredSegment, Odometer
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import Floor
 from echostep.walls.index import WallIndex
@@ -216,10 +216,10 @@ class UsablePings:
     """Pings from nearly one place repeat each other's errors: each counts by the path since the one before, up to `own` after `correlation_m`."""
 
     def __init__(self, background: Background, echo: EchoSettings) -> None:
-        self.path_m = 0.0  # length of the path so far
+        self.odometer = Odometer()
         self.set_ranger_model(background, echo)
         self._x_m, self._y_m = 0.0, 0.0  # end of the path in the walk frame
-        self._last_ping_m = [-math.inf, -math.inf]  # length of the path at each ranger's last ping
+        self._last_ping_m = [-math.inf, -math.inf]  # mark on the path at each ranger's last ping
 
     def set_ranger_model(self, background: Background, echo: EchoSettings) -> None:
         """Use these ranger settings, and this density of echoes without a plan, from the next segment on."""
@@ -229,7 +229,7 @@ class UsablePings:
     @property
     def silent_m(self) -> float:
         """Length of the path since the last ping."""
-        return self.path_m - max(self._last_ping_m)
+        return self.odometer.since_m(max(self._last_ping_m))
 
     def take(self, measured: MeasuredSegment) -> tuple[PingBatch, UnplannedDensities]:
         """The pings that bring information, with their share of the segment and their axis in the walk frame, and their densities without a plan."""
@@ -240,9 +240,9 @@ class UsablePings:
             share = np.clip((measured.t_s - segment.t0_s) / span_s, 0.0, 1.0)
         axis = segment.heading0_rad + share * segment.turn_rad + measured.off_heading_rad
         range_m = np.where(np.isnan(measured.range_m), 0.0, measured.range_m)
-        travel_m = self._travels(measured.ranger, self.path_m + share * length)
+        travel_m = self._travels(measured.ranger, self.odometer.path_m + share * length)
         power = self._own * np.minimum(travel_m / self._correlation_m, 1.0) / _loss(segment.turn_rad, TURNING_RAD)
-        self.path_m += length
+        self.odometer.add(length)
         used = power > LEAST_POWER
         way_x_m, way_y_m = segment.way_m(share)
         x_m, y_m = self._x_m + way_x_m, self._y_m + way_y_m

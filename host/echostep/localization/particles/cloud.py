@@ -203,7 +203,7 @@ class Cloud(Particles):
             if ping is not None:
                 reweight_coarsely(self.arrays, ping, field, model, table)
             self.resample_if_needed()
-        used.path_m += length
+        used.odometer.add(length)
 
     def change_levels(self, move: Move, change: HeightChange) -> None:
         """Update heights and levels after a move, reweight by them, and resample when too few particles carry the weight."""
@@ -313,7 +313,7 @@ class Cloud(Particles):
     @property
     def _rest(self) -> float:
         """Weight outside of one place below which the cloud is no longer coarse."""
-        return COARSE_REST if self.sheet is None or self._coarse_pings.path_m < LEVELS_M else LEVELS_REST
+        return COARSE_REST if self.sheet is None or self._coarse_pings.odometer.path_m < LEVELS_M else LEVELS_REST
 
     def _resample(self, log_wanted: Floats, log_weight: Floats, count: int) -> None:
         """Keep `count` particles with these log-probabilities (n,), each with its log-weight (n,)."""

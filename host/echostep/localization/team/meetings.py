@@ -35,7 +35,7 @@ from echostep.localization.belief import DOUBTED, CloudHypothesis
 from echostep.localization.estimate import LOST_M, TAIL, ellipse95
 from echostep.localization.height.levels import SAME_LEVEL_M
 from echostep.localization.particles.cloud import Cloud
-from echostep.path import PathSegment
+from echostep.path import Odometer, PathSegment
 from echostep.ports.people.check_in import MOST_SD_M, CheckIn
 from echostep.ports.people.meeting import Meeting, parse_meeting
 
@@ -233,35 +233,37 @@ class MeetingNews:
 class MeetingMemory:
     """Decides which meetings may count: a teammate's position counts again after RENEWED_M of the wearer's own path."""
 
-    def __init__(self) -> None:
-        self._path_m: dict[
-            tuple[str, int | None], float
-        ] = {}  # length of the path at the last meeting with each teammate, or range to a beacon of theirs
-        self._contradicted_m: list[float] = []  # lengths of the path at the contradictions since the last agreement
+    def __init__(self, odometer: Odometer) -> None:
+        """`odometer`: of the wearer's path."""
+        self._odometer = odometer
+        # Mark on the path at the last meeting with each teammate, or range to a beacon of theirs
+        self._met_m: dict[tuple[str, int | None], float] = {}
+        self._contradicted_m: list[float] = []  # marks at the contradictions since the last agreement
 
-    def refusal(self, meeting: Meeting, path_m: float) -> MeetingEffect | None:
+    def refusal(self, meeting: Meeting) -> MeetingEffect | None:
         """Why a meeting does not count; None where it does, which is remembered."""
         if not carries_position(meeting):
             return MeetingEffect.EMPTY
         key = meeting.name, meeting.beacon
-        last_m = self._path_m.pop(key, None)
-        repeated = last_m is not None and path_m - last_m < RENEWED_M
-        self._path_m[key] = last_m if repeated and last_m is not None else path_m
-        if len(self._path_m) > MOST_NAMES:
-            self._path_m.pop(next(iter(self._path_m)))
+        last_m = self._met_m.pop(key, -math.inf)
+        repeated = self._odometer.since_m(last_m) < RENEWED_M
+        self._met_m[key] = last_m if repeated else self._odometer.path_m
+        if len(self._met_m) > MOST_NAMES:
+            self._met_m.pop(next(iter(self._met_m)))
         return MeetingEffect.REPEATED if repeated else None
 
     def forget_beacons(self) -> None:
         """Reset the ranges to beacons: a search has begun, whose cloud they have not reweighted yet."""
-        self._path_m = {key: m for key, m in self._path_m.items() if key[1] is None}
+        self._met_m = {key: m for key, m in self._met_m.items() if key[1] is None}
 
     def agree(self) -> None:
         """A teammate agrees with the cloud: earlier contradictions are cancelled."""
         self._contradicted_m.clear()
 
-    def contradict(self, path_m: float) -> int:
+    def contradict(self) -> int:
         """A teammate contradicts the cloud; returns how many have done so in the last RENEWED_M without an agreement since."""
-        self._contradicted_m = [*(m for m in self._contradicted_m if path_m - m < RENEWED_M), path_m][-MOST_NAMES:]
+        recent_m = [m for m in self._contradicted_m if self._odometer.since_m(m) < RENEWED_M]
+        self._contradicted_m = [*recent_m, self._odometer.path_m][-MOST_NAMES:]
         return len(self._contradicted_m)
 
 
