@@ -15,7 +15,8 @@ from typer.testing import CliRunner
 from echostep.cli import app
 from echostep.errors import EchostepError
 from echostep.plan.importers.dxf import entities as dxf_entities
-from echostep.plan.importers.formats import Hints, import_plan, open_plan
+from echostep.plan.importers.formats import import_plan, open_plan
+from echostep.plan.importers.hints import Hints
 from echostep.plan.model import Plan, load_plan
 
 
@@ -222,7 +223,7 @@ def test_commands(tmp_path: Path) -> None:
     command = ["plan", "import", str(tmp_path / "ground.dxf"), "-o", str(tmp_path / "plan.json")]
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0
-    assert "ground, 0 m: 2 walls" in done.output
+    assert "ground, 0 m: 9 x 0 m, 2 walls (8 m)" in done.output
     assert load_plan(tmp_path / "plan.json").digest == open_plan(tmp_path / "ground.dxf").digest
     again = CliRunner().invoke(app, [*command, "--layer", "walls=A-DOOR", "--layer", "walls=A-W*", "--units", "mm"])
     assert again.exit_code == 0

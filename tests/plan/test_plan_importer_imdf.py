@@ -14,7 +14,8 @@ import pytest
 import command_line
 from echostep.errors import EchostepError
 from echostep.plan.check import check_plan
-from echostep.plan.importers.formats import Hints, import_plan
+from echostep.plan.importers.formats import import_plan
+from echostep.plan.importers.hints import Hints
 from echostep.plan.importers.imdf import archive
 from echostep.plan.model import Plan
 
@@ -136,7 +137,7 @@ def changed(name: str, place: int, **about: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("tree", "named"),
     [
-        ({"level.geojson": "{}"}, "manifest.json"),
+        ({"unit.geojson": "{}"}, "no level.geojson in it"),
         ({"manifest.json": "{}"}, "level.geojson"),
         (files() | {"unit.geojson": "[1"}, "unit.geojson: not JSON"),
         (files() | {"unit.geojson": "[" * 100_000}, "unit.geojson: not JSON"),

@@ -12,7 +12,8 @@ import pytest
 import shapely
 
 from echostep.errors import EchostepError
-from echostep.plan.importers.formats import Hints, import_plan
+from echostep.plan.importers.formats import import_plan
+from echostep.plan.importers.hints import Hints
 from echostep.plan.model import Plan, load_plan
 from echostep.plan.writer import save_plan
 from needs_data import data_or_skip

@@ -14,12 +14,13 @@ import typer
 
 from echostep.commands.options import needs
 from echostep.errors import EchostepError
-from echostep.extras import PAGE, require
+from echostep.extras import PAGE, lacks, require
 
 if TYPE_CHECKING:
     from echostep.plan.model import Plan
 
 MOST_LINES, MOST_MARKS = 200, 300  # findings that are printed, and that are drawn
+MARK = b"echostep plan"  # in the header of the pictures that the drawing writes
 
 app = typer.Typer(no_args_is_help=True, help="Plans: import, check, show, edit.")
 
@@ -43,12 +44,35 @@ def import_(
         typer.Option(
             "--layer",
             metavar="KIND=PATTERN",
-            help="DXF: layers of walls, windows, doors, stairs, lifts, rooms or obstacles, as walls=A-WALL*; may be repeated.",
+            help="DXF: layers of walls, columns, windows, doors, stairs, lifts, rooms or obstacles, as walls=A-WALL*; may be repeated.",
         ),
     ] = None,
     units: Annotated[
         str | None, typer.Option("--units", metavar="UNIT", help="DXF: mm, cm, m, in or ft instead of the file's.")
     ] = None,
+    scale: Annotated[
+        str | None,
+        typer.Option(
+            "--scale",
+            metavar="M|X0,Y0,X1,Y1=M",
+            help="DXF: metres a unit, or the distance of two known points in metres.",
+        ),
+    ] = None,
+    window: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--window",
+            metavar="X0,Y0,X1,Y1",
+            help="DXF: this part of the drawing is a storey, in its units; may be repeated, the lowest first.",
+        ),
+    ] = None,
+    level: Annotated[
+        list[str] | None,
+        typer.Option("--level", metavar="NAME", help="DXF: name of a storey; may be repeated, the lowest first."),
+    ] = None,
+    align: Annotated[
+        bool, typer.Option("--align", help="DXF: lay storeys that are drawn apart over each other.")
+    ] = False,
     doors: Annotated[
         float | None,
         typer.Option(
@@ -59,60 +83,47 @@ def import_(
             max=5.0,
         ),
     ] = None,
+    picture: Annotated[bool, typer.Option("--picture/--no-picture", help="Draw the plan as PNG, beside it.")] = True,
 ) -> None:
-    """Make a plan of a building that is drawn in another format."""
-    from echostep.plan.importers.formats import Hints
-    from echostep.plan.importers.imdf.assumed_doors import ASSUMED
-    from echostep.plan.importers.limited import import_limited
+    """Make a plan of a building that is drawn in another format, and show what came in and what was left out."""
+    from echostep.commands.drawing_options import layers_of, scale_of, unit_of, windows_of
+    from echostep.plan.importers.hints import Hints
+    from echostep.plan.importers.limited import import_reported
+    from echostep.plan.importers.summary import summary
     from echostep.plan.writer import save_plan
 
-    plan = import_limited(files[0], Hints(storey, _unit(units), _layers(layer or []), doors), files[1:])
+    hints = Hints(
+        storey,
+        unit_of(units),
+        layers_of(layer or []),
+        doors,
+        scale_of(scale, units),
+        windows_of(window or []),
+        level or [],
+        align,
+    )
+    plan, report = import_reported(files[0], hints, files[1:])
     save_plan(plan, out)
-    for level in plan.levels:
-        counts = f"{len(level.walls)} walls, {len(level.windows)} windows, {len(level.doors)} doors, {len(level.rooms)} rooms"
-        print(f"{level.name}, {level.height_m:g} m: {counts}")
-    print(f"{len(plan.connectors)} stairs, lifts and ramps; {out}")
-    assumed = sum(door.name == ASSUMED for level in plan.levels for door in level.doors)
-    if assumed:
-        print(f"{assumed} doors are assumed, named {ASSUMED!r}: compare them with the building")
-    for line in _levels_without_doors(plan):
+    for line in summary(plan, report):
         print(line)
+    print(f"{out}{_pictured(plan, out) if picture else ''}")
 
 
-def _levels_without_doors(plan: Plan) -> list[str]:
-    """One line when levels with rooms have no door, or when no level has any; what to do about it."""
-    if not any(level.rooms or level.doors for level in plan.levels):
-        return [
-            "The source has neither door openings nor rooms: ways are the gaps in its walls; echostep plan edit draws doors"
-        ]
-    closed = [level.name for level in plan.levels if level.rooms and not level.doors]
-    if not closed:
-        return []
-    where = "The source" if len(closed) == len(plan.levels) else f"The source of {', '.join(closed)}"
-    return [
-        f"{where} has no door openings, so its rooms cannot be entered: "
-        "--doors 0.9 assumes doors 0.9 m wide (IMDF), echostep plan edit draws them"
-    ]
+def _pictured(plan: Plan, out: Path) -> str:
+    """Draw a plan beside its file, in words; a picture that is not of this command stays as it is."""
+    path = out.with_suffix(".png")
+    if words := lacks("a picture", "matplotlib"):
+        return f"; {words}"
+    try:
+        taken = path.exists() and MARK not in path.read_bytes()[:4096]
+    except OSError:
+        taken = True
+    if taken:
+        return f"; {path} is another picture and stays: echostep plan show {out} -o FILE.png draws this one"
+    from echostep.plan.drawing import draw_plan
 
-
-def _unit(name: str | None) -> str | None:
-    from echostep.plan.importers.dxf.entities import METRES
-
-    if name is not None and name not in METRES:
-        raise EchostepError(f"--units {name}: expected one of {', '.join(METRES)}")
-    return name
-
-
-def _layers(texts: list[str]) -> dict[str, list[str]]:
-    from echostep.plan.importers.dxf.drawing import LAYERS
-
-    layers: dict[str, list[str]] = {}
-    for text in texts:
-        kind, _, pattern = text.partition("=")
-        if kind not in LAYERS or not pattern:
-            raise EchostepError(f"--layer {text}: expected KIND=PATTERN with KIND one of {', '.join(LAYERS)}")
-        layers.setdefault(kind, []).append(pattern)
-    return layers
+    draw_plan(plan, path, list(range(len(plan.levels))))
+    return f", {path}"
 
 
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN", help="A plan (JSON), or what can be imported.")]
@@ -211,12 +222,6 @@ def _level(plan: Plan, name: str) -> int:
 
 
 def _bounds(text: str | None) -> tuple[float, float, float, float] | None:
-    if text is None:
-        return None
-    try:
-        x0, y0, x1, y1 = (float(part) for part in text.split(","))
-    except ValueError as error:
-        raise EchostepError(f"--bounds {text}: expected X0,Y0,X1,Y1 in metres") from error
-    if not (abs(x0) < 1e6 and abs(y0) < 1e6 and x0 < x1 < 1e6 and y0 < y1 < 1e6):
-        raise EchostepError(f"--bounds {text}: expected X0 < X1 and Y0 < Y1")
-    return x0, y0, x1, y1
+    from echostep.commands.drawing_options import rectangle
+
+    return None if text is None else rectangle("--bounds", text, 1e6, "metres")

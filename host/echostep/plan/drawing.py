@@ -86,7 +86,7 @@ def draw_plan(
         axes.apply_aspect()
         _draw_names(axes, plan, i, view, [f for f in findings if f.level == i])
     try:
-        figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
+        figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else {"Software": "echostep plan"})
     except OSError as error:
         raise EchostepError(f"{path}: cannot write the picture: {error.strerror or error}") from error
 

@@ -24,6 +24,7 @@ CLOSE_M = 0.01  # half the width of the widest crack between two pieces of a wal
 FLAT_M = 0.005  # greatest distance of a curve from the straight pieces that replace it
 SLIVER_M2 = 1e-3  # smaller areas are dropped
 GRID_M = 1e-3  # coordinates are rounded to it
+HALF_CUT_M = 0.05  # half the width of the strip along a door in which walls drawn as lines are cut
 TOUCH_M = 2e-3  # a face nearer to a wall than this belongs to the wall, not to a window
 FLECK_M = 0.02  # shorter pieces of window count as wall
 
@@ -52,6 +53,9 @@ class DrawnLevel:
     rooms: list[Room] = field(default_factory=list)
     connectors: list[ConnectorShape] = field(default_factory=list)
     openings: list[Polygon] = field(default_factory=list)  # holes in the floor
+    cuts: list[BaseGeometry] = field(
+        default_factory=list
+    )  # where walls drawn as lines are cut besides at the doors' lines
 
     def level(self) -> Level:
         """These shapes as a level of a plan; coordinates are rounded to a millimetre."""
@@ -71,14 +75,31 @@ class DrawnLevel:
         lines = [part for part in pieces(shapes) if isinstance(part, LineString)]
         if not lines:
             return np.zeros((0, 4))
-        openings = [LineString([door.line[:2], door.line[2:]]).buffer(0.05, cap_style="flat") for door in self.doors]
+        doors = [LineString([door.line[:2], door.line[2:]]) for door in self.doors]
+        openings = [door.buffer(HALF_CUT_M, cap_style="flat") for door in doors] + self.cuts
+        jambs = [_across(door) for door in doors] + [LineString() for _ in self.cuts]
         tree = shapely.STRtree(openings)
-        return _segments(cut(line, [openings[i] for i in tree.query(line)]) for line in lines)
+        near = [tree.query(line) for line in lines]
+        return _segments(
+            cut(line, [openings[i] for i in which], [jambs[i] for i in which])
+            for line, which in zip(lines, near, strict=True)
+        )
 
 
-def cut(line: BaseGeometry, openings: list[BaseGeometry]) -> BaseGeometry:
-    """A line without its parts inside the openings."""
-    return line if not openings else line.difference(shapely.union_all(openings))
+def cut(line: BaseGeometry, openings: list[BaseGeometry], jambs: list[BaseGeometry]) -> BaseGeometry:
+    """A line without its parts inside the openings; ends of walls that lie across a door's end, as the jambs do, stay."""
+    if not openings:
+        return line
+    return shapely.union_all(
+        [line.difference(shapely.union_all(openings)), line.intersection(shapely.union_all(jambs))]
+    )
+
+
+def _across(door: LineString) -> BaseGeometry:
+    """The two short lines across the ends of a door's line."""
+    (x0, y0), (x1, y1) = door.coords
+    u, v = HALF_CUT_M * (y0 - y1) / door.length, HALF_CUT_M * (x1 - x0) / door.length
+    return shapely.MultiLineString([((x - u, y - v), (x + u, y + v)) for x, y in ((x0, y0), (x1, y1))])
 
 
 def pieces(shapes: Iterable[BaseGeometry]) -> list[BaseGeometry]:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Imports a file in a process of its own, with limits on time and memory.
 
-In: a path, and hints. Out: `Plan`. Owns the process. Importers stand on large libraries (ezdxf, GEOS, a parser of STEP) that a hostile file can keep
-busy for hours or crash. Here this ends in one error, and Ctrl-C ends it at once.
+In: a path, and hints. Out: `Plan`, `ImportReport`. Owns the process. Importers stand on large libraries (ezdxf, GEOS, a parser of STEP) that a
+hostile file can keep busy for hours or crash. Here this ends in one error, and Ctrl-C ends it at once.
 """
 
 from __future__ import annotations
@@ -15,7 +15,9 @@ from dataclasses import asdict
 from pathlib import Path
 
 from echostep.errors import EchostepError
-from echostep.plan.importers.formats import Hints, import_plan, is_foreign
+from echostep.plan.importers.formats import import_plan, is_foreign
+from echostep.plan.importers.hints import Hints
+from echostep.plan.importers.report import ImportReport
 from echostep.plan.model import Plan, load_plan, parse_plan
 from echostep.plan.writer import plan_json
 
@@ -35,6 +37,11 @@ def open_limited(path: Path | str) -> Plan:
 
 def import_limited(path: Path, hints: Hints | None = None, above: Sequence[Path] = ()) -> Plan:
     """As `formats.import_plan`; raises EchostepError also when the file needs more than the limits."""
+    return import_reported(path, hints, above)[0]
+
+
+def import_reported(path: Path, hints: Hints | None = None, above: Sequence[Path] = ()) -> tuple[Plan, ImportReport]:
+    """As `import_limited`, with what the importer reports."""
     request = json.dumps([str(path), asdict(hints or Hints()), [str(file) for file in above]])
     with subprocess.Popen(
         [sys.executable, "-c", CHILD],
@@ -60,16 +67,18 @@ def import_limited(path: Path, hints: Hints | None = None, above: Sequence[Path]
         raise EchostepError(
             f"{path}: the import failed, or needs more than {MOST_MEMORY >> 30} GiB of memory ({reason}): export one building only"
         )
-    return parse_plan(out.encode())
+    report, _, plan = out.partition("\n")
+    return parse_plan(plan.encode()), ImportReport(**json.loads(report))
 
 
 def main() -> None:
-    """The process: read the request, import, write the plan."""
+    """The process: read the request, import, write the report (one line) and the plan."""
     path, hints, above = json.load(sys.stdin)
     _limit_memory()
     try:
-        plan = import_plan(Path(path), Hints(**hints), [Path(file) for file in above])
-        sys.stdout.buffer.write(plan_json(plan).encode())
+        report = ImportReport()
+        plan = import_plan(Path(path), Hints(**hints), [Path(file) for file in above], report)
+        sys.stdout.buffer.write(f"{json.dumps(asdict(report))}\n{plan_json(plan)}".encode())
     except EchostepError as error:
         print(error, file=sys.stderr)
         sys.exit(REFUSED)

@@ -19,6 +19,7 @@ from echostep.plan.importers.connector_shapes import join_connectors, same_place
 from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, opening, room
 from echostep.plan.importers.geojson import features, label, properties, shape
 from echostep.plan.importers.parsing import parse_json, read_text
+from echostep.plan.importers.report import ImportReport
 from echostep.plan.json_fields import number, text, typed
 from echostep.plan.model import Door, Georeference, Plan
 
@@ -26,7 +27,7 @@ CONNECTOR_KINDS = {"stairs": "stairs", "elevator": "lift", "escalator": "stairs"
 OPEN_PLAN = {"room", "bathroom", "no_geometry", "hallway", "pathway"}  # areas without walls of their own
 
 
-def import_wrld(path: Path, storey_height_m: float) -> Plan:
+def import_wrld(path: Path, storey_height_m: float, report: ImportReport) -> Plan:
     """Import the building of a main.json; raises EchostepError that names the file and the feature."""
     tree = parse_json(read_text(path), str(path))
     try:
@@ -45,7 +46,10 @@ def import_wrld(path: Path, storey_height_m: float) -> Plan:
     except ValueError as error:
         raise EchostepError(f"{path}: {error}") from error
     earth = EarthTransform(georeference)
-    drawn_levels = [_level(file, level_name, round(z * storey_height_m, 6), earth) for z, level_name, file in levels]
+    drawn_levels = [
+        _level(file, DrawnLevel(level_name, round(z * storey_height_m, 6)), earth, report)
+        for z, level_name, file in levels
+    ]
     _open_levels(drawn_levels)
     return Plan(
         name, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels), georeference
@@ -70,22 +74,24 @@ def _floor(row: Any, where: str, folder: Path) -> tuple[int, str, Path]:
     return int(number(row.get("z_order"), f"{where}.z_order", 1000, "floors")), name, folder / file
 
 
-def _level(file: Path, name: str, height_m: float, earth: EarthTransform) -> DrawnLevel:
-    drawn = DrawnLevel(name, height_m)
+def _level(file: Path, drawn: DrawnLevel, earth: EarthTransform, report: ImportReport) -> DrawnLevel:
     tree = parse_json(read_text(file), str(file))
     try:
         for where, feature in features(tree):
             about = properties(feature, where)
             kind = text(about.get("type"), f"{where}.properties.type")
-            _place(drawn, kind, label(about.get("name"), f"{where}.properties.name"), shape(feature, where, earth))
+            name = label(about.get("name"), f"{where}.properties.name")
+            if not _place(drawn, kind, name, shape(feature, where, earth)):
+                report.leave_out(kind[:40])
     except ValueError as error:
         raise EchostepError(f"{file}: {error}") from error
     return drawn
 
 
-def _place(drawn: DrawnLevel, kind: str, name: str, shape: BaseGeometry) -> None:
-    """Add a feature to a level; kinds that plans do not have (outlines, landscaping) are left out."""
-    for area in areas([shape]):
+def _place(drawn: DrawnLevel, kind: str, name: str, shape: BaseGeometry) -> bool:
+    """Add a feature to a level; False for kinds that plans do not have (outlines, landscaping) and for shapes without an area."""
+    found = areas([shape])
+    for area in found:
         if kind == "wall":
             drawn.walls.append(area)
         elif kind == "window":
@@ -100,6 +106,9 @@ def _place(drawn: DrawnLevel, kind: str, name: str, shape: BaseGeometry) -> None
             drawn.openings.append(area)
         elif kind in OPEN_PLAN and (name or kind not in ("no_geometry", "pathway")):
             drawn.rooms.append(room(name or kind.replace("_", " ").capitalize(), area))
+        else:
+            return False
+    return bool(found)
 
 
 def _open_levels(drawn_levels: list[DrawnLevel]) -> None:

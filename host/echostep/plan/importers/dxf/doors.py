@@ -1,112 +1,187 @@
 # SPDX-License-Identifier: MIT
-"""Doors of a drawing: the line from jamb to jamb, derived from the door's symbol.
+"""Doors of a drawing: the gap in the walls that each door symbol belongs to.
 
-In: blocks, arcs and lines on the layers of doors; walls. Out: `Door`s. Owns nothing. A swing is an arc about the hinge: the door goes from the hinge
-to the end of the arc that is nearer to a wall. Two swings of one block are a double door. A door without a swing goes along its longest side.
-
-            ,-'| leaf
-          ,'   |        arc: from the leaf's end to the jamb
-    =====+.....o=====   o: hinge, +: end of the arc at the wall, .....: the door's line
+In: door symbols, walls. Out: `Door`s, those in no wall. Owns how far a symbol may be off its gap. A swing gives the hinge and the width; the end of
+its arc that the drawn leaf does not reach is the closed one. From the hinge along the wall the gap ends at the other jamb. Without a swing the
+longest line is the door, or its leaf drawn open.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
-import numpy as np
 import shapely
-from shapely.geometry import LineString, Point
+from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
 from echostep.plan.importers.drawn_level import opening
-from echostep.plan.importers.dxf.entities import DrawingFrame, parts
+from echostep.plan.importers.dxf.gaps import BY_M, NEAR_M, Gap, WallBands
+from echostep.plan.importers.dxf.symbols import NARROWEST_M, Point, Swing, Symbol
 from echostep.plan.model import Door
 
-NARROWEST_M, WIDEST_M = 0.3, 12.0
-LEAF_M = 0.1  # greatest distance of a leaf's line from the hinge; assumed
+WIDEST_M = 12.0  # of a door without a swing: gates
+LEAST_SHARE, MOST_SHARE = 0.6, 1.3  # width of a gap by the width of the leaf in it; assumed
+FRAME_M = 0.2  # by which a gap may be wider beyond that: frame; assumed
+BESIDE_M = 6.0  # greatest width of a hole in which a door stands beside a window; assumed
+THICKEST_M = 0.5  # of a wall that is drawn through a door
+SAME_M = 0.25  # two doors with nearer middles are one; assumed
 Line = tuple[float, float, float, float]
 
 
-def doors_of(entities: Sequence[Any], walls: Sequence[BaseGeometry], frame: DrawingFrame, file: Path) -> list[Door]:
-    """Doors of blocks, then of swings outside blocks, then of other lines outside blocks that belong to no swing."""
-    stone = shapely.STRtree(list(walls))
-    blocks = [entity for entity in entities if entity.dxftype() == "INSERT"]
-    lines: list[Line] = []
-    for block in blocks:
-        swings, rest = _shapes(_drawn(block, file), frame, file)
-        lines += _double(swings) or [_gap(swing, stone) for swing in swings] or _longest(rest, LEAF_M)
-    swings, rest = _shapes([entity for entity in entities if entity.dxftype() != "INSERT"], frame, file)
-    hinges = shapely.union_all([Point(swing[0]) for swing in swings])
-    loose = [line for line in rest if hinges.is_empty or line.distance(hinges) > LEAF_M]
-    lines += [_gap(swing, stone) for swing in swings] + _longest(loose, 0.01)
-    sound = [line for line in dict.fromkeys(lines) if NARROWEST_M <= math.dist(line[:2], line[2:]) <= WIDEST_M]
-    return [Door(line) for line in sound]
+@dataclass(slots=True)
+class PlacedDoors:
+    """Doors in walls; `cuts`: areas of walls that are drawn through them; `strays`: middles of symbols in no wall."""
+
+    doors: list[Door] = field(default_factory=list)
+    cuts: list[BaseGeometry] = field(default_factory=list)
+    strays: list[Point] = field(default_factory=list)
+
+    def add(self, symbol: Symbol, walls: WallBands) -> None:
+        """Place the doors of a symbol."""
+        lines = list(_lines(symbol, walls))
+        if not lines:
+            middle = shapely.union_all(symbol.lines).envelope.centroid
+            self.strays.append((round(middle.x, 2), round(middle.y, 2)))
+        for line in _joined(lines):
+            if not any(_same(line, other.line) for other in self.doors):
+                self.doors.append(Door(line))
+                if walls.gap(line[:2], _along(line), math.dist(line[:2], line[2:]) / 2, WIDEST_M) is None:
+                    self.cuts.append(walls.faces(line, THICKEST_M))
+
+    def add_swing(self, symbol: Symbol, walls: WallBands) -> bool:
+        """Place a swing that lies on no layer of doors, if it fits a gap exactly; returns whether it does."""
+        lines = [line for swing in symbol.swings if (line := _exact(swing, walls)) is not None]
+        for line in _joined(lines):
+            if not any(_same(line, other.line) for other in self.doors):
+                self.doors.append(Door(line))
+        return bool(lines)
 
 
-def _drawn(block: Any, file: Path, depth: int = 4) -> list[Any]:
-    """All entities of a block and of the blocks inside it, `depth` levels deep."""
-    inner = parts(block, file)
-    deeper = [part for part in inner if part.dxftype() == "INSERT"] if depth else []
-    return [part for part in inner if part.dxftype() != "INSERT"] + [
-        p for part in deeper for p in _drawn(part, file, depth - 1)
+def _lines(symbol: Symbol, walls: WallBands) -> Iterator[Line]:
+    """A line from jamb to jamb for each leaf of a symbol that hangs in a wall."""
+    for swing in symbol.swings:
+        line = _of_swing(_meeting(swing, symbol.swings), walls)
+        if line is not None:
+            yield line
+    if not symbol.swings:
+        line = _of_line(symbol.lines, walls)
+        if line is not None:
+            yield line
+
+
+def _meeting(swing: Swing, swings: Sequence[Swing]) -> Swing:
+    """A swing without a drawn leaf whose arc meets that of the other leaf: there both are closed."""
+    if swing.leaf is None:
+        for k, end in enumerate(swing.ends):
+            others = (other_end for other in swings if other is not swing for other_end in other.ends)
+            if any(math.dist(end, other) < BY_M for other in others):
+                return replace(swing, leaf=1 - k)
+    return swing
+
+
+def _of_swing(swing: Swing, walls: WallBands) -> Line | None:
+    """The gap that a swing closes: towards the closed end of its arc, else along a wall at the hinge."""
+    hinge, radius = swing.hinge, swing.radius_m
+    closed = [end for k, end in enumerate(swing.ends) if k != swing.leaf]
+    towards = [_unit(hinge, end) for end in closed]
+    gaps = [
+        (u, gap) for u in (*towards, *walls.directions(hinge)) if (gap := walls.gap(hinge, u, radius / 2, BESIDE_M))
     ]
+    fitting = [(u, gap) for u, gap in gaps if _fits(gap, radius)]
+    if fitting:
+        in_arc = [pair for pair in fitting if pair[0] in towards]
+        u, gap = min(in_arc or fitting[:1], key=lambda pair: abs(pair[1].width_m - radius))
+        return _line(hinge, u, gap.begin_m, gap.end_m)
+    if (
+        swing.leaf is not None
+    ):  # the drawn leaf tells the closed end: in a larger hole, or in a wall drawn through the door
+        u = towards[0]
+        gap = walls.gap(hinge, u, radius / 2, BESIDE_M)
+        if gap is not None and gap.begin_m >= -NEAR_M and gap.end_m < BESIDE_M and gap.width_m > radius:
+            return _line(hinge, u, min(gap.begin_m, 0.0), radius)
+    through = [end for end in closed if walls.is_at_wall(hinge) and walls.is_at_wall(end)]
+    drawn_through = [end for end in through if walls.gap(hinge, _unit(hinge, end), radius / 2, radius) is None]
+    return (*hinge, *drawn_through[0]) if drawn_through else None
 
 
-Swing = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]  # hinge, both ends of the arc
+def _exact(swing: Swing, walls: WallBands) -> Line | None:
+    """The gap that an arc from jamb to open leaf fits exactly; None for arcs that are no doors: basins, chairs, curved walls."""
+    for k, end in enumerate(swing.ends):
+        u = _unit(swing.hinge, end)
+        gap = walls.gap(swing.hinge, u, swing.radius_m / 2, 2 * swing.radius_m)
+        is_open = not walls.is_at_wall(swing.ends[1 - k], 0.05) or swing.leaf == 1 - k
+        if gap is not None and is_open and abs(gap.begin_m) < BY_M and abs(gap.end_m - swing.radius_m) < BY_M:
+            return _line(swing.hinge, u, gap.begin_m, gap.end_m)
+    return None
 
 
-def _shapes(drawn: Sequence[Any], frame: DrawingFrame, file: Path) -> tuple[list[Swing], list[LineString]]:
-    """Swings (arcs with hinge), and all other lines."""
-    swings, rest = [], []
-    for entity in drawn:
-        line = frame.line(entity, file)
-        if line is None:
-            continue
-        if entity.dxftype() == "ARC":
-            centre = frame.metres(entity.ocs().to_wcs(entity.dxf.center))
-            swings.append((_mm(centre), _mm(line.coords[0]), _mm(line.coords[-1])))
+def _of_line(lines: Sequence[LineString], walls: WallBands) -> Line | None:
+    """The gap of a symbol without a swing: its long side lies in the gap, or in a wall drawn through it, or it is a leaf drawn open."""
+    x0, y0, x1, y1 = opening(shapely.union_all([line.buffer(0.01, cap_style="flat") for line in lines]))
+    a, b = (x0, y0), (x1, y1)
+    length = math.dist(a, b)
+    if not NARROWEST_M - 0.1 <= length <= WIDEST_M:
+        return None
+    along = _unit(a, b)
+    gap = walls.gap(a, along, length / 2, length)
+    if gap is not None and _fits(gap, length):
+        return _line(a, along, gap.begin_m, gap.end_m)
+    if gap is None and walls.is_at_wall(a) and walls.is_at_wall(b):
+        return (*a, *b)
+    for hinge in (a, b):
+        for u in walls.directions(hinge):
+            leaf = walls.gap(hinge, u, length / 2, BESIDE_M)
+            if leaf is not None and _fits(leaf, length):
+                return _line(hinge, u, leaf.begin_m, leaf.end_m)
+    return None
+
+
+def _fits(gap: Gap, leaf_m: float) -> bool:
+    """Whether a leaf of this width, from the place that the gap was asked for, closes the gap."""
+    hangs = -NEAR_M <= gap.begin_m <= NEAR_M
+    return hangs and LEAST_SHARE * leaf_m <= gap.width_m <= MOST_SHARE * leaf_m + FRAME_M
+
+
+def _joined(lines: Sequence[Line]) -> list[Line]:
+    """Leaves that meet in the middle of one gap are one door."""
+    joined: list[Line] = []
+    for line in lines:
+        for k, other in enumerate(joined):
+            spans = [(*q, *p) for p, m in _ends(line) for q, n in _ends(other) if math.dist(m, n) < BY_M]
+            long = max((math.dist(s[:2], s[2:]) for s in spans), default=0.0)
+            both = math.dist(line[:2], line[2:]) + math.dist(other[:2], other[2:])
+            if spans and abs(long - both) < BY_M:
+                joined[k] = max(spans, key=lambda s: math.dist(s[:2], s[2:]))
+                break
         else:
-            rest.append(line)
-    return swings, rest
+            joined.append(line)
+    return joined
 
 
-def _double(swings: list[Swing]) -> list[Line]:
-    """A double door from hinge to hinge, when two swings meet in the middle; else empty."""
-    if len(swings) != 2:
-        return []
-    (a, *ends_a), (b, *ends_b) = swings
-    apart = math.dist(a, b)
-    reach = math.dist(a, ends_a[0]) + math.dist(b, ends_b[0])
-    return [(*a, *b)] if abs(apart - reach) < 0.1 * reach else []
+def _ends(line: Line) -> tuple[tuple[Point, Point], tuple[Point, Point]]:
+    """Each end with the other one."""
+    return (line[:2], line[2:]), (line[2:], line[:2])
 
 
-def _gap(swing: Swing, stone: shapely.STRtree) -> Line:
-    """From the hinge to the end of the arc that is nearer to a wall."""
-    hinge, *ends = swing
-    distances = [_distance(end, stone) for end in ends]
-    return (*hinge, *ends[int(np.argmin(distances))])
+def _same(one: Line, other: Line) -> bool:
+    """Whether two lines are one door: their middles lie together, and they point the same way."""
+    middles = [((x0 + x1) / 2, (y0 + y1) / 2) for x0, y0, x1, y1 in (one, other)]
+    (a, b), (c, d) = _along(one), _along(other)
+    return math.dist(*middles) < SAME_M and abs(a * d - b * c) < 0.5
 
 
-def _distance(point: tuple[float, float], stone: shapely.STRtree) -> float:
-    nearest = stone.query_nearest(Point(point), return_distance=True)[1]
-    return float(nearest[0]) if len(nearest) else 0.0
+def _line(at: Point, along: Point, begin_m: float, end_m: float) -> Line:
+    (x, y), (u, v) = at, along
+    ends = (x + begin_m * u, y + begin_m * v, x + end_m * u, y + end_m * v)
+    return round(ends[0], 3), round(ends[1], 3), round(ends[2], 3), round(ends[3], 3)
 
 
-def _longest(lines: list[LineString], join_m: float) -> list[Line]:
-    """The centre line of each group of connected lines, along its longer side."""
-    blots = shapely.get_parts(shapely.union_all([line.buffer(join_m) for line in lines]))
-    sides = []
-    for blot in blots:
-        x0, y0, x1, y1 = opening(blot)
-        long_m = math.dist((x0, y0), (x1, y1))
-        if long_m > 4 * join_m:  # the blot is wider than the drawing by join_m at each end
-            x, y = (x1 - x0) * join_m / long_m, (y1 - y0) * join_m / long_m
-            sides.append((round(x0 + x, 3), round(y0 + y, 3), round(x1 - x, 3), round(y1 - y, 3)))
-    return sides
+def _along(line: Line) -> Point:
+    return _unit(line[:2], line[2:])
 
 
-def _mm(point: Sequence[float]) -> tuple[float, float]:
-    return round(float(point[0]), 3), round(float(point[1]), 3)
+def _unit(a: Point, b: Point) -> Point:
+    length = math.dist(a, b) or 1.0
+    return (b[0] - a[0]) / length, (b[1] - a[1]) / length

@@ -1,121 +1,216 @@
 # SPDX-License-Identifier: MIT
-"""Drawings (DXF, one file per level) -> `Plan`.
+"""Drawings (DXF, one file or one window of a file per level) -> `Plan`.
 
-In: files, patterns of layer names, units. Out: `Plan`. Owns the default patterns. Lines, polylines, arcs, circles, ellipses and splines on a layer of
-walls become walls, also inside blocks; the meaning of a layer is recognised by its name.
+In: files, hints. Out: `Plan`, and the report. Owns nothing. Lines, polylines, arcs, circles, ellipses, splines, multilines and narrow hatches on a
+layer of walls become walls, also inside blocks; the meaning of a layer is recognised by its name.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from fnmatch import fnmatchcase
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
 
 import shapely
-from shapely.geometry import LineString, MultiLineString
+from shapely.affinity import translate
+from shapely.geometry import LineString, MultiLineString, Point, box
+from shapely.geometry.base import BaseGeometry
 
 from echostep.errors import EchostepError
 from echostep.plan.importers.connector_shapes import join_connectors
 from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas
-from echostep.plan.importers.dxf.doors import doors_of
-from echostep.plan.importers.dxf.entities import METRES, DrawingFrame, entities, read_drawing
-from echostep.plan.json_fields import LIMIT_M
-from echostep.plan.model import ConnectorKind, Plan, Room
+from echostep.plan.importers.dxf.doors import PlacedDoors
+from echostep.plan.importers.dxf.entities import parts
+from echostep.plan.importers.dxf.frame import DrawingFrame
+from echostep.plan.importers.dxf.gaps import WallBands
+from echostep.plan.importers.dxf.rooms import rooms_of
+from echostep.plan.importers.dxf.sheet import Sheet, read_sheet
+from echostep.plan.importers.dxf.storeys import alignment, bounds_of, lies_over, storey_boxes, window_words
+from echostep.plan.importers.dxf.symbols import Symbol, symbol_of, symbols_of
+from echostep.plan.importers.hints import Hints
+from echostep.plan.importers.report import ImportReport
+from echostep.plan.model import ConnectorKind, Plan
 
-LAYERS: dict[str, tuple[str, ...]] = {
-    "walls": ("*wall*", "*wand*", "*waend*", "*wände*", "*mur*", "*cols*", "*column*"),
-    "windows": ("*wind*", "*glaz*", "*fenster*"),
-    "doors": ("*door*", "*tür*", "*tuer*"),
-    "stairs": ("*stair*", "*strs*", "*trepp*"),
-    "lifts": ("*lift*", "*elev*", "*aufzug*"),
-    "rooms": ("*room*", "*raum*", "*space*", "*area-iden*", "*name*"),
-    "obstacles": ("*obstacle*", "*hindernis*"),
-}
-INSUNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m"}
 HALF_TREAD_M = 0.3  # half the greatest distance between neighbouring lines of one staircase: a tread
+CURVES = ("ARC", "ELLIPSE", "SPLINE", "LWPOLYLINE", "POLYLINE")  # entities that a swing may be drawn with
+DEEPEST_SYMBOL = 4  # blocks in blocks of one door
+SHOWN_STRAYS = 3
 
 
-def import_dxf(
-    files: Sequence[Path], storey_height_m: float, layers: Mapping[str, Sequence[str]], units: str | None
-) -> Plan:
+@dataclass(slots=True)
+class _Storey:
+    """One level to be drawn: a sheet, the window of it (map metres) that holds the level, and the frame."""
+
+    sheet: Sheet
+    frame: DrawingFrame
+    window: BaseGeometry | None = None
+    swings: set[int] = field(default_factory=set)  # ids of entities on other layers that turned out to be doors
+
+    def lines(self, *kinds: str) -> list[LineString]:
+        """The lines of kinds of entities, in map metres, inside the window."""
+        return [line for kind in kinds for entity, _ in self.sheet.kinds[kind] for line in self.of(entity)]
+
+    def of(self, entity: Any) -> list[LineString]:
+        """The lines of an entity inside the window; none of one that is a door's swing."""
+        if id(entity) in self.swings:
+            return []
+        return [line for line in self.frame.lines(entity, self.sheet.file) if self.holds(line)]
+
+    def holds(self, shape: BaseGeometry) -> bool:
+        """Whether a shape is of this level."""
+        return self.window is None or bool(self.window.intersects(shape.centroid))
+
+
+def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Plan:
     """Import a building from drawings, the lowest level first; raises EchostepError that names the file and the layer."""
-    patterns = {kind: tuple(name.casefold() for name in (layers.get(kind) or LAYERS[kind])) for kind in LAYERS}
-    drawn_levels, frame = [], None
-    for i, file in enumerate(files):
-        drawing = read_drawing(file)
-        entities = _sorted(drawing, patterns, file)
-        scale_m = METRES[units or _units(drawing, file)]
-        frame = replace(frame, scale_m=scale_m) if frame else DrawingFrame.about(entities["walls"], scale_m)
-        drawn_levels.append(_drawn_level(entities, frame, DrawnLevel(file.stem, round(i * storey_height_m, 6)), file))
+    if hints.windows and len(files) > 1:
+        raise EchostepError(f"{files[1]}: --window is for one drawing with several storeys: give one file")
+    sheets = [read_sheet(file, hints, report) for file in files]
+    report.units = "; ".join(dict.fromkeys(sheet.words for sheet in sheets))
+    frame = DrawingFrame.about(sheets[0].walls, sheets[0].scale_m)
+    storeys = [_Storey(sheet, replace(frame, scale_m=sheet.scale_m)) for sheet in sheets]
+    if hints.windows:
+        storeys = [_in_window(storeys[0], window) for window in hints.windows]
+    _lay_over(storeys, hints, report)
+    names = [*hints.level_names, *(_names(files, len(storeys))[len(hints.level_names) :])]
+    drawn_levels = [
+        _drawn_level(storey, DrawnLevel(name, round(i * hints.storey_height_m, 6)), report)
+        for i, (storey, name) in enumerate(zip(storeys, names, strict=False))
+    ]
     return Plan(files[0].stem, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels))
 
 
-def _sorted(drawing: Any, patterns: Mapping[str, Sequence[str]], file: Path) -> dict[str, list[Any]]:
-    """Entities by the meaning of their layers; raises EchostepError when there are no walls."""
-    by_kind: dict[str, list[Any]] = {kind: [] for kind in patterns}
-    seen: dict[str, str | None] = {}
-    for entity, layer in entities(drawing.modelspace(), file, lambda layer: meaning(layer, patterns) == "doors"):
-        if layer not in seen:
-            seen[layer] = meaning(layer, patterns)
-        kind = seen[layer]
-        if kind is not None:
-            by_kind[kind].append(entity)
-    if not by_kind["walls"]:
-        known = ", ".join(sorted(seen)[:20]) or "none"
+def _names(files: Sequence[Path], levels: int) -> list[str]:
+    return [file.stem for file in files] if levels == len(files) else [f"level {i}" for i in range(levels)]
+
+
+def _in_window(storey: _Storey, window: Sequence[float]) -> _Storey:
+    """The part of a drawing inside a window of drawing units."""
+    s, x0, y0 = storey.frame.scale_m, storey.frame.x0_m, storey.frame.y0_m
+    area = box(window[0] * s - x0, window[1] * s - y0, window[2] * s - x0, window[3] * s - y0)
+    found = _Storey(storey.sheet, storey.frame, area)
+    if not found.lines("walls", "columns"):
         raise EchostepError(
-            f"{file}: nothing on a layer named {' or '.join(patterns['walls'])}; give --layer walls=NAME; layers: {known[:400]}"
+            f"{storey.sheet.file}: --window {','.join(f'{v:g}' for v in window)}: no walls in it; it is in the drawing's units"
         )
-    return by_kind
+    return found
 
 
-def meaning(layer: str, patterns: Mapping[str, Sequence[str]]) -> str | None:
-    """The kind of element on a layer of this name; None when the name matches no pattern."""
-    name = layer.casefold()
-    return next(
-        (kind for kind, names in patterns.items() if any(fnmatchcase(name, pattern) for pattern in names)), None
-    )
+def _lay_over(storeys: list[_Storey], hints: Hints, report: ImportReport) -> None:
+    """Align levels where asked or drawn side by side; else report those that lie elsewhere, and refuse units that contradict each other."""
+    walls = [storey.lines("walls", "columns") for storey in storeys]
+    first = storeys[0].sheet
+    for storey, lines in zip(storeys, walls, strict=True):
+        if not lines:
+            raise EchostepError(
+                f"{storey.sheet.file}: the layers of walls have no lines: give the right ones with --layer walls=NAME"
+            )
+        if storey.window is None and len(boxes := storey_boxes(lines)) > 1:
+            moved = [
+                (x0 + storey.frame.x0_m, y0 + storey.frame.y0_m, x1 + storey.frame.x0_m, y1 + storey.frame.y0_m)
+                for x0, y0, x1, y1 in boxes
+            ]
+            report.doubt(
+                f"{storey.sheet.file.name} looks like {len(boxes)} storeys beside each other: import them as levels with "
+                + window_words(moved, storey.frame.scale_m)
+            )
+    for k in range(1, len(storeys)):
+        storey = storeys[k]
+        over = lies_over(bounds_of(walls[k]), bounds_of(walls[0]))
+        if storey.sheet.unit != first.unit and not (over and _as_large(walls[k], walls[0])) and not hints.align:
+            raise EchostepError(
+                f"{storey.sheet.file}: its units ({storey.sheet.unit}) are not those of {first.file.name} ({first.unit}), and the storeys "
+                "do not lie over each other: give --units, or --align when both are right"
+            )
+        if hints.align or storey.window is not None:
+            dx, dy = alignment(walls[k], walls[0])
+            storeys[k] = _moved(storey, dx, dy)
+        elif not over:
+            report.doubt(
+                f"{storey.sheet.file.name} does not lie over {first.file.name}: --align lays the storeys over each other"
+            )
 
 
-def _units(drawing: Any, file: Path) -> str:
-    try:
-        code = int(drawing.header.get("$INSUNITS", 0))
-    except (TypeError, ValueError):
-        code = 0
-    if code not in INSUNITS:
-        raise EchostepError(
-            f"{file}: the drawing does not say its units ($INSUNITS is {code}): give --units {'|'.join(METRES)}"
-        )
-    return INSUNITS[code]
+def _as_large(one: list[LineString], other: list[LineString]) -> bool:
+    """Whether two levels are of about the same size: within a factor of 2."""
+    sizes = [max(b[2] - b[0], b[3] - b[1]) for b in (bounds_of(one), bounds_of(other))]
+    return max(sizes) < 2 * min(sizes)
 
 
-def _drawn_level(entities: Mapping[str, list[Any]], frame: DrawingFrame, drawn: DrawnLevel, file: Path) -> DrawnLevel:
-    lines = {
-        kind: [line for entity in entities[kind] if (line := frame.line(entity, file))]
-        for kind in entities
-        if kind not in ("doors", "rooms")
-    }
-    if not lines["walls"]:
-        raise EchostepError(f"{file}: the layers of walls have no lines: give the right ones with --layer walls=NAME")
-    drawn.walls, drawn.windows = list(lines["walls"]), list(lines["windows"])
-    drawn.doors = doors_of(entities["doors"], [*drawn.walls, *drawn.windows], frame, file)
-    drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(_noded(lines["obstacles"]))))
-    drawn.rooms = [room for entity in entities["rooms"] if (room := _room(entity, frame))]
+def _moved(storey: _Storey, dx: float, dy: float) -> _Storey:
+    frame = replace(storey.frame, x0_m=storey.frame.x0_m - dx, y0_m=storey.frame.y0_m - dy)
+    window = None if storey.window is None else translate(storey.window, dx, dy)
+    return _Storey(storey.sheet, frame, window)
+
+
+def _drawn_level(storey: _Storey, drawn: DrawnLevel, report: ImportReport) -> DrawnLevel:
+    sheet = storey.sheet
+    _without_lines(storey, report)
+    solid = storey.lines("walls", "columns", "windows")
+    doors = _doors(storey, WallBands(solid), report)
+    drawn.doors, drawn.cuts = doors.doors, doors.cuts
+    drawn.walls, drawn.windows = list(storey.lines("walls", "columns")), list(storey.lines("windows"))
+    drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(_noded(storey.lines("obstacles")))))
+    rooms = rooms_of(sheet.kinds["rooms"], storey.frame, sheet.file, report)
+    drawn.rooms = [room for room in rooms if storey.holds(Point(room.at_m))]
     for kind, layer in (("stairs", "stairs"), ("lift", "lifts")):
-        blots = shapely.union_all([line.buffer(HALF_TREAD_M) for line in lines[layer]])
+        blots = shapely.union_all([line.buffer(HALF_TREAD_M) for line in storey.lines(layer)])
         hulls = [blot.convex_hull.buffer(-HALF_TREAD_M) for blot in shapely.get_parts(blots)]
         drawn.connectors += [ConnectorShape(cast(ConnectorKind, kind), "", area) for area in areas(hulls)]
     return drawn
 
 
-def _room(entity: Any, frame: DrawingFrame) -> Room | None:
-    """A text entity as a room; None when it is empty, far away, or not a text."""
-    if entity.dxftype() not in ("TEXT", "MTEXT", "ATTRIB"):
-        return None
-    words = " ".join((entity.plain_text() if entity.dxftype() == "MTEXT" else entity.dxf.text).split())[:80]
-    x, y = frame.metres(entity.dxf.insert)
-    return Room(words, (round(x, 3), round(y, 3))) if words and max(abs(x), abs(y)) < LIMIT_M else None
+def _without_lines(storey: _Storey, report: ImportReport) -> None:
+    """Report entities on the layers used that have no line: texts, pictures, bodies, unknown objects."""
+    for kind in ("walls", "columns", "windows", "stairs", "lifts", "obstacles"):
+        for entity, layer in storey.sheet.kinds[kind]:
+            if not storey.frame.lines(entity, storey.sheet.file):
+                report.leave_out(f"{entity.dxftype()} on {layer[:40]}")
+
+
+def _doors(storey: _Storey, walls: WallBands, report: ImportReport) -> PlacedDoors:
+    """Doors on their layers, then swings on others that fit a gap exactly."""
+    placed = PlacedDoors()
+    for symbol in _symbols(storey):
+        placed.add(symbol, walls)
+    for entity, layer in [*storey.sheet.others, *storey.sheet.kinds["walls"]]:
+        if entity.dxftype() in CURVES:
+            symbol = symbol_of(storey.of(entity))
+            if symbol.swings and placed.add_swing(symbol, walls):
+                storey.swings.add(id(entity))
+                report.use("doors", layer)
+                report.take_back(f"{entity.dxftype()} on {layer[:40]}")
+    if placed.strays:
+        places = ", ".join(f"x {x:g} y {y:g}" for x, y in placed.strays[:SHOWN_STRAYS])
+        one = len(placed.strays) == 1
+        report.leave_out("door in no wall", len(placed.strays))
+        report.doubt(
+            f"{len(placed.strays)} door{' stands' if one else 's stand'} in no wall and {'was' if one else 'were'} left out ({places}"
+            f"{'' if len(placed.strays) <= SHOWN_STRAYS else ', ...'}): are all layers of walls used?"
+        )
+    return placed
+
+
+def _symbols(storey: _Storey) -> list[Symbol]:
+    """The door symbols of a level: blocks, and loose lines that touch."""
+    loose: list[LineString] = []
+    symbols: list[Symbol] = []
+    for entity, _ in storey.sheet.kinds["doors"]:
+        if entity.dxftype() == "INSERT":
+            lines = [line for part in _parts(entity, storey.sheet.file) for line in storey.of(part)]
+            symbols += [symbol_of(lines)] if lines else []
+        else:
+            loose += storey.of(entity)
+    return [*symbols, *symbols_of(loose)]
+
+
+def _parts(block: Any, file: Path, depth: int = DEEPEST_SYMBOL) -> list[Any]:
+    """All entities of a block and of the blocks inside it."""
+    inner = parts(block, file)
+    deeper = [part for part in inner if part.dxftype() == "INSERT"] if depth else []
+    own = [part for part in inner if part.dxftype() != "INSERT"]
+    return own + [found for part in deeper for found in _parts(part, file, depth - 1)]
 
 
 def _noded(lines: list[LineString]) -> list[Any]:

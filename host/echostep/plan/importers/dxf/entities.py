@@ -1,82 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""Entities of a DXF drawing with blocks expanded, and their lines in metres.
+"""Entities of a DXF drawing with blocks expanded, and the layers that they lie on.
 
-In: a file. Out: entities with their effective layers; polylines. Owns the limits for untrusted drawings.
+In: a file. Out: visible entities with their effective layers. Owns the limits for untrusted drawings. What is not shown on the drawing (layers that
+are frozen or off), and what is not in the file (external references), is reported.
 """
 
 from __future__ import annotations
 
 import io
 import logging
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
-
-import numpy as np
-import shapely
-from shapely.geometry import LineString
 
 from echostep.errors import EchostepError
 from echostep.extras import require
 from echostep.plan.importers.parsing import read_bytes
-from echostep.plan.json_fields import LIMIT_M
+from echostep.plan.importers.report import ImportReport
 
-METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048}
-FLAT_M = 0.005  # greatest distance of an arc from the straight pieces that replace it
-FAR_M = 1e4  # larger coordinates are of a national grid: the origin is then moved to the first wall
-STRAY_M = 1e8  # a line beyond is no building, in whatever grid: twice around the Earth
-STRAY = LineString([(0.0, 0.0), (STRAY_M, 0.0)])  # in the place of a line beyond
 MOST_PARTS = 300_000  # entities in blocks
 DEEPEST_BLOCK = 16
-
-
-@dataclass(frozen=True, slots=True)
-class DrawingFrame:
-    """Drawing units -> map metres."""
-
-    scale_m: float
-    x0_m: float = 0.0
-    y0_m: float = 0.0
-
-    @classmethod
-    def about(cls, walls: Sequence[Any], scale_m: float) -> DrawingFrame:
-        """The drawing's own origin, or the first wall's position in whole metres when the drawing is in a national grid."""
-        line = next((line for entity in walls if (line := cls(scale_m).raw(entity))), None)
-        if line is None or np.abs(shapely.get_coordinates(line)).max() < FAR_M:
-            return cls(scale_m)
-        x, y = np.floor(shapely.get_coordinates(line)[0])
-        return cls(scale_m, float(x), float(y))
-
-    def metres(self, point: Any) -> tuple[float, float]:
-        """A point of the drawing in map metres."""
-        return float(point.x) * self.scale_m - self.x0_m, float(point.y) * self.scale_m - self.y0_m
-
-    def raw(self, entity: Any) -> LineString | None:
-        """The entity as a polyline in metres, `STRAY` for one that no building has; None for an entity without a line."""
-        from ezdxf import path
-        from ezdxf.lldxf.const import DXFError
-
-        try:
-            if not abs(float(getattr(entity.dxf, "radius", 0.0))) * self.scale_m <= STRAY_M:
-                return STRAY
-            drawn = path.make_path(entity)
-            ends = np.array([self.metres(p) for p in drawn.control_vertices()])
-            if len(ends) and not np.abs(ends).max() <= STRAY_M:  # its pieces could not be counted
-                return STRAY
-            points = [self.metres(p) for p in drawn.flattening(FLAT_M / self.scale_m)]
-        except (TypeError, ValueError, ArithmeticError, IndexError, AttributeError, DXFError):
-            return None
-        return LineString(points) if len(set(points)) > 1 and np.isfinite(points).all() else None
-
-    def line(self, entity: Any, file: Path) -> LineString | None:
-        """As `raw`; raises EchostepError when the line is beyond the limit of plans."""
-        line = self.raw(entity)
-        if line is not None and np.abs(shapely.get_coordinates(line)).max() > LIMIT_M:
-            raise EchostepError(
-                f"{file}: layer {entity.dxf.layer!r}: {entity.dxftype()} is {LIMIT_M / 1000:.0f} km away: other units, or a stray line?"
-            )
-        return line
 
 
 def read_drawing(file: Path) -> Any:
@@ -97,22 +40,54 @@ def read_drawing(file: Path) -> Any:
     return drawing
 
 
-def entities(space: Any, file: Path, whole: Callable[[str], bool]) -> Iterator[tuple[Any, str]]:
-    """Each entity with its layer; layer "0" inside a block means the block's layer. Blocks are expanded unless `whole(layer)`."""
-    stack = [(entity, "0", 0) for entity in reversed(list(space))]
-    count = 0
-    while stack:
-        entity, outer, depth = stack.pop()
-        count += depth > 0
-        if count > MOST_PARTS:
-            raise EchostepError(f"{file}: its blocks have more than {MOST_PARTS} parts")
-        own = _layer_of(entity)
-        layer = outer if own == "0" else own
-        yield entity, layer
-        if entity.dxftype() == "INSERT":
-            stack += [(attribute, layer, depth + 1) for attribute in entity.attribs]
-        if entity.dxftype() == "INSERT" and depth < DEEPEST_BLOCK and not whole(layer):
-            stack += [(part, layer, depth + 1) for part in parts(entity, file)]
+class VisibleEntities:
+    """The entities of a drawing's model space that are shown; iterating once reports the others.
+
+    `references`: files that the drawing refers to and that are not in it.
+    """
+
+    def __init__(self, drawing: Any, file: Path, report: ImportReport) -> None:
+        self._space, self._file, self._report = drawing.modelspace(), file, report
+        self._hidden = {}
+        for layer in drawing.layers:
+            if layer.is_frozen() or layer.is_off():
+                self._hidden[str(layer.dxf.name).casefold()] = "frozen" if layer.is_frozen() else "off"
+        self.references: list[str] = []
+
+    def __call__(self, whole: Callable[[str], bool]) -> Iterator[tuple[Any, str]]:
+        """Each entity with its layer; layer "0" inside a block means the block's layer. Blocks are expanded unless `whole(layer)`."""
+        stack = [(entity, "0", 0) for entity in reversed(list(self._space))]
+        count = 0
+        while stack:
+            entity, outer, depth = stack.pop()
+            count += depth > 0
+            if count > MOST_PARTS:
+                raise EchostepError(f"{self._file}: its blocks have more than {MOST_PARTS} parts")
+            own = _layer_of(entity)
+            layer = outer if own == "0" else own
+            is_block = entity.dxftype() == "INSERT"
+            hidden = self._hidden.get(layer.casefold()) or ("invisible" if entity.dxf.get("invisible", 0) else None)
+            if hidden and not (is_block and hidden == "off"):
+                self._report.leave_out(f"{entity.dxftype()} on {layer[:40]} ({hidden})")
+                continue
+            if is_block:
+                stack += [(attribute, layer, depth + 1) for attribute in entity.attribs]
+                if self._is_reference(entity):
+                    continue
+            yield entity, layer
+            if is_block and depth < DEEPEST_BLOCK and not whole(layer):
+                stack += [(part, layer, depth + 1) for part in parts(entity, self._file)]
+
+    def _is_reference(self, insert: Any) -> bool:
+        """Whether a block is a file of its own; notes the file."""
+        block = insert.block()
+        path = "" if block is None else str(block.block.dxf.get("xref_path") or "")
+        if not path and not (block is not None and block.block.is_xref):
+            return False
+        name = path.replace("\\", "/").rsplit("/", 1)[-1] or str(insert.dxf.name)
+        if name not in self.references:
+            self.references.append(name[:60])
+        return True
 
 
 def _layer_of(entity: Any) -> str:

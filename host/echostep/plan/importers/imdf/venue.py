@@ -24,8 +24,9 @@ from echostep.plan.importers.connector_shapes import join_connectors
 from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, pieces, room
 from echostep.plan.importers.geojson import features, label, properties, shape
 from echostep.plan.importers.imdf.archive import Archive
-from echostep.plan.importers.imdf.assumed_doors import doors_at, doors_of_rooms
+from echostep.plan.importers.imdf.assumed_doors import ASSUMED, doors_at, doors_of_rooms
 from echostep.plan.importers.parsing import parse_json
+from echostep.plan.importers.report import ImportReport
 from echostep.plan.json_fields import number, text, typed
 from echostep.plan.model import ConnectorKind, Door, DoorState, Georeference, Plan
 
@@ -59,6 +60,7 @@ SOLID_FIXTURES = {
     "waterfeature",
     "vegetation",
 }
+UNUSED = ("address", "amenity", "anchor", "building", "detail", "footprint", "geofence", "occupant", "section")
 ON_M = 0.2  # greatest distance of an opening from the boundary that it opens; assumed
 
 
@@ -90,15 +92,32 @@ class Feature:
         )[:80]
 
 
-def import_imdf(path: Path, storey_height_m: float, doors_m: float | None = None) -> Plan:
+def import_imdf(path: Path, storey_height_m: float, doors_m: float | None, report: ImportReport) -> Plan:
     """Import the venue of an archive; raises EchostepError that names the file in it and the feature."""
     with Archive(path) as archive:
+        if not archive.has(_file(archive, "level")):
+            raise EchostepError(
+                f"{path}: no level.geojson in it: IMDF is a folder or zip file with level.geojson and unit.geojson"
+            )
         if not archive.has("manifest.json"):
-            raise EchostepError(f"{path}: no manifest.json in it: give a folder or zip file of IMDF")
-        return _venue(archive, path, storey_height_m, doors_m)
+            report.doubt("no manifest.json: read as IMDF by the names of its files")
+        plan = _venue(archive, path, storey_height_m, doors_m, report)
+        _tell(archive, plan, report)
+        return plan
 
 
-def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float | None) -> Plan:
+def _tell(archive: Archive, plan: Plan, report: ImportReport) -> None:
+    """Report kinds of features that plans do not have, doors that were assumed, and the remedy for rooms without doors."""
+    report.doors_remedy = "--doors 0.9 assumes doors 0.9 m wide, echostep plan edit draws them"
+    for kind in UNUSED:
+        if archive.has(name := _file(archive, kind)):
+            report.leave_out(kind, archive.text(name).count('"Feature"'))
+    assumed = sum(door.name == ASSUMED for level in plan.levels for door in level.doors)
+    if assumed:
+        report.doubt(f"{assumed} doors are assumed, named {ASSUMED!r}: compare them with the building")
+
+
+def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float | None, report: ImportReport) -> Plan:
     georeference = _origin(archive)
     earth = EarthTransform(georeference)
     levels = sorted(_features(archive, "level", earth), key=_ordinal)
@@ -115,6 +134,10 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
     order = list(drawn_levels)
     for key, drawn in drawn_levels.items():
         drawn.doors = [door for one in openings[key] for door in _doors(one)]
+        if doors_m is None:
+            report.leave_out(
+                "opening without a width (--doors 0.9 gives one)", sum(not _doors(one) for one in openings[key])
+            )
         _outline(drawn, next(level for level in levels if level.key == key))
         for unit in units[key]:
             _unit(drawn, unit, [one.shape for one in openings[key]])
@@ -125,6 +148,8 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
         for fixture in fixtures[key]:
             if "kiosk" in fixture.where or fixture.category in SOLID_FIXTURES:
                 drawn.obstacles += areas([fixture.shape])
+            else:
+                report.leave_out(f"fixture {fixture.category}")
     _relationships(
         archive,
         earth,

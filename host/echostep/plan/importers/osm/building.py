@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""OpenStreetMap Simple Indoor Tagging (XML, or JSON of Overpass) -> `Plan`.
+"""OpenStreetMap Simple Indoor Tagging (XML, JSON of Overpass, GeoJSON of overpass-turbo) -> `Plan`.
 
-In: an .osm, .xml or .json file. Out: `Plan`. Owns nothing. Rooms have walls, corridors and areas have none, `indoor=wall` is a wall, a building's
-outline is a wall on each of its levels; a door is a node on a wall. Levels are `storey_height_m` apart, level 0 at 0 m.
+In: an .osm, .xml, .json or .geojson file. Out: `Plan`. Owns nothing. Rooms have walls, corridors and areas have none, `indoor=wall` is a wall, a
+building's outline is a wall on each of its levels; a door is a node on a wall. Levels are `storey_height_m` apart, level 0 at 0 m.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from echostep.plan.georeference import EarthTransform
 from echostep.plan.importers.connector_shapes import join_connectors
 from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, room
 from echostep.plan.importers.osm.elements import Elements, Tags, levels_of, read_osm
+from echostep.plan.importers.report import ImportReport
 from echostep.plan.json_fields import LIMIT_M
 from echostep.plan.model import ConnectorKind, Door, DoorState, Georeference, Plan
 
@@ -41,7 +42,7 @@ class OsmSite:
         return (self.drawn_levels[level] for level in levels if level in self.drawn_levels)
 
 
-def import_osm(path: Path, storey_height_m: float) -> Plan:
+def import_osm(path: Path, storey_height_m: float, report: ImportReport) -> Plan:
     """Import the building in a file; raises EchostepError that names the file and the element."""
     elements = read_osm(path)
     levels = sorted({level for tags in elements.indoor_tags() for level in levels_of(tags)})
@@ -56,15 +57,32 @@ def import_osm(path: Path, storey_height_m: float) -> Plan:
     site = OsmSite(
         {level: DrawnLevel(f"level {level:g}", round(level * storey_height_m, 6)) for level in levels}, levels
     )
+    _without_level(elements, report)
     _outlines(site, elements)
     _spaces(site, elements)
-    _doors(site, elements)
+    _doors(site, elements, report)
     _lifts(site, elements)
     drawn_levels = [site.drawn_levels[level] for level in levels]
     name = next((tags["name"] for *_, tags in elements.lines() if "building" in tags and "name" in tags), path.stem)
     return Plan(
         name, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels), georeference
     )
+
+
+def _without_level(elements: Elements, report: ImportReport) -> None:
+    """Report indoor elements that no level tag places."""
+    lost: dict[str, list[str]] = {}
+    for where, _, tags in elements.lines():
+        kind = "room" if tags.get("indoor") == "room" else f"indoor={tags['indoor'][:20]}" if "indoor" in tags else ""
+        if (kind or _way(tags)) and not levels_of(tags, where) and tags.get("building", "no") == "no":
+            lost.setdefault(kind or str(_way(tags)), []).append(where)
+    for kind, names in lost.items():
+        report.leave_out(f"{kind} without level", len(names))
+        one = len(names) == 1
+        report.doubt(
+            f"{len(names)} {kind}{'' if one or kind == 'stairs' else 's'} {'has' if one else 'have'} no level and "
+            f"{'was' if one else 'were'} left out ({', '.join(names[:5])}): tag level=* and download it again"
+        )
 
 
 def _origin(elements: Elements, path: Path) -> Georeference:
@@ -130,12 +148,14 @@ def _wall(site: OsmSite, elements: Elements, nodes: list[int], levels: list[floa
                 site.walls_at.setdefault((level, node), []).append(line)
 
 
-def _doors(site: OsmSite, elements: Elements) -> None:
+def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
     """Add a door for each node with a door tag, on each level where the node lies on a wall."""
     for node, tags in elements.nodes():
         if "door" not in tags and "entrance" not in tags and tags.get("indoor") != "door":
             continue
         own = levels_of(tags, f"node {node}") or site.order
+        if not any((level, node) in site.walls_at for level in own):
+            report.leave_out("door on no wall")
         for level in own:
             for line in site.walls_at.get((level, node), [])[:1]:
                 gap = _gap(line, Point(elements.at_m[node]), _metres(tags, DOOR_M))

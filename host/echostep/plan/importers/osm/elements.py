@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Nodes, ways and multipolygons of an OpenStreetMap file, and the numbers of its level tags.
 
-In: XML, or the JSON of Overpass (`out body; >; out skel;` or `out geom;`); tags (`level=0;1`, `level=-1-2`, `repeat_on=3-5`). Out: `Elements`; level
-numbers, ascending. Owns nothing. XML with an entity or a DTD is refused.
+In: XML, the JSON of Overpass (`out body; >; out skel;` or `out geom;`), or GeoJSON of overpass-turbo; tags (`level=0;1`, `level=-1-2`,
+`repeat_on=3-5`). Out: `Elements`; level numbers, ascending. Owns nothing. XML with an entity or a DTD is refused.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from shapely.geometry import LineString
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.plan.importers.osm.geojson_rows import geojson_rows, without_names
 from echostep.plan.importers.parsing import FORMATS, parse_json, read_text
 from echostep.plan.json_fields import number, typed
 
@@ -57,18 +58,19 @@ class Elements:
     node_tags: dict[int, Tags] = field(default_factory=dict)
     ways: dict[int, list[int]] = field(default_factory=dict)
     way_tags: dict[int, Tags] = field(default_factory=dict)
-    relations: list[tuple[int, list[int], Tags]] = field(default_factory=list)
+    relations: list[tuple[int, list[tuple[int, str]], Tags]] = field(default_factory=list)
     at_m: dict[int, tuple[float, float]] = field(default_factory=dict)
 
     def lines(self) -> Iterator[tuple[str, list[int], Tags]]:
-        """Name, nodes and tags of ways, and of the member ways of multipolygons; only lines of two nodes or more."""
+        """Name, nodes and tags of ways, and of the rings of multipolygons; only lines of two nodes or more. Inner rings have no name."""
         for key, nodes in self.ways.items():
             if len(nodes) > 1:
                 yield f"way {key}", nodes, self.way_tags[key]
         for key, members, tags in self.relations:
-            for nodes in (self.ways.get(member, []) for member in members):
-                if len(nodes) > 1:
-                    yield f"relation {key}", nodes, tags
+            for inner in (False, True):
+                ways = [self.ways.get(ref, []) for ref, role in members if (role == "inner") == inner]
+                for nodes in rings([way for way in ways if len(way) > 1]):
+                    yield f"relation {key}", nodes, without_names(tags) if inner else tags
 
     def nodes(self) -> Iterator[tuple[int, Tags]]:
         """Nodes with tags."""
@@ -89,6 +91,21 @@ class Elements:
         return LineString(positions) if len(set(positions)) > 1 else None
 
 
+def rings(ways: list[list[int]]) -> list[list[int]]:
+    """Ways joined where they share an end, until they are closed: the parts of a multipolygon's outline may be drawn in any direction."""
+    left, joined = [list(way) for way in ways], []
+    while left:
+        line = left.pop()
+        while line[0] != line[-1]:
+            following = next((way for way in left if line[-1] in (way[0], way[-1])), None)
+            if following is None:
+                break
+            left.remove(following)
+            line += following[1:] if following[0] == line[-1] else following[-2::-1]
+        joined.append(line)
+    return joined[::-1]
+
+
 def read_osm(path: Path) -> Elements:
     """Read the elements of a file; raises EchostepError that names the file and the element."""
     text = read_text(path)
@@ -105,6 +122,8 @@ def read_osm(path: Path) -> Elements:
 
 def _json_rows(text: str, path: Path) -> list[Any]:
     tree = typed(parse_json(text, str(path)), "the file", dict)
+    if tree.get("type") == "FeatureCollection":
+        return list(geojson_rows(tree))
     return list(typed(tree.get("elements"), "elements", list))
 
 
@@ -162,7 +181,8 @@ def _add(elements: Elements, row: Any) -> None:
             typed(member, f"{where}: members", dict)
             for member in typed(row.get("members") or [], f"{where}: members", list)
         ]
-        elements.relations.append((key, [_ref(m.get("ref"), where) for m in members if m.get("type") == "way"], tags))
+        ways = [(_ref(m.get("ref"), where), str(m.get("role"))) for m in members if m.get("type") == "way"]
+        elements.relations.append((key, ways, tags))
 
 
 def _degrees(row: dict[str, Any], where: str) -> tuple[float, float]:

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: MIT
+"""Entities of a drawing -> polylines in map metres.
+
+In: entities of ezdxf, the scale. Out: `LineString`s. Owns the limits for stray lines, and which hatches are walls.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Polygon
+
+from echostep.arrays import Floats
+from echostep.errors import EchostepError
+from echostep.plan.json_fields import LIMIT_M
+
+METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048}
+FLAT_M = 0.005  # greatest distance of an arc from the straight pieces that replace it
+FAR_M = 1e4  # larger coordinates are of a national grid: the origin is then moved to the first wall
+STRAY_M = 1e8  # a line beyond is no building, in whatever grid: twice around the Earth
+STRAY = LineString([(0.0, 0.0), (STRAY_M, 0.0)])  # in the place of a line beyond
+THICKEST_M = 1.2  # a hatch that is nowhere wider fills a wall or a column, a wider one a floor; assumed
+ASKEW = 0.5  # sine of the angle between a multiline and its stored offsets below which these are wrong; at right corners it is 0.71
+PICTURES = frozenset(
+    {"IMAGE", "WIPEOUT", "VIEWPORT", "OLE2FRAME", "XLINE", "RAY", "UNDERLAY", "INSERT"}
+)  # with an outline that is no line of the building
+
+
+@dataclass(frozen=True, slots=True)
+class DrawingFrame:
+    """Drawing units -> map metres: scaled, then moved by `x0_m`, `y0_m`."""
+
+    scale_m: float
+    x0_m: float = 0.0
+    y0_m: float = 0.0
+
+    @classmethod
+    def about(cls, walls: Sequence[Any], scale_m: float) -> DrawingFrame:
+        """The drawing's own origin, or the first wall's position in whole metres when the drawing is in a national grid."""
+        line = next((line for entity in walls for line in cls(scale_m).raw(entity)), None)
+        if line is None or np.abs(shapely.get_coordinates(line)).max() < FAR_M:
+            return cls(scale_m)
+        x, y = np.floor(shapely.get_coordinates(line)[0])
+        return cls(scale_m, float(x), float(y))
+
+    def metres(self, point: Any) -> tuple[float, float]:
+        """A point of the drawing in map metres."""
+        return float(point.x) * self.scale_m - self.x0_m, float(point.y) * self.scale_m - self.y0_m
+
+    def raw(self, entity: Any) -> list[LineString]:
+        """The entity as polylines in metres, `STRAY` for one that no building has; empty for an entity without a line."""
+        from ezdxf.lldxf.const import DXFError
+
+        try:
+            if not abs(float(getattr(entity.dxf, "radius", 0.0))) * self.scale_m <= STRAY_M:
+                return [STRAY]
+            lines = [line for path in paths(entity) if (line := self._flat(path)) is not None]
+        except (TypeError, ValueError, ArithmeticError, IndexError, AttributeError, KeyError, DXFError):
+            return []
+        return _thin(lines) if entity.dxftype() in ("HATCH", "MPOLYGON") else lines
+
+    def lines(self, entity: Any, file: Path) -> list[LineString]:
+        """As `raw`; raises EchostepError when a line is beyond the limit of plans."""
+        lines = self.raw(entity)
+        if any(np.abs(shapely.get_coordinates(line)).max() > LIMIT_M for line in lines):
+            raise EchostepError(
+                f"{file}: layer {entity.dxf.layer!r}: {entity.dxftype()} is {LIMIT_M / 1000:.0f} km away: other units, or a stray line?"
+            )
+        return lines
+
+    def _flat(self, path: Any) -> LineString | None:
+        """A path as straight pieces within `FLAT_M`; None when it has no length."""
+        ends = np.array([self.metres(p) for p in path.control_vertices()])
+        if len(ends) and not np.abs(ends).max() <= STRAY_M:  # its pieces could not be counted
+            return STRAY
+        points = [self.metres(p) for p in path.flattening(FLAT_M / self.scale_m)]
+        return LineString(points) if len(set(points)) > 1 and np.isfinite(points).all() else None
+
+
+def paths(entity: Any) -> Iterator[Any]:
+    """The outlines of an entity: one of lines and curves, several of hatches, multilines and polygons; none of texts and pictures."""
+    from ezdxf import path
+
+    kind = entity.dxftype()
+    if kind in PICTURES:
+        return
+    if kind in ("HATCH", "MPOLYGON"):
+        yield from path.from_hatch(entity)
+    elif kind == "MLINE":
+        if _askew(entity):
+            entity.update_geometry()
+        yield from (path.make_path(part) for part in entity.virtual_entities() if part.dxftype() in ("LINE", "ARC"))
+    else:
+        yield path.make_path(entity)
+
+
+def corners(entity: Any) -> list[Floats]:
+    """Corners (n, 2) of the entity's outlines in drawing units; curves count as their chords."""
+    from ezdxf.lldxf.const import DXFError
+
+    try:
+        found = [[(p.start.x, p.start.y), *((c.end.x, c.end.y) for c in p.commands())] for p in paths(entity)]
+    except (TypeError, ValueError, ArithmeticError, IndexError, AttributeError, KeyError, DXFError):
+        return []
+    return [points for row in found if np.isfinite(points := np.array(row, dtype=np.float64)).all() and len(row) > 1]
+
+
+def _askew(mline: Any) -> bool:
+    """Whether the offsets that a multiline stores do not point away from its line."""
+    for one, other in zip(mline.vertices, mline.vertices[1:], strict=False):
+        along, across = other.location - one.location, one.miter_direction
+        length = math.hypot(along.x, along.y) * math.hypot(across.x, across.y)
+        if length and abs(along.x * across.y - along.y * across.x) < ASKEW * length:
+            return True
+    return False
+
+
+def _thin(lines: list[LineString]) -> list[LineString]:
+    """Outlines of the parts of a hatch that are no wider than a wall; islands cut holes."""
+    area = Polygon()
+    for line in lines:
+        if len(line.coords) > 3:
+            area = area.symmetric_difference(shapely.make_valid(Polygon(line.coords)))
+    parts = [part for part in shapely.get_parts(area) if isinstance(part, Polygon)]
+    thin = [part for part in parts if part.buffer(-THICKEST_M / 2).is_empty]
+    return [LineString(ring.coords) for part in thin for ring in (part.exterior, *part.interiors)]

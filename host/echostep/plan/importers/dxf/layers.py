@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: MIT
+"""What the layers of a drawing mean: by their names, and which others look like walls by their lines.
+
+In: names, patterns, lines in metres. Out: kinds of elements. Owns the patterns of names in many languages, and what lines of walls look like.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString
+
+from echostep.arrays import Floats
+
+# Names in English (AIA) and German, Romance, Germanic and Slavic languages, Turkish, Chinese, Japanese, Korean
+LAYERS: dict[str, tuple[str, ...]] = {
+    "walls": (
+        "*wall*", "*partition*", "*masonry*", "*wand*", "*waend*", "*wände*", "*mauer*", "*mur*", "*cloison*", "*pared*", "*tabique*", "*parete*",
+        "*pareti*", "*tramezz*", "*muur*", "*vägg*", "*vegg*", "*væg*", "*seinä*", "*scian*", "*ścian*", "*stěn*", "*стен*", "*перегород*", "*duvar*",
+        "*墙*", "*牆*", "*壁*", "*벽*",
+    ),
+    "columns": ("*cols*", "*column*", "*stütz*", "*stuetz*", "*pfeiler*", "*poteau*", "*pilar*", "*colonn*", "*колонн*", "*kolon*", "*柱*"),
+    "windows": (
+        "*wind*", "*glaz*", "*glas*", "*fenster*", "*ventana*", "*fenetre*", "*fenêtre*", "*finestr*", "*janela*", "*fönster*", "*vindu*", "*okno*",
+        "*okna*", "*окн*", "*pencere*", "*窗*", "*窓*", "*창*",
+    ),
+    "doors": (
+        "*door*", "*tür*", "*tuer*", "*puerta*", "*porte*", "*porta*", "*deur*", "*dør*", "*dörr*", "*drzwi*", "*dveř*", "*двер*", "*门*", "*門*",
+        "*扉*", "*ドア*", "*문*",
+    ),
+    "stairs": (
+        "*stair*", "*strs*", "*trepp*", "*escalier*", "*escalera*", "*scala*", "*escada*", "*schod*", "*лестн*", "*楼梯*", "*階段*",
+    ),
+    "lifts": ("*lift*", "*elev*", "*evtr*", "*aufzug*", "*ascens*", "*лифт*", "*电梯*"),
+    "rooms": ("*room*", "*raum*", "*space*", "*area-iden*", "*name*"),
+    "obstacles": ("*obstacle*", "*hindernis*"),
+}  # fmt: skip
+BESIDE = (
+    "*patt*", "*hatch*", "*schraff*", "*-dim*", "*bemass*", "*bemaß*", "*anno*", "*text*", "*demol*", "*-demo*", "*abbruch*", "*insul*", "*daemm*",
+    "*dämm*",
+)  # fmt: skip
+DRAWN = (
+    "walls",
+    "columns",
+    "windows",
+    "doors",
+    "stairs",
+    "lifts",
+)  # kinds whose layers have others beside them, of hatching or measures
+THINNEST_M, THICKEST_M = 0.05, 0.5  # distance of the two faces of a wall; assumed
+PAIRED = 0.5  # share of the lines of a layer of walls that have such a partner; assumed
+LEAST_M = 5.0  # a layer with less of them is no layer of walls; assumed
+MOST_PIECES = 20_000  # of one layer that are looked at
+
+
+def patterns_of(own: Mapping[str, Sequence[str]]) -> dict[str, tuple[str, ...]]:
+    """Patterns by kind: the caller's own ones instead of the usual ones."""
+    return {kind: tuple(name.casefold() for name in (own.get(kind) or LAYERS[kind])) for kind in LAYERS}
+
+
+def meaning(layer: str, patterns: Mapping[str, Sequence[str]]) -> str | None:
+    """The kind of element on a layer of this name; None when the name matches no pattern, or is of hatching, measures or demolition."""
+    for kind, names in patterns.items():
+        if matches(layer, names):
+            usual = names == LAYERS[kind] and kind in DRAWN
+            return None if usual and matches(layer, BESIDE) else kind
+    return None
+
+
+def matches(layer: str, patterns: Sequence[str]) -> bool:
+    """Whether the name of a layer matches a pattern, small and capital letters being alike."""
+    name = layer.casefold()
+    return any(fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def pieces_of(lines: Sequence[LineString]) -> Floats:
+    """The straight pieces (n, 4) of lines."""
+    rows = [np.zeros((0, 4))]
+    for line in lines:
+        points = shapely.get_coordinates(line)
+        rows.append(np.concatenate((points[:-1], points[1:]), axis=1))
+    return np.concatenate(rows)
+
+
+def faces_m(lines: Sequence[LineString]) -> float:
+    """Length of the lines of a layer that look like faces of walls: 0 unless most have a parallel partner at the distance of a wall's thickness."""
+    pieces = pieces_of(lines)
+    length = np.hypot(*(pieces[:, 2:] - pieces[:, :2]).T)
+    pieces, length = pieces[length > THICKEST_M], length[length > THICKEST_M]
+    if length.sum() < LEAST_M or len(pieces) > MOST_PIECES:
+        return 0.0
+    spacing = spacings(pieces, THICKEST_M)
+    paired = length[(spacing >= THINNEST_M) & (spacing <= THICKEST_M)].sum()
+    return float(paired) if paired > PAIRED * length.sum() else 0.0
+
+
+def spacings(pieces: Floats, most: float) -> Floats:
+    """Distance (n,) from each piece (n, 4) to the nearest parallel one beside its middle, within `most`; infinity where there is none."""
+    nearest = np.full(len(pieces), np.inf)
+    if not len(pieces):
+        return nearest
+    tree = shapely.STRtree(shapely.linestrings(pieces.reshape(-1, 2, 2)))
+    middle = (pieces[:, :2] + pieces[:, 2:]) / 2
+    along = pieces[:, 2:] - pieces[:, :2]
+    along = along / np.hypot(*along.T)[:, None]
+    one, other = tree.query(shapely.points(middle), predicate="dwithin", distance=most)
+    sine = np.abs(along[one, 0] * along[other, 1] - along[one, 1] * along[other, 0])
+    start = pieces[other, :2] - middle[one]
+    apart = np.abs(along[one, 0] * start[:, 1] - along[one, 1] * start[:, 0])
+    beside = (sine < 0.02) & (apart > 1e-3 * most)
+    np.minimum.at(nearest, one[beside], apart[beside])
+    return nearest
