@@ -18,6 +18,7 @@ EXTRAS = dict.fromkeys(PAGE, "page") | {
     "ezdxf": "plans",
     "scipy": "plans",
     "matplotlib": "plots",
+    "PIL": "plots",
     "pyarrow": "parquet",
     "ifcopenshell": "ifc",
     "foxglove": "foxglove",

@@ -122,8 +122,16 @@ def _pictured(plan: Plan, out: Path) -> str:
         return f"; {path} is another picture and stays: echostep plan show {out} -o FILE.png draws this one"
     from echostep.plan.drawing import draw_plan
 
-    draw_plan(plan, path, list(range(len(plan.levels))))
-    return f", {path}"
+    return f", {path}{_without(draw_plan(plan, path, list(range(len(plan.levels)))))}"
+
+
+def _without(letters: str) -> str:
+    """Words on letters that were drawn as boxes; empty when there are none."""
+    return (
+        f"; no font here has the letters {letters[:40]}: install one that does (fonts-noto-cjk, fonts-noto)"
+        if letters
+        else ""
+    )
 
 
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN", help="A plan (JSON), or what can be imported.")]
@@ -155,7 +163,8 @@ def check(
     print(f"{file}: " + (", ".join(f"{count} x {kind}" for kind, count in counts.items()) or "nothing wrong"))
     if picture is not None:
         levels = sorted({finding.level for finding in findings}) or list(range(len(plan.levels)))
-        draw_plan(plan, picture, levels, None, findings[:MOST_MARKS])
+        if letters := draw_plan(plan, picture, levels, None, findings[:MOST_MARKS]):
+            print(f"{picture}{_without(letters)}")
     if findings:
         raise typer.Exit(1)
 
@@ -177,7 +186,9 @@ def show(
     from echostep.plan.importers.limited import open_limited
 
     plan = open_limited(file)
-    draw_plan(plan, out, list(range(len(plan.levels))) if level is None else [_level(plan, level)], _bounds(bounds))
+    levels = list(range(len(plan.levels))) if level is None else [_level(plan, level)]
+    if letters := draw_plan(plan, out, levels, _bounds(bounds)):
+        print(f"{out}{_without(letters)}")
 
 
 @app.command()

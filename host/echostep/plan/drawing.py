@@ -7,7 +7,7 @@ In: a `Plan`, levels, a rectangle, findings. Out: a file. Owns the colours.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ import numpy as np
 
 from echostep.errors import EchostepError
 from echostep.plan.cropping import Bounds, extent, within
-from echostep.plan.labels import Label, draw_labels
+from echostep.plan.labels import Label, draw_labels, fonts_for
 from echostep.plan.model import Connector, Level, Plan, Pose, Room
 from echostep.plan.places.faces import find_faces
 from echostep.plan.places.spaces import MOST_WALLS
@@ -57,8 +57,27 @@ class View:
 
 def draw_plan(
     plan: Plan, path: Path, levels: Sequence[int], bounds: Bounds | None = None, findings: Sequence[PlanFinding] = ()
+) -> str:
+    """Draw levels side by side, all of them or the part within the bounds; raises EchostepError when the file cannot be written.
+
+    Returns the letters of names that no installed font has.
+    """
+    with fonts_for(_texts(plan, levels)) as missing:
+        _draw_levels(plan, path, levels, bounds, findings)
+    return missing
+
+
+def _texts(plan: Plan, levels: Sequence[int]) -> Iterator[str]:
+    """All names on levels."""
+    for i in levels:
+        yield plan.levels[i].name
+        yield from (room.name for room in plan.levels[i].rooms)
+    yield from (connector.name for connector in plan.connectors)
+
+
+def _draw_levels(
+    plan: Plan, path: Path, levels: Sequence[int], bounds: Bounds | None, findings: Sequence[PlanFinding]
 ) -> None:
-    """Draw levels side by side, all of them or the part within the bounds; raises EchostepError when the file cannot be written."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -93,6 +112,11 @@ def draw_plan(
 
 def draw_bare_level(plan: Plan, level: int, bounds: Bounds, pixels_per_m: float, file: IO[bytes]) -> None:
     """Write a level within the bounds as PNG without frame, to the edge of the picture, on a transparent ground."""
+    with fonts_for(_texts(plan, [level])):
+        _draw_bare(plan, level, bounds, pixels_per_m, file)
+
+
+def _draw_bare(plan: Plan, level: int, bounds: Bounds, pixels_per_m: float, file: IO[bytes]) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -125,8 +149,8 @@ def _draw_ground(axes: Any, level: Level) -> None:
 
 
 def _about(levels: Sequence[Level]) -> Bounds:
-    """The rectangle around these levels, with a margin."""
-    boxes = np.array([extent(level.solid) for level in levels])
+    """The rectangle around what these levels have, with a margin."""
+    boxes = np.array([extent(level.solid) for level in levels if len(level.solid)] or [extent(levels[0].solid)])
     x0, y0 = boxes[:, :2].min(axis=0)
     x1, y1 = boxes[:, 2:].max(axis=0)
     edge = 0.03 * max(x1 - x0, y1 - y0, 1.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Names on a drawn level, none over another.
+"""Names on a drawn level, none over another, in fonts that have their letters.
 
 In: labels in order of importance, and the axes with their final place on the figure. Out: the texts that fit. Owns the places taken.
 A name is made smaller, then left out, where it would cover one that is drawn already.
@@ -7,8 +7,11 @@ A name is made smaller, then left out, where it would cover one that is drawn al
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -17,6 +20,7 @@ from echostep.arrays import Floats
 
 SMALLER = (1.0, 0.8, 0.6)  # of the wanted size, tried in this order; assumed
 SMALLEST_PT = 3.0  # of a name: still read when magnified
+BASE_FONT = "DejaVu Sans"  # comes with matplotlib
 APART_PX = 1.0  # between two names
 
 
@@ -29,6 +33,43 @@ class Label:
     size_pt: float
     colour: str
     offsets_pt: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+
+
+@contextmanager
+def fonts_for(texts: Iterable[str]) -> Iterator[str]:
+    """Draw inside with fonts that have the letters of these texts; gives the letters that no installed font has, which are drawn as boxes."""
+    import matplotlib as mpl
+    from matplotlib.font_manager import fontManager
+
+    families = [BASE_FONT]
+    missing = {letter for text in texts for letter in text if letter.isprintable() and not letter.isspace()}
+    missing -= _letters(_path_of(BASE_FONT))
+    for font in sorted(
+        fontManager.ttflist, key=lambda font: (font.style != "normal", font.weight not in (400, "normal"), font.name)
+    ):
+        if missing and (found := missing & _letters(font.fname)):
+            families.append(font.name)
+            missing -= found
+    with mpl.rc_context({"font.family": families}), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from")
+        yield "".join(sorted(missing))
+
+
+def _path_of(family: str) -> str:
+    from matplotlib.font_manager import findfont
+
+    return str(findfont(family))
+
+
+@cache
+def _letters(path: str) -> frozenset[str]:
+    """The letters that a font file has; none for a damaged one."""
+    from matplotlib.ft2font import FT2Font
+
+    try:
+        return frozenset(map(chr, FT2Font(path).get_charmap()))
+    except (OSError, RuntimeError):
+        return frozenset()
 
 
 def draw_labels(axes: Any, labels: Sequence[Label]) -> int:

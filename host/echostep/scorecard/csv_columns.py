@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
 """A CSV file of any tracker: numbers by the names of its columns.
 
-In: a file with a line of names, then numbers, with commas, semicolons or tabs in between. Out: `CsvColumns`. Owns nothing. Every error is one line
-that names the file, the line and the column.
+In: a file with a line of names, then numbers, with commas, semicolons or tabs in between; or a TUM trajectory, with spaces. Out:
+`CsvColumns`. Owns nothing. Every error is one line that names the file, the line and the column.
 """
 
 from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -21,6 +21,16 @@ from echostep.errors import EchostepError
 from echostep.offline.csv_table import CsvLimits, lines_of, separator_of
 
 MOST_ROWS = 1_000_000  # of a track: eight hours at 30 positions a second
+TUM = (
+    "timestamp",
+    "tx",
+    "ty",
+    "tz",
+    "qx",
+    "qy",
+    "qz",
+    "qw",
+)  # format of the RGB-D SLAM benchmark of TUM, written by evo and others
 SHOWN = 40  # characters of a wrong cell that an error repeats
 
 
@@ -69,17 +79,38 @@ class CsvColumns:
         return value
 
 
+def is_tum(first: str) -> bool:
+    """Whether the first line is of a TUM trajectory: eight names or numbers with spaces in between."""
+    return not any(mark in first for mark in ",;\t") and len(first.lstrip("# ").split()) == len(TUM)
+
+
+def _read_tum(first: str, lines: Iterable[str]) -> tuple[tuple[str, ...], list[tuple[int, tuple[str, ...]]]]:
+    """Names and rows of a TUM trajectory; lines that begin with # are comments."""
+    rows = (
+        (number, line)
+        for number, line in enumerate((first, *lines), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    )
+    begin = first.split(maxsplit=1)[0][:1]
+    named = begin != "#" and not begin.isdigit() and begin not in "+-."
+    read = [(number, tuple(line.split())) for number, line in islice(rows, MOST_ROWS + 2)]
+    return TUM, (read[1:] if named else read)[: MOST_ROWS + 1]
+
+
 def read_csv(path: Path) -> CsvColumns:
     """Read a file; raises EchostepError. Empty lines are skipped; a # before the names is, too."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             lines = lines_of(file, CsvLimits())
             first = next(lines, "")
-            delimiter = separator_of(first)
-            names = tuple(name.strip() for name in next(csv.reader([first.lstrip("# ")], delimiter=delimiter), ()))
-            reader = csv.reader(lines, delimiter=delimiter)
-            rows = ((reader.line_num + 1, tuple(cell.strip() for cell in row)) for row in reader if any(row))
-            read = list(islice(rows, MOST_ROWS + 1))
+            if is_tum(first):
+                names, read = _read_tum(first, lines)
+            else:
+                delimiter = separator_of(first)
+                names = tuple(name.strip() for name in next(csv.reader([first.lstrip("# ")], delimiter=delimiter), ()))
+                reader = csv.reader(lines, delimiter=delimiter)
+                rows = ((reader.line_num + 1, tuple(cell.strip() for cell in row)) for row in reader if any(row))
+                read = list(islice(rows, MOST_ROWS + 1))
     except OSError as error:
         raise EchostepError(f"{path}: cannot read it: {error.strerror or error}") from error
     except (UnicodeDecodeError, csv.Error) as error:

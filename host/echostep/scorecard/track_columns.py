@@ -21,10 +21,23 @@ from echostep.plan.model import Plan
 from echostep.scorecard.csv_columns import CsvColumns, read_csv
 
 NAMES = {
-    "time": ("t_s", "t", "time_s", "time", "timestamp_s", "timestamp"),
-    "x": ("x_m", "x", "east_m", "east", "pos_x"),
-    "y": ("y_m", "y", "north_m", "north", "pos_y"),
-    "height": ("z_m", "z", "height_m", "height", "pos_z"),
+    "time": (
+        "t_s",
+        "t",
+        "time_s",
+        "time",
+        "timestamp_s",
+        "timestamp",
+        "time_ms",
+        "timestamp_ms",
+        "t_ms",
+        "time_ns",
+        "timestamp_ns",
+        "t_ns",
+    ),
+    "x": ("x_m", "x", "east_m", "east", "pos_x", "tx"),
+    "y": ("y_m", "y", "north_m", "north", "pos_y", "ty"),
+    "height": ("z_m", "z", "height_m", "height", "pos_z", "tz"),
     "floor": ("level", "floor", "storey"),
     "radius95": ("radius95_m", "ce95_m"),
     "protection": ("protection_m", "protection_level_m"),
@@ -35,6 +48,12 @@ NAMES = {
     "yy": ("yy_m2",),
 }
 REQUIRED = ("time", "x", "y")
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+EPOCH_S = 3e8  # seconds since 1970 in July 1979: a greater number is the time of day of a recording, in whatever unit
+SLOWEST_M_S, WALKED_M_S = (
+    0.005,
+    (0.05, 15.0),
+)  # mean speed below which seconds are doubted, and speeds of tracks; assumed
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +61,7 @@ class ScoredPath:
     """A track or a true path of n rows: `t_s` (n,), `xy_m` (n, 2); None for what the file does not have.
 
     `level`: index of the plan's level, or the file's own number of the floor. `covariance_m2` (n, 3): xx, xy, yy. `lost`: rows that are marked
-    so. `columns`: what was found, name of the column by what it means.
+    so. `columns`: what was found, name of the column by what it means. `time_unit`: in which the file states times.
     """
 
     path: Path
@@ -56,10 +75,14 @@ class ScoredPath:
     radius95_m: Floats | None = None
     protection_m: Floats | None = None
     latency_s: Floats | None = None
+    time_unit: str = field(default="s", compare=False)
 
     def described(self) -> str:
         """The columns that were used, in words."""
-        return f"{self.path}: " + ", ".join(f"{what} is {name}" for what, name in self.columns.items())
+        units = {"time": "" if self.time_unit == "s" else f" in {self.time_unit}"}
+        return f"{self.path}: " + ", ".join(
+            f"{what} is {name}{units.get(what, '')}" for what, name in self.columns.items()
+        )
 
 
 def load_path(path: Path, plan: Plan | None) -> ScoredPath:
@@ -69,7 +92,10 @@ def load_path(path: Path, plan: Plan | None) -> ScoredPath:
     for what in REQUIRED:
         if what not in columns:
             raise EchostepError(f"{path}:1: no column for {what}: it may be named {', '.join(NAMES[what])}")
-    t_s = table.numbers(columns["time"])
+    xy_m = np.column_stack([table.numbers(columns[axis]) for axis in "xy"])
+    written = table.numbers(columns["time"])
+    unit = time_unit(columns["time"], written, xy_m)
+    t_s = written * TIME_UNITS[unit]
     back = np.flatnonzero(np.diff(t_s) < 0.0)
     if len(back):
         raise table.error(int(back[0]) + 1, columns["time"], "the time goes back")
@@ -85,11 +111,26 @@ def load_path(path: Path, plan: Plan | None) -> ScoredPath:
         radius = _radius95(covariance)
     lost = np.array([s.lower() == "lost" for s in table.texts(columns["status"])]) if "status" in columns else None
     return ScoredPath(
-        path, t_s, np.column_stack([table.numbers(columns[axis]) for axis in "xy"]),
+        path, t_s, xy_m,
         np.zeros(len(t_s), bool) if lost is None else lost, columns, height_m,
         _levels(table, columns.get("floor"), height_m, plan), covariance, radius, optional("protection"),
-        optional("latency"),
+        optional("latency"), unit,
     )  # fmt: skip
+
+
+def time_unit(name: str, written: Floats, xy_m: Floats) -> str:
+    """The unit of a column of times: by its name, else by the date that it would be since 1970, else by the speed that it would be."""
+    ending = name.lower().rpartition("_")[2]
+    if ending in TIME_UNITS:
+        return ending
+    greatest = float(np.abs(written).max())
+    if greatest >= EPOCH_S / TIME_UNITS["ms"]:
+        return next(unit for unit in ("ns", "us", "ms") if greatest >= EPOCH_S / TIME_UNITS[unit])
+    way_m, span = float(np.hypot(*np.diff(xy_m, axis=0).T).sum()), float(np.ptp(written))
+    if span <= 0.0 or way_m / span >= SLOWEST_M_S:
+        return "s"
+    fast = {unit: way_m / span / second for unit, second in TIME_UNITS.items()}
+    return next((unit for unit in ("ms", "us", "ns") if WALKED_M_S[0] <= fast[unit] <= WALKED_M_S[1]), "s")
 
 
 def _levels(table: CsvColumns, name: str | None, height_m: Floats | None, plan: Plan | None) -> Floats | None:

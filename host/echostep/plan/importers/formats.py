@@ -9,7 +9,9 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from echostep.errors import EchostepError
 from echostep.plan.importers.hints import Hints
@@ -18,6 +20,22 @@ from echostep.plan.importers.report import ImportReport
 from echostep.plan.model import Plan, load_plan
 from echostep.plan.writer import plan_json
 
+DRAW_OVER = "a picture: echostep plan edit PLAN --picture {} draws over it"
+NEXT_STEPS = {  # formats that are not read, and what to do
+    **dict.fromkeys((".png", ".jpg", ".jpeg", ".svg"), DRAW_OVER.format("FILE")),
+    **dict.fromkeys(
+        (".pgm", ".ppm", ".pbm", ".bmp", ".tif", ".tiff", ".gif", ".webp", ".heic"),
+        f"{DRAW_OVER.format('FILE.png')}, once it is saved as PNG; a map of ROS is imported by its map.yaml",
+    ),
+    ".pdf": f"PDF: make a picture of its page (pdftoppm -png -r 150 FILE page), then it is {DRAW_OVER.format('page-1.png')}",
+    ".dwg": "DWG: save it as DXF (in AutoCAD SAVEAS, or with the free ODA File Converter)",
+    ".dgn": "DGN: save it as DXF",
+    ".dwf": "DWF: save the drawing that it was made of as DXF",
+    **dict.fromkeys((".rvt", ".rfa", ".pln", ".skp", ".3dm"), "a model of its own program: export it there as IFC, or a floor plan as DXF"),
+    **dict.fromkeys((".ifcxml", ".ifcjson"), "export it as IFC (STEP, .ifc)"),
+    ".gml": "IndoorGML or CityGML is not read: export the building as IFC, IMDF or DXF",
+    **dict.fromkeys((".shp", ".gpkg", ".kml", ".kmz"), "export it as DXF (from QGIS: Project, Import/Export), or map it as OpenStreetMap indoor tags"),
+}  # fmt: skip
 OTHERS = {
     ".dxf",
     ".geojson",
@@ -26,8 +44,11 @@ OTHERS = {
     ".imdf",
     ".osm",
     ".xml",
+    ".yaml",
+    ".yml",
     ".zip",
-}  # suffixes of files that are imported, not read as plan.json
+    *NEXT_STEPS,
+}  # files that are not read as plan.json
 SNIFFED_BYTES = 4096  # read to recognise a format
 
 
@@ -69,35 +90,35 @@ def is_foreign(path: Path) -> bool:
 
 
 def _imported(path: Path, hints: Hints, above: Sequence[Path], report: ImportReport) -> Plan:
-    if path.suffix.casefold() == ".dxf":
-        from echostep.plan.importers.dxf.drawing import import_dxf
-
-        return import_dxf([path, *above], hints, report)
-    if above:
+    suffix, height_m = path.suffix.casefold(), hints.storey_height_m
+    if above and suffix != ".dxf":
         raise EchostepError(f"{above[0]}: only drawings (DXF) may be given as several files: give one file or folder")
-    if path.suffix.casefold() in (".osm", ".xml", ".geojson") or _is_map(path):
-        from echostep.plan.importers.osm.building import import_osm
-
-        return import_osm(path, hints.storey_height_m, report)
-    if path.name == "main.json" or (path / "main.json").exists():
-        from echostep.plan.importers.wrld import import_wrld
-
-        return import_wrld(path / "main.json" if path.is_dir() else path, hints.storey_height_m, report)
-    if path.suffix.casefold() in (".ifc", ".ifczip"):
-        from echostep.plan.importers.ifc.building import import_ifc
-
-        return import_ifc(path, report)
-    if _is_imdf(path):
-        from echostep.plan.importers.imdf.venue import import_imdf
-
-        return import_imdf(path, hints.storey_height_m, hints.doors_m, report)
-    if path.name == "core.txt" or (path / "core.txt").exists():
-        from echostep.plan.importers.nodelink import import_nodelink
-
-        return import_nodelink(path / "core.txt" if path.is_dir() else path)
-    if not path.exists():
+    if suffix == ".dxf":
+        plan = _module("dxf.drawing").import_dxf([path, *above], hints, report)
+    elif suffix in (".osm", ".xml", ".geojson") or _is_map(path):
+        plan = _module("osm.building").import_osm(path, height_m, report)
+    elif path.name == "main.json" or (path / "main.json").exists():
+        plan = _module("wrld").import_wrld(path / "main.json" if path.is_dir() else path, height_m, report)
+    elif suffix in (".ifc", ".ifczip"):
+        plan = _module("ifc.building").import_ifc(path, report)
+    elif _is_imdf(path):
+        plan = _module("imdf.venue").import_imdf(path, height_m, hints.doors_m, report)
+    elif path.name == "core.txt" or (path / "core.txt").exists():
+        plan = _module("nodelink").import_nodelink(path / "core.txt" if path.is_dir() else path)
+    elif suffix in (".yaml", ".yml"):
+        plan = _module("raster.ros_map").import_ros_map(path, report)
+    elif not path.exists():
         raise EchostepError(f"{path}: no such file")
-    raise EchostepError(f"{path}: no format of plans that echostep knows: give {FORMATS}")
+    else:
+        raise EchostepError(
+            f"{path}: {NEXT_STEPS.get(suffix, f'no format of plans that echostep knows: give {FORMATS}')}"
+        )
+    return plan  # type: ignore[no-any-return]
+
+
+def _module(name: str) -> Any:
+    """An importer, loaded with its libraries when a file of its format is given."""
+    return import_module(f"echostep.plan.importers.{name}")
 
 
 def _is_imdf(path: Path) -> bool:

@@ -12,9 +12,7 @@ from typing import Any
 
 from echostep.errors import EchostepError
 
-FORMATS = (
-    "DXF, IFC, IMDF (zip or folder), OpenStreetMap (.osm, .xml, JSON of Overpass), WRLD (main.json) or biba (core.txt)"
-)
+FORMATS = "DXF, IFC, IMDF (zip or folder), OpenStreetMap (.osm, .xml, .geojson, JSON of Overpass), ROS (map.yaml), WRLD (main.json), biba (core.txt)"
 LARGEST_BYTES = 512 * 2**20
 
 

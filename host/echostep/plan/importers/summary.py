@@ -21,6 +21,7 @@ MOST_LINES = 12
 MOST_LEVELS, MOST_DOUBTS = 5, 4  # lines on levels, and on doubts; more of them are counted
 MOST_NAMES = 6  # kinds and layers in one line
 AT_WALL_M = 0.15  # greatest distance of both ends of a door from a wall: issue 44's bound for a door in a gap
+SIZES_M, DOORS_M = (2.5, 1500.0), (0.5, 3.0)  # of a level, and of half of the doors; assumed
 CLEAR_M = 0.01  # a wall nearer than this to a door's middle part runs through it
 
 
@@ -40,7 +41,7 @@ def summary(plan: Plan, report: ImportReport) -> list[str]:
         lines.append("layers: " + "; ".join(f"{kind}: {_some(names)}" for kind, names in report.layers.items()))
     if report.left_out:
         lines.append("left out: " + _counted(report.left_out))
-    doubts = [*report.doubts, *_without_doors(plan, report.doors_remedy)]
+    doubts = [*report.doubts, *_implausible(plan), *_without_doors(plan, report.doors_remedy)]
     shown = min(MOST_DOUBTS, MOST_LINES - len(lines) - 1)
     lines += [f"note: {doubt}" for doubt in doubts[:shown]]
     if len(doubts) > shown:
@@ -92,6 +93,20 @@ def _connectors(plan: Plan) -> str:
     words = {"stairs": "stairs", "lift": "lifts", "ramp": "ramps"}
     found = [f"{counts[kind]} {word}" for kind, word in words.items() if counts[kind]]
     return (", ".join(found) or "no stairs, lifts or ramps") + " between levels"
+
+
+def _implausible(plan: Plan) -> list[str]:
+    """What no building has: levels of less than a room's or more than a campus's size, doors that nobody passes or that are gates."""
+    said = []
+    for level in plan.levels:
+        if len(level.walls) and not SIZES_M[0] <= max(size_m(level)) <= SIZES_M[1]:
+            said.append(f"{level.name} is {max(size_m(level)):.3g} m long: is the scale right?")
+    widths = [door.width_m for level in plan.levels for door in level.doors]
+    if widths and not DOORS_M[0] <= (middle := float(np.median(widths))) <= DOORS_M[1]:
+        said.append(
+            f"half of the doors are {middle:.2f} m wide or {'less' if middle < 1 else 'more'}: is the scale right?"
+        )
+    return said[:3]
 
 
 def _without_doors(plan: Plan, remedy: str) -> list[str]:

@@ -108,13 +108,13 @@ def _of_swing(swing: Swing, walls: WallBands) -> Line | None:
 
 def _exact(swing: Swing, walls: WallBands) -> Line | None:
     """The gap that an arc from jamb to open leaf fits exactly; None for arcs that are no doors: basins, chairs, curved walls."""
-    for k, end in enumerate(swing.ends):
-        u = _unit(swing.hinge, end)
-        gap = walls.gap(swing.hinge, u, swing.radius_m / 2, 2 * swing.radius_m)
-        is_open = not walls.is_at_wall(swing.ends[1 - k], 0.05) or swing.leaf == 1 - k
-        if gap is not None and is_open and abs(gap.begin_m) < BY_M and abs(gap.end_m - swing.radius_m) < BY_M:
-            return _line(swing.hinge, u, gap.begin_m, gap.end_m)
-    return None
+    hinge, radius = swing.hinge, swing.radius_m
+    found = []
+    for u in (_unit(hinge, end) for end in swing.ends):
+        gap = walls.gap(hinge, u, radius / 2, 2 * radius)
+        if gap is not None and abs(gap.begin_m) < BY_M and abs(gap.end_m - radius) < BY_M:
+            found.append(_line(hinge, u, gap.begin_m, gap.end_m))
+    return found[0] if len(found) == 1 else None
 
 
 def _of_line(lines: Sequence[LineString], walls: WallBands) -> Line | None:
@@ -128,14 +128,12 @@ def _of_line(lines: Sequence[LineString], walls: WallBands) -> Line | None:
     gap = walls.gap(a, along, length / 2, length)
     if gap is not None and _fits(gap, length):
         return _line(a, along, gap.begin_m, gap.end_m)
-    if gap is None and walls.is_at_wall(a) and walls.is_at_wall(b):
-        return (*a, *b)
     for hinge in (a, b):
         for u in walls.directions(hinge):
             leaf = walls.gap(hinge, u, length / 2, BESIDE_M)
             if leaf is not None and _fits(leaf, length):
                 return _line(hinge, u, leaf.begin_m, leaf.end_m)
-    return None
+    return (*a, *b) if gap is None and walls.is_at_wall(a) and walls.is_at_wall(b) else None
 
 
 def _fits(gap: Gap, leaf_m: float) -> bool:

@@ -27,7 +27,7 @@ from echostep.plan.importers.dxf.gaps import WallBands
 from echostep.plan.importers.dxf.rooms import rooms_of
 from echostep.plan.importers.dxf.sheet import Sheet, read_sheet
 from echostep.plan.importers.dxf.storeys import alignment, bounds_of, lies_over, storey_boxes, window_words
-from echostep.plan.importers.dxf.symbols import Symbol, symbol_of, symbols_of
+from echostep.plan.importers.dxf.symbols import Symbol, is_swing, symbol_of, symbols_of
 from echostep.plan.importers.hints import Hints
 from echostep.plan.importers.report import ImportReport
 from echostep.plan.model import ConnectorKind, Plan
@@ -147,8 +147,7 @@ def _moved(storey: _Storey, dx: float, dy: float) -> _Storey:
 def _drawn_level(storey: _Storey, drawn: DrawnLevel, report: ImportReport) -> DrawnLevel:
     sheet = storey.sheet
     _without_lines(storey, report)
-    solid = storey.lines("walls", "columns", "windows")
-    doors = _doors(storey, WallBands(solid), report)
+    doors = _doors(storey, report)
     drawn.doors, drawn.cuts = doors.doors, doors.cuts
     drawn.walls, drawn.windows = list(storey.lines("walls", "columns")), list(storey.lines("windows"))
     drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(_noded(storey.lines("obstacles")))))
@@ -169,18 +168,21 @@ def _without_lines(storey: _Storey, report: ImportReport) -> None:
                 report.leave_out(f"{entity.dxftype()} on {layer[:40]}")
 
 
-def _doors(storey: _Storey, walls: WallBands, report: ImportReport) -> PlacedDoors:
-    """Doors on their layers, then swings on others that fit a gap exactly."""
+def _doors(storey: _Storey, report: ImportReport) -> PlacedDoors:
+    """Doors on their layers, then swings on others, or among the walls, that fit a gap exactly."""
     placed = PlacedDoors()
+    curves = [pair for pair in (*storey.sheet.others, *storey.sheet.kinds["walls"]) if pair[0].dxftype() in CURVES]
+    swings = [(*pair, symbol) for pair in curves if is_swing(symbol := symbol_of(storey.of(pair[0])))]
+    storey.swings.update(id(entity) for entity, *_ in swings)  # no walls while the doors are looked for
+    walls = WallBands(storey.lines("walls", "columns", "windows"))
     for symbol in _symbols(storey):
         placed.add(symbol, walls)
-    for entity, layer in [*storey.sheet.others, *storey.sheet.kinds["walls"]]:
-        if entity.dxftype() in CURVES:
-            symbol = symbol_of(storey.of(entity))
-            if symbol.swings and placed.add_swing(symbol, walls):
-                storey.swings.add(id(entity))
-                report.use("doors", layer)
-                report.take_back(f"{entity.dxftype()} on {layer[:40]}")
+    for entity, layer, symbol in swings:
+        if placed.add_swing(symbol, walls):
+            report.use("doors", layer)
+            report.take_back(f"{entity.dxftype()} on {layer[:40]}")
+        else:
+            storey.swings.remove(id(entity))
     if placed.strays:
         places = ", ".join(f"x {x:g} y {y:g}" for x, y in placed.strays[:SHOWN_STRAYS])
         one = len(placed.strays) == 1

@@ -59,6 +59,11 @@ def symbol_of(lines: Sequence[LineString]) -> Symbol:
     return Symbol(tuple(lines), tuple(_with_leaf(swing, straight) for swing in swings))
 
 
+def is_swing(symbol: Symbol) -> bool:
+    """Whether a symbol is little more than one swing: arc, leaf, threshold; not a wall with a round corner."""
+    return len(symbol.swings) == 1 and sum(line.length for line in symbol.lines) < 4.0 * symbol.swings[0].radius_m
+
+
 def symbols_of(lines: Sequence[LineString]) -> list[Symbol]:
     """Loose lines as symbols: those that touch belong together."""
     if not lines:

@@ -2,7 +2,8 @@
 """Building models (IFC; needs `pip install echostep[ifc]`) -> `Plan`.
 
 In: an .ifc or .ifczip file. Out: `Plan`. Owns nothing. Each level is cut by a horizontal plane one metre above its floor: the sections of walls,
-columns and curtain walls become walls, so that doors are gaps. Windows, stairs and lifts are rectangles, seen from above; doors lie in their openings.
+columns and curtain walls become walls, so that doors are gaps. Windows, stairs and lifts are rectangles, seen from above; doors lie in their
+openings.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Doors of a model: the line across the opening that a door fills, whichever way its leaf is drawn.
 
-In: an IfcDoor. Out: the door's line and its heights. Owns nothing. The opening's rectangle lies in the wall: the line runs along the wall, in its middle. A door
-that fills no opening has its line from its placement (x along the width) when its shape is no flat leaf, else along its shape.
+In: an IfcDoor. Out: the door's line and its heights. Owns nothing. The opening's rectangle lies in the wall: the line runs along the wall, in its
+middle. A door that fills no opening has its line from its placement (x along the width) when its shape is no flat leaf, else along its shape.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def _host(hole: Any, shapes: Shapes) -> Polygon | None:
 
 
 def _across(hole: SolidBody, wall: Polygon | None, width_m: float) -> Line:
-    """The line along the middle of an opening: along its wall, else along the side that is as long as the door is wide, else along the longer side."""
+    """The line along the middle of an opening: along its wall, else along the side as long as the door is wide, else along the longer side."""
     area = hole.above()
     if wall is not None:
         common = area.intersection(wall)
