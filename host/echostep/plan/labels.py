@@ -44,9 +44,8 @@ def fonts_for(texts: Iterable[str]) -> Iterator[str]:
     families = [BASE_FONT]
     missing = {letter for text in texts for letter in text if letter.isprintable() and not letter.isspace()}
     missing -= _letters(_path_of(BASE_FONT))
-    for font in sorted(
-        fontManager.ttflist, key=lambda font: (font.style != "normal", font.weight not in (400, "normal"), font.name)
-    ):
+    fonts = [font for font in fontManager.ttflist if not font.name.startswith("Last Resort")]  # its letters are boxes
+    for font in sorted(fonts, key=lambda font: (font.style != "normal", font.weight not in (400, "normal"), font.name)):
         if missing and (found := missing & _letters(font.fname)):
             families.append(font.name)
             missing -= found

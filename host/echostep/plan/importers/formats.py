@@ -34,7 +34,7 @@ NEXT_STEPS = {  # formats that are not read, and what to do
     **dict.fromkeys((".rvt", ".rfa", ".pln", ".skp", ".3dm"), "a model of its own program: export it there as IFC, or a floor plan as DXF"),
     **dict.fromkeys((".ifcxml", ".ifcjson"), "export it as IFC (STEP, .ifc)"),
     ".gml": "IndoorGML or CityGML is not read: export the building as IFC, IMDF or DXF",
-    **dict.fromkeys((".shp", ".gpkg", ".kml", ".kmz"), "export it as DXF (from QGIS: Project, Import/Export), or map it as OpenStreetMap indoor tags"),
+    **dict.fromkeys((".shp", ".gpkg", ".kml", ".kmz"), "export it as DXF (QGIS: Project, Import/Export), or map it as OpenStreetMap indoor tags"),
 }  # fmt: skip
 OTHERS = {
     ".dxf",
@@ -91,6 +91,7 @@ def is_foreign(path: Path) -> bool:
 
 def _imported(path: Path, hints: Hints, above: Sequence[Path], report: ImportReport) -> Plan:
     suffix, height_m = path.suffix.casefold(), hints.storey_height_m
+    plan: Plan
     if above and suffix != ".dxf":
         raise EchostepError(f"{above[0]}: only drawings (DXF) may be given as several files: give one file or folder")
     if suffix == ".dxf":
@@ -113,7 +114,7 @@ def _imported(path: Path, hints: Hints, above: Sequence[Path], report: ImportRep
         raise EchostepError(
             f"{path}: {NEXT_STEPS.get(suffix, f'no format of plans that echostep knows: give {FORMATS}')}"
         )
-    return plan  # type: ignore[no-any-return]
+    return plan
 
 
 def _module(name: str) -> Any:

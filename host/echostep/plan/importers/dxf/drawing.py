@@ -183,6 +183,11 @@ def _doors(storey: _Storey, report: ImportReport) -> PlacedDoors:
             report.take_back(f"{entity.dxftype()} on {layer[:40]}")
         else:
             storey.swings.remove(id(entity))
+    if placed.cuts:
+        one = len(placed.cuts) == 1
+        report.doubt(
+            f"{len(placed.cuts)} door{' lies' if one else 's lie'} where a wall is drawn through: the wall was cut there"
+        )
     if placed.strays:
         places = ", ".join(f"x {x:g} y {y:g}" for x, y in placed.strays[:SHOWN_STRAYS])
         one = len(placed.strays) == 1
