@@ -20,6 +20,7 @@ from echostep.operation.recorded import tape
 from echostep.operation.recorded.past import PastView
 from echostep.operation.recorded.record import Heard, decode_record
 from echostep.operation.recorded.tape import Player, Tape, load
+from echostep.page.requests import SetPlaying, SetSpeed
 from echostep.recording.reading import open_recording
 from echostep.recording.repair import contents, edit
 from operation.teams import TOWER, Recording, Team, place, whole_team
@@ -103,7 +104,7 @@ def test_played_at_a_multiple_the_past_becomes_the_present(tmp_path: Path) -> No
     view = PastView(made.tape)
     view.handle(requests.Seek(0.0))
     assert view.look(10.0) is not None
-    for request in (requests.Speed(4.0), requests.Play(True)):
+    for request in (SetSpeed(4.0), SetPlaying(True)):
         view.handle(request)
     found = view.look(10.5)
     assert found is not None

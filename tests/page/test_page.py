@@ -52,6 +52,29 @@ def test_no_text_breaks_the_parser(text: str) -> None:
     assert requests.parse_request(text) is None or '"kind"' in text
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        '"kind":"seek","t_s":1e308', '"kind":"seek","t_s":NaN', '"kind":"seek","t_s":1e999', '"kind":"seek","t_s":true', '"kind":"speed","times":0',
+        '"kind":"speed","times":32.1', '"kind":"skip","by":1.5', '"kind":"skip","by":9007199254740992', '"kind":"play","playing":1', '"kind":"met","name":""',
+        '"kind":"go_to","x_m":1,"y_m":100000.1', '"kind":"go_to","x_m":1,"y_m":1,"level":1000', '"kind":"drawn"', '"kind":"undo","undo":0', '"seq":1',
+    ],
+)  # fmt: skip
+def test_a_request_beyond_its_limits_is_none(text: str) -> None:
+    assert requests.parse_request("{" + text + "}") is None
+
+
+@pytest.mark.parametrize(
+    ("text", "request_"),
+    [
+        ('"kind":"go_to","x_m":1,"y_m":2', requests.GoTo(1.0, 2.0, 0)), ('"kind":"skip","by":-3', requests.StepBy(-3)),
+        ('"kind":"check_in","x_m":1,"y_m":2,"sd_m":0,"heading_rad":4', CheckIn(1.0, 2.0, 4.0 - 2.0 * math.pi, 0.05, 0)),
+    ],
+)  # fmt: skip
+def test_a_request_within_its_limits(text: str, request_: requests.Request) -> None:
+    assert requests.parse_request("{" + text + "}") == request_
+
+
 @given(
     st.binary(max_size=600) | st.dictionaries(fields, json_like, max_size=6).map(lambda tree: json.dumps(tree).encode())
 )

@@ -11,19 +11,12 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from echostep.page.requests import FASTEST, MOST_REQUEST
-from echostep.plan.json_fields import LIMIT_M
+from echostep.page.requests import MOST_REQUEST, FrameDrawn, SetPlaying, SetSpeed
+from echostep.ports.people.payloads import Level, Metres, decoded
 from echostep.team.messages.marks import Identity, MarkKind, Person
 from echostep.team.messages.report import is_printable
 
 Number = Annotated[int, Meta(ge=0, lt=1 << 53)]
-Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M)]
-
-
-class Drawn(msgspec.Struct, frozen=True, tag_field="kind", tag="drawn"):
-    """The page has drawn frame number `seq`."""
-
-    seq: Number
 
 
 class Choose(msgspec.Struct, frozen=True, tag_field="kind", tag="choose"):
@@ -38,7 +31,7 @@ class SetMark(msgspec.Struct, frozen=True, tag_field="kind", tag="mark"):
     mark: MarkKind
     x_m: Metres
     y_m: Metres
-    level: Annotated[int, Meta(ge=0, lt=1000)]
+    level: Level
     by: Person
 
 
@@ -61,35 +54,18 @@ class Seek(msgspec.Struct, frozen=True, tag_field="kind", tag="seek"):
     t_s: Annotated[float, Meta(ge=0.0, le=1e10)]
 
 
-class Play(msgspec.Struct, frozen=True, tag_field="kind", tag="play"):
-    """Play on from the moment that is shown, or hold it."""
-
-    playing: bool
-
-
-class Speed(msgspec.Struct, frozen=True, tag_field="kind", tag="speed"):
-    """Play so many times as fast as it was."""
-
-    times: Annotated[float, Meta(gt=0.0, le=FASTEST)]
-
-
 class Now(msgspec.Struct, frozen=True, tag_field="kind", tag="now"):
     """Show the present."""
 
 
-TimeRequest = Seek | Play | Speed | Now
+TimeRequest = Seek | SetPlaying | SetSpeed | Now
 Action = SetMark | Unmark | Acknowledge
-TableRequest = Drawn | Choose | TimeRequest | Action
+TableRequest = FrameDrawn | Choose | TimeRequest | Action
 _REQUESTS = msgspec.json.Decoder(TableRequest)
 
 
 def parse_request(text: str | None) -> TableRequest | None:
     """The request in a text from a page; None when it is not a valid one."""
-    if text is None or len(text) > MOST_REQUEST:
-        return None
-    try:
-        request: TableRequest = _REQUESTS.decode(text)
-    except (msgspec.MsgspecError, UnicodeError, RecursionError):
-        return None
+    request = None if text is None else decoded(text, _REQUESTS, MOST_REQUEST)
     by = getattr(request, "by", "x")
     return request if is_printable(by) and by.strip() else None

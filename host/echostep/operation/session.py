@@ -19,6 +19,7 @@ from echostep.operation.recorded.past import PastView
 from echostep.operation.recorded.tape import Tape
 from echostep.page.guarded_socket import MOST_UNDRAWN, GuardedSocket
 from echostep.page.protocol import FRAME_S, Refused
+from echostep.page.requests import FrameDrawn, SetPlaying, SetSpeed
 from echostep.page.shared import PageCounts
 from echostep.page.web.faults import Faults
 
@@ -78,13 +79,13 @@ class TableSession(GuardedSocket):
         match request:
             case None:
                 self._counts.unknown += 1
-            case requests.Drawn(seq):
+            case FrameDrawn(seq):
                 self._undrawn.discard(seq)
                 self._news.set()
             case requests.Choose(number):
                 self._chosen, self._due = number, True
                 self._news.set()
-            case requests.Seek() | requests.Play() | requests.Speed() | requests.Now():
+            case requests.Seek() | SetPlaying() | SetSpeed() | requests.Now():
                 if self._view is not None:
                     self._view.handle(request)
                     self._due = True

@@ -6,165 +6,88 @@ In: texts, which may be damaged or hostile. Out: requests; None for a text that 
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
-from echostep.plan.json_fields import LIMIT_M
+import msgspec
+from msgspec import Meta
+
 from echostep.plan.routing import RoutePlace
-from echostep.ports.people.check_in import MOST_LEVELS, Call, CheckIn, Undo, call_of, check_in_of, undo_of
+from echostep.ports.people.check_in import Call, CheckIn, EnteredPlace, Undo
+from echostep.ports.people.payloads import Level, Metres, decoded
 
-MOST_REQUEST = 2048  # bytes
+MOST_REQUEST = 2048  # characters
 MOST_NAME = 32  # characters of a wearer's name, as in reports
 FASTEST = 32.0  # times as fast as it was recorded
+Integer = Annotated[int, Meta(gt=-(1 << 53), lt=1 << 53)]  # that JavaScript represents exactly
 
 
-@dataclass(frozen=True, slots=True)
-class Consider:
+class Entered(EnteredPlace, frozen=True, tag_field="kind", tag="check_in"):
+    """The wearer is at this place: `parse_request` returns its `CheckIn`."""
+
+
+class Consider(EnteredPlace, frozen=True, tag_field="kind", tag="consider"):
     """Say what a check-in would do, without making it."""
 
-    check_in: CheckIn
 
-
-@dataclass(frozen=True, slots=True)
-class Met:
+class Met(msgspec.Struct, frozen=True, tag_field="kind", tag="met"):
     """The wearer stands beside a teammate of this name."""
 
-    name: str
+    name: Annotated[str, Meta(min_length=1, max_length=MOST_NAME)]
 
 
-@dataclass(frozen=True, slots=True)
-class GoTo:
+class GoTo(msgspec.Struct, frozen=True, tag_field="kind", tag="go_to"):
     """Guide the wearer to a place."""
 
-    goal: RoutePlace
+    x_m: Metres
+    y_m: Metres
+    level: Level = 0
+
+    @property
+    def goal(self) -> RoutePlace:
+        """The place."""
+        return RoutePlace(self.x_m, self.y_m, self.level)
 
 
-@dataclass(frozen=True, slots=True)
-class EndGuidance:
+class EndGuidance(msgspec.Struct, frozen=True, tag_field="kind", tag="go_nowhere"):
     """End the guidance to the destination that was chosen on a page."""
 
 
-@dataclass(frozen=True, slots=True)
-class FrameDrawn:
+class FrameDrawn(msgspec.Struct, frozen=True, tag_field="kind", tag="drawn"):
     """The page has drawn frame number `seq`."""
 
-    seq: int
+    seq: Integer
 
 
-@dataclass(frozen=True, slots=True)
-class SetPlaying:
+class SetPlaying(msgspec.Struct, frozen=True, tag_field="kind", tag="play"):
     """Run or pause the replay."""
 
     playing: bool
 
 
-@dataclass(frozen=True, slots=True)
-class SetSpeed:
+class SetSpeed(msgspec.Struct, frozen=True, tag_field="kind", tag="speed"):
     """Replay `times` as fast as it was recorded."""
 
-    times: float
+    times: Annotated[float, Meta(gt=0.0, le=FASTEST)]
 
 
-@dataclass(frozen=True, slots=True)
-class Seek:
+class Seek(msgspec.Struct, frozen=True, tag_field="kind", tag="seek"):
     """Show the moment `t_s` of the replay."""
 
-    t_s: float
+    t_s: Annotated[float, Meta(ge=-1e9, le=1e9)]
 
 
-@dataclass(frozen=True, slots=True)
-class StepBy:
+class StepBy(msgspec.Struct, frozen=True, tag_field="kind", tag="skip"):
     """Move the replay by a number of estimates; negative: back."""
 
-    by: int
+    by: Integer
 
 
-Request = (
-    CheckIn | Undo | Call | Consider | Met | GoTo | EndGuidance | FrameDrawn | SetPlaying | SetSpeed | Seek | StepBy
-)
+_OwnRequest = Undo | Call | Consider | Met | GoTo | EndGuidance | FrameDrawn | SetPlaying | SetSpeed | Seek | StepBy
+Request = CheckIn | _OwnRequest
+_REQUESTS = msgspec.json.Decoder(Entered | _OwnRequest)
 
 
 def parse_request(text: str) -> Request | None:
     """The request in a text from a page; None when the text is not a valid request."""
-    if len(text) > MOST_REQUEST:
-        return None
-    try:
-        tree = json.loads(text)
-    except (ValueError, RecursionError):
-        return None
-    return _request(tree) if isinstance(tree, dict) else None
-
-
-def _request(tree: dict[str, Any]) -> Request | None:
-    kind = tree.get("kind")
-    return _REQUESTS[kind](tree) if isinstance(kind, str) and kind in _REQUESTS else None
-
-
-def _consider(tree: dict[str, Any]) -> Consider | None:
-    check_in = check_in_of(tree)
-    return None if check_in is None else Consider(check_in)
-
-
-def _met(tree: dict[str, Any]) -> Met | None:
-    name = tree.get("name")
-    return Met(name) if isinstance(name, str) and 0 < len(name) <= MOST_NAME else None
-
-
-def _go_to(tree: dict[str, Any]) -> GoTo | None:
-    x, y, level = _number(tree.get("x_m")), _number(tree.get("y_m")), _integer(tree.get("level", 0))
-    if x is None or y is None or level is None or not 0 <= level < MOST_LEVELS:
-        return None
-    return GoTo(RoutePlace(x, y, level))
-
-
-def _drawn(tree: dict[str, Any]) -> FrameDrawn | None:
-    seq = _integer(tree.get("seq"))
-    return None if seq is None else FrameDrawn(seq)
-
-
-def _playing(tree: dict[str, Any]) -> SetPlaying | None:
-    return SetPlaying(tree["playing"]) if isinstance(tree.get("playing"), bool) else None
-
-
-def _speed(tree: dict[str, Any]) -> SetSpeed | None:
-    times = _number(tree.get("times"))
-    return SetSpeed(times) if times is not None and 0.0 < times <= FASTEST else None
-
-
-def _seek(tree: dict[str, Any]) -> Seek | None:
-    t_s = _number(tree.get("t_s"), most=1e9)
-    return None if t_s is None else Seek(t_s)
-
-
-def _skip(tree: dict[str, Any]) -> StepBy | None:
-    by = _integer(tree.get("by"))
-    return None if by is None else StepBy(by)
-
-
-_REQUESTS: dict[str, Callable[[dict[str, Any]], Request | None]] = {
-    "check_in": check_in_of,
-    "undo": undo_of,
-    "call": call_of,
-    "consider": _consider,
-    "met": _met,
-    "go_to": _go_to,
-    "go_nowhere": lambda _: EndGuidance(),
-    "drawn": _drawn,
-    "play": _playing,
-    "speed": _speed,
-    "seek": _seek,
-    "skip": _skip,
-}
-
-
-def _number(value: Any, most: float = LIMIT_M) -> float | None:
-    """The value as a float; None when it is not a number within +-`most`."""
-    fits = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= most
-    return float(value) if fits else None
-
-
-def _integer(value: Any) -> int | None:
-    """The value when it is an integer that JavaScript represents exactly, else None."""
-    return value if isinstance(value, int) and not isinstance(value, bool) and abs(value) < 1 << 53 else None
+    request = decoded(text, _REQUESTS, MOST_REQUEST)
+    return request.check_in if isinstance(request, Entered) else request

@@ -75,8 +75,8 @@ class PageSession(GuardedSocket):
             case requests.FrameDrawn(seq):
                 if (arrived_ns := self._undrawn.pop(seq, None)) is not None:
                     self.latency_s.append((time.monotonic_ns() - arrived_ns) * 1e-9)
-            case requests.Consider(check_in) if check_in.level < levels:
-                answer = self._shared.taps.consider(check_in, self._mailbox.latest)
+            case requests.Consider() if request.level < levels:
+                answer = self._shared.taps.consider(request.check_in, self._mailbox.latest)
                 await self.tell(protocol.encode(answer))
             case CheckIn() if request.level < levels:
                 await self._take(request, self._shared.taps.refusal(request))
@@ -88,8 +88,8 @@ class PageSession(GuardedSocket):
                 await self._take(request, "")
             case requests.Met(name):
                 await self._meet(name)
-            case requests.GoTo(goal) if goal.level < levels:
-                self._mailbox.set_goal(goal)
+            case requests.GoTo() if request.level < levels:
+                self._mailbox.set_goal(request.goal)
             case requests.EndGuidance():
                 self._mailbox.set_goal(None)
             case _ if self._cursor is not None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from echostep.operation import requests
 from echostep.operation.operation import Operation, TableScene
 from echostep.operation.recorded.tape import Player, Tape
+from echostep.page.requests import SetPlaying, SetSpeed
 
 NEAR_END_S = 0.5  # closer to the end of a growing tape is now: what was heard just now is not on the disk yet
 
@@ -51,13 +52,13 @@ class PastView:
             case requests.Seek(t_s):
                 self.is_past, self._asked_s = True, t_s
                 self.playing = self.playing and not self._tape.grows
-            case requests.Play(playing):
+            case SetPlaying(playing):
                 if playing and not self._tape.grows and self._position_s == self._tape.end_s:
                     self._asked_s = 0.0
                 if not playing and not self.is_past:
                     self.is_past, self._asked_s = True, self._tape.end_s - (self._tape.begin_s or 0.0)
                 self.playing = playing
-            case requests.Speed(times):
+            case SetSpeed(times):
                 self.times = times
             case requests.Now():
                 self._return()

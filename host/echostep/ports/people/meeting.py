@@ -12,8 +12,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from echostep.ports.people.check_in import MOST_LEVELS
-from echostep.ports.people.payloads import Metres, Variance, decoded, has_covariance
+from echostep.ports.people.payloads import Level, Metres, Variance, decoded, has_covariance
 
 MEETING = "meeting"  # name of the port
 MOST_BYTES = 512  # of one encoded meeting; assumed
@@ -31,7 +30,7 @@ class Meeting(msgspec.Struct, frozen=True):
     status: Literal["tracking", "uncertain", "lost"]
     x_m: Metres
     y_m: Metres
-    level: Annotated[int, Meta(ge=0, lt=MOST_LEVELS)]
+    level: Level
     xx_m2: Variance
     xy_m2: Annotated[float, Meta(ge=-1e12, le=1e12)]
     yy_m2: Variance

@@ -13,7 +13,10 @@ from msgspec import Meta
 
 from echostep.plan.json_fields import LIMIT_M
 
+MOST_LEVELS = 1000  # of a plan, assumed
+
 Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M)]
+Level = Annotated[int, Meta(ge=0, lt=MOST_LEVELS)]
 Variance = Annotated[float, Meta(ge=0.0, le=1e12)]
 T = TypeVar("T")
 
@@ -29,7 +32,7 @@ class Spread(Protocol):
     def yy_m2(self) -> float: ...
 
 
-def decoded(payload: bytes, decoder: msgspec.json.Decoder[T], most_bytes: int) -> T | None:
+def decoded(payload: bytes | str, decoder: msgspec.json.Decoder[T], most_bytes: int) -> T | None:
     """The structure in a payload; None when the bytes are too many, or none of it."""
     if len(payload) > most_bytes:
         return None

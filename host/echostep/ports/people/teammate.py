@@ -11,8 +11,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from echostep.ports.people.check_in import MOST_LEVELS
-from echostep.ports.people.payloads import Metres, decoded
+from echostep.ports.people.payloads import Level, Metres, decoded
 
 TEAM = "team"  # name of the port
 MOST_BYTES = 512  # of one encoded position; assumed
@@ -24,7 +23,7 @@ class Teammate(msgspec.Struct, frozen=True):
     name: Annotated[str, Meta(max_length=32)]
     x_m: Metres
     y_m: Metres
-    level: Annotated[int, Meta(ge=0, lt=MOST_LEVELS)]
+    level: Level
     radius_m: Annotated[float, Meta(ge=0.0, le=1e7)]
     words: Annotated[str, Meta(max_length=200)] = ""
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from echostep.ports.people.check_in import MOST_LEVELS
 from echostep.ports.people.meeting import Meeting
+from echostep.ports.people.payloads import MOST_LEVELS
 from echostep.team.messages.report import Position
 
 Status = Literal["tracking", "uncertain", "lost"]
