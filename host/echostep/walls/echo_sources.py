@@ -26,13 +26,12 @@ from echostep.walls.index import (
     segments_cross,
     tile_at,
 )
-from echostep.walls.tile_points import CORNER, EDGE, in_sector
+from echostep.walls.tile_points import CORNER, EDGE, WALL, in_sector
 from echostep.walls.visibility import tile_sources
 
 __all__ = ["CORNER", "EDGE", "MOST_SOURCES", "WALL", "Walls", "echo_sources"]
 
 
-WALL = 0.0  # kind, beside EDGE and CORNER
 MOST_SOURCES = 8  # of one ping: the nearest ones mask the others
 FARTHEST_M = 3.0  # greatest `reach_m`: it bounds the tiles made at once
 FOOT_M = 1e-3  # a wall so close before another does not hide it: walls drawn twice
@@ -47,6 +46,20 @@ class Receiver(NamedTuple):
     y: float
     axis_x: float
     axis_y: float
+
+
+class Limits(NamedTuple):
+    """What a query leaves out because it cannot be the first echo.
+
+    Edges farther than `edge_m`, and what is farther than a wall within `sure_m` whose foot is off the axis by at most `sure_cos` (a cosine).
+    """
+
+    sure_m: float
+    sure_cos: float
+    edge_m: float
+
+
+EVERYTHING = Limits(0.0, 1.0, EAR_REACH_M)
 
 
 class SourceList(NamedTuple):
@@ -158,20 +171,38 @@ def echo_sources(
     WALL: foot of the perpendicular on a wall. CORNER: inside of a corner that is about square, where two reflections send sound back. EDGE: any other
     place where a wall ends or walls turn.
     """
-    tile = tile_at(px, py, index)
-    if tile < 0 or not math.isfinite(axis_rad):
-        return 0
-    k = index.tile_number[tile] - 1
-    u = bearing(axis_rad)
     receiver = Receiver(px, py, math.cos(axis_rad), math.sin(axis_rad))
-    sources = SourceList(distance_m, off_axis_rad, kind)
-    if not 0 <= k < index.tabulated:
-        return _sources_of_missing_tile(receiver, tile, u, index, sources)
-    u += k * BEARINGS
-    n = _add_faces(receiver, index.walls, index.faces, u, sources)
-    n = _add_points(receiver, index.walls, index.points, u, n, sources)
+    return first_sources(receiver, axis_rad, index, EVERYTHING, SourceList(distance_m, off_axis_rad, kind))
+
+
+@inline_kernel
+def first_sources(receiver: Receiver, axis_rad: float, index: WallIndex, limits: Limits, sources: SourceList) -> int:
+    """`echo_sources` of a receiver with this bearing of its axis, but for those that `limits` leaves out."""
+    tile, u, n = tile_at(receiver.x, receiver.y, index), bearing(axis_rad), 0
+    if tile >= 0 and math.isfinite(axis_rad):
+        k = index.tile_number[tile] - 1
+        if 0 <= k < index.tabulated:
+            n = _sources_of(receiver, index.walls, index.faces, index.points, u + k * BEARINGS, limits, sources)
+        else:
+            n = _sources_of_missing_tile(receiver, tile, u, index, limits, sources)
+    return n
+
+
+@inline_kernel
+def _sources_of(
+    receiver: Receiver,
+    walls: Floats,
+    faces: SourceTable,
+    points: SourceTable,
+    u: int,
+    limits: Limits,
+    sources: SourceList,
+) -> int:
+    """The sources of unit u."""
+    n, reach_m = _add_faces(receiver, walls, faces, u, limits, sources)
+    n = _add_points(receiver, walls, points, u, n, reach_m, limits, sources)
     for i in range(n):
-        off_axis_rad[i] = _angle(off_axis_rad[i])
+        sources.off_axis[i] = _angle(sources.off_axis[i])
     return n
 
 
@@ -183,19 +214,19 @@ def bearing(axis_rad: float) -> int:
 
 
 @allocating_kernel
-def _sources_of_missing_tile(receiver: Receiver, tile: int, u: int, index: WallIndex, sources: SourceList) -> int:
-    """`echo_sources` in a tile that is not tabulated: its tables are made for this call alone."""
+def _sources_of_missing_tile(
+    receiver: Receiver, tile: int, u: int, index: WallIndex, limits: Limits, sources: SourceList
+) -> int:
+    """The sources in a tile that is not tabulated: its tables are made for this call alone."""
     faces, points = tile_sources(tile, index, 0.0)
-    n = _add_faces(receiver, index.walls, faces, u, sources)
-    n = _add_points(receiver, index.walls, points, u, n, sources)
-    for i in range(n):
-        sources.off_axis[i] = _angle(sources.off_axis[i])
-    return n
+    return _sources_of(receiver, index.walls, faces, points, u, limits, sources)
 
 
 @inline_kernel
-def _add_faces(receiver: Receiver, walls: Floats, faces: SourceTable, u: int, sources: SourceList) -> int:
-    """Feet of perpendiculars on the walls of unit u, with cosines off the axis; their number.
+def _add_faces(
+    receiver: Receiver, walls: Floats, faces: SourceTable, u: int, limits: Limits, sources: SourceList
+) -> tuple[int, float]:
+    """Feet of perpendiculars on the walls of unit u, with cosines off the axis; their number, and up to where a source can be the first.
 
     In the wall's own axes: s along its tangent t, h to the left of it.
 
@@ -206,7 +237,7 @@ def _add_faces(receiver: Receiver, walls: Floats, faces: SourceTable, u: int, so
           start   foot         end
     """
     px, py, ax, ay = receiver
-    n = 0
+    n, reach_m = 0, EAR_REACH_M
     for position in range(faces.start[u], faces.start[u + 1]):
         i = faces.order[position]
         dx, dy = px - faces.rows[i, 0], py - faces.rows[i, 1]
@@ -214,25 +245,39 @@ def _add_faces(receiver: Receiver, walls: Floats, faces: SourceTable, u: int, so
         s, h = dx * tx + dy * ty, dy * tx - dx * ty
         d = abs(h)
         ahead = (ax * ty - ay * tx) * h
-        if not (ahead >= CONE * d and 0.0 <= s <= faces.rows[i, 4] and NEAREST_M < d <= EAR_REACH_M):
+        if not (ahead >= CONE * d and 0.0 <= s <= faces.rows[i, 4] and NEAREST_M < d <= reach_m):
             continue
         share = 1.0 - FOOT_M / d
         qx, qy = px + share * h * ty, py - share * h * tx
         if d > FOOT_M and hidden(px, py, qx, qy, walls, faces, i):
             continue
         n = _insert(n, d, ahead / d, WALL, sources)
-    return n
+        if d <= limits.sure_m and ahead >= limits.sure_cos * d:
+            reach_m = d
+    return n, reach_m
 
 
 @inline_kernel
-def _add_points(receiver: Receiver, walls: Floats, points: SourceTable, u: int, n: int, sources: SourceList) -> int:
-    """Corners and edges of unit u, beside n sources found before; the new number."""
+def _add_points(
+    receiver: Receiver,
+    walls: Floats,
+    points: SourceTable,
+    u: int,
+    n: int,
+    reach_m: float,
+    limits: Limits,
+    sources: SourceList,
+) -> int:
+    """Corners and edges of unit u up to `reach_m`, beside n sources found before; the new number."""
     px, py, ax, ay = receiver
     for position in range(points.start[u], points.start[u + 1]):
         i = points.order[position]
+        if points.rows[i, 7] > reach_m * reach_m:
+            break  # nearest first
         dx, dy = points.rows[i, 0] - px, points.rows[i, 1] - py
         ahead, d2 = dx * ax + dy * ay, dx * dx + dy * dy
-        if not (ahead > 0.0 and ahead * ahead >= CONE * CONE * d2 and d2 <= EAR_REACH_M * EAR_REACH_M):
+        most_m = min(reach_m, limits.edge_m) if points.rows[i, 2] == EDGE else reach_m
+        if not (ahead > 0.0 and ahead * ahead >= CONE * CONE * d2 and d2 <= most_m * most_m):
             continue
         if not in_sector(-dx, -dy, points.rows[i, 3], points.rows[i, 4], points.rows[i, 5], points.rows[i, 6]):
             continue

@@ -26,7 +26,7 @@ JOIN_M = 0.01  # walls whose ends are no further apart are joined: drawing accur
 CONE_RAD = math.radians(40.0)
 MAX_TILES = 40_000_000  # a plan of more is not in metres, and its index would fill the memory
 SHORTEST_M = 1e-6  # shorter walls are left out
-FACE, POINT = 5, 7  # columns of the rows of a face and of a point (`WallIndex`)
+FACE, POINT = 5, 8  # columns of the rows of a face and of a point (`WallIndex`)
 BEARINGS = 16  # sectors of the ranger's axis for which the tables list their rows
 
 
@@ -51,8 +51,8 @@ class WallIndex(NamedTuple):
 
     Tile t is touched by walls[ids[start[t] : start[t + 1]]]. `tile_number[t]` is k + 1 for the k-th tabulated tile, else 0; this index has the first
     `tabulated` of them. Rows of `faces` (walls): start x, y of the wall, its unit tangent x, y, its length. Rows of `points` (ends of walls): x, y,
-    kind, and the sector in which they are of that kind, as unit vectors x, y of its sides, counter-clockwise. Both hold for sound that leaves a wall
-    at up to `slant` (tangent) from its normal.
+    kind, the sector in which they are of that kind, as unit vectors x, y of its sides, counter-clockwise, squared distance from the tile. Both hold
+    for sound that leaves a wall at up to `slant` (tangent) from its normal.
     """
 
     x0_m: float

@@ -16,7 +16,7 @@ from echostep.jit import inline_kernel, kernel, lean_kernel
 from echostep.walls.index import EAR_REACH_M, JOIN_M, POINT, TILE_M, SourceTable, WallIndex
 from echostep.walls.tile_geometry import SLACK_M, by_bearing, covered, frame
 
-EDGE, CORNER = 1.0, 2.0  # kinds of points
+WALL, EDGE, CORNER = 0.0, 1.0, 2.0  # kinds of echo sources
 FLAT_RAD = math.radians(3.0)  # two walls that turn by less continue each other: drawing accuracy
 # Greatest deviation from a right angle at which two reflections still send sound back, assumed.
 CORNER_RAD = math.radians(30.0)
@@ -35,10 +35,10 @@ class Wedge(NamedTuple):
 def tile_points(corners: Floats, near: Int32s, index: WallIndex) -> SourceTable:
     """Ends of the walls of `near` within EAR_REACH_M of a tile: a row for each sector in which an end is a corner or an edge, with its screens.
 
-    While they are collected, rows have three more columns: bearing from the tile, its spread, squared distance. All sectors of one end have the
+    While they are collected, rows have two more columns: bearing from the tile, its spread. All sectors of one end have the
     same screens, which are copied.
     """
-    points, starts = np.empty((8, POINT + 3)), np.zeros(9, np.int32)
+    points, starts = np.empty((8, POINT + 2)), np.zeros(9, np.int32)
     screens, used, count = np.empty(256, np.int32), 0, 0
     sectors, rays = np.empty((64, 5)), np.empty((64, 2))
     walls = index.walls
@@ -62,15 +62,15 @@ def tile_points(corners: Floats, near: Int32s, index: WallIndex) -> SourceTable:
                     points, starts = np.concatenate((points, points)), np.concatenate((starts, starts))
                 if len(screens) < used + more:
                     screens = np.concatenate((screens, screens))
-                points[count, 0], points[count, 1], points[count, 2:POINT] = x, y, sectors[k]
+                points[count, 0], points[count, 1], points[count, 2 : POINT - 1] = x, y, sectors[k]
                 points[count, POINT], points[count, POINT + 1] = centre, spread
-                points[count, POINT + 2] = dx * dx + dy * dy
+                points[count, POINT - 1] = dx * dx + dy * dy
                 if k > 0:
                     screens[used : used + more] = screens[used - more : used]
                 used += more
                 count += 1
                 starts[count] = used
-    bearings, order = by_bearing(points[:count, POINT], points[:count, POINT + 1], points[:count, POINT + 2])
+    bearings, order = by_bearing(points[:count, POINT], points[:count, POINT + 1], points[:count, POINT - 1])
     rows, total = points[:count, :POINT].copy(), np.array([0, count], np.int32)
     return SourceTable(total, bearings, order, rows, starts[: count + 1].copy(), screens[:used].copy())
 

@@ -14,7 +14,14 @@ from echostep.localization.echoes.likelihood import EchoSettings, echo_model, lo
 from echostep.localization.estimate import TrackStatus, ellipse95, estimate, trust
 from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import BENDS, Cloud
-from echostep.localization.particles.kernels import NOISE_BEND, effective_size, piece_of, propagate, systematic
+from echostep.localization.particles.kernels import (
+    NOISE_BEND,
+    begin_segment,
+    effective_size,
+    piece_of,
+    propagate,
+    systematic,
+)
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import CloudSettings
 from echostep.plan.model import Pose
@@ -84,9 +91,9 @@ def test_systematic_resampling_keeps_the_shares(weights: list[float], draw: floa
 
 
 def test_the_effective_size() -> None:
-    assert effective_size(np.zeros(10)) == pytest.approx(10.0)
-    assert effective_size(np.array([0.0, -np.inf, -np.inf])) == pytest.approx(1.0)
-    assert effective_size(np.full(3, -np.inf)) == 0.0
+    assert effective_size(np.ones(10)) == pytest.approx(10.0)
+    assert effective_size(np.array([1.0, 0.0, 0.0])) == pytest.approx(1.0)
+    assert effective_size(np.zeros(3)) == 0.0
 
 
 def test_walls_take_the_weight_and_the_rest_carries_on() -> None:
@@ -113,11 +120,11 @@ def test_ways_of_particles_differ_in_the_middle_of_a_turn_and_end_alike() -> Non
     noise = np.zeros((5, len(found.x_m)))
     noise[NOISE_BEND] = np.linspace(*BENDS, len(found.x_m))
     found.turn_rad[:], found.scale[:] = 0.0, 1.0
-    begin = found.y_m.copy()
-    propagate(found.arrays, piece_of(move, 0.0, 0.5), 0.5, noise, 6.0, BOX.index)
+    begin, arrays = found.y_m.copy(), begin_segment(found.arrays)
+    propagate(found.arrays, arrays, piece_of(move, 0.0, 0.5), 0.5, noise, math.exp(-6.0), BOX.index)
     middle = found.y_m - begin
     assert [middle.max(), middle.min()] == pytest.approx([0.0, -0.4])
-    propagate(found.arrays, piece_of(move, 0.5, 1.0), 0.5, noise, 6.0, BOX.index)
+    propagate(found.arrays, arrays, piece_of(move, 0.5, 1.0), 0.5, noise, math.exp(-6.0), BOX.index)
     assert found.y_m == pytest.approx(begin)
 
 

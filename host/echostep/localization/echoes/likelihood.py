@@ -33,6 +33,9 @@ NEGLIGIBLE_REST = 1e-4
 SILENT_SHARE = 0.2  # share of outliers and of hidden views that are "no echo", assumed
 HIDDEN_NEARER = 0.6  # share of echoes from hidden views that are nearer than the plan's first source: more is added to a room than removed
 LEAST_LOGIT = -8.0  # below it a source is not detected: probability 3e-4
+SURE_RAD = math.radians(20.0)  # angle off the axis within which a near wall surely answers: half of the cone
+SURE_COS = math.cos(SURE_RAD)
+MINIMAL_M, FARTHEST_M = 1e-3, 100.0  # distances between which any ranger's limits lie
 GATE_SD = 6.0  # a source further from the range than so many standard deviations adds nothing
 
 
@@ -110,7 +113,10 @@ class EchoSettings:
 
 
 class EchoModel(NamedTuple):
-    """`EchoSettings` as the kernels take them: levels in logits, the beam in logits per square radian."""
+    """`EchoSettings` as the kernels take them: levels in logits, the beam in logits per square radian.
+
+    `sure_m`: within it a wall up to SURE_RAD off the axis leaves less than NEGLIGIBLE_REST undetected. `edge_m`: beyond it no edge is detected.
+    """
 
     sd_m: float
     slant_m: float
@@ -125,6 +131,8 @@ class EchoModel(NamedTuple):
     hidden_m: float
     stray: float
     outlier: float
+    sure_m: float
+    edge_m: float
 
 
 def echo_model(s: EchoSettings) -> EchoModel:
@@ -132,10 +140,23 @@ def echo_model(s: EchoSettings) -> EchoModel:
     per_db = 1.0 / s.soft_db
     beam = 2.0 * s.rim_db / math.radians(27.5) ** 2
     reach = per_db * (20.0 * math.log10(s.maximum_m) + ABSORPTION_DB_M * s.maximum_m)
+    beam, edge = per_db * beam, per_db * s.edge_db
+    sure = math.log(1.0 / NEGLIGIBLE_REST - 1.0)
     return EchoModel(
-        s.sd_m, s.slant_m, reach, per_db, per_db * beam, per_db * s.edge_db, per_db * s.corner_db,
+        s.sd_m, s.slant_m, reach, per_db, beam, edge, per_db * s.corner_db,
         s.maximum_m, s.minimum_m, s.hidden, s.hidden_m, s.stray, s.outlier,
+        _distance_m(reach - beam * SURE_RAD**2 - sure, per_db, 1.0), _distance_m(reach - edge - LEAST_LOGIT, per_db, 1.5),
     )  # fmt: skip
+
+
+def _distance_m(level: float, per_db: float, spreading: float) -> float:
+    """Distance at which spreading and absorption take this level, in logits; `spreading`: in units of that of a wall. By bisection."""
+    low, high = MINIMAL_M, FARTHEST_M
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        taken = per_db * (spreading * DB * math.log(middle) + ABSORPTION_DB_M * middle)
+        low, high = (middle, high) if taken < level else (low, middle)
+    return low
 
 
 @lean_kernel

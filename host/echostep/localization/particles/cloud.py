@@ -37,16 +37,15 @@ from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.kernels import (
     NOISE_BEND,
     NOISE_TURN,
-    CloudModel,
-    EchoMemory,
-    MoveProgress,
+    begin_segment,
     effective_size,
+    end_segment,
     piece_of,
     propagate,
-    propagate_and_reweight,
     systematic,
 )
 from echostep.localization.particles.particles import GATHERED_REST, Particles
+from echostep.localization.particles.reweighting import CloudModel, EchoMemory, MoveProgress, propagate_and_reweight
 from echostep.localization.particles.sampling import heaviest, kld_size, log_mode_weight, spread_evenly
 from echostep.localization.particles.start import ANY_LEVEL, Air, Start, draw_poses, near_count
 from echostep.localization.settings import CloudSettings
@@ -198,7 +197,11 @@ class Cloud(Particles):
             if share > done:
                 noise = noise if noise.shape[1] == len(self.x_m) else self._noise(move, 1.0)
                 piece = piece_of(move, done, share)
-                propagate(self.arrays, piece, share - done, noise, COARSE_WALL_COST, walls.index)
+                arrays = begin_segment(self.arrays)
+                top, _ = propagate(
+                    self.arrays, arrays, piece, share - done, noise, math.exp(-COARSE_WALL_COST), walls.index
+                )
+                end_segment(self.arrays, arrays, top)
                 done = share
             if ping is not None:
                 reweight_coarsely(self.arrays, ping, field, model, table)
@@ -296,7 +299,7 @@ class Cloud(Particles):
             else 0.5 * log_mode_weight(self.x_m, self.y_m, self.turn_rad, self.weight)
         )
         wanted_weight = self.log_weight - weight_after
-        if effective_size(wanted_weight) >= self._settings.resample_below * len(self.x_m):
+        if effective_size(np.exp(wanted_weight)) >= self._settings.resample_below * len(self.x_m):
             return
         self._resample(wanted_weight, weight_after, len(self.x_m))
         wanted = self._wanted_size()

@@ -26,7 +26,15 @@ from echostep.localization.height.levels import (
     level_change_model,
 )
 from echostep.localization.particle_arrays import Move, ParticleArrays
-from echostep.localization.particles.kernels import NOISE_BEND, MovePiece, effective_size, propagate, systematic
+from echostep.localization.particles.kernels import (
+    NOISE_BEND,
+    MovePiece,
+    begin_segment,
+    effective_size,
+    end_segment,
+    propagate,
+    systematic,
+)
 from echostep.localization.particles.start import Start, draw_poses
 from echostep.localization.settings import CloudSettings
 from echostep.path import MeasuredSegment, PathSegment
@@ -114,7 +122,9 @@ class AugmentedMcl:
         noise[:NOISE_BEND] = math.sqrt(share) * sds * self._rng.standard_normal((NOISE_BEND, SIZE))
         p, dx, dy = self._particles, share * segment.dx_m, share * segment.dy_m
         walls = self._walls.near(p.x_m, p.y_m, math.hypot(dx, dy))
-        propagate(p, MovePiece(dx, dy, 0.0, 0.0), 1.0, noise, s.wall_cost, walls)
+        arrays = begin_segment(p)
+        top, _ = propagate(p, arrays, MovePiece(dx, dy, 0.0, 0.0), 1.0, noise, math.exp(-s.wall_cost), walls)
+        end_segment(p, arrays, top)
 
     def _weight(self, axis: float, range_m: float, walk_heading_rad: float) -> None:
         """Weights and their mean (lines 5 to 10 of the table), then resampling (lines 11 to 16)."""
@@ -122,7 +132,7 @@ class AugmentedMcl:
         mean = weight_by_ping(p, axis, range_m, self._model, self._walls.near(p.x_m, p.y_m))
         self._slow += (ALPHA_SLOW if self._slow else 1.0) * (mean - self._slow)
         self._fast += (ALPHA_FAST if self._fast else 1.0) * (mean - self._fast)
-        if effective_size(p.log_weight) < 0.5 * SIZE:
+        if effective_size(np.exp(p.log_weight)) < 0.5 * SIZE:
             self._resample(walk_heading_rad)
 
     def _resample(self, walk_heading_rad: float) -> None:

@@ -21,7 +21,7 @@ from echostep.localization.beacons.model import BeaconModel, BeaconSettings, bea
 from echostep.localization.beacons.slam import initial_health, propose_heading_jumps
 from echostep.localization.beacons.step import Beacons, no_waiting, update_by_reading
 from echostep.localization.particle_arrays import Move, ParticleArrays
-from echostep.localization.particles.kernels import keep_chosen, propagate_without_walls, systematic
+from echostep.localization.particles.kernels import systematic
 from echostep.localization.settings import CloudSettings
 from echostep.simulation.world.beacon_ground import BeaconGround, is_in_reach, measure
 from echostep.walls.echo_sources import Walls
@@ -100,7 +100,7 @@ def _propagate(cloud: BeaconCloud, dx: float, dy: float, rng: np.random.Generato
     if length > 0.0:
         root, particles = math.sqrt(length), cloud.particles
         move = Move(dx, dy, cloud.step_sd * root, TURN_SD_RAD * root, SCALE_SD * root)
-        propagate_without_walls(particles, move, rng)
+        _propagate_on_open_ground(particles, move, rng)
         propose_heading_jumps(particles.turn_rad, particles.log_weight, length, cloud.model, rng)
 
 
@@ -111,5 +111,25 @@ def _reweight(cloud: BeaconCloud, measurement: BeaconMeasurement, rng: np.random
     size = update_by_reading(particles, cloud.beacons, measurement, cloud.model, cloud.walls, has_plan, rng)
     if size < RESAMPLE_BELOW * len(particles.x_m):
         chosen = systematic(np.exp(particles.log_weight), rng.random(), len(particles.x_m))
-        keep_chosen(particles, chosen)
+        _keep_chosen(particles, chosen)
         resample_beliefs(cloud.beacons.beliefs, chosen)
+
+
+@kernel
+def _propagate_on_open_ground(particles: ParticleArrays, move: Move, rng: np.random.Generator) -> None:
+    """Move every particle on open ground, without walls."""
+    x, y, turn, scale, _ = particles
+    for i in range(len(x)):
+        turn[i] += move.turn_sd_rad * rng.standard_normal()
+        scale[i] += move.scale_sd * rng.standard_normal()
+        c, s = math.cos(turn[i]), math.sin(turn[i])
+        x[i] += scale[i] * (c * move.dx_m - s * move.dy_m) + move.sd_m * rng.standard_normal()
+        y[i] += scale[i] * (s * move.dx_m + c * move.dy_m) + move.sd_m * rng.standard_normal()
+
+
+@kernel
+def _keep_chosen(particles: ParticleArrays, chosen: Ints) -> None:
+    """Replace the particles by the chosen ones (n,) in place, with equal weights; their number stays."""
+    x, y, turn, scale, log_weight = particles
+    x[:], y[:], turn[:], scale[:] = x[chosen], y[chosen], turn[chosen], scale[chosen]
+    log_weight[:] = 0.0
