@@ -10,25 +10,23 @@ Owns the estimates, the page and the connection to the commander while the run l
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack, nullcontext
 from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from echostep.extras import lacks
-from echostep.guidance.cues import Cue, arrow_sign, describe_cue
 from echostep.guidance.guided_rescue import GuidedRescue
 from echostep.guidance.guided_run import guidance_of
 from echostep.interruption import holding_signals, raise_held
 from echostep.localization.estimate import Estimate
-from echostep.output.derived import Derived
 from echostep.output.terminal import TerminalView
 from echostep.page.elements.true_position import TruePath
 from echostep.ports.chunks import Portion
 from echostep.recording.clock import clock_of
 from echostep.recording.reading import Recording
-from echostep.recording.recorder import Recorder
+from echostep.recording.recorder import DerivedMessage, Recorder
 from echostep.scorecard.truth import Truth
 from echostep.session.arrivals import Arrivals
 from echostep.session.browser import open_browser
@@ -37,13 +35,21 @@ from echostep.session.losses import Losses
 from echostep.session.options import OutputOptions
 from echostep.session.progress import progress_line
 from echostep.session.results import Result, summary_words, write_results
+from echostep.session.sinks import (
+    DerivedSink,
+    MarkSink,
+    PageSink,
+    ReportSink,
+    Sink,
+    SpokenCueSink,
+    TeammateSink,
+    TerminalSink,
+)
 from echostep.tracker import Tracker
 
 if TYPE_CHECKING:
-    from echostep.output.foxglove_live import FoxgloveServer
     from echostep.page.live import LivePage
     from echostep.page.shared_drawing import SharedDrawing
-    from echostep.session.team.mark_feed import MarkFeed
     from echostep.session.team.team_feed import TeamFeed
     from echostep.session.team.teammate_feed import TeammateFeed
     from echostep.team.endpoint import Endpoint
@@ -81,9 +87,9 @@ class Session:
         self.feed: TeamFeed | None = None  # place of the wearer whom a rescuer is guided to
         self.teammates: TeammateFeed | None = None  # teammates whom the wearer may have met, and their beacons
         self._publishing: Publishing | None = None
-        self._marks: MarkFeed | None = None  # what commanders mark
         self._drawing: SharedDrawing | None = None  # of a walk without a plan, for the team
-        self._foxglove: FoxgloveServer | None = None
+        self._sinks: list[Sink] = []
+        self._writers: list[Callable[[list[DerivedMessage]], None]] = []  # of what is derived from estimates
         self._opened = ExitStack()
         self._interrupted = False
 
@@ -136,6 +142,7 @@ class Session:
         )
         console.print(f"The page: {page.url}", highlight=False)
         self.page = opened.enter_context(page)
+        self._sinks.append(PageSink(page))
         if self.output.browser and open_browser(page.url):
             page.wait_for_page()
 
@@ -161,8 +168,9 @@ class Session:
         print_line = partial(console.print, markup=False, highlight=False)
         publishing = Publishing(self.output.outlet, self.tracker, self.source, print_line, clock)
         self._publishing = opened.enter_context(publishing)
+        self._sinks.append(ReportSink(publishing))
         if self.page:
-            self.page.receipt_of = self._publishing.receipt
+            self.page.receipt_of = publishing.receipt
             self.page.team_fault = lambda: publishing.fault
 
     def _open_foxglove(self, opened: ExitStack) -> None:
@@ -170,8 +178,9 @@ class Session:
             return
         from echostep.output.foxglove_live import FoxgloveServer
 
-        self._foxglove = opened.enter_context(FoxgloveServer(self.output.foxglove, self.title))
-        console.print(f"Foxglove: open connection, Foxglove WebSocket, {self._foxglove.url}", highlight=False)
+        foxglove = opened.enter_context(FoxgloveServer(self.output.foxglove, self.title))
+        self._writers.append(foxglove.write)
+        console.print(f"Foxglove: open connection, Foxglove WebSocket, {foxglove.url}", highlight=False)
 
     def _open_feed(self, opened: ExitStack) -> None:
         """Subscribe to the other wearer in a rescuer's live run; in a replay the received places are in the recording."""
@@ -194,11 +203,13 @@ class Session:
         print_line = partial(console.print, markup=False, highlight=False)
         self.teammates = TeammateFeed(broker, outlet, publishing.run, self.tracker.plan, print_line)
         opened.callback(self.teammates.close)
+        self._sinks.append(TeammateSink(self.teammates, self.tracker, self.page, self._drawing))
         if self.page is None:
             return
-        self._marks = MarkFeed(broker, outlet, publishing.run, self.tracker.plan.digest, print_line)
-        self.page.acknowledged_by = self._marks.acknowledged_by
-        opened.callback(self._marks.close)
+        marks = MarkFeed(broker, outlet, publishing.run, self.tracker.plan.digest, print_line)
+        self.page.acknowledged_by = marks.acknowledged_by
+        opened.callback(marks.close)
+        self._sinks.append(MarkSink(marks, self.page))
 
     def track(
         self,
@@ -210,68 +221,44 @@ class Session:
 
         `progress` gives the finished fraction, 0 to 1. `recorder` gets the derived messages of each portion, after the portion was shown.
         """
-        sinks = [
-            sink for sink in (recorder and recorder.write_derived, self._foxglove and self._foxglove.write) if sink
-        ]
-        derived = Derived(self.tracker) if sinks else None
-        if derived and self.tracker.plan.georeference and (words := lacks("/location", "pyproj")):
-            console.print(f"Longitude and latitude are left out: {words}", markup=False, highlight=False)
         shown = self.output.terminal and console.is_terminal
         view = TerminalView(self.tracker, self.title, progress, console) if shown else None
+        sinks = self._sinks + self._local_sinks(view, recorder)
         with view or nullcontext(), holding_signals():
             try:
                 for portion in portions:
-                    estimates = self._take(portion)
-                    self._show(estimates, view)
-                    if derived:
-                        messages = derived.take(portion, estimates)
-                        for write in sinks:
-                            write(messages)
+                    for sink in sinks:
+                        sink.arrive()
+                    self.arrivals.note(portion)
+                    estimates = self.tracker.take(portion)
+                    self.estimates += estimates
+                    for sink in sinks:
+                        sink.take(portion, estimates)
                     raise_held()
             except KeyboardInterrupt:
                 self._interrupted = True
 
-    def _take(self, portion: Portion) -> list[Estimate]:
-        """Track one portion and publish its estimates."""
-        if self.page:
-            self.page.note_arrival()
-        self.arrivals.note(portion)
-        estimates = self.tracker.take(portion)
-        names = self.teammates.news() if self.teammates else None
-        if self.teammates and estimates:
-            self.teammates.share(self.tracker.own_beacons)
-        if self.teammates and self._drawing:
-            self.teammates.share_drawing(self._drawing)
-        if self.page:
-            if self._marks and (marks := self._marks.news()) is not None:
-                self.page.set_marks(marks)
-            if names is not None:
-                self.page.set_team(names)
-            self.page.publish(portion)
-            print_notices(self.page.notices)
-        self.estimates += estimates
-        if self._publishing:
-            self._publishing.publish(estimates)
-        return estimates
-
-    def _show(self, estimates: list[Estimate], view: TerminalView | None) -> None:
-        """Show new estimates and the newest cue; without a view, print each new cue that is spoken."""
-        cues = self.guided.news() if self.guided else []
+    def _local_sinks(self, view: TerminalView | None, recorder: Recorder | None) -> list[Sink]:
+        """The terminal, and what is derived from estimates, for the recording and for viewers."""
+        sinks: list[Sink] = []
         if view:
-            cue = self.guided.cue if self.guided else None
-            view.show(estimates, describe_cue(cue) if cue else "")
-        else:
-            _print_spoken(cues)
+            sinks.append(TerminalSink(view, self.guided))
+        elif self.guided:
+            sinks.append(SpokenCueSink(self.guided))
+        if writers := [*([recorder.write_derived] if recorder else []), *self._writers]:
+            sinks.append(DerivedSink(self.tracker, writers))
+            if self.tracker.plan.georeference and (words := lacks("/location", "pyproj")):
+                console.print(f"Longitude and latitude are left out: {words}", markup=False, highlight=False)
+        return sinks
 
     def finish(self, title: str, truth: Truth | None = None, elapsed_s: float | None = None) -> None:
         """Write track.csv, track.png and cues.csv and print a summary; raises EchostepError when a file cannot be written.
 
         The page shows the end of the run, and its summary.
         """
-        if self.page:
-            self.page.end(summary_words(self.estimates, truth))
-        if self._drawing and self._drawing.too_long:
-            console.print("The drawing became too large for the team: the broker keeps an earlier one")
+        summary = summary_words(self.estimates, truth)
+        for sink in self._sinks:
+            sink.end(summary)
         losses, silent = self.losses.describe(self.arrivals.worn_s), self.arrivals.silent()
         result = Result(title, self.estimates, truth, elapsed_s, losses, silent)
         write_results(self.output.folder, self.tracker, self.guided, result)
@@ -289,9 +276,3 @@ class Session:
                 print_notices(page.notices)
         except KeyboardInterrupt:
             pass
-
-
-def _print_spoken(cues: Sequence[Cue]) -> None:
-    for cue in cues:
-        if cue.spoken:
-            console.print(f"{cue.t_s:7.1f} s  {arrow_sign(cue.arrow_rad)}  {cue.spoken}")
