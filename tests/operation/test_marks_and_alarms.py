@@ -18,6 +18,7 @@ from echostep.page.server import Address, PageServer
 from echostep.plan.model import load_plan
 from echostep.session.team import mark_feed
 from echostep.session.team.mark_feed import MarkFeed
+from echostep.session.team.subscription import TeamSubscription
 from echostep.team.endpoint import parse_endpoint, parse_outlet
 from echostep.team.inbox import Inbox, ListenerThread
 from echostep.team.messages.marks import ALL
@@ -67,7 +68,9 @@ def test_two_commanders_and_a_wearer_have_one_state(browser: Any, tmp_path: Path
     monkeypatch.setattr(mark_feed, "LOOK_S", 0.0)
     with Broker(tmp_path) as broker, Commander(broker.url) as ann, Commander(broker.url) as ben:
         outlet = parse_outlet([broker.url], "anna", "red")
-        wearer = MarkFeed(outlet.endpoints[0], outlet, "0123abcd", load_plan(PLAN).digest, print)
+        subscription = TeamSubscription(outlet.endpoints[0], print)
+        wearer = MarkFeed(subscription, outlet, "0123abcd", load_plan(PLAN).digest)
+        subscription.open()
         box = box_to(broker.url)
         box.offer(report("anna", alarm=ReportedAlarm("mayday", "no motion", 1, 31.0)))
         assert until(lambda: ann.look().rows and ben.look().rows)
@@ -114,7 +117,7 @@ def test_two_commanders_and_a_wearer_have_one_state(browser: Any, tmp_path: Path
         assert not page.wrong
         page.context.close()
         box.close()
-        wearer.close()
+        subscription.close()
 
 
 @needs_broker

@@ -11,20 +11,26 @@ import pytest
 from echostep.errors import EchostepError
 from echostep.plan.model import load_plan
 from echostep.ports.people.teammate import Teammate, parse_teammate
+from echostep.session.options import OutputOptions
+from echostep.session.session import Session
 from echostep.session.team import team_feed
+from echostep.session.team.subscription import TeamSubscription
 from echostep.session.team.team_feed import TeamFeed
 from echostep.team import outbox
-from echostep.team.endpoint import parse_outlet
+from echostep.team.endpoint import parse_endpoint, parse_outlet
+from echostep.tracker import Tracker
 from team.network import box_to
 from team.team_broker import Broker, needs_broker
 from team.team_reports import PLAN, POSITION, report
 from waiting import PATIENCE_S, until
 
 
-def test_without_a_broker_it_is_said_what_is_missing() -> None:
+def test_without_a_broker_it_is_said_what_is_missing(tmp_path: Path) -> None:
     for outlet in (None, parse_outlet(["cot+udp://127.0.0.1:6969"], "bo", "red")):
-        with pytest.raises(EchostepError, match="--publish mqtt://HOST"):
-            TeamFeed(outlet, "anna", load_plan(PLAN), print)
+        output = OutputOptions(tmp_path, terminal=False, outlet=outlet)
+        session = Session(Tracker(load_plan(PLAN)), "bo", "live", output, "wearer:anna")
+        with pytest.raises(EchostepError, match=r"--guide wearer:anna needs .* --publish mqtt://HOST"), session:
+            pass
 
 
 @needs_broker
@@ -37,7 +43,9 @@ def test_the_newest_place_of_the_wearer_is_heard_although_the_broker_dies(
     said: list[str] = []
     heard: list[Teammate | None] = []
     with Broker(tmp_path) as broker:
-        feed = TeamFeed(parse_outlet([broker.url], "bo", "red"), "anna", load_plan(PLAN), said.append)
+        subscription = TeamSubscription(parse_endpoint(broker.url), said.append)
+        feed = TeamFeed(subscription, "red", "anna", load_plan(PLAN), said.append)
+        subscription.open()
 
         def is_at(x_m: float) -> bool:
             heard.extend(parse_teammate(payload) for payload in feed.pop())
@@ -56,7 +64,7 @@ def test_the_newest_place_of_the_wearer_is_heard_although_the_broker_dies(
         assert until(lambda: is_at(6.0) or any("another plan" in line for line in said))
         for box in (anna, eve):
             box.close()
-        feed.close()
+        subscription.close()
     assert {place.name for place in heard if place} == {"anna"}
     assert heard[0] == Teammate("anna", 3.0, 2.0, 0, 0.8, "on Ground floor, in Office 1")
     assert not any(place and place.x_m == 6.0 for place in heard)

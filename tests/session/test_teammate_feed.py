@@ -5,17 +5,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
 
 import pytest
 
-from echostep.page.live import LivePage
 from echostep.plan.model import Plan, load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.ports.people.meeting import MEETING, parse_meeting
 from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon, TeamBeacons, parse_team_beacons
-from echostep.session.chunk_streams import with_teammates
+from echostep.session.chunk_streams import MessageSource, with_messages
 from echostep.session.team import teammate_feed
+from echostep.session.team.subscription import TeamSubscription
 from echostep.session.team.teammate_feed import TeammateFeed
 from echostep.team import outbox
 from echostep.team.endpoint import parse_endpoint, parse_outlet
@@ -32,25 +31,13 @@ def arrival_ns(chunk: Chunk | None) -> int:
     return chunk.t_arrival_ns if chunk else 0
 
 
-class Told:
-    """A page on which these names were chosen."""
-
-    def __init__(self, *names: str) -> None:
-        self.names = list(names)
-
-    def pop_meetings(self) -> list[str]:
-        names, self.names = self.names, []
-        return names
-
-
 @needs_broker
 def test_teammates_on_this_plan_can_be_met(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The wearer's own reports, those on another plan and those of another team are not among them."""
     monkeypatch.setattr(outbox, "FRESH_S", PATIENCE_S)
     monkeypatch.setattr(teammate_feed, "LOOK_S", 0.0)
     with Broker(tmp_path) as broker:
-        outlet = parse_outlet([broker.url], "bo", "red")
-        feed = TeammateFeed(outlet.endpoints[0], outlet, RUN, load_plan(PLAN), print)
+        feed, subscription = a_feed(broker, load_plan(PLAN), "bo", RUN)
         said: list[tuple[str, ...]] = []
 
         def hears(*names: str) -> bool:
@@ -64,11 +51,11 @@ def test_teammates_on_this_plan_can_be_met(tmp_path: Path, monkeypatch: pytest.M
         assert until(lambda: hears("zoe"))
         boxes["anna"].offer(report("anna", position=replace(POSITION, x_m=5.0)))
         assert until(lambda: hears("anna", "zoe"))
-        page = Told("anna", "eve", "nobody", "bo")
-        chunks = [*with_teammates([Chunk(BOARD, 7, b"")], cast("LivePage", page), feed, arrival_ns)]
+        source: MessageSource = MEETING, lambda: feed.meetings(["anna", "eve", "nobody", "bo"])
+        chunks = [*with_messages([Chunk(BOARD, 7, b"")], [source], arrival_ns)]
         for box in boxes.values():
             box.close()
-        feed.close()
+        subscription.close()
     assert [(chunk.port, chunk.t_arrival_ns) for chunk in chunks if chunk] == [(BOARD, 7), (MEETING, 7)]
     met = parse_meeting(chunks[1].data if chunks[1] else b"")
     assert met is not None
@@ -92,11 +79,13 @@ def test_beacons_reach_teammates_once_and_hostile_ones_are_counted(
     heard: list[TeamBeacons] = []
     with Broker(tmp_path) as broker:
         publish(broker.url, "echostep/red/bo/beacons", early.encode())
-        bo, zoe = (a_feed(broker, plan, name, run) for name, run in (("bo", "0000bbbb"), ("zoe", RUN)))
+        (bo, of_bo), (zoe, of_zoe) = (
+            a_feed(broker, plan, name, run) for name, run in (("bo", "0000bbbb"), ("zoe", RUN))
+        )
 
         def hears(count: int) -> bool:
             bo.news()
-            chunks = with_teammates([Chunk(BOARD, 7, b"")], None, bo, arrival_ns)
+            chunks = with_messages([Chunk(BOARD, 7, b"")], [(TEAM_BEACONS, bo.beacons)], arrival_ns)
             heard.extend(told for c in chunks if c and c.port == TEAM_BEACONS and (told := parse_team_beacons(c.data)))
             return len(heard) == count
 
@@ -112,8 +101,8 @@ def test_beacons_reach_teammates_once_and_hostile_ones_are_counted(
             publish(broker.url, f"echostep/{topic}/beacons", payload)
         zoe.share(lambda: (a_beacon(7), a_beacon(9)))
         assert until(lambda: hears(3) and sum(bo.rejected.values()) == 2)
-        bo.close()
-        zoe.close()
+        of_bo.close()
+        of_zoe.close()
     assert [(told.name, told.run, [b.number for b in told.beacons]) for told in heard] == [
         ("bo", "0000aaaa", [3]), ("zoe", RUN, [7]), ("zoe", RUN, [7, 9]),
     ]  # fmt: skip
@@ -127,6 +116,9 @@ def publish(url: str, topic: str, payload: bytes) -> None:
     sender.close()
 
 
-def a_feed(broker: Broker, plan: Plan, name: str, run: str) -> TeammateFeed:
+def a_feed(broker: Broker, plan: Plan, name: str, run: str) -> tuple[TeammateFeed, TeamSubscription]:
     outlet = parse_outlet([broker.url], name, "red")
-    return TeammateFeed(outlet.endpoints[0], outlet, run, plan, print)
+    subscription = TeamSubscription(outlet.endpoints[0], print)
+    feed = TeammateFeed(subscription, outlet, run, plan)
+    subscription.open()
+    return feed, subscription

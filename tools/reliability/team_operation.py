@@ -25,7 +25,7 @@ from pathlib import Path
 from echostep.guidance.cues import CueKind
 from echostep.plan.model import Plan, load_plan
 from echostep.ports.chunks import Chunk
-from echostep.session.chunk_streams import paced, portions_of, with_team
+from echostep.session.chunk_streams import paced, portions_of, with_messages
 from echostep.session.options import OutputOptions
 from echostep.session.session import Session
 from echostep.simulation.devices.board import PythonBoard
@@ -65,7 +65,7 @@ def walk(role: str, url: str, plan: Plan, speed: float) -> None:
         with Session(tracker, role, "simulated", output, guide) as session:
             session.prepare()
             print("walks", flush=True)
-            chunks = with_team(paced(scenario.chunks(), speed), session.feed, _arrival_ns)
+            chunks = with_messages(paced(scenario.chunks(), speed), session.message_sources, _arrival_ns)
             session.track(portions_of(chunks, 16))
             cue = session.guided.cue if session.guided else None
     print(json.dumps({"role": role, "cue": cue.text if cue else "", "kind": cue.kind.value if cue else ""}), flush=True)

@@ -16,6 +16,7 @@ from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from echostep.errors import EchostepError
 from echostep.extras import lacks
 from echostep.guidance.guided_rescue import GuidedRescue
 from echostep.guidance.guided_run import guidance_of
@@ -24,12 +25,17 @@ from echostep.localization.estimate import Estimate
 from echostep.output.terminal import TerminalView
 from echostep.page.elements.true_position import TruePath
 from echostep.ports.chunks import Portion
+from echostep.ports.people.check_in import PERSON
+from echostep.ports.people.meeting import MEETING
+from echostep.ports.people.team_beacons import TEAM_BEACONS
+from echostep.ports.people.teammate import TEAM
 from echostep.recording.clock import clock_of
 from echostep.recording.reading import Recording
 from echostep.recording.recorder import DerivedMessage, Recorder
 from echostep.scorecard.truth import Truth
 from echostep.session.arrivals import Arrivals
 from echostep.session.browser import open_browser
+from echostep.session.chunk_streams import MessageSource
 from echostep.session.console import console, print_notices
 from echostep.session.losses import Losses
 from echostep.session.options import OutputOptions
@@ -50,12 +56,12 @@ from echostep.tracker import Tracker
 if TYPE_CHECKING:
     from echostep.page.live import LivePage
     from echostep.page.shared_drawing import SharedDrawing
-    from echostep.session.team.team_feed import TeamFeed
-    from echostep.session.team.teammate_feed import TeammateFeed
-    from echostep.team.endpoint import Endpoint
+    from echostep.session.team.subscription import TeamSubscription
+    from echostep.team.endpoint import Endpoint, Outlet
     from echostep.team.publish import Publishing, Source
 
 PAGE_POLL_S = 0.2
+_print_line = partial(console.print, markup=False, highlight=False)
 
 
 class Session:
@@ -84,8 +90,7 @@ class Session:
         self.arrivals = Arrivals()
         self.page: LivePage | None = None
         self.estimates: list[Estimate] = []
-        self.feed: TeamFeed | None = None  # place of the wearer whom a rescuer is guided to
-        self.teammates: TeammateFeed | None = None  # teammates whom the wearer may have met, and their beacons
+        self.message_sources: list[MessageSource] = []  # what people and team send during the run
         self._publishing: Publishing | None = None
         self._drawing: SharedDrawing | None = None  # of a walk without a plan, for the team
         self._sinks: list[Sink] = []
@@ -98,8 +103,7 @@ class Session:
             self._open_drawing(opened)
             self._open_page(opened)
             self._open_publishing(opened)
-            self._open_feed(opened)
-            self._open_marks(opened)
+            self._open_team(opened)
             self._open_foxglove(opened)
             self._opened = opened.pop_all()
         return self
@@ -114,11 +118,11 @@ class Session:
         from echostep.session.team.drawing_share import UnseenDrawing, shared_drawing
 
         assert self.output.outlet
-        name, say = self.output.outlet.name, partial(console.print, markup=False, highlight=False)
+        name = self.output.outlet.name
         self._drawing = shared_drawing(self.tracker, name)
-        say(f"What the walk draws goes to {self._broker}: teammates are tracked on it by --plan wearer:{name}")
+        _print_line(f"What the walk draws goes to {self._broker}: teammates are tracked on it by --plan wearer:{name}")
         if self.output.page is None:
-            opened.callback(UnseenDrawing(self.tracker, self._drawing, say).close)
+            opened.callback(UnseenDrawing(self.tracker, self._drawing, _print_line).close)
 
     @property
     def _broker(self) -> Endpoint | None:
@@ -143,6 +147,7 @@ class Session:
         console.print(f"The page: {page.url}", highlight=False)
         self.page = opened.enter_context(page)
         self._sinks.append(PageSink(page))
+        self.message_sources.append((PERSON, page.pop_check_ins))
         if self.output.browser and open_browser(page.url):
             page.wait_for_page()
 
@@ -165,8 +170,7 @@ class Session:
         from echostep.team.publish import Publishing
 
         clock = clock_of(self.recorded.metadata) if self.recorded else None
-        print_line = partial(console.print, markup=False, highlight=False)
-        publishing = Publishing(self.output.outlet, self.tracker, self.source, print_line, clock)
+        publishing = Publishing(self.output.outlet, self.tracker, self.source, _print_line, clock)
         self._publishing = opened.enter_context(publishing)
         self._sinks.append(ReportSink(publishing))
         if self.page:
@@ -182,34 +186,43 @@ class Session:
         self._writers.append(foxglove.write)
         console.print(f"Foxglove: open connection, Foxglove WebSocket, {foxglove.url}", highlight=False)
 
-    def _open_feed(self, opened: ExitStack) -> None:
-        """Subscribe to the other wearer in a rescuer's live run; in a replay the received places are in the recording."""
-        if self.recorded is not None or not isinstance(self.guided, GuidedRescue):
-            return
-        from echostep.session.team.team_feed import TeamFeed
-
-        print_line = partial(console.print, markup=False, highlight=False)
-        self.feed = TeamFeed(self.output.outlet, self.guided.name, self.tracker.plan, print_line)
-        opened.callback(self.feed.close)
-
-    def _open_marks(self, opened: ExitStack) -> None:
-        """A live run shares beacons and drawings through its first broker; its page shows the commanders' marks, and offers meetings."""
+    def _open_team(self, opened: ExitStack) -> None:
+        """A live run subscribes to its team at its first broker; in a replay what was received is in the recording."""
         outlet, publishing, broker = self.output.outlet, self._publishing, self._broker
-        if outlet is None or publishing is None or broker is None or self.recorded is not None:
+        if self.recorded is not None:
             return
+        if isinstance(self.guided, GuidedRescue) and broker is None:
+            raise EchostepError(
+                f"--guide wearer:{self.guided.name} needs the team's broker: --publish mqtt://HOST --name YOURS"
+            )
+        if outlet is None or publishing is None or broker is None:
+            return
+        from echostep.session.team.subscription import TeamSubscription
+
+        subscription = TeamSubscription(broker, _print_line)
+        self._read_team(subscription, outlet, publishing.run)
+        opened.callback(subscription.close)
+        subscription.open()
+
+    def _read_team(self, subscription: TeamSubscription, outlet: Outlet, run: str) -> None:
+        """Read teammates and beacons; the place of the wearer whom a rescuer is guided to; and for a page the commanders' marks."""
         from echostep.session.team.mark_feed import MarkFeed
+        from echostep.session.team.team_feed import TeamFeed
         from echostep.session.team.teammate_feed import TeammateFeed
 
-        print_line = partial(console.print, markup=False, highlight=False)
-        self.teammates = TeammateFeed(broker, outlet, publishing.run, self.tracker.plan, print_line)
-        opened.callback(self.teammates.close)
-        self._sinks.append(TeammateSink(self.teammates, self.tracker, self.page, self._drawing))
-        if self.page is None:
+        page, plan = self.page, self.tracker.plan
+        if isinstance(self.guided, GuidedRescue):
+            feed = TeamFeed(subscription, outlet.team, self.guided.name, plan, _print_line)
+            self.message_sources.append((TEAM, feed.pop))
+        teammates = TeammateFeed(subscription, outlet, run, plan)
+        self._sinks.append(TeammateSink(teammates, self.tracker, page, self._drawing))
+        self.message_sources.append((TEAM_BEACONS, teammates.beacons))
+        if page is None:
             return
-        marks = MarkFeed(broker, outlet, publishing.run, self.tracker.plan.digest, print_line)
-        self.page.acknowledged_by = marks.acknowledged_by
-        opened.callback(marks.close)
-        self._sinks.append(MarkSink(marks, self.page))
+        self.message_sources.append((MEETING, lambda: teammates.meetings(page.pop_meetings())))
+        marks = MarkFeed(subscription, outlet, run, plan.digest)
+        page.acknowledged_by = marks.acknowledged_by
+        self._sinks.append(MarkSink(marks, page))
 
     def track(
         self,

@@ -21,7 +21,7 @@ from echostep.plan.model import Plan
 from echostep.ports.chunks import Chunk, Portion
 from echostep.recording.recorder import Recorder
 from echostep.scorecard.truth import load_truth
-from echostep.session.chunk_streams import paced, portions_of, recorded, with_check_ins, with_teammates
+from echostep.session.chunk_streams import paced, portions_of, recorded, with_messages
 from echostep.session.console import console, print_notices
 from echostep.session.metadata import SIMULATED, run_metadata
 from echostep.session.options import OutputOptions
@@ -135,8 +135,7 @@ def _place_text(plan: Plan, waypoints: Sequence[Waypoint]) -> str:
 def _portions(chunks: Iterator[Chunk], session: Session, recorder: Recorder, speed: float | None) -> Iterator[Portion]:
     """The simulated chunks, recorded; a run that is watched is slowed down and tracked in small portions."""
     source = paced(chunks, speed) if speed else chunks
-    with_taps = with_check_ins(source, session.page, _arrival_ns)
-    with_people = with_teammates(with_taps, session.page, session.teammates, _arrival_ns)
+    with_people = with_messages(source, session.message_sources, _arrival_ns)
     return portions_of(
         recorded(with_people, recorder, wait_for_disk=True), WATCHED_PORTION if speed else UNSEEN_PORTION
     )

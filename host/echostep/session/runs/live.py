@@ -25,7 +25,7 @@ from echostep.ports.arrival_clock import SleepWatch, now_ns
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk
 from echostep.ports.serial_ports import SerialPorts
 from echostep.recording.recorder import Recorder
-from echostep.session.chunk_streams import portions_of, recorded, with_check_ins, with_team, with_teammates
+from echostep.session.chunk_streams import portions_of, recorded, with_messages
 from echostep.session.console import console, print_notices
 from echostep.session.last_place import PlaceKeeper, board_number, read_kept, start_last
 from echostep.session.metadata import LAST, clock_metadata, plan_of, run_metadata, start_given, version_metadata
@@ -131,9 +131,7 @@ def _recorded_chunks(
     """Chunks of the ports, check-ins and meetings of the page, messages of teammates, each recorded before it is used; the MTx is set up."""
     chunks = _chunks_for(ports, seconds)
     if session is not None:
-        chunks = with_check_ins(chunks, session.page, lambda _: now_ns())
-        chunks = with_teammates(chunks, session.page, session.teammates, lambda _: now_ns())
-        chunks = with_team(chunks, session.feed, lambda _: now_ns())
+        chunks = with_messages(chunks, session.message_sources, lambda _: now_ns())
     chunks = _with_subscription(with_role_check(recorded(chunks, recorder), ports.urls), ports)
     return _with_mtx_setup(chunks, ports, rate_hz) if MTX in ports.names else chunks
 

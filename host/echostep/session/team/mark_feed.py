@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The mark feed: marks that commanders have set, and the acknowledgements of this run's alarms, for the page of a wearer's run.
 
-In: retained messages of the broker that a run publishes to. Out: marks on this plan, when they change; names of commanders. Owns the subscription
-and its thread; the tracker never waits for it.
+In: the team subscription. Out: marks on this plan, when they change; names of commanders. Owns the board of received marks.
 """
 
 from __future__ import annotations
@@ -10,35 +9,28 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Callable
 
 from echostep.page.elements.marks import ShownMark
-from echostep.team.endpoint import Endpoint, Outlet
-from echostep.team.inbox import Inbox, ListenerThread
+from echostep.session.team.subscription import LOOK_S, TeamSubscription
+from echostep.team.endpoint import Outlet
+from echostep.team.inbox import ReceivedMessage
 from echostep.team.messages.marks import MARKS, MarkBoard, acks_of
 from echostep.team.messages.report import BadReportError
-from echostep.team.mqtt.publisher import Listener
-
-LOOK_S = 0.5  # between two looks at what was heard; assumed
 
 
 class MarkFeed:
     """`news` gives the marks when they have changed; rejected messages are counted in `rejected`."""
 
-    def __init__(
-        self, broker: Endpoint, outlet: Outlet, run: str, plan_sha256: str, print_line: Callable[[str], None]
-    ) -> None:
+    def __init__(self, subscription: TeamSubscription, outlet: Outlet, run: str, plan_sha256: str) -> None:
         """`outlet`, `run`: under which names this wearer's alarms are published."""
         self.rejected: Counter[str] = Counter()
         self._team, self._name, self._run = outlet.team, outlet.name, run
         self._plan_sha256 = plan_sha256
-        self._inbox, self._board = Inbox(), MarkBoard()
+        self._board = MarkBoard()
         self._shown: tuple[ShownMark, ...] = ()
         self._looked_s = -math.inf
-        self._receiver = ListenerThread(
-            Listener(broker, [MARKS, acks_of(outlet.team, outlet.name)], self._inbox.put),
-            lambda text: print_line(f"{broker}: marks: {text}"),
-        )
+        self._subscription = subscription
+        subscription.add([MARKS, acks_of(outlet.team, outlet.name)], self._receive)
 
     def news(self) -> tuple[ShownMark, ...] | None:
         """All marks on this plan; None when they are the same as before. Never waits."""
@@ -46,13 +38,7 @@ class MarkFeed:
         if now_s - self._looked_s < LOOK_S:
             return None
         self._looked_s = now_s
-        messages, dropped = self._inbox.take_all()
-        self.rejected.update(dropped)
-        for message in messages:
-            try:
-                self._board.receive(message.topic or "", message.payload)
-            except BadReportError as error:
-                self.rejected[str(error)] += 1
+        self._subscription.look()
         marks = [m for m in self._board.marks.values() if m.plan_sha256 == self._plan_sha256]
         shown = tuple(ShownMark(m.id, m.mark, m.x_m, m.y_m, m.level, m.by) for m in marks)
         if shown == self._shown:
@@ -65,6 +51,8 @@ class MarkFeed:
         ack = self._board.acks.get((self._team, self._name, f"{self._run}-{number}"))
         return ack.by if ack else None
 
-    def close(self) -> None:
-        """End the subscription."""
-        self._receiver.close()
+    def _receive(self, message: ReceivedMessage) -> None:
+        try:
+            self._board.receive(message.topic or "", message.payload)
+        except BadReportError as error:
+            self.rejected[str(error)] += 1

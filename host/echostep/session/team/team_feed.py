@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The team feed: the newest place of one other wearer, from the broker that a run publishes to.
+"""The team feed: the newest place of one other wearer, of any team.
 
-In: reports of all teams on the broker. Out: payloads of chunks of the port `TEAM`, at most one a second. Owns the subscription, its thread and the
-roster of received reports; the tracker never waits for it.
+In: the team subscription. Out: payloads of chunks of the port `TEAM`, at most one a second. Owns the roster of received reports.
 """
 
 from __future__ import annotations
@@ -11,34 +10,29 @@ import math
 import time
 from collections.abc import Callable, Iterator
 
-from echostep.errors import EchostepError
 from echostep.plan.model import Plan
 from echostep.ports.people.teammate import Teammate
-from echostep.team.commander import update_roster
-from echostep.team.endpoint import Outlet
-from echostep.team.inbox import Inbox, ListenerThread
-from echostep.team.mqtt.publisher import Listener
+from echostep.session.team.subscription import LOOK_S, TeamSubscription
+from echostep.team.inbox import ReceivedMessage
 from echostep.team.roster import Member, MemberState, Roster
 
-LOOK_S = 0.5  # between two looks at what was heard; assumed
 NEWS_S = 1.0  # between two places that are passed on; assumed
 
 
 class TeamFeed:
-    """`pop` gives new places of the wearer; `close` ends the subscription."""
+    """`pop` gives new places of the wearer."""
 
-    def __init__(self, outlet: Outlet | None, name: str, plan: Plan, print_line: Callable[[str], None]) -> None:
-        """Raises EchostepError without a broker to listen at."""
-        broker = outlet.broker if outlet else None
-        if broker is None or outlet is None:
-            raise EchostepError(f"--guide wearer:{name} needs the team's broker: --publish mqtt://HOST --name YOURS")
-        self._name, self._team, self._plan, self._print_line = name, outlet.team, plan, print_line
-        self._inbox, self._roster = Inbox(), Roster()
+    def __init__(
+        self, subscription: TeamSubscription, team: str, name: str, plan: Plan, print_line: Callable[[str], None]
+    ) -> None:
+        """`team`: the own one; it comes first where wearers of several teams have this name."""
+        self._name, self._team, self._plan, self._print_line = name, team, plan, print_line
+        self._roster = Roster()
         self._last: Teammate | None = None
         self._looked_s = self._told_s = -math.inf
         self._warned = False
-        listener = Listener(broker, [f"echostep/+/{name}/+"], self._inbox.put)
-        self._receiver = ListenerThread(listener, lambda text: print_line(f"{broker}: {text}"))
+        self._subscription = subscription
+        subscription.add([f"echostep/+/{name}/+"], self._receive)
 
     def pop(self) -> Iterator[bytes]:
         """The wearer's place as the bytes of a chunk, when it is new; never waits."""
@@ -46,16 +40,15 @@ class TeamFeed:
         if now_s - self._looked_s < LOOK_S:
             return
         self._looked_s = now_s
-        update_roster(self._inbox, self._roster)
+        self._subscription.look()
         member = self._member(now_s)
         place = None if member is None else self._place(member, now_s)
         if place is not None and place != self._last and now_s - self._told_s >= NEWS_S:
             self._last, self._told_s = place, now_s
             yield place.encode()
 
-    def close(self) -> None:
-        """End the subscription."""
-        self._receiver.close()
+    def _receive(self, message: ReceivedMessage) -> None:
+        self._roster.receive(*message)
 
     def _member(self, now_s: float) -> Member | None:
         """The wearer of this name: of the own team before another's, running before ended, the latest heard."""

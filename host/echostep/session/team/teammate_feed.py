@@ -1,52 +1,48 @@
 # SPDX-License-Identifier: MIT
-"""The teammate feed: teammates whom the wearer may have met, from the broker that a run publishes to.
+"""The teammate feed: teammates whom the wearer may have met.
 
-In: messages of the own team; the beacons that this wearer has placed, and what its walk has drawn. Out: names of teammates with reports on this
+In: the team subscription; the beacons that this wearer has placed, and what its walk has drawn. Out: names of teammates with reports on this
 plan, when they change; the bytes of a `Meeting` with one of them, and of the beacons that they share; this wearer's own and its drawing for the
-broker. Owns the subscription, its thread and the roster of received reports; the tracker never waits for it.
+broker. Owns the roster of received reports.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 from echostep.localization.team.shared_beacons import MOST_TEAMMATES
 from echostep.page.shared_drawing import SharedDrawing
 from echostep.plan.model import Plan
 from echostep.ports.people.team_beacons import SharedBeacon, TeamBeacons, parse_team_beacons
-from echostep.team.commander import take_messages
-from echostep.team.endpoint import Endpoint, Outlet
-from echostep.team.inbox import Inbox, ListenerThread
+from echostep.session.team.subscription import LOOK_S, TeamSubscription
+from echostep.team.endpoint import Outlet
+from echostep.team.inbox import ReceivedMessage
 from echostep.team.messages.meeting import meeting_with
 from echostep.team.messages.shared_beacons import BEACONS, SHARE_S, beacons_message
 from echostep.team.messages.shared_drawings import drawing_topic
-from echostep.team.mqtt.publisher import Listener
 from echostep.team.roster import Member, MemberState, Roster
 
-LOOK_S = 0.5  # between two looks at what was heard; assumed
 LISTED_S = 60.0  # a teammate without a report for longer is not listed; assumed
 
 
 class TeammateFeed:
-    """`news` gives the names when they have changed, `meeting` the bytes of a chunk; rejected reports are counted in `rejected`."""
+    """`news` gives the names when they have changed, `meetings` and `beacons` the bytes of chunks; rejected reports are counted in `rejected`."""
 
-    def __init__(
-        self, broker: Endpoint, outlet: Outlet, run: str, plan: Plan, print_line: Callable[[str], None]
-    ) -> None:
+    def __init__(self, subscription: TeamSubscription, outlet: Outlet, run: str, plan: Plan) -> None:
         """`run`: of this wearer; beacons placed by an earlier run under the same name are taken like a teammate's."""
         self._own, self._run, self._plan = (outlet.team, outlet.name), run, plan
-        self._inbox, self._roster = Inbox(), Roster()
+        self._roster = Roster()
         self.rejected = self._roster.rejected
         self._names: tuple[str, ...] = ()
         self._looked_s = self._shared_s = self._drawing_s = -math.inf
         self._placed: dict[str, bytes] = {}  # newest beacons of each teammate that were not taken yet, by name
         self._taken: dict[str, tuple[float, bytes]] = {}  # those that were taken, and when
         self._shared = b""
-        listener = Listener(broker, [f"echostep/{outlet.team}/+/+"], self._inbox.put)
-        self._receiver = ListenerThread(listener, lambda text: print_line(f"{broker}: teammates: {text}"))
+        self._subscription = subscription
+        subscription.add([f"echostep/{outlet.team}/+/+"], self._receive)
 
     def news(self) -> tuple[str, ...] | None:
         """Names of the teammates, sorted; None when they are the same as before. Never waits."""
@@ -59,8 +55,13 @@ class TeammateFeed:
         self._names = names
         return names
 
-    def meeting(self, name: str) -> bytes | None:
-        """A meeting with a teammate now, by the newest report; None when there is no report under this name."""
+    def meetings(self, names: Iterable[str]) -> Iterator[bytes]:
+        """A meeting now with each of these teammates, by its newest report; nothing for a name without a report."""
+        for name in names:
+            if payload := self._meeting(name):
+                yield payload
+
+    def _meeting(self, name: str) -> bytes | None:
         now_s = time.monotonic()
         member = self._members(now_s).get(name)
         position = None if member is None else member.position(now_s)
@@ -86,25 +87,22 @@ class TeammateFeed:
             return
         message = TeamBeacons(1, self._own[1], self._run, self._plan.digest, beacons)
         topic, payload = beacons_message(self._own[0], message)
-        if payload != self._shared and (beacons or self._shared) and self._receiver.send(topic, payload):
+        if payload != self._shared and (beacons or self._shared) and self._subscription.send(topic, payload):
             self._shared, self._shared_s = payload, now_s
 
     def share_drawing(self, drawing: SharedDrawing) -> None:
         """Publish the newest drawing, every SHARE_S when there is a newer one and the last one has been sent."""
         now_s = time.monotonic()
-        if now_s - self._drawing_s < SHARE_S or not self._receiver.sent_all:
+        if now_s - self._drawing_s < SHARE_S or not self._subscription.sent_all:
             return
         plan = drawing.take()
-        if plan is not None and self._receiver.send(drawing_topic(*self._own), plan):
+        if plan is not None and self._subscription.send(drawing_topic(*self._own), plan):
             self._drawing_s = now_s
-
-    def close(self) -> None:
-        """End the subscription."""
-        self._receiver.close()
 
     def _members(self, now_s: float) -> dict[str, Member]:
         """The run with the newest report of each teammate with a position on this plan, by name."""
-        self._look(now_s)
+        self._looked_s = now_s
+        self._subscription.look()
         members = [
             m for m in self._roster.members(now_s)
             if (m.report.team, m.report.name) != self._own and m.report.position is not None
@@ -113,12 +111,10 @@ class TeammateFeed:
         ]  # fmt: skip
         return {m.report.name: m for m in sorted(members, key=lambda m: -m.silent_s(now_s))}
 
-    def _look(self, now_s: float) -> None:
-        """Move received messages into the roster, and note the beacons."""
-        self._looked_s = now_s
-        for message in take_messages(*self._inbox.take_all(), self._roster):
-            if message.topic is not None and message.topic.endswith(f"/{BEACONS}"):
-                self._note_beacons(message.payload)
+    def _receive(self, message: ReceivedMessage) -> None:
+        """Update the roster with a message, or note its beacons."""
+        if self._roster.receive(*message) and message.topic is not None and message.topic.endswith(f"/{BEACONS}"):
+            self._note_beacons(message.payload)
 
     def _note_beacons(self, payload: bytes) -> None:
         message = parse_team_beacons(payload)
