@@ -16,8 +16,8 @@ from echostep.arrays import Floats
 from echostep.mapping.graph.bias import find_bias, without_bias
 from echostep.mapping.graph.directions import right_angles_off
 from echostep.mapping.graph.graph import Graph
+from echostep.mapping.graph.levels import find_levels
 from echostep.mapping.graph.nodes import Nodes, nodes_of
-from echostep.mapping.graph.storeys import find_storeys
 from echostep.mapping.mapper import Mapped, close_loops, find_pieces, find_walls, new_graph
 from echostep.mapping.smoothed_heading import with_smoothed_headings
 from echostep.mapping.walls.drawing import draw
@@ -47,7 +47,7 @@ class GrowingMap:
         nodes, pings = without_bias(nodes, pings, bias)
         fragments, directions = find_pieces(nodes, pings)
         graph, solved, first = new_graph(nodes, fragments, directions), self._solved, 0
-        graph.storeys = find_storeys(self._segments, nodes)
+        graph.levels = find_levels(self._segments, nodes)
         if solved is not None and _begins_alike(solved.nodes, nodes) and _same(solved.base_rad, graph.base_rad):
             first, graph.base_rad = len(solved.nodes) - 1, solved.base_rad
             graph.pose = _continued(solved.pose, graph.pose)

@@ -110,9 +110,9 @@ def join_walks(
 ) -> tuple[Mapped, tuple[Join, ...]]:
     """One drawing in the map of the first walk; raises EchostepError where a walk has no certain place on the others."""
     for name, walk in walks:
-        if (storeys := walk.graph.storeys) is not None:
+        if (levels := walk.graph.levels) is not None:
             raise EchostepError(
-                f"{name}: leads over {len(storeys.height_m)} storeys; walks are joined, or fitted to a plan, on one only: draw it by itself"
+                f"{name}: leads over {len(levels.height_m)} floors; walks are joined, or fitted to a plan, on one only: draw it by itself"
             )
     (first, whole), *left = walks
     joins: list[Join] = []
@@ -129,7 +129,7 @@ def join_walks(
         else:
             known = ", ".join([first, *(join.name for join in joins)])
             raise EchostepError(
-                f"{refused[0]} on the walls of {known}: is it another building, another storey, or did the walks pass no room in"
+                f"{refused[0]} on the walls of {known}: is it another building, another floor, or did the walks pass no room in"
                 " common? Walk through places that were walked before, or draw it by itself"
             )
         progress(len(joins) / (len(walks) - 1))

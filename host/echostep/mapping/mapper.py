@@ -19,10 +19,10 @@ from echostep.mapping.graph.closures import APART_M, STRETCH_M, find_closure
 from echostep.mapping.graph.directions import LEAST_EVIDENCE, Directions
 from echostep.mapping.graph.fragments import Fragments, find_fragments
 from echostep.mapping.graph.graph import ROUNDS, Closure, FittedWalls, Graph, contradicted
+from echostep.mapping.graph.levels import BETWEEN, find_levels
 from echostep.mapping.graph.nodes import Nodes, Pings, nodes_of
 from echostep.mapping.graph.relief import find_relief
 from echostep.mapping.graph.spots import with_spots
-from echostep.mapping.graph.storeys import BETWEEN, find_storeys
 from echostep.mapping.smoothed_heading import with_smoothed_headings
 from echostep.mapping.walls.drawing import Drawing, draw
 from echostep.path import MeasuredSegment
@@ -34,7 +34,7 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """The solved `graph` of all walks, its `pings`, what is drawn of each storey, whether the (first) walk shows two directions, closures undone."""
+    """The solved `graph` of all walks, its `pings`, what is drawn of each level, whether the (first) walk shows two directions, closures undone."""
 
     graph: Graph
     pings: Pings
@@ -43,15 +43,15 @@ class Mapped:
     undone: tuple[Closure, ...]
 
     @property
-    def first_storey(self) -> int:
+    def first_level(self) -> int:
         """That on which the first level stretch of path is."""
-        storeys = self.graph.storeys
-        return 0 if storeys is None else int(storeys.of[storeys.of != BETWEEN][0])
+        levels = self.graph.levels
+        return 0 if levels is None else int(levels.of[levels.of != BETWEEN][0])
 
     @property
     def drawing(self) -> Drawing:
-        """What is drawn of the first storey."""
-        return self.drawings[self.first_storey]
+        """What is drawn of the first level."""
+        return self.drawings[self.first_level]
 
 
 def map_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _share: None) -> Mapped:
@@ -71,7 +71,7 @@ def solve_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda 
     nodes, pings = without_bias(nodes, pings, find_bias(nodes, pings))
     fragments, directions = find_pieces(nodes, pings)
     graph = new_graph(nodes, fragments, directions)
-    graph.storeys = find_storeys(segments, nodes)
+    graph.levels = find_levels(segments, nodes)
     for _ in range(LOCAL_ROUNDS):
         find_walls(graph)
     undone = close_loops(graph, progress)
@@ -108,8 +108,8 @@ def new_graph(nodes: Nodes, fragments: Fragments, directions: Directions) -> Gra
 def find_walls(graph: Graph) -> None:
     """Find which fragments are of one wall, and solve; those detected on stairs are of walls there, which constrain the heading."""
     node = graph.fragments.node
-    storey = np.zeros(len(node), np.int64) if graph.storeys is None else graph.storeys.with_flights[node]
-    graph.walls = associate(graph.nodes, graph.fragments, *graph.places(), _anchored(graph), storey)
+    level = np.zeros(len(node), np.int64) if graph.levels is None else graph.levels.with_flights[node]
+    graph.walls = associate(graph.nodes, graph.fragments, *graph.places(), _anchored(graph), level)
     graph.solve()
 
 

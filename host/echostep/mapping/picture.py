@@ -43,7 +43,7 @@ def draw_picture(path: Path, plan: Plan, walked_m: Sequence[Sequence[Floats]], b
         axes = figure.add_subplot(count, 1, k + 1, aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         _draw_level(axes, level, walked_m[count - 1 - k], built[count - 1 - k] if built else None)
         if count > 1:
-            axes.set_title(f"storey {level.name}, {level.height_m:+.1f} m", fontsize="small")
+            axes.set_title(f"floor {level.name}, {level.height_m:+.1f} m", fontsize="small")
     try:
         figure.savefig(path)
     except OSError as error:

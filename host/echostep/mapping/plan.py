@@ -48,23 +48,23 @@ def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, Walked]:
 
 
 def plan_in(mapped: Mapped, moved: Moved, start: Pose, name: str) -> tuple[Plan, Walked]:
-    """The plan in the frame that `moved` leads to, and what was walked of each level; heights are above the first storey."""
-    storeys, first_storey = mapped.graph.storeys, mapped.first_storey
-    heights = np.zeros(1) if storeys is None else storeys.height_m - storeys.height_m[first_storey]
-    wells = [] if storeys is None else wells_of(storeys, moved(mapped.graph.pose[:, :2]))
+    """The plan in the frame that `moved` leads to, and what was walked of each level; heights are above the first level."""
+    walk_levels, first_level = mapped.graph.levels, mapped.first_level
+    heights = np.zeros(1) if walk_levels is None else walk_levels.height_m - walk_levels.height_m[first_level]
+    wells = [] if walk_levels is None else wells_of(walk_levels, moved(mapped.graph.pose[:, :2]))
     walked = tuple(tuple(moved(path) for path in drawing.paths_m) for drawing in mapped.drawings)
     levels, lengths_m, variances = [], [], []
     for k, drawing in enumerate(mapped.drawings):
         walls = np.round(moved(drawing.walls.reshape(-1, 2)).reshape(-1, 4), ROUND)
         length_m = np.hypot(*(walls[:, 2:] - walls[:, :2]).T)
         long = length_m > LEAST_M
-        level = Level(str(k - first_storey), round(float(heights[k]), 1), walls[long])
+        level = Level(str(k - first_level), round(float(heights[k]), 1), walls[long])
         levels.append(with_wells(replace(level, doors=_doors(level, walked[k])), k, wells))
         lengths_m += length_m[long].tolist()
         variances += (drawing.sd_m[long] ** 2).tolist()
     sd = round(math.sqrt(float(np.average(variances, weights=lengths_m))), ROUND) if variances else None
     connectors = tuple(connector(well, number) for number, well in enumerate(wells, 1))
-    plan = Plan(name, tuple(levels), replace(start, level=first_storey), "", connectors, uncertainty_m=sd)
+    plan = Plan(name, tuple(levels), replace(start, level=first_level), "", connectors, uncertainty_m=sd)
     return plan, walked
 
 

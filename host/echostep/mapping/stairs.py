@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Stairs between the storeys of a drawing, as connectors in a well with a way in on each level.
+"""Stairs between the levels of a drawing, as connectors in a well with a way in on each level.
 
 In: the path on the stairs, in the plan. Out: `Well`s; levels with the walls of these. Owns their width. Echoes on stairs are not drawn:
 the well is the rectangle about the path.
@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Floats
-from echostep.mapping.graph.storeys import Storeys
+from echostep.mapping.graph.levels import WalkLevels
 from echostep.plan.model import Connector, Door, Level
 
 HALF_M = 0.6  # of a flight's width, assumed
@@ -36,13 +36,13 @@ class Well:
         return tuple(sorted({level for level, _, _ in self.ways_in}))
 
 
-def wells_of(storeys: Storeys, path: Floats) -> list[Well]:
+def wells_of(levels: WalkLevels, path: Floats) -> list[Well]:
     """The wells of a path (n, 2); flights above one another are in one well."""
     wells: list[Well] = []
-    for first, last in storeys.stairs:
+    for first, last in levels.stairs:
         flight = shapely.LineString(path[first : last + 1])
         area = shapely.oriented_envelope(flight.buffer(HALF_M, cap_style="flat"))
-        ends = tuple((int(storeys.of[k]), float(path[k, 0]), float(path[k, 1])) for k in (first, last))
+        ends = tuple((int(levels.of[k]), float(path[k, 0]), float(path[k, 1])) for k in (first, last))
         well, apart = Well(area, ends), []
         for other in wells:
             shared = other.area.intersection(well.area).area

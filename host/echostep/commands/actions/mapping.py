@@ -161,7 +161,7 @@ def described(mapped: Mapped, plan: Plan) -> list[str]:
     ]
     if len(plan.levels) > 1:
         heights = ", ".join(f"{level.height_m:+.1f}" for level in plan.levels)
-        lines.append(f"{len(plan.levels)} storeys at {heights} m, {len(plan.connectors)} stairs")
+        lines.append(f"{len(plan.levels)} floors at {heights} m, {len(plan.connectors)} stairs")
     if mapped.directions.evidence >= LEAST_EVIDENCE:
         lines.append("walls have two directions at right angles: the heading is corrected by them")
     closures = mapped.graph.closures

@@ -27,11 +27,11 @@ SMALL_M = 0.5  # a shorter fragment begins no wall: a corner or an edge seems to
 
 
 def associate(
-    nodes: Nodes, fragments: Fragments, centre_m: Floats, normal_rad: Floats, anchored: Bools, storey: Ints
+    nodes: Nodes, fragments: Fragments, centre_m: Floats, normal_rad: Floats, anchored: Bools, level: Ints
 ) -> FittedWalls:
     """The walls of all fragments, each at the mean of its pieces; those of one piece too. `anchored` (f,): the place is known by a closure.
 
-    `storey` (f,): a wall is on one.
+    `level` (f,): a wall is on one.
     """
     order = np.lexsort((-fragments.half_m, fragments.node))
     size_m, spot = fragments.half_m[order] * 2.0, is_spot(fragments.half_m[order])
@@ -40,9 +40,9 @@ def associate(
     way_m = nodes.way_m[fragments.node]
     placed = _Placed(centre_m, normal_rad, fragments.half_m, fragments.sd_rad, way_m, anchored)
     of, normals, rhos, count = np.full(len(order), -1, np.int64), [], [], 0
-    for k in range(int(storey.max(initial=-1)) + 1):
-        longs = long[storey[long] == k]
-        found, normal, rho = _associate(np.concatenate([longs, short[storey[short] == k]]), len(longs), placed)
+    for k in range(int(level.max(initial=-1)) + 1):
+        longs = long[level[long] == k]
+        found, normal, rho = _associate(np.concatenate([longs, short[level[short] == k]]), len(longs), placed)
         of = np.where(found < 0, of, found + count)
         normals.append(normal)
         rhos.append(rho)

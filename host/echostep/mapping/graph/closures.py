@@ -95,7 +95,7 @@ def find_closure(graph: Graph, begin: int, end: int, until_m: float) -> Closure 
     """The closure of the stretch of nodes [begin, end) with what was passed before `until_m` of the path, if there is one."""
     f, way_m = graph.fragments, graph.nodes.way_m
     node = (begin + end) // 2
-    usable = (f.half_m > 0.25) & (graph.storey_of(f.node) == graph.storey_of(np.array([node])))
+    usable = (f.half_m > 0.25) & (graph.level_of(f.node) == graph.level_of(np.array([node])))
     new = np.flatnonzero((f.node >= begin) & (f.node < end) & usable)
     if len(new) < 2:
         return None

@@ -19,8 +19,8 @@ from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
 from echostep.mapping.graph.directions import ALIGNED, DIRECTION_SD_RAD, RIGHT_RAD
 from echostep.mapping.graph.fragments import Fragments
+from echostep.mapping.graph.levels import WalkLevels
 from echostep.mapping.graph.nodes import Nodes
-from echostep.mapping.graph.storeys import Storeys
 
 ROUNDS = 4  # of Gauss-Newton; the graph is nearly linear
 ONE_WALL = 0.8  # share of fragments that are of the wall they lie on, at first; others, as furniture before it, lie anywhere within
@@ -59,7 +59,7 @@ class Closure:
 class Graph:
     """`pose` (n, 3), `walls`: the newest solution. `base_rad`: one of the two directions of the building; None: it has none.
 
-    `storeys`: None where all nodes are on one.
+    `levels`: None where all nodes are on one.
     """
 
     nodes: Nodes
@@ -69,7 +69,7 @@ class Graph:
     closures: list[Closure] = field(default_factory=list)
     base_rad: float | None = None
     factor: SuperLU | None = None
-    storeys: Storeys | None = None
+    levels: WalkLevels | None = None
 
     def solve(self, rounds: int = ROUNDS) -> None:
         """Gauss-Newton from the present poses."""
@@ -109,9 +109,9 @@ class Graph:
         covariance: Floats = columns[3 * new : 3 * new + 3] - columns[3 * old : 3 * old + 3]
         return 0.5 * (covariance + covariance.T)
 
-    def storey_of(self, node: Ints) -> Ints:
-        """The storey of each of these nodes (k,)."""
-        return np.zeros(len(node), np.int64) if self.storeys is None else self.storeys.of[node]
+    def level_of(self, node: Ints) -> Ints:
+        """The level of each of these nodes (k,)."""
+        return np.zeros(len(node), np.int64) if self.levels is None else self.levels.of[node]
 
     def paths(self) -> tuple[Floats, ...]:
         """The path (k, 2) of each walk; nodes before the first walk are those of a plan."""

@@ -31,7 +31,7 @@ ALONG_RAD = 2.0 * ALONG_SD_RAD  # of a piece from the course of the path, within
 @dataclass(frozen=True, slots=True)
 class Drawing:
     """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of the distance of each from the places beside it; `paths_m`: the
-    corrected path (k, 2) of each walk, or each piece of it on this storey.
+    corrected path (k, 2) of each walk, or each piece of it on this level.
     """
 
     walls: Floats
@@ -40,13 +40,13 @@ class Drawing:
 
 
 def draw(graph: Graph, pings: Pings) -> tuple[Drawing, ...]:
-    """The walls that the echoes of a walk show, on each storey."""
-    storeys = graph.storeys
-    if storeys is None:
+    """The walls that the echoes of a walk show, on each level."""
+    levels = graph.levels
+    if levels is None:
         return (_drawn(graph, pings, graph.paths()),)
     walls = []
-    for k in range(len(storeys.height_m)):
-        on = storeys.of == k
+    for k in range(len(levels.height_m)):
+        on = levels.of == k
         of = np.where(on[graph.fragments.node], graph.walls.of, -1)
         own = on[pings.node]
         paths = tuple(piece for path in graph.paths() for piece in pieces_on(path, on))
@@ -56,7 +56,7 @@ def draw(graph: Graph, pings: Pings) -> tuple[Drawing, ...]:
 
 
 def pieces_on(path: Floats, on: Bools) -> list[Floats]:
-    """The pieces (k, 2) of a path (n, 2) whose nodes are `on` (n,) a storey."""
+    """The pieces (k, 2) of a path (n, 2) whose nodes are `on` (n,) a level."""
     return [path[a:b] for a, b in spans(on)]
 
 

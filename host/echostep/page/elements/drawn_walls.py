@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from echostep.arrays import Floats
 from echostep.localization.estimate import Estimate
-from echostep.mapping.graph.storeys import BETWEEN
+from echostep.mapping.graph.levels import BETWEEN
 
 if TYPE_CHECKING:
     from echostep.mapping.mapper import Mapped
@@ -51,7 +51,7 @@ NO_DRAWING = ShownDrawing(0.0, np.zeros((0, 5), np.float32), np.zeros((0, 2), np
 def walk_drawing(mapped: Mapped) -> WalkDrawing:
     """The part of a drawing that a page shows."""
     pose = mapped.graph.pose
-    level = mapped.graph.storey_of(np.arange(len(pose)))
+    level = mapped.graph.level_of(np.arange(len(pose)))
     newest = int(level[level != BETWEEN][-1])
     drawing = mapped.drawings[newest]
     walls = np.column_stack([drawing.walls, drawing.sd_m])

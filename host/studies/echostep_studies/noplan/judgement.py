@@ -17,7 +17,7 @@ from msgspec import UNSET, UnsetType
 
 from echostep.arrays import Bools, Floats
 from echostep.mapping.graph.graph import Closure
-from echostep.mapping.graph.storeys import BETWEEN
+from echostep.mapping.graph.levels import BETWEEN
 from echostep.mapping.mapper import Mapped
 from echostep_studies.bench.walks import SimulatedWalk, T, X, Y, Z
 
@@ -110,7 +110,7 @@ def heights_m(walk: SimulatedWalk, t_s: Floats) -> Floats:
 
 def levels_of(mapped: Mapped, walk: SimulatedWalk) -> list[int]:
     """The true level of each drawn storey: the nearest one in height above the start."""
-    storeys, start = mapped.graph.storeys, float(walk.truth[0, Z])
+    storeys, start = mapped.graph.levels, float(walk.truth[0, Z])
     above = np.zeros(1) if storeys is None else storeys.height_m
     true = np.array([level.height_m for level in walk.built.levels])
     return [int(np.argmin(np.abs(true - start - height))) for height in above]
@@ -120,7 +120,7 @@ def storey_columns(mapped: Mapped, walk: SimulatedWalk) -> StoreyColumns:
     """The storeys of a drawing."""
     z = heights_m(walk, mapped.graph.nodes.t_s)
     on = np.array([np.abs(z - level.height_m) < LEVEL_M for level in walk.built.levels])
-    storey = mapped.graph.storey_of(np.arange(len(z)))
+    storey = mapped.graph.level_of(np.arange(len(z)))
     level = np.array(levels_of(mapped, walk))[np.maximum(storey, 0)]
     wrong = on.any(0) & (storey != BETWEEN) & ~on[level, np.arange(len(z))]
     return StoreyColumns(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Walks over stairs: each storey is drawn, and the stairs that join them (simulated)."""
+"""Walks over stairs: each level is drawn, and the stairs that join them (simulated)."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.mapping.graph.levels import BETWEEN, find_levels
 from echostep.mapping.graph.nodes import nodes_of
-from echostep.mapping.graph.storeys import BETWEEN, find_storeys
 from echostep.mapping.joining import join_walks
 from echostep.mapping.mapper import Mapped, map_walk
 from echostep.mapping.picture import draw_picture
@@ -43,7 +43,7 @@ def up_and_down() -> tuple[Waypoint, ...]:
 
 @pytest.fixture(scope="module")
 def walk() -> SimulatedWalk:
-    """Two storeys of the tower."""
+    """Two levels of the tower."""
     return simulate(Site(tower(2), up_and_down()), 7)
 
 
@@ -59,7 +59,7 @@ def drawn(walk: SimulatedWalk, mapped: Mapped) -> tuple[Plan, Walked]:
     return plan_of(mapped, walk.pose_at(walk.segments[0].segment.t0_s), "tower")
 
 
-def test_each_storey_has_its_walls(drawn: tuple[Plan, Walked]) -> None:
+def test_each_level_has_its_walls(drawn: tuple[Plan, Walked]) -> None:
     plan, _ = drawn
     assert [level.name for level in plan.levels] == ["0", "1"]
     assert plan.levels[1].height_m == pytest.approx(STOREY_M, abs=0.3)
@@ -88,25 +88,25 @@ def test_the_stairs_join_them_and_the_check_finds_nothing_wrong(drawn: tuple[Pla
     assert check_plan(plan) == []
     read = parse_plan(plan_json(plan).encode())
     assert [len(level.walls) for level in read.levels] == [len(level.walls) for level in plan.levels]
-    draw_picture(tmp_path / "storeys.png", plan, walked)
-    assert (tmp_path / "storeys.png").stat().st_size > 1000
+    draw_picture(tmp_path / "levels.png", plan, walked)
+    assert (tmp_path / "levels.png").stat().st_size > 1000
 
 
-def test_no_return_joins_two_storeys(mapped: Mapped) -> None:
+def test_no_return_joins_two_levels(mapped: Mapped) -> None:
     """The corridors are alike and above each other; coming down again is a return to the lower one."""
-    storeys = mapped.graph.storeys
-    assert storeys is not None
-    pairs = [(int(storeys.of[c.old]), int(storeys.of[c.new])) for c in mapped.graph.closures]
+    levels = mapped.graph.levels
+    assert levels is not None
+    pairs = [(int(levels.of[c.old]), int(levels.of[c.new])) for c in mapped.graph.closures]
     assert pairs
     assert all(old == new for old, new in pairs)
 
 
 def test_walls_of_the_stairwell_hold_the_path_over_the_stairs(mapped: Mapped) -> None:
-    """Each way over the stairs hears walls, which are of no storey and of no other way."""
-    graph, storeys = mapped.graph, mapped.graph.storeys
-    assert storeys is not None
-    place = storeys.with_flights
-    assert (place[storeys.of != BETWEEN] == storeys.of[storeys.of != BETWEEN]).all()
+    """Each way over the stairs hears walls, which are of no level and of no other way."""
+    graph, levels = mapped.graph, mapped.graph.levels
+    assert levels is not None
+    place = levels.with_flights
+    assert (place[levels.of != BETWEEN] == levels.of[levels.of != BETWEEN]).all()
     assert np.unique(place).tolist() == [0, 1, 2, 3]
     node, wall = graph.fragments.node, graph.walls.of
     for flight in (2, 3):
@@ -116,7 +116,7 @@ def test_walls_of_the_stairwell_hold_the_path_over_the_stairs(mapped: Mapped) ->
 
 
 def test_a_walk_over_stairs_is_not_joined_with_others(mapped: Mapped) -> None:
-    with pytest.raises(EchostepError, match="first: leads over 2 storeys"):
+    with pytest.raises(EchostepError, match="first: leads over 2 floors"):
         join_walks([("first", mapped), ("second", mapped)])
 
 
@@ -134,31 +134,31 @@ def stepped(rises: Floats, *, foot: bool = True) -> list[MeasuredSegment]:
 
 
 @pytest.mark.parametrize("foot", [True, False])
-def test_storeys_are_told_apart_by_the_climb(foot: bool) -> None:
-    """Up two storeys by a landing each, down one: three storeys, one of them twice."""
+def test_levels_are_told_apart_by_the_climb(foot: bool) -> None:
+    """Up two levels by a landing each, down one: three levels, one of them twice."""
     flat, flight, landing = np.zeros(40), np.full(4, 0.42), np.zeros(2)
     up = np.concatenate([flight, landing, flight])
     segments = stepped(np.concatenate([flat, up, flat, up, flat, -up, flat]), foot=foot)
     nodes, _ = nodes_of(segments)
-    storeys = find_storeys(segments, nodes)
-    assert storeys is not None
-    assert storeys.height_m == pytest.approx([0.0, 3.36, 6.72], abs=0.4)
-    level = storeys.of[storeys.of != BETWEEN]
-    assert level[np.flatnonzero(np.diff(level, prepend=-2))].tolist() == [0, 1, 2, 1]
-    assert np.mean(storeys.of == BETWEEN) < 0.25
-    assert [sorted((int(storeys.of[a]), int(storeys.of[b]))) for a, b in storeys.stairs] == [[0, 1], [1, 2], [1, 2]]
+    levels = find_levels(segments, nodes)
+    assert levels is not None
+    assert levels.height_m == pytest.approx([0.0, 3.36, 6.72], abs=0.4)
+    on_level = levels.of[levels.of != BETWEEN]
+    assert on_level[np.flatnonzero(np.diff(on_level, prepend=-2))].tolist() == [0, 1, 2, 1]
+    assert np.mean(levels.of == BETWEEN) < 0.25
+    assert [sorted((int(levels.of[a]), int(levels.of[b]))) for a, b in levels.stairs] == [[0, 1], [1, 2], [1, 2]]
 
 
-def test_sills_ramps_and_drift_are_no_storeys() -> None:
+def test_sills_ramps_and_drift_are_no_levels() -> None:
     """A few steps up and down, a ramp of 6 %, and 1 cm of error in each step for 200 m."""
     steps = np.concatenate([np.zeros(20), np.full(3, 0.17), np.zeros(20), np.full(3, -0.17), np.zeros(20)])
     ramp = np.concatenate([np.full(30, 0.042), np.zeros(20)])
     for rises in (steps, ramp, np.full(280, 0.01), np.zeros(0)):
         segments = stepped(np.concatenate([np.zeros(20), rises]))
-        assert find_storeys(segments, nodes_of(segments)[0]) is None
+        assert find_levels(segments, nodes_of(segments)[0]) is None
 
 
-def test_pressure_alone_that_no_board_sends_is_one_storey() -> None:
+def test_pressure_alone_that_no_board_sends_is_one_level() -> None:
     segments = [replace(m, height_m=np.zeros(0)) for m in stepped(np.full(60, 0.4), foot=False)]
     assert math.isinf(segments[0].segment.rise_sd_m)
-    assert find_storeys(segments, nodes_of(segments)[0]) is None
+    assert find_levels(segments, nodes_of(segments)[0]) is None

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The storeys of a walk: level stretches of path, separated by the climb of the foot between them.
+"""The levels of a walk: flat stretches of path, separated by the climb of the foot between them.
 
-In: measured segments, nodes. Out: `Storeys`. Owns the limits. From one stretch to the next the foot's rise is exact to centimetres; a storey that is
-entered again gets its height of before, so its errors do not add up over a walk. Pressure counts only where no foot is worn.
+In: measured segments, nodes. Out: `WalkLevels`. Owns the limits. From one stretch to the next the foot's rise is exact to centimetres; a level that
+is entered again gets its height of before, so its errors do not add up over a walk. Pressure counts only where no foot is worn.
 """
 
 from __future__ import annotations
@@ -20,39 +20,39 @@ from echostep.path import MeasuredSegment
 
 # Assumed, not measured.
 WINDOW_M = 2.5  # of path to either side of a node: longer than the landing between two flights
-FLAT_M = 0.5  # of rise in both windows, from which it is no level ground: steeper than a wheelchair's ramp (8 %)
-STRETCH_M = 4.0  # of level path that is a storey; a shorter one is a landing
-APART_M = 1.5  # between two storeys, at least: half a storey
-SILL_M = 0.25  # of rise from the last level place, up to which a node still belongs to it: one step
+FLAT_M = 0.5  # of rise in both windows, from which it is no flat ground: steeper than a wheelchair's ramp (8 %)
+STRETCH_M = 4.0  # of flat path that is a level; a shorter one is a landing
+APART_M = 1.5  # between two levels, at least: half the usual height of a floor
+SILL_M = 0.25  # of rise from the last flat place, up to which a node still belongs to it: one step
 PRESSURE_S = 10.0  # over which heights by pressure are averaged by their median, where no foot is worn
-BETWEEN = -1  # storey of a node on stairs
+BETWEEN = -1  # level of a node on stairs
 
 
 @dataclass(frozen=True, slots=True)
-class Storeys:
-    """`of` (n,): storey of each node, BETWEEN on stairs; `height_m` (s,) of each above the first node's, ascending."""
+class WalkLevels:
+    """`of` (n,): level of each node, BETWEEN on stairs; `height_m` (s,) of each above the first node's, ascending."""
 
     of: Ints
     height_m: Floats
 
     @property
     def stairs(self) -> list[tuple[int, int]]:
-        """The last node on a storey and the first one on another, of each way between them."""
-        level = np.flatnonzero(self.of != BETWEEN)
-        changed = np.flatnonzero(np.diff(self.of[level]))
-        return [(int(level[k]), int(level[k + 1])) for k in changed]
+        """The last node on a level and the first one on another, of each way between them."""
+        flat = np.flatnonzero(self.of != BETWEEN)
+        changed = np.flatnonzero(np.diff(self.of[flat]))
+        return [(int(flat[k]), int(flat[k + 1])) for k in changed]
 
     @property
     def with_flights(self) -> Ints:
-        """The storey of each node (n,); each way over stairs is one of its own, numbered after the storeys."""
-        storey = self.of.copy()
+        """The level of each node (n,); each way over stairs is one of its own, numbered after the levels."""
+        level = self.of.copy()
         for k, (first, end) in enumerate(spans(self.of == BETWEEN).tolist(), len(self.height_m)):
-            storey[first:end] = k
-        return storey
+            level[first:end] = k
+        return level
 
 
-def find_storeys(segments: Sequence[MeasuredSegment], nodes: Nodes) -> Storeys | None:
-    """The storeys of a walk; None where it has only one."""
+def find_levels(segments: Sequence[MeasuredSegment], nodes: Nodes) -> WalkLevels | None:
+    """The levels of a walk; None where it has only one."""
     climb, way = np.interp(nodes.t_s, *_climb(segments)), nodes.way_m
     after, before = (np.interp(way + side * WINDOW_M, way, climb) for side in (1.0, -1.0))
     stretches = [
@@ -75,10 +75,10 @@ def find_storeys(segments: Sequence[MeasuredSegment], nodes: Nodes) -> Storeys |
     order = np.argsort(heights)
     rank = np.argsort(order)
     of = np.full(len(way), BETWEEN)
-    for (first, end), storey in zip(stretches, which, strict=True):
+    for (first, end), level in zip(stretches, which, strict=True):
         low, high = _widened(climb, first, end)
-        of[low:high] = rank[storey]
-    return Storeys(_filled(of), np.array(heights)[order])
+        of[low:high] = rank[level]
+    return WalkLevels(_filled(of), np.array(heights)[order])
 
 
 def _height_m(climb: Floats, way: Floats, first: int, end: int, *, from_end: bool) -> float:
@@ -98,9 +98,9 @@ def _widened(climb: Floats, first: int, end: int) -> tuple[int, int]:
 
 
 def _filled(of: Ints) -> Ints:
-    """Nodes between two stretches of one storey, as over a few steps up and down, belong to it."""
-    level = np.flatnonzero(of != BETWEEN)
-    for a, b in zip(level[:-1], level[1:], strict=True):
+    """Nodes between two stretches of one level, as over a few steps up and down, belong to it."""
+    flat = np.flatnonzero(of != BETWEEN)
+    for a, b in zip(flat[:-1], flat[1:], strict=True):
         if of[a] == of[b]:
             of[a:b] = of[a]
     return of
