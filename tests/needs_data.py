@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from places import DATA
+from echostep_studies.frame.recordings import DATA
 
 
 def needs_data(folder: str = "") -> pytest.MarkDecorator:

@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: MIT
 """Where things are in a checkout, for all tools.
 
-In: $ECHOSTEP_DATA. Out: paths; the command that starts the twin. Owns nothing. Every tool is started in the root of the checkout, with
+In: nothing. Out: paths; the command that starts the twin. Owns nothing. Every tool is started in the root of the checkout, with
 `PYTHONPATH=tools:tests .venv/bin/python -m FOLDER.TOOL`.
 """
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 OUT = ROOT / "out"
-DATA = Path(os.environ.get("ECHOSTEP_DATA", ROOT.parent / "shared" / "data"))  # public recordings
 PLAN = ROOT / "host/echostep/plans/demo.json"
 TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--elf", str(ROOT / "firmware/build/echostep.elf")]

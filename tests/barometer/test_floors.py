@@ -26,10 +26,10 @@ from echostep_studies.barometer.floor_record import find_storeys, stays
 from echostep_studies.barometer.floors_command import parse_heights, record_floors
 from echostep_studies.barometer.pressure_csv import load_pressures
 from echostep_studies.floors.study import FloorScene, judge, longest_s
+from echostep_studies.frame.recordings import DATA
 from echostep_studies.simulation.air_pressure import Weather, device_temperatures, pressures
 from echostep_studies.simulation.vertical_day import climb
 from needs_data import needs_data
-from places import DATA
 
 STOREYS = np.array([0.0, 3.5, 7.0])
 PA_PER_M = 101_325.0 * 9.80665 / (287.053 * 293.15)

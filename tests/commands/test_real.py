@@ -11,8 +11,8 @@ import pytest
 
 from echostep.recording.reading import open_recording
 from echostep_studies.bench.recordings.hallways import names_in, read_hallway
+from echostep_studies.frame.recordings import DATA
 from needs_data import needs_data
-from places import DATA
 from waiting import PATIENCE_S
 
 pytestmark = needs_data("gx5_gcp")

@@ -9,10 +9,9 @@ import pytest
 from echostep.arrays import Floats
 from echostep.foot.steps import Foot, walk_track
 from echostep_studies.bench.recordings.feet import SETS
-from echostep_studies.frame.recordings import read_sets
+from echostep_studies.frame.recordings import DATA, read_sets
 from foot import foot_walks as fw
 from needs_data import needs_data
-from places import DATA
 
 EARTH = np.array([0.2, 0.05, -0.43])  # gauss, walk frame
 IRON = np.array([0.05, -0.08, 0.03])  # of the shoe

@@ -22,10 +22,9 @@ from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker
 from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata
 from echostep_studies.bench.recordings.feet import SETS
-from echostep_studies.frame.recordings import read_sets
+from echostep_studies.frame.recordings import DATA, read_sets
 from foot import foot_walks as fw
 from needs_data import needs_data
-from places import DATA
 
 
 def axis_mountings() -> list[Floats]:

@@ -12,10 +12,9 @@ from echostep.arrays import Floats
 from echostep.foot.steps import walk_track
 from echostep_studies.bench.recordings.feet import SETS, FootRecording
 from echostep_studies.feet.study import track_of
-from echostep_studies.frame.recordings import recordings_in
+from echostep_studies.frame.recordings import DATA, recordings_in
 from foot import foot_walks as fw
 from needs_data import needs_data
-from places import DATA
 
 QUICK_LAPS = fw.FootManner((1.2, 0.0, 0.0), turn_rad=0.35, swing_s=0.55, stance_s=0.22, toe_off_rad=1.0, roll_s=0.09)
 STEPS = 40

@@ -21,8 +21,8 @@ from echostep.errors import EchostepError
 from echostep.offline.imu_csv import load_imu
 from echostep.simulation.devices.mtx import specific_force_and_rate
 from echostep.simulation.people.walker import Person, walk
+from echostep_studies.frame.recordings import DATA
 from needs_data import needs_data
-from places import DATA
 
 HEADER = "t_s,ax,ay,az,gx,gy,gz"
 Spoil = Callable[[np.ndarray, np.random.Generator], np.ndarray]

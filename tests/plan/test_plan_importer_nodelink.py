@@ -11,8 +11,8 @@ import pytest
 import command_line
 from echostep.errors import EchostepError
 from echostep.plan.importers.formats import import_plan
+from echostep_studies.frame.recordings import DATA
 from needs_data import needs_data
-from places import DATA
 
 SMALL = {
     "core.txt": "byProgram\nfloor,2,0.jpg,1.jpg\nheight,4.5\nstart,1\nscale,0.5\nnode,node.txt\n",

@@ -21,10 +21,10 @@ from echostep.recording.capture_summary import summary
 from echostep.xsens import MTDATA, MTDATA2, MtMessage, MtSample, OutputFormat, encode_frame
 from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import BY_LENGTH, CONFIGURED, GIVEN, OutputFormats
+from echostep_studies.frame.recordings import DATA
 from echostep_studies.simulation.devices.mtx_setup import pack
 from naive.mt_frames import valid_frames
 from needs_data import needs_data
-from places import DATA
 
 REAL = sorted(p for end in ("bin", "mtb", "xbus") for p in (DATA / "mtb").glob(f"**/*.{end}"))
 HALF = math.sqrt(0.5)

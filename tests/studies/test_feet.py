@@ -22,10 +22,9 @@ from echostep_studies.bench.recordings.foot_metrics import FootFigure, align, pl
 from echostep_studies.feet import leave_one_out
 from echostep_studies.feet.rows import FigureRow
 from echostep_studies.feet.study import track_of
-from echostep_studies.frame.recordings import recordings_in
+from echostep_studies.frame.recordings import DATA, recordings_in
 from foot.foot_walks import any_rotation
 from needs_data import needs_data
-from places import DATA
 
 Row = dict[str, Any]
 needs_recordings = needs_data()

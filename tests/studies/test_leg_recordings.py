@@ -14,7 +14,7 @@ from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import Flag, StrideSettings
 from echostep.simulation.people.walker import Person, walk
 from echostep_studies.bench.recordings.legs import SETS, LegRecording, moves_of
-from echostep_studies.frame.recordings import read_sets
+from echostep_studies.frame.recordings import DATA, read_sets
 from echostep_studies.legs.recordings import (
     BOTH,
     LENGTHS,
@@ -27,7 +27,6 @@ from echostep_studies.legs.recordings import (
     strides_of,
 )
 from needs_data import needs_data
-from places import DATA
 
 
 @pytest.fixture(scope="module")

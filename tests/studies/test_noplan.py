@@ -20,6 +20,7 @@ from echostep.plan.model import Level, load_plan
 from echostep.simulation.scenario import DEMO_WAYPOINTS
 from echostep_studies.bench.sites import Site, plan_of
 from echostep_studies.bench.walks import SimulatedWalk
+from echostep_studies.frame.recordings import DATA
 from echostep_studies.frame.study import StudyRequest
 from echostep_studies.noplan.columns import DrawnRun
 from echostep_studies.noplan.footslam import RADIUS_M, footslam, hexagon
@@ -28,7 +29,6 @@ from echostep_studies.noplan.real_clutter import walked_log, with_stated_drift
 from echostep_studies.noplan.sites import furnished, loop_walls
 from echostep_studies.noplan.study import drawn_rows, names_of, noplan_study, one_run
 from needs_data import needs_data
-from places import DATA
 from studies.carmen_logs import WALLS as WALLS_OF_LOG
 from studies.carmen_logs import write_log
 

@@ -46,9 +46,9 @@ from echostep.walls.level_sheet import (
     nearest_level,
 )
 from echostep_studies.floors.storeys import judge, through
+from echostep_studies.frame.recordings import DATA
 from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tour, tower
 from needs_data import needs_data
-from places import DATA
 
 FLAT = HeightChange(0.0, 0.02, 0.0, math.inf, 0.0, 1.0)
 

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from echostep.xsens import MTDATA2, FrameReader, MtxReader, axes, encode_frame
 from echostep.xsens.packets import Packet, read_packets
+from echostep_studies.frame.recordings import DATA
 from needs_data import needs_data
-from places import DATA
 
 MTB = DATA / "mtb"
 CAPTURES = [f"einride_{k}" for k in (1, 2, 3, 5)]

@@ -19,7 +19,8 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from places import DATA, ROOT, TWIN
+from echostep_studies.frame.recordings import DATA
+from places import ROOT, TWIN
 
 STUDIES = ("girard2011", "echoes", "trails", "lee2010", "floors", "legs", "storeys", "fischer2008", "feet")
 WITHOUT_RUNS = ("echoes", "feet")

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import pytest
 
+from echostep_studies.frame.recordings import DATA
 from echostep_studies.incapacity import study as incapacity
 from echostep_studies.incapacity.columns import TOLD_S, DaySummary, LyingRun, LyingSummary, summarize
 from echostep_studies.incapacity.falls import FallRun, NoFallRun
 from echostep_studies.incapacity.study import incapacitated, one_run, recorded, work_day
 from needs_data import data_or_skip
-from places import DATA
 
 
 def test_every_wearer_who_cannot_move_is_told_within_35_s() -> None:

@@ -20,11 +20,11 @@ from echostep.commands.actions.offline import foot as run_foot
 from echostep.errors import EchostepError
 from echostep.foot import steps as foot
 from echostep.simulation.devices import onboard_filter as onboard
+from echostep_studies.frame.recordings import DATA
 from echostep_studies.papers import fischer2008
 from echostep_studies.papers.fischer2008 import Fischer2008
 from foot.foot_walks import MANNERS, any_rotation, course, felt
 from needs_data import needs_data
-from places import DATA
 
 needs_recordings = needs_data("xsens_mtw_voisard")
 

@@ -15,7 +15,7 @@ import numpy as np
 from echostep.output.table import Table
 from echostep_studies.bench.filtering import FilterRun
 from echostep_studies.bench.judgement import JudgedRun
-from echostep_studies.frame.report import LOST_M, as_dict, as_dicts, rows_by_name
+from echostep_studies.frame.report import LOST_END_M, as_dict, as_dicts, rows_by_name
 
 ALARM_S = 5.0  # an error of more than ALARM_M must be flagged within this time
 FIT = 0.5  # probability of the plan below which a run says that it does not fit
@@ -158,7 +158,7 @@ def _judged_summary(summary: ClaimsSummary, runs: Sequence[JudgedRow]) -> Judged
         mean_m=_rounded(float(np.mean(after))) if after else None,
         ce95_m=_rounded(float(np.quantile(after, 0.95))) if after else None,
         median_m=_rounded(float(np.median([e for r in runs for e in r.error_m]))),
-        lost=sum(r.error_m[-1] > LOST_M for r in runs),
+        lost=sum(r.error_m[-1] > LOST_END_M for r in runs),
         false_tracking=_rounded(sum(r.false_tracking for r in runs) / claims),
         false_lost=_rounded(sum(r.false_lost for r in runs) / claims),
         beyond_protection=_rounded(sum(r.beyond_protection for r in runs) / claims),

@@ -32,7 +32,7 @@ from echostep.simulation.people.tours import tour as tour_of
 from echostep.simulation.people.walker import Person, Waypoint
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker
-from echostep_studies.frame.report import LOST_M, as_dicts, rows_by_name
+from echostep_studies.frame.report import LOST_END_M, as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.tower import tour, tower
 
@@ -156,7 +156,7 @@ def judge(plan: Plan, truth: Floats, estimates: Sequence[Estimate], name: str, s
         name=name, profile="default", seed=seed, mean_m=statistics.mean_m, sd_m=statistics.sd_m, max_m=statistics.max_m,
         min_m=statistics.min_m, ending_m=statistics.ending_m, ce95_m=statistics.p95_m,
         coverage95=float(np.mean([e.holds(px, py) for e, px, py, _ in places])),
-        lost=int(error[-1] > LOST_M), said_lost=float(np.mean([e.status is TrackStatus.LOST for e in estimates])),
+        lost=int(error[-1] > LOST_END_M), said_lost=float(np.mean([e.status is TrackStatus.LOST for e in estimates])),
         floor_right=float(right.mean()), strict_right=float(strict.mean()), longest_wrong_s=wrong_s,
         floors=len({e.level for e in estimates}),
     )  # fmt: skip

@@ -15,7 +15,8 @@ from typing import TypeVar
 from echostep.errors import EchostepError
 from echostep.output.table import console
 
-DATA = Path(os.environ.get("ECHOSTEP_DATA", "../shared/data"))  # where the public recordings are
+# The public recordings, found from the root of a checkout
+DATA = Path(os.environ.get("ECHOSTEP_DATA", "../shared/data")).resolve()
 Recording = TypeVar("Recording")
 Sets = Sequence[tuple[str, str, Callable[[Path], Iterable[Recording]]]]
 

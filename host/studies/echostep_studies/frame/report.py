@@ -20,7 +20,7 @@ from echostep.scorecard.error_statistics import error_statistics
 
 Row = dict[str, Any]  # the columns of a row by name
 
-LOST_M = 3.0  # error at the end of a run above which it counts as lost: a definition
+LOST_END_M = 3.0  # error at the end of a run above which the run counts as lost: a definition
 
 
 class Named(Protocol):
@@ -58,7 +58,7 @@ class ErrorSummary:
 
     `mean_m`, `sd_m`, `max_m`, `min_m`, `ending_m` are computed for each run, then averaged over the runs; `worst_m` is the greatest error of all,
     `ce50_m` and `ce95_m` are percentiles of all errors [ISO/IEC 18305:2016, 8.9].
-    `coverage95`: share of all steps with the truth inside the 95 % ellipse. `lost`: number of runs that end more than `LOST_M` off.
+    `coverage95`: share of all steps with the truth inside the 95 % ellipse. `lost`: number of runs that end more than `LOST_END_M` off.
     """
 
     name: str
@@ -91,7 +91,7 @@ def summary(
         name=name, profile=profile, runs=len(each), mean_m=mean("mean_m"), sd_m=mean("sd_m"), max_m=mean("max_m"),
         min_m=mean("min_m"), ending_m=mean("ending_m"), ce50_m=round(whole.median_m, 4), ce95_m=round(whole.p95_m, 4),
         worst_m=round(whole.max_m, 4), coverage95=round(sum(steps) / len(steps), 4) if steps else None,
-        lost=sum(errors[-1] > LOST_M for errors in errors_m),
+        lost=sum(errors[-1] > LOST_END_M for errors in errors_m),
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import UNSET, UnsetType
 
 from echostep.output.table import Table
-from echostep_studies.frame.report import LOST_M, as_dicts, rows_by_name
+from echostep_studies.frame.report import LOST_END_M, as_dicts, rows_by_name
 from echostep_studies.frame.study import StudyRequest
 from echostep_studies.noplan.joined import PairRun, PairSummary, joined_summary
 
@@ -131,7 +131,7 @@ def _drawn_summary(group: Sequence[DrawnRun]) -> DrawnSummary:
 
 def _second_summary(group: Sequence[SecondRun]) -> SecondSummary:
     means = [row.mean_m for row in group]
-    lost = sum(row.end_m > LOST_M for row in group)
+    lost = sum(row.end_m > LOST_END_M for row in group)
     return SecondSummary(
         name=group[0].name, runs=len(group), mean_m=float(np.mean(means)), worst_m=max(means), lost=lost
     )
