@@ -56,8 +56,9 @@ def test_no_text_breaks_the_parser(text: str) -> None:
     "text",
     [
         '"kind":"seek","t_s":1e308', '"kind":"seek","t_s":NaN', '"kind":"seek","t_s":1e999', '"kind":"seek","t_s":true', '"kind":"speed","times":0',
-        '"kind":"speed","times":32.1', '"kind":"skip","by":1.5', '"kind":"skip","by":9007199254740992', '"kind":"play","playing":1', '"kind":"met","name":""',
-        '"kind":"go_to","x_m":1,"y_m":100000.1', '"kind":"go_to","x_m":1,"y_m":1,"level":1000', '"kind":"drawn"', '"kind":"undo","undo":0', '"seq":1',
+        '"kind":"speed","times":32.1', '"kind":"skip","by":1.5', '"kind":"skip","by":9007199254740992', '"kind":"play","playing":1',
+        '"kind":"met","name":""', '"kind":"go_to","x_m":1,"y_m":100000.1', '"kind":"go_to","x_m":1,"y_m":1,"level":1000',
+        '"kind":"drawn"', '"kind":"undo","undo":0', '"seq":1',
     ],
 )  # fmt: skip
 def test_a_request_beyond_its_limits_is_none(text: str) -> None:

@@ -17,8 +17,8 @@ from echostep.plan.importers import limited
 from echostep.plan.importers.formats import import_plan
 from echostep.plan.importers.imdf.archive import FREE_BYTES, MOST_RATIO, Archive
 from echostep.plan.importers.limited import import_limited, open_limited
-from echostep.plan.json_fields import MOST_CORNERS
 from echostep.plan.model import load_plan
+from echostep.plan.plan_file import MOST_CORNERS
 from echostep.plan.writer import plan_json
 
 SQUARE = ((0, 0, 4, 0), (4, 0, 4, 4), (4, 4, 0, 4), (0, 4, 0, 0))

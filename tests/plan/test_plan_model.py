@@ -60,6 +60,7 @@ def test_a_good_plan(tmp_path: Path) -> None:
     assert plan.levels[0].rooms[0].name == "A"
 
 
+CORNERS = [[0, 0], [1, 0], [1, 1]]
 WRONG: list[tuple[dict[str, Any], str]] = [
     ({"echostep_plan": 2}, "echostep_plan"),
     ({"levels": []}, "levels"),
@@ -69,6 +70,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"levels": [{"walls": [[1, 1, 1, 1]]}]}, "without length"),
     ({"levels": [{"walls": [[0, 0, 1e30, 1]]}]}, "finite"),
     ({"levels": [{"walls": [[0, 0, True, 1]]}]}, "finite"),
+    ({"levels": [{"walls": [[0, 0, "\ud800", 1]]}]}, r"'\\ud800' is not a text"),
     ({"start": {"x": 1, "y": 2}}, "start.heading_deg|None"),
     ({"start": []}, "start"),
     ({"name": 4}, "name"),
@@ -77,12 +79,23 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"levels": [{"walls": [], "doors": [{"line": [0, 0, 0, 1], "state": "ajar"}]}]}, r"doors\[0\].state"),
     ({"levels": [{"walls": [], "windows": [[0, 0, 0]]}]}, r"windows\[0\]"),
     ({"levels": [{"walls": [], "obstacles": [[[0, 0], [1, 1], [0, 0]]]}]}, r"obstacles\[0\]"),
-    ({"levels": [{"walls": [[0, 0, 1, 10**400]]}]}, r"walls\[0\]: a huge number"),
-    ({"connectors": [{"kind": "hole"}]}, r"connectors\[0\].levels"),
-    ({"connectors": [{"kind": "hole", "levels": ["ground", "roof"]}]}, "no level is named 'roof'"),
-    ({"connectors": [{"kind": "hole", "levels": [0, 1]}]}, "from 0 to 0"),
-    ({"connectors": [{"kind": "hole", "levels": [0, True]}]}, "from 0 to 0"),
-    ({"connectors": [{"kind": "stairs", "levels": [0, 0]}]}, "two levels"),
+    ({"levels": [{"walls": [[0, 0, 1, 10**400]]}]}, r"walls\[0\]\[3\]: a huge number is not a finite"),
+    ({"connectors": [{"kind": "lift", "outline": CORNERS}]}, r"connectors\[0\].levels: missing"),
+    (
+        {"connectors": [{"kind": "hole", "levels": [0, 1], "outline": CORNERS}]},
+        r"kind: 'hole' is not one of stairs, lift",
+    ),
+    ({"connectors": [{"kind": "lift", "levels": ["ground", "roof"], "outline": CORNERS}]}, "no level is named 'roof'"),
+    ({"connectors": [{"kind": "lift", "levels": [0, 1], "outline": CORNERS}]}, "from 0 to 0"),
+    (
+        {"connectors": [{"kind": "lift", "levels": [0, True], "outline": CORNERS}]},
+        r"levels\[1\]: True is not the name or",
+    ),
+    ({"connectors": [{"kind": "lift", "levels": [0, 0], "outline": CORNERS}]}, "two levels"),
+    (
+        {"connectors": [{"kind": "lift", "levels": [0, 0]}]},
+        r"connectors\[0\].outline: missing, expected a list of corners",
+    ),
     ({"start": {"x": 1, "y": 2, "heading_deg": 0, "level": 1}}, "start.level"),
     ({"georeference": {"origin": [0, 91]}}, "georeference.origin"),
     ({"georeference": {"origin": [0]}}, "georeference.origin"),

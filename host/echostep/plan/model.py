@@ -9,19 +9,25 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 from pathlib import Path
-from typing import Any, Literal, cast, get_args
+from typing import Any
 
 import numpy as np
+from msgspec import UNSET
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.plan.json_fields import choice, number, outline, point, segment, segments, text, typed
+from echostep.fields import checked, short
+from echostep.plan import plan_file
+from echostep.plan.plan_file import ConnectorFields, DoorFields, LevelFields, PlanFields, RoomFields
 
 FORMAT_VERSION = 1
-DoorState = Literal["open", "closed", "unknown"]
-ConnectorKind = Literal["stairs", "lift", "ramp"]
+ConnectorKind = plan_file.ConnectorKind
+DoorState = plan_file.DoorState
+WITHOUT_LENGTH = "a wall without length: both ends are the same point"
 
 
 def _no_segments() -> Floats:
@@ -165,105 +171,82 @@ def parse_plan(raw: bytes) -> Plan:
 
 
 def _plan(tree: Any, digest: str) -> Plan:
-    tree = typed(tree, "the file", dict)
-    version = tree.get("echostep_plan")
+    version = tree.get("echostep_plan") if isinstance(tree, dict) else None
     if version != FORMAT_VERSION or version is True:
-        raise ValueError(
-            f"echostep_plan is {str(version)[:40]!r}, expected {FORMAT_VERSION}: is this an echostep plan?"
-        )
-    rows = typed(tree.get("levels"), "levels", list)
-    if not rows:
-        raise ValueError("levels: a plan needs at least one level")
-    levels = tuple(_level(row, f"levels[{i}]") for i, row in enumerate(rows))
-    names = [level.name for level in levels]
-    connectors = typed(tree.get("connectors", []), "connectors", list)
+        raise ValueError(f"echostep_plan is {short(version)}, expected {FORMAT_VERSION}: is this an echostep plan?")
+    fields = checked(tree, PlanFields)
+    levels = tuple(_level(level, f"levels[{i}]") for i, level in enumerate(fields.levels))
+    names, start, geo = [level.name for level in levels], fields.start, fields.georeference
+    start_level = 0 if start is None else _level_index(start.level, "start.level", names)
     return Plan(
-        name=text(tree.get("name", "plan"), "name"),
+        name=fields.name,
         levels=levels,
-        start=None if tree.get("start") is None else _start(tree["start"], names),
+        start=None if start is None else Pose(start.x, start.y, math.radians(start.heading_deg), start_level),
         digest=digest,
-        connectors=tuple(_connector(row, f"connectors[{i}]", names) for i, row in enumerate(connectors)),
-        georeference=None if tree.get("georeference") is None else _georeference(tree["georeference"]),
-        uncertainty_m=None if tree.get("uncertainty_m") is None else _uncertainty(tree["uncertainty_m"]),
+        connectors=tuple(_connector(row, f"connectors[{i}]", names) for i, row in enumerate(fields.connectors)),
+        georeference=None if geo is None else Georeference(*geo.origin, math.radians(geo.rotation_deg), geo.crs),
+        uncertainty_m=fields.uncertainty_m,
     )
 
 
-def _level(row: Any, where: str) -> Level:
-    row = typed(row, where, dict)
-    rooms, doors, obstacles = (
-        typed(row.get(key, []), f"{where}.{key}", list) for key in ("rooms", "doors", "obstacles")
-    )
+def _level(fields: LevelFields, where: str) -> Level:
     return Level(
-        name=text(row.get("name", where), f"{where}.name"),
-        height_m=number(row.get("height_m", 0.0), f"{where}.height_m"),
-        walls=segments(row.get("walls"), f"{where}.walls"),
-        rooms=tuple(_room(room, f"{where}.rooms[{i}]") for i, room in enumerate(rooms)),
-        doors=tuple(_door(door, f"{where}.doors[{i}]") for i, door in enumerate(doors)),
-        windows=segments(row.get("windows", []), f"{where}.windows"),
-        obstacles=tuple(outline(corners, f"{where}.obstacles[{i}]") for i, corners in enumerate(obstacles)),
-        doubtful=segments(row.get("doubtful", []), f"{where}.doubtful"),
+        name=where if fields.name is UNSET else fields.name,
+        height_m=fields.height_m,
+        walls=_segments(fields.walls, f"{where}.walls"),
+        rooms=tuple(_room(room, f"{where}.rooms[{i}]") for i, room in enumerate(fields.rooms)),
+        doors=tuple(_door(door, f"{where}.doors[{i}]") for i, door in enumerate(fields.doors)),
+        windows=_segments(fields.windows, f"{where}.windows"),
+        obstacles=tuple(_outline(corners, f"{where}.obstacles[{i}]") for i, corners in enumerate(fields.obstacles)),
+        doubtful=_segments(fields.doubtful, f"{where}.doubtful"),
     )
 
 
-def _room(row: Any, where: str) -> Room:
-    row = typed(row, where, dict)
-    corners = None if row.get("outline") is None else outline(row["outline"], f"{where}.outline")
-    return Room(text(row.get("name"), f"{where}.name"), point(row.get("at"), f"{where}.at"), corners)
+def _room(fields: RoomFields, where: str) -> Room:
+    corners = None if fields.outline is None else _outline(fields.outline, f"{where}.outline")
+    return Room(fields.name, fields.at, corners)
 
 
-def _door(row: Any, where: str) -> Door:
-    row = typed(row, where, dict)
-    state = choice(row.get("state", "unknown"), f"{where}.state", get_args(DoorState))
-    return Door(
-        segment(row.get("line"), f"{where}.line"), cast(DoorState, state), text(row.get("name", ""), f"{where}.name")
-    )
+def _door(fields: DoorFields, where: str) -> Door:
+    if fields.line[:2] == fields.line[2:]:
+        raise ValueError(f"{where}.line: {WITHOUT_LENGTH}")
+    return Door(fields.line, fields.state, fields.name)
 
 
-def _connector(row: Any, where: str, names: list[str]) -> Connector:
-    row = typed(row, where, dict)
-    references = typed(row.get("levels"), f"{where}.levels", list)
-    levels = sorted({_level_index(reference, f"{where}.levels", names) for reference in references})
+def _connector(fields: ConnectorFields, where: str, names: list[str]) -> Connector:
+    levels = sorted({_level_index(reference, f"{where}.levels", names) for reference in fields.levels})
     if len(levels) < 2:
         raise ValueError(f"{where}.levels: a connector needs two levels or more")
-    return Connector(
-        cast(ConnectorKind, choice(row.get("kind"), f"{where}.kind", get_args(ConnectorKind))),
-        text(row.get("name", ""), f"{where}.name"),
-        tuple(levels),
-        outline(row.get("outline"), f"{where}.outline"),
-    )
+    return Connector(fields.kind, fields.name, tuple(levels), _outline(fields.outline, f"{where}.outline"))
 
 
-def _level_index(value: Any, where: str, names: list[str]) -> int:
+def _level_index(reference: str | int, where: str, names: list[str]) -> int:
     """The index of a level that the file gives by its name or its index."""
-    if isinstance(value, str):
-        if names.count(value) != 1:
-            raise ValueError(f"{where}: {'two levels are' if value in names else 'no level is'} named {value[:40]!r}")
-        return names.index(value)
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < len(names):
+    if isinstance(reference, str):
+        if (count := names.count(reference)) != 1:
+            raise ValueError(f"{where}: {'two levels are' if count else 'no level is'} named {reference[:40]!r}")
+        return names.index(reference)
+    if not 0 <= reference < len(names):
         raise ValueError(f"{where}: expected names of levels or indices from 0 to {len(names) - 1}")
-    return value
+    return reference
 
 
-def _start(row: Any, names: list[str]) -> Pose:
-    row = typed(row, "start", dict)
-    x, y, heading = (number(row.get(key), f"start.{key}") for key in ("x", "y", "heading_deg"))
-    return Pose(x, y, math.radians(heading), _level_index(row.get("level", 0), "start.level", names))
+def _outline(points: Sequence[tuple[float, float]], where: str) -> Floats:
+    """An outline of at least three corners -> (n, 2) float64; corners repeated one after the other are one."""
+    if len(points) > plan_file.MOST_CORNERS:
+        raise ValueError(f"{where}: {len(points)} corners, expected {plan_file.MOST_CORNERS} at most")
+    corners = [corner for corner, _ in groupby(points)]
+    if len(corners) > 1 and corners[0] == corners[-1]:
+        corners.pop()
+    if len(set(corners)) < 3:
+        raise ValueError(f"{where}: an outline needs at least three different corners")
+    return np.array(corners, dtype=np.float64)
 
 
-def _georeference(row: Any) -> Georeference:
-    row = typed(row, "georeference", dict)
-    origin = typed(row.get("origin"), "georeference.origin", list)
-    if len(origin) != 2:
-        raise ValueError("georeference.origin: expected [longitude, latitude] in degrees")
-    return Georeference(
-        number(origin[0], "georeference.origin", 180.0, "degrees east"),
-        number(origin[1], "georeference.origin", 90.0, "degrees north"),
-        math.radians(number(row.get("rotation_deg", 0.0), "georeference.rotation_deg", 360.0, "degrees")),
-        text(row.get("crs", "EPSG:4326"), "georeference.crs"),
-    )
-
-
-def _uncertainty(value: Any) -> float:
-    if (sd_m := number(value, "uncertainty_m")) < 0.0:
-        raise ValueError(f"uncertainty_m: {sd_m} is negative")
-    return sd_m
+def _segments(rows: Sequence[tuple[float, float, float, float]], where: str) -> Floats:
+    """Segments, each with a length -> (n, 4) float64."""
+    segments = np.array(rows, dtype=np.float64).reshape(-1, 4)
+    without_length = (segments[:, :2] == segments[:, 2:]).all(axis=1)
+    if without_length.any():
+        raise ValueError(f"{where}[{without_length.argmax()}]: {WITHOUT_LENGTH}")
+    return segments

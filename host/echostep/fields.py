@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: MIT
+"""Fields of a message from outside: checked against a structure, with one sentence about a wrong one.
+
+In: parsed JSON or TOML, which may be hostile, and a msgspec struct or a dataclass. Out: the structure, or a ValueError that begins with the path of
+the wrong field, as `levels[0].doors[2].line`. Owns nothing: a type's `Meta(description=...)` says what its values are.
+"""
+
+from __future__ import annotations
+
+import re
+import reprlib
+from typing import Any, TypeVar
+
+import msgspec
+from msgspec import inspect
+
+# names of types without a description
+KINDS = {
+    "float": "a finite number", "int": "a whole number", "bool": "true or false", "str": "a text", "array": "a list", "object": "an object",
+}  # fmt: skip
+T = TypeVar("T")
+
+
+def checked(tree: Any, kind: type[T]) -> T:
+    """The tree as a structure of this kind; raises ValueError that names the wrong field, or says what the structure's own check says."""
+    try:
+        return msgspec.convert(tree, kind)
+    except msgspec.ValidationError as error:
+        raise ValueError(error.__cause__ or _sentence(error, tree, inspect.type_info(kind))) from error
+    except UnicodeEncodeError as error:  # of a lone surrogate, where no text is expected
+        raise ValueError(f"{short(error.object)} is not a text that can be written as UTF-8") from error
+
+
+def field_of(error: msgspec.ValidationError) -> tuple[str, bool]:
+    """The path of the field that an error is about, empty for the message itself, and whether the field is missing. Without text of the sender."""
+    words, _, path = str(error).rpartition(" - at `$")
+    words, path = (words, path.strip("`.")) if words else (path, "")
+    missing = re.match(r"Object missing required field `(\w+)`", words)
+    return (f"{path}.{missing[1]}".strip("."), True) if missing else (path, False)
+
+
+def short(value: Any) -> str:
+    """The value as shown in an error: a few dozen characters in one line."""
+    if isinstance(value, int) and value.bit_length() > 1000:
+        return "a huge number"
+    return reprlib.repr(value)
+
+
+def _sentence(error: msgspec.ValidationError, tree: Any, root: inspect.Type) -> str:
+    path, is_missing = field_of(error)
+    kind, description = _described(root)
+    for step in re.findall(r"\w+", path):
+        kind, description = _described(_inner(kind, step))
+        tree = tree.get(step) if isinstance(tree, dict) else tree[int(step)]
+    expected = re.match(r"Expected `(\w+)", str(error))
+    what = description or KINDS.get(expected[1] if expected else "", "a value that is allowed")
+    where = path or "the file"
+    return f"{where}: missing, expected {what}" if is_missing else f"{where}: {short(tree)} is not {what}"
+
+
+def _described(kind: inspect.Type) -> tuple[Any, str]:
+    """A type, of a union its first one, and what it says about its values; empty: nothing."""
+    kind = kind.types[0] if isinstance(kind, inspect.UnionType) else kind
+    if not isinstance(kind, inspect.Metadata):
+        return kind, ""
+    return kind.type, (kind.extra_json_schema or {}).get("description", "")
+
+
+def _inner(kind: Any, step: str) -> inspect.Type:
+    """The type of a field of a structure, or of an element of a list."""
+    if isinstance(kind, inspect.StructType | inspect.DataclassType):
+        return next(field.type for field in kind.fields if field.encode_name == step)
+    inner: inspect.Type = kind.item_types[int(step)] if isinstance(kind, inspect.TupleType) else kind.item_type
+    return inner

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: MIT
+"""The fields of plan.json: `plan/model.py` makes a `Plan` of them.
+
+In: nothing. Out: structs whose types check each field, and say what it is. Owns the limits.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import UNSET, Meta, Struct, UnsetType
+
+from echostep.plan.json_fields import LIMIT_M
+
+MOST_CORNERS = 10_000  # of an outline: a room of a drawing with arcs has hundreds
+DoorState = Literal["open", "closed", "unknown"]
+ConnectorKind = Literal["stairs", "lift", "ramp"]
+
+Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M, description=f"a finite number within {LIMIT_M:.0f} m")]
+Deviation = Annotated[float, Meta(ge=0.0, le=LIMIT_M, description=f"a finite number from 0 to {LIMIT_M:.0f} m")]
+Longitude = Annotated[float, Meta(ge=-180.0, le=180.0, description="a finite number within 180 degrees east")]
+Latitude = Annotated[float, Meta(ge=-90.0, le=90.0, description="a finite number within 90 degrees north")]
+Text = Annotated[str, Meta(pattern=r"^[^\ud800-\udfff]*$", description="a text")]  # that can be written as UTF-8
+Reference = Annotated[Text | int, Meta(description="the name or the index of a level")]
+Point = Annotated[tuple[Metres, Metres], Meta(description="[x, y] in metres")]
+Outline = Annotated[list[Point], Meta(description="a list of corners, [x, y] in metres")]
+Segment = Annotated[tuple[Metres, Metres, Metres, Metres], Meta(description="[x0, y0, x1, y1] in metres")]
+Segments = Annotated[list[Segment], Meta(description="a list of [x0, y0, x1, y1] in metres")]
+
+
+class RoomFields(Struct):
+    """A room, and where its name is written."""
+
+    name: Text
+    at: Point
+    outline: Outline | None = None
+
+
+class DoorFields(Struct):
+    """A gap in the walls."""
+
+    line: Segment
+    state: Annotated[DoorState, Meta(description="one of open, closed, unknown")] = "unknown"
+    name: Text = ""
+
+
+class LevelFields(Struct):
+    """One level."""
+
+    walls: Segments
+    name: Text | UnsetType = UNSET
+    height_m: Metres = 0.0
+    rooms: list[RoomFields] = []
+    doors: list[DoorFields] = []
+    windows: Segments = []
+    obstacles: list[Outline] = []
+    doubtful: Segments = []
+
+
+class ConnectorFields(Struct):
+    """Stairs, a lift or a ramp."""
+
+    kind: Annotated[ConnectorKind, Meta(description="one of stairs, lift, ramp")]
+    levels: list[Reference]
+    outline: Outline
+    name: Text = ""
+
+
+class StartFields(Struct):
+    """Where a walk begins."""
+
+    x: Metres
+    y: Metres
+    heading_deg: Annotated[
+        float, Meta(ge=-LIMIT_M, le=LIMIT_M, description=f"a finite number within {LIMIT_M:.0f} degrees")
+    ]
+    level: Reference = 0
+
+
+class GeoreferenceFields(Struct):
+    """Where the origin lies on Earth."""
+
+    origin: Annotated[tuple[Longitude, Latitude], Meta(description="[longitude, latitude] in degrees")]
+    rotation_deg: Annotated[float, Meta(ge=-360.0, le=360.0, description="a finite number within 360 degrees")] = 0.0
+    crs: Text = "EPSG:4326"
+
+
+class PlanFields(Struct):
+    """The whole file, but for the version of the format."""
+
+    levels: Annotated[list[LevelFields], Meta(min_length=1, description="a list of at least one level")]
+    name: Text = "plan"
+    connectors: list[ConnectorFields] = []
+    start: StartFields | None = None
+    georeference: GeoreferenceFields | None = None
+    uncertainty_m: Deviation | None = None
