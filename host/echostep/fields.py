@@ -53,9 +53,10 @@ def _sentence(error: msgspec.ValidationError, tree: Any, root: inspect.Type) -> 
         kind, description = _described(_inner(kind, step))
         tree = tree.get(step) if isinstance(tree, dict) else tree[int(step)]
     expected = re.match(r"Expected `(\w+)", str(error))
-    what = description or KINDS.get(expected[1] if expected else "", "a value that is allowed")
     where = path or "the file"
-    return f"{where}: missing, expected {what}" if is_missing else f"{where}: {short(tree)} is not {what}"
+    if is_missing:
+        return f"{where}: missing" + (f", expected {description}" if description else "")
+    return f"{where}: {short(tree)} is not {description or KINDS.get(expected[1] if expected else '', 'allowed')}"
 
 
 def _described(kind: inspect.Type) -> tuple[Any, str]:

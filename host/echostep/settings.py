@@ -7,14 +7,15 @@ In: a TOML file (sections named as the fields of `Settings`). Out: `Settings`. O
 from __future__ import annotations
 
 import dataclasses
-import math
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
+from sys import float_info
 from typing import Any
 
 from echostep.board.calibration import GyroSettings, Imus, ImuSettings, RangerSettings
 from echostep.errors import EchostepError
+from echostep.fields import checked, short
 from echostep.foot.steps import FootSettings
 from echostep.foot.trunk_path import GaitSettings
 from echostep.legs.heading import CompassErrors
@@ -78,28 +79,24 @@ def parse_settings(text: str, origin: str) -> Settings:
 
 def _settings_of(tree: dict[str, Any]) -> Settings:
     """Settings from a parsed TOML tree; raises ValueError that names the section and the field."""
-    sections = {f.name: f.default_factory for f in dataclasses.fields(Settings)}
-    sections_read: dict[str, Any] = {}
-    for name, rows in tree.items():
-        if name not in sections:
-            raise ValueError(f"[{name}] is no section; there are {', '.join(sections)}")
-        sections_read[name] = _section(name, rows, sections[name]())  # type: ignore[operator]
-    return Settings(**sections_read)
+    defaults = {f.name: getattr(Settings(), f.name) for f in dataclasses.fields(Settings)}
+    if unknown := tree.keys() - defaults.keys():
+        raise ValueError(f"[{min(unknown)}] is no section; there are {', '.join(defaults)}")
+    return Settings(**{name: _section(name, rows, defaults[name]) for name, rows in tree.items()})
 
 
 def _section(name: str, rows: Any, default: Any) -> Any:
     """A copy of the section's defaults with the fields of `rows`; raises ValueError that names the field."""
     if not isinstance(rows, dict):
         raise ValueError(f"{name}: expected a section, [{name}]")
-    known = {f.name: getattr(default, f.name) for f in dataclasses.fields(default)}
+    known = dataclasses.asdict(default)
     rows = {RENAMED.get((name, key), key): value for key, value in rows.items()}
     for key, value in rows.items():
         if key not in known:
             raise ValueError(f"[{name}] {key}: unknown; there are {', '.join(known)}")
-        if isinstance(value, bool) != isinstance(known[key], bool) or not isinstance(value, int | float | bool):
-            raise ValueError(f"[{name}] {key}: {value!r} is not a number like the default {known[key]!r}")
-        if isinstance(known[key], int) and not isinstance(value, int):
-            raise ValueError(f"[{name}] {key}: {value!r} is not a whole number")
-        if not math.isfinite(value) or (known[key] > 0 and value < 0):
-            raise ValueError(f"[{name}] {key}: {value!r} makes no sense; the default is {known[key]!r}")
-    return dataclasses.replace(default, **{k: type(known[k])(v) for k, v in rows.items()})
+        if isinstance(value, float | int) and (not abs(value) <= float_info.max or value < 0 < known[key]):
+            raise ValueError(f"[{name}] {key}: {short(value)} makes no sense; the default is {known[key]!r}")
+    try:
+        return checked(rows, type(default))
+    except ValueError as error:
+        raise ValueError(f"[{name}] {error}") from error

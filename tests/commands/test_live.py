@@ -166,6 +166,7 @@ def test_a_mistake_ends_with_one_line_that_names_it(tmp_path: Path, arguments: l
         ("[cloud]\nsize = 1.5", "size"),
         ("[cloud]\nsize = -4", "size"),
         ("[cloud]\nstart_sd_m = nan", "start_sd_m"),
+        ("[cloud]\nsize = 1" + 400 * "0", "size: a huge number"),
         ("[echo]\nsd_m = 0", "sd_m"),
         ("[mtx]\nrate_hz = 0", "rate_hz"),
         ("cloud = 3", "cloud"),

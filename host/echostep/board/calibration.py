@@ -57,7 +57,7 @@ class RangerSettings:
     def __post_init__(self) -> None:
         """Raise ValueError for rangers that do not look aside."""
         if abs(self.ahead_deg) > MOST_AHEAD_DEG:
-            raise ValueError(f"[ranger] ahead_deg: rangers look aside, at most {MOST_AHEAD_DEG:.0f} degrees off it")
+            raise ValueError(f"ahead_deg: rangers look aside, at most {MOST_AHEAD_DEG:.0f} degrees off it")
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,10 +51,10 @@ class CloudSettings:
     def __post_init__(self) -> None:
         """Raise ValueError for a cloud without particles."""
         if not 1 <= self.size <= 10_000_000:
-            raise ValueError(f"[cloud] size: {self.size} particles make no cloud")
+            raise ValueError(f"size: {self.size} particles make no cloud")
         for name in ("kld", "cell_m", "cell_deg"):
             if getattr(self, name) <= 0.0:
-                raise ValueError(f"[cloud] {name}: must be greater than 0")
+                raise ValueError(f"{name}: must be greater than 0")
 
 
 @dataclass(frozen=True, slots=True)

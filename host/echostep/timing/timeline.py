@@ -41,7 +41,7 @@ class MtxTiming:
     def __post_init__(self) -> None:
         """Raise ValueError for a rate that no MTx has."""
         if not 1.0 <= self.rate_hz <= 2000.0:
-            raise ValueError(f"[mtx] rate_hz: {self.rate_hz} is not a rate of an MTx")
+            raise ValueError(f"rate_hz: {self.rate_hz} is not a rate of an MTx")
 
 
 class Arrivals(NamedTuple):

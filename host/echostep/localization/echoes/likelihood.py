@@ -102,14 +102,14 @@ class EchoSettings:
         """Raise ValueError for lengths of zero and for numbers that are not probabilities."""
         for name in ("sd_m", "soft_db", "correlation_m", "outlier", "hidden", "hidden_m"):
             if getattr(self, name) <= 0.0:
-                raise ValueError(f"[echo] {name}: must be greater than 0")
+                raise ValueError(f"{name}: must be greater than 0")
         for name in ("hidden", "stray", "outlier"):
             if getattr(self, name) >= 1.0:
-                raise ValueError(f"[echo] {name}: must be a probability below 1")
+                raise ValueError(f"{name}: must be a probability below 1")
         if not 0.0 < self.own <= 1.0:
-            raise ValueError("[echo] own: must be a share above 0, at most 1")
+            raise ValueError("own: must be a share above 0, at most 1")
         if not 0.0 < self.minimum_m < 0.5 * self.maximum_m:
-            raise ValueError("[echo] minimum_m: must be well below maximum_m")
+            raise ValueError("minimum_m: must be well below maximum_m")
 
 
 class EchoModel(NamedTuple):
