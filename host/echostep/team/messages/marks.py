@@ -18,7 +18,7 @@ from typing import Annotated, Literal, TypeVar
 import msgspec
 from msgspec import Meta
 
-from echostep.team.messages.report import BadReportError, Metres, check_name, is_printable
+from echostep.team.messages.report import BadReportError, Metres, check_name, decoded, is_printable
 
 ROOT = "echostep-table"
 MARKS, ALL = f"{ROOT}/mark/#", f"{ROOT}/#"
@@ -164,6 +164,6 @@ class MarkBoard:
 
 def _decoded(payload: bytes, decoder: msgspec.json.Decoder[T], what: str) -> T:
     try:
-        return decoder.decode(payload)
-    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise BadReportError(f"not a valid {what}") from error
+        return decoded(payload, decoder)
+    except BadReportError as error:
+        raise BadReportError(f"not a valid {what}: {error}") from error

@@ -9,16 +9,18 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import unicodedata
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal, TypeVar
 
 import msgspec
 from msgspec import Meta
 
 from echostep.errors import EchostepError
+from echostep.fields import field_of
 
 MAX_PAYLOAD = 8192  # bytes; a report has about 900
 WITHOUT_PLAN = 64 * "0"  # the SHA-256 of no file: the wearer is tracked without a plan, in a frame of its own
@@ -212,6 +214,7 @@ class Presence:
     presence: Literal["online", "ended", "broken"]
 
 
+T = TypeVar("T")
 _REPORTS, _PRESENCES = msgspec.json.Decoder(Report), msgspec.json.Decoder(Presence)
 
 
@@ -222,7 +225,7 @@ def encode(report: Report | Presence) -> bytes:
 
 def decode(payload: bytes) -> Report:
     """Decode a payload; raises BadReportError and no other exception, for any bytes."""
-    report: Report = _decoded(payload, _REPORTS)
+    report = decoded(payload, _REPORTS)
     check_name(report.team)
     check_name(report.name)
     if not 0.0 <= report.stale_after_s <= 86_400.0:
@@ -245,11 +248,11 @@ def decode(payload: bytes) -> Report:
 
 def decode_presence(payload: bytes) -> Presence:
     """As `decode`, for a presence message."""
-    presence: Presence = _decoded(payload, _PRESENCES)
-    return presence
+    return decoded(payload, _PRESENCES)
 
 
-def _decoded(payload: bytes, decoder: msgspec.json.Decoder[Any]) -> Any:
+def decoded(payload: bytes, decoder: msgspec.json.Decoder[T]) -> T:
+    """The message in a payload; raises BadReportError that names the wrong field, without text of the sender, which may control a terminal."""
     if len(payload) > MAX_PAYLOAD:
         raise BadReportError("too long")
     try:
@@ -257,17 +260,13 @@ def _decoded(payload: bytes, decoder: msgspec.json.Decoder[Any]) -> Any:
     except UnicodeDecodeError as error:
         raise BadReportError("not UTF-8") from error
     except msgspec.ValidationError as error:
-        raise BadReportError(_named(str(error))) from error
+        path, is_missing = field_of(error)
+        name = re.sub(r"\[\d+\]", "", path)  # as many sentences as fields
+        raise BadReportError(
+            f"no field `{name}`" if is_missing else f"wrong field {name}" if name else "not a report"
+        ) from error
     except (msgspec.DecodeError, RecursionError) as error:
         raise BadReportError("not JSON") from error
-
-
-def _named(error: str) -> str:
-    """The error of msgspec without text of the sender, which may contain control sequences for a terminal."""
-    if "missing required field" in error:
-        return error.replace("Object missing required", "no")
-    at = error.rpartition(" - at `$.")[2].rstrip("`")
-    return f"wrong field {at}" if at.replace(".", "").replace("_", "").isalnum() and at.isascii() else "not a report"
 
 
 def check_name(text: str) -> None:
