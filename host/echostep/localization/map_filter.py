@@ -48,6 +48,7 @@ from echostep.localization.settings import FilterSettings, echo_models, with_pla
 from echostep.localization.team.meetings import (
     FITS,
     WRONG,
+    Meeting,
     MeetingEffect,
     MeetingMemory,
     moved_by,
@@ -57,7 +58,6 @@ from echostep.localization.team.meetings import (
 from echostep.localization.window import RecentWay
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
-from echostep.ports.people.meeting import Meeting
 
 SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports the cloud, assumed
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate: no plan is more exact

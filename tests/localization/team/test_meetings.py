@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -25,9 +24,9 @@ from echostep.localization.team.meetings import (
     PLACE_M,
     RENEWED_M,
     WRONG,
+    Meeting,
     MeetingEffect,
     MeetingMemory,
-    PreparedMeeting,
     best_omega,
     covariance,
     information,
@@ -39,7 +38,7 @@ from echostep.localization.team.meetings import (
 from echostep.path import Odometer, PathSegment
 from echostep.plan.model import Plan, Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
-from echostep.ports.people.meeting import MEETING, Meeting, parse_meeting
+from echostep.ports.people.meeting import MEETING, MeetingMessage, parse_meeting
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import lay_out_levels
 from walks import walk_chunks
@@ -48,6 +47,7 @@ PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 AREA_M2 = 250.0
 KIM = Meeting("kim", "tracking", 4.0, 5.0, 0, 0.01, 0.0, 0.01)
 FAR = Meeting("eve", "tracking", 20.0, 2.0, 0, 0.0025, 0.0, 0.0025)
+FAR_MESSAGE = MeetingMessage("eve", "tracking", 20.0, 2.0, 0, 0.0025, 0.0, 0.0025)
 
 
 def cloud(mean: tuple[float, float], sd: tuple[float, float], size: int = 20_000, seed: int = 1) -> Cloud:
@@ -144,7 +144,7 @@ def test_a_meeting_on_the_way_is_at_the_places_to_which_it_leads(turn_rad: float
 def test_a_range_is_from_the_place_at_which_it_was_measured() -> None:
     """The cloud of a stride's begin is 3 m from the beacon, at its end 1.8 m."""
     segment = PathSegment(10.0, 11.0, 1.2, 0.0, 0.0, 0.0, 0.02, 0.001, 1)
-    measured = msgspec.structs.replace(KIM, range_m=1.8, range_sd_m=0.2)
+    measured = replace(KIM, range_m=1.8, range_sd_m=0.2)
     rights = [
         weigh(cloud((1.0, 5.0), (0.05, 0.05), 500), on_the_way(measured, segment, t_s), AREA_M2) for t_s in (10.0, 11.0)
     ]
@@ -156,7 +156,6 @@ def test_the_way_to_a_meeting_ends_with_its_segment_and_a_guess_is_none() -> Non
     segment = PathSegment(10.0, 12.0, 1.2, 0.4, 0.0, 0.0, 0.02, 0.001, 1)
     for t_s, share in ((-math.inf, 0.0), (9.0, 0.0), (11.0, 0.5), (13.0, 1.0)):
         met = on_the_way(KIM, segment, t_s)
-        assert isinstance(met, PreparedMeeting)
         assert (met.way_x_m, met.way_y_m) == pytest.approx((1.2 * share, 0.4 * share))
         assert start_at(met).sd_m >= start_at(KIM).sd_m
     assert on_the_way(KIM, replace(segment, sd_m=50.0), 11.0) is KIM
@@ -264,7 +263,7 @@ def test_an_old_report_says_less() -> None:
 
 @given(st.binary(max_size=600) | st.sampled_from([
     b'{"name":"k","status":"tracking","x_m":1e999,"y_m":0,"level":0,"xx_m2":1,"xy_m2":0,"yy_m2":1}', b"[" * 500,
-    Meeting("kim", "tracking", 4.0, 5.0, 0, 0.01, 0.5, 0.01).encode(), Meeting("kim", "tracking", 4.0, 5.0, 9, 1.0, 0.0, 1.0).encode(),
+    MeetingMessage("kim", "tracking", 4.0, 5.0, 0, 0.01, 0.5, 0.01).encode(), MeetingMessage("kim", "tracking", 4.0, 5.0, 9, 1.0, 0.0, 1.0).encode(),
 ]))  # fmt: skip
 def test_hostile_meetings_are_counted(payload: bytes) -> None:
     tracker = _SHARED
@@ -278,7 +277,7 @@ _SHARED = Tracker(PLAN)
 
 
 def test_a_meeting_comes_back_from_its_bytes() -> None:
-    met = Meeting("Kim", "uncertain", 1.25, -2.5, 3, 0.5, 0.1, 0.25, 1.5, 0.75, 2.0, 0.1)
+    met = MeetingMessage("Kim", "uncertain", 1.25, -2.5, 3, 0.5, 0.1, 0.25, 1.5, 0.75, 2.0, 0.1)
     assert parse_meeting(met.encode()) == met
 
 
@@ -288,7 +287,7 @@ def test_where_no_start_is_known_a_meeting_is_one() -> None:
     tracker = Tracker(replace(PLAN, start=None), waits=True)
     half = len(chunks) // 2
     assert tracker.take(portion_of(chunks[:half])) == []
-    tracker.feed(Chunk(MEETING, chunks[half].t_arrival_ns, FAR.encode()))
+    tracker.feed(Chunk(MEETING, chunks[half].t_arrival_ns, FAR_MESSAGE.encode()))
     estimates = tracker.take(portion_of(chunks[half:]))
     assert math.hypot(estimates[0].x_m - 20.0, estimates[0].y_m - 2.0) < 2.0
 
@@ -297,7 +296,7 @@ def test_where_no_start_is_known_a_meeting_is_one() -> None:
 def test_a_replay_has_the_same_meetings_in_any_portions() -> None:
     chunks = list(walk_chunks())
     at = 2 * len(chunks) // 3
-    chunks.insert(at, Chunk(MEETING, chunks[at].t_arrival_ns, FAR.encode()))
+    chunks.insert(at, Chunk(MEETING, chunks[at].t_arrival_ns, FAR_MESSAGE.encode()))
     runs = []
     for size in (1, 37, 5000):
         tracker = Tracker(PLAN, Start(), seed=2)

@@ -21,13 +21,12 @@ from echostep.localization.building import Building
 from echostep.localization.estimate import Estimate, digest
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.start import Start
-from echostep.localization.team.meetings import RENEWED_M, MeetingEffect, MeetingMemory, MeetingQueue
+from echostep.localization.team.meetings import RENEWED_M, Meeting, MeetingEffect, MeetingMemory, MeetingQueue
 from echostep.localization.team.shared_beacons import MOST_TEAMMATES, TeamBeaconMap
 from echostep.page.elements.marks import beacon_marks
 from echostep.path import Odometer
 from echostep.plan.model import Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
-from echostep.ports.people.meeting import Meeting
 from echostep.ports.people.team_beacons import MOST_SHARED, TEAM_BEACONS, SharedBeacon, TeamBeacons, parse_team_beacons
 from echostep.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
 from echostep.simulation.devices.board import PythonBoard

@@ -4,7 +4,7 @@
 In: a cloud with its probability, a `Meeting`. Out: the same cloud, reweighted, and how well the meeting fits it; which meetings count. Owns the model
 and its constants, when each teammate was met, and the meetings that wait.
 
-The cloud is that at the begin of a segment, the meeting happened during it, up to a stride later: `PreparedMeeting` carries the displacement until
+The cloud is that at the begin of a segment, the meeting happened during it, up to a stride later: `on_the_way` gives it the displacement until
 then, and each particle is reweighted at its place displaced by it.
 
 If the meeting is right, the wearer stands beside the teammate: the offset is N(0, SIDE_SD_M^2) per axis after a tap, and a radio range is N(distance,
@@ -24,11 +24,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
-import msgspec
 import numpy as np
+from msgspec import structs
 
 from echostep.arrays import Bools, Floats
 from echostep.localization.belief import DOUBTED, CloudHypothesis
@@ -37,7 +37,7 @@ from echostep.localization.height.levels import SAME_LEVEL_M
 from echostep.localization.particles.cloud import Cloud
 from echostep.path import Odometer, PathSegment
 from echostep.ports.people.check_in import MOST_SD_M, CheckIn
-from echostep.ports.people.meeting import Meeting, parse_meeting
+from echostep.ports.people.meeting import parse_meeting
 
 # Assumed, not measured.
 SIDE_SD_M = 0.6  # per axis, of the offset between two people side by side: an arm's length
@@ -58,15 +58,33 @@ PLACE_M = 2.0  # radio range within which the teammate's place is the wearer's, 
 MOST_NAMES = 4096  # teammates and beacons that are remembered: the most of a team's beacons that a tracker keeps
 MOST_WAITING = 64  # meetings that wait for their segment
 
-TimedMeeting = tuple[float, Meeting]  # time (s) of a meeting, -inf where it is not known
 
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """A meeting as the filter uses it: the fields of a `MeetingMessage`, and the displacement (walk frame) since the moment of the cloud.
 
-class PreparedMeeting(Meeting, frozen=True):
-    """A meeting, with the displacement (m, walk frame) since the moment of the cloud; `share`: 1 / number of meetings from one measurement."""
+    `share`: the power of its likelihood, 1 / number of meetings that rest on one measurement.
+    """
 
+    name: str
+    status: str
+    x_m: float
+    y_m: float
+    level: int
+    xx_m2: float
+    xy_m2: float
+    yy_m2: float
+    age_s: float = 0.0
+    level_probability: float = 1.0
+    range_m: float | None = None
+    range_sd_m: float = 0.0
+    beacon: int | None = None
     way_x_m: float = 0.0
     way_y_m: float = 0.0
     share: float = 1.0
+
+
+TimedMeeting = tuple[float, Meeting]  # time (s) of a meeting, -inf where it is not known
 
 
 def on_the_way(meeting: Meeting, segment: PathSegment, t_s: float) -> Meeting:
@@ -75,8 +93,7 @@ def on_the_way(meeting: Meeting, segment: PathSegment, t_s: float) -> Meeting:
     if segment.unobserved or span_s <= 0.0:
         return meeting
     share = min(max((t_s - segment.t0_s) / span_s, 0.0), 1.0)
-    way = {"way_x_m": share * segment.dx_m, "way_y_m": share * segment.dy_m}
-    return PreparedMeeting(**(msgspec.structs.asdict(meeting) | way))
+    return replace(meeting, way_x_m=share * segment.dx_m, way_y_m=share * segment.dy_m)
 
 
 def carries_position(meeting: Meeting) -> bool:
@@ -94,15 +111,10 @@ def covariance(meeting: Meeting) -> Floats:
     return total
 
 
-def share_of(meeting: Meeting) -> float:
-    """The power of a meeting's likelihood: the powers of all meetings that rest on one measurement sum to 1."""
-    return meeting.share if isinstance(meeting, PreparedMeeting) else 1.0
-
-
 def start_at(meeting: Meeting) -> CheckIn:
     """A start by a meeting alone: about the teammate, within the radio's range and the way until then, with any heading."""
     range_m = 0.0 if meeting.range_m is None else meeting.range_m
-    way_m2 = meeting.way_x_m**2 + meeting.way_y_m**2 if isinstance(meeting, PreparedMeeting) else 0.0
+    way_m2 = meeting.way_x_m**2 + meeting.way_y_m**2
     sd_m = math.sqrt(0.5 * (float(np.trace(covariance(meeting))) + range_m**2 + way_m2))
     return CheckIn(meeting.x_m, meeting.y_m, None, min(max(sd_m, RANGE_BODY_SD_M), MOST_SD_M), meeting.level)
 
@@ -148,10 +160,9 @@ def best_omega(own: Floats, other: Floats) -> float:
 def places_at(cloud: Cloud, meeting: Meeting) -> Floats:
     """Places (n, 2) of the particles at the meeting, map frame."""
     place: Floats = np.column_stack([cloud.map_x_m, cloud.y_m])
-    if isinstance(meeting, PreparedMeeting):
-        c, s = np.cos(cloud.turn_rad), np.sin(cloud.turn_rad)
-        x, y = meeting.way_x_m, meeting.way_y_m
-        place += cloud.scale[:, None] * np.column_stack([c * x - s * y, s * x + c * y])
+    c, s = np.cos(cloud.turn_rad), np.sin(cloud.turn_rad)
+    x, y = meeting.way_x_m, meeting.way_y_m
+    place += cloud.scale[:, None] * np.column_stack([c * x - s * y, s * x + c * y])
     return place
 
 
@@ -170,7 +181,7 @@ def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
     right = density / (density + wrong * anywhere)
     factor = log_met if cloud.is_coarse else _intersection(meeting, place, weight, log_met) if right >= FITS else None
     if factor is not None:  # a cloud that is concentrated elsewhere is not changed
-        factor = share_of(meeting) * factor
+        factor = meeting.share * factor
         factor -= factor.max()
         factor -= math.log(float(weight @ np.exp(factor)))
         # Right or wrong, in these shares: a mixture of the reweighted cloud and the old one.
@@ -293,11 +304,11 @@ class MeetingQueue:
 
     def receive(self, payload: bytes, levels: int) -> Meeting | None:
         """The meeting in the bytes of a chunk, on a plan of so many levels; bytes that are none are counted."""
-        meeting = parse_meeting(payload)
-        if meeting is None or meeting.level >= levels:
+        message = parse_meeting(payload)
+        if message is None or message.level >= levels:
             self.counts["bad"] += 1
             return None
-        return meeting
+        return Meeting(**structs.asdict(message))
 
     def add(self, meeting: Meeting, t_s: float) -> None:
         """Keep a meeting of this time; of too many the oldest are dropped."""
@@ -326,7 +337,7 @@ def weigh_range(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> floa
     right = weigh(each.cloud, meeting, area_m2)
     if each.has_contracted or each.is_stated:
         before = each.doubts.get(meeting.name, 0.0)
-        after = before + share_of(meeting) * math.log(WRONG[meeting.status] / max(1.0 - right, LEAST_WRONG))
+        after = before + meeting.share * math.log(WRONG[meeting.status] / max(1.0 - right, LEAST_WRONG))
         each.doubts[meeting.name] = min(max(after, MOST_DOUBT), 0.0)
         each.plausibility.add(each.doubts[meeting.name] - before)
     return right

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from echostep.board.gateway import BeaconReading
 from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.team.meetings import PreparedMeeting, TimedMeeting
+from echostep.localization.team.meetings import Meeting, TimedMeeting
 from echostep.ports.people.team_beacons import SharedBeacon, parse_team_beacons
 
 MOST_TEAMMATES = 64  # whose beacons are kept, the newest, assumed
@@ -69,9 +69,9 @@ class TeamBeaconMap:
         return meetings
 
 
-def _range_to(name: str, b: SharedBeacon, reading: BeaconReading, share: float) -> PreparedMeeting:
+def _range_to(name: str, b: SharedBeacon, reading: BeaconReading, share: float) -> Meeting:
     """A reading as a range to the place that the teammate `name` reports for the beacon."""
-    return PreparedMeeting(
+    return Meeting(
         name, "uncertain", b.x_m, b.y_m, b.level, b.xx_m2, b.xy_m2, b.yy_m2,
         range_m=reading.range_m, range_sd_m=TEAM_RANGE_SD_M, beacon=b.number, share=share,
     )  # fmt: skip

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Meeting: another wearer is beside this one, as a chunk of the port `MEETING`, with what that wearer's tracker has reported.
 
-In: a tap or a radio range, and the position of a report. Out: the bytes of a chunk, and a `Meeting` from such bytes, which may be damaged or hostile.
-Owns the limits. The bytes are recorded like those of any port, so a replay has the same meetings in the same order.
+In: a tap or a radio range, and the position of a report. Out: the bytes of a chunk; a `MeetingMessage` from such bytes, which may be damaged or
+hostile. Owns the limits. The bytes are recorded like those of any port, so a replay has the same meetings in the same order.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ MOST_BYTES = 512  # of one encoded meeting; assumed
 MOST_RANGE_M = 1000.0  # beyond the reach of any radio for short ranges
 
 
-class Meeting(msgspec.Struct, frozen=True):
+class MeetingMessage(msgspec.Struct, frozen=True):
     """A wearer is near: the newest position (x_m, y_m) on `level` that the wearer's tracker reported, with its covariance (m2), `age_s` ago.
 
     `level_probability`: of that level. `range_m`: the distance by radio, with standard deviation `range_sd_m`; None: a tap says "side by side".
@@ -45,10 +45,10 @@ class Meeting(msgspec.Struct, frozen=True):
         return msgspec.json.encode(self)
 
 
-_DECODER = msgspec.json.Decoder(Meeting)
+_DECODER = msgspec.json.Decoder(MeetingMessage)
 
 
-def parse_meeting(payload: bytes) -> Meeting | None:
+def parse_meeting(payload: bytes) -> MeetingMessage | None:
     """The meeting in a chunk; None when the bytes are none, or hold no covariance."""
     meeting = decoded(payload, _DECODER, MOST_BYTES)
     return meeting if meeting is not None and has_covariance(meeting) else None

@@ -19,7 +19,7 @@ from echostep.localization.estimate import Estimate
 from echostep.localization.particles.start import Start
 from echostep.plan.model import Pose
 from echostep.ports.chunks import Chunk, portion_of
-from echostep.ports.people.meeting import MEETING, Meeting
+from echostep.ports.people.meeting import MEETING, MeetingMessage
 from echostep.ports.people.team_beacons import TEAM_BEACONS, TeamBeacons
 from echostep.simulation.scenario import START_NS
 from echostep.team.messages.meeting import meeting_with
@@ -112,7 +112,7 @@ class _Wearer:
             if len(early) < len(portion):
                 return
 
-    def meet(self, meeting: Meeting, t_s: float) -> None:
+    def meet(self, meeting: MeetingMessage, t_s: float) -> None:
         """Give the tracker a meeting now."""
         self.hear(Chunk(MEETING, START_NS + int(1e9 * t_s), meeting.encode()))
 
@@ -123,7 +123,7 @@ class _Wearer:
 
 def _report(
     walks: TeamWalks, team: Sequence[_Wearer], who: int, encounter: Encounter, how: How, rng: np.random.Generator
-) -> Meeting | None:
+) -> MeetingMessage | None:
     """The report about this wearer that the other tracker gets."""
     team[who].advance(encounter.t_s)
     estimate = team[who].tracker.state.estimate
