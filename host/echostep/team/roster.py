@@ -14,6 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+from echostep.ports.people.team_beacons import BEACONS, parse_team_beacons
 from echostep.team.messages.report import (
     BadReportError,
     Position,
@@ -23,7 +24,6 @@ from echostep.team.messages.report import (
     decode,
     decode_presence,
 )
-from echostep.team.messages.shared_beacons import BEACONS, decode_beacons
 from echostep.team.outbox import aged
 
 MAX_MEMBERS = 256
@@ -131,7 +131,7 @@ class Roster:
             elif leaf == "presence":
                 self._receive_presence(team, name, decode_presence(payload))
             elif leaf == BEACONS:
-                decode_beacons(name, payload)
+                _check_beacons(name, payload)
             else:
                 raise BadReportError("unknown topic")
         except BadReportError as error:
@@ -241,6 +241,14 @@ def _topic_parts(topic: str | None) -> tuple[str, str, str]:
     for name in parts[1:3]:
         check_name(name)
     return parts[1], parts[2], parts[3]
+
+
+def _check_beacons(name: str, payload: bytes) -> None:
+    """Raises BadReportError for a payload that is not the beacons of this wearer."""
+    if (beacons := parse_team_beacons(payload)) is None:
+        raise BadReportError("not valid beacons")
+    if beacons.name != name:
+        raise BadReportError("beacons and topic contradict each other")
 
 
 def _jumps(before: Position | None, after: Position | None) -> bool:

@@ -7,16 +7,33 @@ hostile. Owns the limits. The bytes are recorded like those of any port, so a re
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Protocol
 
 import msgspec
 from msgspec import Meta
 
-from echostep.ports.people.payloads import Level, Metres, Variance, decoded, has_covariance
+from echostep.ports.people.payloads import MOST_LEVELS, Level, Metres, Spread, Variance, decoded, has_covariance
 
+Status = Literal["tracking", "uncertain", "lost"]
+KNOWN: dict[str, Status] = {"tracking": "tracking", "uncertain": "uncertain"}  # any other state carries no position
 MEETING = "meeting"  # name of the port
 MOST_BYTES = 512  # of one encoded meeting; assumed
 MOST_RANGE_M = 1000.0  # beyond the reach of any radio for short ranges
+
+
+class ReportedPosition(Spread, Protocol):
+    """A position as teammates report it."""
+
+    @property
+    def x_m(self) -> float: ...
+    @property
+    def y_m(self) -> float: ...
+    @property
+    def floor(self) -> int: ...
+    @property
+    def floor_probability(self) -> float: ...
+    @property
+    def age_s(self) -> float: ...
 
 
 class MeetingMessage(msgspec.Struct, frozen=True):
@@ -27,7 +44,7 @@ class MeetingMessage(msgspec.Struct, frozen=True):
     """
 
     name: Annotated[str, Meta(min_length=1, max_length=32)]
-    status: Literal["tracking", "uncertain", "lost"]
+    status: Status
     x_m: Metres
     y_m: Metres
     level: Level
@@ -46,6 +63,18 @@ class MeetingMessage(msgspec.Struct, frozen=True):
 
 
 _DECODER = msgspec.json.Decoder(MeetingMessage)
+
+
+def meeting_with(
+    name: str, status: str, p: ReportedPosition, measured: tuple[float, float] | None = None
+) -> MeetingMessage | None:
+    """A meeting with a teammate, from its report; None on a floor that no plan has. `measured`: a radio range and its standard deviation (m)."""
+    if not 0 <= p.floor < MOST_LEVELS:
+        return None
+    range_m, range_sd_m = (None, 0.0) if measured is None else measured
+    return MeetingMessage(
+        name, KNOWN.get(status, "lost"), p.x_m, p.y_m, p.floor, p.xx_m2, p.xy_m2, p.yy_m2, p.age_s, p.floor_probability, range_m, range_sd_m,
+    )  # fmt: skip
 
 
 def parse_meeting(payload: bytes) -> MeetingMessage | None:

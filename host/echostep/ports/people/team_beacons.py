@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Beacons that a teammate has placed: the message on the broker, and the same bytes as a chunk of the port `TEAM_BEACONS`.
+"""Beacons that a teammate has placed: retained messages on `echostep/<team>/<wearer>/beacons`, and chunks of the port `TEAM_BEACONS`.
 
-In: places of beacons by a teammate's tracker. Out: the bytes, and `TeamBeacons` from such bytes, which may be damaged or hostile. Owns the limits.
+In: places of beacons by a tracker. Out: topic and bytes, and `TeamBeacons` from such bytes, which may be damaged or hostile. Owns the limits.
 The bytes are recorded like those of any port, so a replay has the same beacons in the same order.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import msgspec
@@ -15,12 +16,15 @@ from msgspec import Meta
 from echostep.ports.people.payloads import Level, Metres, Variance, decoded, has_covariance
 
 TEAM_BEACONS = "team_beacons"  # name of the port
+BEACONS = "beacons"  # last part of the topic
+SHARE_S = 5.0  # between two messages of a wearer, at least; assumed
 MOST_BYTES = 8192  # of one encoded message; 64 beacons have 6,500
 MOST_SHARED = 64  # beacons of one teammate: the most that a gateway tells apart
 MOST_NUMBER = 0xFFFF  # of a beacon [protocol/messages.toml, beacon]
 
 
-class SharedBeacon(msgspec.Struct, frozen=True):
+@dataclass(frozen=True, slots=True)
+class SharedBeacon:
     """Beacon `number` at (x_m, y_m) on `level` of the plan, with the covariance (m2) of its place, the placing wearer's own error included."""
 
     number: Annotated[int, Meta(ge=0, le=MOST_NUMBER)]
@@ -40,6 +44,10 @@ class TeamBeacons(msgspec.Struct, frozen=True):
     run: Annotated[str, Meta(pattern="^[0-9a-f]{8}$")]
     plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
     beacons: Annotated[tuple[SharedBeacon, ...], Meta(max_length=MOST_SHARED)]
+
+    def topic(self, team: str) -> str:
+        """Where the broker keeps the message."""
+        return f"echostep/{team}/{self.name}/{BEACONS}"
 
     def encode(self) -> bytes:
         """The message as JSON: the bytes of a chunk."""

@@ -16,12 +16,11 @@ from dataclasses import replace
 from echostep.localization.team.shared_beacons import MOST_TEAMMATES
 from echostep.page.shared_drawing import SharedDrawing
 from echostep.plan.model import Plan
-from echostep.ports.people.team_beacons import SharedBeacon, TeamBeacons, parse_team_beacons
+from echostep.ports.people.meeting import meeting_with
+from echostep.ports.people.team_beacons import BEACONS, SHARE_S, SharedBeacon, TeamBeacons, parse_team_beacons
 from echostep.session.team.subscription import LOOK_S, TeamSubscription
 from echostep.team.endpoint import Outlet
 from echostep.team.inbox import ReceivedMessage
-from echostep.team.messages.meeting import meeting_with
-from echostep.team.messages.shared_beacons import BEACONS, SHARE_S, beacons_message
 from echostep.team.messages.shared_drawings import drawing_topic
 from echostep.team.roster import Member, MemberState, Roster
 
@@ -86,7 +85,7 @@ class TeammateFeed:
         if now_s - self._shared_s < SHARE_S or (beacons := own_beacons()) is None:
             return
         message = TeamBeacons(1, self._own[1], self._run, self._plan.digest, beacons)
-        topic, payload = beacons_message(self._own[0], message)
+        topic, payload = message.topic(self._own[0]), message.encode()
         if payload != self._shared and (beacons or self._shared) and self._subscription.send(topic, payload):
             self._shared, self._shared_s = payload, now_s
 

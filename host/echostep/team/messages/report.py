@@ -21,6 +21,7 @@ from msgspec import Meta
 
 from echostep.errors import EchostepError
 from echostep.fields import field_of
+from echostep.ports.people.payloads import has_covariance
 
 MAX_PAYLOAD = 8192  # bytes; a report has about 900
 WITHOUT_PLAN = 64 * "0"  # the SHA-256 of no file: the wearer is tracked without a plan, in a frame of its own
@@ -237,7 +238,7 @@ def decode(payload: bytes) -> Report:
         raise BadReportError("status and last place contradict each other")
     texts = [report.plan, report.version, *findings]
     for q in (p, report.last_place):
-        if q is not None and q.xy_m2**2 > q.xx_m2 * q.yy_m2 * (1.0 + 1e-9) + 1e-12:
+        if q is not None and not has_covariance(q):
             raise BadReportError("position: not a covariance")
         texts += [q.floor_name, q.where] if q else []
     for text in texts:

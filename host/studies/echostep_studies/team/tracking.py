@@ -19,11 +19,9 @@ from echostep.localization.estimate import Estimate
 from echostep.localization.particles.start import Start
 from echostep.plan.model import Pose
 from echostep.ports.chunks import Chunk, portion_of
-from echostep.ports.people.meeting import MEETING, MeetingMessage
-from echostep.ports.people.team_beacons import TEAM_BEACONS, TeamBeacons
+from echostep.ports.people.meeting import MEETING, MeetingMessage, meeting_with
+from echostep.ports.people.team_beacons import SHARE_S, TEAM_BEACONS, TeamBeacons
 from echostep.simulation.scenario import START_NS
-from echostep.team.messages.meeting import meeting_with
-from echostep.team.messages.shared_beacons import SHARE_S
 from echostep.team.outbox import aged
 from echostep.team.publish import position_of
 from echostep.tracker import Tracker
