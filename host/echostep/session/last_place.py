@@ -10,10 +10,11 @@ from __future__ import annotations
 import json
 import math
 import os
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+import msgspec
 from serial.tools import list_ports
 
 from echostep.errors import EchostepError
@@ -22,7 +23,7 @@ from echostep.localization.height.levels import ClimbSettings
 from echostep.localization.particles.start import Start
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan
-from echostep.session.metadata import LAST, air_of, bounded
+from echostep.session.metadata import LAST, bounded, possible
 from echostep.tracker import Tracker
 from echostep.tracker.last_place import LastPlace, start_after
 
@@ -78,18 +79,14 @@ def read_kept(folder: Path) -> Kept:
     path = folder / FILE
     try:
         with path.open("rb") as file:
-            tree = json.loads(file.read(MOST_BYTES))
-        place, air = tree["place"], air_of(tree["place"]["air"])
-        x, y = bounded([float(place["x_m"]), float(place["y_m"])])
-        (sd,) = bounded([float(place["sd_m"])], least=0.0)
-        if place["level"] < 0:
-            raise ValueError
-        last = LastPlace(x, y, sd, int(place["level"]), air)
-        utc = datetime.fromisoformat(tree["utc"])
-        return Kept(last, utc.astimezone(UTC), str(tree["plan_sha256"]), str(tree["board"]))
+            kept = msgspec.json.decode(file.read(MOST_BYTES), type=Kept)
+        bounded([kept.place.x_m, kept.place.y_m])
+        bounded([kept.place.sd_m, kept.place.level], least=0.0)
+        possible(kept.place.air)
+        return replace(kept, utc=kept.utc.astimezone(UTC))
     except FileNotFoundError as error:
         raise EchostepError(f"--start {LAST}: {path}: no run has kept a place there: {GIVE}") from error
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as error:
+    except (OSError, ValueError, OverflowError, RecursionError, msgspec.MsgspecError) as error:
         raise EchostepError(f"--start {LAST}: {path} cannot be used: {GIVE}") from error
 
 

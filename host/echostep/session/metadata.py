@@ -15,9 +15,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 from echostep.board.messages import SCHEMA_HASH
 from echostep.errors import EchostepError
@@ -34,6 +36,20 @@ CHECK_IN_START = "tapped"  # value of the field `start`: the walk begins at a ch
 LAST = "last"  # value of `--start`: where the last live run ended
 SIMULATED = "simulated"  # value of the field `source`
 START_LIMIT_M = 1e6  # of a start's x and y: no plan is larger
+Coordinate = Annotated[float, Meta(ge=-START_LIMIT_M, lt=START_LIMIT_M)]
+
+
+class RecordedRoom(msgspec.Struct):
+    """The field `start_room`: the walk begins in this outline, None: anywhere, on this level."""
+
+    outline_m: list[tuple[Coordinate, Coordinate]] | None = None
+    level: int = ANY_LEVEL
+
+
+class RecordedPause(msgspec.Struct):
+    """The field `start_after_pause`: the heights by the barometer of the run before, None where there are none."""
+
+    air: Air | None
 
 
 def run_metadata(
@@ -90,12 +106,9 @@ def recorded_start(metadata: Mapping[str, str], path: Path) -> Pose | Start | No
     """The start of a recorded run, None when there is none; raises EchostepError when it is damaged."""
     try:
         if metadata.get("start") == ANYWHERE:
-            room = json.loads(metadata.get("start_room", "{}"))
-            outline = room.get("outline_m")
-            return Start(
-                room_m=None if outline is None else np.array(bounded(np.ravel(outline))).reshape(-1, 2),
-                level=int(room.get("level", ANY_LEVEL)),
-            )
+            room = msgspec.json.decode(metadata.get("start_room", "{}"), type=RecordedRoom)
+            outline = None if room.outline_m is None else np.array(room.outline_m).reshape(-1, 2)
+            return Start(room_m=outline, level=room.level)
         text = metadata.get("start_x_y_rad")
         if text is None:
             return None
@@ -106,9 +119,9 @@ def recorded_start(metadata: Mapping[str, str], path: Path) -> Pose | Start | No
         sd_m, sd_rad = bounded((float(part) for part in metadata["start_sd_m_rad"].split(",")), least=0.0)
         if "start_after_pause" not in metadata:
             return Start(pose, sd_m, sd_rad)
-        air = air_of(json.loads(metadata["start_after_pause"])["air"])
-        return Start(pose, sd_m, sd_rad, air=air, after_pause=True)
-    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as error:
+        pause = msgspec.json.decode(metadata["start_after_pause"], type=RecordedPause)
+        return Start(pose, sd_m, sd_rad, air=possible(pause.air), after_pause=True)
+    except (ValueError, OverflowError, RecursionError, msgspec.MsgspecError) as error:
         raise EchostepError(f"{path}: its recorded start is damaged: give one with --start X,Y,DEG") from error
 
 
@@ -137,13 +150,12 @@ def start_given(tracking: TrackingOptions, plan: Plan) -> Pose | Start | None:
     return Start(plan.start, sd_m, math.radians(sd_deg))
 
 
-def air_of(tree: Any) -> Air | None:
-    """The heights by pressure in a JSON object; raises ValueError, TypeError or KeyError when it is damaged."""
-    if tree is None:
-        return None
-    (zero_m,) = bounded([float(tree["zero_m"])])
-    (sd_m,) = bounded([float(tree["sd_m"])], least=0.0)
-    return Air(zero_m, sd_m)
+def possible(air: Air | None) -> Air | None:
+    """The heights by pressure; raises ValueError where they are out of bounds."""
+    if air is not None:
+        bounded([air.zero_m])
+        bounded([air.sd_m], least=0.0)
+    return air
 
 
 def bounded(values: Iterable[float], least: float = -START_LIMIT_M) -> list[float]:
