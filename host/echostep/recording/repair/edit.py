@@ -6,11 +6,12 @@ In: a recording. Out: a new recording, and lines of text about it. Owns nothing.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
+
+import msgspec
 
 from echostep.errors import EchostepError
 from echostep.recording.mcap_records import port_of
@@ -23,6 +24,15 @@ START = "start_x_y_rad"  # metadata key
 AFTER_ALL_NS = 1 << 64  # later than any recorded time
 
 Metadata = Mapping[str, str]
+
+
+class RecordedEstimate(msgspec.Struct):
+    """What a start needs of a recorded estimate."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    level: int = 0
 
 
 def repair(path: Path, out: Path) -> list[str]:
@@ -100,8 +110,7 @@ def _start_at(path: Path, t_ns: int) -> str | None:
     start = None
     for message in Recovery(path).messages():
         if message.channel.topic == "/estimate" and message.t_ns <= t_ns:
-            with suppress(ValueError, KeyError, TypeError):
-                body = json.loads(message.body)
-                x, y, heading = (float(body[key]) for key in ("x_m", "y_m", "heading_rad"))
-                start = f"{x!r},{y!r},{heading!r},{int(body.get('level', 0))}"
+            with suppress(UnicodeError, RecursionError, msgspec.MsgspecError):
+                at = msgspec.json.decode(message.body, type=RecordedEstimate)
+                start = f"{at.x_m!r},{at.y_m!r},{at.heading_rad!r},{at.level}"
     return start
