@@ -11,7 +11,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan.model import FORMAT_VERSION, Connector, Door, Georeference, Level, Plan, Pose, Room
 
@@ -48,7 +47,7 @@ def _level(level: Level) -> dict[str, Any]:
     if level.doors:
         tree["doors"] = [_door(door) for door in level.doors]
     if level.obstacles:
-        tree["obstacles"] = [_corners(corners) for corners in level.obstacles]
+        tree["obstacles"] = [corners.tolist() for corners in level.obstacles]
     return tree | {"rooms": [_room(room) for room in level.rooms]}
 
 
@@ -58,7 +57,7 @@ def _door(door: Door) -> dict[str, Any]:
 
 def _room(room: Room) -> dict[str, Any]:
     return {"name": room.name, "at": list(room.at_m)} | (
-        {} if room.outline_m is None else {"outline": _corners(room.outline_m)}
+        {} if room.outline_m is None else {"outline": room.outline_m.tolist()}
     )
 
 
@@ -67,7 +66,7 @@ def _connector(connector: Connector) -> dict[str, Any]:
         "kind": connector.kind,
         "name": connector.name,
         "levels": list(connector.levels),
-        "outline": _corners(connector.outline_m),
+        "outline": connector.outline_m.tolist(),
     }
 
 
@@ -82,11 +81,6 @@ def _georeference(georeference: Georeference) -> dict[str, Any]:
         "origin": [georeference.longitude_deg, georeference.latitude_deg],
         "rotation_deg": _degrees(georeference.rotation_rad),
     }
-
-
-def _corners(corners: Floats) -> list[list[float]]:
-    rows: list[list[float]] = corners.tolist()
-    return rows
 
 
 def _degrees(angle_rad: float) -> float:
