@@ -84,6 +84,10 @@ bool capture_trigger(uint8_t side);   /* sends a trigger pulse (12 us); false: t
 enum capture_state capture_take_pulse(uint8_t side, struct capture_pulse *out);
 void capture_end_pulse(uint8_t side); /* gives up waiting */
 
+/* Levels of inputs; no chip may be selected. */
+enum level { LEVEL_MISO, LEVEL_D4, LEVEL_D13, LEVEL_SDA, LEVEL_SCL, LEVELS };
+uint8_t levels_read(void); /* a bit for each */
+
 /* Supply voltage. */
 bool adc_take(uint16_t *reading); /* 1024 * 1.1 V / supply, and starts the next measurement (0.1 ms); false: not finished */
 

@@ -4,6 +4,7 @@
 #include "board.h"         /* start, clock, USB, sleep */
 #include "compass.h"       /* sensor */
 #include "configuration.h" /* carries out `configure` */
+#include "electrical.h"    /* sent once a second */
 #include "foot.h"          /* sensor of a foot board */
 #include "gyros.h"         /* sensor */
 #include "link.h"          /* messages to and from the host */
@@ -75,6 +76,8 @@ static void send_subscribed_reports(void)
 		parts_send();
 	if (link_wants(REPORTS_FOOT))
 		foot_send_health();
+	if (link_wants(REPORTS_ELECTRICAL))
+		electrical_send();
 }
 
 static void send_identity_and_configuration(void)
@@ -226,6 +229,7 @@ static uint32_t run_sensors(void)
 	wake = earlier(wake, pressure_run(now));
 	restart_enter(CRASH_PLACE_SUPPLY);
 	supply_run();
+	electrical_run();
 	restart_enter(CRASH_PLACE_REPORTS);
 	return earlier(wake, send_each_second(now));
 }

@@ -242,6 +242,19 @@ uint8_t msg_pack_foot_health(uint8_t *out, const struct msg_foot_health *m)
 	return (uint8_t)(end - out);
 }
 
+uint8_t msg_pack_electrical(uint8_t *out, const struct msg_electrical *m)
+{
+	uint8_t *end = out;
+	end = put32(end, m->ticks);
+	end = put8(end, m->readings);
+	end = put8(end, m->miso_ones);
+	end = put8(end, m->d4_ones);
+	end = put8(end, m->d13_ones);
+	end = put8(end, m->sda_ones);
+	end = put8(end, m->scl_ones);
+	return (uint8_t)(end - out);
+}
+
 bool msg_unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t length)
 {
 	if (length != MSG_CLOCK_QUERY_SIZE)

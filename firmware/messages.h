@@ -40,6 +40,7 @@ enum {
 	MSG_MAGNETIC = 0x0E,
 	MSG_FOOT = 0x0F,
 	MSG_FOOT_HEALTH = 0x10,
+	MSG_ELECTRICAL = 0x11,
 	MSG_IDENTIFY = 0x81,
 	MSG_CLOCK_QUERY = 0x82,
 	MSG_CONFIGURE = 0x83,
@@ -64,6 +65,7 @@ enum {
 	MSG_MAGNETIC_SIZE = 10,
 	MSG_FOOT_SIZE = 18,
 	MSG_FOOT_HEALTH_SIZE = 12,
+	MSG_ELECTRICAL_SIZE = 10,
 	MSG_IDENTIFY_SIZE = 0,
 	MSG_CLOCK_QUERY_SIZE = 2,
 	MSG_CONFIGURE_SIZE = 5,
@@ -196,6 +198,7 @@ enum {
 	REPORTS_MOTION = 4,
 	REPORTS_MAGNETIC = 8,
 	REPORTS_FOOT = 16,
+	REPORTS_ELECTRICAL = 32,
 };
 
 /* Firmware version and schema. Sent when the port opens, when asked for, and once a second. Layout and CRC seed of this message
@@ -406,6 +409,20 @@ struct msg_foot_health {
 	int16_t temperature; /* 1/333.87 degC, -32768: invalid */
 };
 uint8_t msg_pack_foot_health(uint8_t *out, const struct msg_foot_health *m);
+
+/* Levels of the board's inputs, once a second: of so many readings, one in each turn of the main loop, how many were ones. No
+ * chip is selected then, so that MISO has its idle level. D4 and D13 are pulled up in the processor: an open one reads as ones.
+ * */
+struct msg_electrical {
+	uint32_t ticks; /* 0.5 us */
+	uint8_t readings;
+	uint8_t miso_ones;
+	uint8_t d4_ones;
+	uint8_t d13_ones;
+	uint8_t sda_ones;
+	uint8_t scl_ones;
+};
+uint8_t msg_pack_electrical(uint8_t *out, const struct msg_electrical *m);
 
 /* Request for identity and configuration. Its CRC seed is the fixed one, as identity's. */
 /* identify has no fields. */

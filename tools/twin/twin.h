@@ -57,8 +57,9 @@ avr_int_vector_t *vector(int number);
 bool pin_is_output(char port, uint8_t pin);
 bool pin_is_pulled_up(char port, uint8_t pin);
 
-/* Sets the level that a chip drives onto a pin; at most one such pin per port. Against an output of the processor: trace `contention on`. */
+/* Sets the level that a chip drives onto a pin. Against an output of the processor: trace `contention on`. */
 void drive_pin(char port, uint8_t pin, bool level);
+void release_pin(char port, uint8_t pin); /* no chip drives it: its pull-up, or a zero */
 
 /* Replaces the functions that the program's reads and writes of a register call. */
 void take_register(avr_io_addr_t address, avr_io_read_t read, avr_io_write_t write);
@@ -170,6 +171,7 @@ bool spi_outruns(unsigned rise_ns);       /* half a bit is shorter than a level 
 
 /* miso.c: what the processor reads while no part drives MISO. */
 uint8_t miso_idle(void);
+void miso_millisecond(void);
 bool miso_fault(const char *name, const char *value);
 
 /* The devices: power-up (a reset of the processor is none), and fault switches `name=value` (false: no such switch). */

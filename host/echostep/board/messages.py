@@ -143,6 +143,7 @@ class Reports(IntFlag):
     MOTION = 4
     MAGNETIC = 8
     FOOT = 16
+    ELECTRICAL = 32
 
 
 _IDENTITY = struct.Struct("<IIBBBB")
@@ -703,6 +704,36 @@ class FootHealth(NamedTuple):
         return message
 
 
+_ELECTRICAL = struct.Struct("<IBBBBBB")
+
+
+class Electrical(NamedTuple):
+    """Levels of the board's inputs, once a second: of so many readings, one in each turn of the main loop, how many were ones."""
+
+    ticks: int  # 0.5 us
+    readings: int
+    miso_ones: int
+    d4_ones: int
+    d13_ones: int
+    sda_ones: int
+    scl_ones: int
+
+    @property
+    def id(self) -> int:
+        return 0x11
+
+    def pack(self) -> bytes:
+        """Bytes of the body; raises struct.error when a value does not fit its type."""
+        return _ELECTRICAL.pack(*self)
+
+    @classmethod
+    def unpack(cls, body: bytes) -> Electrical:
+        """Values of a body; raises ValueError when length or an enumeration is wrong."""
+        if len(body) != 10:
+            raise ValueError(f"electrical: {len(body)} bytes, expected 10")
+        return cls._make(_ELECTRICAL.unpack(body))
+
+
 _IDENTIFY = struct.Struct("<")
 
 
@@ -876,6 +907,7 @@ Message = (
     | Magnetic
     | Foot
     | FootHealth
+    | Electrical
     | Identify
     | ClockQuery
     | Configure
@@ -901,6 +933,7 @@ BY_ID: dict[int, type[Message]] = {
     0x0E: Magnetic,
     0x0F: Foot,
     0x10: FootHealth,
+    0x11: Electrical,
     0x81: Identify,
     0x82: ClockQuery,
     0x83: Configure,
@@ -1095,6 +1128,17 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("errors", "<u2"),
             ("missed", "<u2"),
             ("temperature", "<i2"),
+        ]
+    ),
+    0x11: np.dtype(
+        [
+            ("ticks", "<u4"),
+            ("readings", "u1"),
+            ("miso_ones", "u1"),
+            ("d4_ones", "u1"),
+            ("d13_ones", "u1"),
+            ("sda_ones", "u1"),
+            ("scl_ones", "u1"),
         ]
     ),
     0x81: np.dtype([]),

@@ -156,6 +156,7 @@ static void run_millisecond(avr_cycle_count_t end)
 		avr->cycle = end;
 		return;
 	}
+	miso_millisecond();
 	if (row.sync_us != NO_SYNC)
 		avr_cycle_timer_register(avr, clock_cycles(row.sync_us) + 1, sync_rise, NULL);
 	if (avr->cycle < end)

@@ -19,6 +19,7 @@
 #define MCU "atmega32u4"
 #define FREQUENCY 16000000u
 #define EXTERNAL_INTERRUPTS 7
+#define PORTS 5 /* B to F */
 
 avr_t *avr;
 uint64_t random_state = 1;
@@ -87,24 +88,50 @@ bool pin_is_pulled_up(char port, uint8_t pin)
 	return !pin_is_output(port, pin) && (port_registers(port)[1] & (1u << pin));
 }
 
+/* Pins of a port that chips drive, and their levels: simavr wants all of a port at once. */
+static struct {
+	uint8_t mask, value;
+} driven[PORTS];
+
+static void apply_driven(char port)
+{
+	avr_ioport_external_t outside = {
+		.name = (unsigned)port & 0x7Fu,
+		.mask = driven[port - 'B'].mask,
+		.value = driven[port - 'B'].value,
+	};
+
+	avr_ioctl(avr, (uint32_t)AVR_IOCTL_IOPORT_SET_EXTERNAL(port), &outside);
+}
+
+static void raise_level(char port, uint8_t pin, bool level)
+{
+	avr_raise_irq(avr_io_getirq(avr, (uint32_t)AVR_IOCTL_IOPORT_GETIRQ(port), pin), level);
+}
+
 /* The level is set in two ways: when the program writes to the port with the pull-up on, simavr keeps only an external level. A pin that the
  * processor drives keeps the processor's level; two different ones are a short circuit through both. */
 void drive_pin(char port, uint8_t pin, bool level)
 {
-	avr_ioport_external_t outside = {
-		.name = (unsigned)port & 0x7Fu,
-		.mask = (uint8_t)(1u << pin),
-		.value = (uint8_t)((unsigned)level << pin),
-	};
+	uint8_t bit = (uint8_t)(1u << pin);
 
 	floating_pin(port, pin, false);
-	avr_ioctl(avr, (uint32_t)AVR_IOCTL_IOPORT_SET_EXTERNAL(port), &outside);
-	if (pin_is_output(port, pin)) {
-		if (level != !!(port_registers(port)[1] & (1u << pin)))
-			bench_trace("contention on P%c%u", port, pin);
-		return;
-	}
-	avr_raise_irq(avr_io_getirq(avr, (uint32_t)AVR_IOCTL_IOPORT_GETIRQ(port), pin), level);
+	driven[port - 'B'].mask |= bit;
+	driven[port - 'B'].value = (uint8_t)((driven[port - 'B'].value & ~bit) | (level ? bit : 0));
+	apply_driven(port);
+	if (!pin_is_output(port, pin))
+		raise_level(port, pin, level);
+	else if (level != !!(port_registers(port)[1] & bit))
+		bench_trace("contention on P%c%u", port, pin);
+}
+
+void release_pin(char port, uint8_t pin)
+{
+	driven[port - 'B'].mask &= (uint8_t)~(1u << pin);
+	driven[port - 'B'].value &= (uint8_t)~(1u << pin);
+	apply_driven(port);
+	if (!pin_is_output(port, pin))
+		raise_level(port, pin, pin_is_pulled_up(port, pin));
 }
 
 void take_register(avr_io_addr_t address, avr_io_read_t read, avr_io_write_t write)

@@ -38,12 +38,11 @@ static avr_cycle_count_t swing(avr_t *a, avr_cycle_count_t when, void *param)
 
 void floating_pin(char port, uint8_t pin, bool open)
 {
-	avr_ioport_external_t outside = { .name = (unsigned)port & 0x7Fu, .mask = 0, .value = 0 };
-
 	for (int k = 0; k < PINS; k++)
 		if (pins[k].port == port && pins[k].pin == pin && open != pins[k].open) {
 			pins[k].open = open;
-			avr_ioctl(avr, (uint32_t)AVR_IOCTL_IOPORT_SET_EXTERNAL(port), &outside);
+			if (open)
+				release_pin(port, pin);
 			follow(&pins[k]);
 		}
 }

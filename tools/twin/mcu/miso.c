@@ -53,6 +53,12 @@ uint8_t miso_idle(void)
 	return volts < HIGH_MIN_V && undefined == NOISE ? (uint8_t)random_below(256) : 0xFF;
 }
 
+/* The pin itself, which the program may read while no chip is selected. */
+void miso_millisecond(void)
+{
+	drive_pin('B', MISO, miso_idle() & 1);
+}
+
 bool miso_fault(const char *name, const char *value)
 {
 	static const char *const kinds[KINDS] = { "zeros", "ones", "noise" };

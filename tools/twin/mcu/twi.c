@@ -226,6 +226,20 @@ static uint8_t read_plain(avr_t *a, avr_io_addr_t register_address, void *param)
 	return a->data[register_address];
 }
 
+/* The pins: a part that holds a line low; else the pull-ups. */
+static void set_line(enum twi_fault fault)
+{
+	line = fault;
+	if (fault == TWI_STUCK || fault == TWI_STUCK_FOREVER)
+		drive_pin('D', 1, false);
+	else
+		release_pin('D', 1);
+	if (fault == TWI_CLOCK_STUCK)
+		drive_pin('D', 0, false);
+	else
+		release_pin('D', 0);
+}
+
 /* With the TWI off, the program can clock the bus by hand: a one in DDRD drives a line low. */
 static void lines_changed(struct avr_irq_t *irq, uint32_t value, void *param)
 {
@@ -235,7 +249,7 @@ static void lines_changed(struct avr_irq_t *irq, uint32_t value, void *param)
 	(void)irq;
 	(void)param;
 	if (!(avr->data[TWCR] & TWEN) && (before & SCL) && !(driven & SCL) && ++clocks >= CLOCKS_TO_FREE && line == TWI_STUCK) {
-		line = TWI_GOOD;
+		set_line(TWI_GOOD);
 		bench_trace("sda released");
 	}
 	before = driven;
@@ -269,7 +283,7 @@ void twi_fault(enum twi_fault fault)
 {
 	uint8_t control = avr->data[TWCR];
 
-	line = fault;
+	set_line(fault);
 	if (fault != TWI_GOOD || !(control & TWEN))
 		return;
 	if (control & TWSTO) /* a stop or start that waited for SDA to rise */
