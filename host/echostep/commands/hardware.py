@@ -20,6 +20,9 @@ def doctor(
     mtx: Annotated[str | None, typer.Option("--mtx", metavar="PORT", help="Port of the MTx.")] = None,
     foot: Annotated[str | None, typer.Option("--foot", metavar="PORT", help="Port of a foot board.")] = None,
     seconds: Annotated[float, typer.Option(help="Seconds to listen.", min=3.0, max=3600.0)] = 6.0,
+    electrical: Annotated[
+        bool, typer.Option("--electrical", help="Also the levels of the boards' inputs: for wiring a new board.")
+    ] = False,
     udev: Annotated[bool, typer.Option("--udev", help="Only print the udev rules.")] = False,
 ) -> None:
     """Check ports, boards and MTx, and say what to do about each fault. Exit status 1 when there is a fault."""
@@ -27,7 +30,7 @@ def doctor(
 
     if udev:
         typer.echo(examination.rules_text(), nl=False)
-    elif not examination.run(board, mtx, seconds, foot):
+    elif not examination.run(board, mtx, seconds, foot, electrical=electrical):
         raise typer.Exit(1)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from echostep.board.faults.electrical import electrical_findings, level_line
 from echostep.board.faults.findings import part_in, part_text_of
 from echostep.board.faults.health import (
     NAMES,
@@ -36,6 +37,7 @@ CONSTANT_SAMPLES = 400  # so many equal samples in a row are a fault: a gyro has
 FULL_SCALE = 2047  # counts of an ADIS16100
 SIX_AXES_FULL_SCALE = 4697  # counts of `gyros` at the 1000 deg/s of an LSM6DSO, less its last 0.1 %
 HURRIED_G = 18.0  # range of the MTx that is beyond a hurried foot's force [echostep evaluate kits]
+FIRST_LEVELS = (1, 6)  # version of the firmware that reports levels
 LEAST_PINGS = 20  # for a statement on echoes
 
 
@@ -45,6 +47,7 @@ class Diagnosis:
 
     lines: list[str] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
+    electrical: bool = False  # also the levels of the boards' inputs
 
     @property
     def fine(self) -> bool:
@@ -60,6 +63,7 @@ def judge_board(report: Diagnosis, probed: ProbeResult, port: str) -> None:
         report.findings += [finding] if finding else []
         return
     report.lines += board_lines("board", probed, port) + _device_lines(probed) + _rate_lines(probed)
+    electrical_diagnosis(report, probed, "board")
     report.findings += board_findings(reports) + _stream_findings(probed) + _version_findings(reports.identity, port)
     if probed.rates_hz:
         report.findings += rate_findings(reports, probed.rates_hz)
@@ -95,6 +99,18 @@ def clock_diagnosis(report: Diagnosis, probed: ProbeResult, subject: str) -> Non
     else:
         report.lines.append(f"clock     {describe(drift)}")
         report.findings += _clock_findings(drift, subject)
+
+
+def electrical_diagnosis(report: Diagnosis, probed: ProbeResult, subject: str) -> None:
+    """Add the levels of a board's inputs, and findings by them, if they are wanted."""
+    if not report.electrical:
+        return
+    if line := level_line(probed.reports):
+        report.lines.append(line)
+        report.findings += electrical_findings(probed.reports)
+        return
+    what = f"reports no levels: its firmware is older than {'.'.join(map(str, FIRST_LEVELS))}"
+    report.findings.append(Finding(Severity.WARNING, subject, what, "flash it: echostep flash"))
 
 
 def _supply_lines(reports: BoardReports) -> list[str]:

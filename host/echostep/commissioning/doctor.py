@@ -37,18 +37,22 @@ STYLES = {Severity.NOTE: "cyan", Severity.WARNING: "yellow", Severity.FAULT: "bo
 __all__ = ["examine", "rules_text", "run"]
 
 
-def run(board: str | None, mtx: str | None, seconds: float, foot: str | None = None) -> bool:
+def run(
+    board: str | None, mtx: str | None, seconds: float, foot: str | None = None, *, electrical: bool = False
+) -> bool:
     """Check everything and print the report; returns whether there is no warning and no fault."""
     console = Console(soft_wrap=True, highlight=False)
     with listening_bar("Looking at the ports and listening: stand still", seconds, console):
-        report = examine(board, mtx, seconds, foot)
+        report = examine(board, mtx, seconds, foot, electrical=electrical)
     print_report(report, console)
     return report.fine
 
 
-def examine(board: str | None, mtx: str | None, seconds: float = PROBE_S, foot: str | None = None) -> Diagnosis:
-    """Check everything; ports that are None are searched for."""
-    report = Diagnosis()
+def examine(
+    board: str | None, mtx: str | None, seconds: float = PROBE_S, foot: str | None = None, *, electrical: bool = False
+) -> Diagnosis:
+    """Check everything; ports that are None are searched for. `electrical`: also the levels of the boards' inputs."""
+    report = Diagnosis(electrical=electrical)
     seen = list_seen()
     report.lines += [f"port      {port.name}: {port.role.value} ({port.text})" for port in seen]
     board, foot = find_boards(seen, board, foot)

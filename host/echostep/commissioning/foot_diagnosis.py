@@ -13,7 +13,14 @@ from echostep.board.faults.device_faults import foot_celsius
 from echostep.board.faults.findings import PART_NAMES, Finding, Severity
 from echostep.board.faults.health import board_findings
 from echostep.board.messages import FOOT_HEALTH_TEMPERATURE_INVALID, FootHealth, FootState, Part
-from echostep.commissioning.diagnosis import Diagnosis, board_lines, clock_diagnosis, silence, stale_firmware
+from echostep.commissioning.diagnosis import (
+    Diagnosis,
+    board_lines,
+    clock_diagnosis,
+    electrical_diagnosis,
+    silence,
+    stale_firmware,
+)
 from echostep.commissioning.probe import ProbeResult
 
 RATE_HZ, RATE_ERROR = 225.0, 0.03  # 1125 Hz / 5 [firmware/icm20649.c]; its own clock is within 1 % [DS-000192, table 4]
@@ -33,6 +40,7 @@ def judge_foot_board(report: Diagnosis, probed: ProbeResult, port: str) -> None:
         report.findings.append(finding)
         return
     report.lines += board_lines(subject, probed, port)
+    electrical_diagnosis(report, probed, subject)
     if reports.foot is None:
         report.findings.append(_no_part(probed))
         return

@@ -30,7 +30,7 @@ from echostep.board.messages import (
     SelfTest,
     Sync,
 )
-from echostep.board.subscription import SUBSCRIBE, BoardSubscription
+from echostep.board.subscription import SUBSCRIBE_ELECTRICAL, BoardSubscription
 from echostep.errors import EchostepError
 from echostep.ports.arrival_clock import now_s as clock_s
 from echostep.ports.chunks import BOARD, MTX, Chunk
@@ -204,7 +204,7 @@ class _Probe:
         result = self.result
         result.reports.add(message)
         if self._subscription.is_due(message):
-            self._send(SUBSCRIBE)
+            self._send(SUBSCRIBE_ELECTRICAL)
         ticks: int = getattr(message, "ticks", 0)
         self._first_ticks = ticks if self._first_ticks is None else self._first_ticks
         elapsed = (ticks - self._first_ticks + (1 << 31)) % (1 << 32) - (1 << 31)

@@ -12,6 +12,7 @@ from enum import IntEnum
 from echostep.board.messages import (
     BoardHealth,
     Configuration,
+    Electrical,
     FootHealth,
     GyroHealth,
     Healthy,
@@ -98,6 +99,7 @@ class BoardReports:
     gyros: dict[int, GyroHealth] = field(default_factory=dict)
     parts: Parts | None = None
     foot: FootHealth | None = None  # of a foot board
+    electrical: Electrical | None = None
 
     def add(self, message: Message) -> None:
         """Keep a message if it is a report; after a restart of the board there is no previous status."""
@@ -112,6 +114,8 @@ class BoardReports:
             self.parts = message
         elif isinstance(message, FootHealth):
             self.foot = message
+        elif isinstance(message, Electrical):
+            self.electrical = message
         elif isinstance(message, GyroHealth):
             self.gyros[message.gyro] = message
         elif isinstance(message, Status):
