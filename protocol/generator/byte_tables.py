@@ -26,7 +26,10 @@ def _tables(messages: list[Message]) -> str:
     value = schema_hash(messages)
     lines = [f"Schema hash `0x{value:08X}`, CRC seed `0x{crc_seed(value):04X}`.", ""]
     checks = [f"`0x{binascii.crc_hqx(CHECKED, seed):04X}`" for seed in (crc_seed(value), FIXED_SEED)]
-    lines += [f"CRC of the nine bytes `{CHECKED.decode()}`: {checks[0]} with this seed, {checks[1]} with the fixed one.", ""]
+    lines += [
+        f"CRC of the nine bytes `{CHECKED.decode()}`: {checks[0]} with this seed, {checks[1]} with the fixed one.",
+        "",
+    ]
     for message in messages:
         lines += _table(message)
     return "\n".join(lines).rstrip() + "\n"

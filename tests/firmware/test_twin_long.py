@@ -26,7 +26,15 @@ def firmware_whose_clock_starts_at(overflows: int, folder: Path) -> Path:
     """The firmware with another first value of the upper half of its clock."""
     if not shutil.which("avr-gcc"):
         pytest.skip("avr-gcc is missing")
-    build = ["make", "-s", "-C", ROOT / "firmware", f"BUILD={folder}", f"CLOCK_START={overflows}u", folder / "echostep.elf"]
+    build = [
+        "make",
+        "-s",
+        "-C",
+        ROOT / "firmware",
+        f"BUILD={folder}",
+        f"CLOCK_START={overflows}u",
+        folder / "echostep.elf",
+    ]
     subprocess.run(list(map(str, build)), check=True, timeout=PATIENCE_S)
     return folder / "echostep.elf"
 

@@ -36,7 +36,13 @@ PAGES = [
     ),
     *(
         ROOT / name
-        for name in ("protocol/README.md", "firmware/README.md", "firmware/hardware/README.md", "tools/twin/README.md")
+        for name in (
+            "protocol/README.md",
+            "firmware/README.md",
+            "firmware/bench.md",
+            "firmware/hardware/README.md",
+            "tools/twin/README.md",
+        )
     ),
     *MANUAL,
 ]

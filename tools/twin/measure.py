@@ -186,7 +186,9 @@ def foot_figures(seconds: int) -> list[Figure]:
     board.close()
     assert result.status is not None
     offsets = stamp_offsets(stamps, [t for t, text in board.trace if text == "foot"])
-    worst, sd = stamp_errors(offsets, float(np.median(offsets)))  # a constant error would not be seen: there is no other stamp
+    worst, sd = stamp_errors(
+        offsets, float(np.median(offsets))
+    )  # a constant error would not be seen: there is no other stamp
     rate, lost, memory = len(stamps) / (seconds - SETTLED_S), reader.counts.lost, result.status.memory_used
     return [
         ("foot samples/s", f"{rate:.1f}", "225 within 1 %", abs(rate / 225.0 - 1.0) < 0.0105),

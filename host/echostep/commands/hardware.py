@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`echostep doctor`, `flash` and `calibrate`: commands about boards and sensors.
+"""`echostep doctor`, `bench-report`, `flash` and `calibrate`: commands about boards and sensors.
 
 In: the command's arguments and options. Out: findings, a flashed board, settings. Slow imports wait until a command runs.
 """
@@ -32,6 +32,19 @@ def doctor(
         typer.echo(examination.rules_text(), nl=False)
     elif not examination.run(board, mtx, seconds, foot, electrical=electrical):
         raise typer.Exit(1)
+
+
+@app.command()
+def bench_report(
+    board: Annotated[str | None, typer.Option("--board", metavar="PORT", help="Port of the board.")] = None,
+    foot: Annotated[str | None, typer.Option("--foot", metavar="PORT", help="Port of a foot board.")] = None,
+    seconds: Annotated[float, typer.Option(help="Seconds to listen.", min=3.0, max=3600.0)] = 30.0,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The report.")] = Path("bench-report.txt"),
+) -> None:
+    """Collect what a new board tells of itself into one text file, to be sent in with measurements (firmware/bench.md)."""
+    from echostep.commissioning import bench_report as bench
+
+    typer.echo(bench.write(board, foot, seconds, out))
 
 
 @app.command()

@@ -48,6 +48,7 @@ class Diagnosis:
     lines: list[str] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
     electrical: bool = False  # also the levels of the boards' inputs
+    probed: dict[str, ProbeResult] = field(default_factory=dict)  # what was received, by the board's subject
 
     @property
     def fine(self) -> bool:
@@ -58,6 +59,7 @@ class Diagnosis:
 def judge_board(report: Diagnosis, probed: ProbeResult, port: str) -> None:
     """Add facts and findings on the board at this port."""
     reports = probed.reports
+    report.probed["board"] = probed
     finding = stale_firmware(probed, port, "board") or silence(probed, port, "board")
     if finding is not None or reports.identity is None:
         report.findings += [finding] if finding else []

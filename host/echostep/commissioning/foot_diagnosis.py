@@ -35,6 +35,7 @@ LEAST_SAMPLES = 100
 def judge_foot_board(report: Diagnosis, probed: ProbeResult, port: str) -> None:
     """Add facts and findings on the foot board at this port."""
     subject, reports = "foot board", probed.reports
+    report.probed[subject] = probed
     finding = stale_firmware(probed, port, subject) or silence(probed, port, subject)
     if finding is not None:
         report.findings.append(finding)
