@@ -16,7 +16,7 @@ from command_line import echostep
 from docs.pages import hardware
 from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC
 from hardware.lanes import lanes
-from hardware.nets import problems
+from hardware.nets import HIGH_MIN_V, PULL_UP_OHM, idle_v, problems
 from hardware.wiring import Device, WiredBoard, boards, pins
 from players import twin_board
 
@@ -93,6 +93,27 @@ def test_bad_wiring_is_found() -> None:
     }
     for words, bad in cases.items():
         assert any(words in text for text in problems(bad)), (words, problems(bad))
+
+
+def without(of: str, name: str) -> WiredBoard:
+    return replace(board(of), devices=tuple(one for one in board(of).devices if one.name != name))
+
+
+def test_miso_rests_at_a_one_by_its_resistor() -> None:
+    """Without it, between the processor's thresholds: what tools/twin plays by default."""
+    for name, least, most in (("2026", 1.02, 1.29), ("foot", 0.83, 1.67)):
+        bare = without(name, "pull-up of MISO")
+        assert [round(idle_v(bare, "MISO", ohm), 2) for ohm in reversed(PULL_UP_OHM)] == [least, most]
+        assert any("net MISO: it rests between the processor's thresholds" in text for text in problems(bare))
+        assert min(idle_v(board(name), "MISO", ohm) for ohm in PULL_UP_OHM) > HIGH_MIN_V
+    source = (FIRMWARE.parent / "tools/twin/mcu/miso.c").read_text()
+    ohms = {ohm for one in boards() for device in one.devices for _, ohm in device.symbol.pulls.values()}
+    assert ohms == {float(re.findall(r"#define BOARD_OHM ([\d.]+)", source)[0])}
+
+
+def test_an_echo_line_needs_its_resistors_other_end() -> None:
+    cut = without("2026", "left Echo resistor")
+    assert "2026, net ECHO_L_1K: it ends nowhere" in problems(cut)
 
 
 def test_an_adis16100_beside_breakout_boards_of_2026_is_a_problem() -> None:

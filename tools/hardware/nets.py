@@ -2,23 +2,49 @@
 """Electrical checks of a board's nets, the simple part of what KiCad calls ERC.
 
 In: a `WiredBoard`. Out: problems in words; none when every pin is wired or meant to be open, every net has one driver or parts that take
-turns, supplies are in range, and no level exceeds what an input withstands. Currents and rise times are not checked. Owns nothing.
+turns, supplies are in range, no level exceeds what an input withstands, and MISO rests at a one or a zero. Currents and rise times are not
+checked. Owns the processor's thresholds.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from hardware.wiring import POWER, Device, WiredBoard
 
 DRIVERS = ("out", "tri")
 PROCESSOR_V = 5.0  # level of its outputs
+PULL_UP_OHM = (20e3, 50e3)  # of the processor [ATmega32U4 data sheet, table 29-1]
+LOW_MAX_V, HIGH_MIN_V = (
+    0.9,
+    1.9,
+)  # what it reads for certain: 0.2 VCC - 0.1 V and 0.2 VCC + 0.9 V [the same, from memory]
 
 
 def problems(board: WiredBoard) -> list[str]:
     """All problems of a board."""
     texts = [f"{board.name}, {device.name}: {text}" for device in board.devices for text in _of_device(device)]
     return texts + [f"{board.name}, net {net}: {text}" for net in sorted(_nets(board)) for text in _of_net(board, net)]
+
+
+def idle_v(board: WiredBoard, net: str, pull_up_ohm: float = math.inf) -> float:
+    """Voltage of a net that nothing drives, by the resistors on it and the processor's pull-up; NaN without any."""
+    pulls = [(PROCESSOR_V, pull_up_ohm)]
+    for device in board.devices:
+        pulls += [
+            device.symbol.pulls[pin] for pin, at in device.pins.items() if at == net and pin in device.symbol.pulls
+        ]
+        if device.symbol.title == "resistor" and net in device.pins.values():
+            (other,) = (at for at in device.pins.values() if at != net)
+            pulls += [(POWER[other], ohm_of(device))] if other in POWER else []
+    siemens = sum(1.0 / ohm for _, ohm in pulls)
+    return sum(volts / ohm for volts, ohm in pulls) / siemens if siemens else math.nan
+
+
+def ohm_of(resistor: Device) -> float:
+    """The resistance that the note of a resistor begins with: `2.2 kohm`."""
+    return 1e3 * float(resistor.note.split(" kohm")[0])
 
 
 def _nets(board: WiredBoard) -> set[str]:
@@ -53,8 +79,10 @@ def _of_net(board: WiredBoard, net: str) -> Iterator[str]:
     either = any(kind == "io" for _, _, kind in ends) or (processor is not None and processor.direction == "io")
     if fixed > 1 or (fixed and shared):
         yield "it has several drivers"
-    if not (fixed or shared or either):
+    if not (fixed or shared or either or _is_driven_through(board, net)):
         yield "nothing drives it"
+    if shared and processor and not all(_is_certain(idle_v(board, net, ohm)) for ohm in PULL_UP_OHM):
+        yield "it rests between the processor's thresholds"
     for device, pin, kind in ends:
         others = [_level(d, k) for d, p, k in ends if (d, p) != (device, pin)]
         if processor and processor.direction != "in":
@@ -62,6 +90,19 @@ def _of_net(board: WiredBoard, net: str) -> Iterator[str]:
         limit = device.symbol.bus_v if kind in DRIVERS else device.symbol.input_v
         if max(others, default=0.0) > limit:
             yield f"{device.name}, pin {pin} withstands {limit:g} V, another drives {max(others):g} V"
+
+
+def _is_certain(volts: float) -> bool:
+    return not LOW_MAX_V < volts < HIGH_MIN_V
+
+
+def _is_driven_through(board: WiredBoard, net: str) -> bool:
+    """Whether a resistor joins the net to one that a part drives."""
+    joined = {
+        at for d in board.devices if d.symbol.title == "resistor" and net in d.pins.values() for at in d.pins.values()
+    }
+    drives = {at for d in board.devices for pin, at in d.pins.items() if d.symbol.pins.get(pin) in (*DRIVERS, "io")}
+    return bool((joined - {net} - POWER.keys()) & drives)
 
 
 def _level(device: Device, kind: str) -> float:

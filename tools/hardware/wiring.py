@@ -37,6 +37,7 @@ class Symbol:
     input_v: float
     bus_v: float
     pins: dict[str, str]  # kind by name
+    pulls: dict[str, tuple[float, float]]  # resistors on its board, from a pin to a voltage: V, ohm
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,10 @@ def pins() -> tuple[Pin, ...]:
 def boards() -> tuple[WiredBoard, ...]:
     """The three boards."""
     table = _table()
-    symbols = {name: Symbol(**{**row, "supply_v": tuple(row["supply_v"])}) for name, row in table["symbol"].items()}
+    symbols = {
+        name: Symbol(**{"pulls": {}, **row, "supply_v": tuple(row["supply_v"])})
+        for name, row in table["symbol"].items()
+    }
     made = []
     for row in table["board"]:
         devices = tuple(Device(**{**device, "symbol": symbols[device["symbol"]]}) for device in row["device"])
