@@ -138,8 +138,9 @@ kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of i
 flips: $(READY) ## flip 314 random bits of a recording, one at a time: what becomes of the track, and what the replay says
 	$(TOOL) reliability.flip_recording
 
-hardware: $(READY) ## the printed boxes: STL in out/hardware, checked to be closed, and their pictures; not built yet
+hardware: $(READY) ## checks the nets of the wiring; the printed boxes: STL in out/hardware, checked to be closed, and their pictures; not built yet
 	@tools/apt.sh openscad || echo "OpenSCAD is not installed, and this user may not install it."
+	$(TOOL) hardware.nets
 	$(TOOL) hardware.boxes
 
 flash: ## build the firmware and write it to a board: make flash PORT=/dev/ttyACM0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Electrical checks of a board's nets, the simple part of what KiCad calls ERC.
+"""Electrical checks of the boards' nets, the simple part of what KiCad calls ERC; `make hardware` runs them.
 
 In: a `WiredBoard`. Out: problems in words; none when every pin is wired or meant to be open, every net has one driver or parts that take
 turns, supplies are in range, no level exceeds what an input withstands, and MISO rests at a one or a zero. Currents and rise times are not
@@ -9,9 +9,10 @@ checked. Owns the processor's thresholds.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator
 
-from hardware.wiring import POWER, Device, WiredBoard
+from hardware.wiring import POWER, Device, WiredBoard, boards
 
 DRIVERS = ("out", "tri")
 PROCESSOR_V = 5.0  # level of its outputs
@@ -108,3 +109,13 @@ def _is_driven_through(board: WiredBoard, net: str) -> bool:
 def _level(device: Device, kind: str) -> float:
     """Level at which a pin drives, V. A pin that goes either way follows its net: the shifter, open drains."""
     return device.symbol.logic_v if kind in DRIVERS else 0.0
+
+
+def main() -> int:
+    found = [text for board in boards() for text in problems(board)]
+    print("\n".join(found) or f"wiring: {sum(len(_nets(board)) for board in boards())} nets, each with one driver at a time")
+    return int(bool(found))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
