@@ -17,6 +17,7 @@ from echostep.plan.importers import limited
 from echostep.plan.importers.formats import import_plan
 from echostep.plan.importers.imdf.archive import FREE_BYTES, MOST_RATIO, Archive
 from echostep.plan.importers.limited import import_limited, open_limited
+from echostep.plan.importers.report import ImportReport
 from echostep.plan.model import load_plan
 from echostep.plan.plan_file import MOST_CORNERS
 from echostep.plan.writer import plan_json
@@ -39,8 +40,10 @@ def arc(radius: str) -> str:
 
 
 def test_unknown_entities_are_left_out(tmp_path: Path) -> None:
-    plan = import_plan(drawing(tmp_path / "a.dxf", "0\nAEC_WALL\n5\n99\n8\nWalls\n10\n1.0\n"))
-    assert len(plan.levels[0].walls) == len(SQUARE)
+    report = ImportReport()
+    file = drawing(tmp_path / "a.dxf", "0\nAEC_WALL\n5\n99\n8\nWalls\n10\n1.0\n")
+    assert len(import_plan(file, report=report).levels[0].walls) == len(SQUARE)
+    assert sum("AEC_WALL" in what for what in report.left_out) == 1
 
 
 @pytest.mark.parametrize("radius", ["1e300", "1e15", "1e12"])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import logging
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -20,9 +21,10 @@ from echostep.plan.importers.report import ImportReport
 
 MOST_PARTS = 300_000  # entities in blocks
 DEEPEST_BLOCK = 16
+REMOVED = re.compile(r"Removed invalid DXF entity (\w+)\(")  # of ezdxf about entities of a kind that it does not know
 
 
-def read_drawing(file: Path) -> Any:
+def read_drawing(file: Path, report: ImportReport) -> Any:
     """Read a drawing, repaired where ezdxf can; raises EchostepError when the file is not a drawing."""
     require(f"{file}: DXF", "ezdxf")
     from ezdxf import recover
@@ -37,6 +39,12 @@ def read_drawing(file: Path) -> Any:
         raise EchostepError(f"{file}: not a DXF drawing: {reason}") from error
     if not len(drawing.modelspace()) and auditor.has_errors:
         raise EchostepError(f"{file}: the drawing is damaged: {auditor.errors[0].message[:200]}")
+    for fix in auditor.fixes:
+        if removed := REMOVED.search(fix.message):
+            report.leave_out(f"{removed[1][:40]} (object of another program)")
+            report.doubt(
+                f"{removed[1][:40]} and its like cannot be read: save as plain DXF (AutoCAD: -EXPORTTOAUTOCAD)"
+            )
     return drawing
 
 

@@ -27,6 +27,7 @@ STRAY_M = 1e8  # a line beyond is no building, in whatever grid: twice around th
 STRAY = LineString([(0.0, 0.0), (STRAY_M, 0.0)])  # in the place of a line beyond
 THICKEST_M = 1.2  # a hatch that is nowhere wider fills a wall or a column, a wider one a floor; assumed
 ASKEW = 0.5  # sine of the angle between a multiline and its stored offsets below which these are wrong; at right corners it is 0.71
+PROXY_LINES = ("LINE", "ARC", "CIRCLE", "LWPOLYLINE", "POLYLINE")
 PICTURES = frozenset(
     {"IMAGE", "WIPEOUT", "VIEWPORT", "OLE2FRAME", "XLINE", "RAY", "UNDERLAY", "INSERT"}
 )  # with an outline that is no line of the building
@@ -96,6 +97,8 @@ def paths(entity: Any) -> Iterator[Any]:
         if _askew(entity):
             entity.update_geometry()
         yield from (path.make_path(part) for part in entity.virtual_entities() if part.dxftype() in ("LINE", "ARC"))
+    elif kind == "ACAD_PROXY_ENTITY":  # an object of another program, with lines to show it by
+        yield from (path.make_path(part) for part in entity.virtual_entities() if part.dxftype() in PROXY_LINES)
     else:
         yield path.make_path(entity)
 

@@ -48,7 +48,7 @@ class Sheet:
 
 def read_sheet(file: Path, hints: Hints, report: ImportReport) -> Sheet:
     """Read and sort a drawing; raises EchostepError when walls or units are missing or doubtful."""
-    drawing = read_drawing(file)
+    drawing = read_drawing(file, report)
     patterns = patterns_of(hints.layers)
     visible = VisibleEntities(drawing, file, report)
     kinds: dict[str, Layered] = {kind: [] for kind in patterns}
