@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 
 from echostep.errors import EchostepError
 from echostep.plan.importers.formats import import_plan
+from echostep.plan.importers.report import ImportReport
 from echostep.plan.model import Plan
 
 ifcopenshell = pytest.importorskip("ifcopenshell", reason="ifcopenshell is not installed: pip install 'echostep[ifc]'")
@@ -20,10 +22,14 @@ ifcopenshell = pytest.importorskip("ifcopenshell", reason="ifcopenshell is not i
 class Model:
     """A building in millimetres."""
 
-    def __init__(self) -> None:
-        from ifcopenshell.api import aggregate, context, project, root, unit
+    def __init__(self, schema: str = "IFC4") -> None:
+        from ifcopenshell.api import aggregate, context, owner, project, root, unit
 
-        self.file: Any = project.create_file()
+        self.file: Any = project.create_file(version=schema)
+        if schema == "IFC2X3":  # needs an owner of each element
+            person, company = owner.add_person(self.file), owner.add_organisation(self.file)
+            owner.add_person_and_organisation(self.file, person=person, organisation=company)
+            owner.add_application(self.file)
         self.project = root.create_entity(self.file, ifc_class="IfcProject", name="House")
         unit.assign_unit(self.file)  # millimetres
         model = context.add_context(self.file, context_type="Model")
@@ -62,10 +68,22 @@ class Model:
         self._put(element, *at, turn)
         return element
 
-    def cut(self, wall: Any, at: tuple[float, float, float], size: tuple[float, float, float]) -> None:
+    def cut(self, wall: Any, at: tuple[float, float, float], size: tuple[float, float, float]) -> Any:
         from ifcopenshell.api import feature
 
-        feature.add_feature(self.file, feature=self.box("IfcOpeningElement", at, size), element=wall)
+        opening = self.box("IfcOpeningElement", at, size)
+        feature.add_feature(self.file, feature=opening, element=wall)
+        return opening
+
+    def fill(self, opening: Any, element: Any) -> None:
+        from ifcopenshell.api import feature
+
+        feature.add_filling(self.file, opening=opening, element=element)
+
+    def contain(self, storey: Any, *elements: Any) -> None:
+        from ifcopenshell.api import spatial
+
+        spatial.assign_container(self.file, products=list(elements), relating_structure=storey)
 
     def _put(self, product: Any, x: float, y: float, z: float, turn: float) -> None:
         from ifcopenshell.api import geometry
@@ -153,3 +171,117 @@ def test_no_model(tmp_path: Path, text: str, named: str) -> None:
     with pytest.raises(EchostepError, match=named) as caught:
         import_plan(tmp_path / "a.ifc")
     assert "\n" not in str(caught.value)
+
+
+def imported(model: Model, folder: Path) -> tuple[Plan, ImportReport]:
+    model.file.write(str(folder / "a.ifc"))
+    report = ImportReport()
+    return import_plan(folder / "a.ifc", report=report), report
+
+
+def without_shape(model: Model, kind: str, **about: Any) -> Any:
+    """An element without a representation."""
+    from ifcopenshell.api import root
+
+    element = root.create_entity(model.file, ifc_class=kind, name=kind)
+    for name, value in about.items():
+        setattr(element, name, value)
+    return element
+
+
+@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4", "IFC4X3"])
+@pytest.mark.parametrize("leaf", ["drawn open", "without a shape", "closed"])
+def test_a_door_lies_in_its_opening(tmp_path: Path, leaf: str, schema: str) -> None:
+    """The wall x 4.0 to 4.2 has an opening y 3 to 5, which reaches out of the wall on one side."""
+    model = Model(schema)
+    model.storey("Ground", 0.0)
+    wall = model.box("IfcWall", (4.2, 0, 0), (8, 0.2, 2.6), math.pi / 2)
+    opening = model.cut(wall, (4.0, 3.0, 0), (0.5, 2.0, 2.1))
+    if leaf == "without a shape":
+        door = without_shape(model, "IfcDoor")
+    else:
+        door = model.box("IfcDoor", (4.05, 3.0, 0), (1.0, 0.05, 2.1) if leaf == "drawn open" else (0.05, 2.0, 2.1))
+    model.fill(opening, door)
+    plan, report = imported(model, tmp_path)
+    assert len(plan.levels[0].doors) == 1
+    x0, y0, x1, y1 = plan.levels[0].doors[0].line
+    assert (x0, x1) == pytest.approx((4.1, 4.1), abs=0.01)
+    assert sorted((y0, y1)) == pytest.approx([3, 5], abs=0.01)
+    assert report.left_out == {}
+
+
+def test_a_door_without_opening_has_its_placement(tmp_path: Path) -> None:
+    """A leaf drawn open, 0.9 m wide along the placement's x."""
+    model = Model()
+    model.storey("Ground", 0.0)
+    model.box("IfcWall", (0, 0, 0), (4, 0.2, 2.6))
+    model.box("IfcWall", (4.9, 0, 0), (4, 0.2, 2.6))
+    door = model.box("IfcDoor", (4.0, 0.1, 0), (0.9, 0.9, 2.1))
+    door.OverallWidth, door.OverallHeight = 900.0, 2100.0
+    plan, _ = imported(model, tmp_path)
+    assert [one.line for one in plan.levels[0].doors] == [pytest.approx((4.0, 0.1, 4.9, 0.1), abs=0.01)]
+
+
+def test_what_has_no_shape_is_counted_and_filled_openings_place_windows(tmp_path: Path) -> None:
+    model = Model()
+    model.storey("Ground", 0.0)
+    wall = model.box("IfcWall", (0, 0, 0), (8, 0.2, 2.6))
+    model.fill(model.cut(wall, (2, -0.1, 0.8), (1.5, 0.4, 1.2)), without_shape(model, "IfcWindow"))
+    for kind in ("IfcDoor", "IfcWindow", "IfcWall"):
+        without_shape(model, kind)
+    for kind in ("IfcSlab", "IfcFurniture", "IfcFurniture"):
+        model.box(kind, (0, 0, 0), (1, 1, 0.2))
+    plan, report = imported(model, tmp_path)
+    assert len(plan.levels[0].windows) >= 2
+    assert report.left_out == {
+        "IfcWall without a shape": 1, "IfcWindow without a shape": 1, "IfcDoor without a shape, an opening or a width": 1,
+        "IfcSlab": 1, "IfcFurniture": 2,
+    }  # fmt: skip
+    assert "doors without a shape were left out" in report.doubts[0]
+
+
+def test_reference_levels_are_no_storeys(tmp_path: Path) -> None:
+    """Levels without walls, doors and rooms close to another one; two half storeys with walls stay, and are told."""
+    model = Model()
+    walls = [model.box("IfcWall", (0, 0, z), (8, 0.2, 2.0)) for z in (0.0, 2.9, 4.2)]
+    named = {
+        name: model.storey(name, z)
+        for name, z in (("Slab 0", -0.36), ("Ground", 0.0), ("Slab 1", 2.6), ("First", 2.9), ("Half", 4.2))
+    }
+    for name, wall in zip(("Ground", "First", "Half"), walls, strict=True):
+        model.contain(named[name], wall)
+    plan, report = imported(model, tmp_path)
+    assert [level.name for level in plan.levels] == ["Ground", "First", "Half"]
+    assert report.doubts == [
+        "reference levels, not storeys: Slab 0 (-0.36 m), Slab 1 (2.6 m)",
+        "levels First and Half are 1.30 m apart: half storeys, or reference levels?",
+    ]
+
+
+def test_names_of_storeys_and_rooms(tmp_path: Path) -> None:
+    """Of a storey the name goes before the long name, of a room the other way round."""
+    model = Model()
+    storey = model.storey("Ground floor", 0.0)
+    storey.LongName = "ACID00000001"
+    model.box("IfcWall", (0, 0, 0), (8, 0.2, 2.6))
+    model.box("IfcSpace", (1, 1, 0), (2, 2, 2.6), name="1.01").LongName = "Kitchen"
+    plan, _ = imported(model, tmp_path)
+    assert plan.levels[0].name == "Ground floor"
+    assert [room.name for room in plan.levels[0].rooms] == ["Kitchen"]
+
+
+def test_a_packed_model(tmp_path: Path) -> None:
+    house = write_house(tmp_path)
+    with zipfile.ZipFile(tmp_path / "house.ifczip", "w", zipfile.ZIP_DEFLATED) as packed:
+        packed.write(house, "model/house.ifc")
+    assert import_plan(tmp_path / "house.ifczip").digest == import_plan(house).digest
+    with zipfile.ZipFile(tmp_path / "none.ifczip", "w") as packed:
+        packed.writestr("readme.txt", "x")
+    for name, raw, named in (
+        ("none.ifczip", None, "no .ifc file in it"),
+        ("bad.ifczip", b"PK\x03\x04x", "not a zip file"),
+    ):
+        if raw is not None:
+            (tmp_path / name).write_bytes(raw)
+        with pytest.raises(EchostepError, match=named):
+            import_plan(tmp_path / name)

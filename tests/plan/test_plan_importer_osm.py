@@ -12,8 +12,9 @@ import pytest
 
 from echostep.errors import EchostepError
 from echostep.plan.check import check_plan
-from echostep.plan.importers.formats import import_plan
+from echostep.plan.importers.formats import import_plan, open_plan
 from echostep.plan.importers.osm.elements import levels_of
+from echostep.plan.importers.report import ImportReport
 from echostep.plan.model import Plan
 
 LON, LAT = 8.85, 53.11
@@ -164,3 +165,75 @@ def test_wrong_xml(tmp_path: Path, text: str, named: str) -> None:
     with pytest.raises(EchostepError, match=named) as caught:
         import_plan(tmp_path / "a.osm")
     assert "\n" not in str(caught.value)
+
+
+def geojson(*shapes: tuple[str, Any, dict[str, str]]) -> str:
+    features = [
+        {"type": "Feature", "properties": {"@id": f"way/{k}"} | tags, "geometry": {"type": kind, "coordinates": at}}
+        for k, (kind, at, tags) in enumerate(shapes)
+    ]
+    return json.dumps({"type": "FeatureCollection", "generator": "overpass-turbo", "features": features})
+
+
+RING = [[8.0, 50.0], [8.0001, 50.0], [8.0001, 50.0001], [8.0, 50.0001], [8.0, 50.0]]
+ROOM = {"indoor": "room", "level": "0", "name": "Room 1"}
+
+
+@pytest.mark.parametrize("name", ["export.geojson", "export.json"])
+def test_geojson_of_overpass_turbo(tmp_path: Path, name: str) -> None:
+    """A door's point lies on the wall that has a corner there; polygons with holes, several polygons, lines."""
+    hole = [[8.00002, 50.00002], [8.00004, 50.00002], [8.00004, 50.00004], [8.00002, 50.00002]]
+    (tmp_path / name).write_text(
+        geojson(
+            ("Polygon", [RING, hole], ROOM),
+            ("Point", [8.0001, 50.0], {"door": "yes", "level": "0"}),
+            ("Point", [8.00005, 50.00005], {"door": "yes", "level": "0"}),
+            ("LineString", [[8.0001, 50.0], [8.0002, 50.0]], {"indoor": "wall", "level": "0"}),
+            ("MultiPolygon", [[RING]], {"indoor": "room", "level": "1", "name": "Room 2"}),
+        )
+    )
+    report = ImportReport()
+    plan = open_plan(tmp_path / name)
+    assert import_plan(tmp_path / name, report=report).digest == plan.digest
+    assert [[room.name for room in level.rooms] for level in plan.levels] == [["Room 1"], ["Room 2"]]
+    assert len(plan.levels[0].doors) == 1
+    assert report.left_out == {"door on no wall": 1}
+    assert plan.georeference is not None
+    assert len(plan.levels[0].walls) == 4 + 3 + 1  # outline, hole, the wall beside
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (geojson(("Polygon", [[[0, 0], [1, 0], [0, 0]]], {"building": "yes"})), "indoor"),
+        (geojson(("Curve", [], ROOM)), "no type of geometry"),
+        (geojson(("Point", [200, 0], ROOM)), r"features\[0\]"),
+        (geojson(("Point", [1], ROOM)), "expected .longitude, latitude."),
+        (geojson(("Polygon", 3, ROOM)), "coordinates"),
+    ],
+)
+def test_wrong_geojson(tmp_path: Path, text: str, named: str) -> None:
+    (tmp_path / "a.geojson").write_text(text)
+    with pytest.raises(EchostepError, match=named):
+        import_plan(tmp_path / "a.geojson")
+
+
+def test_rooms_without_a_level_are_told(tmp_path: Path) -> None:
+    rooms = [way(60, [1, 2, 3, 4, 1], indoor="room", name="Lost"), way(61, [1, 2, 3, 4, 1], indoor="area")]
+    (tmp_path / "a.json").write_text(json.dumps({"elements": [*HOUSE, *rooms]}))
+    report = ImportReport()
+    import_plan(tmp_path / "a.json", report=report)
+    assert report.left_out["room without level"] == 1
+    assert report.left_out["indoor=area without level"] == 1
+    assert report.doubts[0].startswith("1 room has no level and was left out (way 60)")
+
+
+def test_a_room_drawn_as_a_relation_has_its_name(tmp_path: Path) -> None:
+    """Its outline is two open ways in opposite directions; the hole's walls have no name."""
+    outline = [way(70, [1, 2, 3]), way(71, [1, 4, 3]), way(72, [2, 3, 4, 2])]
+    members = [{"type": "way", "ref": ref, "role": role} for ref, role in ((70, "outer"), (71, "outer"), (72, "inner"))]
+    tags = {"type": "multipolygon", "indoor": "room", "level": "0", "name": "Ring"}
+    relation = {"type": "relation", "id": 7, "members": members, "tags": tags}
+    (tmp_path / "a.json").write_text(json.dumps({"elements": [*HOUSE, *outline, relation]}))
+    plan = import_plan(tmp_path / "a.json")
+    assert sum(room.name == "Ring" for level in plan.levels for room in level.rooms) == 1

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,7 @@ def test_every_kind_of_entity_is_a_wall_or_counted(tmp_path: Path) -> None:
     """What goes in against what comes out: each entity on a layer of walls gives lines or a count, each on another layer a count."""
     doc, space = sheet()
     house(space)
-    lines = {
+    lines: dict[str, Callable[[float], Any]] = {
         "LINE": lambda x: space.add_line((x, 20), (x, 24), WALL),
         "LWPOLYLINE": lambda x: space.add_lwpolyline([(x, 20), (x, 24)], dxfattribs=WALL),
         "POLYLINE": lambda x: space.add_polyline2d([(x, 20), (x, 24)], dxfattribs=WALL),
@@ -60,7 +61,7 @@ def test_every_kind_of_entity_is_a_wall_or_counted(tmp_path: Path) -> None:
         "MLINE": lambda x: space.add_mline([(x, 20), (x, 24)], dxfattribs=WALL | {"scale_factor": 0.2}),
         "HATCH": lambda x: space.add_hatch(dxfattribs=WALL).paths.add_polyline_path(corners((x, 20, x + 0.2, 24)), is_closed=True),
     }  # fmt: skip
-    counted = {
+    counted: dict[str, Callable[[], Any]] = {
         "TEXT": lambda: space.add_text("W1", dxfattribs=WALL),
         "MTEXT": lambda: space.add_mtext("W2", dxfattribs=WALL),
         "POINT": lambda: space.add_point((1, 1), dxfattribs=WALL),
@@ -70,8 +71,8 @@ def test_every_kind_of_entity_is_a_wall_or_counted(tmp_path: Path) -> None:
     }  # fmt: skip
     for k, draw in enumerate(lines.values()):
         draw(20 + 5 * k)
-    for draw in counted.values():
-        draw()
+    for draw_one in counted.values():
+        draw_one()
     for _ in range(3):
         space.add_line((1, 1), (2, 2), {"layer": "FURNITURE"})
     space.add_circle((1, 1), 1, {"layer": "FURNITURE"})

@@ -22,11 +22,12 @@ MOST_LEVELS, MOST_DOUBTS = 5, 4  # lines on levels, and on doubts; more of them 
 MOST_NAMES = 6  # kinds and layers in one line
 AT_WALL_M = 0.15  # greatest distance of both ends of a door from a wall: issue 44's bound for a door in a gap
 SIZES_M, DOORS_M = (2.5, 1500.0), (0.5, 3.0)  # of a level, and of half of the doors; assumed
+THROUGH_M = 0.2  # to both sides of a door, which must be free: half the thickness of a wall; assumed
 CLEAR_M = 0.01  # a wall nearer than this to a door's middle part runs through it
 
 
 def summary(plan: Plan, report: ImportReport) -> list[str]:
-    """At most `MOST_LINES` lines."""
+    """Less than `MOST_LINES` lines: the caller adds one on the files written."""
     lines = [_level(level) for level in plan.levels[:MOST_LEVELS]]
     if len(plan.levels) > MOST_LEVELS:
         more = plan.levels[MOST_LEVELS:]
@@ -42,7 +43,7 @@ def summary(plan: Plan, report: ImportReport) -> list[str]:
     if report.left_out:
         lines.append("left out: " + _counted(report.left_out))
     doubts = [*report.doubts, *_implausible(plan), *_without_doors(plan, report.doors_remedy)]
-    shown = min(MOST_DOUBTS, MOST_LINES - len(lines) - 1)
+    shown = max(0, min(MOST_DOUBTS, MOST_LINES - len(lines) - 2))
     lines += [f"note: {doubt}" for doubt in doubts[:shown]]
     if len(doubts) > shown:
         lines.append(f"note: {len(doubts) - shown} more: " + "; ".join(doubts[shown:])[:300])
@@ -50,7 +51,7 @@ def summary(plan: Plan, report: ImportReport) -> list[str]:
 
 
 def doors_in_gaps(level: Level) -> int:
-    """The number of doors that lie in a gap of a wall: both ends at a wall or at the next door, no wall through the middle."""
+    """The number of doors that lie in a gap of a wall: both ends at a wall or at the next door, the way through free."""
     solid = level.solid
     tree = shapely.STRtree(shapely.linestrings(solid.reshape(-1, 2, 2))) if len(solid) else None
     return 0 if tree is None else sum(_in_gap(door, tree, level.doors) for door in level.doors)
@@ -65,13 +66,23 @@ def _in_gap(door: Door, tree: shapely.STRtree, doors: Sequence[Door]) -> bool:
         others = [shapely.LineString((other.line[:2], other.line[2:])) for other in doors if other is not door]
         beside = shapely.union_all(others)
         at_wall = [one or beside.distance(end) < AT_WALL_M for one, end in zip(at_wall, ends, strict=True)]
-    return all(at_wall) and not len(tree.query(inner, predicate="dwithin", distance=CLEAR_M))
+    blocked = [len(tree.query(way, predicate="dwithin", distance=CLEAR_M)) > 0 for way in (inner, _across(door))]
+    return all(at_wall) and not any(blocked)
+
+
+def _across(door: Door) -> shapely.LineString:
+    """The way through a door: across its middle, out of a thick wall on both sides."""
+    x0, y0, x1, y1 = door.line
+    x, y = (x0 + x1) / 2, (y0 + y1) / 2
+    u, v = THROUGH_M * (y1 - y0) / door.width_m, THROUGH_M * (x0 - x1) / door.width_m
+    return shapely.LineString([(x - u, y - v), (x + u, y + v)])
 
 
 def size_m(level: Level) -> tuple[float, float]:
     """Width and height of the rectangle around a level's walls and windows."""
-    x0, y0, x1, y1 = extent(level.solid)
-    return (x1 - x0, y1 - y0) if len(level.solid) else (0.0, 0.0)
+    drawn = np.concatenate((level.walls, level.windows))
+    x0, y0, x1, y1 = extent(drawn)
+    return (x1 - x0, y1 - y0) if len(drawn) else (0.0, 0.0)
 
 
 def _level(level: Level) -> str:

@@ -17,6 +17,7 @@ from echostep.plan.model import Door, Level
 NARROWEST_M, WIDEST_M = 0.5, 1.6  # of an opening that a door could close
 LONGEST_JAMB_M = 0.3  # a shorter wall at the end of another one is a jamb: the longer one still ends free
 TOUCH_M = 0.02  # walls with a smaller distance touch
+SAME_M = 0.1  # two gaps with nearer middles are one, found from both its ends
 THICKNESS_M = 0.05  # an opening ends at this distance from its own wall's end at the earliest
 
 
@@ -60,8 +61,10 @@ def _free_ends(walls: Floats, lines: Floats, level: Level) -> tuple[Floats, Floa
 
 def _once(gaps: Floats) -> list[list[float]]:
     """Gaps (n, 4) without those that were found from their other end too."""
-    unique: dict[tuple[float, float], list[float]] = {}
-    for row in gaps.tolist():
-        middle = round((row[0] + row[2]) / 2, 1), round((row[1] + row[3]) / 2, 1)
-        unique.setdefault(middle, row)
-    return list(unique.values())
+    middles = shapely.points((gaps[:, :2] + gaps[:, 2:]) / 2)
+    one, other = shapely.STRtree(middles).query(middles, predicate="dwithin", distance=SAME_M)
+    repeated: set[int] = set()
+    for k, later in zip(one.tolist(), other.tolist(), strict=True):
+        if k < later and k not in repeated:
+            repeated.add(later)
+    return [row for k, row in enumerate(gaps.tolist()) if k not in repeated]
