@@ -76,11 +76,12 @@ def test_at_most_twelve_lines() -> None:
 
 
 def test_doors_in_gaps_are_counted() -> None:
+    """The entrance of this building is drawn in a wall without a gap."""
     level = seven_floors().levels[1]
-    assert doors_in_gaps(level) == len(level.doors) == 7
+    assert (doors_in_gaps(level), len(level.doors)) == (6, 7)
     away = Door((4.5, 2.0, 5.5, 2.0))
     through = Door((17.0, 14.0, 18.0, 14.0))
-    assert doors_in_gaps(replace(level, doors=(*level.doors, away, through))) == 7
+    assert doors_in_gaps(replace(level, doors=(*level.doors, away, through))) == 6
 
 
 def test_sizes_that_no_building_has_are_told() -> None:

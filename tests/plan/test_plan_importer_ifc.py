@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ ifcopenshell = pytest.importorskip("ifcopenshell", reason="ifcopenshell is not i
 class Model:
     """A building in millimetres."""
 
-    def __init__(self, schema: str = "IFC4") -> None:
+    def __init__(self, schema: Literal["IFC2X3", "IFC4", "IFC4X3"] = "IFC4") -> None:
         from ifcopenshell.api import aggregate, context, owner, project, root, unit
 
         self.file: Any = project.create_file(version=schema)
@@ -191,7 +191,7 @@ def without_shape(model: Model, kind: str, **about: Any) -> Any:
 
 @pytest.mark.parametrize("schema", ["IFC2X3", "IFC4", "IFC4X3"])
 @pytest.mark.parametrize("leaf", ["drawn open", "without a shape", "closed"])
-def test_a_door_lies_in_its_opening(tmp_path: Path, leaf: str, schema: str) -> None:
+def test_a_door_lies_in_its_opening(tmp_path: Path, leaf: str, schema: Literal["IFC2X3", "IFC4", "IFC4X3"]) -> None:
     """The wall x 4.0 to 4.2 has an opening y 3 to 5, which reaches out of the wall on one side."""
     model = Model(schema)
     model.storey("Ground", 0.0)
