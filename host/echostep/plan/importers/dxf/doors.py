@@ -47,7 +47,8 @@ class PlacedDoors:
         for line in _joined(lines):
             if not any(_same(line, other.line) for other in self.doors):
                 self.doors.append(Door(line))
-                if walls.gap(line[:2], _along(line), math.dist(line[:2], line[2:]) / 2, WIDEST_M) is None:
+                width_m = math.dist(line[:2], line[2:])
+                if walls.gap(line[:2], _along(line), width_m / 2, width_m) is None:
                     self.cuts.append(walls.faces(line, THICKEST_M))
 
     def add_swing(self, symbol: Symbol, walls: WallBands) -> bool:
@@ -87,7 +88,7 @@ def _of_swing(swing: Swing, walls: WallBands) -> Line | None:
     closed = [end for k, end in enumerate(swing.ends) if k != swing.leaf]
     towards = [_unit(hinge, end) for end in closed]
     gaps = [
-        (u, gap) for u in (*towards, *walls.directions(hinge)) if (gap := walls.gap(hinge, u, radius / 2, BESIDE_M))
+        (u, gap) for u in (*towards, *walls.directions(hinge)) if (gap := walls.gap(hinge, u, radius / 2, 2 * radius))
     ]
     fitting = [(u, gap) for u, gap in gaps if _fits(gap, radius)]
     if fitting:
@@ -130,7 +131,7 @@ def _of_line(lines: Sequence[LineString], walls: WallBands) -> Line | None:
         return _line(a, along, gap.begin_m, gap.end_m)
     for hinge in (a, b):
         for u in walls.directions(hinge):
-            leaf = walls.gap(hinge, u, length / 2, BESIDE_M)
+            leaf = walls.gap(hinge, u, length / 2, 2 * length)
             if leaf is not None and _fits(leaf, length):
                 return _line(hinge, u, leaf.begin_m, leaf.end_m)
     return (*a, *b) if gap is None and walls.is_at_wall(a) and walls.is_at_wall(b) else None

@@ -46,6 +46,7 @@ class _Storey:
     frame: DrawingFrame
     window: BaseGeometry | None = None
     swings: set[int] = field(default_factory=set)  # ids of entities on other layers that turned out to be doors
+    _lines: dict[int, list[LineString]] = field(default_factory=dict)  # by id of the entities, which the sheet keeps
 
     def lines(self, *kinds: str) -> list[LineString]:
         """The lines of kinds of entities, in map metres, inside the window."""
@@ -55,7 +56,13 @@ class _Storey:
         """The lines of an entity inside the window; none of one that is a door's swing."""
         if id(entity) in self.swings:
             return []
-        return [line for line in self.frame.lines(entity, self.sheet.file) if self.holds(line)]
+        if id(entity) not in self._lines:
+            self._lines[id(entity)] = self.of_part(entity)
+        return self._lines[id(entity)]
+
+    def of_part(self, part: Any) -> list[LineString]:
+        """The lines of a block's part inside the window: it lives for a moment, so its lines are not kept."""
+        return [line for line in self.frame.lines(part, self.sheet.file) if self.holds(line)]
 
     def holds(self, shape: BaseGeometry) -> bool:
         """Whether a shape is of this level."""
@@ -164,7 +171,7 @@ def _without_lines(storey: _Storey, report: ImportReport) -> None:
     """Report entities on the layers used that have no line: texts, pictures, bodies, unknown objects."""
     for kind in ("walls", "columns", "windows", "stairs", "lifts", "obstacles"):
         for entity, layer in storey.sheet.kinds[kind]:
-            if not storey.frame.lines(entity, storey.sheet.file):
+            if storey.window is None and not storey.of(entity):
                 report.leave_out(f"{entity.dxftype()} on {layer[:40]}")
 
 
@@ -205,7 +212,7 @@ def _symbols(storey: _Storey) -> list[Symbol]:
     symbols: list[Symbol] = []
     for entity, _ in storey.sheet.kinds["doors"]:
         if entity.dxftype() == "INSERT":
-            lines = [line for part in _parts(entity, storey.sheet.file) for line in storey.of(part)]
+            lines = [line for part in _parts(entity, storey.sheet.file) for line in storey.of_part(part)]
             symbols += [symbol_of(lines)] if lines else []
         else:
             loose += storey.of(entity)

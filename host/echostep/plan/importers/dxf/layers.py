@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString
 
-from echostep.arrays import Floats
+from echostep.arrays import Floats, Ints
 
 # Names in English (AIA) and German, Romance, Germanic and Slavic languages, Turkish, Chinese, Japanese, Korean
 LAYERS: dict[str, tuple[str, ...]] = {
@@ -40,7 +40,8 @@ LAYERS: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 BESIDE = (
     "*patt*", "*hatch*", "*schraff*", "*-dim*", "*bemass*", "*bemaß*", "*anno*", "*text*", "*demol*", "*-demo*", "*abbruch*", "*insul*", "*daemm*",
-    "*dämm*",
+    "*dämm*", "*furn*", "*möbel*", "*moebel*", "*muebl*", "*mobil*", "*sanit*", "*plumb*", "*clng*", "*ceil*", "*elec*", "*hvac*", "*equip*",
+    "*tile*",
 )  # fmt: skip
 DRAWN = (
     "walls",
@@ -51,6 +52,11 @@ DRAWN = (
     "lifts",
 )  # kinds whose layers have others beside them, of hatching or measures
 THINNEST_M, THICKEST_M = 0.05, 0.5  # distance of the two faces of a wall; assumed
+LONG_M = 1.0  # of a piece of wall
+CROWD_M, MOST_BESIDE = (
+    0.65,
+    3,
+)  # so near to a face, and so many other parallels at most: cavities, plaster, linings; assumed
 PAIRED = 0.5  # share of the lines of a layer of walls that have such a partner; assumed
 LEAST_M = 5.0  # a layer with less of them is no layer of walls; assumed
 MOST_PIECES = 20_000  # of one layer that are looked at
@@ -86,22 +92,26 @@ def pieces_of(lines: Sequence[LineString]) -> Floats:
 
 
 def faces_m(lines: Sequence[LineString]) -> float:
-    """Length of the lines of a layer that look like faces of walls: 0 unless most have a parallel partner at the distance of a wall's thickness."""
+    """Length of the lines of a layer that look like faces of walls, 0 where most do not.
+
+    A face has a parallel partner at the distance of a wall's thickness, and few other parallels beside it: treads, tiles, hatching have many. Half
+    of the length of walls is in pieces of a metre or more: furniture is shorter.
+    """
     pieces = pieces_of(lines)
     length = np.hypot(*(pieces[:, 2:] - pieces[:, :2]).T)
     pieces, length = pieces[length > THICKEST_M], length[length > THICKEST_M]
-    if length.sum() < LEAST_M or len(pieces) > MOST_PIECES:
+    if length.sum() < LEAST_M or len(pieces) > MOST_PIECES or length[length >= LONG_M].sum() < 0.5 * length.sum():
         return 0.0
-    spacing = spacings(pieces, THICKEST_M)
-    paired = length[(spacing >= THINNEST_M) & (spacing <= THICKEST_M)].sum()
+    spacing, beside = parallels(pieces, CROWD_M)
+    paired = length[(spacing >= THINNEST_M) & (spacing <= THICKEST_M) & (beside <= MOST_BESIDE)].sum()
     return float(paired) if paired > PAIRED * length.sum() else 0.0
 
 
-def spacings(pieces: Floats, most: float) -> Floats:
-    """Distance (n,) from each piece (n, 4) to the nearest parallel one beside its middle, within `most`; infinity where there is none."""
-    nearest = np.full(len(pieces), np.inf)
+def parallels(pieces: Floats, most: float) -> tuple[Floats, Ints]:
+    """Of each piece (n, 4): distance (n,) to the nearest parallel one beside its middle, infinite if none is within `most`; and how many are."""
+    nearest, count = np.full(len(pieces), np.inf), np.zeros(len(pieces), dtype=np.int64)
     if not len(pieces):
-        return nearest
+        return nearest, count
     tree = shapely.STRtree(shapely.linestrings(pieces.reshape(-1, 2, 2)))
     middle = (pieces[:, :2] + pieces[:, 2:]) / 2
     along = pieces[:, 2:] - pieces[:, :2]
@@ -112,4 +122,5 @@ def spacings(pieces: Floats, most: float) -> Floats:
     apart = np.abs(along[one, 0] * start[:, 1] - along[one, 1] * start[:, 0])
     beside = (sine < 0.02) & (apart > 1e-3 * most)
     np.minimum.at(nearest, one[beside], apart[beside])
-    return nearest
+    np.add.at(count, one[beside], 1)
+    return nearest, count

@@ -16,7 +16,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.plan.importers.dxf.entities import parts
 from echostep.plan.importers.dxf.frame import corners
-from echostep.plan.importers.dxf.layers import spacings
+from echostep.plan.importers.dxf.layers import parallels
 
 MOST_PIECES = 5000  # the longest ones, whose distances are measured
 MOST_SYMBOLS = 500  # of doors that are measured
@@ -38,7 +38,7 @@ def lengths_of(by_kind: Mapping[str, Sequence[Any]], file: Path) -> dict[str, fl
         length = np.hypot(*(pieces[:, 2:] - pieces[:, :2]).T)
         lengths["wall"] = median(length, length)
         longest = np.argsort(-length)[:MOST_PIECES]
-        spacing = spacings(pieces[longest], 2 * THIN * lengths["wall"])
+        spacing, _ = parallels(pieces[longest], 2 * THIN * lengths["wall"])
         thickness = median(spacing, length[longest])
         if thickness < THIN * lengths["wall"]:
             lengths["thickness"] = thickness
