@@ -183,6 +183,12 @@ STUDIES = (
         lambda request, given: _of("clutter.study").clutter_study(given["data"], given["starts"], request.seed),
     ),
     StudyCommand(
+        "importers",
+        "Drawings, models and maps of a folder, imported without options: time, sizes, counts, doors in gaps, enclosed rooms.",
+        (_data("Folder of DXF, IFC, IMDF, OpenStreetMap, ROS or WRLD files, searched with its folders.", Parameter.empty), JSON),
+        lambda _request, given: _of("importers.study").importers_study(given["data"]),
+    ),
+    StudyCommand(
         "noplan",
         "Buildings drawn from a walk without a plan, beside FootSLAM; a second person on the drawing (simulated).",
         _usual("noplan", 50, "Walks of each row.", WESTPORT, _rows("*/10min")),
