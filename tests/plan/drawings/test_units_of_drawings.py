@@ -53,6 +53,16 @@ def test_a_unit_that_is_wrong_is_refused_with_the_right_one(tmp_path: Path, draw
         assert size_m(import_plan(path, Hints(units=drawn)).levels[0]) == pytest.approx((10, 8), abs=0.01)
 
 
+def test_a_unit_that_is_possible_but_odd_is_told(tmp_path: Path) -> None:
+    """Drawn in cm, called inches: a building of 25 m with walls 0.76 m thick may be, but hardly."""
+    report = ImportReport()
+    import_plan(drawing(tmp_path / "a.dxf", "cm", "in", door=False), report=report)
+    assert (
+        report.doubts[0].endswith("25.4 m long in inches as stated, 10 m in centimetres: --units cm?")
+        or "--units cm?" in report.doubts[0]
+    )
+
+
 @pytest.mark.parametrize("drawn", list(METRES))
 def test_a_drawing_without_units_is_asked_about(tmp_path: Path, drawn: str) -> None:
     with pytest.raises(EchostepError, match=rf"does not say its units.*--units {drawn}$"):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """`echostep evaluate importers`: each drawing, model and map of a folder, as `echostep plan import` reads it without options.
 
-In: a folder. Out: rows `{file, outcome, seconds, levels, long_m, wide_m, walls, doors, in_gaps, rooms, enclosed, left_out, says}`, JSON, a table. Owns
-nothing.
+In: a folder. Out: rows `{file, outcome, seconds, levels, long_m, wide_m, walls, doors, in_gaps, rooms, enclosed, left_out, says}`, JSON, a table.
+Owns nothing.
 Whether a plan is right is for people to see; what is counted here shows where it cannot be: doors in no gap, rooms that are not enclosed, a refusal.
 """
 

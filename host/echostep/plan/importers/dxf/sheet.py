@@ -66,7 +66,7 @@ def read_sheet(file: Path, hints: Hints, report: ImportReport) -> Sheet:
     if hints.scale_m is not None:
         scale_m, words, unit = hints.scale_m, f"{hints.scale_m:g} m a unit (--scale)", None
     else:
-        scale_m, words = scale_of(drawing, lengths, hints.units, file)
+        scale_m, words = scale_of(drawing, lengths, hints.units, file, report)
         unit = None if hints.units else stated_unit(drawing)
     sheet = Sheet(file, kinds, others, scale_m, words, unit)
     _tell(sheet, report, asks="walls" not in hints.layers)

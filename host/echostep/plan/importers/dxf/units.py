@@ -15,6 +15,7 @@ from typing import Any
 
 from echostep.errors import EchostepError
 from echostep.plan.importers.dxf.frame import METRES
+from echostep.plan.importers.report import ImportReport
 
 INSUNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m"}
 NAMES = {"mm": "millimetres", "cm": "centimetres", "m": "metres", "in": "inches", "ft": "feet"}
@@ -39,10 +40,13 @@ USUAL = {
     "thickness": Usual(0.03, 1.3, 0.2, 0.5, "its walls are {} thick"),
     "text": Usual(0.015, 3.0, 0.25, 0.6, "its letters are {} high"),
 }
+MUCH_ODDER = 6.0  # difference of the sums of squares from which another unit is worth a question: as unusual as 2.4 standard deviations; assumed
 LEAST_PIECE = 1e-9
 
 
-def scale_of(drawing: Any, lengths: Mapping[str, float], given: str | None, file: Path) -> tuple[float, str]:
+def scale_of(
+    drawing: Any, lengths: Mapping[str, float], given: str | None, file: Path, report: ImportReport
+) -> tuple[float, str]:
     """Metres a unit, and the words for the summary; raises EchostepError when the units are not stated or contradict the lengths.
 
     `lengths`: what was measured, by the keys of `USUAL`, in drawing units. `given`: the unit of --units.
@@ -60,6 +64,9 @@ def scale_of(drawing: Any, lengths: Mapping[str, float], given: str | None, file
         words = " and ".join(USUAL[key].words.format(_metres(lengths[key] * METRES[stated])) for key in wrong[:2])
         ask = f"is it in {NAMES[sensible]}? {advice} (or --units {stated} if it is right)" if sensible else advice
         raise EchostepError(f"{file}: the drawing states {NAMES[stated]} ($INSUNITS), but then {words}: {ask}")
+    if sensible and _oddity(lengths, METRES[stated]) - _oddity(lengths, METRES[sensible]) > MUCH_ODDER:
+        sizes = f"{_size(lengths, stated)} long in {NAMES[stated]} as stated, {_size(lengths, sensible)} in {NAMES[sensible]}"
+        report.doubt(f"{file.name} would be a more usual building in another unit: {sizes}: --units {sensible}?")
     return METRES[stated], f"{stated} ($INSUNITS; sizes fit)" if lengths else f"{stated} ($INSUNITS)"
 
 
