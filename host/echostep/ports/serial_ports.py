@@ -2,6 +2,8 @@
 """The serial ports of a live run.
 
 In: URLs of ports (pyserial, or udp://). Out: `Chunk`s in order of arrival. Owns the open ports, which are locked for this process, their threads.
+
+A port that went away is opened again, under the name that its device has then, if that has a USB serial number. Its first chunk is then empty.
 """
 
 from __future__ import annotations
@@ -20,7 +22,11 @@ from echostep.ports.access import holders, refusal
 from echostep.ports.arrival_clock import now_ns
 from echostep.ports.chunks import Chunk, ChunkQueue
 from echostep.ports.port_faults import PORT_FAULTS
+from echostep.ports.tcp import TcpPort
 from echostep.ports.udp import UdpPort
+from echostep.ports.usb_number import port_of_number, usb_number
+
+AnyPort = serial.SerialBase | UdpPort | TcpPort
 
 # Assumed, all of them.
 IDLE_S = 0.05  # longest wait for a chunk; short, so that the set-up of the MTx repeats its requests in time
@@ -43,7 +49,11 @@ class SerialPorts:
         self._stop = threading.Event()
         self._told: Counter[str] = Counter()  # dropped chunks by port that a notice has told of
         self.urls = dict(urls)
-        self._ports: dict[str, serial.SerialBase | UdpPort] = {}
+        self._ports: dict[str, AnyPort] = {}
+        self.lost: set[str] = set()  # names under which ports were opened that are away at present
+        self._opened_as = {
+            name: name for name in urls
+        }  # by the name of the device: the name under which its chunks come
         check_different(urls)
         try:
             for name, url in urls.items():
@@ -52,6 +62,7 @@ class SerialPorts:
             for port in self._ports.values():
                 port.close()
             raise
+        self._numbers = {name: usb_number(url) for name, url in urls.items()}
         self.notices: deque[str] = deque(maxlen=MOST_NOTICES)
         self._threads = [
             threading.Thread(target=self._read, args=(name, url, baud[name]), daemon=True) for name, url in urls.items()
@@ -76,9 +87,14 @@ class SerialPorts:
     def send(self, port: str, sent: bytes) -> None:
         """Write to a port, for at most `WRITE_TIMEOUT_S`; a failure becomes a notice."""
         try:
-            self._ports[port].write(sent)
+            self._ports[self._opened_as[port]].write(sent)
         except PORT_FAULTS as error:
             self.notices.append(f"{port}: cannot write: {error}")
+
+    def exchange(self, one: str, other: str) -> None:
+        """The devices of two names have exchanged their ports: what is sent to either goes to the port of the other; chunks keep their names."""
+        self._opened_as[one], self._opened_as[other] = self._opened_as[other], self._opened_as[one]
+        self.urls[one], self.urls[other] = self.urls[other], self.urls[one]
 
     def close(self) -> None:
         """Stop the threads and close the ports."""
@@ -94,29 +110,52 @@ class SerialPorts:
             port = self._ports[name]
             try:
                 received = port.read(max(1, port.in_waiting))
-                if waiting := port.in_waiting if received else 0:  # a read that has waited returns its first byte alone
+                # A read of a serial port that has waited returns its first byte alone.
+                if received and isinstance(port, serial.SerialBase) and (waiting := port.in_waiting):
                     received += port.read(waiting)
             except (TypeError, *PORT_FAULTS) as error:  # TypeError: closed under a blocking read
-                self._reopen(name, url, baud, error)
+                url = self._reopen(name, url, baud, error)
                 continue
             if isinstance(port, UdpPort) and (news := port.news()):
                 self.notices.append(f"{name}: {news}")
             if received:
                 self._queue.put(Chunk(name, now_ns(), received))
 
-    def _reopen(self, name: str, url: str, baud: int, error: Exception) -> None:
-        """Close a lost port and try to open it until that succeeds or `close` is called."""
+    def _reopen(self, name: str, url: str, baud: int, error: Exception) -> str:
+        """Close a lost port and try to open it until that succeeds or `close` is called; returns its URL, which may be another one."""
         if self._stop.is_set():
-            return
-        self.notices.append(f"{name}: {url} went away ({error}); trying again")
+            return url
+        why = (
+            ""
+            if isinstance(error, serial.SerialException | TypeError)
+            else f" ({getattr(error, 'strerror', '') or error})"
+        )
+        self.notices.append(f"{name}: {url} went away{why}: it is opened again as soon as it is back")
         self._ports[name].close()
+        self.lost.add(name)
         while not self._stop.wait(REOPEN_S):
+            place = self._place_of(name, url)
             try:
-                self._ports[name] = _open(url, baud)
+                if place is None:
+                    continue
+                self._ports[name] = _open(place, baud)
             except EchostepError:
                 continue
-            self.notices.append(f"{name}: {url} is back")
-            return
+            self.notices.append(f"{name}: {url} is back" + (f" as {place}" if place != url else ""))
+            device = next(device for device, opened in self._opened_as.items() if opened == name)
+            self.urls[device] = place
+            self._queue.put(Chunk(name, now_ns(), b""))
+            self.lost.discard(name)
+            return place
+        return url
+
+    def _place_of(self, name: str, url: str) -> str | None:
+        """Where the device of a lost port is now: by its serial number, if it has one; None while it is not plugged in."""
+        number = self._numbers[name]
+        if not number:
+            return url
+        place = port_of_number(number)
+        return url if place and os.path.realpath(url) == os.path.realpath(place) else place
 
 
 def check_different(urls: Mapping[str, str]) -> None:
@@ -126,13 +165,15 @@ def check_different(urls: Mapping[str, str]) -> None:
             raise EchostepError(f"{url} is given twice, for {name} and {other}: each has a port of its own")
 
 
-def _open(url: str, baud: int) -> serial.SerialBase | UdpPort:
+def _open(url: str, baud: int) -> AnyPort:
     """The port, locked for this process; raises EchostepError that names the program which has it."""
     if refused := refusal(url):
         raise EchostepError(str(refused))
     try:
         if url.startswith("udp://"):
             return UdpPort(url)
+        if url.startswith("socket://"):
+            return TcpPort(url, WRITE_TIMEOUT_S)
         return serial.serial_for_url(
             url, baudrate=baud, timeout=READ_TIMEOUT_S, write_timeout=WRITE_TIMEOUT_S, exclusive=True
         )

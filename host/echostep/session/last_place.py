@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 import msgspec
-from serial.tools import list_ports
 
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate, TrackStatus
@@ -66,12 +64,6 @@ class PlaceKeeper:
             written.replace(self._path)
         except OSError:
             return
-
-
-def board_number(port: str) -> str:
-    """The USB serial number of the board on a port; empty where it has none."""
-    device = os.path.realpath(port)
-    return next((seen.serial_number or "" for seen in list_ports.comports() if seen.device == device), "")
 
 
 def read_kept(folder: Path) -> Kept:

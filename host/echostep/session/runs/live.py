@@ -24,15 +24,16 @@ from echostep.plan.model import Plan
 from echostep.ports.arrival_clock import SleepWatch, now_ns
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk
 from echostep.ports.serial_ports import SerialPorts
+from echostep.ports.usb_number import usb_number
 from echostep.recording.recorder import Recorder
 from echostep.session.chunk_streams import portions_of, recorded, with_messages
 from echostep.session.console import console, print_notices
-from echostep.session.last_place import PlaceKeeper, board_number, read_kept, start_last
+from echostep.session.last_place import PlaceKeeper, read_kept, start_last
 from echostep.session.metadata import LAST, clock_metadata, plan_of, run_metadata, start_given, version_metadata
 from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
 from echostep.session.progress import with_bar
 from echostep.session.results import output_folder
-from echostep.session.runs.port_roles import with_role_check
+from echostep.session.runs.port_roles import with_right_names, with_role_check
 from echostep.session.runs.recording import start_recording
 from echostep.session.runs.starts import check_start
 from echostep.session.session import Session
@@ -51,7 +52,7 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -
     path = tracking.settings_path
     settings_toml = read_settings(path) if path else ""
     settings, seed = parse_settings(settings_toml, str(path)), tracking.seed or 0
-    number, is_last = board_number(ports.board), tracking.start == LAST
+    number, is_last = usb_number(ports.board), tracking.start == LAST
     start = _last_start(output.folder, plan, number, settings) if is_last else start_given(tracking, plan)
     tracker = Tracker(plan, start, settings, seed)
     check_start(plan, tracker.start, given=tracking.start is not None and not is_last, recorded=is_last)
@@ -129,7 +130,7 @@ def _recorded_chunks(
     session: Session | None = None,
 ) -> Iterator[Chunk | None]:
     """Chunks of the ports, check-ins and meetings of the page, messages of teammates, each recorded before it is used; the MTx is set up."""
-    chunks = _chunks_for(ports, seconds)
+    chunks = with_right_names(_chunks_for(ports, seconds), ports)
     if session is not None:
         chunks = with_messages(chunks, session.message_sources, lambda _: now_ns())
     chunks = _with_subscription(with_role_check(recorded(chunks, recorder), ports.urls), ports)
