@@ -3,12 +3,19 @@
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Iterable
 
+import pytest
+
 from board_runs import ROOT
+from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, MTX, Chunk
+from echostep.session.options import PortOptions
+from echostep.session.runs.live import _open_ports
 from echostep.session.runs.port_roles import SURE_BYTES, with_right_names
+from echostep.team.endpoint import Outlet, parse_endpoint
 
 CAPTURES = ROOT / "tests/captures"
 BYTES = {name: (CAPTURES / f"{name}.bin").read_bytes()[: 2 * SURE_BYTES] for name in (BOARD, MTX)}
@@ -95,3 +102,23 @@ def test_bytes_of_no_known_device_wait_two_seconds_and_are_recorded_as_they_are(
     ports = Ports()
     noise = [Chunk(BOARD, k * 1_000_000_000, b"\x55" * 10) for k in range(4)]
     assert by_name([opened_again(BOARD), *noise], ports)[BOARD] == b"\x55" * 40
+
+
+@pytest.mark.parametrize(
+    ("options", "publish", "named"),
+    [
+        ({"mtx": "/dev/null"}, [], "for board and mtx"),
+        ({"beacons": "/dev/null"}, [], "for board and gateway"),
+        ({"foot": "/dev/null"}, [], "for board and foot"),
+        ({}, ["mesh:///dev/null"], "for board and --publish mesh:///dev/null (1)"),
+        ({"mtx": "/dev/zero"}, ["mesh:///dev/zero"], "for mtx and --publish mesh:///dev/zero (1)"),
+        ({}, ["mesh:///dev/zero", "mesh:///dev/../dev/zero"], "for --publish mesh:///dev/zero (1) and --publish"),
+    ],
+)
+def test_two_uses_of_one_port_are_refused_at_once(options: dict[str, str], publish: list[str], named: str) -> None:
+    outlet = Outlet(tuple(map(parse_endpoint, publish)), "anna", "red")
+    with pytest.raises(EchostepError, match=f"is given twice, {re.escape(named)}"):
+        _open_ports(
+            PortOptions("/dev/null", options.get("mtx"), options.get("beacons"), None, None, options.get("foot")),
+            outlet,
+        )

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from echostep.board.frames import BoardReader, StaleFirmwareError, encode
 from echostep.board.messages import Identify
@@ -23,7 +24,7 @@ from echostep.localization.particles.start import Start
 from echostep.plan.model import Plan
 from echostep.ports.arrival_clock import SleepWatch, now_ns
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk
-from echostep.ports.serial_ports import SerialPorts
+from echostep.ports.serial_ports import SerialPorts, check_different
 from echostep.ports.usb_number import usb_number
 from echostep.recording.recorder import Recorder
 from echostep.session.chunk_streams import portions_of, recorded, with_messages
@@ -43,6 +44,9 @@ from echostep.tracker import Tracker
 from echostep.xsens.configuration.startup import MtxStart
 from echostep.xsens.reader import warm_up
 
+if TYPE_CHECKING:
+    from echostep.team.endpoint import Outlet
+
 BAUD = dict.fromkeys((BOARD, MTX, FOOT, GATEWAY), 115200)
 
 
@@ -60,7 +64,7 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -
     session.prepare()
     folder = output_folder(output.folder)
     tracker.watchers.append(PlaceKeeper(folder, tracker, number).note)
-    with closing(_open_ports(ports)) as opened:
+    with closing(_open_ports(ports, output.outlet)) as opened:
         _identify(opened)
         metadata = run_metadata(plan, tracker.start, seed, "live", settings_toml) | clock_metadata()
         session.arrivals.urls = opened.urls
@@ -115,11 +119,15 @@ def _identify(ports: SerialPorts) -> None:
             ports.send(name, encode(Identify(), 0))
 
 
-def _open_ports(options: PortOptions) -> SerialPorts:
+def _open_ports(options: PortOptions, outlet: Outlet | None = None) -> SerialPorts:
+    """The ports of a run; raises EchostepError when two uses of the run have the same one, the radio of `outlet` included."""
     if options.mtx is not None and options.foot is not None:
         raise EchostepError("--mtx and --foot: only one of them is on the foot: give that one")
     urls = {BOARD: options.board, MTX: options.mtx, FOOT: options.foot, GATEWAY: options.beacons}
-    return SerialPorts({name: url for name, url in urls.items() if url is not None}, BAUD)
+    given = {name: url for name, url in urls.items() if url is not None}
+    radios = [endpoint.host for endpoint in outlet.endpoints if endpoint.scheme == "mesh"] if outlet else []
+    check_different(given | {f"--publish mesh://{port} ({k})": port for k, port in enumerate(radios, 1)})
+    return SerialPorts(given, BAUD)
 
 
 def _recorded_chunks(
