@@ -14,6 +14,10 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import stat
+import sys
+import tempfile
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -49,13 +53,46 @@ def _root_of(folder: Path) -> Path | None:
 
 
 def _base(package: Path, root: Path) -> Path:
-    """NUMBA_CACHE_DIR, or `__pycache__` beside the sources, or a folder of the user's where that is not writable."""
+    """NUMBA_CACHE_DIR, or `__pycache__` beside the sources, or where that is not writable a folder of the user's, or a temporary one."""
     inside = package.relative_to(root.parent)
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(chosen) / inside
     if os.access(package, os.W_OK):
         return package / "__pycache__"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / inside
+    return (_users_folder() or _temporary_folder()) / inside
+
+
+@cache
+def _users_folder() -> Path | None:
+    """XDG_CACHE_HOME or ~/.cache; None without a home, and where that cannot be written."""
+    try:
+        folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):  # RuntimeError: the user has no home
+        return None
+    return folder if os.access(folder, os.W_OK) else None
+
+
+@cache
+def _temporary_folder() -> Path:
+    """A folder of this user's alone, kept between runs where nobody else can have made it; it is said when it is made.
+
+    numba runs what it finds in its cache, so a folder that another user may write is not used.
+    """
+    owner = os.getuid() if hasattr(os, "getuid") else "user"
+    folder = Path(tempfile.gettempdir()) / f"echostep-kernels-{owner}"
+    with suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+        print(f"echostep: no home that can be written: compiled kernels are kept in {folder}", file=sys.stderr)
+    state = folder.lstat()
+    if stat.S_ISDIR(state.st_mode) and state.st_uid == owner and not state.st_mode & 0o022:
+        return folder
+    made = Path(tempfile.mkdtemp(prefix="echostep-kernels-"))
+    print(
+        f"echostep: kernels are compiled for this run alone, in {made}: give a folder in NUMBA_CACHE_DIR",
+        file=sys.stderr,
+    )
+    return made
 
 
 def _digest(source: str) -> str:

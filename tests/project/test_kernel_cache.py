@@ -7,11 +7,13 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
 
 import echostep
+from echostep import kernel_cache
 from echostep.jit import kernel
 from echostep.kernel_cache import PACKAGE, cache_folder
 from waiting import PATIENCE_S
@@ -81,3 +83,43 @@ def test_a_kernel_of_another_package_stays_where_numba_puts_it() -> None:
         return x
 
     assert str(PACKAGE) not in str(here._cache.cache_path)  # type: ignore[attr-defined]
+
+
+def folder_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: Path | None) -> Path:
+    """Where kernels go when the package cannot be written, with this home, and a temporary folder of the test's."""
+    for name in ("_users_folder", "_temporary_folder"):
+        getattr(kernel_cache, name).cache_clear()
+    package = tmp_path / "p"
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    access = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != package and access(path, mode))
+
+    def at_home(_: type[Path]) -> Path:
+        if home is None:
+            raise RuntimeError("Could not determine home directory.")
+        return home
+
+    monkeypatch.setattr(Path, "home", classmethod(at_home))
+    return kernel_cache._base(package, package)
+
+
+def test_without_a_home_kernels_go_to_a_temporary_folder_that_is_told_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert folder_of(tmp_path, monkeypatch, tmp_path / "home") == tmp_path / "home/.cache/p"
+    for home in (None, Path("/proc/nowhere")):
+        assert folder_of(tmp_path, monkeypatch, home) == tmp_path / f"echostep-kernels-{os.getuid()}/p"
+    assert capsys.readouterr().err.count("no home that can be written") == 1
+
+
+def test_a_temporary_folder_that_another_user_may_write_is_not_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / f"echostep-kernels-{os.getuid()}").mkdir()
+    (tmp_path / f"echostep-kernels-{os.getuid()}").chmod(0o777)
+    used = folder_of(tmp_path, monkeypatch, None)
+    assert used.parent.name not in ("", f"echostep-kernels-{os.getuid()}")
+    assert "give a folder in NUMBA_CACHE_DIR" in capsys.readouterr().err

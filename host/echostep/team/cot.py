@@ -19,9 +19,10 @@ from contextlib import suppress
 from uuid import NAMESPACE_URL, uuid5
 from xml.etree import ElementTree
 
-from echostep.team.endpoint import Endpoint, tls_context
+from echostep.team.endpoint import Endpoint
 from echostep.team.messages.report import Report, ReportedAlarm, ReportedPlace
 from echostep.team.outbox import Delivery
+from echostep.team.tls import tls_context
 
 FRIEND_ON_FOOT = "a-f-G-U-C"  # friendly, ground, unit, combat
 EMERGENCY, EMERGENCY_OVER = "b-a-o-tbl", "b-a-o-can"  # alarm, other: ATAK's "911 Alert" and its cancelling

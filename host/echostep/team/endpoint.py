@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: MIT
 """The URL of a broker or of a TAK receiver, parsed into an `Endpoint`.
 
-In: a URL. Out: an `Endpoint`, its TLS context. Owns nothing. Errors name the URL without its password, and what to do.
+In: a URL. Out: an `Endpoint`. Owns nothing. Errors name the URL without its password, and what to do.
 """
 
 from __future__ import annotations
 
-import ssl
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from echostep.errors import EchostepError
@@ -18,6 +16,7 @@ from echostep.team.messages.report import checked_name
 
 PORTS = {"mqtt": 1883, "mqtts": 8883, "cot+udp": 6969, "cot+tcp": 8087, "cot+tls": 8089, "mesh": 0}
 FILES = ("ca", "cert", "key")
+NAME = "name"  # that the server's certificate has, where it is not the host's
 BROKERS = ("mqtt", "mqtts")  # schemes of brokers, which keep messages
 PACKAGES = dict.fromkeys(PORTS, "pyproj") | {
     "mqtt": "paho",
@@ -36,6 +35,7 @@ class Endpoint:
     user: str | None
     password: str | None
     files: dict[str, str]
+    certificate_name: str = ""
     wearers: int = 0  # that share the channel of a mesh; 0: not given
 
     @property
@@ -68,16 +68,19 @@ def parse_endpoint(url: str, schemes: tuple[str, ...] = tuple(PORTS)) -> Endpoin
         raise EchostepError(f"{shown}: expected {parts.scheme}://HOST[:PORT]")
     if not _is_resolvable(host):
         raise EchostepError(f"{shown}: the host name is not valid: check its spelling")
-    if unknown := set(asked) - set(FILES):
-        raise EchostepError(f"{shown}: {', '.join(sorted(unknown))}: unknown; there are {', '.join(FILES)}")
+    if unknown := set(asked) - {*FILES, NAME}:
+        raise EchostepError(f"{shown}: {', '.join(sorted(unknown))}: unknown; there are {', '.join((*FILES, NAME))}")
+    certificate_name = asked.pop(NAME, [""])[-1]
     endpoint = Endpoint(
         parts.scheme, host, port or PORTS[parts.scheme],
         unquote(parts.username) if parts.username else None,
         unquote(parts.password) if parts.password else None,
-        {name: values[-1] for name, values in asked.items()},
+        {name: values[-1] for name, values in asked.items()}, certificate_name,
     )  # fmt: skip
-    if endpoint.files and not endpoint.secure:
-        raise EchostepError(f"{shown}: ca, cert and key are for {'mqtts' if 'mqtt' in parts.scheme else 'cot+tls'}://")
+    if (endpoint.files or certificate_name) and not endpoint.secure:
+        raise EchostepError(
+            f"{shown}: ca, cert, key and name are for {'mqtts' if 'mqtt' in parts.scheme else 'cot+tls'}://"
+        )
     if ("cert" in endpoint.files) != ("key" in endpoint.files):
         raise EchostepError(f"{shown}: cert and key belong together")
     if endpoint.user is not None and "mqtt" not in parts.scheme:
@@ -90,7 +93,7 @@ def _mesh(shown: str, port: str, asked: dict[str, list[str]]) -> Endpoint:
     wearers = asked.pop("wearers", ["0"])[-1]
     if not port.startswith("/") or asked or not (wearers.isascii() and wearers.isdigit() and int(wearers) <= 1000):
         raise EchostepError(f"{shown}: expected mesh:///dev/PORT[?wearers=N]")
-    return Endpoint("mesh", port, 0, None, None, {}, int(wearers))
+    return Endpoint("mesh", port, 0, None, None, {}, wearers=int(wearers))
 
 
 def _is_resolvable(host: str) -> bool:
@@ -123,23 +126,3 @@ def parse_outlet(urls: Sequence[str], name: str, team: str) -> Outlet:
     return Outlet(
         tuple(parse_endpoint(url) for url in urls), checked_name("--name", name), checked_name("--team", team)
     )
-
-
-def tls_context(endpoint: Endpoint) -> ssl.SSLContext:
-    """A TLS context that always verifies the server's certificate and name; raises EchostepError that names the file."""
-    for name, path in endpoint.files.items():
-        if not Path(path).is_file():
-            raise EchostepError(f"{endpoint}: {name}={path}: there is no such file")
-    try:
-        context = ssl.create_default_context(cafile=endpoint.files.get("ca"))
-        if "cert" in endpoint.files:
-            context.load_cert_chain(endpoint.files["cert"], endpoint.files["key"], password=_no_password)
-    except (OSError, ValueError) as error:
-        names = ", ".join(f"{k}={v}" for k, v in endpoint.files.items())
-        raise EchostepError(f"{endpoint}: cannot use {names}: {error}") from error
-    return context
-
-
-def _no_password() -> str:
-    """Called by OpenSSL for an encrypted key: an error instead of a prompt on the terminal."""
-    raise ValueError("the key is encrypted; give it without a passphrase")

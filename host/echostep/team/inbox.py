@@ -13,6 +13,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
+from echostep.team.faults import in_words
 from echostep.team.messages.report import MAX_PAYLOAD
 from echostep.team.outbox import RETRY_PAUSES_S
 
@@ -127,7 +128,7 @@ class ListenerThread:
                 self.connected = False
                 self._listener.close()
                 if failures == 0:
-                    self._print_line(f"{error}; trying again")
+                    self._print_line(f"{in_words(error)}; trying again")
                 self._closing.wait(RETRY_PAUSES_S[min(failures, len(RETRY_PAUSES_S) - 1)])
                 failures += 1
         self._listener.close()

@@ -20,6 +20,7 @@ from enum import StrEnum
 from typing import Protocol
 
 from echostep.localization.estimate import RISK, WALKER_M_S, claims_place, ellipse95, trust
+from echostep.team.faults import in_words
 from echostep.team.messages.report import Position, Report, ReportedAlarm, moment
 
 # After so long without a new estimate the last one is sent again, with its age and a larger covariance
@@ -191,17 +192,13 @@ class Outbox:
         if self._open:
             self.counts.breaks += 1
         self._open = False
-        self.fault = _reason(error)
+        self.fault = in_words(error)
         if self._failures == 0:
             self._print_state(f"{self.fault}; tracking goes on, trying again")
         pause_s = RETRY_PAUSES_S[min(self._failures, len(RETRY_PAUSES_S) - 1)] * random.uniform(0.8, 1.2)
         self._failures += 1
         with self._changed:
             self._changed.wait_for(lambda: self._closing_s is not None, pause_s)
-
-
-def _reason(error: Exception) -> str:
-    return (isinstance(error, OSError) and error.strerror) or str(error) or type(error).__name__
 
 
 def stamped(report: Report, sequence: int, unix_s: float, age_s: float, overtaken: int) -> Report:

@@ -18,6 +18,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
 from echostep.team.endpoint import Endpoint
+from echostep.team.faults import in_words
 
 ANSWER_S = 5.0  # longest wait for an answer of the broker
 KEEPALIVE_S = 6  # the broker sends the last will after 1.5 times as long [MQTT 3.1.1, 3.1.2.10]
@@ -74,7 +75,7 @@ def connect(client: paho.Client, endpoint: Endpoint, most_bytes: int = MAX_PACKE
     try:
         client.connect(endpoint.host, endpoint.port, keepalive=KEEPALIVE_S, properties=properties)
     except (OSError, ValueError) as error:
-        raise ConnectionError((isinstance(error, OSError) and error.strerror) or str(error)) from error
+        raise ConnectionError(in_words(error)) from error
     try:
         run_until(client, lambda: client.is_connected() or bool(refused), "the broker does not answer")
     except OSError as error:

@@ -15,7 +15,7 @@ from typing import Any
 
 import paho.mqtt.client as paho
 
-from echostep.team.endpoint import Endpoint, tls_context
+from echostep.team.endpoint import Endpoint
 from echostep.team.messages.report import Presence, Report, encode
 from echostep.team.mqtt.broker import (
     CLIENT_ERRORS,
@@ -31,6 +31,7 @@ from echostep.team.mqtt.broker import (
     run_until,
 )
 from echostep.team.outbox import Delivery
+from echostep.team.tls import tls_context
 
 
 class MqttTransport:
