@@ -25,8 +25,8 @@ root_doc = "README"
 include_patterns = [
     "README.md",
     "host/*.md",
-    "host/docs/*.md",
-    "host/studies/*.md",
+    "host/docs/**/*.md",
+    "host/studies/**/*.md",
     "firmware/*.md",
     "firmware/hardware/*.md",
     "protocol/*.md",
