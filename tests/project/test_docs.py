@@ -22,13 +22,17 @@ from echostep.plan.model import load_plan
 from team.team_broker import Broker, needs_broker
 
 MANUAL = sorted((ROOT / "host/docs").glob("*.md"))
+DESIGN = sorted((ROOT / "host/docs/design").glob("*.md"))
+DECISIONS = sorted((ROOT / "host/docs/decisions").glob("*.md"))
+NOTEBOOK = sorted((ROOT / "host/studies/notebook").glob("*.md"))
+RESULTS = sorted((ROOT / "host/docs/results").glob("*.md"))
+SERIES = (DESIGN, DECISIONS, NOTEBOOK)
 PAGES = [
     *(
         ROOT / name
         for name in (
             "README.md",
             "host/README.md",
-            "host/DESIGN.md",
             "host/CHANGELOG.md",
             "host/CONTRIBUTING.md",
             "host/SECURITY.md",
@@ -45,6 +49,10 @@ PAGES = [
         )
     ),
     *MANUAL,
+    *DESIGN,
+    *DECISIONS,
+    *NOTEBOOK,
+    *RESULTS,
 ]
 PROGRAMS = (
     "python3",
@@ -57,6 +65,14 @@ PROGRAMS = (
 
 
 FILE_NAMES = {path.name for folder in ("host", "tools", "tests", "protocol") for path in (ROOT / folder).rglob("*.py")}
+
+
+SOURCE = "\n".join(
+    path.read_text()
+    for folder in ("host/echostep", "host/studies", "protocol", "firmware")
+    for path in sorted((ROOT / folder).rglob("*"))
+    if path.suffix in {".py", ".toml", ".c", ".h", ".js"}
+)
 
 
 def name_of(page: Path) -> str:
@@ -83,6 +99,46 @@ def test_links_lead_somewhere(page: Path) -> None:
 def test_the_manual_lists_every_page() -> None:
     listed = (ROOT / "host/docs/README.md").read_text()
     assert [page.name for page in MANUAL if f"({page.name})" not in listed] == ["README.md"]
+    assert [page.name for page in RESULTS if f"(results/{page.name})" not in listed] == []
+    assert len(MANUAL) + len(RESULTS) <= 30
+
+
+@pytest.mark.parametrize("series", SERIES, ids=("design", "decisions", "notebook"))
+def test_a_series_lists_its_pages(series: list[Path]) -> None:
+    """A page lies beside the README that lists it once in a table."""
+    (index,) = [page for page in series if page.name == "README.md"]
+    rows = "\n".join(re.findall(r"^\|.*\|$", index.read_text(), flags=re.M))
+    assert len(series) > 10
+    for page in series:
+        assert page == index or f"]({page.name})" in rows, page.name
+
+
+@pytest.mark.parametrize("page", DESIGN, ids=name_of)
+def test_a_page_of_the_design_has_a_length_to_read(page: Path) -> None:
+    assert 40 <= len(page.read_text().splitlines()) <= 130
+
+
+@pytest.mark.parametrize("page", [page for page in DECISIONS if page.name != "README.md"], ids=name_of)
+def test_a_decision_is_short_and_whole(page: Path) -> None:
+    text = page.read_text()
+    assert len(text.splitlines()) <= 25
+    assert re.findall(r"^\*\*(\w+)\.\*\*", text, flags=re.M) == ["Status", "Context", "Decision", "Consequences"]
+    assert re.fullmatch(r"\d{4}-[a-z0-9-]+\.md", page.name)
+    assert text.startswith(f"# {int(page.name[:4])}. ")
+
+
+@pytest.mark.parametrize("page", [page for page in NOTEBOOK if page.name != "README.md"], ids=name_of)
+def test_a_page_of_the_notebook_is_whole(page: Path) -> None:
+    text = page.read_text()
+    assert re.findall(r"^\*\*(\w+)\.\*\*", text, flags=re.M) == ["Question", "Change", "Command", "Seeds"]
+    assert re.findall(r"^## (.*)$", text, flags=re.M) == ["Measured", "Verdict"]
+
+
+@pytest.mark.parametrize("page", DESIGN, ids=name_of)
+def test_a_name_in_the_design_stands_in_the_code(page: Path) -> None:
+    """`Class.method`, `function_name` and `CONSTANT` of the text, wherever in the package, the settings or the protocol."""
+    for name in re.findall(r"`(?:[A-Za-z_]\w*\.)?(_?[A-Za-z]\w*)`", page.read_text()):
+        assert re.search(rf"\b{re.escape(name)}\b", SOURCE), name
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if page.parent != ROOT / "protocol"], ids=name_of)
@@ -103,7 +159,8 @@ def test_a_file_named_without_its_folder_exists(page: Path) -> None:
 @pytest.mark.parametrize("flow", ["echo", "step", "tap", "plan file"])
 def test_a_code_flow_names_what_its_files_hold(flow: str) -> None:
     """Each `name` of a code flow stands in one of the files that the flow names."""
-    text = (ROOT / "host/DESIGN.md").read_text().partition(f"## Code flow of one {flow}\n")[2].partition("\n## ")[0]
+    page = (ROOT / "host/docs/design/data-path.md").read_text()
+    text = page.partition(f"## Code flow of one {flow}\n")[2].partition("\n## ")[0].partition("\n|")[0]
     files = re.findall(r"`([\w/]+\.(?:py|c|js))`", text)
     assert len(files) > 3
     roots = {path: ROOT if path.startswith("firmware/") else ROOT / "host/echostep" for path in files}
@@ -253,13 +310,28 @@ def test_the_results_stand_beside_those_of_others() -> None:
         assert any(other in row for row in rows), other
 
 
+def test_a_question_about_the_code_is_answered_in_two_hops() -> None:
+    """README -> design/README, whose table names files, and functions that stand in one of them."""
+    assert "(host/docs/design/README.md)" in (ROOT / "README.md").read_text()
+    where = (ROOT / "host/docs/design/README.md").read_text().partition("## Where is ...\n")[2]
+    rows = [row.split("|")[1:3] for row in where.splitlines() if row.startswith("| ")][1:]
+    assert len(rows) > 10
+    for question, answer in rows:
+        files = re.findall(r"`([\w/]+\.(?:py|toml))`", answer)
+        roots = [root / path for path in files for root in (ROOT, ROOT / "host/echostep") if (root / path).exists()]
+        assert len(roots) == len(files) > 0, question
+        source = "".join(path.read_text() for path in roots)
+        for name in re.findall(r"`(?:[A-Z]\w+\.)?(\w+)`", answer):
+            assert re.search(rf"\b{name}\b", source), (question, name)
+
+
 def test_the_readme_leads_to_every_page() -> None:
     """By the manual's index, which lists them all."""
     text = (ROOT / "README.md").read_text()
     for page in (
         "host/docs/README.md",
         "host/docs/results.md",
-        "host/DESIGN.md",
+        "host/docs/design/README.md",
         "firmware/README.md",
         "protocol/README.md",
     ):

@@ -103,7 +103,7 @@ def test_the_search_finds_without_a_server_or_a_network(site: Path, browser: Any
     requests: list[str] = []
     page.on("request", lambda request: requests.append(request.url))
     page.goto((site / "search.html").as_uri() + "?q=resampling")
-    page.wait_for_selector("#search-results li a[href*='DESIGN']")
+    page.wait_for_selector("#search-results li a[href*='design/cloud']")
     page.goto((site / "index.html").as_uri())
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.evaluate("[...document.images].every(image => image.complete && image.naturalWidth > 0)")

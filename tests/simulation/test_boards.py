@@ -116,7 +116,7 @@ def test_sequential_pings_take_turns_every_seventy_milliseconds() -> None:
 
 
 def test_the_other_rangers_echo_counts_when_it_comes_first() -> None:
-    """It moves with the jitter between the triggers; the own echo does not [host/DESIGN.md, the bench]."""
+    """It moves with the jitter between the triggers; the own echo does not [host/docs/design/bench.md]."""
     none = {x.outcome for x in heard(PythonBoard(seed=1).advance(rows_of(2_000, (0, 0)))) if isinstance(x, m.Ping)}
     assert none == {m.Outcome.NO_ECHO}
     late_us = 30_000  # of the left ranger's ping at the right one, and the other way round

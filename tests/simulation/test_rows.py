@@ -18,7 +18,7 @@ from simulation.simulated import SPEED_M_S
 
 
 def test_a_row_has_the_layout_of_the_bench() -> None:
-    """The fields of host/DESIGN.md, one after the other without gaps."""
+    """The fields of host/docs/design/bench.md, one after the other without gaps."""
     row = np.zeros(1, ROW)
     row["thigh"], row["calf"], row["belt"] = -1, 2, 3
     row["own_us"], row["cross_us"] = (4, 5), (6, 7)

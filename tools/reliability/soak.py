@@ -46,7 +46,7 @@ SEED = 1
 PORTION = 100  # chunks that are tracked together: about a tenth of a second
 SAMPLE_S = 60.0  # simulated, between two looks at the memory
 SETTLED_S = 1800.0  # from then on memory must not grow
-TICKS_S = 2_000_000  # of the board's clock [host/DESIGN.md, Time]
+TICKS_S = 2_000_000  # of the board's clock [host/docs/design/time-and-frames.md]
 WRAP = 1 << 32
 # Limits: what a day of 24 h may cost.
 HOST_MB_H, TWIN_MB_H = 8.0, 0.1

@@ -15,7 +15,7 @@
 #define CYCLES_PER_MS 16000u
 #define US(n) ((avr_cycle_count_t)(n) * 16u)
 
-/* One millisecond of the sensors' input (host/DESIGN.md, the bench). */
+/* One millisecond of the sensors' input (host/docs/design/bench.md). */
 struct row {
 	int16_t rate[3]; /* thigh, calf, belt: ADIS16100 counts */
 	uint16_t own_us[2];   /* left, right ranger: trigger to its own echo, 0: none */

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Inputs of the simulated board's sensors, as rows of one millisecond (host/DESIGN.md, the bench).
+"""Inputs of the simulated board's sensors, as rows of one millisecond (docs/design/bench.md).
 
 In: a walk, the levels of a building, a seeded generator. Out: rows for a board. Owns the sensors.
 """

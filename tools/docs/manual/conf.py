@@ -2,7 +2,7 @@
 """The manual as a site (`make site`): the same pages as in the source tree, with search, for Sphinx.
 
 In: the Markdown files named in `include_patterns`, at their places, so that their links hold in both. Out: HTML that needs no network. The order
-of the contents is that of the table in host/docs/README.md. Owns nothing.
+of the contents is that of the table in host/docs/README.md; below design, decisions and notebook stand their pages. Owns nothing.
 """
 
 from __future__ import annotations
@@ -15,6 +15,11 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[3]
 MANUAL = Path("host/docs")
+SERIES = (
+    "host/docs/design",
+    "host/docs/decisions",
+    "host/studies/notebook",
+)  # folders whose README lists the other pages
 
 project = "echostep"
 version = release = tomllib.loads((ROOT / "host/pyproject.toml").read_text())["project"]["version"]
@@ -25,8 +30,10 @@ root_doc = "README"
 include_patterns = [
     "README.md",
     "host/*.md",
-    "host/docs/**/*.md",
-    "host/studies/**/*.md",
+    "host/docs/*.md",
+    "host/docs/*/*.md",
+    "host/studies/*.md",
+    "host/studies/notebook/*.md",
     "firmware/*.md",
     "firmware/hardware/*.md",
     "protocol/*.md",
@@ -51,10 +58,15 @@ def contents(manual: str) -> list[str]:
 
 
 def add_contents(_app: Any, document: str, source: list[str]) -> None:
-    """Append the contents to the first page's text; they are seen in the sidebar only."""
+    """Append the contents to the first page's text, and to that of each series; they are seen in the sidebar only."""
+    folder, _, name = document.rpartition("/")
     if document == root_doc:
-        pages = "\n".join([f"{MANUAL}/README", *contents((ROOT / MANUAL / "README.md").read_text())])
-        source[0] += f"\n```{{toctree}}\n:hidden:\n\n{pages}\n```\n"
+        pages = [f"{MANUAL}/README", *contents((ROOT / MANUAL / "README.md").read_text())]
+    elif folder in SERIES and name == "README":
+        pages = sorted(page.stem for page in (ROOT / folder).glob("*.md") if page.stem != name)
+    else:
+        return
+    source[0] += "\n```{toctree}\n:hidden:\n\n" + "\n".join(pages) + "\n```\n"
 
 
 def copy_first_page(app: Any, failure: Exception | None) -> None:

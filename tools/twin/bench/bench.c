@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * The bench protocol (host/DESIGN.md): rows, host bytes and faults in; board bytes, traces and acknowledgements out. */
+ * The bench protocol (host/docs/design/bench.md): rows, host bytes and faults in; board bytes, traces and acknowledgements out. */
 #include <errno.h>
 #include <math.h>
 #include <stdarg.h>

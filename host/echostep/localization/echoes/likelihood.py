@@ -80,7 +80,7 @@ class EchoSettings:
     `stray`: a second reflection when no source was detected; `outlier`: anything else, from ping to ping.
     `correlation_m`: length of the path over which errors of successive echoes become independent: those of the plan, of a ranger's bias, and of the
     trunk's sway, which lasts half a stride. `own`: share of an echo's information that none before it has brought, however far back: a plan that is
-    not what stands there errs alike for metres (by the filter's errors among real clutter: host/DESIGN.md).
+    not what stands there errs alike for metres (by the filter's errors among real clutter: echo-own of the studies' notebook).
     """
 
     sd_m: float = 0.036

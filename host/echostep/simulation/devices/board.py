@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sensor board of the simulation: the Python board, or a child process that speaks the bench protocol (host/DESIGN.md).
+"""The sensor board of the simulation: the Python board, or a child process that speaks the bench protocol (docs/design/bench.md).
 
 In: rows of one millisecond, bytes from the host, fault switches. Out: (t_ns, bytes) as they leave the board's USB port. Owns the board's state.
 """

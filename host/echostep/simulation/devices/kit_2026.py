@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The sensors of the kit of 2026: pulse rangers, LSM6DSO on thigh, calf and belt, LIS3MDL at the belt, BMP390; none of them was built yet.
 
-In: a walk, the levels of a building, a seeded generator. Out: extended rows for a board (host/DESIGN.md, the bench). Owns the parts' errors.
+In: a walk, the levels of a building, a seeded generator. Out: extended rows for a board (docs/design/bench.md). Owns the parts' errors.
 
 Axes: of thigh and calf x ahead, y up along the segment, z to the side; of the belt x ahead, y to the left, z up, tilted as a belt is. The forces on
 thigh and calf are those of gravity alone; the trunk's include its horizontal acceleration.

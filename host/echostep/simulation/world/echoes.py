@@ -40,7 +40,7 @@ OWN, CROSS = 0, 1
 
 @dataclass(frozen=True, slots=True)
 class Echoes:
-    """`own_us`, `cross_us` (n, 2): left, right; 0 without a detected echo (see host/DESIGN.md, the bench)."""
+    """`own_us`, `cross_us` (n, 2): left, right; 0 without a detected echo (see docs/design/bench.md)."""
 
     own_us: Counts
     cross_us: Counts
