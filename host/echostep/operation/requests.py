@@ -12,7 +12,8 @@ import msgspec
 from msgspec import Meta
 
 from echostep.page.requests import MOST_REQUEST, FrameDrawn, SetPlaying, SetSpeed
-from echostep.ports.people.payloads import Level, Metres, decoded
+from echostep.plan.plan_file import Metres
+from echostep.ports.people.payloads import Level, decoded
 from echostep.team.messages.marks import Identity, MarkKind, Person
 from echostep.team.messages.report import is_printable
 

@@ -11,9 +11,10 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from echostep.plan.plan_file import Metres
 from echostep.plan.routing import RoutePlace
 from echostep.ports.people.check_in import Call, CheckIn, EnteredPlace, Undo
-from echostep.ports.people.payloads import Level, Metres, decoded
+from echostep.ports.people.payloads import Level, decoded
 
 MOST_REQUEST = 2048  # characters
 MOST_NAME = 32  # characters of a wearer's name, as in reports

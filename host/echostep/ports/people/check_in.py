@@ -15,7 +15,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta, structs
 
-from echostep.ports.people.payloads import Level, Metres, decoded
+from echostep.plan.plan_file import Metres
+from echostep.ports.people.payloads import Level, decoded
 
 PERSON = "person"  # name of the port
 # Assumed, all of them.

@@ -12,7 +12,8 @@ from typing import Annotated, Literal, Protocol
 import msgspec
 from msgspec import Meta
 
-from echostep.ports.people.payloads import MOST_LEVELS, Level, Metres, Spread, Variance, decoded, has_covariance
+from echostep.plan.plan_file import Metres
+from echostep.ports.people.payloads import MOST_LEVELS, Level, Spread, Variance, decoded, has_covariance
 
 Status = Literal["tracking", "uncertain", "lost"]
 KNOWN: dict[str, Status] = {"tracking": "tracking", "uncertain": "uncertain"}  # any other state carries no position

@@ -11,11 +11,8 @@ from typing import Annotated, Protocol, TypeVar
 import msgspec
 from msgspec import Meta
 
-from echostep.plan.json_fields import LIMIT_M
-
 MOST_LEVELS = 1000  # of a plan, assumed
 
-Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M)]
 Level = Annotated[int, Meta(ge=0, lt=MOST_LEVELS)]
 Variance = Annotated[float, Meta(ge=0.0, le=1e12)]
 T = TypeVar("T")

@@ -13,7 +13,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from echostep.ports.people.payloads import Level, Metres, Variance, decoded, has_covariance
+from echostep.plan.plan_file import Metres
+from echostep.ports.people.payloads import Level, Variance, decoded, has_covariance
 
 TEAM_BEACONS = "team_beacons"  # name of the port
 BEACONS = "beacons"  # last part of the topic

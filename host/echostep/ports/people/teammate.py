@@ -11,7 +11,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from echostep.ports.people.payloads import Level, Metres, decoded
+from echostep.plan.plan_file import Metres
+from echostep.ports.people.payloads import Level, decoded
 
 TEAM = "team"  # name of the port
 MOST_BYTES = 512  # of one encoded position; assumed

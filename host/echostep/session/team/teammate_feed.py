@@ -2,7 +2,7 @@
 """The teammate feed: teammates whom the wearer may have met.
 
 In: the team subscription; the beacons that this wearer has placed, and what its walk has drawn. Out: names of teammates with reports on this
-plan, when they change; the bytes of a `Meeting` with one of them, and of the beacons that they share; this wearer's own and its drawing for the
+plan, when they change; the bytes of a meeting with one of them, and of the beacons that they share; this wearer's own and its drawing for the
 broker. Owns the roster of received reports.
 """
 

@@ -18,7 +18,8 @@ from typing import Annotated, Literal, TypeVar
 import msgspec
 from msgspec import Meta
 
-from echostep.team.messages.report import BadReportError, Metres, check_name, decoded, is_printable
+from echostep.ports.people.payloads import Level
+from echostep.team.messages.report import BadReportError, Metres, check_name, decode_as, is_printable
 
 ROOT = "echostep-table"
 MARKS, ALL = f"{ROOT}/mark/#", f"{ROOT}/#"
@@ -41,7 +42,7 @@ class Mark(msgspec.Struct, frozen=True, omit_defaults=True):
     mark: MarkKind
     x_m: Metres
     y_m: Metres
-    level: Annotated[int, Meta(ge=0, lt=1000)]
+    level: Level
     by: Person
     unix_s: Annotated[float, Meta(ge=0.0, le=1e11)]
     plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
@@ -164,6 +165,6 @@ class MarkBoard:
 
 def _decoded(payload: bytes, decoder: msgspec.json.Decoder[T], what: str) -> T:
     try:
-        return decoded(payload, decoder)
+        return decode_as(payload, decoder)
     except BadReportError as error:
         raise BadReportError(f"not a valid {what}: {error}") from error

@@ -21,11 +21,11 @@ from msgspec import Meta
 
 from echostep.errors import EchostepError
 from echostep.fields import field_of
+from echostep.plan.json_fields import LIMIT_M
 from echostep.ports.people.payloads import has_covariance
 
 MAX_PAYLOAD = 8192  # bytes; a report has about 900
 WITHOUT_PLAN = 64 * "0"  # the SHA-256 of no file: the wearer is tracked without a plan, in a frame of its own
-LIMIT_M = 1e5
 
 Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M, description="m, on the plan (x east, y north)")]
 Name = Annotated[
@@ -226,7 +226,7 @@ def encode(report: Report | Presence) -> bytes:
 
 def decode(payload: bytes) -> Report:
     """Decode a payload; raises BadReportError and no other exception, for any bytes."""
-    report = decoded(payload, _REPORTS)
+    report = decode_as(payload, _REPORTS)
     check_name(report.team)
     check_name(report.name)
     if not 0.0 <= report.stale_after_s <= 86_400.0:
@@ -249,10 +249,10 @@ def decode(payload: bytes) -> Report:
 
 def decode_presence(payload: bytes) -> Presence:
     """As `decode`, for a presence message."""
-    return decoded(payload, _PRESENCES)
+    return decode_as(payload, _PRESENCES)
 
 
-def decoded(payload: bytes, decoder: msgspec.json.Decoder[T]) -> T:
+def decode_as(payload: bytes, decoder: msgspec.json.Decoder[T]) -> T:
     """The message in a payload; raises BadReportError that names the wrong field, without text of the sender, which may control a terminal."""
     if len(payload) > MAX_PAYLOAD:
         raise BadReportError("too long")
