@@ -171,7 +171,7 @@ def parse_plan(raw: bytes) -> Plan:
 
 
 def _plan(tree: Any, digest: str) -> Plan:
-    version = tree.get("echostep_plan") if isinstance(tree, dict) else None
+    version = tree.get("echostep_plan") if isinstance(tree, dict) else FORMAT_VERSION
     if version != FORMAT_VERSION or version is True:
         raise ValueError(f"echostep_plan is {short(version)}, expected {FORMAT_VERSION}: is this an echostep plan?")
     fields = checked(tree, PlanFields)
