@@ -121,15 +121,13 @@ class Listener:
         except RefusedError:
             self._use_mqtt5 = not self._use_mqtt5
             raise
-        subscribed: list[bool] = []
-        client.on_subscribe = lambda _c, _u, _m, codes, _p: subscribed.append(
-            not any(code.is_failure for code in codes)
-        )
+        answers: list[list[bool]] = []  # whether each topic is refused
+        client.on_subscribe = lambda _c, _u, _m, codes, _p: answers.append([code.is_failure for code in codes])
         client.subscribe([(topic, 0) for topic in self._topics])
-        run_until(client, lambda: bool(subscribed), "the broker does not answer")
-        if not subscribed[0]:
+        run_until(client, lambda: bool(answers), "the broker does not answer")
+        if refused := [topic for topic, is_refused in zip(self._topics, answers[0], strict=False) if is_refused]:
             raise ConnectionError(
-                f"the broker refuses the subscription to {', '.join(self._topics)}: check user and password"
+                f"the broker refuses the subscription to {', '.join(refused)}: check user and password"
             )
 
     def run_once(self, timeout_s: float) -> None:
