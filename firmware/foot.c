@@ -35,10 +35,10 @@ static void fail(uint32_t now, uint8_t fault)
 	due = now + SEEK_TICKS;
 }
 
-/* A gyro that has proven itself at the thigh is another part. */
+/* A gyro at the thigh that answers, and has proven what it is, is another part. */
 static bool may_be_here(void)
 {
-	return is_foot_board() || parts_in(DEVICE_THIGH) == PART_NONE;
+	return is_foot_board() || !(status.healthy & 1u << DEVICE_THIGH);
 }
 
 static bool seek(uint32_t now)

@@ -9,13 +9,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from echostep.board.frames import BoardReader, Frames, StaleFirmwareError
-from echostep.board.messages import Configuration, Foot, FootHealth
+from echostep.board.messages import (
+    BY_ID,
+    BoardHealth,
+    ClockReply,
+    Configuration,
+    Electrical,
+    Foot,
+    FootHealth,
+    Identity,
+    Parts,
+    Status,
+)
 from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep.xsens import FrameReader
 
 DEVICES = {BOARD: "the sensor board", MTX: "the MTx", FOOT: "the foot board"}
 LEAST_FRAMES = 3  # one of 256 wrong frames of an MTx passes its checksum
 LISTENED_BYTES = 1 << 14  # by which a device has sent so many frames: half a second of a board, two of an MTx
+
+_REPORTS = (BoardHealth, ClockReply, Configuration, Electrical, Identity, Parts, Status)
+_OF_EVERY_BOARD = {number for number, kind in BY_ID.items() if kind in _REPORTS}
 
 
 def sender(received: bytes) -> str | None:
@@ -26,7 +40,9 @@ def sender(received: bytes) -> str | None:
     except StaleFirmwareError:
         return BOARD
     if reader.counts.good >= LEAST_FRAMES:
-        return FOOT if _is_of_foot(frames) else BOARD
+        if _is_of_foot(frames):
+            return FOOT
+        return None if set(frames.id.tolist()) <= _OF_EVERY_BOARD else BOARD  # a foot board seeks its part for 0.1 s
     return MTX if not reader.counts.good and len(FrameReader().feed(received)) >= LEAST_FRAMES else None
 
 
