@@ -18,7 +18,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.offline.csv_table import CsvLimits, lines_of, separator_of
+from echostep.offline.csv_table import SEPARATORS, CsvLimits, lines_of, separator_of
 
 MOST_ROWS = 1_000_000  # of a track: eight hours at 30 positions a second
 TUM = (
@@ -79,16 +79,23 @@ class CsvColumns:
         return value
 
 
+def is_comment(line: str) -> bool:
+    """Whether a line is words after a #, neither names of columns nor those of a TUM trajectory."""
+    return line.lstrip().startswith("#") and not any(mark in line for mark in SEPARATORS) and not is_tum(line)
+
+
 def is_tum(first: str) -> bool:
     """Whether the first line is of a TUM trajectory: eight names or numbers with spaces in between."""
-    return not any(mark in first for mark in ",;\t") and len(first.lstrip("# ").split()) == len(TUM)
+    return not any(mark in first for mark in SEPARATORS) and len(first.lstrip("# ").split()) == len(TUM)
 
 
-def _read_tum(first: str, lines: Iterable[str]) -> tuple[tuple[str, ...], list[tuple[int, tuple[str, ...]]]]:
+def _read_tum(
+    first: str, lines: Iterable[str], number: int
+) -> tuple[tuple[str, ...], list[tuple[int, tuple[str, ...]]]]:
     """Names and rows of a TUM trajectory; lines that begin with # are comments."""
     rows = (
         (number, line)
-        for number, line in enumerate((first, *lines), 1)
+        for number, line in enumerate((first, *lines), number)
         if line.strip() and not line.lstrip().startswith("#")
     )
     begin = first.split(maxsplit=1)[0][:1]
@@ -98,18 +105,22 @@ def _read_tum(first: str, lines: Iterable[str]) -> tuple[tuple[str, ...], list[t
 
 
 def read_csv(path: Path) -> CsvColumns:
-    """Read a file; raises EchostepError. Empty lines are skipped; a # before the names is, too."""
+    """Read a file; raises EchostepError. Empty lines are skipped, and comments (#) above the names; a # before the names is, too."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             lines = lines_of(file, CsvLimits())
-            first = next(lines, "")
+            comments = 0
+            while is_comment(first := next(lines, "")):
+                comments += 1
             if is_tum(first):
-                names, read = _read_tum(first, lines)
+                names, read = _read_tum(first, lines, comments + 1)
             else:
                 delimiter = separator_of(first)
                 names = tuple(name.strip() for name in next(csv.reader([first.lstrip("# ")], delimiter=delimiter), ()))
                 reader = csv.reader(lines, delimiter=delimiter)
-                rows = ((reader.line_num + 1, tuple(cell.strip() for cell in row)) for row in reader if any(row))
+                rows = (
+                    (reader.line_num + 1 + comments, tuple(cell.strip() for cell in row)) for row in reader if any(row)
+                )
                 read = list(islice(rows, MOST_ROWS + 1))
     except OSError as error:
         raise EchostepError(f"{path}: cannot read it: {error.strerror or error}") from error
