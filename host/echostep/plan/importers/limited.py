@@ -30,9 +30,14 @@ CHILD = "from echostep.plan.importers.limited import main; main()"
 
 
 def open_limited(path: Path | str) -> Plan:
-    """As `formats.open_plan`, other formats than plan.json in a process with limits."""
+    """As `formats.open_plan`, other formats than plan.json in a process with limits; doubts about an import go to stderr."""
     path = Path(path)
-    return import_limited(path) if is_foreign(path) else load_plan(path)
+    if not is_foreign(path):
+        return load_plan(path)
+    plan, report = import_reported(path)
+    for doubt in report.doubts:
+        print(f"{path}: note: {doubt}", file=sys.stderr)
+    return plan
 
 
 def import_limited(path: Path, hints: Hints | None = None, above: Sequence[Path] = ()) -> Plan:

@@ -74,7 +74,7 @@ class VisibleEntities:
             own = _layer_of(entity)
             layer = outer if own == "0" else own
             is_block = entity.dxftype() == "INSERT"
-            hidden = self._hidden.get(layer.casefold()) or ("invisible" if entity.dxf.get("invisible", 0) else None)
+            hidden = self._hidden.get(layer.casefold()) or ("invisible" if _is_invisible(entity) else None)
             if hidden and not (is_block and hidden == "off"):
                 self._report.leave_out(f"{entity.dxftype()} on {layer[:40]} ({hidden})")
                 continue
@@ -106,6 +106,16 @@ def _layer_of(entity: Any) -> str:
         return str(entity.dxf.layer)
     except (AttributeError, DXFError):
         return "0"
+
+
+def _is_invisible(entity: Any) -> bool:
+    """Whether an entity is hidden by itself; not one of an unknown kind."""
+    from ezdxf.lldxf.const import DXFError
+
+    try:
+        return bool(entity.dxf.get("invisible", 0))
+    except (AttributeError, DXFError):
+        return False
 
 
 def parts(insert: Any, file: Path) -> list[Any]:

@@ -130,6 +130,6 @@ def _thin(lines: list[LineString]) -> list[LineString]:
     for line in lines:
         if len(line.coords) > 3:
             area = area.symmetric_difference(shapely.make_valid(Polygon(line.coords)))
-    parts = [part for part in shapely.get_parts(area) if isinstance(part, Polygon)]
+    parts = [part for part in shapely.get_parts(area) if isinstance(part, Polygon) and not part.is_empty]
     thin = [part for part in parts if part.buffer(-THICKEST_M / 2).is_empty]
     return [LineString(ring.coords) for part in thin for ring in (part.exterior, *part.interiors)]
