@@ -12,7 +12,7 @@ from echostep.arrays import Floats
 from echostep.offline.bursts import spread
 from echostep.offline.imu_csv import load_imu
 
-EVEN_S = np.arange(2487) * 0.01
+EVEN_S: Floats = np.arange(0.0, 24.865, 0.01)
 
 
 def stamped(burst: int, apart_s: float, t_s: Floats = EVEN_S) -> Floats:
@@ -39,7 +39,9 @@ def test_a_pause_stays_a_pause() -> None:
 
 def test_even_and_jittered_times_are_left_alone() -> None:
     jitter = np.abs(np.random.default_rng(5).normal(0, 0.003, len(EVEN_S)))
-    for t_s in (EVEN_S, EVEN_S[:4], np.round(EVEN_S / 2, 3), np.maximum.accumulate(EVEN_S / 2 + jitter), EVEN_S[::-1]):
+    late: Floats = np.maximum.accumulate(EVEN_S / 2 + jitter)
+    others: list[Floats] = [EVEN_S, EVEN_S[:4], np.round(EVEN_S / 2, 3), late, EVEN_S[::-1]]
+    for t_s in others:
         same, notes = spread(t_s)
         assert same is t_s
         assert notes == ()

@@ -113,7 +113,10 @@ def _level(device: Device, kind: str) -> float:
 
 def main() -> int:
     found = [text for board in boards() for text in problems(board)]
-    print("\n".join(found) or f"wiring: {sum(len(_nets(board)) for board in boards())} nets, each with one driver at a time")
+    print(
+        "\n".join(found)
+        or f"wiring: {sum(len(_nets(board)) for board in boards())} nets, each with one driver at a time"
+    )
     return int(bool(found))
 
 

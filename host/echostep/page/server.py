@@ -92,7 +92,7 @@ class SocketServer(Generic[S]):
         token = None if address.host in LOOPBACK else secrets.token_urlsafe(16)
         self.url = _url(self._listener, token)
         self.connections = Connections(self._listener)
-        self.access_control = AccessControl(self._application(token), token, self.connections)
+        self.access_control = AccessControl(self._application(token), token, self.connections, site.faults.tell)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._wake_pending = False
         settings = uvicorn.Config(

@@ -14,6 +14,7 @@ import threading
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping
 from itertools import combinations
+from typing import TypeAlias
 
 import serial
 
@@ -26,7 +27,7 @@ from echostep.ports.tcp import TcpPort
 from echostep.ports.udp import UdpPort
 from echostep.ports.usb_number import port_of_number, usb_number
 
-AnyPort = serial.SerialBase | UdpPort | TcpPort
+AnyPort: TypeAlias = "serial.SerialBase | UdpPort | TcpPort"
 
 # Assumed, all of them.
 IDLE_S = 0.05  # longest wait for a chunk; short, so that the set-up of the MTx repeats its requests in time

@@ -23,8 +23,8 @@ class _NamedContext(ssl.SSLContext):
 
     name = ""
 
-    def wrap_socket(self, sock: Any, *arguments: Any, server_hostname: Any = None, **more: Any) -> ssl.SSLSocket:
-        return super().wrap_socket(sock, *arguments, server_hostname=self.name or server_hostname, **more)
+    def wrap_socket(self, *arguments: Any, **more: Any) -> ssl.SSLSocket:
+        return super().wrap_socket(*arguments, **more | ({"server_hostname": self.name} if self.name else {}))
 
 
 def tls_context(endpoint: Endpoint) -> ssl.SSLContext:

@@ -129,8 +129,38 @@ def test_another_site_is_refused(origin: str | None, host: str | None) -> None:
         assert server.pages == 0
 
 
-def connect_as(server: PageServer, origin: str, host: str | None) -> ClientConnection:
+@pytest.mark.parametrize(
+    ("origin", "host", "forwarded"),
+    [
+        ("https://localhost:8443", "localhost:8443", ""),  # the proxy keeps the browser's Host
+        ("https://walk.example.org", "127.0.0.1:8431", "walk.example.org"),  # or tells it beside its own
+    ],
+)
+def test_a_page_behind_a_proxy_with_https_is_served(origin: str, host: str, forwarded: str) -> None:
+    with served() as (server, mailbox):
+        mailbox.publish(scene())
+        with connect_as(server, origin, host, forwarded) as page:
+            assert json.loads(page.recv(timeout=PATIENCE_S))["kind"] == "hello"
+
+
+def test_a_page_that_a_proxy_hides_is_refused_and_the_reason_is_told_once() -> None:
+    with served() as (server, _):
+        for _ in range(2):
+            with pytest.raises((ConnectionClosed, InvalidStatus)):
+                connect_as(server, "https://localhost:8443", "127.0.0.1:8431").recv(timeout=PATIENCE_S)
+        (told,) = server.shared.faults.notices
+        for k in range(20):
+            with pytest.raises((ConnectionClosed, InvalidStatus)):
+                connect_as(server, f"https://evil{k}.example", "127.0.0.1:8431").recv(timeout=PATIENCE_S)
+        assert len(server.shared.faults.notices) <= 4
+    assert told.startswith(
+        "a page of https://localhost:8443 (Host 127.0.0.1:8431) is refused by the page's server: a proxy before it must pass"
+    )
+
+
+def connect_as(server: PageServer, origin: str, host: str | None, forwarded: str = "") -> ClientConnection:
     headers = {"Origin": origin} if origin else {}
+    headers |= {"X-Forwarded-Host": forwarded} if forwarded else {}
     if host is None:
         return connect(f"ws{server.url[4:]}socket", additional_headers=headers, origin=None, open_timeout=PATIENCE_S)
     name, port = server.url[7:].rstrip("/").split(":")

@@ -2,11 +2,12 @@
 // The WebSocket to the server: reconnects when it closes, parses frames, sends requests.
 
 const LONGEST_WAIT_MS = 5000;
+const REFUSALS = 4;  // connections in a row that failed, after two seconds, before that is explained
 
 export class Link {
   // `parse`: bytes of a frame -> frame.
   constructor({ onHello, onFrame, onRefused, onFailed, onConsidered, onState, parse = parseFrame }) {
-    Object.assign(this, { onHello, onFrame, onRefused, onFailed, onConsidered, onState, parse, wait: 250 });
+    Object.assign(this, { onHello, onFrame, onRefused, onFailed, onConsidered, onState, parse, wait: 250, failures: 0 });
     this.open();
   }
 
@@ -18,6 +19,8 @@ export class Link {
     this.socket.onmessage = ({ data }) => (typeof data === 'string' ? this.onText(JSON.parse(data)) : this.onFrame(this.parse(data)));
     this.socket.onclose = () => {
       this.onState(false);
+      this.failures += 1;
+      if (this.failures === REFUSALS) this.onFailed('No connection to the tracker: has it ended? A proxy must pass WebSockets, and the browser\'s Host or X-Forwarded-Host.');
       setTimeout(() => this.open(), this.wait);
       this.wait = Math.min(2 * this.wait, LONGEST_WAIT_MS);
     };
@@ -26,6 +29,7 @@ export class Link {
   onText(message) {
     if (message.kind === 'hello') {
       this.wait = 250;
+      this.failures = 0;
       this.onState(true);
       this.onHello(message);
     } else if (message.kind === 'refused') this.onRefused(message.reason);

@@ -5,11 +5,15 @@ In: every request to the server. Out: the same request, or a refusal. Owns the c
 when a request begins and ends. On the loopback interface a web page of
 another site must not reach the socket: `Host` must name this machine and `Origin` must be the page's own. On other interfaces the address contains
 a random token, and requests without it are refused.
+
+Behind a proxy the page's own address may begin with https, and is in `X-Forwarded-Host` where the proxy puts its target into `Host`: a page of
+another site cannot set that header for a socket. What is refused for its address is told, for a proxy may be the reason.
 """
 
 from __future__ import annotations
 
 import hmac
+from collections.abc import Callable
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -30,11 +34,20 @@ SECURITY_HEADERS = {
 }
 
 
+MOST_TOLD = 4  # addresses that are told; a hostile page may invent others
+SAID_CHARACTERS = 100  # of an address
+
+
 class AccessControl:
     """ASGI middleware. `token`: first part of each path; None: only requests to the loopback interface are answered."""
 
-    def __init__(self, app: ASGIApp, token: str | None, connections: Connections) -> None:
+    def __init__(
+        self, app: ASGIApp, token: str | None, connections: Connections, tell: Callable[[str], None] | None = None
+    ) -> None:
+        """`tell` gets a sentence on a page that is refused because of its address."""
         self.refused = 0
+        self._tell = tell
+        self._told: set[str] = set()
         self._connections = connections
         self._app = app
         self._token = token
@@ -72,18 +85,45 @@ class AccessControl:
         host, origin = headers.get("host", ""), headers.get("origin")
         if self._token is None:
             if _host_name(host) not in LOOPBACK:
+                self._tell_of(
+                    f"a page at {host}",
+                    "a proxy before it must send Host: 127.0.0.1 and its own name as X-Forwarded-Host",
+                )
                 return False
         elif not hmac.compare_digest(scope["path"].split("/")[1].encode(), self._token.encode()):
             return False
         if origin is None:
             return bool(scope["type"] == "http")
-        return origin.lower() == f"http://{host.lower()}"
+        own = {name.strip().lower() for name in (host, headers.get("x-forwarded-host", "")) if name.strip()}
+        if _netloc(origin) in own:
+            return True
+        self._tell_of(
+            f"a page of {origin} (Host {host})",
+            "a proxy before it must pass the browser's Host, or send it as X-Forwarded-Host",
+        )
+        return False
+
+    def _tell_of(self, page: str, remedy: str) -> None:
+        """Tell once of a page that is refused."""
+        page = "".join(c for c in page[:SAID_CHARACTERS] if c.isprintable())
+        if self._tell and page not in self._told and len(self._told) < MOST_TOLD:
+            self._told.add(page)
+            self._tell(f"{page} is refused by the page's server: {remedy}")
 
 
 def _peer(scope: Scope) -> Peer:
     """Address and port of the other end."""
     host, port = scope.get("client") or ("", 0)
     return str(host), int(port)
+
+
+def _netloc(origin: str) -> str | None:
+    """Host and port of an origin of the web; None when it is none."""
+    try:
+        parts = urlsplit(origin.lower())
+    except ValueError:
+        return None
+    return parts.netloc if parts.scheme in ("http", "https") else None
 
 
 def _host_name(host: str) -> str | None:

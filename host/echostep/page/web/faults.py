@@ -25,6 +25,10 @@ class Faults:
         """The exception in words, with the line of code that raised it."""
         return self.note_text(f"{type(error).__name__}: {str(error)[:200]}{_place(error)}")
 
+    def tell(self, sentence: str) -> None:
+        """A sentence that is no fault of the server, for the terminal."""
+        self.notices.append(sentence)
+
     def note_text(self, what: str) -> str:
         """A fault that is no exception, in words."""
         text = f"The page's server has a fault: {what}"

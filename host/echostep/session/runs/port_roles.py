@@ -47,7 +47,10 @@ def with_right_names(chunks: Iterable[Chunk | None], ports: SerialPorts) -> Iter
         if chunk is None or (chunk.port not in names.held and chunk.data):
             yield chunk if chunk is None or chunk.port not in names.device else names.named(chunk)
         else:
-            yield from names.take(chunk) or [None]
+            known = names.take(chunk)
+            yield from known
+            if not known:
+                yield None  # so that those who wait for a time see it pass
 
 
 class _Names:
