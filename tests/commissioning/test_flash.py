@@ -20,7 +20,7 @@ from board_runs import ELF, ROOT
 from command_line import echostep
 from echostep.board import messages as m
 from echostep.board.frames import encode
-from echostep.commissioning.flash import check_hex
+from echostep.commissioning.flash import _error_line, check_hex
 from echostep.errors import EchostepError
 from players import pseudo_terminal
 from waiting import PATIENCE_S
@@ -115,6 +115,7 @@ def test_what_avrdude_says_is_passed_on(tmp_path: Path, body: str, words: str) -
     assert done.returncode == 2
     assert words in done.stderr
     assert "reset button" in done.stderr
+    assert "ModemManager" in done.stderr
     assert done.stderr.count("\n") == 1
 
 
@@ -211,3 +212,8 @@ def test_the_shipped_firmware_belongs_to_this_host() -> None:
     built = ELF.with_suffix(".hex")
     if built.exists():
         assert built.read_text() == text, "the firmware has changed: make firmware"
+
+
+def test_a_line_of_avrdude_that_goes_on_is_passed_on_whole() -> None:
+    said = "Connecting to programmer: .\navrdude: error: butterfly programmer uses avr_write_page() but does not provide\n         a cmd() method.\n"
+    assert _error_line(said) == "error: butterfly programmer uses avr_write_page() but does not provide a cmd() method."

@@ -37,6 +37,7 @@ POLL_S = 0.05
 AVRDUDE_S = 120.0
 FLASH_MAX = 32768 - 4096  # bytes; the bootloader occupies the rest of the ATmega32U4
 FULL_BAR = 50  # characters of avrdude's progress bar
+MODEMS = "if ModemManager runs here, it talks to new ports: install the udev rules (echostep doctor --udev)"
 PRESS = "press its reset button (Pro Micro: twice, quickly) and run this again within eight seconds"
 
 
@@ -171,7 +172,7 @@ def _output(command: list[str]) -> Iterator[str]:
             yield output.decode(errors="replace")
         if status := child.wait(timeout=5.0):
             raise EchostepError(
-                f"avrdude failed (status {status}): {_error_line(output.decode(errors='replace'))}; {PRESS}"
+                f"avrdude failed (status {status}): {_error_line(output.decode(errors='replace'))}; {PRESS}; {MODEMS}"
             )
     finally:
         if child.poll() is None:
@@ -181,9 +182,10 @@ def _output(command: list[str]) -> Iterator[str]:
 
 
 def _error_line(output: str) -> str:
-    """The first line of avrdude's output that names an error, else the last line."""
+    """The first line of avrdude's output that names an error, with the lines that continue it, else the last line."""
+    joined = re.sub(r"\n[ \t]+", " ", output.replace("\r\n", "\n"))
     lines = [
-        line.strip() for line in output.splitlines() if line.strip() and "Thank you" not in line and "#" not in line
+        line.strip() for line in joined.splitlines() if line.strip() and "Thank you" not in line and "#" not in line
     ]
     telling = [line for line in lines if re.search("error|not responding|mismatch|cannot|can't|fail", line, re.I)]
     return (telling or lines or ["it printed nothing"])[0 if telling else -1].removeprefix("avrdude: ")
