@@ -72,7 +72,10 @@ class Recovery:
         file = map_file(self.path)
         self.size = len(file)
         if file[: len(MCAP_MAGIC)].tobytes() != MCAP_MAGIC:
-            raise EchostepError(f"{self.path}: not a recording: it does not begin as an MCAP file does")
+            raise EchostepError(
+                f"{self.path}: not a recording: it does not begin as an MCAP file does; "
+                "bytes of one port are read by echostep decode"
+            )
         for opcode, body in summary(file):
             self._register(opcode, body)
         for begin, end, content in self._scan(file, len(MCAP_MAGIC)):
