@@ -47,7 +47,7 @@ def test_it_runs_without_a_home_in_a_narrow_terminal_of_locale_c(tmp_path: Path,
     }
     environment |= {} if home is None else {"HOME": home}
     plan = ROOT / "host/echostep/plans/demo.json"
-    command = [sys.executable, "-m", "echostep", "plan", "check", plan]
+    command = [sys.executable, "-m", "echostep", "plan", "check", str(plan)]
     done = subprocess.run(command, env=environment, cwd="/", capture_output=True, timeout=PATIENCE_S, check=False)
     assert done.returncode == 0, done.stderr
     assert b"Traceback" not in done.stderr

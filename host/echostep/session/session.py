@@ -120,7 +120,9 @@ class Session:
         assert self.output.outlet
         name = self.output.outlet.name
         self._drawing = shared_drawing(self.tracker, name)
-        _print_line(f"What the walk draws goes to {self._broker}: teammates are tracked on it by --plan wearer:{name}")
+        _print_line(
+            f"Once the walk has drawn walls, they are offered to {self._broker}: teammates take them by --plan wearer:{name}"
+        )
         if self.output.page is None:
             opened.callback(UnseenDrawing(self.tracker, self._drawing, _print_line).close)
 
