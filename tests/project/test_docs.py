@@ -113,6 +113,14 @@ def test_a_series_lists_its_pages(series: list[Path]) -> None:
         assert page == index or f"]({page.name})" in rows, page.name
 
 
+def test_an_entry_of_the_changelog_is_one_line() -> None:
+    _, *entries = (ROOT / "host/CHANGELOG.md").read_text().partition("\n## ")[2].splitlines()
+    assert len(entries) > 50
+    for line in entries:
+        assert line.startswith(("- ", "#")) or not line, line
+        assert len(line) <= 200, line
+
+
 @pytest.mark.parametrize("page", DESIGN, ids=name_of)
 def test_a_page_of_the_design_has_a_length_to_read(page: Path) -> None:
     assert 40 <= len(page.read_text().splitlines()) <= 130
