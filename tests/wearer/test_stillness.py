@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from echostep.arrays import Floats
 from echostep.legs.trunk_path import GyroBlock
-from echostep.wearer.stillness import WINDOW_S, MotionWindows, Stillness, Window
+from echostep.wearer.stillness import MOST_SAMPLES, WINDOW_S, MotionWindows, Stillness, Window
 
 
 def samples(seconds: float, moves_s: tuple[float, ...], seed: int = 0) -> tuple[Floats, Floats]:
@@ -42,6 +42,14 @@ def test_samples_of_an_earlier_window_are_skipped() -> None:
     windows.add(np.array([5.0]), np.zeros((1, 1)))
     assert not windows.add(np.array([1.0, 2.0]), np.ones((2, 1)))
     assert windows.add(np.array([5.6]), np.zeros((1, 1))) == [(0, Window(5.5, False))]
+
+
+def test_times_that_stand_still_fill_no_memory() -> None:
+    windows, kept = MotionWindows(np.array([0.5])), 2 * MOST_SAMPLES
+    for _ in range(40):
+        assert not windows.add(np.full(1_000, 1.1), np.zeros((1_000, 1)))
+    assert sum(len(t_s) for t_s, _ in windows._samples) < kept
+    assert windows.add(np.array([1.6]), np.zeros((1, 1))) == [(0, Window(1.5, False))]
 
 
 def test_sensors_that_have_never_moved_say_nothing() -> None:

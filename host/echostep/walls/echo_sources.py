@@ -172,38 +172,47 @@ def echo_sources(
     place where a wall ends or walls turn.
     """
     receiver = Receiver(px, py, math.cos(axis_rad), math.sin(axis_rad))
-    return first_sources(receiver, axis_rad, index, EVERYTHING, SourceList(distance_m, off_axis_rad, kind))
+    sources = SourceList(distance_m, off_axis_rad, kind)
+    tile, u = tile_at(px, py, index), bearing(axis_rad)
+    if tile < 0 or not math.isfinite(axis_rad):
+        return 0
+    k = index.tile_number[tile] - 1
+    if 0 <= k < index.tabulated:
+        return _sources_of_unit(receiver, index.walls, index.faces, index.points, u + k * BEARINGS, EVERYTHING, sources)
+    return _sources_of_missing_tile(receiver, tile, u, index, EVERYTHING, sources)
 
 
 @inline_kernel
 def first_sources(receiver: Receiver, axis_rad: float, index: WallIndex, limits: Limits, sources: SourceList) -> int:
-    """`echo_sources` of a receiver with this bearing of its axis, but for those that `limits` leaves out."""
+    """`echo_sources` of a receiver with this bearing of its axis, but for those that `limits` leaves out: for loops over many receivers."""
     tile, u, n = tile_at(receiver.x, receiver.y, index), bearing(axis_rad), 0
     if tile >= 0 and math.isfinite(axis_rad):
         k = index.tile_number[tile] - 1
         if 0 <= k < index.tabulated:
-            n = _sources_of(receiver, index.walls, index.faces, index.points, u + k * BEARINGS, limits, sources)
+            n = _add_sources(receiver, index.walls, index.faces, index.points, u + k * BEARINGS, limits, sources)
         else:
             n = _sources_of_missing_tile(receiver, tile, u, index, limits, sources)
     return n
 
 
 @inline_kernel
-def _sources_of(
-    receiver: Receiver,
-    walls: Floats,
-    faces: SourceTable,
-    points: SourceTable,
-    u: int,
-    limits: Limits,
-    sources: SourceList,
-) -> int:
+def _add_sources(
+    receiver: Receiver, walls: Floats, faces: SourceTable, points: SourceTable, u: int, limits: Limits, sources: SourceList,
+) -> int:  # fmt: skip
     """The sources of unit u."""
     n, reach_m = _add_faces(receiver, walls, faces, u, limits, sources)
     n = _add_points(receiver, walls, points, u, n, reach_m, limits, sources)
     for i in range(n):
         sources.off_axis[i] = _angle(sources.off_axis[i])
     return n
+
+
+@lean_kernel
+def _sources_of_unit(
+    receiver: Receiver, walls: Floats, faces: SourceTable, points: SourceTable, u: int, limits: Limits, sources: SourceList,
+) -> int:  # fmt: skip
+    """The same, called: compiled once for all places where a call costs nothing."""
+    return _add_sources(receiver, walls, faces, points, u, limits, sources)
 
 
 @inline_kernel
@@ -219,7 +228,7 @@ def _sources_of_missing_tile(
 ) -> int:
     """The sources in a tile that is not tabulated: its tables are made for this call alone."""
     faces, points = tile_sources(tile, index, 0.0)
-    return _sources_of(receiver, index.walls, faces, points, u, limits, sources)
+    return _sources_of_unit(receiver, index.walls, faces, points, u, limits, sources)
 
 
 @inline_kernel

@@ -29,6 +29,7 @@ LEAST_RATIO = 2.5
 # thighs exceed it, 0-80 % of those of feet; breathing turns neither.
 LEAST_RAD_S = 0.004
 WINDOW_S = 0.5
+MOST_SAMPLES = 10_000  # of one window, 20 kHz: no sensor has more, and times that stand still fill no memory
 # Limits: twice the largest range of an MTx's noise in half a second (0.105 rad/s, 0.26 m/s2 by its manual, simulated; other sensors of the
 # public recordings: 0.04 rad/s, 0.16 m/s2). A foot that is lifted, turned or shifted exceeds them several times; breathing turns no shoe.
 FOOT_RAD_S, FOOT_M_S2 = 0.2, 0.6
@@ -37,37 +38,14 @@ LEG_RAD_S = 0.15  # of thigh, shank and belt; noise of an ADIS16100 has a range 
 SWAY_WINDOWS, LEAST_SWAYING = 10, 8
 
 
-class SwayWindows:
-    """`add` takes samples; `restart` returns whether the last window sways, when the next sample is of a later one."""
-
-    def __init__(self, channels: int) -> None:
-        self.channels = channels
-        self._sums: Floats = np.zeros((SHORT, channels))
-        self._counts: Floats = np.zeros(SHORT)
-
-    def add(self, index: Ints, part: Ints, values: Floats) -> Bools:
-        """Whether the windows sway that these samples touch, in ascending order; the last one is not finished.
-
-        `index` (n,), ascending: window of each sample. `part` (n,): its short mean, 0 to 24. `values` (n, c) in rad/s. The first window is the last
-        one of the previous call when nothing came in between (`restart` otherwise).
-        """
-        windows = np.r_[True, index[1:] != index[:-1]].cumsum() - 1
-        flat, total = windows * SHORT + part, int(windows[-1] + 1) * SHORT
-        counts = np.bincount(flat, minlength=total).astype(np.float64)
-        sums: Floats = np.column_stack([np.bincount(flat, column, total) for column in values.T])
-        counts[:SHORT] += self._counts
-        sums[:SHORT] += self._sums
-        self._counts, self._sums = counts[-SHORT:], sums[-SHORT:]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            short = (sums / counts[:, None]).reshape(-1, SHORT, values.shape[1])
-        return sways(short)
-
-    def restart(self) -> Bools:
-        """Whether the last window sways; the next samples are of a later one."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            short = (self._sums / self._counts[:, None])[None]
-        self._sums, self._counts = np.zeros_like(self._sums), np.zeros(SHORT)
-        return sways(short)
+def swaying(t_s: Floats, windows: Ints, values: Floats) -> Bools:
+    """Whether windows (w,) sway; `windows` (n,), ascending from 0: that of each sample (n, c) in rad/s, taken at `t_s` (n,)."""
+    part = np.clip(SHORT * (t_s / WINDOW_S - np.floor(t_s / WINDOW_S)), 0, SHORT - 1).astype(np.int64)
+    flat, total = windows * SHORT + part, int(windows[-1] + 1) * SHORT
+    counts = np.bincount(flat, minlength=total)
+    sums: Floats = np.column_stack([np.bincount(flat, column, total) for column in values.T])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return sways((sums / counts[:, None]).reshape(-1, SHORT, values.shape[1]))
 
 
 def sways(short: Floats) -> Bools:
@@ -88,14 +66,13 @@ class Window(NamedTuple):
 
 
 class MotionWindows:
-    """Windows of one sensor: `add` takes samples and returns the windows that they complete."""
+    """Windows of one sensor: `add` takes samples and returns the windows that they complete. Owns the samples of the unfinished one."""
 
-    def __init__(self, limits: Floats, swaying: int = 0) -> None:
-        """`limits` (c,): of the range of each channel; the first `swaying` ones are gyros, used for the test of sway."""
-        self._limits = limits
-        self._index = -1  # of the unfinished window
-        self._low, self._high = np.full(len(limits), np.inf), np.full(len(limits), -np.inf)
-        self._sway = SwayWindows(swaying) if swaying else None
+    def __init__(self, limits: Floats, sway_channels: int = 0) -> None:
+        """`limits` (c,): of the range of each channel; the first `sway_channels` ones are gyros, used for the test of sway."""
+        self._limits, self._sway_channels = limits, sway_channels
+        self._index, self._count = -1, 0  # of the unfinished window, and its samples
+        self._samples: list[tuple[Floats, Floats]] = []
         self._swayed: deque[bool] = deque(maxlen=SWAY_WINDOWS)
 
     def add(self, t_s: Floats, values: Floats) -> list[tuple[int, Window]]:
@@ -105,34 +82,37 @@ class MotionWindows:
         """
         index = np.floor(t_s / WINDOW_S).astype(np.int64)
         fresh = np.flatnonzero(index >= self._index)
-        t_s, index, values = t_s[fresh], index[fresh], values[fresh]
-        if not len(index):
+        if not len(fresh):
             return []
+        before, last = self._count, int(index[fresh[-1]])
+        if before < MOST_SAMPLES or last != self._index:
+            self._keep(t_s[fresh], values[fresh])
+        if last == self._index:
+            return []
+        t_s, values = (np.concatenate(parts) for parts in zip(*self._samples, strict=True))
+        index = np.floor(t_s / WINDOW_S).astype(np.int64)
         begins = np.flatnonzero(np.r_[True, index[1:] != index[:-1]])
-        low, high = np.minimum.reduceat(values, begins), np.maximum.reduceat(values, begins)
-        sways = self._sways(t_s, index, values)
-        index, completed_by = index[begins], fresh[begins]
-        if index[0] == self._index:
-            completed_by = completed_by[1:]
-            low[0], high[0] = np.minimum(low[0], self._low), np.maximum(high[0], self._high)
-        elif self._index < 0:
-            completed_by = completed_by[1:]
-        else:
-            index = np.r_[self._index, index]
-            low, high = np.vstack([self._low, low]), np.vstack([self._high, high])
-        self._index, self._low, self._high = int(index[-1]), low[-1], high[-1]
-        moved: list[bool] = np.any((high - low)[:-1] > self._limits, axis=1).tolist()
-        ends_s: list[float] = (WINDOW_S * (index[:-1] + 1.0)).tolist()
-        rows = zip(ends_s, moved, sways[:-1].tolist(), strict=True)
-        return list(zip(completed_by.tolist(), [self._window(*row) for row in rows], strict=True))
+        finished = self._finished(t_s, index, values, begins)
+        self._samples, self._count, self._index = [], 0, last
+        self._keep(t_s[begins[-1] :], values[begins[-1] :])
+        return list(zip(fresh[begins[1:] - before].tolist(), finished, strict=True))
 
-    def _sways(self, t_s: Floats, index: Ints, values: Floats) -> Bools:
-        """Whether the windows sway that the samples touch, and before them the last one, when it is complete."""
-        if self._sway is None:
-            return np.zeros(len(np.unique(index)) + (0 <= self._index != index[0]), np.bool_)
-        before = self._sway.restart() if 0 <= self._index != index[0] else np.zeros(0, np.bool_)
-        part = np.clip(SHORT * (t_s / WINDOW_S - index), 0, SHORT - 1).astype(np.int64)
-        return np.r_[before, self._sway.add(index, part, values[:, : self._sway.channels])]
+    def _keep(self, t_s: Floats, values: Floats) -> None:
+        self._samples.append((t_s, values))
+        self._count += len(t_s)
+
+    def _finished(self, t_s: Floats, index: Ints, values: Floats, begins: Ints) -> list[Window]:
+        """All windows but the last one of samples (n,), whose windows begin at `begins`."""
+        span = np.maximum.reduceat(values, begins) - np.minimum.reduceat(values, begins)
+        moved = np.any(span > self._limits, axis=1)
+        sways = np.zeros(len(begins), np.bool_)
+        if self._sway_channels:
+            windows = np.repeat(np.arange(len(begins)), np.diff(np.r_[begins, len(index)]))
+            sways = swaying(t_s, windows, values[:, : self._sway_channels])
+        ends_s = WINDOW_S * (index[begins] + 1.0)
+        return [
+            self._window(*row) for row in list(zip(ends_s.tolist(), moved.tolist(), sways.tolist(), strict=True))[:-1]
+        ]
 
     def _window(self, end_s: float, moved: bool, sways: bool) -> Window:
         """A finished window: it counts as swaying when most of those before it did so too, up to a movement."""
