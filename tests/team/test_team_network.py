@@ -56,7 +56,7 @@ class Ear:
 
     def has_all_at(self, t_s: float) -> bool:
         """Whether the newest position of each of 20 members is of that time."""
-        return [m.report.position.t_s for m in self.members() if m.report.position] == [t_s] * 20
+        return [m.report.last_known.t_s for m in self.members() if m.report.last_known] == [t_s] * 20
 
     def only(self) -> Member:
         (member,) = self.members()

@@ -170,7 +170,7 @@ def test_a_stream_server_that_stops_reading_does_not_hold_old_positions() -> Non
 
         assert ends(offer_all)  # although the line stands still
         assert until(lambda: words)
-        assert "timed out" in words[0]
+        assert "the host does not answer" in words[0]
         assert box.counts.sent < 500
         box.close()
 
@@ -193,7 +193,7 @@ def test_events_go_out_by_tls_with_a_client_certificate(certificates: Certificat
     distrusting.close()
     server.stop()
     assert ElementTree.fromstring(server.lines[0]).get("uid") == "echostep-red-anna"
-    assert "certificate verify failed" in words[0]
+    assert "an authority that this computer does not know" in words[0]
 
 
 @needs_broker
