@@ -93,7 +93,7 @@ class TeammateSink(Sink):
     def end(self, _summary: str, /) -> None:
         """Report a drawing that was too large to be shared."""
         if self._drawing and self._drawing.too_long:
-            console.print("The drawing became too large for the team: the broker keeps an earlier one")
+            console.print("The drawing became too large for the team: what was drawn later was not sent")
 
 
 class MarkSink(Sink):
