@@ -199,6 +199,11 @@ def arc_on_the_wall_layer(space: Any, gap: Gap) -> None:
     arc(space, gap.x, gap.begin, gap.width, layer=WALL)
 
 
+def all_on_the_wall_layer(space: Any, gap: Gap) -> None:
+    arc(space, gap.x, gap.begin, gap.width, layer=WALL)
+    space.add_line((gap.x, gap.begin), (gap.x + gap.width, gap.begin), WALL)
+
+
 def closed(space: Any, gap: Gap) -> None:
     space.add_line((gap.x, gap.begin), (gap.x, gap.end), DOOR)
 
@@ -225,7 +230,7 @@ def unequal_double(space: Any, gap: Gap) -> None:
 WALL_STYLES: Sequence[Walls] = (outlines, faces, axes, hatches, solids, multilines, blocks)
 DOOR_STYLES: Sequence[Doors] = (
     loose, at_the_face, in_a_frame, half_open, arc_alone, leaf_alone, threshold, bulge, chain, spline, ellipse, block, mirrored_block, arc_elsewhere,
-    arc_on_the_wall_layer, closed, sliding,
+    arc_on_the_wall_layer, all_on_the_wall_layer, closed, sliding,
 )  # fmt: skip
 DOUBLE_STYLES: Sequence[Doors] = (double, unequal_double)
 

@@ -23,6 +23,7 @@ from plan.drawings.drawn_houses import (
     Doors,
     Gap,
     Walls,
+    all_on_the_wall_layer,
     corners,
     leaf_alone,
     outlines,
@@ -59,7 +60,7 @@ def failures(
 
 @pytest.mark.parametrize("walls", WALL_STYLES, ids=lambda walls: str(walls.__name__))
 def test_every_door_lies_in_its_gap(tmp_path: Path, walls: Walls) -> None:
-    """17 ways to draw a door and 2 of double doors, in the middle of a wall."""
+    """18 ways to draw a door and 2 of double doors, in the middle of a wall."""
     doors = [*((door, Gap()) for door in DOOR_STYLES), *((door, Gap(3.0, 4.8)) for door in DOUBLE_STYLES)]
     assert failures(tmp_path / "a.dxf", walls, doors, TURN, SHIFT) == []
 
@@ -78,6 +79,12 @@ def test_walls_keep_their_jambs(tmp_path: Path) -> None:
     assert len(level.walls) == 14
     assert [(4.0, 3.0), (4.1, 3.0)] in ends
     assert [(4.0, 3.9), (4.1, 3.9)] in ends
+
+
+def test_a_leaf_among_the_walls_is_no_wall(tmp_path: Path) -> None:
+    level = import_plan(write_house(tmp_path / "a.dxf", outlines, all_on_the_wall_layer, Gap())).levels[0]
+    assert len(level.doors) == 1
+    assert len(level.walls) == 14
 
 
 def test_a_door_in_no_wall_is_told_and_not_placed(tmp_path: Path) -> None:

@@ -51,13 +51,12 @@ class PlacedDoors:
                 if walls.gap(line[:2], _along(line), width_m / 2, width_m) is None:
                     self.cuts.append(walls.faces(line, THICKEST_M))
 
-    def add_swing(self, symbol: Symbol, walls: WallBands) -> bool:
-        """Place a swing that lies on no layer of doors, if it fits a gap exactly; returns whether it does."""
-        lines = [line for swing in symbol.swings if (line := _exact(swing, walls)) is not None]
-        for line in _joined(lines):
-            if not any(_same(line, other.line) for other in self.doors):
-                self.doors.append(Door(line))
-        return bool(lines)
+    def add_swing(self, swing: Swing, walls: WallBands) -> Line | None:
+        """Place a swing that lies on no layer of doors, if it fits a gap exactly; returns the gap, None where it does not."""
+        line = _exact(swing, walls)
+        if line is not None and not any(_same(line, other.line) for other in self.doors):
+            self.doors.append(Door(line))
+        return line
 
 
 def _lines(symbol: Symbol, walls: WallBands) -> Iterator[Line]:

@@ -27,7 +27,7 @@ from echostep.plan.importers.dxf.gaps import WallBands
 from echostep.plan.importers.dxf.rooms import rooms_of
 from echostep.plan.importers.dxf.sheet import Sheet, read_sheet
 from echostep.plan.importers.dxf.storeys import alignment, bounds_of, lies_over, storey_boxes, window_words
-from echostep.plan.importers.dxf.symbols import Symbol, is_swing, symbol_of, symbols_of
+from echostep.plan.importers.dxf.symbols import LEAF_M, Swing, Symbol, draws_open_leaf, is_swing, symbol_of, symbols_of
 from echostep.plan.importers.hints import Hints
 from echostep.plan.importers.report import ImportReport
 from echostep.plan.model import ConnectorKind, Plan
@@ -184,12 +184,33 @@ def _doors(storey: _Storey, report: ImportReport) -> PlacedDoors:
     walls = WallBands(storey.lines("walls", "columns", "windows"))
     for symbol in _symbols(storey):
         placed.add(symbol, walls)
+    leaves = []
     for entity, layer, symbol in swings:
-        if placed.add_swing(symbol, walls):
+        gap = placed.add_swing(symbol.swings[0], walls)
+        if gap is None:
+            storey.swings.remove(id(entity))
+        else:
+            leaves.append((symbol.swings[0], gap[2:]))
             report.use("doors", layer)
             report.take_back(f"{entity.dxftype()} on {layer[:40]}")
-        else:
-            storey.swings.remove(id(entity))
+    _take_leaves(storey, leaves)
+    _tell_doors(placed, report)
+    return placed
+
+
+def _take_leaves(storey: _Storey, leaves: list[tuple[Swing, tuple[float, float]]]) -> None:
+    """Leaves that are drawn open among the walls, beside a swing that is a door, are no walls."""
+    drawn = [(entity, lines) for entity, _ in storey.sheet.kinds["walls"] if (lines := storey.of(entity))]
+    tree = shapely.STRtree([lines[0] for _, lines in drawn]) if leaves else shapely.STRtree([])
+    for swing, closed in leaves:
+        for k in tree.query(Point(swing.hinge), predicate="dwithin", distance=LEAF_M):
+            entity, lines = drawn[k]
+            if draws_open_leaf(lines, swing, closed):
+                storey.swings.add(id(entity))
+
+
+def _tell_doors(placed: PlacedDoors, report: ImportReport) -> None:
+    """Report doors that walls are drawn through, and symbols in no wall."""
     if placed.cuts:
         one = len(placed.cuts) == 1
         report.doubt(
@@ -203,7 +224,6 @@ def _doors(storey: _Storey, report: ImportReport) -> PlacedDoors:
             f"{len(placed.strays)} door{' stands' if one else 's stand'} in no wall and {'was' if one else 'were'} left out ({places}"
             f"{'' if len(placed.strays) <= SHOWN_STRAYS else ', ...'}): are all layers of walls used?"
         )
-    return placed
 
 
 def _symbols(storey: _Storey) -> list[Symbol]:

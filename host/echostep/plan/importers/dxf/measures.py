@@ -69,8 +69,8 @@ def median(values: Floats, weights: Floats) -> float:
 def _radii(entity: Any, file: Path) -> Iterator[float]:
     """Radii of the swings of a door symbol."""
     if entity.dxftype() == "INSERT":
-        for part in parts(entity, file):
-            yield from _radii(part, file) if part.dxftype() == "ARC" else ()
+        inner = [radius for part in parts(entity, file) if part.dxftype() == "ARC" for radius in _radii(part, file)]
+        yield from [max(inner)] if inner else []  # the leaf's; smaller ones are of its handle
     elif entity.dxftype() == "ARC":
         sweep = (entity.dxf.end_angle - entity.dxf.start_angle) % 360.0
         radius = float(entity.dxf.radius)

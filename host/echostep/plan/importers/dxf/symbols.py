@@ -30,6 +30,7 @@ LEAST_TURN_RAD, MOST_TURN_RAD = (
 OFF = 0.04  # greatest distance of a swing's corners from its circle, by its radius: splines are no circles; assumed
 JOIN_M = 0.06  # drawn lines nearer than this are one symbol; assumed
 LEAF_M = 0.15  # greatest distance of a leaf's ends from the hinge and the end of the arc; assumed
+MOST_LEAF = 2.4  # length of a leaf's outline by its width: a rectangle
 MOST_CORNERS = 2000  # of a polyline that is searched
 Point = tuple[float, float]
 
@@ -62,6 +63,14 @@ def symbol_of(lines: Sequence[LineString]) -> Symbol:
 def is_swing(symbol: Symbol) -> bool:
     """Whether a symbol is little more than one swing: arc, leaf, threshold; not a wall with a round corner."""
     return len(symbol.swings) == 1 and sum(line.length for line in symbol.lines) < 4.0 * symbol.swings[0].radius_m
+
+
+def draws_open_leaf(lines: Sequence[LineString], swing: Swing, closed: Point) -> bool:
+    """Whether lines are no more than the leaf of a swing, drawn open; `closed`: the end of its arc that is at the jamb."""
+    open_end = max(swing.ends, key=lambda end: math.dist(end, closed))
+    pieces = [LineString(pair) for line in lines for pair in _straight(line)]
+    is_small = sum(line.length for line in lines) < MOST_LEAF * swing.radius_m
+    return is_small and any(_is_leaf(piece, swing.hinge, open_end) for piece in pieces)
 
 
 def symbols_of(lines: Sequence[LineString]) -> list[Symbol]:

@@ -17,7 +17,7 @@ from echostep.errors import EchostepError
 from echostep.plan.importers.dxf.frame import METRES
 from echostep.plan.importers.report import ImportReport
 
-INSUNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m"}
+INSUNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 21: "ft"}  # 21: feet of the US survey, longer by 2e-6
 NAMES = {"mm": "millimetres", "cm": "centimetres", "m": "metres", "in": "inches", "ft": "feet"}
 
 
