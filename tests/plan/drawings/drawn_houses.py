@@ -227,12 +227,20 @@ def unequal_double(space: Any, gap: Gap) -> None:
     space.add_arc((gap.x, gap.end), other, 270, 360, dxfattribs=DOOR)
 
 
+def double_on_the_wall_layer(space: Any, gap: Gap) -> None:
+    half = gap.width / 2
+    arc(space, gap.x, gap.begin, half, layer=WALL)
+    space.add_arc((gap.x, gap.end), half, 270, 360, dxfattribs=WALL)
+    for y in (gap.begin, gap.end):
+        space.add_line((gap.x, y), (gap.x + half, y), WALL)
+
+
 WALL_STYLES: Sequence[Walls] = (outlines, faces, axes, hatches, solids, multilines, blocks)
 DOOR_STYLES: Sequence[Doors] = (
     loose, at_the_face, in_a_frame, half_open, arc_alone, leaf_alone, threshold, bulge, chain, spline, ellipse, block, mirrored_block, arc_elsewhere,
     arc_on_the_wall_layer, all_on_the_wall_layer, closed, sliding,
 )  # fmt: skip
-DOUBLE_STYLES: Sequence[Doors] = (double, unequal_double)
+DOUBLE_STYLES: Sequence[Doors] = (double, unequal_double, double_on_the_wall_layer)
 
 
 def placed(point: tuple[float, float], turn: float, shift: tuple[float, float]) -> tuple[float, float]:

@@ -25,6 +25,7 @@ from plan.drawings.drawn_houses import (
     Walls,
     all_on_the_wall_layer,
     corners,
+    double_on_the_wall_layer,
     leaf_alone,
     outlines,
     placed,
@@ -60,7 +61,7 @@ def failures(
 
 @pytest.mark.parametrize("walls", WALL_STYLES, ids=lambda walls: str(walls.__name__))
 def test_every_door_lies_in_its_gap(tmp_path: Path, walls: Walls) -> None:
-    """18 ways to draw a door and 2 of double doors, in the middle of a wall."""
+    """18 ways to draw a door and 3 of double doors, in the middle of a wall."""
     doors = [*((door, Gap()) for door in DOOR_STYLES), *((door, Gap(3.0, 4.8)) for door in DOUBLE_STYLES)]
     assert failures(tmp_path / "a.dxf", walls, doors, TURN, SHIFT) == []
 
@@ -82,9 +83,10 @@ def test_walls_keep_their_jambs(tmp_path: Path) -> None:
 
 
 def test_a_leaf_among_the_walls_is_no_wall(tmp_path: Path) -> None:
-    level = import_plan(write_house(tmp_path / "a.dxf", outlines, all_on_the_wall_layer, Gap())).levels[0]
-    assert len(level.doors) == 1
-    assert len(level.walls) == 14
+    for door, gap in ((all_on_the_wall_layer, Gap()), (double_on_the_wall_layer, Gap(3.0, 4.8))):
+        level = import_plan(write_house(tmp_path / "a.dxf", outlines, door, gap)).levels[0]
+        assert len(level.doors) == 1
+        assert len(level.walls) == 14
 
 
 def test_a_door_in_no_wall_is_told_and_not_placed(tmp_path: Path) -> None:

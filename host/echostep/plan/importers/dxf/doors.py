@@ -58,6 +58,20 @@ class PlacedDoors:
             self.doors.append(Door(line))
         return line
 
+    def add_pair(self, symbol: Symbol, walls: WallBands) -> Line | None:
+        """Place two swings that meet and lie on no layer of doors, if they fit a gap exactly; returns the gap, None where they do not."""
+        leaves = [_of_swing(_meeting(swing, symbol.swings), walls) for swing in symbol.swings]
+        lines = _joined([leaf for leaf in leaves if leaf is not None])
+        if len(symbol.swings) != 2 or None in leaves or len(lines) != 1:
+            return None
+        width_m = math.dist(lines[0][:2], lines[0][2:])
+        gap = walls.gap(lines[0][:2], _along(lines[0]), width_m / 2, width_m)
+        if gap is None or abs(gap.begin_m) > BY_M or abs(gap.end_m - width_m) > BY_M:
+            return None
+        if not any(_same(lines[0], other.line) for other in self.doors):
+            self.doors.append(Door(lines[0]))
+        return lines[0]
+
 
 def _lines(symbol: Symbol, walls: WallBands) -> Iterator[Line]:
     """A line from jamb to jamb for each leaf of a symbol that hangs in a wall."""

@@ -184,18 +184,33 @@ def _doors(storey: _Storey, report: ImportReport) -> PlacedDoors:
     walls = WallBands(storey.lines("walls", "columns", "windows"))
     for symbol in _symbols(storey):
         placed.add(symbol, walls)
-    leaves = []
+    _swings_elsewhere(storey, swings, placed, walls, report)
+    _tell_doors(placed, report)
+    return placed
+
+
+def _swings_elsewhere(
+    storey: _Storey, swings: list[tuple[Any, str, Symbol]], placed: PlacedDoors, walls: WallBands, report: ImportReport
+) -> None:
+    """Place swings on layers that are not of doors, single or in pairs; those that fit no gap are what their layer says."""
+    doors: list[tuple[Any, str, Swing, tuple[float, float]]] = []
+    left: dict[int, tuple[Any, str, Swing]] = {}  # by id of the line, which the symbols of pairs keep
     for entity, layer, symbol in swings:
         gap = placed.add_swing(symbol.swings[0], walls)
         if gap is None:
-            storey.swings.remove(id(entity))
+            left |= {id(line): (entity, layer, symbol.swings[0]) for line in symbol.lines}
         else:
-            leaves.append((symbol.swings[0], gap[2:]))
-            report.use("doors", layer)
-            report.take_back(f"{entity.dxftype()} on {layer[:40]}")
-    _take_leaves(storey, leaves)
-    _tell_doors(placed, report)
-    return placed
+            doors.append((entity, layer, symbol.swings[0], gap[2:]))
+    for pair in symbols_of([line for _, _, symbol in swings for line in symbol.lines if id(line) in left]):
+        if len(pair.swings) == 2 and placed.add_pair(pair, walls) is not None:
+            for entity, layer, swing in (left.pop(id(line)) for line in pair.lines):
+                other = next((one.hinge for one in pair.swings if one.hinge != swing.hinge), swing.hinge)
+                doors.append((entity, layer, swing, other))
+    storey.swings.difference_update(id(entity) for entity, _, _ in left.values())
+    for entity, layer, _, _ in doors:
+        report.use("doors", layer)
+        report.take_back(f"{entity.dxftype()} on {layer[:40]}")
+    _take_leaves(storey, [(swing, closed) for _, _, swing, closed in doors])
 
 
 def _take_leaves(storey: _Storey, leaves: list[tuple[Swing, tuple[float, float]]]) -> None:
