@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 import pytest
-from ezdxf.filemanagement import new
+from ezdxf.filemanagement import new, readfile
 
 from echostep.plan.importers.formats import import_plan
 from echostep.plan.importers.report import ImportReport
@@ -101,6 +101,21 @@ def test_a_door_in_no_wall_is_told_and_not_placed(tmp_path: Path) -> None:
     assert import_plan(tmp_path / "a.dxf", report=report).levels[0].doors == ()
     assert report.left_out["door in no wall"] == 1
     assert "1 door stands in no wall and was left out (x 5.45 y 4.45)" in report.doubts[0]
+
+
+def test_marks_beside_doors_are_no_doors(tmp_path: Path) -> None:
+    """Frames of the doors' numbers, and jambs apart from the leaf."""
+    path = write_house(tmp_path / "a.dxf", outlines, DOOR_STYLES[0], Gap())
+    doc = readfile(path)
+    space = doc.modelspace()
+    space.add_circle((7, 4), 0.3, dxfattribs=DOOR)
+    space.add_lwpolyline(corners((7.8, 5, 7.85, 5.1)), close=True, dxfattribs=DOOR)
+    space.add_circle((7, 6), 0.3, dxfattribs={"layer": "A-DOOR-IDEN"})
+    doc.saveas(path)
+    report = ImportReport()
+    assert len(import_plan(path, report=report).levels[0].doors) == 1
+    assert report.doubts == []
+    assert report.left_out == {"mark on a layer of doors": 2, "CIRCLE on A-DOOR-IDEN": 1}
 
 
 def test_a_door_beside_a_window_that_is_not_recognised(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
 import shapely
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
@@ -21,6 +22,7 @@ from echostep.plan.importers.dxf.gaps import BY_M, NEAR_M, Gap, WallBands
 from echostep.plan.importers.dxf.symbols import NARROWEST_M, Point, Swing, Symbol
 from echostep.plan.model import Door
 
+LONG = 2.5  # length of a leaf by its thickness, at least; assumed
 WIDEST_M = 12.0  # of a door without a swing: gates
 LEAST_SHARE, MOST_SHARE = 0.6, 1.3  # width of a gap by the width of the leaf in it; assumed
 FRAME_M = 0.2  # by which a gap may be wider beyond that: frame; assumed
@@ -32,16 +34,22 @@ Line = tuple[float, float, float, float]
 
 @dataclass(slots=True)
 class PlacedDoors:
-    """Doors in walls; `cuts`: areas of walls that are drawn through them; `strays`: middles of symbols in no wall."""
+    """Doors in walls; `cuts`: areas of walls that are drawn through them.
+
+    `strays`: middles of symbols in no wall. `marks`: number of small shapes that are no doors: frames of numbers, jambs.
+    """
 
     doors: list[Door] = field(default_factory=list)
     cuts: list[BaseGeometry] = field(default_factory=list)
     strays: list[Point] = field(default_factory=list)
+    marks: int = 0
 
     def add(self, symbol: Symbol, walls: WallBands) -> None:
         """Place the doors of a symbol."""
         lines = list(_lines(symbol, walls))
-        if not lines:
+        if not lines and not (symbol.swings or _is_long(symbol.lines)):
+            self.marks += 1
+        elif not lines:
             middle = shapely.union_all(symbol.lines).envelope.centroid
             self.strays.append((round(middle.x, 2), round(middle.y, 2)))
         for line in _joined(lines):
@@ -148,6 +156,13 @@ def _of_line(lines: Sequence[LineString], walls: WallBands) -> Line | None:
             if leaf is not None and _fits(leaf, length):
                 return _line(hinge, u, leaf.begin_m, leaf.end_m)
     return (*a, *b) if gap is None and walls.is_at_wall(a) and walls.is_at_wall(b) else None
+
+
+def _is_long(lines: Sequence[LineString]) -> bool:
+    """Whether lines may be a leaf or a threshold: as long as a door is wide, and narrow."""
+    box = np.asarray(shapely.union_all([line.buffer(0.01) for line in lines]).minimum_rotated_rectangle.exterior.coords)
+    sides = sorted((math.dist(box[0], box[1]), math.dist(box[1], box[2])))
+    return sides[1] >= NARROWEST_M and sides[1] >= LONG * sides[0]
 
 
 def _fits(gap: Gap, leaf_m: float) -> bool:

@@ -226,6 +226,8 @@ def _take_leaves(storey: _Storey, leaves: list[tuple[Swing, tuple[float, float]]
 
 def _tell_doors(placed: PlacedDoors, report: ImportReport) -> None:
     """Report doors that walls are drawn through, and symbols in no wall."""
+    if placed.marks:
+        report.leave_out("mark on a layer of doors", placed.marks)
     if placed.cuts:
         one = len(placed.cuts) == 1
         report.doubt(

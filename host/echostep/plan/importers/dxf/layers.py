@@ -41,7 +41,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
 BESIDE = (
     "*patt*", "*hatch*", "*schraff*", "*-dim*", "*bemass*", "*bemaß*", "*anno*", "*text*", "*demol*", "*-demo*", "*abbruch*", "*insul*", "*daemm*",
     "*dämm*", "*furn*", "*möbel*", "*moebel*", "*muebl*", "*mobil*", "*sanit*", "*plumb*", "*clng*", "*ceil*", "*elec*", "*hvac*", "*equip*",
-    "*tile*",
+    "*tile*", "*-iden*", "*-tag*", "*-symb*",
 )  # fmt: skip
 DRAWN = (
     "walls",
