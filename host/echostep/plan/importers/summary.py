@@ -22,7 +22,7 @@ MOST_LEVELS, MOST_DOUBTS = 5, 4  # lines on levels, and on doubts; more of them 
 MOST_NAMES = 6  # kinds and layers in one line
 AT_WALL_M = 0.15  # greatest distance of both ends of a door from a wall: issue 44's bound for a door in a gap
 SIZES_M, DOORS_M = (2.5, 1500.0), (0.5, 3.0)  # of a level, and of half of the doors; assumed
-THROUGH_M = 0.2  # to both sides of a door, which must be free: half the thickness of a wall; assumed
+THROUGH_M = 0.2  # to the sides of a door, of which one must be free: half the thickness of a wall; assumed
 CLEAR_M = 0.01  # a wall nearer than this to a door's middle part runs through it
 
 
@@ -66,16 +66,18 @@ def _in_gap(door: Door, tree: shapely.STRtree, doors: Sequence[Door]) -> bool:
         others = [shapely.LineString((other.line[:2], other.line[2:])) for other in doors if other is not door]
         beside = shapely.union_all(others)
         at_wall = [one or beside.distance(end) < AT_WALL_M for one, end in zip(at_wall, ends, strict=True)]
-    blocked = [len(tree.query(way, predicate="dwithin", distance=CLEAR_M)) > 0 for way in (inner, _across(door))]
-    return all(at_wall) and not any(blocked)
+    through, *sides = (
+        len(tree.query(way, predicate="dwithin", distance=CLEAR_M)) > 0 for way in (inner, *_sides(door))
+    )
+    return all(at_wall) and not through and not all(sides)
 
 
-def _across(door: Door) -> shapely.LineString:
-    """The way through a door: across its middle, out of a thick wall on both sides."""
+def _sides(door: Door) -> tuple[shapely.LineString, shapely.LineString]:
+    """The ways from a door's middle to both its sides: both are blocked inside a wall that is drawn with its thickness and without a gap."""
     x0, y0, x1, y1 = door.line
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
     u, v = THROUGH_M * (y1 - y0) / door.width_m, THROUGH_M * (x0 - x1) / door.width_m
-    return shapely.LineString([(x - u, y - v), (x + u, y + v)])
+    return shapely.LineString([(x, y), (x - u, y - v)]), shapely.LineString([(x, y), (x + u, y + v)])
 
 
 def size_m(level: Level) -> tuple[float, float]:
