@@ -86,6 +86,16 @@ def test_the_part_is_found_whatever_its_idle_line_reads(bench: Bench, undefined:
     assert not [text for _, text in bench.board.trace if "misreads" in text]
 
 
+def test_wrong_bits_from_the_part_are_counted_and_named(foot: Bench) -> None:
+    """Its samples carry no checksum: once a second its identity is read again."""
+    foot.fault("spi_errors=100")
+    kept, said = BoardReports(), set()
+    for message in run(foot, 12_000):
+        kept.add(message)
+        said |= {str(finding) for finding in board_findings(kept)}
+    assert [text for text in said if text.startswith("foot sensor (ICM-20649): sent wrong bits 1 time in")]
+
+
 def test_every_sample_comes_and_is_stamped_within_the_limit(foot: Bench) -> None:
     found = samples(run(foot, 10_000))
     assert len(found) == pytest.approx(10 * RATE_HZ, rel=0.012)  # its own clock is 1 % off

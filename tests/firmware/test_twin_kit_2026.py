@@ -372,7 +372,7 @@ def test_wrong_bits_from_an_lsm6dso_are_counted_and_named(imus: Bench) -> None:
     imus.run(12_000, extended_rows(12_000))
     assert {m.Fault.BAD_VALUE} <= {x.fault_calf for x in imus.messages if isinstance(x, m.Status)}
     words = "calf gyro (LSM6DSO): sent wrong bits"
-    assert [x for x in imus.all_findings if x.startswith(words) and "SPI cable" in x]
+    assert [x for x in imus.all_findings if x.startswith(words) and "SPI wires" in x]
 
 
 def test_lsm6dso_test_themselves_at_the_start(imus: Bench) -> None:

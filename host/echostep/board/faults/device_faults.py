@@ -43,6 +43,7 @@ UNMOVED_COUNTS = 12  # largest response to a self-test that is taken for none; a
 CELSIUS_AT_ZERO, CELSIUS_PER_COUNT = 25.0, 0.1453  # 8.4 mV per degC [ADXRS300], counts of 5 V / 4096
 PROPER_RESPONSES = "-121 to -376 and 121 to 376"  # counts, to ST1 and ST2
 
+WRONG_BITS_REMEDY = "shorten its SPI wires, and put 100 ohm in series into SCK and MOSI at the board"
 _POWER_CYCLE = "power-cycle the board, check 3.3 V and the level shifter"
 _PRESSURE_TEXTS = {
     Fault.NO_ANSWER: (
@@ -173,11 +174,23 @@ def gyro_findings(reports: BoardReports) -> list[Finding]:
 
 
 def foot_findings(reports: BoardReports) -> list[Finding]:
-    """A finding on the part of a foot board that does not run."""
-    foot = reports.foot
-    if foot is None or foot.foot_state == FootState.RUNNING or not foot.errors:
+    """A finding on the part of a foot board that does not run, or whose bits arrive wrong."""
+    foot, before, subject = reports.foot, reports.previous_foot, "foot sensor (ICM-20649)"
+    if foot is None or not foot.errors:
         return []
-    return [Finding(Severity.FAULT, "foot sensor (ICM-20649)", *foot_text(Fault(foot.fault)))]
+    if foot.foot_state != FootState.RUNNING:
+        return [Finding(Severity.FAULT, subject, *foot_text(Fault(foot.fault)))]
+    more = 0 if before is None else (foot.errors - before.errors) & 0xFFFF
+    if foot.fault != Fault.BAD_VALUE or not more:
+        return []
+    return [
+        Finding(
+            Severity.WARNING,
+            subject,
+            f"sent wrong bits {more} time{'s' if more > 1 else ''} in the last second",
+            WRONG_BITS_REMEDY,
+        )
+    ]
 
 
 def foot_celsius(counts: int) -> float:

@@ -99,6 +99,7 @@ class BoardReports:
     gyros: dict[int, GyroHealth] = field(default_factory=dict)
     parts: Parts | None = None
     foot: FootHealth | None = None  # of a foot board
+    previous_foot: FootHealth | None = None
     electrical: Electrical | None = None
 
     def add(self, message: Message) -> None:
@@ -113,7 +114,7 @@ class BoardReports:
         elif isinstance(message, Parts):
             self.parts = message
         elif isinstance(message, FootHealth):
-            self.foot = message
+            self.previous_foot, self.foot = self.foot, message
         elif isinstance(message, Electrical):
             self.electrical = message
         elif isinstance(message, GyroHealth):

@@ -10,7 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from echostep.board.faults.device_faults import device_findings, foot_findings, gyro_celsius, gyro_findings
+from echostep.board.faults.device_faults import (
+    WRONG_BITS_REMEDY,
+    device_findings,
+    foot_findings,
+    gyro_celsius,
+    gyro_findings,
+)
 from echostep.board.faults.findings import (
     DEVICES,
     GYROS,
@@ -129,8 +135,8 @@ def _intermittent_findings(reports: BoardReports) -> list[Finding]:
             what = f"failed {count} times {span} ({fault.name.lower().replace('_', ' ')}), and answers again"
             remedy = "a loose plug is likely: move the cable and watch"
             if fault is Fault.BAD_VALUE and device & GYROS:
-                what = f"sent wrong bits {count} times {span}"
-                remedy = "shorten its SPI cable, and put 100 ohm in series into SCK and MOSI at the board"
+                what = f"sent wrong bits {count} time{'s' if count > 1 else ''} {span}"
+                remedy = WRONG_BITS_REMEDY
             findings.append(Finding(Severity.WARNING, name_of(reports, device), what, remedy))
     return findings
 
