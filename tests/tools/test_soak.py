@@ -34,6 +34,9 @@ class LateBoard(PythonBoard):
         self.trace: list[tuple[int, str]] = []
         self.pid = os.getpid()
 
+    def fault(self, text: str) -> None:
+        """No stray edge: it has no inputs."""
+
     def advance(self, rows: np.ndarray) -> Sent:
         return [(t_ns - self._late_ms * 1_000_000, sent) for t_ns, sent in super().advance(rows)]
 

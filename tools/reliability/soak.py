@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A working day through the real firmware and the host's live pipeline: memory, losses, the wrap of the board's clock, and the replay.
 
-In: the ELF and the twin; simulated hours. Out: figures with their limits, PASS or FAIL; exit status 1 when one is missed. Owns the limits.
+A stray edge a minute is on the input of SyncOut. In: the ELF and the twin; simulated hours. Out: figures with their limits, PASS or FAIL; exit
+status 1 when one is missed. Owns the limits.
 
 The stages are those of `echostep live` from the ports on: check-ins, recording, subscription, tracker, page with a client, derived messages. In
 the place of the ports are the twin's and the MTx's bytes in simulated time, as fast as they are used, and `PORTION` chunks are tracked
@@ -92,7 +93,10 @@ class Measured:
 
 
 class TourPorts:
-    """The ports as `live` uses them: the tour's chunks up to a time, and a way to the board; memory is measured once a minute of the tour."""
+    """The ports as `live` uses them: the tour's chunks up to a time, and a way to the board.
+
+    Once a minute of the tour memory is measured, and a stray edge disturbs the board's SyncOut input.
+    """
 
     names = (BOARD,)  # the MTx is set up already
 
@@ -113,6 +117,7 @@ class TourPorts:
             if self._tour.t_s >= due_s:
                 due_s += min(SAMPLE_S, self._seconds / 20.0)
                 self._look()
+                self._tour.board.fault("glitch=left")  # an edge on D4 that is none of SyncOut's
             if self._tour.t_s >= self._seconds:
                 return
             yield chunk

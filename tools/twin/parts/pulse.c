@@ -118,14 +118,26 @@ void pulse_resume(void)
 	pulse_power();
 }
 
-/* A disturbance of an echo line that is low: high for 3 ms. */
+static avr_cycle_count_t glitch_ends(avr_t *a, avr_cycle_count_t when, void *param)
+{
+	struct ranger *r = param;
+
+	(void)a;
+	(void)when;
+	if (!r->line)
+		drive_pin(r->echo_port, (uint8_t)r->echo_pin, false);
+	set_line(r, r->line);
+	return 0;
+}
+
+/* A disturbance of an echo line that is low, or of SyncOut: high for 3 ms. */
 bool pulse_glitch(const char *value)
 {
 	for (int k = 0; k < 2; k++)
 		if (!strcmp(value, rangers[k].name)) {
 			if (!rangers[k].line) {
 				drive_pin(rangers[k].echo_port, (uint8_t)rangers[k].echo_pin, true);
-				avr_cycle_timer_register(avr, GLITCH, fall, &rangers[k]);
+				avr_cycle_timer_register(avr, GLITCH, glitch_ends, &rangers[k]);
 			}
 			return true;
 		}
