@@ -200,6 +200,7 @@ MISTAKES: dict[str, Mistake] = {
     "the disk is full": disk_full,
 }
 WITH_BROKER = ("the broker refuses the reports", "a certificate is for another name")
+WITH_PROCESS = (*WITH_BROKER, "the plan has a format that cannot be read")
 
 
 @pytest.mark.long
@@ -207,7 +208,7 @@ WITH_BROKER = ("the broker refuses the reports", "a certificate is for another n
     "ignore::pytest.PytestUnraisableExceptionWarning"
 )  # paho leaves a socket that failed to shake hands to the collector
 @pytest.mark.parametrize(
-    "mistake", [pytest.param(name, marks=pytest.mark.process if name in WITH_BROKER else ()) for name in MISTAKES]
+    "mistake", [pytest.param(name, marks=pytest.mark.process if name in WITH_PROCESS else ()) for name in MISTAKES]
 )
 def test_what_a_mistake_prints_stands_in_the_manual(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mistake: str

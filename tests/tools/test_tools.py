@@ -28,6 +28,7 @@ HERE = "tools/test_tools.py"
 STARTED_BY = {
     "docs.generate": HERE,
     "hardware.boxes": "tools/test_boxes.py",
+    "hardware.nets": HERE,
     "release.licences": "tools/test_licences.py",
     "release.same_bits": HERE,
     "release.tested_versions": HERE,
@@ -201,3 +202,8 @@ def test_a_small_team_loads_the_broker(start: Start, capsys: pytest.CaptureFixtu
 def test_a_missed_limit_is_the_exit_status(passed: bool | None, status: int) -> None:
     figures = [campaign.Figure("a", "1"), campaign.Figure("b", "2", "<= 1", passed), campaign.none("c", 0)]
     assert campaign.report("x", figures) == status
+
+
+def test_the_nets_of_the_boards_have_no_problem(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
+    assert start("hardware.nets") == 0
+    assert "each with one driver at a time" in capsys.readouterr().out

@@ -8,6 +8,7 @@ checked. Owns the processor's thresholds.
 
 from __future__ import annotations
 
+import argparse
 import math
 import sys
 from collections.abc import Iterator
@@ -17,10 +18,8 @@ from hardware.wiring import POWER, Device, WiredBoard, boards
 DRIVERS = ("out", "tri")
 PROCESSOR_V = 5.0  # level of its outputs
 PULL_UP_OHM = (20e3, 50e3)  # of the processor [ATmega32U4 data sheet, table 29-1]
-LOW_MAX_V, HIGH_MIN_V = (
-    0.9,
-    1.9,
-)  # what it reads for certain: 0.2 VCC - 0.1 V and 0.2 VCC + 0.9 V [the same, from memory]
+# What it reads for certain: 0.2 VCC - 0.1 V and 0.2 VCC + 0.9 V [the same, from memory]
+LOW_MAX_V, HIGH_MIN_V = 0.9, 1.9
 
 
 def problems(board: WiredBoard) -> list[str]:
@@ -112,6 +111,7 @@ def _level(device: Device, kind: str) -> float:
 
 
 def main() -> int:
+    argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0]).parse_args()
     found = [text for board in boards() for text in problems(board)]
     print(
         "\n".join(found)
