@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from echostep.page.elements.marks import ShownMark
 from echostep.plan.model import Plan
-from echostep.team.commander import notes
+from echostep.team.commander import heading_on, notes
 from echostep.team.cot import alarm_words
 from echostep.team.messages.marks import AlarmKey, Mark, MarkBoard
 from echostep.team.messages.report import Position
@@ -24,7 +24,6 @@ STATES = {
     MemberState.WAITING: "no position yet", MemberState.TRACKING: "", MemberState.ENDED: "run ended",
 }  # in words; a position that is tracked needs none  # fmt: skip
 COUNTED = {state: words or "tracked" for state, words in STATES.items()}  # in the summary
-COMPASS = ("E", "NE", "N", "NW", "W", "SW", "S", "SE")
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +151,7 @@ def shown_details(
         rows += [("floor", f"{p.floor_name} ({100.0 * p.floor_probability:.0f} %)"), ("place", p.where or "not named")]
         rows += [("position", f"x {p.x_m:.1f}, y {p.y_m:.1f} m"), ("95 % within", metres(p.radius95_m))]
         rows += [("safe radius", metres(p.protection_m) if p.protection_m is not None else "none")]
-        rows += [("heading", heading_words(p))]
+        rows += [("heading", heading_on(plan, m))]
     if r.motion:
         rows += [("walked", f"{r.motion.walked_m:.0f} m"), ("last step", f"{r.motion.still_s:.0f} s before the report")]
     if r.trunk_tilt_deg is not None:
@@ -169,11 +168,3 @@ def tilt_words(tilt_deg: float) -> str:
     tilt_rad = math.radians(tilt_deg)
     posture = "upright" if tilt_rad < UPRIGHT_RAD else "lying" if tilt_rad > LYING_RAD else "bent"
     return f"{posture} ({tilt_deg:.0f}°)"
-
-
-def heading_words(p: Position) -> str:
-    """The heading: NE 45°."""
-    if p.heading_rad is None:
-        return "not known"
-    degrees = math.degrees(p.heading_rad) % 360.0
-    return f"{COMPASS[round(degrees / 45.0) % 8]} {degrees:.0f}°"

@@ -24,7 +24,8 @@ from rich.text import Text
 from echostep.arrays import Octets
 from echostep.board.faults.health import Finding, Severity
 from echostep.localization.estimate import Estimate, claims_place
-from echostep.plan.model import Level
+from echostep.plan.model import Level, Plan
+from echostep.plan.places.bearing import heading_words
 from echostep.tracker import Tracker
 
 REFRESH_S = 0.1
@@ -148,7 +149,7 @@ class TerminalView:
             self._progress.update(self._bar, completed=self._fraction())
         parts = [
             self._canvas.render(self._last if self._last and claims_place(self._last.status) else None),
-            Text(describe(self._last) + self._level_text()),
+            Text(describe(self._last, self._tracker.plan) + self._level_text()),
             Text(health(self._tracker), style="grey62"),
             *(Text(str(finding), style="bold red") for finding in findings(self._tracker)),
         ]
@@ -157,8 +158,8 @@ class TerminalView:
         self._live.update(Panel(Group(*parts, self._progress), title=self._title, expand=False), refresh=True)
 
 
-def describe(e: Estimate | None) -> str:
-    """The estimate as a line of text."""
+def describe(e: Estimate | None, plan: Plan) -> str:
+    """An estimate on a plan as a line of text."""
     if e is None:
         return "waiting for the foot to stand still"
     if not claims_place(e.status):
@@ -166,7 +167,7 @@ def describe(e: Estimate | None) -> str:
         return f"{e.status.value}: place not known{places}   step {e.step}   t {e.t_s:.1f} s"
     return (
         f"{e.status.value}, {e.ellipse95.major_m:.2f} m   x {e.x_m:.2f} m  y {e.y_m:.2f} m  "
-        f"heading {math.degrees(e.heading_rad) % 360:.0f}°   step {e.step}   t {e.t_s:.1f} s"
+        f"heading {heading_words(plan, e.heading_rad, e.heading_sd_rad)}   step {e.step}   t {e.t_s:.1f} s"
     )
 
 

@@ -26,13 +26,14 @@ from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
 from echostep.page.elements.marks import BeaconMark, ShownMark
 from echostep.page.elements.meetings import ShownMeeting
-from echostep.page.elements.scene import KNOWN_HEADING_RAD, PageScene, ParticleSample
+from echostep.page.elements.scene import PageScene, ParticleSample
 from echostep.page.elements.stream_rates import StreamRates
 from echostep.page.elements.taps import Considered
 from echostep.page.elements.true_position import TruePosition
 from echostep.page.elements.undo_offer import UndoOffer
 from echostep.page.replay_cursor import PlayState
 from echostep.plan.model import Plan
+from echostep.plan.places.bearing import KNOWN_HEADING_RAD
 from echostep.plan.routing import RoutePlace
 
 FRAME_S = 1.0 / 30.0  # shortest time between two frames
@@ -110,7 +111,8 @@ class ShownHypothesis:
 class ShownEstimate:
     """The estimate as the page reads it: position, `where` in words, 95 % ellipse, heading, status, share of the particles on each level.
 
-    `protection_m`: the error is beyond it at a risk of 1 in 1,000; None where no radius is that safe. `hypotheses`: while several places fit.
+    `heading`: in words. `protection_m`: the error is beyond it at a risk of 1 in 1,000; None where no radius is that safe. `hypotheses`: while
+    several places fit.
     `placed`: it claims a place; otherwise no position is written or drawn.
     """
 
@@ -122,8 +124,8 @@ class ShownEstimate:
     major_m: float
     minor_m: float
     angle_rad: float
+    heading: str
     heading_rad: float
-    heading_sd_rad: float
     heading_known: bool
     step: int
     status: str
@@ -229,13 +231,14 @@ def walls(plan: Plan, level: int) -> bytes:
 class FrameParts:
     """What a frame has beside its scene, for one page.
 
-    `where`: of the estimate, which claims a place if `placed`. `places`: of its hypotheses, in words. `trail`: float32 rows x, y, level, the first
-    numbered `trail_from`.
+    `where`, `heading`: of the estimate in words; it claims a place if `placed`. `places`: of its hypotheses, in words. `trail`: float32 rows x, y,
+    level, the first numbered `trail_from`.
     `particles`, `drawing`: None when the page has them already. `play`: state of a replay. `ended`: how well the run went, when this is its end.
     """
 
     seq: int
     where: str = ""
+    heading: str = ""
     placed: bool = True
     places: tuple[str, ...] = ()
     trail: bytes = b""
@@ -297,8 +300,8 @@ def _estimate(scene: PageScene, parts: FrameParts) -> ShownEstimate | None:
         where=parts.where,
         placed=parts.placed,
         **e.ellipse95._asdict(),
+        heading=parts.heading,
         heading_rad=e.heading_rad,
-        heading_sd_rad=min(e.heading_sd_rad, np.pi),
         heading_known=e.heading_sd_rad <= KNOWN_HEADING_RAD,
         step=e.step,
         status=e.status.value,

@@ -26,6 +26,7 @@ from echostep.page.mailbox import Mailbox
 from echostep.page.protocol import FRAME_S
 from echostep.page.replay_cursor import ReplayCursor
 from echostep.page.shared import Shared
+from echostep.plan.places.bearing import heading_words
 from echostep.ports.people.check_in import Call, CheckIn, Undo
 
 
@@ -161,6 +162,7 @@ class PageSession(GuardedSocket):
         parts = protocol.FrameParts(
             seq=self._seq,
             where=self._shared.taps.where(scene.estimate) if scene.estimate else "",
+            heading=self._heading(scene.estimate) if scene.estimate else "",
             placed=self._is_placed(scene),
             places=self._shared.taps.places(scene.estimate) if scene.estimate else (),
             trail=self._mailbox.trail.part(begin, scene.trail_count),
@@ -177,6 +179,10 @@ class PageSession(GuardedSocket):
         self._marks, self._team, self._drawing = self._mailbox.marks, self._mailbox.team, drawing
         self._last, self._trail_count, self._particles = scene, scene.trail_count, scene.particles
         return protocol.frame(scene, parts)
+
+    def _heading(self, estimate: Estimate) -> str:
+        """The heading in words."""
+        return f"heading {heading_words(self._mailbox.plan, estimate.heading_rad, estimate.heading_sd_rad)}"
 
     def _is_placed(self, scene: PageScene) -> bool:
         """Whether the estimate is shown as a place; without a plan it is the end of the drawn path in any case."""

@@ -17,7 +17,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from echostep.plan.model import Plan
+from echostep.plan.model import NO_PLAN, Plan
+from echostep.plan.places.bearing import heading_words
 from echostep.team.cot import alarm_words
 from echostep.team.inbox import Inbox, ReceivedMessage
 from echostep.team.messages.report import WITHOUT_PLAN
@@ -119,11 +120,18 @@ def _cells(
         "floor": p.floor_name if p else "",
         "where": "" if p is None else p.where if r.position else f"last: {p.where}" if p.where else "last",
         "to start": "" if from_start is None else f"{from_start:.0f} m",
-        "looks": "" if p is None or p.heading_rad is None else f"{math.degrees(p.heading_rad) % 360:.0f}°",
+        "looks": "" if p is None or p.heading_rad is None else heading_on(plan, m),
         "nearest m": f"{near[0]:.1f} {near[1].report.name}" if near else "",
         "walked m": f"{r.motion.walked_m:.0f}" if r.motion else "",
         "note": "; ".join(notes(m, plan, now_s, duplicates)),
     }
+
+
+def heading_on(plan: Plan, m: Member) -> str:
+    """The last heading of a member in words; one that was tracked on another plan has its own north."""
+    p = m.report.last_known
+    known = plan if m.report.plan_sha256 == plan.digest else NO_PLAN
+    return heading_words(known, p.heading_rad if p else None)
 
 
 def _state(m: Member, now_s: float) -> str:

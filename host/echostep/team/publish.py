@@ -22,6 +22,7 @@ from echostep.errors import EchostepError
 from echostep.localization.estimate import CHI2_95, Estimate, TrackStatus, claims_place
 from echostep.path import Odometer
 from echostep.plan.model import Level, Plan
+from echostep.plan.places.bearing import KNOWN_HEADING_RAD
 from echostep.plan.places.whereabouts import Whereabouts
 from echostep.team.cot import StreamTransport, UdpTransport
 from echostep.team.endpoint import Endpoint, Outlet
@@ -43,7 +44,6 @@ Source = Literal["live", "replay", "simulated"]
 AVERAGING_S = 3.0  # of speed and rates
 MIN_SPEED_SPAN_S = 0.5  # a speed over less time is reported as 0
 MAX_PROTECTION_M = 100.0  # a larger protection radius is not reported: it says no more than none
-MAX_HEADING_SD_RAD = 1.0  # a heading with a larger standard deviation is not reported
 POWER_SUPPLIES = Path("/sys/class/power_supply")
 
 
@@ -249,7 +249,7 @@ def position_of(levels: Sequence[Level], e: Estimate) -> Position:
     """The position of an estimate as it is reported."""
     return Position(
         t_s=e.t_s, age_s=0.0, x_m=e.x_m, y_m=e.y_m, xx_m2=e.xx_m2, xy_m2=e.xy_m2, yy_m2=e.yy_m2,
-        radius95_m=e.ellipse95.major_m, heading_rad=e.heading_rad if e.heading_sd_rad <= MAX_HEADING_SD_RAD else None,
+        radius95_m=e.ellipse95.major_m, heading_rad=e.heading_rad if e.heading_sd_rad <= KNOWN_HEADING_RAD else None,
         heading_sd_rad=min(e.heading_sd_rad, 100.0), floor=e.level, floor_name=printable(levels[e.level].name, 64),
         floor_probability=min(max(e.levels[e.level], 0.0), 1.0), z_m=e.z_m, z_sd_m=e.z_sd_m,
         protection_m=e.protection_m if e.protection_m <= MAX_PROTECTION_M and e.status is not TrackStatus.LOST else None,

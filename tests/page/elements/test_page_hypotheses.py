@@ -39,7 +39,7 @@ def test_places_that_fit_are_drawn_and_told(browser: Any, tmp_path: Path) -> Non
         page.screenshot(path=tmp_path / "places.png")
         mailbox.publish(replace(scene(2.0), estimate=replace(told(t_s=2.0), protection_m=0.4)))
         wait_for(page, "document.querySelector('#places').hidden")
-        assert "within 0.40 m" in page.text_content("#place")
+        assert "within 0.40 m · heading E 090° ±1°" in page.text_content("#place")
         assert not page.wrong
         page.context.close()
 

@@ -23,7 +23,6 @@ from echostep.page.elements.true_position import TruePosition
 from echostep.page.elements.undo_offer import UndoOffer
 from echostep.tracker.state import ParticleSnapshot
 
-KNOWN_HEADING_RAD = 1.0  # above this standard deviation the page draws a circle instead of an arrow
 MOST_SHOWN = 10_000  # particles in a frame
 
 

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from echostep.localization.estimate import Estimate, TrackStatus, claims_place
-from echostep.page.elements.scene import KNOWN_HEADING_RAD, PageScene, format_metres
+from echostep.page.elements.scene import PageScene, format_metres
 from echostep.plan.model import Plan
+from echostep.plan.places.bearing import KNOWN_HEADING_RAD
 from echostep.plan.places.spaces import PlanSpaces
 from echostep.plan.places.standing import StandingGround
 from echostep.plan.places.whereabouts import Whereabouts

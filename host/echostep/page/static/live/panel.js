@@ -5,7 +5,6 @@ import { drawnText } from './drawing.js';
 import { marksText } from '../marks.js';
 
 const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕', ended: '■' };
-const COMPASS = ['E', 'NE', 'N', 'NW', 'W', 'SW', 'S', 'SE'];
 const SPOKEN_MS = 8000;  // shortest time between two positions for a screen reader
 const FASTEST_RAD_S = Math.PI;  // of the guidance arrow's turn
 const MOST_BUTTONS = 3;  // floors as buttons on a phone; more of them are a list
@@ -171,11 +170,9 @@ function placesText(estimate, levels) {
 
 function positionText(estimate, levels) {
   if (!estimate.placed) return 'no position';
-  const degrees = ((estimate.heading_rad * 180) / Math.PI + 360) % 360, spread = Math.round((estimate.heading_sd_rad * 180) / Math.PI);
-  const heading = estimate.heading_known ? `${COMPASS[Math.round(degrees / 45) % 8]} ${Math.round(degrees) % 360}° ±${spread}°` : 'heading unknown';
   const floor = levels.length > 1 ? levels[estimate.level].name : '';
   const safe = estimate.protection_m === null ? '' : `within ${length(estimate.protection_m)}`;
-  return [[estimate.where, floor].filter(Boolean).join(', '), `x ${estimate.x_m.toFixed(1)}, y ${estimate.y_m.toFixed(1)} m`, safe, heading].filter(Boolean).join(' · ');
+  return [[estimate.where, floor].filter(Boolean).join(', '), `x ${estimate.x_m.toFixed(1)}, y ${estimate.y_m.toFixed(1)} m`, safe, estimate.heading].filter(Boolean).join(' · ');
 }
 
 function echoText(lines) {

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: MIT
+"""Bearing: a heading in words, as people read a compass: "E 090°".
+
+In: a plan, a heading on it. Out: words. Owns the limit of a known heading. Page, terminal and the commander's lists take their words from here;
+files and reports for machines keep radians and degrees counter-clockwise from x.
+"""
+
+from __future__ import annotations
+
+import math
+
+from echostep.plan.model import Plan
+
+KNOWN_HEADING_RAD = 1.0  # standard deviation above which a heading is not known, assumed
+LETTERS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
+NOT_KNOWN = "not known"
+
+
+def heading_words(plan: Plan, heading_rad: float | None, sd_rad: float | None = None) -> str:
+    """A heading (rad, counter-clockwise from the map's x axis) as degrees clockwise from north, with its standard deviation where that is given.
+
+    North is true north on a plan with a georeference, else "plan north", the map's y axis. Without a plan y is where the walk began to go: no letter.
+    """
+    if heading_rad is None or (sd_rad is not None and sd_rad > KNOWN_HEADING_RAD):
+        return NOT_KNOWN
+    turned_rad = plan.georeference.rotation_rad if plan.georeference else 0.0
+    bearing_deg = round(90.0 - math.degrees(heading_rad + turned_rad)) % 360
+    letter = f"{LETTERS[round(bearing_deg / 45.0) % 8]} " if plan.is_drawn else ""
+    spread = "" if sd_rad is None else f" ±{math.degrees(sd_rad):.0f}°"
+    north = ", plan north" if plan.is_drawn and plan.georeference is None else ""
+    return f"{letter}{bearing_deg:03d}°{spread}{north}"
