@@ -88,7 +88,7 @@ def test_the_terminal_and_the_page_name_no_place(plan: Plan) -> None:
     assert describe(lost(10.0), plan).startswith("lost: place not known, 2 places fit")
     taps = Taps(plan)
     assert (taps.where(lost(10.0)), taps.where(told(*OFFICE))) == ("", "in Office 1")
-    assert taps.places(lost(10.0)) == ("in Office 1", "in North corridor")
+    assert taps.places(lost(10.0)) == "places that fit: 1 in Office 1 50 % · 2 in North corridor 50 %"
 
 
 def test_the_last_line_of_a_run_says_so(plan: Plan, tmp_path: Path) -> None:

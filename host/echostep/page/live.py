@@ -26,7 +26,7 @@ from echostep.page.elements.guidance import ShownGuidance, guidance_of_cue
 from echostep.page.elements.lookahead import extrapolate
 from echostep.page.elements.marks import ShownMark, beacon_marks
 from echostep.page.elements.meetings import shown_meeting
-from echostep.page.elements.scene import MOST_SHOWN, PageScene, sample_of, status_text
+from echostep.page.elements.scene import MOST_SHOWN, PageScene, is_placed, sample_of, status_text
 from echostep.page.elements.stream_rates import StreamRateMeter
 from echostep.page.elements.true_position import TruePath
 from echostep.page.elements.undo_offer import UndoClock, echoes_fit
@@ -93,6 +93,7 @@ class LivePage:
         self._lookahead_s = -math.inf
         self._new: list[PageScene] = []  # to publish
         self._trail_end: Estimate | None = None
+        self._trail_breaks = False  # before its next point
         self._check_ins = (0, 0)  # check-ins and undoings
         self._undo_clock = UndoClock()
         self._drawing: DrawingProcess | None = None  # of a walk without a plan
@@ -272,16 +273,19 @@ class LivePage:
         self._new.append(self._scene)
 
     def _extend_trail(self, estimate: Estimate) -> None:
-        """Append the estimate to the trail when it has moved; a check-in or its undoing breaks the line."""
+        """Append the estimate to the trail when it has moved; a check-in, its undoing, or a time without a place breaks the line."""
         end, trail = self._trail_end, self._mailbox.trail
+        if not is_placed(estimate, self._tracker.plan):
+            self._trail_breaks = end is not None
+            return
         moved_m = max(abs(estimate.x_m - end.x_m), abs(estimate.y_m - end.y_m)) if end is not None else math.inf
         if end is not None and estimate.level == end.level and moved_m <= TRAIL_STEP_M:
             return
         state = self._tracker.state
         check_ins = state.check_ins, state.undone
-        if check_ins != self._check_ins:
+        if check_ins != self._check_ins or self._trail_breaks:
             trail.add(math.nan, math.nan, estimate.level)
-        self._trail_end, self._check_ins = estimate, check_ins
+        self._trail_end, self._check_ins, self._trail_breaks = estimate, check_ins, False
         trail.add(estimate.x_m, estimate.y_m, estimate.level)
 
     def _echo_lines(self, measured: MeasuredSegment | None, estimate: Estimate) -> tuple[EchoLine, ...]:

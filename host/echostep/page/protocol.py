@@ -98,13 +98,13 @@ class Failed:
 
 @dataclass(frozen=True, slots=True)
 class ShownHypothesis:
-    """A place that fits, `where` it is in words, and its probability."""
+    """A place that fits, its number in the sentence that names it, and its probability."""
 
+    number: int
     probability: float
     x_m: float
     y_m: float
     level: int
-    where: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ class ShownEstimate:
     """The estimate as the page reads it: position, `where` in words, 95 % ellipse, heading, status, share of the particles on each level.
 
     `heading`: in words. `protection_m`: the error is beyond it at a risk of 1 in 1,000; None where no radius is that safe. `hypotheses`: while
-    several places fit.
+    several places fit; `places` names them in a sentence.
     `placed`: it claims a place; otherwise no position is written or drawn.
     """
 
@@ -134,6 +134,7 @@ class ShownEstimate:
     z_sd_m: float
     protection_m: float | None
     hypotheses: tuple[ShownHypothesis, ...]
+    places: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,8 +232,8 @@ def walls(plan: Plan, level: int) -> bytes:
 class FrameParts:
     """What a frame has beside its scene, for one page.
 
-    `where`, `heading`: of the estimate in words; it claims a place if `placed`. `places`: of its hypotheses, in words. `trail`: float32 rows x, y,
-    level, the first numbered `trail_from`.
+    `where`, `heading`: of the estimate in words; it claims a place if `placed`. `places`: its hypotheses in a sentence. `trail`: float32 rows x,
+    y, level, the first numbered `trail_from`.
     `particles`, `drawing`: None when the page has them already. `play`: state of a replay. `ended`: how well the run went, when this is its end.
     """
 
@@ -240,7 +241,7 @@ class FrameParts:
     where: str = ""
     heading: str = ""
     placed: bool = True
-    places: tuple[str, ...] = ()
+    places: str = ""
     trail: bytes = b""
     trail_from: int = 0
     particles: ParticleSample | None = None
@@ -310,9 +311,9 @@ def _estimate(scene: PageScene, parts: FrameParts) -> ShownEstimate | None:
         z_sd_m=e.z_sd_m,
         protection_m=e.protection_m if np.isfinite(e.protection_m) else None,
         hypotheses=tuple(
-            ShownHypothesis(h.probability, h.x_m, h.y_m, h.level, place)
-            for h, place in zip(e.hypotheses, parts.places, strict=False)
+            ShownHypothesis(k + 1, h.probability, h.x_m, h.y_m, h.level) for k, h in enumerate(e.hypotheses)
         ),
+        places=parts.places,
     )
 
 

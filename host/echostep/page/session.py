@@ -15,12 +15,12 @@ from collections import deque
 from starlette.websockets import WebSocket
 
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate, claims_place
+from echostep.localization.estimate import Estimate
 from echostep.page import protocol, requests
 from echostep.page.elements.drawn_walls import NO_DRAWING, ShownDrawing
 from echostep.page.elements.guidance import Destination, ShownGuidance
 from echostep.page.elements.marks import ShownMark
-from echostep.page.elements.scene import PageScene, ParticleSample
+from echostep.page.elements.scene import PageScene, ParticleSample, is_placed
 from echostep.page.guarded_socket import MOST_UNDRAWN, GuardedSocket
 from echostep.page.mailbox import Mailbox
 from echostep.page.protocol import FRAME_S
@@ -163,8 +163,8 @@ class PageSession(GuardedSocket):
             seq=self._seq,
             where=self._shared.taps.where(scene.estimate) if scene.estimate else "",
             heading=self._heading(scene.estimate) if scene.estimate else "",
-            placed=self._is_placed(scene),
-            places=self._shared.taps.places(scene.estimate) if scene.estimate else (),
+            placed=scene.estimate is not None and is_placed(scene.estimate, self._mailbox.plan),
+            places=self._shared.taps.places(scene.estimate) if scene.estimate else "",
             trail=self._mailbox.trail.part(begin, scene.trail_count),
             trail_from=begin,
             particles=scene.particles if scene.particles is not self._particles else None,
@@ -183,10 +183,6 @@ class PageSession(GuardedSocket):
     def _heading(self, estimate: Estimate) -> str:
         """The heading in words."""
         return f"heading {heading_words(self._mailbox.plan, estimate.heading_rad, estimate.heading_sd_rad)}"
-
-    def _is_placed(self, scene: PageScene) -> bool:
-        """Whether the estimate is shown as a place; without a plan it is the end of the drawn path in any case."""
-        return scene.estimate is not None and (claims_place(scene.estimate.status) or not self._mailbox.plan.is_drawn)
 
     def _guidance(self, scene: PageScene) -> ShownGuidance | None:
         """Guidance to the destination chosen on a page, else the run's; starts a search for a route when one is due."""

@@ -8,16 +8,38 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from echostep.localization.estimate import TrackStatus
+import numpy as np
+import pytest
+
+from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.particles.places import LikelyPlace
 from echostep.localization.particles.start import Start
 from echostep.page.elements.scene import status_text
-from page.browser import Walk, looking, picture, wait_for
-from page.frames import scene, served, told
+from echostep.page.elements.taps import Taps
+from echostep.page.live import LivePage
+from echostep.tracker import Tracker
+from page.browser import READY, Walk, loaded_page, looking, picture, wait_for
+from page.frames import LOCAL, PLAN, scene, served, told
 
 PLACES = (LikelyPlace(0.62, 5.0, 7.5, 0, 0.4, 0.0), LikelyPlace(0.31, 5.0, 2.0, 0, 0.4, 0.0))
 SEARCHED_S = 6.0  # of the demo's walk: along one of two corridors that are alike
 DRAWN = "document.querySelector('#places').textContent"
+SIZES = ((1280, 800), (360, 740))
+STILL = "!document.getAnimations().length"
+INK = """(places) => {
+    const canvas = document.querySelector('#canvas'), style = getComputedStyle(document.documentElement);
+    const { data, width } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    const rings = places.map(([x, y]) => echostep.view.toScreen(x, y).map((v) => v * devicePixelRatio));
+    const [here, left] = ['--here', '--left'].map((name) => [1, 3, 5].map((k) => parseInt(style.getPropertyValue(name).trim().slice(k, k + 2), 16)));
+    const is = (k, ink) => data[k + 3] > 250 && ink.every((v, c) => Math.abs(data[k + c] - v) < 6);
+    let away = 0, echo = 0;
+    for (let k = 0; k < data.length; k += 4) {
+        const x = (k / 4) % width, y = Math.floor(k / 4 / width);
+        if (is(k, here) && rings.every(([u, v]) => Math.hypot(x - u, y - v) > 20 * devicePixelRatio)) away++;
+        if (is(k, left)) echo++;
+    }
+    return [away, echo];
+}"""  # pixels of two colours on the map
 
 
 def test_words_for_places_for_a_plan_that_does_not_fit_and_for_neither() -> None:
@@ -34,7 +56,7 @@ def test_places_that_fit_are_drawn_and_told(browser: Any, tmp_path: Path) -> Non
         mailbox.publish(replace(scene(), estimate=estimate, status_text=status_text(estimate)))
         page = looking(browser, server.url, "bright")
         wait_for(page, f"{DRAWN}.includes('31 %')")
-        assert page.evaluate(DRAWN) == "places that fit: 62 % in North corridor · 31 % in South corridor"
+        assert page.evaluate(DRAWN) == "places that fit: 1 in North corridor 62 % · 2 in South corridor 31 %"
         assert "within" not in page.text_content("#place")
         page.screenshot(path=tmp_path / "places.png")
         mailbox.publish(replace(scene(2.0), estimate=replace(told(t_s=2.0), protection_m=0.4)))
@@ -42,6 +64,50 @@ def test_places_that_fit_are_drawn_and_told(browser: Any, tmp_path: Path) -> Non
         assert "within 0.40 m · heading E 090° ±1°" in page.text_content("#place")
         assert not page.wrong
         page.context.close()
+
+
+def test_the_sentence_names_each_place_once_with_the_numbers_of_its_rings() -> None:
+    third = LikelyPlace(0.05, 9.0, 7.5, 0, 0.4, 0.0)
+    taps = Taps(PLAN)
+    assert taps.places(replace(told(), hypotheses=(*PLACES, third))) == (
+        "places that fit: 1, 3 in North corridor 67 % · 2 in South corridor 31 %"
+    )
+    assert taps.places(told()) == ""
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_without_a_place_nothing_on_the_map_looks_like_one(browser: Any, size: tuple[int, int], tmp_path: Path) -> None:
+    """Marks of the wearer's colour are those of the places that fit, and no echo is drawn; a tracked wearer has all of them at the position."""
+    lost, echoes = replace(told(13.0, 5.0, status=TrackStatus.LOST, sd_m=4.0), hypotheses=PLACES), scene().echo_lines
+    with served() as (server, mailbox):
+        mailbox.publish(replace(scene(), estimate=lost))
+        page = loaded_page(browser, server.url, {"viewport": {"width": size[0], "height": size[1]}}, READY)
+
+        def marks(estimate: Estimate, t_s: float) -> tuple[int, int]:
+            """Pixels of the wearer's colour away from the places that fit, and of the left echo's."""
+            mailbox.publish(replace(scene(t_s), estimate=replace(estimate, t_s=t_s), echo_lines=echoes))
+            wait_for(page, f"echostep.last.t_s === {t_s} && {STILL}")
+            page.screenshot(path=tmp_path / f"{size[0]}-{estimate.status}-{len(estimate.hypotheses)}.png")
+            away, echo = page.evaluate(INK, [[p.x_m, p.y_m] for p in estimate.hypotheses])
+            return int(away), int(echo)
+
+        assert marks(lost, 2.0) == (0, 0)
+        assert page.evaluate("echostep.scene.frame.told.hypotheses.map((place) => place.number)") == [1, 2]
+        assert "plan" not in page.text_content("#echoes")
+        assert marks(replace(lost, hypotheses=()), 3.0) == (0, 0)
+        away, echo = marks(told(13.0, 5.0), 4.0)
+        assert min(away, echo) > 20
+        assert not page.wrong
+        page.context.close()
+
+
+def test_the_track_has_a_gap_where_no_place_was_claimed() -> None:
+    known, lost = TrackStatus.TRACKING, TrackStatus.LOST
+    with LivePage(Tracker(PLAN), "test", LOCAL) as page:
+        for k, status in enumerate((lost, known, known, lost, lost, known)):
+            page._watch(None, told(2.0 + k, 7.5, float(k), status))
+        rows = np.frombuffer(page._mailbox.trail.part(0, 9), "<f4").reshape(-1, 3)
+    assert np.array_equal(rows[:, 0], [3.0, 4.0, math.nan, 7.0], equal_nan=True)
 
 
 def test_from_nowhere_two_corridors_fit_until_the_wearer_turns(browser: Any, tmp_path: Path) -> None:

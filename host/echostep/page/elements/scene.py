@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Octets
-from echostep.localization.estimate import OUTSIDE, UNFIT, Estimate, TrackStatus
+from echostep.localization.estimate import OUTSIDE, UNFIT, Estimate, TrackStatus, claims_place
 from echostep.page.elements.alarm import ShownAlarm
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
@@ -21,6 +21,7 @@ from echostep.page.elements.meetings import ShownMeeting
 from echostep.page.elements.stream_rates import StreamRates
 from echostep.page.elements.true_position import TruePosition
 from echostep.page.elements.undo_offer import UndoOffer
+from echostep.plan.model import Plan
 from echostep.tracker.state import ParticleSnapshot
 
 MOST_SHOWN = 10_000  # particles in a frame
@@ -67,6 +68,11 @@ class PageScene:
     truth: TruePosition | None = None
     alarm: ShownAlarm | None = None
     met: ShownMeeting | None = None
+
+
+def is_placed(estimate: Estimate, plan: Plan) -> bool:
+    """Whether an estimate is shown as a place; without a plan it is the end of the drawn path in any case."""
+    return claims_place(estimate.status) or not plan.is_drawn
 
 
 def sample_of(particles: ParticleSnapshot) -> ParticleSample:

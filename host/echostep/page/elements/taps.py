@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from echostep.localization.estimate import Estimate, TrackStatus, claims_place
+from echostep.page.elements.likely_places import places_text
 from echostep.page.elements.scene import PageScene, format_metres
 from echostep.plan.model import Plan
 from echostep.plan.places.bearing import KNOWN_HEADING_RAD
@@ -48,23 +49,23 @@ class Taps:
         self.whereabouts = Whereabouts(plan, spaces)
         self._ground = StandingGround(plan, spaces)
         self._plan = plan
-        self._last: tuple[Estimate | None, str, tuple[str, ...]] = (None, "", ())
+        self._last: tuple[Estimate | None, str, str] = (None, "", "")
 
     def where(self, estimate: Estimate) -> str:
         """The place of an estimate in words; cached, for all pages of a live run show the same one."""
         return self._words(estimate)[0]
 
-    def places(self, estimate: Estimate) -> tuple[str, ...]:
-        """The places of its hypotheses in words."""
+    def places(self, estimate: Estimate) -> str:
+        """The places of its hypotheses as a sentence."""
         return self._words(estimate)[1]
 
-    def _words(self, estimate: Estimate) -> tuple[str, tuple[str, ...]]:
+    def _words(self, estimate: Estimate) -> tuple[str, str]:
         """Both, kept for the next page that asks."""
         if self._last[0] is not estimate:
             words = self.whereabouts.words
             places = tuple(words(h.x_m, h.y_m, h.level) for h in estimate.hypotheses)
             where = words(estimate.x_m, estimate.y_m, estimate.level) if claims_place(estimate.status) else ""
-            self._last = estimate, where, places
+            self._last = estimate, where, places_text(estimate.hypotheses, places, self._plan)
         return self._last[1:]
 
     def refusal(self, check_in: CheckIn) -> str:

@@ -116,7 +116,7 @@ function draw() {
   requestAnimationFrame(draw);
   const { told: estimate } = scene.frame ?? {};
   if (dirty && estimate && follows && !mode && !taps.ghost) {
-    if (!view.shows(planView.box)) view.keep(estimate.x_m, estimate.y_m);
+    if (estimate.placed && !view.shows(planView.box)) view.keep(estimate.x_m, estimate.y_m);
     if (estimate.level !== scene.level && estimate.level !== wantedLevel) showLevel(estimate.level);
   }
   const moved = drawnStamp !== view.stamp;
@@ -127,7 +127,7 @@ function draw() {
     drawnStamp = view.stamp;
   }
   if (mode && !$('cross').hidden) aim(view.toMap(view.width / 2, view.height / 2), mode === 'here' ? turned : null);
-  planView.names(view, estimate?.level === scene.level ? view.toScreen(estimate.x_m, estimate.y_m) : null);
+  planView.names(view, estimate?.placed && estimate.level === scene.level ? view.toScreen(estimate.x_m, estimate.y_m) : null);
   painter.paint(view, scene);
   if (dirty && scene.frame && plan) {
     panel.frame(scene.frame);

@@ -34,17 +34,16 @@ export class Painter {
     this.trail(view, scene.trail, scene.level, scene.drawing?.trail_count ?? 0);
     paintMarks(pen, view, scene.marks, scene.level, this.colour);
     const { told: estimate } = scene.frame ?? {};
-    const { guidance, goal } = scene.frame ?? {}, path = guidance && estimate?.level === scene.level ? guidance.path : [];
+    const { guidance, goal } = scene.frame ?? {}, path = guidance && estimate?.placed && estimate.level === scene.level ? guidance.path : [];
     if (path.length > 1) this.line(path.map(([x, y]) => view.toScreen(x, y)), this.colour.goal, 3, [8, 7]);
     if (goal?.level === scene.level) this.flag(view, [goal.x_m, goal.y_m]);
     else if (path.length && !guidance.own) this.flag(view, path.at(-1));
     this.beacons(view, (scene.frame?.beacons ?? []).filter((beacon) => beacon.level === scene.level));
-    if (estimate && estimate.level === scene.level) {
-      // A lost wearer has no sign: only the ellipse about the last place, unless several places fit.
-      if (estimate.placed) for (const line of scene.frame.beams) this.echoLine(view, line);
-      if (estimate.placed) this.protection(view, estimate);
-      if (estimate.placed || !estimate.hypotheses.length) this.ellipse(view, estimate);
-      if (estimate.placed) this.wearer(view, estimate);
+    if (estimate?.placed && estimate.level === scene.level) {  // without a place nothing is drawn that looks like one
+      for (const line of scene.frame.beams) this.echoLine(view, line);
+      this.protection(view, estimate);
+      this.ellipse(view, estimate);
+      this.wearer(view, estimate);
     }
     for (const place of estimate?.hypotheses ?? []) if (place.level === scene.level) this.hypothesis(view, place);
     const truth = scene.frame?.truth;
@@ -215,8 +214,8 @@ export class Painter {
     pen.setLineDash([]);
   }
 
-  // A place that fits: a ring with its probability.
-  hypothesis(view, { x_m, y_m, probability }) {
+  // A place that fits: a ring with its number, and its probability.
+  hypothesis(view, { number, x_m, y_m, probability }) {
     const [sx, sy] = view.toScreen(x_m, y_m), { pen } = this, text = `${Math.round(100 * probability)} %`;
     pen.beginPath();
     pen.arc(sx, sy, 11, 0, 2 * Math.PI);
@@ -233,6 +232,9 @@ export class Painter {
     pen.fillStyle = this.colour.ink;
     pen.strokeText(text, sx + 15, sy + 5);
     pen.fillText(text, sx + 15, sy + 5);
+    pen.textAlign = 'center';
+    pen.strokeText(number, sx, sy + 5);
+    pen.fillText(number, sx, sy + 5);
   }
 
   // An arrow along the heading; a circle when the heading is not known.

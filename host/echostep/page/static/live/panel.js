@@ -46,9 +46,9 @@ export class Panel {
     const status = ended ? 'ended' : estimate?.status ?? 'waiting', words = ended ? `ended: ${ended}${play ? '. ▶ plays it again' : ''}` : said;
     this.status(status, words);
     put('place', estimate ? positionText(estimate, this.plan.levels) : '');
-    put('places', estimate ? placesText(estimate, this.plan.levels) : '');
-    $('places').hidden = !estimate?.hypotheses.length;
-    put('echoes', estimate ? echoText(beams) : '');
+    put('places', estimate?.places ?? '');
+    $('places').hidden = !estimate?.places;
+    put('echoes', estimate ? echoText(beams, estimate.placed) : '');
     put('health', streams ? rateText(streams) : 'no bytes yet');
     put('wrong', streams?.wrong ?? '');
     $('wrong').hidden = !streams?.wrong;
@@ -159,15 +159,6 @@ export class Panel {
   }
 }
 
-// The places that fit, the likeliest first.
-function placesText(estimate, levels) {
-  const texts = estimate.hypotheses.map(({ probability, where, level, x_m, y_m }) => {
-    const floor = levels.length > 1 ? levels[level].name : '', at = where || `x ${x_m.toFixed(0)}, y ${y_m.toFixed(0)} m`;
-    return `${Math.round(100 * probability)} % ${[at, floor].filter(Boolean).join(', ')}`;
-  });
-  return texts.length ? `places that fit: ${texts.join(' · ')}` : '';
-}
-
 function positionText(estimate, levels) {
   if (!estimate.placed) return 'no position';
   const floor = levels.length > 1 ? levels[estimate.level].name : '';
@@ -175,8 +166,9 @@ function positionText(estimate, levels) {
   return [[estimate.where, floor].filter(Boolean).join(', '), `x ${estimate.x_m.toFixed(1)}, y ${estimate.y_m.toFixed(1)} m`, safe, estimate.heading].filter(Boolean).join(' · ');
 }
 
-function echoText(lines) {
-  const ranges = ({ measured_m, expected_m }) => `${length(measured_m)}, plan ${length(expected_m)}`;
+// What the plan predicts is that of a place: without one only the measured range.
+function echoText(lines, placed) {
+  const ranges = ({ measured_m, expected_m }) => `${length(measured_m)}${placed ? `, plan ${length(expected_m)}` : ''}`;
   const texts = lines.map((line) => `${line.ranger ? 'right' : 'left'} ${ranges(line)}`);
   return texts.length ? texts.join(' · ') : 'no echoes';
 }

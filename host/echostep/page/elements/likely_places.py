@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: MIT
+"""The places that fit, as a sentence: "1, 3 in North corridor 62 % · 2 in South corridor 31 %"; the numbers are those of the rings on the map.
+
+In: hypotheses, their places in words, a plan. Out: words. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from echostep.localization.particles.places import LikelyPlace
+from echostep.plan.model import Plan
+
+
+def places_text(hypotheses: Sequence[LikelyPlace], words: Sequence[str], plan: Plan) -> str:
+    """Each place once with the numbers and the probability of its hypotheses, in the order of the numbers; empty without hypotheses."""
+    numbers: dict[str, list[str]] = {}
+    probability: dict[str, float] = {}
+    for k, (place, where) in enumerate(zip(hypotheses, words, strict=True)):
+        floor = f", {plan.levels[place.level].name}" if len(plan.levels) > 1 else ""
+        name = f"{where or f'x {place.x_m:.0f}, y {place.y_m:.0f} m'}{floor}"
+        numbers.setdefault(name, []).append(str(k + 1))
+        probability[name] = probability.get(name, 0.0) + place.probability
+    texts = [f"{', '.join(numbers[name])} {name} {100.0 * share:.0f} %" for name, share in probability.items()]
+    return f"places that fit: {' · '.join(texts)}" if texts else ""
