@@ -23,7 +23,7 @@ from echostep.page.drawing_process import DrawingProcess
 from echostep.page.elements.alarm import shown_alarm
 from echostep.page.elements.echo_lines import EchoLine, expected_range, last_echo_lines
 from echostep.page.elements.guidance import ShownGuidance, guidance_of_cue
-from echostep.page.elements.lookahead import extrapolate
+from echostep.page.elements.lookahead import extrapolate, moves_as_one
 from echostep.page.elements.marks import ShownMark, beacon_marks
 from echostep.page.elements.meetings import shown_meeting
 from echostep.page.elements.scene import MOST_SHOWN, PageScene, is_placed, sample_of, status_text
@@ -219,12 +219,13 @@ class LivePage:
         self._lookahead_s = later[-1].t1_s
         moved = extrapolate(estimate, state.last_segment, later)
         particles, guidance = self._scene.particles, self._scene.guidance
+        dx_m, dy_m = moved.x_m - estimate.x_m, moved.y_m - estimate.y_m
         self._lookahead = replace(
             self._scene,
             arrived_ns=self._bytes_arrived_ns,
             t_s=moved.t_s,
             estimate=moved,
-            particles=particles and particles.moved(moved.x_m - estimate.x_m, moved.y_m - estimate.y_m),
+            particles=particles and (particles.moved(dx_m, dy_m) if moves_as_one(estimate) else particles),
             status_text=status_text(moved, no_plan=not self._tracker.plan.is_drawn),
             guidance=guidance and guidance.turned(moved.heading_rad - estimate.heading_rad),
             truth=self.truth.at(moved.t_s) if self.truth else None,

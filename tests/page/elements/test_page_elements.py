@@ -12,21 +12,24 @@ import pytest
 import shapely
 
 from echostep.errors import EchostepError
-from echostep.localization.estimate import TrackStatus
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization.particles.places import LikelyPlace
+from echostep.localization.particles.start import Start
 from echostep.page import requests
 from echostep.page.elements.guidance import Destination, RouteFinder
-from echostep.page.elements.lookahead import extrapolate
+from echostep.page.elements.lookahead import extrapolate, moves_as_one
 from echostep.page.elements.scene import status_text
 from echostep.page.elements.taps import Taps
 from echostep.page.elements.undo_offer import UndoClock, UndoOffer
+from echostep.page.live import LivePage
 from echostep.page.mailbox import SceneHistory
 from echostep.page.replay_cursor import ReplayCursor
 from echostep.plan.model import Plan, Pose
 from echostep.plan.routing import RoutePlace
-from echostep.ports.chunks import Chunk
+from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import CheckIn
 from echostep.tracker import Tracker
-from page.frames import PLAN, scene, told
+from page.frames import LOCAL, PLAN, scene, told
 from plan.imported_plans import seven_floors
 
 
@@ -105,6 +108,38 @@ def test_a_step_leads_ahead_of_its_echoes(chunks: list[Chunk]) -> None:
     assert len(off_m) > 5
     assert max(off_m) < 0.3
     assert np.median(off_m) < 0.1
+
+
+@pytest.mark.parametrize("start", [Start(), Pose(2.0, 7.5, 0.0)], ids=["in search", "tracked"])
+def test_a_cloud_in_search_waits_for_its_estimate(chunks: list[Chunk], start: Start | Pose) -> None:
+    """The step of a mean moves no particle of a search through a wall; a tracked cloud is ahead with its wearer."""
+    tracker, moved = Tracker(PLAN, start, seed=1), []
+    with LivePage(tracker, "test", LOCAL) as page:
+        for begin in range(0, len(chunks), 5):
+            portion = portion_of(chunks[begin : begin + 5])
+            tracker.take(portion)
+            page.publish(portion)
+            ahead, last = page._lookahead, page._scene
+            if ahead and ahead.particles and last.particles and ahead.estimate and last.estimate:
+                stands = np.array_equal(ahead.particles.x_m, last.particles.x_m) and np.array_equal(
+                    ahead.particles.y_m, last.particles.y_m
+                )
+                assert (ahead.estimate.x_m, ahead.estimate.y_m) != (last.estimate.x_m, last.estimate.y_m)
+                moved.append(not stands)
+    assert len(moved) > 5
+    assert (not any(moved)) if isinstance(start, Start) else all(moved)
+
+
+@pytest.mark.parametrize(
+    ("last", "as_one"),
+    [
+        (told(), True), (told(status=TrackStatus.UNCERTAIN, sd_m=1.0), True), (told(status=TrackStatus.LOST), False),
+        (replace(told(status=TrackStatus.UNCERTAIN), hypotheses=(LikelyPlace(0.6, 5.0, 7.5, 0, 0.4, 0.0),)), False),
+        (replace(told(), heading_sd_rad=1.5), False),
+    ],
+)  # fmt: skip
+def test_particles_move_with_the_mean_at_one_place_with_one_heading(last: Estimate, as_one: bool) -> None:
+    assert moves_as_one(last) is as_one
 
 
 def crosses_a_wall(plan: Plan, level: int, line_m: Sequence[Sequence[float]]) -> bool:

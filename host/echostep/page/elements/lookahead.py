@@ -11,10 +11,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from echostep.angles import wrap
-from echostep.localization.estimate import Estimate, ellipse95, trust
+from echostep.localization.estimate import Estimate, claims_place, ellipse95, trust
 from echostep.path import PathSegment
+from echostep.plan.places.bearing import KNOWN_HEADING_RAD
 
 DRIFT_M = 0.05  # standard deviation that is added per segment and axis to the foot's own; assumed
+
+
+def moves_as_one(estimate: Estimate) -> bool:
+    """Whether the step of the mean is that of all particles: they are at one place and share a heading.
+
+    In a search each has its own heading; the step of their mean would move them through walls.
+    """
+    return not estimate.hypotheses and claims_place(estimate.status) and estimate.heading_sd_rad <= KNOWN_HEADING_RAD
 
 
 def extrapolate(estimate: Estimate, segment: PathSegment, later: Sequence[PathSegment]) -> Estimate:
