@@ -6,8 +6,10 @@ from __future__ import annotations
 import io
 import json
 import math
+import re
 import time
 from dataclasses import replace
+from typing import Any
 
 import jsonschema
 import pytest
@@ -16,12 +18,14 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from echostep.plan.model import load_plan
-from echostep.team.commander import as_tree, notes, table, update_roster
+from echostep.team.commander import _cells, as_tree, notes, table, update_roster
 from echostep.team.inbox import MESSAGES_PER_TOPIC, Inbox
-from echostep.team.messages.report import BadReportError, Presence, check_name, decode, encode, schema
+from echostep.team.messages.report import BadReportError, Motion, Presence, check_name, decode, encode, schema
 from echostep.team.roster import CONTRADICTION, MAX_MEMBERS, MAX_REASONS, MemberState, Roster
 from team.letters import NOW, UNIX, heard, said
 from team.team_reports import PLAN, POSITION, report
+
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 
 
 def test_a_report_reads_back_as_it_was_and_obeys_its_schema() -> None:
@@ -214,6 +218,26 @@ def test_a_table_is_as_long_as_the_terminal_and_has_the_most_urgent_first() -> N
     assert sum("red/" in line for line in shown) == 16
     assert "red/kim" in next(line for line in shown if "red/" in line)
     assert any(line.startswith("and 25 more") for line in shown)
+
+
+@pytest.mark.parametrize("columns", [30, 40, 60, 80, 100, 110, 120, 136, 180])
+def test_a_narrow_table_drops_columns_and_cuts_no_number(columns: int) -> None:
+    far = replace(POSITION, x_m=-1234.5, y_m=-9876.5, where="in the corridor, by the door of Laboratory 1234567")
+    more: dict[str, Any] = {"battery_percent": 17, "motion": Motion(7000, 98765.0, 77.0, 0.4)}
+    roster = heard(said("a wearer with a long name", position=far, **more), said("bo", status="lost"))
+    plan, members = load_plan(PLAN), roster.members(NOW + 4000.0)
+    cells = [_cells(m, members, plan, NOW + 4000.0, set()).values() for m in members]
+    whole = {number for row in cells for cell in row for number in NUMBER.findall(cell)}
+    assert {"-1234.5", "-9876.5", "17", "98765", "1234567"} <= whole
+    console = Console(file=io.StringIO(), width=columns)
+    console.print(table(roster, plan, NOW + 4000.0, connected=True, columns=columns))
+    shown = console.file.getvalue().split("\n")  # type: ignore[attr-defined]
+    assert max(map(len, shown)) <= columns
+    rows = [line for line in shown if "red/" in line]
+    assert len(rows) == 2
+    assert {number for line in rows for number in NUMBER.findall(line)} <= whole
+    assert ("-1234.5, -9876.5" in "".join(rows)) == (columns >= 80)
+    assert "98765" in "".join(rows) or columns < 180
 
 
 def test_two_senders_under_one_name_and_run_are_named() -> None:

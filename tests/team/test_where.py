@@ -38,7 +38,7 @@ def test_the_commander_and_tak_see_it() -> None:
     roster.receive("echostep/red/anna/estimate", encode(made), False, 0.0, made.sent_s)
     (grid, *_) = table(roster, load_plan(PLAN), 0.0, connected=True).renderables
     assert "where" in [column.header for column in grid.columns]  # type: ignore[union-attr]
-    (narrow, *_) = table(roster, load_plan(PLAN), 0.0, connected=True, columns=120).renderables
+    (narrow, *_) = table(roster, load_plan(PLAN), 0.0, connected=True, columns=80).renderables
     assert "where" not in [column.header for column in narrow.columns]  # type: ignore[union-attr]
 
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
-from rich.cells import cell_len
+from rich.cells import cell_len, set_cell_size
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
@@ -25,7 +25,9 @@ from echostep.team.messages.report import WITHOUT_PLAN
 from echostep.team.roster import CLOCK_OFF_S, NO_STEP_S, Member, MemberState, Roster, nearest
 
 ALL_COLUMNS_WIDTH = 136  # characters; a narrower terminal shows fewer columns
-MAX_COLUMN_WIDTH = 24  # characters
+MAX_COLUMN_WIDTH = 24  # characters, of words
+LEAST_NOTE = 8  # characters
+EDGES, APART = 2, 2  # characters beside the table and between its columns [rich.box.SIMPLE_HEAD]
 TABLE_LINES = 8  # of a table beside its members: title, head, and what is below it
 LOW_BATTERY_PERCENT = 20
 NO_ESTIMATE_S = 3.0  # an older estimate is mentioned in the state
@@ -33,7 +35,10 @@ COLUMNS = {
     "name": "left", "state": "left", "x, y m": "right", "±95% m": "right", "floor": "left", "where": "left", "to start": "right",
     "looks": "right", "nearest m": "left", "walked m": "right", "note": "left",
 }  # fmt: skip
-LEAST_WIDTHS = {"looks": 110, "nearest m": 110, "walked m": 110, "where": 136}  # of a terminal that shows these columns
+DROPPED = (
+    "where", "walked m", "looks", "nearest m", "to start", "floor", "±95% m", "x, y m", "note",
+)  # in this order where the terminal is too narrow  # fmt: skip
+WORDS = ("name", "floor", "where", "nearest m")  # may be cut short at their end; a cut number would be another number
 STYLES = {
     MemberState.MAYDAY: "bold blink white on red", MemberState.LOST: "bold white on red",
     MemberState.STALE: "bold red", MemberState.UNCERTAIN: "yellow",
@@ -74,24 +79,48 @@ def table(
         box=SIMPLE_HEAD,
         padding=(0, 1, 0, 0),
     )
-    names = [name for name in COLUMNS if columns >= LEAST_WIDTHS.get(name, 0)]
     duplicates = roster.duplicates(now_s)
     shown = members if lines is None else members[: max(lines - TABLE_LINES, 1)]
     rows = [_cells(m, members, plan, now_s, duplicates) for m in shown]
-    left = columns - 2
-    for name in names:
-        longest = max([len(name)] + [cell_len(row[name]) for row in rows])
-        width = max(left, 8) if name == "note" else min(longest, MAX_COLUMN_WIDTH)
-        left -= width + 2
+    widths = _widths(rows, columns)
+    for name, width in widths.items():
         grid.add_column(name, justify=COLUMNS[name], no_wrap=True, width=width)  # type: ignore[arg-type]
     for m, row in zip(shown, rows, strict=True):
-        grid.add_row(*(Text(row[name]) for name in names), style=STYLES[m.state(now_s)])
+        grid.add_row(
+            *(Text(_shortened(row[name], width)) for name, width in widths.items()), style=STYLES[m.state(now_s)]
+        )
     below = [Text(f"and {len(members) - len(shown)} more", style="grey62")] if len(shown) < len(members) else []
     if not connected:
         below.append(Text("no connection to the broker", style="bold red"))
     if roster.rejected:
         below.append(Text(f"rejected: {rejected(roster)}", style="grey62"))
     return Group(grid, *below)
+
+
+def _widths(rows: Sequence[Mapping[str, str]], columns: int) -> dict[str, int]:
+    """Width of each column that fits into `columns` characters; the note takes what is left."""
+    widths = {name: max([len(name), *(cell_len(row[name]) for row in rows)]) for name in COLUMNS}
+    widths |= {name: min(widths[name], MAX_COLUMN_WIDTH) for name in WORDS} | {"note": LEAST_NOTE}
+
+    def left() -> int:
+        return columns - EDGES - sum(width + APART for width in widths.values())
+
+    for name in DROPPED:
+        if left() < 0:
+            del widths[name]
+    last = "note" if "note" in widths else "name"
+    widths[last] = max(widths[last] + left(), LEAST_NOTE)
+    return widths
+
+
+def _shortened(text: str, width: int) -> str:
+    """The text, or as much of it as fits; a word with a number in it is left out rather than cut."""
+    if cell_len(text) <= width:
+        return text
+    head = set_cell_size(text, width - 1).rstrip()
+    begun, _, cut = head.rpartition(" ")
+    whole = text[len(begun) + 1 :].split(" ", maxsplit=1)[0] if begun else ""
+    return f"{begun if cut != whole and any(map(str.isdigit, whole)) else head}…"
 
 
 def summary(members: Sequence[Member], now_s: float) -> str:
