@@ -24,6 +24,7 @@ from echostep.page.elements.undo_offer import UndoClock, UndoOffer
 from echostep.page.live import LivePage
 from echostep.page.mailbox import SceneHistory
 from echostep.page.replay_cursor import ReplayCursor
+from echostep.path import PathSegment
 from echostep.plan.model import Plan, Pose
 from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import Chunk, portion_of
@@ -140,6 +141,21 @@ def test_a_cloud_in_search_waits_for_its_estimate(chunks: list[Chunk], start: St
 )  # fmt: skip
 def test_particles_move_with_the_mean_at_one_place_with_one_heading(last: Estimate, as_one: bool) -> None:
     assert moves_as_one(last) is as_one
+
+
+@pytest.mark.parametrize(
+    ("status", "sd_m", "step_sd_m", "then"),
+    [
+        (TrackStatus.UNCERTAIN, 4.5, 0.02, "uncertain, 11 m"), (TrackStatus.TRACKING, 0.1, 0.02, "tracking, 0.3 m"),
+        (TrackStatus.TRACKING, 0.1, 1.0, "uncertain, 2 m"), (TrackStatus.TRACKING, 0.1, 9.0, "lost: walk along a wall or tap where you are"),
+    ],
+)  # fmt: skip
+def test_a_step_ahead_changes_the_status_only_where_it_widens_the_radius(
+    status: TrackStatus, sd_m: float, step_sd_m: float, then: str
+) -> None:
+    """Half of the probability may be within 5 m of a position whose 95 % radius is 11 m: it stays `uncertain` while a foot lands."""
+    last, landed = told(sd_m=sd_m, status=status), PathSegment(1.0, 2.0, 0.7, 0.0, 0.0, 0.0, step_sd_m, 0.0, 2)
+    assert status_text(extrapolate(last, landed, [landed])) == then
 
 
 def crosses_a_wall(plan: Plan, level: int, line_m: Sequence[Sequence[float]]) -> bool:

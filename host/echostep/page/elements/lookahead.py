@@ -41,7 +41,9 @@ def extrapolate(estimate: Estimate, segment: PathSegment, later: Sequence[PathSe
             yy + position_m2 + heading_rad2 * dx * dx,
         )
     last = later[-1]
-    status = max(estimate.status, trust(ellipse95(xx, xy, yy).major_m), key=list(type(estimate.status)).index)
+    status, before, after = estimate.status, trust(estimate.ellipse95.major_m), trust(ellipse95(xx, xy, yy).major_m)
+    if after is not before:  # otherwise the filter's own status holds, which knows more than the radius
+        status = max(status, after, key=list(type(status)).index)
     heading = float(wrap(last.heading1_rad + turn))
     return replace(
         estimate, t_s=last.t1_s, x_m=x, y_m=y, xx_m2=xx, xy_m2=xy, yy_m2=yy, heading_rad=heading, step=last.step, status=status

@@ -159,7 +159,7 @@ class Report:
     status: Annotated[
         Literal["waiting", "tracking", "uncertain", "lost"],
         Meta(
-            description="waiting: no estimate yet; uncertain: beyond 1 m of 95 % radius; lost: beyond 5 m, or the sensors are silent"
+            description="waiting: no estimate; tracking: error below 1 m at 95 %; lost: above 5 m at 50 %, or silent sensors; uncertain: between"
         ),
     ]
     position: Annotated[Position | None, Meta(description="missing while waiting and while lost")]
