@@ -33,7 +33,7 @@ from echostep.page.elements.true_position import TruePosition
 from echostep.page.elements.undo_offer import UndoOffer
 from echostep.page.replay_cursor import PlayState
 from echostep.plan.model import Plan
-from echostep.plan.places.bearing import KNOWN_HEADING_RAD
+from echostep.plan.places.bearing import KNOWN_HEADING_RAD, north_rad
 from echostep.plan.routing import RoutePlace
 
 FRAME_S = 1.0 / 30.0  # shortest time between two frames
@@ -63,10 +63,11 @@ class LevelLabels:
 
 @dataclass(frozen=True, slots=True)
 class PlanLabels:
-    """A plan without its walls."""
+    """A plan without its walls. `north_rad`: direction of north on it, counter-clockwise from the map's x axis."""
 
     name: str
     digest: str
+    north_rad: float
     levels: tuple[LevelLabels, ...]
 
 
@@ -220,7 +221,7 @@ def hello(plan: Plan, title: str, *, replay: bool) -> Hello:
         )
         for level in plan.levels
     )
-    return Hello(title, replay, PlanLabels(plan.name, plan.digest, levels))
+    return Hello(title, replay, PlanLabels(plan.name, plan.digest, north_rad(plan), levels))
 
 
 def walls(plan: Plan, level: int) -> bytes:

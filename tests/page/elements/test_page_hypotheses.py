@@ -11,19 +11,24 @@ from typing import Any
 import numpy as np
 import pytest
 
+from echostep.guidance.cues import Cue, CueKind
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.particles.places import LikelyPlace
 from echostep.localization.particles.start import Start
+from echostep.page.elements.guidance import guidance_of_cue
 from echostep.page.elements.scene import status_text
 from echostep.page.elements.taps import Taps
 from echostep.page.live import LivePage
+from echostep.plan.routing import Route, Stretch
 from echostep.tracker import Tracker
 from page.browser import READY, Walk, loaded_page, looking, picture, wait_for
 from page.frames import LOCAL, PLAN, scene, served, told
+from page.test_page_browser import ink_near
 
 PLACES = (LikelyPlace(0.62, 5.0, 7.5, 0, 0.4, 0.0), LikelyPlace(0.31, 5.0, 2.0, 0, 0.4, 0.0))
 SEARCHED_S = 6.0  # of the demo's walk: along one of two corridors that are alike
 DRAWN = "document.querySelector('#places').textContent"
+WAY = Route((Stretch(0, np.array([[2.0, 7.5], [9.5, 7.5]])),))
 SIZES = ((1280, 800), (360, 740))
 STILL = "!document.getAnimations().length"
 INK = """(places) => {
@@ -97,6 +102,38 @@ def test_without_a_place_nothing_on_the_map_looks_like_one(browser: Any, size: t
         assert marks(replace(lost, hypotheses=()), 3.0) == (0, 0)
         away, echo = marks(told(13.0, 5.0), 4.0)
         assert min(away, echo) > 20
+        assert not page.wrong
+        page.context.close()
+
+
+def test_the_way_is_hidden_while_no_place_is_claimed(browser: Any, tmp_path: Path) -> None:
+    way = guidance_of_cue(Cue(1.0, CueKind.AHEAD, "Straight ahead", 0.1, "", 7.5, 0.1), WAY, 0, None)
+    with served() as (server, mailbox):
+        mailbox.publish(replace(scene(), guidance=way))
+        page = loaded_page(browser, server.url, {"viewport": {"width": 1280, "height": 800}}, READY)
+        for t_s, status, shown in ((2.0, TrackStatus.LOST, False), (3.0, TrackStatus.TRACKING, True)):
+            mailbox.publish(replace(scene(t_s), estimate=told(13.0, 5.0, t_s, status), guidance=way))
+            wait_for(page, f"echostep.last.t_s === {t_s} && {STILL}")
+            page.screenshot(path=tmp_path / f"way-{status}.png")
+            assert page.evaluate("echostep.last.guidance.path.length") == 2
+            assert [ink_near(page, 2.0 + 7.5 * share, 7.5) for share in (0.1, 0.5, 0.9)] == [shown] * 3
+        assert not page.wrong
+        page.context.close()
+
+
+def test_the_view_does_not_follow_a_mean_that_is_no_place(browser: Any) -> None:
+    with served() as (server, mailbox):
+        mailbox.publish(scene())
+        page = loaded_page(browser, server.url, {"viewport": {"width": 1280, "height": 800}}, READY)
+        page.evaluate("echostep.view.zoom(8)")  # the building is larger than the screen: the view follows
+        mailbox.publish(scene(1.5))
+        wait_for(page, "echostep.last.t_s === 1.5 && echostep.view.toScreen(2, 7.5).every((pixel) => pixel > 0)")
+        stands = page.evaluate("[echostep.view.x, echostep.view.y]")
+        for k, status in enumerate((TrackStatus.LOST, TrackStatus.LOST, TrackStatus.TRACKING)):
+            mailbox.publish(replace(scene(2.0 + k), estimate=told(20.0 + k, 2.0, 2.0 + k, status)))
+            wait_for(page, f"echostep.last.t_s === {2.0 + k}")
+            assert (page.evaluate("[echostep.view.x, echostep.view.y]") == stands) == (status is TrackStatus.LOST)
+        assert page.get_attribute("#follow", "aria-pressed") == "true"
         assert not page.wrong
         page.context.close()
 

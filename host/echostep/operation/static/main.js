@@ -32,6 +32,7 @@ const drawn = (window.echostep = { frames: 0, view, scene, link, last: null }); 
 
 async function hello(message) {
   plan = message.plan;
+  view.north = plan.north_rad;
   found = fitted = false;
   fault('');
   trails.clear();
@@ -144,7 +145,7 @@ function scale() {
   const longest = 90 / view.scale, unit = 10 ** Math.floor(Math.log10(longest)), length = [5, 2, 1].find((k) => k * unit <= longest) * unit;
   $('bar').style.width = `${length * view.scale}px`;
   $('bar-text').textContent = length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;
-  $('needle').style.transform = `rotate(${-view.turn}rad)`;
+  $('needle').style.transform = `rotate(${-view.tilt}rad)`;
 }
 
 function tapped(position, pixel) {
@@ -175,7 +176,7 @@ function hint(text) {
 
 function key(name) {
   const middle = [view.width / 2, view.height / 2];
-  const does = { m: () => { place(view.toMap(...middle), middle); $('mark-cleared').focus(); }, n: () => view.rotate(-view.turn), w: () => view.fit(planView.box), Escape: () => { sheet.close(); list.choose(null); } }[name.length === 1 ? name.toLowerCase() : name];
+  const does = { m: () => { place(view.toMap(...middle), middle); $('mark-cleared').focus(); }, n: () => view.northUp(), w: () => view.fit(planView.box), Escape: () => { sheet.close(); list.choose(null); } }[name.length === 1 ? name.toLowerCase() : name];
   does?.();
   return Boolean(does);
 }
@@ -185,7 +186,7 @@ $('acknowledge').onclick = () => sheet.signed((by) => link.send('acknowledge', {
 $('closer').onclick = () => view.zoom(1.4);
 $('farther').onclick = () => view.zoom(1 / 1.4);
 $('whole').onclick = () => view.fit(planView.box);
-$('north').onclick = () => view.rotate(-view.turn);
+$('north').onclick = () => view.northUp();
 window.addEventListener('error', ({ message }) => fault(`This page has a fault: ${message}. Reload it.`));
 window.addEventListener('unhandledrejection', ({ reason }) => fault(`This page has a fault: ${reason?.message ?? reason}. Reload it.`));
 view.onChanged = ask;

@@ -36,6 +36,7 @@ const drawn = (window.echostep = { frames: 0, view, scene, link, last: null }); 
 async function hello(message) {
   if (plan && plan.digest !== message.plan.digest) startAnew();
   plan = message.plan;
+  view.north = plan.north_rad;
   scene.trail.count = 0;
   scene.drawing = null;
   invited = false;
@@ -182,7 +183,7 @@ function go([x_m, y_m], level) { link.send('go_to', { x_m, y_m, level }); }
 function key(name) {
   const middle = view.toMap(view.width / 2, view.height / 2);
   const actions = {
-    n: () => view.rotate(-view.turn), w: fitWhole, f: toggleFollow,
+    n: () => view.northUp(), w: fitWhole, f: toggleFollow,
     h: () => !$('here').hidden && enter('here', true), g: () => enter('go', true),
     Escape: () => enter(null),
     Enter: () => mode && posed(middle, mode === 'here' ? turned : null),
@@ -220,7 +221,7 @@ $('follow').onclick = () => toggleFollow();
 $('closer').onclick = () => view.zoom(1.4);
 $('farther').onclick = () => view.zoom(1 / 1.4);
 $('whole').onclick = fitWhole;
-$('north').onclick = () => view.rotate(-view.turn);
+$('north').onclick = () => view.northUp();
 $('help').onclick = () => link.send('call', { help: true });
 $('fine').onclick = () => link.send('call', { help: false });
 $('end-guidance').onclick = () => link.send('go_nowhere');

@@ -3,7 +3,7 @@
 
 export class View {
   constructor() {
-    Object.assign(this, { x: 0, y: 0, scale: 20, turn: 0, width: 1, height: 1, stamp: 0, onChanged: () => {} });
+    Object.assign(this, { x: 0, y: 0, scale: 20, turn: 0, north: Math.PI / 2, width: 1, height: 1, stamp: 0, onChanged: () => {} });
   }
 
   changed() {
@@ -54,6 +54,11 @@ export class View {
     const middle = [this.width / 2, this.height / 2];
     this.grip(middle, middle, 1, by);
   }
+
+  // How far north is from up, in radians counter-clockwise on the screen; `north` is its direction on the map.
+  get tilt() { return this.north + this.turn - Math.PI / 2; }
+
+  northUp() { this.rotate(-this.tilt); }
 
   pan(dx, dy) { this.grip([0, 0], [dx, dy]); }
 

@@ -147,7 +147,7 @@ export class Panel {
     const longest = 90 / view.scale, unit = 10 ** Math.floor(Math.log10(longest)), length = [5, 2, 1].find((k) => k * unit <= longest) * unit;
     $('bar').style.width = `${length * view.scale}px`;
     $('bar-text').textContent = length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;
-    $('needle').style.transform = `rotate(${-view.turn}rad)`;
+    $('needle').style.transform = `rotate(${-view.tilt}rad)`;
   }
 
   // Text for screen readers: at once when the status has changed, else not more often than every SPOKEN_MS.
