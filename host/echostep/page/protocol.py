@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Everything that goes to a page: typed messages and their bytes. No other module encodes anything for a page.
 
-In: plans, scenes, answers. Out: JSON for texts, bytes for frames and walls. Owns nothing. Numbers of numpy are written as numbers, NaN and infinity
+In: plans, scenes, answers. Out: JSON for texts, bytes for frames and lines of plans. Owns nothing. Numbers of numpy are written as numbers, NaN and infinity
 as null; a field that cannot be encoded is a TypeError here. A frame, little-endian:
 
     u32         length of the JSON header, padded with spaces to a multiple of four
@@ -35,6 +35,7 @@ from echostep.page.replay_cursor import PlayState
 from echostep.plan.model import Plan
 from echostep.plan.places.bearing import KNOWN_HEADING_RAD, north_rad
 from echostep.plan.routing import RoutePlace
+from echostep.plan.symbols import level_lines, way_names
 
 FRAME_S = 1.0 / 30.0  # shortest time between two frames
 GRID = 65535.0  # cells across the cloud: the greatest u16
@@ -53,17 +54,17 @@ class RoomLabel:
 
 @dataclass(frozen=True, slots=True)
 class LevelLabels:
-    """A level without its walls, of which there are `walls`."""
+    """A level without its lines. `ways`: names of stairs, lifts and ramps."""
 
     name: str
     height_m: float
-    walls: int
     rooms: tuple[RoomLabel, ...]
+    ways: tuple[RoomLabel, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class PlanLabels:
-    """A plan without its walls. `north_rad`: direction of north on it, counter-clockwise from the map's x axis."""
+    """A plan without its lines. `north_rad`: direction of north on it, counter-clockwise from the map's x axis."""
 
     name: str
     digest: str
@@ -215,18 +216,22 @@ def encode(message: Message) -> str:
 
 def hello(plan: Plan, title: str, *, replay: bool) -> Hello:
     """The first message of a run on this plan."""
-    levels = tuple(
-        LevelLabels(
-            level.name, level.height_m, len(level.solid), tuple(RoomLabel(room.name, room.at_m) for room in level.rooms)
-        )
-        for level in plan.levels
-    )
+    levels = tuple(_labels(plan, k) for k in range(len(plan.levels)))
     return Hello(title, replay, PlanLabels(plan.name, plan.digest, north_rad(plan), levels))
 
 
-def walls(plan: Plan, level: int) -> bytes:
-    """The walls of a level (an index into the plan's levels) as rows of float32 x0, y0, x1, y1 in metres."""
-    return plan.levels[level].solid.astype("<f4").tobytes()
+def _labels(plan: Plan, k: int) -> LevelLabels:
+    level = plan.levels[k]
+    rooms = tuple(RoomLabel(room.name, room.at_m) for room in level.rooms)
+    ways = tuple(RoomLabel(name, at_m) for name, at_m in way_names(plan, k))
+    return LevelLabels(level.name, level.height_m, rooms, ways)
+
+
+def lines(plan: Plan, level: int) -> bytes:
+    """The lines of a level (an index into the plan's levels): a header with their numbers by kind, and rows of float32 x0, y0, x1, y1 in metres."""
+    by_kind = level_lines(plan, level)
+    rows = np.concatenate(list(by_kind.values())).astype("<f4").tobytes()
+    return packed({kind: len(lines) for kind, lines in by_kind.items()}, rows)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The server: a page and its sockets, in a thread with an event loop of its own.
 
-In: a site or a mailbox, an address. Out: HTML, walls and frames to browsers. Owns the thread, the listening socket and the sessions.
+In: a site or a mailbox, an address. Out: HTML, plans and frames to browsers. Owns the thread, the listening socket and the sessions.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ S = TypeVar("S", bound=SocketSession)
 
 @dataclass(frozen=True, slots=True)
 class PageSite(Generic[S]):
-    """What a server serves: the page `index`, files of `folders` by the first part of their path, walls of `plan`, a session for each socket."""
+    """What a server serves: the page `index`, files of `folders` by the first part of their path, lines of `plan`, a session for each socket."""
 
     name: str
     plan: Plan
@@ -140,7 +140,7 @@ class SocketServer(Generic[S]):
     def _application(self, token: str | None) -> Starlette:
         routes = [
             Route("/", self._index),
-            Route("/walls/{level:int}", self._walls),
+            Route("/lines/{level:int}", self._lines),
             WebSocketRoute("/socket", self._socket),
             *(Mount(f"/{name}", StaticFiles(directory=folder)) for name, folder in self._site.folders.items()),
         ]
@@ -163,11 +163,11 @@ class SocketServer(Generic[S]):
     async def _index(self, _: Request) -> Response:
         return FileResponse(self._site.index)
 
-    async def _walls(self, request: Request) -> Response:
+    async def _lines(self, request: Request) -> Response:
         level = request.path_params["level"]
         if level >= len(self._site.plan.levels):
             raise HTTPException(404)
-        return Response(protocol.walls(self._site.plan, level), media_type="application/octet-stream")
+        return Response(protocol.lines(self._site.plan, level), media_type="application/octet-stream")
 
     async def _socket(self, websocket: WebSocket) -> None:
         await websocket.accept()

@@ -2,6 +2,7 @@
 // The commander's page: connects the link to the server, the map and the list.
 
 import { Gestures } from '../static/gestures.js';
+import { COMMAND, startLegend } from '../static/legend.js';
 import { Link } from '../static/link.js';
 import { PlanView } from '../static/plan.js';
 import { startTheme } from '../static/theme.js';
@@ -25,6 +26,7 @@ let plan = null, wantedLevel = 0, fitted = false, isAsked = false, drawnStamp = 
 
 const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onState: connection, parse: parseFrame });
 const sheet = new Sheet((kind, fields) => link.send(kind, fields), hint);
+const showLegend = startLegend($('legend-button'), COMMAND);
 const timeBar = new TimeBar((kind, fields) => link.send(kind, fields));
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
@@ -46,13 +48,13 @@ async function hello(message) {
 
 async function showLevel(level) {
   wantedLevel = level;
-  const answer = await fetch(new URL(`walls/${level}`, document.baseURI)).catch(() => null);
+  const answer = await fetch(new URL(`lines/${level}`, document.baseURI)).catch(() => null);
   if (!answer) return;  // the server is away; when it is back, its hello shows the level again
   if (!answer.ok) return fault(await answer.text());
-  const walls = await answer.arrayBuffer();
+  const lines = await answer.arrayBuffer();
   if (level !== wantedLevel) return;
   scene.level = level;
-  planView.show(new Float32Array(walls), plan.levels[level].rooms);
+  planView.show(lines, plan.levels[level]);
   if (!fitted) view.fit(planView.box);
   fitted = true;
   floors.show(level, scene.rows);
@@ -176,7 +178,7 @@ function hint(text) {
 
 function key(name) {
   const middle = [view.width / 2, view.height / 2];
-  const does = { m: () => { place(view.toMap(...middle), middle); $('mark-cleared').focus(); }, n: () => view.northUp(), w: () => view.fit(planView.box), Escape: () => { sheet.close(); list.choose(null); } }[name.length === 1 ? name.toLowerCase() : name];
+  const does = { m: () => { place(view.toMap(...middle), middle); $('mark-cleared').focus(); }, l: showLegend, n: () => view.northUp(), w: () => view.fit(planView.box), Escape: () => { sheet.close(); list.choose(null); } }[name.length === 1 ? name.toLowerCase() : name];
   does?.();
   return Boolean(does);
 }

@@ -2,6 +2,7 @@
 // The live page: connects the link to the server, the map, the panel and the user's actions. *Level*: index into the plan's levels; *floor*: its name on the page.
 
 import { Gestures } from './gestures.js';
+import { LIVE, startLegend } from './legend.js';
 import { stayAwake } from './live/awake.js';
 import { Link } from './link.js';
 import { Painter } from './live/paint.js';
@@ -28,6 +29,7 @@ const link = new Link({
   onHello: hello, onFrame: frame, onRefused: (reason) => hint(reason, 6000), onFailed: (reason) => panel.fault(reason), onConsidered: (answer) => taps.considered(answer), onState: connection,
 });
 const speech = new Speech($('speech'), $('sentence'), $('invitation'), $('unspoken'));
+const showLegend = startLegend($('legend-button'), LIVE);
 const replay = new Replay((kind, fields) => link.send(kind, fields));
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
@@ -66,13 +68,13 @@ function startAnew() {
 
 async function showLevel(level) {
   wantedLevel = level;
-  const answer = await fetch(new URL(`walls/${level}`, document.baseURI)).catch(() => null);
+  const answer = await fetch(new URL(`lines/${level}`, document.baseURI)).catch(() => null);
   if (!answer) return;  // the server is away; when it is back, its hello shows the level again
   if (!answer.ok) return panel.fault(await answer.text());
-  const walls = await answer.arrayBuffer();
+  const lines = await answer.arrayBuffer();
   if (level !== wantedLevel) return;
   scene.level = level;
-  planView.show(new Float32Array(walls), plan.levels[level].rooms);
+  planView.show(lines, plan.levels[level]);
   if (!fitted) view.fit(planView.box);
   fitted = true;
   panel.floors(level, scene.frame?.told);
@@ -183,7 +185,7 @@ function go([x_m, y_m], level) { link.send('go_to', { x_m, y_m, level }); }
 function key(name) {
   const middle = view.toMap(view.width / 2, view.height / 2);
   const actions = {
-    n: () => view.northUp(), w: fitWhole, f: toggleFollow,
+    l: showLegend, n: () => view.northUp(), w: fitWhole, f: toggleFollow,
     h: () => !$('here').hidden && enter('here', true), g: () => enter('go', true),
     Escape: () => enter(null),
     Enter: () => mode && posed(middle, mode === 'here' ? turned : null),

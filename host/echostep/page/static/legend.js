@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// The legend: what each sign on the map means; a dialog that a button or the key L opens, on the wearer's and the commander's page.
+
+const line = (d, colour = 'wall', width = 1.5, more = '') => `<path d="${d}" fill="none" stroke="var(--${colour})" stroke-width="${width}" ${more}/>`;
+const shape = (d, colour, fill = colour) => `<path d="${d}" fill="${fill === 'none' ? 'none' : `var(--${fill})`}" stroke="var(--${colour})" stroke-width="2"/>`;
+const disc = (r, colour, fill = 'none', more = '') => `<circle r="${r}" fill="${fill === 'none' ? 'none' : `var(--${fill})`}" stroke="var(--${colour})" stroke-width="2" ${more}/>`;
+const letter = (text, colour) => `<text y="4.5" text-anchor="middle" font-size="12" font-weight="700" fill="var(--${colour})">${text}</text>`;
+const JAMBS = 'M-9-5V5M9-5V5';
+const JOINED = line('M-16 0H-9M9 0H16', 'wall', 2.5);  // the wall on both sides of a door or a window
+const STEPS = [-8, -4, 0, 4, 8].map((x) => `M${x}-7V7`).join(''), BOX = 'M-12-7H12V7H-12Z';
+
+const BUILDING = [
+  [line('M-16 0H16', 'wall', 2.5), 'wall, side of an obstacle'],
+  [JOINED + line('M-9-3H9V3H-9ZM-9 0H9'), 'window'],
+  [JOINED + line(JAMBS), 'door that is open'],
+  [JOINED + line(`${JAMBS}M-9 0H9`), 'door that is shut'],
+  [JOINED + line(JAMBS) + line('M-9 0H9', 'wall', 1.5, 'stroke-dasharray="3 3"'), 'door, open or shut; to which side it opens is in no plan'],
+  [line(BOX + STEPS), 'stairs; ↑ ↓ beside the name: they lead up, down'],
+  [line(`${BOX}M-12-7 12 7M-12 7 12-7`), 'lift'],
+  [line(`${BOX}M-12 0H12M-12 0-8-3M-12 0-8 3M12 0 8-3M12 0 8 3`), 'ramp'],
+];
+const MARKS = [
+  [shape('M-8-8H8V8H-8Z', 'good', 'halo') + letter('✓', 'good'), 'cleared, marked by a commander'],
+  [shape('M0-10 10 0 0 10-10 0Z', 'bad', 'halo') + letter('!', 'bad'), 'hazard'],
+  [disc(9, 'here', 'halo') + letter('M', 'here'), 'meeting point'],
+];
+const ARROW = 'M12 0-8 7-4 0-8-7Z';
+
+export const LIVE = [
+  ['The building', BUILDING],
+  ['The wearer', [
+    [shape(ARROW, 'here'), 'you, and where your feet point'], [disc(7, 'here', 'here'), 'you; heading not known'],
+    [disc(9, 'here', 'none'), 'you are in it, with 95 %'], [disc(9, 'here', 'none', 'stroke-dasharray="4 4"'), 'you are in it, but for 1 in 1,000'],
+    [disc(9, 'here') + letter('1', 'ink'), 'a place that fits, with its probability'],
+    [[[-6, -3], [0, 4], [5, -5], [-2, 0], [7, 3]].map(([x, y]) => `<rect x="${x}" y="${y}" width="3" height="3" fill="var(--cloud)"/>`).join(''), 'where you may be'],
+    [line('M-16 4-4-3 16 2', 'trail', 2), 'track'],
+  ]],
+  ['Echoes, beacons and ways', [
+    [line('M-16 0H8', 'left', 2.5) + line('M8-6V6', 'left', 3.5), 'range measured to the left'], [line('M-16 0H8', 'right', 2.5) + line('M8-6V6', 'right', 3.5), 'to the right'],
+    [line('M-16 0H4', 'expected', 1.5, 'stroke-dasharray="2 4"') + '<circle cx="9" r="5" fill="none" stroke="var(--expected)" stroke-width="1.5"/>', 'range that the plan predicts'],
+    [shape('M0-8 7 5H-7Z', 'beacon'), 'beacon; hollow: silent or moved'], [line('M-16 0H16', 'goal', 3, 'stroke-dasharray="7 6"'), 'way to the flag'],
+    [shape('M0-8 8 0 0 8-8 0Z', 'good', 'none'), 'true position, of a simulation'],
+  ]],
+  ['Marks', MARKS],
+];
+export const COMMAND = [
+  ['The building', BUILDING],
+  ['Wearers', [
+    [shape('M0-10 9 6H-9Z', 'bad'), 'mayday'], [disc(7, 'bad', 'halo') + line('M-3-3 3 3M-3 3 3-3', 'bad', 2.5), 'lost'], [disc(7, 'bad', 'halo'), 'silent'],
+    [disc(7, 'fair', 'halo') + shape('M0-6A6 6 0 0 1 0 6Z', 'fair'), 'uncertain'], [disc(7, 'good', 'good'), 'tracked; a tip points along the heading'], [shape('M-6-6H6V6H-6Z', 'faint', 'halo'), 'run ended'],
+    [disc(9, 'good', 'none', 'stroke-dasharray="4 4"'), 'in it, but for 1 in 1,000'], [disc(9, 'good', 'none', 'stroke-dasharray="2 4"'), 'in it, with 95 %'],
+    [line('M-16 4-4-3 16 2', 'trail', 2), 'trail of the last 3 minutes'],
+  ]],
+  ['Marks', MARKS],
+];
+
+// A dialog with these groups of [picture, words]; returns what opens it.
+export function startLegend(button, groups) {
+  const dialog = document.createElement('dialog');
+  dialog.id = 'legend';
+  dialog.setAttribute('aria-label', 'Legend');
+  const rows = (entries) => entries.map(([picture, words]) => `<li><svg viewBox="-16 -12 32 24" aria-hidden="true">${picture}</svg><span>${words}</span></li>`).join('');
+  dialog.innerHTML = `<form method="dialog"><h2>Legend</h2><button aria-label="Close">✕</button></form><div tabindex="0" role="group" aria-label="Signs">${groups.map(([title, entries]) => `<h3>${title}</h3><ul>${rows(entries)}</ul>`).join('')}</div>`;
+  dialog.onclick = ({ target }) => { if (target === dialog) dialog.close(); };  // beside it
+  document.body.append(dialog);
+  const open = () => dialog.showModal();
+  button.onclick = open;
+  return open;
+}
