@@ -37,7 +37,7 @@ SKIPPED = 500  # chunks in a portion before the page is opened
 SHOWN = (  # for the error of a test
     "[window.echostep?.scene?.frame && { ...echostep.scene.frame, beams: 0, trail: 0, cloud: 0 }, document.body.innerText]"
 )
-NAMES = "[...document.querySelectorAll('#rooms text')].filter((e) => e.getAttribute('visibility') === 'visible').map((e) => e.textContent)"
+NAMES = "[...document.querySelectorAll('#rooms .room')].filter((e) => e.getAttribute('visibility') === 'visible').map((e) => e.textContent)"
 SETTLED = """(() => {
     const map = document.querySelector('#map'), { view } = echostep;
     return Math.abs(view.width - map.clientWidth) < 1 && Math.abs(view.height - map.clientHeight) < 1;

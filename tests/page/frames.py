@@ -13,6 +13,7 @@ from email.message import Message
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
@@ -77,6 +78,15 @@ def header(received: str | bytes) -> dict[str, Any]:
     assert isinstance(received, bytes)
     length = int.from_bytes(received[:4], "little")
     return dict(json.loads(received[4 : 4 + length]))
+
+
+def lines_of(url: str, level: int) -> dict[str, NDArray[np.float32]]:
+    """The lines of a level by kind, as the page reads them."""
+    received = fetched(f"{url}lines/{level}").body
+    counts = header(received)
+    assert all(isinstance(count, int) for count in counts.values())
+    rows = np.frombuffer(received[4 + int.from_bytes(received[:4], "little") :], "<f4").reshape(-1, 4)
+    return dict(zip(counts, np.split(rows, np.cumsum(list(counts.values()))[:-1]), strict=True))
 
 
 def next_frame(page: ClientConnection) -> dict[str, Any]:

@@ -78,7 +78,9 @@ def test_a_wearer_sees_stairs_lifts_doors_and_windows(browser: Any, size: str, t
     with served(Mailbox(plan, "test", replay=False)) as (server, mailbox):
         shares = tuple(float(k == 1) for k in range(len(plan.levels)))
         estimate = replace(told(4.0, 7.0), level=1, levels=shares)
-        mailbox.publish(replace(scene(), estimate=estimate, echo_lines=(), particles=None, status_text="tracking, 0.2 m"))
+        mailbox.publish(
+            replace(scene(), estimate=estimate, echo_lines=(), particles=None, status_text="tracking, 0.2 m")
+        )
         page = loaded_page(browser, server.url, {"viewport": {"width": width, "height": height}}, READY)
         looked_at(page, size, tmp_path)
 

@@ -18,7 +18,7 @@ from board_runs import ROOT
 from command_line import echostep
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.model import Georeference, Plan, load_plan
-from echostep.plan.overlay import EDGE_M, Overlay, overlays, write_overlays
+from echostep.plan.pictures.overlay import EDGE_M, Overlay, overlays, write_overlays
 from echostep_studies.simulation.tower import tower
 
 DEMO = load_plan(ROOT / "host/echostep/plans/demo.json")

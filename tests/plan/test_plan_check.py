@@ -23,9 +23,9 @@ from echostep.cli import app
 from echostep.errors import EchostepError
 from echostep.plan.check import check_plan
 from echostep.plan.cropping import within
-from echostep.plan.drawing import draw_plan
 from echostep.plan.findings import PlanFinding
 from echostep.plan.model import Level, Plan, load_plan, parse_plan
+from echostep.plan.pictures.drawing import draw_plan
 
 DEMO = Path(str(resources.files("echostep"))) / "plans/demo.json"
 

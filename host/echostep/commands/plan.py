@@ -120,7 +120,7 @@ def _pictured(plan: Plan, out: Path) -> str:
         taken = True
     if taken:
         return f"; {path} is another picture and stays: echostep plan show {out} -o FILE.png draws this one"
-    from echostep.plan.drawing import draw_plan
+    from echostep.plan.pictures.drawing import draw_plan
 
     return f", {path}{_without(draw_plan(plan, path, list(range(len(plan.levels)))))}"
 
@@ -149,8 +149,8 @@ def check(
 ) -> None:
     """Tell what is wrong with a plan: exit status 0 when nothing is, 1 when something is."""
     from echostep.plan.check import check_plan
-    from echostep.plan.drawing import draw_plan
     from echostep.plan.importers.limited import open_limited
+    from echostep.plan.pictures.drawing import draw_plan
 
     plan = open_limited(file)
     findings = check_plan(plan)
@@ -182,8 +182,8 @@ def show(
 ) -> None:
     """Draw a plan."""
     require(str(out), "matplotlib")
-    from echostep.plan.drawing import draw_plan
     from echostep.plan.importers.limited import open_limited
+    from echostep.plan.pictures.drawing import draw_plan
 
     plan = open_limited(file)
     levels = list(range(len(plan.levels))) if level is None else [_level(plan, level)]
@@ -199,7 +199,7 @@ def overlay(
     """Make a picture of each storey that lies on the map: in ATAK (GRG), Google Earth, QGIS."""
     require(str(out), "matplotlib", "pyproj")
     from echostep.plan.importers.limited import open_limited
-    from echostep.plan.overlay import write_overlays
+    from echostep.plan.pictures.overlay import write_overlays
 
     for made in write_overlays(open_limited(file), out):
         print(f"{made.name}: {made.south:.7f} to {made.north:.7f} N, {made.west:.7f} to {made.east:.7f} E")

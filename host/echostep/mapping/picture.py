@@ -14,8 +14,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.plan.drawing import DOOR, OBSTACLE, WALL
 from echostep.plan.model import Level, Plan
+from echostep.plan.pictures.drawing import DOOR, OBSTACLE, WALL
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Everything that goes to a page: typed messages and their bytes. No other module encodes anything for a page.
 
-In: plans, scenes, answers. Out: JSON for texts, bytes for frames and lines of plans. Owns nothing. Numbers of numpy are written as numbers, NaN and infinity
-as null; a field that cannot be encoded is a TypeError here. A frame, little-endian:
+In: plans, scenes, answers. Out: JSON for texts, bytes for frames and lines of plans. Owns nothing. Numbers of numpy are written as numbers, NaN and
+infinity as null; a field that cannot be encoded is a TypeError here. A frame, little-endian:
 
     u32         length of the JSON header, padded with spaces to a multiple of four
     bytes       the header (`FrameHeader`); its keys "trail", "drawing" and "cloud" say how many rows follow
@@ -33,9 +33,9 @@ from echostep.page.elements.true_position import TruePosition
 from echostep.page.elements.undo_offer import UndoOffer
 from echostep.page.replay_cursor import PlayState
 from echostep.plan.model import Plan
+from echostep.plan.pictures.symbols import level_lines, way_names
 from echostep.plan.places.bearing import KNOWN_HEADING_RAD, north_rad
 from echostep.plan.routing import RoutePlace
-from echostep.plan.symbols import level_lines, way_names
 
 FRAME_S = 1.0 / 30.0  # shortest time between two frames
 GRID = 65535.0  # cells across the cloud: the greatest u16

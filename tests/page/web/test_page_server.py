@@ -24,20 +24,20 @@ from echostep.page.guarded_socket import MOST_UNDRAWN
 from echostep.page.mailbox import MOST_CHECK_INS, Mailbox
 from echostep.page.server import MOST_PAGES, Address, PageServer
 from echostep.ports.people.check_in import CheckIn
-from page.frames import PLAN, fetched, header, next_frame, opened, scene, served
+from page.frames import PLAN, fetched, header, lines_of, next_frame, opened, scene, served
 from waiting import PATIENCE_S, ends
 
 
-def test_a_page_gets_plan_walls_and_frames() -> None:
+def test_a_page_gets_plan_lines_and_frames() -> None:
     with served() as (server, mailbox):
         mailbox.trail.add(1.0, 2.0, 0)
         mailbox.publish(scene(trail_count=1))
         with opened(server) as page:
             hello = json.loads(page.recv(timeout=PATIENCE_S))
             frame = next_frame(page)
-        walls = fetched(f"{server.url}walls/0").body
+        walls = lines_of(server.url, 0)["wall"]
     assert hello["plan"]["levels"][0]["rooms"][0]["name"] == "Office 1"
-    assert np.array_equal(np.frombuffer(walls, "<f4").reshape(-1, 4), PLAN.levels[0].solid.astype("<f4"))
+    assert np.array_equal(walls, PLAN.levels[0].solid.astype("<f4"))
     assert frame["trail"] == {"first": 0, "count": 1}
     assert frame["cloud"]["count"] == 300
 
@@ -173,7 +173,7 @@ def test_without_the_token_nothing_answers() -> None:
         port, token = server.url.split(":")[2].split("/")[:2]
         local = f"http://127.0.0.1:{port}"
         assert len(token) >= 20
-        for path in ("", "static/main.js", "walls/0", f"{token[:-1]}/", "../"):
+        for path in ("", "static/main.js", "lines/0", f"{token[:-1]}/", "../"):
             assert fetched(f"{local}/{path}").status == 404
         with pytest.raises(InvalidStatus):
             connect(f"ws{local[4:]}/socket", origin=Origin(local), open_timeout=PATIENCE_S)

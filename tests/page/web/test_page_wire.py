@@ -14,13 +14,13 @@ from echostep.page import protocol
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.mailbox import Mailbox
 from echostep.plan.model import Plan
-from page.frames import PLAN, fetched, next_frame, opened, scene, served
+from page.frames import PLAN, fetched, lines_of, next_frame, opened, scene, served
 from plan.imported_plans import seven_floors
 from waiting import PATIENCE_S
 
 
 @pytest.mark.parametrize("plan", [PLAN, seven_floors()], ids=["demo", "seven floors"])
-def test_a_page_of_any_plan_gets_hello_walls_and_frames(plan: Plan) -> None:
+def test_a_page_of_any_plan_gets_hello_lines_and_frames(plan: Plan) -> None:
     """An outline is an array, and an array is no JSON: the imported plan's page stayed dark."""
     with served(Mailbox(plan, "test", replay=False)) as (server, mailbox):
         mailbox.publish(scene())
@@ -28,8 +28,9 @@ def test_a_page_of_any_plan_gets_hello_walls_and_frames(plan: Plan) -> None:
             hello = json.loads(page.recv(timeout=PATIENCE_S))
             frame = next_frame(page)
         for k, level in enumerate(plan.levels):
-            walls = fetched(f"{server.url}walls/{k}").body
-            assert len(walls) == 16 * len(level.solid) == 16 * hello["plan"]["levels"][k]["walls"]
+            lines = lines_of(server.url, k)
+            assert len(lines["wall"]) == len(level.solid) - len(level.windows)
+            assert len(lines["unknown"]) == len(level.doors)  # both plans say of no door whether it is open
         assert not server.shared.faults.notices
     rooms = [[room["name"] for room in level["rooms"]] for level in hello["plan"]["levels"]]
     assert rooms == [[room.name for room in level.rooms] for level in plan.levels]
@@ -76,15 +77,15 @@ def broken(*_: object, **__: object) -> None:
     1 / 0  # noqa: B018
 
 
-def test_a_fault_in_a_frame_and_in_the_walls(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_in_a_frame_and_in_the_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     with served() as (server, mailbox):
         monkeypatch.setattr(protocol, "frame", broken)
-        monkeypatch.setattr(protocol, "walls", broken)
+        monkeypatch.setattr(protocol, "lines", broken)
         mailbox.publish(scene())
         with opened(server) as page:
             assert json.loads(page.recv(timeout=PATIENCE_S))["kind"] == "hello"
             assert json.loads(page.recv(timeout=PATIENCE_S))["kind"] == "failed"
-        refused = fetched(f"{server.url}walls/0")
+        refused = fetched(f"{server.url}lines/0")
         assert refused.status == 500
         assert b"ZeroDivisionError" in refused.body
         assert len(server.shared.faults.notices) == 1  # the same line of code

@@ -21,9 +21,9 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan.cropping import Bounds, extent
-from echostep.plan.drawing import draw_bare_level
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.model import Plan
+from echostep.plan.pictures.drawing import draw_bare_level
 
 KML = "http://www.opengis.net/kml/2.2"
 PIXELS_PER_M, MOST_PX = 40.0, 4096  # a door is 36 pixels wide; what older phones can show as one texture

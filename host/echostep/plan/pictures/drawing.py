@@ -16,8 +16,8 @@ import numpy as np
 
 from echostep.errors import EchostepError
 from echostep.plan.cropping import Bounds, extent, within
-from echostep.plan.labels import Label, draw_labels, fonts_for
 from echostep.plan.model import Connector, Level, Plan, Pose, Room
+from echostep.plan.pictures.labels import Label, draw_labels, fonts_for
 from echostep.plan.places.faces import find_faces
 from echostep.plan.places.spaces import MOST_WALLS
 
