@@ -25,6 +25,8 @@ from echostep.plan.model import Door
 LONG = 2.5  # length of a leaf by its thickness, at least; assumed
 WIDEST_M = 12.0  # of a door without a swing: gates
 LEAST_SHARE, MOST_SHARE = 0.6, 1.3  # width of a gap by the width of the leaf in it; assumed
+CORNER_M = 0.2  # from a door in a corner to the axis of a thick wall there; assumed
+MOST_OFF_M = 0.3  # from both jambs together; assumed
 FRAME_M = 0.2  # by which a gap may be wider beyond that: frame; assumed
 BESIDE_M = 6.0  # greatest width of a hole in which a door stands beside a window; assumed
 THICKEST_M = 0.5  # of a wall that is drawn through a door
@@ -134,7 +136,8 @@ def _exact(swing: Swing, walls: WallBands) -> Line | None:
     found = []
     for u in (_unit(hinge, end) for end in swing.ends):
         gap = walls.gap(hinge, u, radius / 2, 2 * radius)
-        if gap is not None and abs(gap.begin_m) < BY_M and abs(gap.end_m - radius) < BY_M:
+        off = (math.inf,) if gap is None else (abs(gap.begin_m), abs(gap.end_m - radius))
+        if gap is not None and max(off) < CORNER_M and sum(off) < MOST_OFF_M:
             found.append(_line(hinge, u, gap.begin_m, gap.end_m))
     return found[0] if len(found) == 1 else None
 
@@ -155,7 +158,20 @@ def _of_line(lines: Sequence[LineString], walls: WallBands) -> Line | None:
             leaf = walls.gap(hinge, u, length / 2, 2 * length)
             if leaf is not None and _fits(leaf, length):
                 return _line(hinge, u, leaf.begin_m, leaf.end_m)
-    return (*a, *b) if gap is None and walls.is_at_wall(a) and walls.is_at_wall(b) else None
+    corner = next((line for hinge, end in ((a, b), (b, a)) if (line := _across_leaf(hinge, end, walls))), None)
+    return corner or ((*a, *b) if gap is None and walls.is_at_wall(a) and walls.is_at_wall(b) else None)
+
+
+def _across_leaf(hinge: Point, end: Point, walls: WallBands) -> Line | None:
+    """The gap from a hinge in a corner at right angles to a leaf that is drawn open against the other wall: the wall goes on at its far end."""
+    (u, v), length = _unit(hinge, end), math.dist(hinge, end)
+    for across in ((-v, u), (v, -u)):
+        gap = walls.gap(hinge, across, length / 2, 2 * length)
+        if gap is not None and max(abs(gap.begin_m), abs(gap.end_m - length)) < CORNER_M:
+            line = _line(hinge, across, gap.begin_m, gap.end_m)
+            if any(abs(a * u + b * v) < 0.1 for a, b in walls.directions(line[2:])):
+                return line
+    return None
 
 
 def _is_long(lines: Sequence[LineString]) -> bool:
