@@ -62,14 +62,24 @@ def test_sound_plans() -> None:
 
 
 def test_an_open_room() -> None:
-    (finding,) = check_plan(flat(box(), rooms=[ROOM]))
+    wide = [[0, 0, 1, 0], [3, 0, 4, 0], *box()[2:]]
+    (finding,) = check_plan(flat(wide, rooms=[ROOM]))
     assert finding.kind == "open room"
-    assert "is 1 m wide or less" in finding.text
-    assert finding.position_m == pytest.approx((1.5, 0.0), abs=0.3)
+    assert "is 2 m wide or less" in finding.text
+    assert finding.position_m == pytest.approx((2.0, 0.0), abs=0.3)
     assert kinds(flat([], rooms=[ROOM])) == ["open room"]
     (finding,) = check_plan(flat([[0, 0, 4, 0], [4, 0, 4, 2.6], [4, 3, 0, 3], [0, 3, 0, 0]], rooms=[ROOM]))
     assert finding.position_m == pytest.approx((4.0, 2.8), abs=0.3)
     assert "is 0.5 m wide or less" in finding.text
+
+
+def test_a_gap_that_people_can_pass_is_a_passage() -> None:
+    """Two rooms without a listed door: one opens to the other, the other to the outside."""
+    walls = [*box(0, 0, 8), [4, 0, 4, 1], [4, 1.9, 4, 3]]
+    rooms = [ROOM, {"name": "B", "at": [6, 1]}]
+    assert kinds(flat(walls, rooms=rooms)) == []
+    assert kinds(house([{"walls": walls, "rooms": rooms}], start={"x": 6, "y": 2, "heading_deg": 0})) == []
+    assert kinds(flat([*walls, [4, 1, 4, 1.9]], rooms=rooms)) == ["unreachable"]
 
 
 def test_walls_that_almost_meet() -> None:

@@ -17,6 +17,7 @@ from echostep.arrays import Bools, Floats
 from echostep.plan.findings import Lines, PlanFinding
 from echostep.plan.model import Level, Plan
 from echostep.plan.places.faces import JAMB_M, OUTSIDE, TOUCH_M, Faces, extend, faces_under, find_faces
+from echostep.plan.places.gaps import with_gaps
 from echostep.plan.places.leaks import narrowest_opening
 from echostep.plan.places.reachability import unreachable_rooms
 from echostep.plan.places.standing import StandingGround
@@ -26,20 +27,21 @@ NEAR_M = 0.1  # a wall's end that is nearer than this to a wall was meant to tou
 OVERLAP_M = 0.02  # shorter overlaps are not reported
 ELBOW_M2 = 1.0  # stairs with less free area beside them than this have no access
 MOST_LEAKS = 20  # searches for the opening of a room in one plan, because each takes a while
-NOT_ENCLOSED = "is not enclosed by walls and doors"
+NOT_ENCLOSED = "is not enclosed by walls, doors and gaps"
 PARALLEL = 0.02  # sine of the angle below which walls count as parallel
 
 
 def check_plan(plan: Plan) -> list[PlanFinding]:
     """All findings of a plan, sorted by level and numbered from 1."""
     needs_faces = bool(plan.connectors) or any(level.rooms for level in plan.levels)
+    passable = replace(plan, levels=tuple(with_gaps(level) for level in plan.levels)) if needs_faces else plan
     faces = [
         find_faces(level if needs_faces else Level(level.name, level.height_m, level.walls[:0]))
-        for level in plan.levels
+        for level in passable.levels
     ]
     findings = [finding for i, level in enumerate(plan.levels) for finding in _level(level, i, faces[i])]
-    findings += unreachable_rooms(plan, faces)
-    findings += _connectors(plan, faces)
+    findings += unreachable_rooms(passable, faces)
+    findings += _connectors(passable, faces)
     findings += _start(plan)
     findings.sort(key=lambda finding: finding.level)
     not_enclosed = [k for k, finding in enumerate(findings) if finding.text.endswith(NOT_ENCLOSED)]

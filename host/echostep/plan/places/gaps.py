@@ -7,6 +7,8 @@ A wall that ends free is continued: the opening ends at the first wall within a 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import shapely
 
@@ -40,6 +42,11 @@ def door_gaps(level: Level) -> tuple[Door, ...]:
     fits = (nearest_m >= NARROWEST_M) & np.isfinite(nearest_m)
     gaps = np.concatenate((begin[fits], (begin + np.where(fits, nearest_m, 0.0)[:, None] * outward)[fits]), axis=1)
     return tuple(Door((float(a), float(b), float(c), float(d))) for a, b, c, d in _once(gaps))
+
+
+def with_gaps(level: Level) -> Level:
+    """The level with its unlisted openings as doors: a gap that people can pass is a passage."""
+    return replace(level, doors=(*level.doors, *door_gaps(level)))
 
 
 def _free_ends(walls: Floats, lines: Floats, level: Level) -> tuple[Floats, Floats]:

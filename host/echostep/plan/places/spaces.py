@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from echostep.plan.model import Connector, Door, Plan, Room
 from echostep.plan.places.faces import OUTSIDE, Faces, door_faces, find_faces
-from echostep.plan.places.gaps import door_gaps
+from echostep.plan.places.gaps import with_gaps
 
 # Assumed:
 WALL_M = 0.6  # a space without room and door that is narrower than this is the inside of a wall
@@ -82,7 +82,7 @@ def find_spaces(plan: Plan, level_index: int) -> Spaces | None:
     level = plan.levels[level_index]
     if len(level.solid) > MOST_WALLS:
         return None
-    level = replace(level, doors=(*level.doors, *door_gaps(level)))
+    level = with_gaps(level)
     faces = find_faces(level)
     at = faces.indices_of(np.array([room.at_m for room in level.rooms]).reshape(-1, 2)).tolist()
     names: dict[int, list[Room]] = defaultdict(list)
