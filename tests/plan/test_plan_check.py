@@ -23,9 +23,9 @@ from echostep.cli import app
 from echostep.errors import EchostepError
 from echostep.plan.check import check_plan
 from echostep.plan.cropping import within
-from echostep.plan.findings import PlanFinding
 from echostep.plan.model import Level, Plan, load_plan, parse_plan
 from echostep.plan.pictures.drawing import draw_plan
+from echostep.plan.places.findings import PlanFinding
 
 DEMO = Path(str(resources.files("echostep"))) / "plans/demo.json"
 
@@ -62,7 +62,7 @@ def test_sound_plans() -> None:
 
 
 def test_an_open_room() -> None:
-    wide = [[0, 0, 1, 0], [3, 0, 4, 0], *box()[2:]]
+    wide: list[list[float]] = [[0, 0, 1, 0], [3, 0, 4, 0], *box()[2:]]
     (finding,) = check_plan(flat(wide, rooms=[ROOM]))
     assert finding.kind == "open room"
     assert "is 2 m wide or less" in finding.text
@@ -75,7 +75,7 @@ def test_an_open_room() -> None:
 
 def test_a_gap_that_people_can_pass_is_a_passage() -> None:
     """Two rooms without a listed door: one opens to the other, the other to the outside."""
-    walls = [*box(0, 0, 8), [4, 0, 4, 1], [4, 1.9, 4, 3]]
+    walls: list[list[float]] = [*box(0, 0, 8), [4, 0, 4, 1], [4, 1.9, 4, 3]]
     rooms = [ROOM, {"name": "B", "at": [6, 1]}]
     assert kinds(flat(walls, rooms=rooms)) == []
     assert kinds(house([{"walls": walls, "rooms": rooms}], start={"x": 6, "y": 2, "heading_deg": 0})) == []

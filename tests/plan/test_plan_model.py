@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Connector, Door, Georeference, Level, Plan, Pose, Room, load_plan, parse_plan
+from echostep.plan.model import Connector, Door, Georeference, Level, Plan, Pose, Question, Room, load_plan, parse_plan
 from echostep.plan.writer import plan_json, save_plan
 
 GOOD: dict[str, Any] = {
@@ -36,6 +36,10 @@ FULL: dict[str, Any] = GOOD | {
             "doors": [{"line": [0, 1, 0, 2], "state": "open", "name": "street"}, {"line": [0, 0, 0, 1]}],
             "obstacles": [[[1, 1], [2, 1], [2, 2], [1, 1]]],
             "rooms": [{"name": "A", "at": [2, 1], "outline": [[0, 0], [4, 0], [4, 3], [0, 3]]}],
+            "questions": [
+                {"text": "a door?", "about": "door", "at": [0, 1], "lines": [[0, 1, 0, 2]], "proposed": True},
+                {"text": "open?", "about": "room", "at": [2, 1]},
+            ],
         },
         {"name": "first", "height_m": 3.5, "walls": [], "rooms": []},
     ],
@@ -72,6 +76,11 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"levels": [{"walls": [[0, 0, True, 1]]}]}, "finite"),
     ({"levels": [{"walls": [[0, 0, "\ud800", 1]]}]}, r"'\\ud800' is not a text"),
     ({"start": {"x": 1, "y": 2}}, "start.heading_deg|None"),
+    (
+        {"levels": [{"walls": [], "questions": [{"text": "?", "about": "cat", "at": [0, 0]}]}]},
+        "one of door, wall, room",
+    ),
+    ({"levels": [{"walls": [], "questions": [{"text": "?", "about": "door", "at": [0]}]}]}, r"questions\[0\].at"),
     ({"start": []}, "start"),
     ({"name": 4}, "name"),
     ({"name": "\ud800"}, "name"),
@@ -145,6 +154,10 @@ def test_all_fields(tmp_path: Path) -> None:
     assert plan.start == Pose(1, 1, math.radians(90), 1)
     assert plan.georeference == Georeference(-2.978, 56.46, math.radians(12.5), "EPSG:4326")
     assert plan.uncertainty_m == 0.05
+    assert ground.questions == (
+        Question("a door?", "door", (0, 1), ((0, 1, 0, 2),), is_proposed=True),
+        Question("open?", "room", (2, 1)),
+    )
 
 
 def same(one: Plan, other: Plan) -> None:
@@ -156,6 +169,7 @@ def same(one: Plan, other: Plan) -> None:
     for a, b in zip(one.levels, other.levels, strict=True):
         assert (a.name, a.height_m, a.rooms, a.doors) == (b.name, b.height_m, b.rooms, b.doors)
         assert all(same_array(p.outline_m, q.outline_m) for p, q in zip(a.rooms, b.rooms, strict=True))
+        assert a.questions == b.questions
         assert same_array(a.walls, b.walls)
         assert same_array(a.windows, b.windows)
         assert all(same_array(p, q) for p, q in zip(a.obstacles, b.obstacles, strict=True))

@@ -10,8 +10,8 @@ import matplotlib.font_manager as fonts
 import pytest
 
 import command_line
-from echostep.plan.pictures import drawing, labels
 from echostep.plan.model import Plan, load_plan
+from echostep.plan.pictures import drawing, labels
 from echostep.plan.pictures.drawing import draw_plan
 
 WALLS = [[400, 300, 404, 300], [404, 300, 404, 303], [404, 303, 402, 303], [401, 303, 400, 303], [400, 303, 400, 300]]

@@ -90,6 +90,7 @@ def import_(
     from echostep.plan.importers.hints import Hints
     from echostep.plan.importers.limited import import_reported
     from echostep.plan.importers.summary import summary
+    from echostep.plan.questions import with_questions
     from echostep.plan.writer import save_plan
 
     hints = Hints(
@@ -103,10 +104,17 @@ def import_(
         align,
     )
     plan, report = import_reported(files[0], hints, files[1:])
+    plan = with_questions(plan)
     save_plan(plan, out)
     for line in summary(plan, report):
         print(line)
-    print(f"{out}{_pictured(plan, out) if picture else ''}")
+    print(f"{out}{_pictured(plan, out) if picture else ''}{_asked(plan, out)}")
+
+
+def _asked(plan: Plan, out: Path) -> str:
+    """Words on the questions that an import leaves; empty without any."""
+    count = sum(len(level.questions) for level in plan.levels)
+    return f"; {count} question{'' if count == 1 else 's'} to answer: echostep plan edit {out}" if count else ""
 
 
 def _pictured(plan: Plan, out: Path) -> str:

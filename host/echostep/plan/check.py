@@ -14,9 +14,9 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Bools, Floats
-from echostep.plan.findings import Lines, PlanFinding
 from echostep.plan.model import Level, Plan
 from echostep.plan.places.faces import JAMB_M, OUTSIDE, TOUCH_M, Faces, extend, faces_under, find_faces
+from echostep.plan.places.findings import Lines, PlanFinding
 from echostep.plan.places.gaps import with_gaps
 from echostep.plan.places.leaks import narrowest_opening
 from echostep.plan.places.reachability import unreachable_rooms

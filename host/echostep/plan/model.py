@@ -22,11 +22,12 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.fields import checked, short
 from echostep.plan import plan_file
-from echostep.plan.plan_file import ConnectorFields, DoorFields, LevelFields, PlanFields, RoomFields
+from echostep.plan.plan_file import ConnectorFields, DoorFields, LevelFields, PlanFields, QuestionFields, RoomFields
 
 FORMAT_VERSION = 1
 ConnectorKind = plan_file.ConnectorKind
 DoorState = plan_file.DoorState
+QuestionAbout = plan_file.QuestionAbout
 WITHOUT_LENGTH = "a wall without length: both ends are the same point"
 
 
@@ -59,6 +60,20 @@ class Door:
 
 
 @dataclass(frozen=True, slots=True)
+class Question:
+    """What an import could not decide, for a person to answer in the plan editor; walks ignore it.
+
+    `at_m`: where to look. `lines_m`: the doors or walls that it is about. `is_proposed`: they are no part of the plan, but may be.
+    """
+
+    text: str
+    about: QuestionAbout
+    at_m: tuple[float, float]
+    lines_m: tuple[tuple[float, float, float, float], ...] = ()
+    is_proposed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Level:
     """One level: `walls` (n, 4) and `windows` (k, 4) are x0, y0, x1, y1 in map metres; doors are gaps in them; obstacles are outlines (m, 2).
 
@@ -73,6 +88,7 @@ class Level:
     windows: Floats = field(default_factory=_no_segments)
     obstacles: tuple[Floats, ...] = ()
     doubtful: Floats = field(default_factory=_no_segments)
+    questions: tuple[Question, ...] = ()
 
     @property
     def solid(self) -> Floats:
@@ -199,6 +215,7 @@ def _level(fields: LevelFields, where: str) -> Level:
         windows=_segments(fields.windows, f"{where}.windows"),
         obstacles=tuple(_outline(corners, f"{where}.obstacles[{i}]") for i, corners in enumerate(fields.obstacles)),
         doubtful=_segments(fields.doubtful, f"{where}.doubtful"),
+        questions=tuple(_question(question, f"{where}.questions[{i}]") for i, question in enumerate(fields.questions)),
     )
 
 
@@ -211,6 +228,11 @@ def _door(fields: DoorFields, where: str) -> Door:
     if fields.line[:2] == fields.line[2:]:
         raise ValueError(f"{where}.line: {WITHOUT_LENGTH}")
     return Door(fields.line, fields.state, fields.name)
+
+
+def _question(fields: QuestionFields, where: str) -> Question:
+    _segments(fields.lines, f"{where}.lines")
+    return Question(fields.text, fields.about, fields.at, tuple(fields.lines), fields.proposed)
 
 
 def _connector(fields: ConnectorFields, where: str, names: list[str]) -> Connector:

@@ -10,11 +10,11 @@ from typing import Annotated, Literal
 
 from msgspec import UNSET, Meta, Struct, UnsetType
 
-from echostep.plan.json_fields import LIMIT_M
-
+LIMIT_M = 1e5  # greatest coordinate: 100 km, more than any site
 MOST_CORNERS = 10_000  # of an outline: a room of a drawing with arcs has hundreds
 DoorState = Literal["open", "closed", "unknown"]
 ConnectorKind = Literal["stairs", "lift", "ramp"]
+QuestionAbout = Literal["door", "wall", "room"]
 
 Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M, description=f"a finite number within {LIMIT_M:.0f} m")]
 Deviation = Annotated[float, Meta(ge=0.0, le=LIMIT_M, description=f"a finite number from 0 to {LIMIT_M:.0f} m")]
@@ -44,6 +44,16 @@ class DoorFields(Struct):
     name: Text = ""
 
 
+class QuestionFields(Struct):
+    """What an import could not decide."""
+
+    text: Text
+    about: Annotated[QuestionAbout, Meta(description="one of door, wall, room")]
+    at: Point
+    lines: Segments = []
+    proposed: bool = False
+
+
 class LevelFields(Struct):
     """One level."""
 
@@ -55,6 +65,7 @@ class LevelFields(Struct):
     windows: Segments = []
     obstacles: list[Outline] = []
     doubtful: Segments = []
+    questions: list[QuestionFields] = []
 
 
 class ConnectorFields(Struct):

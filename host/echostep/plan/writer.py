@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from echostep.errors import EchostepError
-from echostep.plan.model import FORMAT_VERSION, Connector, Door, Georeference, Level, Plan, Pose, Room
+from echostep.plan.model import FORMAT_VERSION, Connector, Door, Georeference, Level, Plan, Pose, Question, Room
 
 
 def save_plan(plan: Plan, path: Path | str) -> None:
@@ -48,11 +48,20 @@ def _level(level: Level) -> dict[str, Any]:
         tree["doors"] = [_door(door) for door in level.doors]
     if level.obstacles:
         tree["obstacles"] = [corners.tolist() for corners in level.obstacles]
+    if level.questions:
+        tree["questions"] = [_question(question) for question in level.questions]
     return tree | {"rooms": [_room(room) for room in level.rooms]}
 
 
 def _door(door: Door) -> dict[str, Any]:
     return {"line": list(door.line), "state": door.state} | ({"name": door.name} if door.name else {})
+
+
+def _question(question: Question) -> dict[str, Any]:
+    lines = [list(line) for line in question.lines_m]
+    return {
+        "text": question.text, "about": question.about, "at": list(question.at_m), "lines": lines, "proposed": question.is_proposed,
+    }  # fmt: skip
 
 
 def _room(room: Room) -> dict[str, Any]:

@@ -3,6 +3,8 @@
 
 export const GRID_M = 0.05;
 export const JOINT_M = 1e-3; // ends with a smaller distance are one joint
+const THICK_M = 0.6, JAMB_M = 0.15; // distance of a wall's two faces, and of a door's end from the wall's end there, at most
+const PARALLEL = 0.02; // sine of the angle below which the faces of a wall are parallel
 const IN_LINE = 1e-3; // sine of the angle below which two segments are in line
 
 export const round = (v) => Math.round(v * 1e4) / 1e4;
@@ -72,6 +74,7 @@ export function crossing([px, py], [ux, uy], [x0, y0, x1, y1]) {
 }
 
 // Cut a door of a width into wall k at the point nearest to p; null where the wall is too short. Remaining pieces shorter than a joint are dropped.
+// Of a wall that is drawn as two faces the other one is cut too, and the gap's ends join both.
 export function cutDoor(level, k, p, width, kept = { state: 'unknown' }) {
   const wall = level.walls[k], [a, b] = ends(wall), long = length(wall);
   if (!(width > JOINT_M) || long < width - JOINT_M) return null;
@@ -79,9 +82,31 @@ export function cutDoor(level, k, p, width, kept = { state: 'unknown' }) {
   let s = Math.min(Math.max(foot(p, wall).t * long - w / 2, 0), long - w);
   s = Math.min(Math.round(s / GRID_M) * GRID_M, long - w);
   const at = (d) => (d <= JOINT_M ? a : d >= long - JOINT_M ? b : spot([a[0] + d * u[0], a[1] + d * u[1]]));
-  const jambs = [at(s), at(s + w)];
-  const parts = [[...a, ...jambs[0]], [...jambs[1], ...b]].filter((part) => length(part) > JOINT_M);
-  return { ...level, walls: level.walls.toSpliced(k, 1, ...parts), doors: [...(level.doors ?? []), { ...kept, line: jambs.flat() }] };
+  const jambs = [at(s), at(s + w)], other = otherFace(level.walls, k, jambs), walls = level.walls.toSpliced(k, 1, ...beside(wall, jambs));
+  if (other >= 0) {
+    const face = level.walls[other], across = jambs.map((e) => spot(foot(e, face).at));
+    walls.splice(walls.indexOf(face), 1, ...beside(face, across));
+    jambs.forEach((e, i) => { if (!ends(wall).some((corner) => same(corner, e))) walls.push([...e, ...across[i]]); });
+  }
+  return { ...level, walls, doors: [...(level.doors ?? []), { ...kept, line: jambs.flat() }] };
+}
+
+// The parts of a wall on both sides of the piece between two points on it, in the order of the wall.
+function beside(wall, [p, q]) {
+  const [near, far] = foot(p, wall).t <= foot(q, wall).t ? [p, q] : [q, p], [a, b] = ends(wall);
+  return [[...a, ...near], [...far, ...b]].filter((part) => length(part) > JOINT_M);
+}
+
+// The other face of the wall whose one face is wall k: the index of the nearest parallel wall all along the piece from p to q, or -1.
+function otherFace(walls, k, [p, q]) {
+  const u = unit(p, q), along = (e) => (e[0] - p[0]) * u[0] + (e[1] - p[1]) * u[1];
+  let found = -1, least = THICK_M;
+  walls.forEach((row, i) => {
+    const [a, b] = ends(row), v = unit(a, b), away = Math.abs((a[0] - p[0]) * u[1] - (a[1] - p[1]) * u[0]);
+    const covers = Math.min(along(a), along(b)) < JOINT_M && Math.max(along(a), along(b)) > distance(p, q) - JOINT_M;
+    if (i !== k && covers && Math.abs(u[0] * v[1] - u[1] * v[0]) < PARALLEL && away > JOINT_M && away < least) [found, least] = [i, away];
+  });
+  return found;
 }
 
 // Whether two segments are in line and share an end.
@@ -91,19 +116,39 @@ function continues(a, b) {
   return Math.abs(ux * vy - uy * vx) < IN_LINE && [p, q].some((e) => same(e, r) || same(e, s));
 }
 
-// Remove door k: the walls on both sides and the gap become one wall. Returns {level, wall: its index, or -1 when no wall was beside the door}.
-export function fillDoor(level, k) {
-  const door = level.doors[k].line, doors = level.doors.toSpliced(k, 1), sides = [];
-  for (const end of ends(door)) {
-    const i = level.walls.findIndex((w, j) => !sides.includes(j) && continues(door, w) && ends(w).some((e) => same(e, end)));
+// Fill the gap of a line: the walls that continue it and the gap become one wall, the last. Returns the walls; the same ones when no wall is beside the gap.
+function filled(walls, line) {
+  const sides = [];
+  for (const end of ends(line)) {
+    const i = walls.findIndex((w, j) => !sides.includes(j) && continues(line, w) && ends(w).some((e) => same(e, end)));
     if (i >= 0) sides.push(i);
   }
-  if (!sides.length) return { level: { ...level, doors }, wall: -1 };
-  const points = [...ends(door), ...sides.flatMap((i) => ends(level.walls[i]))], u = unit(...ends(door));
+  if (!sides.length) return walls;
+  const points = [...ends(line), ...sides.flatMap((i) => ends(walls[i]))], u = unit(...ends(line));
   const along = (e) => e[0] * u[0] + e[1] * u[1];
   points.sort((a, b) => along(a) - along(b));
-  const walls = [...level.walls.filter((_, i) => !sides.includes(i)), [...points[0], ...points.at(-1)]];
-  return { level: { ...level, walls, doors }, wall: walls.length - 1 };
+  return [...walls.filter((_, i) => !sides.includes(i)), [...points[0], ...points.at(-1)]];
+}
+
+// The two ends of a gap in a wall that is drawn as two faces: short walls across the line, one at each of its ends; null for other gaps.
+function jambsOf(walls, line) {
+  const u = unit(...ends(line)), found = ends(line).map((end) => walls.find((w) => {
+    const v = unit(...ends(w));
+    return length(w) < THICK_M && Math.abs(u[0] * v[0] + u[1] * v[1]) < PARALLEL && foot(end, w).away < JAMB_M;
+  }));
+  return found.every(Boolean) && Math.abs(length(found[0]) - length(found[1])) < GRID_M ? found : null;
+}
+
+// Remove door k: the walls on both sides and the gap become one wall, of a wall with two faces both. Returns {level, wall: its index, or -1 when no wall was beside the door}.
+export function fillDoor(level, k) {
+  const { line } = level.doors[k], doors = level.doors.toSpliced(k, 1), jambs = jambsOf(level.walls, line);
+  let walls = level.walls;
+  if (jambs) {
+    const [[a, b], other] = jambs.map(ends), [c, d] = distance(a, other[0]) < distance(a, other[1]) ? other : other.toReversed();
+    const off = (row) => foot(line.slice(0, 2), row).away, faces = [[...a, ...c], [...b, ...d]].sort((one, two) => off(two) - off(one));
+    walls = faces.reduce(filled, walls.filter((wall) => !jambs.includes(wall)));
+  } else walls = filled(walls, line);
+  return { level: { ...level, walls, doors }, wall: walls === level.walls ? -1 : walls.length - 1 };
 }
 
 // Move the centre of door k to p: along its wall, or freely where it has none. Null where it does not fit.

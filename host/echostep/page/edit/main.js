@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The plan editor: loads the plan and the picture, connects sheet, tools, view and buttons, saves. A *level* is an index into the plan's levels.
 
+import { Asking } from './asking.js';
 import { box } from './geometry.js';
 import { paint } from './paint.js';
 import { Pointer } from './pointer.js';
@@ -13,7 +14,7 @@ const byId = (id) => document.getElementById(id);
 const KEYS = { v: 'select', w: 'wall', d: 'door', x: 'erase', n: 'room', s: 'scale', o: 'origin' };
 const FIRST_WIDTH_M = 20; // of a picture without a scale
 const view = new View(), map = byId('map');
-let sheet, tools, stamp, waiting = false;
+let sheet, tools, asking, stamp, waiting = false;
 
 const say = (text) => { byId('status').textContent = text; };
 const wrong = (text) => { byId('wrong').textContent = text; };
@@ -44,10 +45,11 @@ function changed() {
 
 function draw() {
   waiting = false;
-  paint({ level: tools.level, picture: tools.picture, view, chosen: tools.chosen, draft: tools.draft, measure: Boolean(tools.live), cross: tools.cross, points: tools.points });
+  asking.paint();
+  paint({ shown: asking.shown, level: tools.level, picture: tools.picture, view, chosen: tools.chosen, draft: tools.draft, measure: Boolean(tools.live), cross: tools.cross, points: tools.points });
   for (const button of document.querySelectorAll('[data-tool]')) button.setAttribute('aria-pressed', String(button.dataset.tool === tools.name));
-  byId('undo').disabled = !sheet.past.length;
-  byId('redo').disabled = !sheet.future.length;
+  byId('step-back').disabled = !sheet.past.length;
+  byId('step-forth').disabled = !sheet.future.length;
   byId('save').toggleAttribute('data-unsaved', sheet.unsaved);
   byId('title').textContent = `${sheet.tree.name}${sheet.unsaved ? ' (not saved)' : ''}`;
   const names = sheet.tree.levels.map((level) => level.name), options = byId('level');
@@ -123,7 +125,7 @@ function key(e) {
   const done = {
     ArrowLeft: () => step(e, [-1, 0]), ArrowRight: () => step(e, [1, 0]), ArrowUp: () => step(e, [0, 1]), ArrowDown: () => step(e, [0, -1]),
     Enter: enter, ' ': enter, Escape: () => { tools.stop(); say('Ended'); }, Delete: () => tools.chosen && tools.remove(tools.chosen), Backspace: () => tools.chosen && tools.remove(tools.chosen),
-    '+': () => view.zoom(1.25), '=': () => view.zoom(1.25), '-': () => view.zoom(0.8), 0: show, PageUp: () => goLevel(sheet.k + 1), PageDown: () => goLevel(sheet.k - 1),
+    '+': () => view.zoom(1.25), '=': () => view.zoom(1.25), '-': () => view.zoom(0.8), 0: show, a: () => asking.accept(), m: () => asking.place(), r: () => asking.reject(), q: () => asking.next(), PageUp: () => goLevel(sheet.k + 1), PageDown: () => goLevel(sheet.k - 1),
   }[name] ?? (KEYS[name] && (() => pick(KEYS[name])));
   if (!done) return;
   e.preventDefault();
@@ -164,7 +166,8 @@ async function start() {
   stamp = answer.headers.get('etag');
   sheet = new Sheet(tree);
   await loadPicture(tree.name);
-  tools = new Tools(sheet, view, { ask, say, changed, doorWidth });
+  tools = new Tools(sheet, view, { ask, say, changed, doorWidth, asked: (question) => asking.show(question, false), placed: (p) => asking.placed(p) });
+  asking = new Asking(sheet, view, tools, { say, changed });
   new Pointer(map, view, { down: (p) => tools.down(p), move: (p) => tools.move(p), up: (p, click) => tools.up(p, click), cancel: () => { tools.cancel(); changed(); }, moved: changed });
   new ResizeObserver(() => { view.resize(map.clientWidth, map.clientHeight); changed(); }).observe(map);
   view.resize(map.clientWidth, map.clientHeight);
@@ -173,15 +176,16 @@ async function start() {
   document.addEventListener('keydown', key);
   for (const button of document.querySelectorAll('[data-tool]')) button.onclick = () => pick(button.dataset.tool);
   const clicks = {
-    end: () => { tools.stop(); changed(); }, add: addLevel, undo: () => turn('undo'), redo: () => turn('redo'), whole: show, save: () => save(),
+    end: () => { tools.stop(); changed(); }, add: addLevel, 'step-back': () => turn('undo'), 'step-forth': () => turn('redo'), whole: show, save: () => save(),
     closer: () => { view.zoom(1.25); changed(); }, farther: () => { view.zoom(0.8); changed(); },
   };
   for (const [id, done] of Object.entries(clicks)) byId(id).onclick = done;
   byId('level').onchange = () => goLevel(Number(byId('level').value));
   startTheme(byId('look'), changed);
   addEventListener('beforeunload', (e) => { if (sheet.unsaved) e.preventDefault(); });
-  say(sheet.picture && !sheet.picture.set ? 'Set the scale first: Scale, then two points whose distance you know' : HINTS.select);
-  window.echostep = { view, sheet, tools };
+  const asked = asking.open.length && `${asking.open.length} questions of the import are marked: answer them one by one, or Move, Door and Delete as you like`;
+  say(sheet.picture && !sheet.picture.set ? 'Set the scale first: Scale, then two points whose distance you know' : asked || HINTS.select);
+  window.echostep = { view, sheet, tools, asking };
 }
 
 start().catch((error) => wrong(`Cannot start: ${error.message}`));

@@ -17,7 +17,19 @@ function mark(kind, [x, y], text, chosen) {
   return made;
 }
 
-export function paint({ level, picture, view, chosen, draft, measure, cross, points }) {
+// The open questions of a level: their lines, dashed where they are proposed, and a mark each.
+function paintQuestions(questions, shown, view) {
+  const lines = (wanted) => path(questions.filter((q) => q.proposed === wanted).flatMap((q) => q.lines));
+  byId('asked-lines').setAttribute('d', lines(false));
+  byId('proposed').setAttribute('d', lines(true));
+  return questions.flatMap((question) => {
+    const [x, y] = view.toScreen(...question.at), made = [mark('circle', [x, y]), mark('text', [x, y + 5], '?')];
+    for (const one of made) one.dataset.question = question === shown ? 'shown' : '';
+    return made;
+  });
+}
+
+export function paint({ level, picture, view, chosen, shown, draft, measure, cross, points }) {
   byId('world').setAttribute('transform', `matrix(${view.matrix().join(' ')})`);
   const image = byId('image');
   image.toggleAttribute('hidden', !picture);
@@ -32,7 +44,7 @@ export function paint({ level, picture, view, chosen, draft, measure, cross, poi
   byId('draft').setAttribute('d', draft ? path([draft]) : '');
   const marks = (level.rooms ?? []).map((room, k) => mark('text', view.toScreen(...room.at), room.name, chosen?.kind === 'room' && chosen.k === k));
   for (const p of [...(row ? ends(row) : []), ...points]) marks.push(mark('circle', view.toScreen(...p)));
-  byId('marks').replaceChildren(...marks);
+  byId('marks').replaceChildren(...marks, ...paintQuestions(level.questions ?? [], shown, view));
   byId('cross').setAttribute('transform', `translate(${view.toScreen(...cross).join(' ')})`);
   const measured = draft ?? (measure ? row : null), text = byId('measure');
   text.textContent = measured && length(measured) > 0 ? `${length(measured).toFixed(2)} m` : '';

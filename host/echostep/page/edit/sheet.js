@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The sheet: the plan and the picture's position, with undo and redo. Owns the history; every change makes a new tree.
 
+import { settled } from './questions.js';
+
 const MOST_KEPT = 300; // changes that can be undone
 
 export class Sheet {
@@ -15,7 +17,7 @@ export class Sheet {
     [this.tree, this.picture, this.future] = [tree, picture, []];
   }
 
-  setLevel(level) { this.change({ ...this.tree, levels: this.tree.levels.with(this.k, level) }); }
+  setLevel(level) { this.change({ ...this.tree, levels: this.tree.levels.with(this.k, settled(level)) }); }
 
   undo() { this.go(this.past, this.future); }
   redo() { this.go(this.future, this.past); }

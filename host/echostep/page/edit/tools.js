@@ -3,10 +3,12 @@
 
 import { cutDoor, distance, ends, fillDoor, foot, hit, moveDoor, moveJoints, moveWall, onGrid, round, same, scaled, snap } from './geometry.js';
 
+import { questionAt } from './questions.js';
+
 const REACH_PX = 14;
 
 export class Tools {
-  // `desk`: ask(question, answer) -> promise of a text or null, say(text), changed(), doorWidth() in metres
+  // `desk`: ask(question, answer) -> promise of a text or null, say(text), changed(), doorWidth() in metres, asked(question), placed(position)
   constructor(sheet, view, desk) {
     Object.assign(this, { sheet, view, desk, name: 'select', pressed: null, held: null, live: null, chosen: null, draft: null, chain: null, points: [], cross: [0, 0] });
   }
@@ -36,7 +38,9 @@ export class Tools {
     this.cross = p;
     this.pressed = { at: p, began: false };
     if (this.name === 'origin' && this.sheet.picture) this.held = { from: p };
-    if (this.name === 'select') {
+    const asked = this.name === 'select' && questionAt(this.level, p, this.reach);
+    if (asked) this.desk.asked(asked);
+    else if (this.name === 'select') {
       const found = hit(this.level, p, this.reach);
       this.chosen = found;
       if (found) this.held = { found, from: p };
@@ -118,6 +122,8 @@ export class Tools {
     if (cut) sheet.setLevel(cut);
     this.desk.say(cut ? `Door ${width.toFixed(2)} m` : `This wall is shorter than ${width.toFixed(2)} m`);
   }
+
+  place(p) { this.desk.placed(p); }
 
   erase(p) { this.remove(hit(this.sheet.level, p, this.reach)); }
 

@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Floats
 from echostep.plan.importers.straight import merge_collinear
-from echostep.plan.model import ConnectorKind, Door, Level, Room
+from echostep.plan.model import ConnectorKind, Door, Level, Question, Room
 
 # Assumed, all of them:
 CLOSE_M = 0.01  # half the width of the widest crack between two pieces of a wall that is closed
@@ -56,6 +56,7 @@ class DrawnLevel:
     cuts: list[BaseGeometry] = field(
         default_factory=list
     )  # where walls drawn as lines are cut besides at the doors' lines
+    questions: list[Question] = field(default_factory=list)
 
     def level(self) -> Level:
         """These shapes as a level of a plan; coordinates are rounded to a millimetre."""
@@ -68,6 +69,7 @@ class DrawnLevel:
             doors=tuple(self.doors),
             windows=merge_collinear(np.concatenate((window_faces, self._lines(self.windows)))),
             obstacles=tuple(corners for area in self.obstacles if len(corners := ring(area)) > 2),
+            questions=tuple(self.questions),
         )
 
     def _lines(self, shapes: Iterable[BaseGeometry]) -> Floats:

@@ -17,7 +17,8 @@ from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Floats
 from echostep.plan.georeference import EarthTransform
-from echostep.plan.json_fields import LIMIT_M, text, typed
+from echostep.plan.importers.parsing import text, typed
+from echostep.plan.plan_file import LIMIT_M
 
 
 def features(tree: Any) -> Iterator[tuple[str, dict[str, Any]]]:

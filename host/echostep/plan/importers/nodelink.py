@@ -20,8 +20,8 @@ from echostep.errors import EchostepError
 from echostep.plan.importers.connector_shapes import join_connectors
 from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas
 from echostep.plan.importers.parsing import read_text
-from echostep.plan.json_fields import LIMIT_M
 from echostep.plan.model import Plan
+from echostep.plan.plan_file import LIMIT_M
 
 MOST_FLOORS = 200
 ZONE_WITH_STAIRS = "1"

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Reads untrusted files within limits.
+"""Reads untrusted files within limits, and checks values in their JSON.
 
-In: a path. Out: bytes, text, or parsed JSON; every error is an EchostepError that names the file. Owns the limits.
+In: a path. Out: bytes, text, or parsed JSON; every error is an EchostepError that names the file. In: a value and its path in the file, as
+`features[3].geometry`. Out: the value with its type, or a ValueError that begins with the path. Owns the limits.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from echostep.errors import EchostepError
+from echostep.fields import short
 
 FORMATS = "DXF, IFC, IMDF (zip or folder), OpenStreetMap (.osm, .xml, .geojson, JSON of Overpass), ROS (map.yaml), WRLD (main.json), biba (core.txt)"
 LARGEST_BYTES = 512 * 2**20
@@ -41,12 +43,33 @@ def decode(raw: bytes, name: str) -> str:
         raise EchostepError(f"{name}: not UTF-8 text (byte {error.start}): save it as UTF-8") from error
 
 
-def parse_json(text: str, name: str) -> Any:
+def parse_json(raw: str, name: str) -> Any:
     """Parse JSON; NaN and infinities are errors."""
     try:
-        return json.loads(text, parse_constant=_refuse)
+        return json.loads(raw, parse_constant=_refuse)
     except (ValueError, RecursionError) as error:
         raise EchostepError(f"{name}: not JSON: {error}") from error
+
+
+def number(value: Any, where: str, limit: float, unit: str) -> float:
+    """A finite number within +-limit."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= limit:
+        raise ValueError(f"{where}: {short(value)} is not a finite number within {limit:.0f} {unit}")
+    return float(value)
+
+
+def text(value: Any, where: str) -> str:
+    """A string that can be written as UTF-8."""
+    if not isinstance(value, str) or any("\ud800" <= letter <= "\udfff" for letter in value):
+        raise ValueError(f"{where}: {short(value)} is not a text")
+    return value
+
+
+def typed(value: Any, where: str, kind: type) -> Any:
+    """A value of type `kind`: list, or dict (an object)."""
+    if not isinstance(value, kind):
+        raise ValueError(f"{where}: expected {'a list' if kind is list else 'an object'}, found {type(value).__name__}")
+    return value
 
 
 def _refuse(constant: str) -> float:

@@ -9,69 +9,85 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
+from msgspec import Meta, Struct
 from shapely.geometry.base import BaseGeometry
 
 from echostep.errors import EchostepError
+from echostep.fields import checked
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.importers.connector_shapes import join_connectors, same_place
 from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, opening, room
 from echostep.plan.importers.geojson import features, label, properties, shape
-from echostep.plan.importers.parsing import parse_json, read_text
+from echostep.plan.importers.parsing import parse_json, read_text, text
 from echostep.plan.importers.report import ImportReport
-from echostep.plan.json_fields import number, text, typed
 from echostep.plan.model import Door, Georeference, Plan
+from echostep.plan.plan_file import Longitude, Text
 
 CONNECTOR_KINDS = {"stairs": "stairs", "elevator": "lift", "escalator": "stairs", "ramp": "ramp"}
 OPEN_PLAN = {"room", "bathroom", "no_geometry", "hallway", "pathway"}  # areas without walls of their own
 
 
+class LocationFields(Struct):
+    """Where the building stands, as a point of GeoJSON."""
+
+    coordinates: Annotated[list[Longitude], Meta(min_length=2, description="[longitude, latitude] in degrees")]
+
+    def __post_init__(self) -> None:
+        if not abs(self.coordinates[1]) <= 90.0:
+            raise ValueError("location.coordinates: a latitude beyond 90 degrees")
+
+
+class FloorFields(Struct):
+    """One level and its file."""
+
+    filename: Text
+    z_order: Annotated[float, Meta(ge=-1000, le=1000, description="a finite number within 1000 floors")]
+    name: Text = ""
+    readable_name: Text = ""
+
+
+class BuildingFields(Struct):
+    """What is read of main.json."""
+
+    location: LocationFields
+    levels: Annotated[list[FloorFields], Meta(min_length=1, description="a list of at least one level")]
+    name: Text = ""
+
+
 def import_wrld(path: Path, storey_height_m: float, report: ImportReport) -> Plan:
     """Import the building of a main.json; raises EchostepError that names the file and the feature."""
-    tree = parse_json(read_text(path), str(path))
     try:
-        tree = typed(tree, "the file", dict)
-        georeference = _georeference(tree)
-        levels = sorted(
-            (
-                _floor(row, f"levels[{i}]", path.parent)
-                for i, row in enumerate(typed(tree.get("levels"), "levels", list))
-            ),
-            key=lambda level: level[0],
-        )
-        if not levels:
-            raise ValueError("levels: a plan needs at least one level")
-        name = text(tree.get("name", path.parent.name), "name")
+        building = checked(parse_json(read_text(path), str(path)), BuildingFields)
+        files = [_beside(row.filename, f"levels[{i}]", path.parent) for i, row in enumerate(building.levels)]
     except ValueError as error:
         raise EchostepError(f"{path}: {error}") from error
+    longitude, latitude = building.location.coordinates[:2]
+    georeference = Georeference(longitude, latitude)
     earth = EarthTransform(georeference)
     drawn_levels = [
-        _level(file, DrawnLevel(level_name, round(z * storey_height_m, 6)), earth, report)
-        for z, level_name, file in levels
+        _level(
+            file, DrawnLevel(row.readable_name or row.name, round(int(row.z_order) * storey_height_m, 6)), earth, report
+        )
+        for row, file in sorted(zip(building.levels, files, strict=True), key=lambda pair: pair[0].z_order)
     ]
     _open_levels(drawn_levels)
     return Plan(
-        name, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels), georeference
+        building.name or path.parent.name,
+        tuple(drawn.level() for drawn in drawn_levels),
+        None,
+        "",
+        join_connectors(drawn_levels),
+        georeference,
     )
 
 
-def _georeference(tree: dict[str, Any]) -> Georeference:
-    where = "location.coordinates"
-    at = typed(typed(tree.get("location"), "location", dict).get("coordinates"), where, list)
-    if len(at) < 2:
-        raise ValueError(f"{where}: expected [longitude, latitude]")
-    return Georeference(number(at[0], where, 180.0, "degrees"), number(at[1], where, 90.0, "degrees"))
-
-
-def _floor(row: Any, where: str, folder: Path) -> tuple[int, str, Path]:
-    """Order, name and file of a level; the file must be in the folder of main.json."""
-    row = typed(row, where, dict)
-    name = text(row.get("readable_name", row.get("name")), f"{where}.name")
-    file = text(row.get("filename"), f"{where}.filename")
+def _beside(file: str, where: str, folder: Path) -> Path:
+    """A level's file, which must be in the folder of main.json."""
     if Path(file).name != file or file in ("", "..") or "\x00" in file:
         raise ValueError(f"{where}.filename: {file[:60]!r} is not a file beside main.json")
-    return int(number(row.get("z_order"), f"{where}.z_order", 1000, "floors")), name, folder / file
+    return folder / file
 
 
 def _level(file: Path, drawn: DrawnLevel, earth: EarthTransform, report: ImportReport) -> DrawnLevel:

@@ -22,7 +22,7 @@ from echostep.plan.places.faces import find_faces
 from echostep.plan.places.spaces import MOST_WALLS
 
 if TYPE_CHECKING:
-    from echostep.plan.findings import PlanFinding
+    from echostep.plan.places.findings import PlanFinding
 
 WALL, WINDOW, DOOR, OBSTACLE = "#333333", "#56b4e9", "#d55e00", "#bbbbbb"
 ROOM, ROOM_NAME = "#f3efe6", "#555555"

@@ -11,9 +11,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from echostep.plan.findings import PlanFinding
 from echostep.plan.model import Level, Plan, Room
 from echostep.plan.places.faces import OUTSIDE, Face, Faces, connected_groups, door_faces, leader_of
+from echostep.plan.places.findings import PlanFinding
 
 MANY_CLOSED = 5  # from so many rooms without a door on a level, their cause is reported once; assumed
 

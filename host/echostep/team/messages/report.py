@@ -21,7 +21,7 @@ from msgspec import Meta
 
 from echostep.errors import EchostepError
 from echostep.fields import field_of
-from echostep.plan.json_fields import LIMIT_M
+from echostep.plan.plan_file import LIMIT_M
 from echostep.ports.people.payloads import has_covariance
 
 MAX_PAYLOAD = 8192  # bytes; a report has about 900

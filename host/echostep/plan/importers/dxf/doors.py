@@ -20,7 +20,7 @@ from shapely.geometry.base import BaseGeometry
 from echostep.plan.importers.drawn_level import opening
 from echostep.plan.importers.dxf.gaps import BY_M, NEAR_M, Gap, WallBands
 from echostep.plan.importers.dxf.symbols import NARROWEST_M, Point, Swing, Symbol
-from echostep.plan.model import Door
+from echostep.plan.model import Door, Question
 
 LONG = 2.5  # length of a leaf by its thickness, at least; assumed
 WIDEST_M = 12.0  # of a door without a swing: gates
@@ -36,14 +36,16 @@ Line = tuple[float, float, float, float]
 
 @dataclass(slots=True)
 class PlacedDoors:
-    """Doors in walls; `cuts`: areas of walls that are drawn through them.
+    """Doors in walls; `cuts`: areas of walls that are drawn through them, the `cut_doors`.
 
-    `strays`: middles of symbols in no wall. `marks`: number of small shapes that are no doors: frames of numbers, jambs.
+    `strays`: middles of symbols in no wall, and what would be their doors.
+    `marks`: number of small shapes that are no doors: frames of numbers, jambs.
     """
 
     doors: list[Door] = field(default_factory=list)
     cuts: list[BaseGeometry] = field(default_factory=list)
-    strays: list[Point] = field(default_factory=list)
+    cut_doors: list[Line] = field(default_factory=list)
+    strays: list[tuple[Point, Line]] = field(default_factory=list)
     marks: int = 0
 
     def add(self, symbol: Symbol, walls: WallBands) -> None:
@@ -53,13 +55,14 @@ class PlacedDoors:
             self.marks += 1
         elif not lines:
             middle = shapely.union_all(symbol.lines).envelope.centroid
-            self.strays.append((round(middle.x, 2), round(middle.y, 2)))
+            self.strays.append(((round(middle.x, 2), round(middle.y, 2)), _drawn_line(symbol)))
         for line in _joined(lines):
             if not any(_same(line, other.line) for other in self.doors):
                 self.doors.append(Door(line))
                 width_m = math.dist(line[:2], line[2:])
                 if walls.gap(line[:2], _along(line), width_m / 2, width_m) is None:
                     self.cuts.append(walls.faces(line, THICKEST_M))
+                    self.cut_doors.append(line)
 
     def add_swing(self, swing: Swing, walls: WallBands) -> Line | None:
         """Place a swing that lies on no layer of doors, if it fits a gap exactly; returns the gap, None where it does not."""
@@ -82,6 +85,15 @@ class PlacedDoors:
             self.doors.append(Door(lines[0]))
         return lines[0]
 
+    def questions(self) -> Iterator[Question]:
+        """What a person should look at: symbols in no wall, and doors that a wall is drawn through."""
+        for at, line in self.strays:
+            if math.dist(line[:2], line[2:]) > BY_M:
+                yield Question("door in no wall, left out: is it a door?", "door", at, (line,), is_proposed=True)
+        for line in self.cut_doors:
+            at = (line[0] + line[2]) / 2, (line[1] + line[3]) / 2
+            yield Question("a wall was drawn through this door, and cut: is it a door?", "door", at, (line,))
+
 
 def _lines(symbol: Symbol, walls: WallBands) -> Iterator[Line]:
     """A line from jamb to jamb for each leaf of a symbol that hangs in a wall."""
@@ -93,6 +105,14 @@ def _lines(symbol: Symbol, walls: WallBands) -> Iterator[Line]:
         line = _of_line(symbol.lines, walls)
         if line is not None:
             yield line
+
+
+def _drawn_line(symbol: Symbol) -> Line:
+    """The line of a door that stands in no wall: from the hinge to the closed end of its arc, else along its longest side."""
+    if symbol.swings:
+        swing = symbol.swings[0]
+        return (*swing.hinge, *swing.ends[0 if swing.leaf == 1 else 1])
+    return opening(shapely.union_all([line.buffer(0.01, cap_style="flat") for line in symbol.lines]))
 
 
 def _meeting(swing: Swing, swings: Sequence[Swing]) -> Swing:

@@ -7,11 +7,12 @@ layer of walls become walls, also inside blocks; the meaning of a layer is recog
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import shapely
 from shapely.affinity import translate
 from shapely.geometry import LineString, MultiLineString, Point, box
@@ -24,18 +25,20 @@ from echostep.plan.importers.dxf.doors import PlacedDoors
 from echostep.plan.importers.dxf.entities import parts
 from echostep.plan.importers.dxf.frame import DrawingFrame
 from echostep.plan.importers.dxf.gaps import WallBands
+from echostep.plan.importers.dxf.layers import pieces_of
 from echostep.plan.importers.dxf.rooms import rooms_of
 from echostep.plan.importers.dxf.sheet import Sheet, read_sheet
 from echostep.plan.importers.dxf.storeys import alignment, bounds_of, lies_over, storey_boxes, window_words
 from echostep.plan.importers.dxf.symbols import LEAF_M, Swing, Symbol, draws_open_leaf, is_swing, symbol_of, symbols_of
 from echostep.plan.importers.hints import Hints
 from echostep.plan.importers.report import ImportReport
-from echostep.plan.model import ConnectorKind, Plan
+from echostep.plan.model import ConnectorKind, Plan, Question
 
 HALF_TREAD_M = 0.3  # half the greatest distance between neighbouring lines of one staircase: a tread
 CURVES = ("ARC", "ELLIPSE", "SPLINE", "LWPOLYLINE", "POLYLINE")  # entities that a swing may be drawn with
 DEEPEST_SYMBOL = 4  # blocks in blocks of one door
 SHOWN_STRAYS = 3
+MOST_PIECES = 2000  # of walls in a question
 
 
 @dataclass(slots=True)
@@ -156,6 +159,7 @@ def _drawn_level(storey: _Storey, drawn: DrawnLevel, report: ImportReport) -> Dr
     _without_lines(storey, report)
     doors = _doors(storey, report)
     drawn.doors, drawn.cuts = doors.doors, doors.cuts
+    drawn.questions = [*doors.questions(), *_left_out_walls(storey)]
     drawn.walls, drawn.windows = list(storey.lines("walls", "columns")), list(storey.lines("windows"))
     drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(_noded(storey.lines("obstacles")))))
     rooms = rooms_of(sheet.kinds["rooms"], storey.frame, sheet.file, report)
@@ -187,6 +191,19 @@ def _doors(storey: _Storey, report: ImportReport) -> PlacedDoors:
     _swings_elsewhere(storey, swings, placed, walls, report)
     _tell_doors(placed, report)
     return placed
+
+
+def _left_out_walls(storey: _Storey) -> Iterator[Question]:
+    """A question about each layer that looks like walls and was left out."""
+    for layer in storey.sheet.alike:
+        lines = [line for entity, own in storey.sheet.others if own == layer for line in storey.of(entity)]
+        pieces = np.round(pieces_of(lines), 3)
+        pieces = pieces[(pieces[:, :2] != pieces[:, 2:]).any(axis=1)]
+        if 0 < len(pieces) <= MOST_PIECES:
+            x0, y0, x1, y1 = pieces[np.hypot(*(pieces[:, 2:] - pieces[:, :2]).T).argmax()]
+            text = f"layer {layer[:40]} looks like walls and was left out: take it in?"
+            at = round(float(x0 + x1) / 2, 3), round(float(y0 + y1) / 2, 3)
+            yield Question(text, "wall", at, tuple((a, b, c, d) for a, b, c, d in pieces.tolist()), is_proposed=True)
 
 
 def _swings_elsewhere(
@@ -234,7 +251,7 @@ def _tell_doors(placed: PlacedDoors, report: ImportReport) -> None:
             f"{len(placed.cuts)} door{' lies' if one else 's lie'} where a wall is drawn through: the wall was cut there"
         )
     if placed.strays:
-        places = ", ".join(f"x {x:g} y {y:g}" for x, y in placed.strays[:SHOWN_STRAYS])
+        places = ", ".join(f"x {x:g} y {y:g}" for (x, y), _ in placed.strays[:SHOWN_STRAYS])
         one = len(placed.strays) == 1
         report.leave_out("door in no wall", len(placed.strays))
         report.doubt(

@@ -18,7 +18,7 @@ from shapely.geometry import LineString, Polygon
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.plan.json_fields import LIMIT_M
+from echostep.plan.plan_file import LIMIT_M
 
 METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 FLAT_M = 0.005  # greatest distance of an arc from the straight pieces that replace it

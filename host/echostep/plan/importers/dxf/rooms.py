@@ -15,8 +15,8 @@ from shapely.geometry import Point, Polygon
 from echostep.plan.importers.drawn_level import areas, room
 from echostep.plan.importers.dxf.frame import DrawingFrame
 from echostep.plan.importers.report import ImportReport
-from echostep.plan.json_fields import LIMIT_M
 from echostep.plan.model import Room
+from echostep.plan.plan_file import LIMIT_M
 
 LEAST_M2 = 1.0  # smaller closed lines are frames of texts, symbols, furniture; assumed
 TEXTS = ("TEXT", "MTEXT", "ATTRIB")

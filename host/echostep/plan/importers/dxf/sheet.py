@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ Layered = list[tuple[Any, str]]  # entities with their layers
 class Sheet:
     """`kinds`: entities by the meaning of their layers; `others`: those on layers without one.
 
-    `unit`: as the file states it; None where it does not, or where hints overrule it.
+    `alike`: layers of the others that look like walls. `unit`: as the file states it; None where it does not, or where hints overrule it.
     """
 
     file: Path
@@ -39,6 +39,7 @@ class Sheet:
     scale_m: float
     words: str
     unit: str | None
+    alike: tuple[str, ...] = ()
 
     @property
     def walls(self) -> list[Any]:
@@ -69,12 +70,14 @@ def read_sheet(file: Path, hints: Hints, report: ImportReport) -> Sheet:
         scale_m, words = scale_of(drawing, lengths, hints.units, file, report)
         unit = None if hints.units else stated_unit(drawing)
     sheet = Sheet(file, kinds, others, scale_m, words, unit)
-    _tell(sheet, report, asks="walls" not in hints.layers)
-    return sheet
+    return replace(sheet, alike=_tell(sheet, report, asks="walls" not in hints.layers))
 
 
-def _tell(sheet: Sheet, report: ImportReport, *, asks: bool) -> None:
-    """Report the layers used, what lies on others, and those that look like walls; raises EchostepError when most walls seem to be there."""
+def _tell(sheet: Sheet, report: ImportReport, *, asks: bool) -> tuple[str, ...]:
+    """Report the layers used, what lies on others, and those that look like walls, which are returned.
+
+    Raises EchostepError when most walls seem to be there.
+    """
     for kind, pairs in sheet.kinds.items():
         for layer, _ in Counter(layer for _, layer in pairs).most_common():
             if kind != "rooms":
@@ -84,7 +87,7 @@ def _tell(sheet: Sheet, report: ImportReport, *, asks: bool) -> None:
     frame = DrawingFrame.about(sheet.walls, sheet.scale_m)
     alike = _like_walls(sheet.others, frame)
     if not alike:
-        return
+        return ()
     used_m = sum(line.length for entity in sheet.walls for line in frame.raw(entity))
     words = ", ".join(f"{layer} ({length:.0f} m)" for layer, length in alike[:4])
     advice = " ".join(
@@ -96,6 +99,7 @@ def _tell(sheet: Sheet, report: ImportReport, *, asks: bool) -> None:
             "or only the layers that are right"
         )
     report.doubt(f"what looks like walls was left out: {words}; {advice} takes it in")
+    return tuple(layer for layer, _ in alike)
 
 
 def _like_walls(pairs: Layered, frame: DrawingFrame) -> list[tuple[str, float]]:

@@ -20,7 +20,7 @@ from echostep.arrays import Floats, Ints
 from echostep.errors import EchostepError
 from echostep.plan.importers.drawn_level import areas
 from echostep.plan.importers.report import ImportReport
-from echostep.plan.json_fields import LIMIT_M
+from echostep.plan.plan_file import LIMIT_M
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from echostep.errors import EchostepError
 from echostep.extras import require
 from echostep.plan.importers.parsing import LARGEST_BYTES, read_bytes
 from echostep.plan.importers.report import ImportReport
-from echostep.plan.json_fields import LIMIT_M
+from echostep.plan.plan_file import LIMIT_M
 
 REFERENCE_M = (
     1.0  # a storey without walls, doors and rooms nearer than this to another one is a reference level of it; assumed

@@ -25,9 +25,8 @@ from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, area
 from echostep.plan.importers.geojson import features, label, properties, shape
 from echostep.plan.importers.imdf.archive import Archive
 from echostep.plan.importers.imdf.assumed_doors import ASSUMED, doors_at, doors_of_rooms
-from echostep.plan.importers.parsing import parse_json
+from echostep.plan.importers.parsing import number, parse_json, text, typed
 from echostep.plan.importers.report import ImportReport
-from echostep.plan.json_fields import number, text, typed
 from echostep.plan.model import ConnectorKind, Door, DoorState, Georeference, Plan
 
 OPEN = {

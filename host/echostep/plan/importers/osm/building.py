@@ -22,8 +22,8 @@ from echostep.plan.importers.connector_shapes import join_connectors
 from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, room
 from echostep.plan.importers.osm.elements import Elements, Tags, levels_of, read_osm
 from echostep.plan.importers.report import ImportReport
-from echostep.plan.json_fields import LIMIT_M
 from echostep.plan.model import ConnectorKind, Door, DoorState, Georeference, Plan
+from echostep.plan.plan_file import LIMIT_M
 
 DOOR_M, STAIRS_M, LIFT_M = 0.9, 1.5, 1.8  # widths where the map states none: usual sizes
 MOST_LEVELS = 200

@@ -22,8 +22,7 @@ from shapely.geometry import LineString
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan.importers.osm.geojson_rows import geojson_rows, without_names
-from echostep.plan.importers.parsing import FORMATS, parse_json, read_text
-from echostep.plan.json_fields import number, typed
+from echostep.plan.importers.parsing import FORMATS, number, parse_json, read_text, typed
 
 RANGE = re.compile(r"^(-?\d+(?:\.\d+)?)\s*-\s*(-?\d+(?:\.\d+)?)$")
 MOST = 300  # greatest level number, and most levels in a range

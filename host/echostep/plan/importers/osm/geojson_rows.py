@@ -11,7 +11,7 @@ from itertools import count
 from typing import Any
 
 from echostep.plan.importers.geojson import features, properties
-from echostep.plan.json_fields import number, typed
+from echostep.plan.importers.parsing import number, typed
 
 RESOLUTION = 7  # decimals of a degree
 

@@ -20,8 +20,8 @@ from echostep.plan.importers.drawn_level import DrawnLevel
 from echostep.plan.importers.parsing import read_bytes, read_text
 from echostep.plan.importers.raster.tracing import trace
 from echostep.plan.importers.report import ImportReport
-from echostep.plan.json_fields import LIMIT_M
 from echostep.plan.model import Plan
+from echostep.plan.plan_file import LIMIT_M
 
 MOST_PIXELS = 100_000_000
 OCCUPIED = 0.65  # default of map_server
