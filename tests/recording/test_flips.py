@@ -78,7 +78,7 @@ def test_a_flipped_arrival_time_is_corrected_by_repair(tmp_path: Path) -> None:
     found = list(open_recording(tmp_path / "b.mcap").chunks())
     assert [chunk.data for chunk in found] == [chunk.data for chunk in CHUNKS]
     assert max(abs(a.t_arrival_ns - b.t_arrival_ns) for a, b in zip(found, CHUNKS, strict=True)) <= 40_000_000
-    assert info(tmp_path / "b.mcap")[-1].endswith("whole")
+    assert info(tmp_path / "b.mcap")[-1] == "  whole, but made of a damaged recording"
 
 
 def test_a_wrong_length_costs_a_few_messages_not_all_behind_it(tmp_path: Path) -> None:

@@ -143,6 +143,7 @@ def _record(recording: Recording, tracker: Tracker, out: Path, estimates: list[E
             new = tracker.take(portion)
             estimates += new
             recorder.write_derived(derived.take(portion, new))
+        recorder.write_damage(recording.damage_notes())
     if recorder.notices:
         raise EchostepError(recorder.notices[0])
 

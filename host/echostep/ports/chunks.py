@@ -15,7 +15,7 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
-from echostep.arrays import Ints, Octets
+from echostep.arrays import Bools, Ints, Octets
 from echostep.jit import kernel
 
 # Names of the ports.
@@ -82,6 +82,12 @@ class Portion:
         part = slice(begin, end)
         return Portion(
             self.ports, self.port[part], self.t_arrival_ns[part], self.start[part], self.end[part], self.received
+        )
+
+    def where(self, kept: Bools) -> Portion:
+        """The chunks of those rows (n,) that are kept."""
+        return Portion(
+            self.ports, self.port[kept], self.t_arrival_ns[kept], self.start[kept], self.end[kept], self.received
         )
 
     def cut_after(self, *names: str) -> Iterator[Portion]:

@@ -29,6 +29,7 @@ MCAP_MAGIC = b"\x89MCAP0\r\n"
 HEAD_SIZE = 9
 MESSAGE = 0x05  # opcode
 MESSAGE_SIZE = 22
+SEQUENCE_OFFSET = 2  # in the body of a message
 LOG_TIME_OFFSET = 6  # in the body of a message
 CHANNEL_IDS = 1 << 16  # a channel number has 16 bits
 
@@ -45,6 +46,11 @@ def port_of(channel: Channel) -> str:
     if channel.message_encoding != RAW_ENCODING or not channel.topic.endswith("/bytes"):
         return ""
     return channel.topic.removeprefix("/").removesuffix("/bytes")
+
+
+def is_misnamed(channel: Channel) -> bool:
+    """Whether a channel has either the encoding or the name of a port's, not both."""
+    return (channel.message_encoding == RAW_ENCODING) != channel.topic.endswith("/bytes")
 
 
 def decompress_chunk(body: bytes) -> bytes | None:

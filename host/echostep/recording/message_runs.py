@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Runs of the ports' messages in an MCAP file, as portions.
 
-In: the bytes of a file or of a decompressed chunk record, possibly damaged or hostile. Out: `Portion`s. Owns nothing.
+In: the bytes of a file or of a decompressed chunk record, possibly damaged or hostile. Out: `Portion`s, and the messages' numbers. Owns nothing.
 Messages of other channels than the ports' are skipped.
 """
 
@@ -10,52 +10,78 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from mcap.opcode import Opcode
 from mcap.records import Channel
 
 from echostep.arrays import Bools, Ints, Octets
 from echostep.jit import kernel
 from echostep.ports.chunks import LATEST_NS, Portion
+from echostep.recording.damage.ending import Ending
+from echostep.recording.damage.scan import record_end
 from echostep.recording.mcap_records import (
     CHANNEL_IDS,
     HEAD_SIZE,
     LOG_TIME_OFFSET,
     MESSAGE,
     MESSAGE_SIZE,
+    SEQUENCE_OFFSET,
+    is_misnamed,
     parse_record,
     port_of,
     read_uint,
 )
-from echostep.recording.scan import record_end
 
 PORTION_BYTES = 1 << 18  # about, of the file in one portion: about five seconds of a walk; assumed
 
 
+@dataclass(frozen=True, slots=True)
+class MessageRun:
+    """Consecutive messages of the ports, and the number of each."""
+
+    portion: Portion
+    sequence: Ints
+
+
 @dataclass
 class PortChannels:
-    """Channels read so far: `names` of ports, by channel number the index into `names` (-1: of no port), and `known`: whether it was read."""
+    """Channels read so far: `names` of ports, by channel number the index into `names` (-1: of no port), and `known`: whether it was read.
+
+    `misnamed`: topics of channels that carry bytes of a port but are not named as one, or the reverse: one of the two is damaged.
+    """
 
     names: tuple[str, ...] = ()
     port_of_channel: Ints = field(default_factory=lambda: np.full(CHANNEL_IDS, -1, np.int64))
     known: Bools = field(default_factory=lambda: np.zeros(CHANNEL_IDS, np.bool_))
+    misnamed: set[str] = field(default_factory=set)
+    _settled: set[int] = field(default_factory=set)  # numbers of the channels in a trusted summary
+
+    def add_summary(self, ending: Ending) -> None:
+        """Add the channels that are repeated at the end; no later record changes those of a trusted summary."""
+        for opcode, body in ending.summary:
+            if opcode == Opcode.CHANNEL and (channel := parse_record(Channel, body)):
+                self.add(body)
+                self._settled |= {channel.id} if ending.trusted else set()
 
     def add(self, body: bytes) -> None:
         """Add the channel of a channel record; its number may have had another meaning before."""
         channel = parse_record(Channel, body)
-        if channel is None:
+        if channel is None or channel.id in self._settled:
             return
         self.known[channel.id], self.port_of_channel[channel.id] = True, -1
         if name := port_of(channel):
             self.names = tuple(dict.fromkeys((*self.names, name)))
             self.port_of_channel[channel.id] = self.names.index(name)
+        elif is_misnamed(channel):
+            self.misnamed.add(channel.topic)
 
 
-def read_messages(file: Octets, offset: int, channels: PortChannels) -> tuple[Portion | None, int]:
+def read_messages(file: Octets, offset: int, channels: PortChannels) -> tuple[MessageRun | None, int]:
     """The ports' messages among the consecutive valid messages from `offset` on, about `PORTION_BYTES` of them; and the offset after them."""
     stop = min(offset + PORTION_BYTES, len(file))
     most = (stop - offset) // (HEAD_SIZE + MESSAGE_SIZE) + 1
-    port, t_arrival_ns, start, end = (np.empty(most, np.int64) for _ in range(4))
+    port, t_arrival_ns, sequence, start, end = (np.empty(most, np.int64) for _ in range(5))
     count, next_offset = _read_run(
-        file, offset, stop, channels.port_of_channel, channels.known, (port, t_arrival_ns, start, end)
+        file, offset, stop, channels.port_of_channel, channels.known, (port, t_arrival_ns, sequence, start, end)
     )
     if not count:
         return None, next_offset
@@ -63,15 +89,20 @@ def read_messages(file: Octets, offset: int, channels: PortChannels) -> tuple[Po
     portion = Portion(
         channels.names, port[:count], t_arrival_ns[:count], start[:count] - offset, end[:count] - offset, received
     )
-    return portion, next_offset
+    return MessageRun(portion, sequence[:count]), next_offset
 
 
 @kernel
 def _read_run(
-    file: Octets, offset: int, stop: int, port_of_channel: Ints, known: Bools, columns: tuple[Ints, Ints, Ints, Ints]
+    file: Octets,
+    offset: int,
+    stop: int,
+    port_of_channel: Ints,
+    known: Bools,
+    columns: tuple[Ints, Ints, Ints, Ints, Ints],
 ) -> tuple[int, int]:
-    """Fill the columns port, arrival, start and end from the messages before `stop`; returns the number of rows, and where the run ends."""
-    port, t_arrival_ns, start, end = columns
+    """Fill the columns port, arrival, number, start and end from the messages before `stop`; returns the number of rows, and where the run ends."""
+    port, t_arrival_ns, sequence, start, end = columns
     count = 0
     while offset < stop and file[offset] == MESSAGE:
         after = record_end(file, offset, known)
@@ -82,6 +113,7 @@ def _read_run(
             port[count] = port_of_channel[read_uint(file, body, 2)]
             log_time_ns = read_uint(file, body + LOG_TIME_OFFSET, 8)
             t_arrival_ns[count] = log_time_ns if 0 <= log_time_ns <= LATEST_NS else LATEST_NS
+            sequence[count] = read_uint(file, body + SEQUENCE_OFFSET, 4)
             start[count], end[count] = body + MESSAGE_SIZE, after
             count += 1
     return count, offset

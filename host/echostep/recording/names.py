@@ -83,7 +83,7 @@ def remove_older(wanted: Path, keep: int) -> list[Path]:
     removed = []
     for _, path in sorted(_numbered(wanted))[: -max(keep, LEAST_KEPT)]:
         with suppress(OSError):
-            if not _is_being_written(path):
+            if not is_being_written(path):
                 path.unlink()
                 removed.append(path)
     return removed
@@ -99,7 +99,7 @@ def _numbered(wanted: Path) -> list[tuple[int, Path]]:
     return [(int(match[1]), path) for path in paths if (match := pattern.fullmatch(path.name))]
 
 
-def _is_being_written(path: Path) -> bool:
+def is_being_written(path: Path) -> bool:
     """Whether a process has locked the file."""
     if fcntl is None:
         return False
@@ -108,4 +108,6 @@ def _is_being_written(path: Path) -> bool:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
             return True
+        except OSError:  # a file system without locks
+            return False
     return False

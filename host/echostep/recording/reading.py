@@ -10,19 +10,24 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Metadata
+from mcap.records import Header, Metadata
 
 from echostep.arrays import Octets
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk, Portion
+from echostep.recording.damage.ending import Ending, begins_as_mcap, checksum_matches, read_ending
+from echostep.recording.damage.notes import MISPLACED, made_of, missing_ports
+from echostep.recording.damage.placing import Placement
+from echostep.recording.damage.scan import map_file, next_valid_run, record_end
 from echostep.recording.mcap_records import HEAD_SIZE, MCAP_MAGIC, MESSAGE, decompress_chunk, parse_record
-from echostep.recording.message_runs import PortChannels, read_messages
-from echostep.recording.recorder import METADATA_NAME
-from echostep.recording.scan import checksum_differs, map_file, next_valid_run, record_end, summary
+from echostep.recording.message_runs import MessageRun, PortChannels, read_messages
+from echostep.recording.names import is_being_written
+from echostep.recording.recorder import DAMAGE_NAME, LIBRARY, METADATA_NAME
 
 
 @dataclass
@@ -40,8 +45,14 @@ class Recording:
     damaged_bytes: int = 0  # in no valid record
     damaged_places: int = 0
     unreadable_chunks: int = 0  # chunk records of the file that could not be decompressed
+    misplaced: int = 0  # messages that stand twice in the file, or not where they were written
     grows: bool = False  # it is being written: reading ends before an unfinished record
     resume: int = -1  # offset from which `portions_from` goes on behind the last portion; -1 inside a compressed chunk
+    library: str = ""  # by which the file was written
+    before: list[str] = field(default_factory=list)  # damage of the recordings of which this one was made
+    _intact: bool | None = None  # whether the checksum is right; None: unknown yet
+    _channels: PortChannels = field(default_factory=PortChannels)
+    _ports: set[str] = field(default_factory=set)  # with messages
 
     def chunks(self) -> Iterator[Chunk]:
         """Chunks in the order in which they were recorded."""
@@ -50,9 +61,9 @@ class Recording:
 
     def portions(self) -> Iterator[Portion]:
         """The same chunks as portions of many."""
-        for record in self._records():
-            if isinstance(record, Portion):
-                yield record
+        for portion in self._placed(record for record in self._records() if isinstance(record, MessageRun)):
+            self._ports.update(portion.ports[k] for k in np.unique(portion.port).tolist())
+            yield portion
         self.fraction = 1.0
 
     def portions_from(self, offset: int) -> Iterator[Portion]:
@@ -61,29 +72,58 @@ class Recording:
             yield from self.portions()
             return
         file, channels = map_file(self.path), PortChannels()
-        for opcode, body in summary(file):
-            if opcode == Opcode.CHANNEL:
-                channels.add(body)
+        channels.add_summary(read_ending(file))
         for _, record in self._scan(file, len(MCAP_MAGIC), channels):
             if isinstance(record, tuple) and record[0] == Opcode.CHUNK:
                 deque(self._records_in_chunk(record[1], channels), maxlen=0)
-            if isinstance(record, Portion) or record[0] == Opcode.CHUNK:
+            if isinstance(record, MessageRun) or record[0] == Opcode.CHUNK:
                 break
         for record in self._from(file, offset, channels):
-            if isinstance(record, Portion):
-                yield record
+            if isinstance(record, MessageRun):
+                yield record.portion
 
-    def _records(self) -> Iterator[Portion | tuple[int, bytes]]:
-        """Messages as portions, other records as opcode and body, in order, up to the footer; damaged bytes are skipped and counted."""
-        file, channels = map_file(self.path), PortChannels()
-        self.truncated, self.altered = True, False
+    @property
+    def damaged(self) -> bool:
+        """Whether something is wrong with this very file, which `repair` makes whole."""
+        return bool(self.altered or self.damaged_bytes or self.unreadable_chunks or self.misplaced or self.truncated)
+
+    def damage(self) -> list[str]:
+        """What is wrong with the file, as sentences, once it was read; and what was wrong with those of which it was made."""
+        return [*self._own_damage(), *self.before]
+
+    def damage_notes(self) -> list[str]:
+        """The same, to be noted in a recording that is made of this one."""
+        return [*made_of(self.path, self._own_damage()), *self.before]
+
+    def _own_damage(self) -> list[str]:
+        places = f"{self.damaged_bytes} damaged bytes in {self.damaged_places} places were skipped"
+        facts = [
+            (self.altered, "its checksum is wrong: bytes have changed since it was recorded"),
+            (self.damaged_bytes, places),
+            (self.unreadable_chunks, f"{self.unreadable_chunks} compressed chunks cannot be opened"),
+            (self.misplaced, MISPLACED.format(self.misplaced)),
+            (self.truncated, "the recording ends without an end record: it was not closed; all before was used"),
+        ]
+        lines = [text for applies, text in facts if applies]
+        lost = missing_ports(self._ports, self._channels.misnamed) if self.damaged else []
+        return [*lines, *lost]
+
+    def _records(self) -> Iterator[MessageRun | tuple[int, bytes]]:
+        """Messages as runs, other records as opcode and body, in order, up to the footer; damaged bytes are skipped and counted."""
+        file, self._channels, self._ports = map_file(self.path), PortChannels(), set()
+        self.truncated, self.altered, self.misplaced = True, False, 0
         self.damaged_bytes = self.damaged_places = self.unreadable_chunks = 0
-        for opcode, body in summary(file):
-            if opcode == Opcode.CHANNEL:
-                channels.add(body)
-        yield from self._from(file, len(MCAP_MAGIC), channels)
+        ending = Ending() if self.grows else read_ending(file)
+        if self._intact is None:
+            self._intact = bool(ending.data_end >= 0 and checksum_matches(file, ending.data_end))
+        if self._intact:
+            file = file[: ending.data_end]
+        else:
+            self._channels.add_summary(ending)
+        yield from self._from(file, len(MCAP_MAGIC), self._channels)
+        self.truncated = self.truncated and not self._intact and not self.grows
 
-    def _from(self, file: Octets, offset: int, channels: PortChannels) -> Iterator[Portion | tuple[int, bytes]]:
+    def _from(self, file: Octets, offset: int, channels: PortChannels) -> Iterator[MessageRun | tuple[int, bytes]]:
         """The records from an offset on."""
         for begin, record in self._scan(file, offset, channels):
             self.fraction = begin / len(file)
@@ -93,15 +133,41 @@ class Recording:
                 if opcode == Opcode.FOOTER and begin + HEAD_SIZE + len(body) + len(MCAP_MAGIC) >= len(file):
                     self.truncated = False
                     return
-                if opcode == Opcode.DATA_END:
-                    self.altered = self.altered or checksum_differs(file, begin)
+                if opcode == Opcode.DATA_END and (matches := checksum_matches(file, begin)) is not None:
+                    self.altered = self.altered or not matches
+                    if matches:  # whatever follows, all before is there
+                        self.truncated = False
+                        return
                 if opcode == Opcode.CHUNK:
                     yield from self._marked(self._records_in_chunk(body, channels), begin + HEAD_SIZE + len(body))
+                self._note(opcode, body)
             yield record
 
+    def _note(self, opcode: int, body: bytes) -> None:
+        """Keep the recorder's name, and earlier damage; the metadata are read when the recording is opened."""
+        if opcode == Opcode.HEADER and (header := parse_record(Header, body)):
+            self.library = header.library
+        if opcode == Opcode.METADATA and (stored := parse_record(Metadata, body)) and stored.name == DAMAGE_NAME:
+            self.before = list(stored.metadata.values())
+
+    def _placed(self, runs: Iterator[MessageRun]) -> Iterator[Portion]:
+        """The portions without messages that are not in their place; those of an intact file, or of another recorder, as they are."""
+        placement, this = Placement(), next(runs, None)
+        if self._intact or self.grows or not self.library.startswith(LIBRARY):
+            yield from (run.portion for run in chain([this] if this else [], runs))
+            return
+        while this is not None:
+            place = self.resume, self.fraction
+            following = next(runs, None)
+            kept = placement.keep(this.sequence, following.sequence if following else this.sequence[:0])
+            self.misplaced = placement.misplaced
+            ahead, (self.resume, self.fraction) = (self.resume, self.fraction), place
+            yield this.portion if kept.all() else this.portion.where(kept)
+            (self.resume, self.fraction), this = ahead, following
+
     def _marked(
-        self, records: Iterator[Portion | tuple[int, bytes]], end: int
-    ) -> Iterator[Portion | tuple[int, bytes]]:
+        self, records: Iterator[MessageRun | tuple[int, bytes]], end: int
+    ) -> Iterator[MessageRun | tuple[int, bytes]]:
         """The records of a compressed chunk that ends at `end`: only behind the last one can reading go on."""
         before = next(records, None)
         self.resume = -1
@@ -112,7 +178,7 @@ class Recording:
             yield before
             before = record
 
-    def _records_in_chunk(self, body: bytes, channels: PortChannels) -> Iterator[Portion | tuple[int, bytes]]:
+    def _records_in_chunk(self, body: bytes, channels: PortChannels) -> Iterator[MessageRun | tuple[int, bytes]]:
         records = decompress_chunk(body)
         if records is None:
             self.unreadable_chunks += 1
@@ -122,12 +188,12 @@ class Recording:
 
     def _scan(
         self, file: Octets, offset: int, channels: PortChannels
-    ) -> Iterator[tuple[int, Portion | tuple[int, bytes]]]:
+    ) -> Iterator[tuple[int, MessageRun | tuple[int, bytes]]]:
         """Offset and content of portions and other valid records, from `offset` on."""
         while offset < len(file):
-            portion, offset = read_messages(file, offset, channels)
-            if portion:
-                yield offset, portion
+            run, offset = read_messages(file, offset, channels)
+            if run:
+                yield offset, run
             end = record_end(file, offset, channels.known)
             if end < 0 and offset < len(file) and self.grows:
                 return
@@ -149,10 +215,11 @@ def open_recording(path: Path | str) -> Recording:
     """A recording and its metadata; raises EchostepError when the file is missing or holds no recorded bytes."""
     recording, has_bytes = Recording(Path(path)), False
     try:
+        recording.grows = is_being_written(recording.path)
         with recording.path.open("rb") as file:
-            is_mcap = file.read(len(MCAP_MAGIC)) == MCAP_MAGIC
+            is_mcap = begins_as_mcap(file.read(len(MCAP_MAGIC)))
         for record in recording._records() if is_mcap else ():
-            if isinstance(record, Portion):
+            if isinstance(record, MessageRun):
                 has_bytes = True
                 if recording.metadata:
                     break

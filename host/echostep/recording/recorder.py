@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import IO, Any, Self
 
 from mcap.writer import CompressionType, IndexType, Writer
 
@@ -23,6 +23,10 @@ from echostep.recording.background_writer import BackgroundWriter
 from echostep.recording.mcap_records import RAW_ENCODING
 
 METADATA_NAME = "echostep"  # of the metadata record
+DAMAGE_NAME = (
+    "echostep.damage"  # of a second one, at the end: what was wrong with the recording of which this one was made
+)
+LIBRARY = "echostep"  # in the header: it numbers the messages of all channels together
 # Assumed, all of them.
 WAIT_NS = 500_000_000  # arrival time between two waits of `wait_for_disk`
 RAW_LIMIT = 1 << 26  # bytes of chunks that may wait for a full disk: an hour and a half
@@ -47,20 +51,31 @@ class DerivedMessage:
     body: Mapping[str, Any]
 
 
+def begin_file(file: IO[bytes]) -> Writer:
+    """A writer of records without chunks, as each file of ours has them: a flipped bit costs one message, not all that were compressed with it."""
+    writer = Writer(
+        file,
+        compression=CompressionType.NONE,
+        index_types=IndexType.ALL,
+        use_chunking=False,
+        enable_data_crcs=True,
+    )
+    writer.start(profile="", library=LIBRARY)
+    return writer
+
+
+def numbered(lines: Iterable[str]) -> dict[str, str]:
+    """Lines as the values of a metadata record."""
+    return {f"{k:03}": line for k, line in enumerate(dict.fromkeys(lines))}
+
+
 class Recorder:
     """Writes chunks to a new file; raises EchostepError when the file cannot be created, or exists."""
 
     def __init__(self, path: Path | str, metadata: Mapping[str, str]) -> None:
         """`metadata`: what a replay needs and a reader may want to know (start, seed, plan, note), as text."""
         self._file = BackgroundWriter(path)
-        self._writer = Writer(
-            self._file,  # type: ignore[arg-type]  # the writer calls only `write` and `tell`
-            compression=CompressionType.NONE,
-            index_types=IndexType.ALL,
-            use_chunking=False,
-            enable_data_crcs=True,
-        )
-        self._writer.start(profile="", library="echostep")
+        self._writer = begin_file(self._file)  # type: ignore[arg-type]  # the writer calls only `write` and `tell`
         self._writer.add_metadata(METADATA_NAME, dict(metadata))
         self._channels: dict[str, int] = {}  # by port or topic
         self._sequence = 0
@@ -108,6 +123,11 @@ class Recorder:
             channel = self._channels.get(message.topic.name) or self._register_topic(message.topic)
             body = json.dumps(message.body, allow_nan=False, separators=(",", ":")).encode()
             self._add_message(channel, message.t_ns, body)
+
+    def write_damage(self, lines: Iterable[str]) -> None:
+        """Record what was wrong with the recording from which the chunks come; nothing when it was whole."""
+        if noted := numbered(lines):
+            self._writer.add_metadata(DAMAGE_NAME, noted)
 
     def _add_message(self, channel: int, t_ns: int, data: bytes) -> None:
         self._writer.add_message(channel, t_ns, data, t_ns, self._sequence)

@@ -13,6 +13,7 @@ from echostep.localization.belief import DOUBTED
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.path import MeasuredSegment
 from echostep.recording.reading import Recording
+from echostep.recording.repair.contents import printable
 from echostep.tracker import Tracker
 from echostep.tracker.state import StreamState, TrackerState
 
@@ -93,18 +94,8 @@ def _by_hand(state: TrackerState) -> str:
 
 def skipped(recording: Recording, streams: StreamState) -> list[str]:
     """One line for each kind of damage; none for a whole recording of undisturbed ports."""
-    front_end = streams.front_end
+    front_end, damage = streams.front_end, recording.damage()
     facts = [
-        (recording.altered, "its checksum is wrong: bytes have changed since it was recorded"),
-        (
-            recording.damaged_bytes,
-            f"{recording.damaged_bytes} damaged bytes in {recording.damaged_places} places were skipped",
-        ),
-        (recording.unreadable_chunks, f"{recording.unreadable_chunks} compressed chunks cannot be opened"),
-        (
-            recording.truncated,
-            "the recording ends without an end record: it was not closed; all before was used",
-        ),
         (
             front_end.bad_arrivals,
             f"{front_end.bad_arrivals} arrival times contradict the devices' counters and were not used",
@@ -118,10 +109,7 @@ def skipped(recording: Recording, streams: StreamState) -> list[str]:
             f"{streams.mtx.bad_checksum} damaged messages of the {streams.foot_name} were dropped",
         ),
     ]
-    lines = [f"{recording.path}: {text}" for applies, text in facts if applies]
-    damaged = recording.altered or recording.damaged_bytes or recording.truncated
-    return (
-        [*lines, f"  echostep repair {recording.path} -o OUT makes a whole file of what is readable"]
-        if damaged
-        else lines
-    )
+    lines = [*damage, *(text for applies, text in facts if applies)]
+    lines = [printable(f"{recording.path}: {line}") for line in lines]
+    advice = f"  echostep repair {recording.path} -o OUT makes a whole file of what is readable"
+    return [*lines, advice] if recording.damaged else lines

@@ -17,6 +17,7 @@ from echostep.board.messages import SCHEMA_HASH, Identity
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, FOOT, LATEST_NS, MTX
 from echostep.recording.capture import Decoder
+from echostep.recording.damage.notes import MISPLACED, made_of, missing_ports
 from echostep.recording.mcap_records import port_of
 from echostep.recording.repair.arrival_order import ArrivalOrder
 from echostep.recording.repair.recovery import RecordedMessage, Recovery
@@ -123,8 +124,10 @@ def info(path: Path) -> list[str]:
     contents.finish()
     if not contents.ports and not contents.derived:
         raise EchostepError(f"{path}: no message in it can be read: is this an echostep recording (.mcap)?")
-    problems = problems_of(recovery, contents)
-    condition = problems or ["  whole"]
+    condition = problems_of(recovery, contents)
+    if len(condition) == len(recovery.before):
+        so_far = "it is being written: whole so far" if recovery.grows else "whole"
+        condition.append(f"  {so_far}{', but made of a damaged recording' if recovery.before else ''}")
     if is_mended_by_repair(recovery, contents):
         condition.append(f"  echostep repair {path} -o OUT makes a whole file of what is readable")
     return [printable(line) for line in [*_head(recovery, contents), *_port_lines(contents), *condition]]
@@ -174,33 +177,48 @@ def _port_lines(contents: Contents) -> list[str]:
     return lines
 
 
+def damage_of(recovery: Recovery, contents: Contents) -> list[str]:
+    """What is wrong with a file that was read to its end, as sentences; empty for a whole one, and for one that is being written."""
+    inside = [(begin, end) for begin, end in recovery.damaged if end < recovery.size]
+    lost = sum(end - begin for begin, end in inside)
+    places = f"{lost} bytes in {len(inside)} places are not valid, the first at byte {inside[0][0] if inside else 0}"
+    middle = ", in the middle of a record" if len(inside) < len(recovery.damaged) else ""
+    corrected = f"{contents.order.corrected} arrival times contradict their neighbours; repair corrects them"
+    facts = [
+        (bool(inside), f"damaged: {places}"),
+        (recovery.unreadable_chunks, f"damaged: {recovery.unreadable_chunks} compressed chunks cannot be opened"),
+        (contents.order.corrected, corrected),
+        (recovery.altered, "its checksum is wrong: bytes have changed since it was written"),
+        (recovery.misplaced, MISPLACED.format(recovery.misplaced)),
+        (
+            not (recovery.has_footer or recovery.grows or recovery.intact),
+            f"the file ends too early{middle}: the recorder was stopped before it could close it",
+        ),
+    ]
+    lines = [text for applies, text in facts if applies]
+    return [*lines, *(missing_ports(contents.ports, recovery.misnamed) if lines else ())]
+
+
+def damage_notes(recovery: Recovery, contents: Contents) -> list[str]:
+    """What was wrong with a recording and those before it, for the one that is made of it."""
+    return [*made_of(recovery.path, damage_of(recovery, contents)), *recovery.before]
+
+
 def problems_of(recovery: Recovery, contents: Contents) -> list[str]:
     """What is wrong with a file that was read to its end, as lines; empty for a complete file."""
-    lines = [f"  {error}" for error in contents.errors]
-    inside = [(begin, end) for begin, end in recovery.damaged if end < recovery.size]
-    if inside:
-        byte_count, first = sum(end - begin for begin, end in inside), inside[0][0]
-        lines.append(f"  damaged: {byte_count} bytes in {len(inside)} places are not valid, the first at byte {first}")
-    if recovery.unreadable_chunks:
-        lines.append(f"  damaged: {recovery.unreadable_chunks} compressed chunks cannot be opened")
-    if contents.order.corrected:
-        lines.append(f"  {contents.order.corrected} arrival times contradict their neighbours; repair corrects them")
-    if recovery.altered:
-        lines.append("  its checksum is wrong: bytes have changed since it was written")
-    if contents.out_of_order:
-        lines.append(
-            f"  {contents.out_of_order} chunks of one port came long after later ones of another: repair leaves them so"
-        )
-    if not recovery.has_footer:
-        middle = ", in the middle of a record" if len(inside) < len(recovery.damaged) else ""
-        lines.append(f"  the file ends too early{middle}: the recorder was stopped before it could close it")
-    return lines
+    late = f"{contents.out_of_order} chunks of one port came long after later ones of another: repair leaves them so"
+    end = "the end of the file is cut off behind the last message: nothing is lost, but other programs may not open it"
+    lines = [*contents.errors, *recovery.before, *damage_of(recovery, contents)]
+    lines += [end] if recovery.intact and not recovery.has_footer else []
+    lines += [late] if contents.out_of_order else []
+    return [f"  {line}" for line in lines]
 
 
 def is_mended_by_repair(recovery: Recovery, contents: Contents) -> bool:
     """Whether a repaired copy lacks a fault of this file; what the decoder could not read, and the order between ports, stay as they are."""
-    damaged = recovery.damaged or recovery.unreadable_chunks or recovery.altered or not recovery.has_footer
-    return bool(damaged or contents.order.corrected)
+    unfinished = not recovery.has_footer and not recovery.grows
+    damaged = recovery.damaged or recovery.unreadable_chunks or recovery.altered or unfinished
+    return bool(damaged or recovery.misplaced or contents.order.corrected)
 
 
 def with_progress(recovery: Recovery, contents: Contents, title: str) -> Iterator[RecordedMessage]:

@@ -16,7 +16,7 @@ import msgspec
 from echostep.errors import EchostepError
 from echostep.recording.mcap_records import port_of
 from echostep.recording.repair.arrival_order import ArrivalOrder
-from echostep.recording.repair.contents import Contents, problems_of, with_progress
+from echostep.recording.repair.contents import Contents, damage_notes, problems_of, with_progress
 from echostep.recording.repair.recovery import RecordedMessage, Recovery
 from echostep.recording.repair.rewrite import RewrittenRecording
 
@@ -43,6 +43,7 @@ def repair(path: Path, out: Path) -> list[str]:
         _copy(messages, rewritten, saved, lambda: recovery.metadata)
         if not saved.ports and not saved.derived:
             raise EchostepError(f"{path}: nothing in it can be saved: no message is readable")
+        rewritten.write_damage(damage_notes(recovery, saved))
     derived = sum(saved.derived.values())
     return [
         f"{out}: {saved.chunks} chunks and {derived} derived messages, {saved.seconds:.1f} s",
@@ -77,7 +78,8 @@ def cut(path: Path, begin_s: float, end_s: float, out: Path) -> list[str]:
             raise EchostepError(
                 f"{path}: nothing was recorded from {begin_s:g} to {end_s:g} s; see echostep info {path}"
             )
-    lines = [f"{out}: {contents.chunks} chunks, {contents.seconds:.1f} s"]
+        rewritten.write_damage(damage_notes(recovery, contents))
+    lines = [f"{out}: {contents.chunks} chunks, {contents.seconds:.1f} s", *problems_of(recovery, contents)]
     if begin_s > 0.0 and start is None:
         lines.append("The position at the start of the piece is not recorded: replay it with --start X,Y,DEG")
     return lines

@@ -4,7 +4,7 @@
 In: an MCAP file: complete, truncated, damaged in the middle, from our recorder or rewritten by another tool. Out: its messages in the order of
 the file, both the ports' and derived ones, and the byte ranges without valid records. Owns the read position in the file.
 
-What a valid record is: `scan.py`.
+What a valid record is: `damage/scan.py`.
 """
 
 from __future__ import annotations
@@ -12,15 +12,19 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import chain, compress, islice
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Channel, Metadata, Schema
+from mcap.records import Channel, Header, Metadata, Schema
 
 from echostep.arrays import Bools, Octets
 from echostep.errors import EchostepError
+from echostep.recording.damage.ending import begins_as_mcap, checksum_matches, read_ending
+from echostep.recording.damage.placing import Placement
+from echostep.recording.damage.scan import CHUNK, map_file, next_valid_run, record_end
 from echostep.recording.mcap_records import (
     CHANNEL_IDS,
     HEAD_SIZE,
@@ -28,11 +32,13 @@ from echostep.recording.mcap_records import (
     MESSAGE,
     MESSAGE_SIZE,
     decompress_chunk,
+    is_misnamed,
     parse_record,
 )
-from echostep.recording.recorder import METADATA_NAME
-from echostep.recording.scan import CHUNK, checksum_differs, map_file, next_valid_run, record_end, summary
+from echostep.recording.names import is_being_written
+from echostep.recording.recorder import DAMAGE_NAME, LIBRARY, METADATA_NAME
 
+PLACED_AT_ONCE = 8192  # messages whose places are decided together: some seconds of a walk; assumed
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
@@ -58,9 +64,16 @@ class Recovery:
     unreadable_chunks: int = 0  # chunk records that cannot be decompressed
     has_footer: bool = False  # the recorder was closed
     altered: bool = False  # the file's checksum says that bytes have changed since they were written
+    grows: bool = False  # a process is writing it
+    intact: bool = False  # it says that none have
+    misplaced: int = 0  # messages that stand twice in the file, or not where they were written
+    misnamed: set[str] = field(default_factory=set)  # topics of channels of which either name or encoding is damaged
+    library: str = ""  # by which the file was written
+    before: list[str] = field(default_factory=list)  # damage of the recordings of which this one was made
     size: int = 0  # of the file, bytes
     byte_offset: int = 0  # of the record that was read last
     _is_channel: Bools = field(default_factory=lambda: np.zeros(CHANNEL_IDS, np.bool_))  # by channel number
+    _settled: bool = False  # the channels are those of a summary whose checksum is right
 
     @property
     def fraction(self) -> float:
@@ -68,16 +81,25 @@ class Recovery:
         return self.byte_offset / max(self.size, 1)
 
     def messages(self) -> Iterator[RecordedMessage]:
-        """All readable messages; raises EchostepError when the file cannot be read or is not an MCAP file."""
+        """All readable messages in their place; raises EchostepError when the file cannot be read or is not an MCAP file."""
         file = map_file(self.path)
-        self.size = len(file)
-        if file[: len(MCAP_MAGIC)].tobytes() != MCAP_MAGIC:
+        self.size, self.grows = len(file), is_being_written(self.path)
+        if not begins_as_mcap(file):
             raise EchostepError(
                 f"{self.path}: not a recording: it does not begin as an MCAP file does; "
                 "bytes of one port are read by echostep decode"
             )
-        for opcode, body in summary(file):
+        ending = read_ending(file)
+        self.intact = ending.data_end >= 0 and checksum_matches(file, ending.data_end) is True
+        for opcode, body in () if self.intact else ending.summary:
             self._register(opcode, body)
+        self._settled = bool(self.channels) and ending.trusted
+        yield from self._placed(self._contents(file[: ending.data_end] if self.intact else file))
+        self.byte_offset = self.size
+        self.has_footer = self.has_footer or self.intact
+
+    def _contents(self, file: Octets) -> Iterator[RecordedMessage]:
+        """All readable messages in the order of the file."""
         for begin, end, content in self._scan(file, len(MCAP_MAGIC)):
             self.byte_offset = begin
             if content is None:
@@ -86,7 +108,16 @@ class Recovery:
                 yield content
             else:
                 yield from self._messages_in_chunk(content)
-        self.byte_offset = self.size
+
+    def _placed(self, messages: Iterator[RecordedMessage]) -> Iterator[RecordedMessage]:
+        """The messages without those that are not in their place; of an intact file, or of another recorder, all of them."""
+        placement, this = Placement(), list(islice(messages, PLACED_AT_ONCE))
+        while this and not self.intact and self.library.startswith(LIBRARY):
+            following = list(islice(messages, PLACED_AT_ONCE))
+            numbers, ahead = (np.array([m.sequence for m in part], np.int64) for part in (this, following))
+            yield from compress(this, placement.keep(numbers, ahead).tolist())
+            self.misplaced, this = placement.misplaced, following
+        yield from chain(this, messages)
 
     def _scan(self, file: Octets, begin: int) -> Iterator[tuple[int, int, RecordedMessage | bytes | None]]:
         """Begin, end and content from offset `begin` on: a message, the body of a chunk record, or None for a range without valid records."""
@@ -94,6 +125,8 @@ class Recovery:
         size = len(file)
         while begin < size:
             end = record_end(file, begin, self._is_channel)
+            if end < 0 and self.grows and next_valid_run(file, begin + 1, self._is_channel) == size:
+                return
             if end < 0:
                 end = next_valid_run(file, begin + 1, self._is_channel)
                 yield begin, end, None
@@ -105,10 +138,15 @@ class Recovery:
             elif opcode == CHUNK:
                 yield begin, end, bytes(view[body:end])
             elif opcode == Opcode.FOOTER and end + len(MCAP_MAGIC) >= size:
-                self.has_footer = bytes(view[end:size]) == MCAP_MAGIC
+                self.has_footer = True
                 return
             elif opcode == Opcode.DATA_END:
-                self.altered = self.altered or checksum_differs(file, begin)
+                matches = checksum_matches(file, begin)
+                self.altered = self.altered or matches is False
+                if matches:  # whatever follows, all before is there
+                    self.intact = True
+                    self.has_footer = bytes(view[size - len(MCAP_MAGIC) : size]) == MCAP_MAGIC
+                    return
             else:
                 self._register(opcode, bytes(view[body:end]))
             begin = end
@@ -127,11 +165,20 @@ class Recovery:
                 yield content
 
     def _register(self, opcode: int, body: bytes) -> None:
-        """Keep a channel, a schema or the recorder's metadata; ignore other records."""
+        """Keep a channel, a schema, the recorder's name and its metadata; ignore other records."""
         if opcode == Opcode.CHANNEL and (channel := parse_record(Channel, body)):
+            if self._settled and channel.id in self.channels:
+                return
             self.channels[channel.id] = channel
             self._is_channel[channel.id] = True
+            self.misnamed |= {channel.topic} if is_misnamed(channel) else set()
         elif opcode == Opcode.SCHEMA and (schema := parse_record(Schema, body)):
-            self.schemas[schema.id] = schema
-        elif opcode == Opcode.METADATA and (stored := parse_record(Metadata, body)) and stored.name == METADATA_NAME:
-            self.metadata = dict(stored.metadata)
+            if not (self._settled and schema.id in self.schemas):
+                self.schemas[schema.id] = schema
+        elif opcode == Opcode.HEADER and (header := parse_record(Header, body)):
+            self.library = header.library
+        elif opcode == Opcode.METADATA and (stored := parse_record(Metadata, body)):
+            if stored.name == METADATA_NAME:
+                self.metadata = dict(stored.metadata)
+            elif stored.name == DAMAGE_NAME:
+                self.before = list(stored.metadata.values())

@@ -1,22 +1,21 @@
 # SPDX-License-Identifier: MIT
 """Writes a new recording from the messages of another one.
 
-In: metadata and messages. Out: an MCAP file of compressed, indexed chunk records, as viewers read it fastest. Owns the new file.
+In: metadata, messages, what was wrong with the other one. Out: an MCAP file as the recorder writes it, the messages numbered anew. Owns the new file.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mcap.records import Channel, Schema
-from mcap.writer import Writer
 
 from echostep.errors import EchostepError
 from echostep.recording.names import create
-from echostep.recording.recorder import METADATA_NAME
+from echostep.recording.recorder import DAMAGE_NAME, METADATA_NAME, begin_file, numbered
 from echostep.recording.repair.recovery import RecordedMessage
 
 
@@ -32,12 +31,18 @@ class RewrittenRecording:
         self._schema_ids: dict[int, int] = {0: 0}  # by number in the source; 0: no schema
         self._channels: dict[tuple[str, str, int], int] = {}  # by topic, encoding and schema number in the source
         self._file = os.fdopen(create(path), "wb")
-        self._writer = Writer(self._file, enable_data_crcs=True)
-        self._writer.start(profile="", library="echostep")
+        self._writer = begin_file(self._file)
+        self._sequence = 0
 
     def write_metadata(self, metadata: Mapping[str, str]) -> None:
         """Write the recorder's metadata; call it before the first `write`."""
         self._writer.add_metadata(METADATA_NAME, dict(metadata))
+
+    def write_damage(self, lines: Iterable[str]) -> None:
+        """Write what was wrong with the other recording, after its last message; nothing when it was whole."""
+        with self._report_write_errors():
+            if noted := numbered(lines):
+                self._writer.add_metadata(DAMAGE_NAME, noted)
 
     def write(self, message: RecordedMessage) -> None:
         """Write one message."""
@@ -45,7 +50,8 @@ class RewrittenRecording:
         key = (channel.topic, channel.message_encoding, channel.schema_id)
         with self._report_write_errors():
             number = self._channels.get(key) or self._register(channel, key)
-            self._writer.add_message(number, message.t_ns, message.body, message.publish_ns, message.sequence)
+            self._writer.add_message(number, message.t_ns, message.body, message.publish_ns, self._sequence)
+        self._sequence += 1
 
     def _register(self, channel: Channel, key: tuple[str, str, int]) -> int:
         if channel.schema_id not in self._schema_ids and (schema := self._schemas.get(channel.schema_id)):

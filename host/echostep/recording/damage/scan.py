@@ -9,18 +9,14 @@ at the next offset from which several consecutive records are valid.
 
 from __future__ import annotations
 
-import zlib
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from mcap.opcode import Opcode
 
 from echostep.arrays import Bools, Octets
 from echostep.errors import EchostepError
 from echostep.jit import kernel
 from echostep.recording.mcap_records import (
-    CHANNEL_IDS,
     HEAD_SIZE,
     MCAP_MAGIC,
     MESSAGE,
@@ -32,15 +28,12 @@ from echostep.recording.mcap_records import (
 # [MCAP format specification]
 CHUNK = 0x06  # opcode
 LAST_OPCODE = 0x0F
-FOOTER_SIZE = 20  # bytes of its body
-DATA_END_SIZE = 4  # bytes of its body: the checksum of all bytes before it, 0 for none
 # Assumed.
 VALID_RUN = 4  # so many consecutive records are not valid by chance
 OTHER_LIMIT = 1 << 20  # bytes; only messages and chunk records are larger
 LARGE = (
     1 << 12
 )  # bytes; a larger message must be followed by a possible record: one wrong bit of its length would swallow many others
-CHECKSUM_BYTES = 1 << 20  # of one call: Ctrl-C is seen between two
 
 
 def map_file(path: Path) -> Octets:
@@ -53,29 +46,6 @@ def map_file(path: Path) -> Octets:
         raise EchostepError(
             f"{path}: cannot read the recording: {getattr(error, 'strerror', None) or error}"
         ) from error
-
-
-def summary(file: Octets) -> Iterator[tuple[int, bytes]]:
-    """Opcode and body of the records at the end of a closed file; it repeats channels and schemas there, in case its beginning is damaged."""
-    footer = len(file) - len(MCAP_MAGIC) - FOOTER_SIZE - HEAD_SIZE
-    ends_as_mcap = file[-len(MCAP_MAGIC) :].tobytes() == MCAP_MAGIC
-    if footer < len(MCAP_MAGIC) or not ends_as_mcap or file[footer] != Opcode.FOOTER:
-        return
-    begin = read_uint(file, footer + HEAD_SIZE, 8)
-    no_channel = np.zeros(CHANNEL_IDS, np.bool_)
-    while len(MCAP_MAGIC) <= begin < footer and (end := record_end(file, begin, no_channel)) >= 0:
-        yield int(file[begin]), file[begin + HEAD_SIZE : end].tobytes()
-        begin = end
-
-
-def checksum_differs(file: Octets, data_end: int) -> bool:
-    """Whether the bytes before the data-end record at this offset are others than those that were written; False without a checksum."""
-    body = data_end + HEAD_SIZE
-    expected = int.from_bytes(file[body : body + DATA_END_SIZE].tobytes(), "little")
-    crc = 0
-    for begin in range(0, data_end if expected else 0, CHECKSUM_BYTES):
-        crc = zlib.crc32(file[begin : min(begin + CHECKSUM_BYTES, data_end)], crc)  # type: ignore[arg-type]
-    return crc != expected
 
 
 @kernel
