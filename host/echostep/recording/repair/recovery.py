@@ -90,13 +90,12 @@ class Recovery:
                 "bytes of one port are read by echostep decode"
             )
         ending = read_ending(file)
-        self.intact = ending.data_end >= 0 and checksum_matches(file, ending.data_end) is True
+        self.intact = self.has_footer = ending.data_end >= 0 and checksum_matches(file, ending.data_end) is True
         for opcode, body in () if self.intact else ending.summary:
             self._register(opcode, body)
         self._settled = bool(self.channels) and ending.trusted
         yield from self._placed(self._contents(file[: ending.data_end] if self.intact else file))
         self.byte_offset = self.size
-        self.has_footer = self.has_footer or self.intact
 
     def _contents(self, file: Octets) -> Iterator[RecordedMessage]:
         """All readable messages in the order of the file."""
