@@ -18,6 +18,8 @@ from echostep.commands.studies import add_studies
 from echostep.errors import EchostepError
 from echostep.extras import EXTRAS, lacks
 from echostep.interruption import end_by_signals
+from echostep.printing.lines import complain, say
+from echostep.printing.people import lost_result, to_people
 
 app = typer.Typer(
     add_completion=False,
@@ -39,7 +41,7 @@ def _print_version(wanted: bool) -> None:
 
         from echostep.board.messages import SCHEMA_HASH
 
-        typer.echo(f"echostep {version('echostep')}, protocol 0x{SCHEMA_HASH:08X}")
+        say(f"echostep {version('echostep')}, protocol 0x{SCHEMA_HASH:08X}")
         raise typer.Exit
 
 
@@ -56,22 +58,32 @@ def options(
 def main() -> None:
     """Entry point: a mistake ends with one line and status 2; signals end a run after its files are written."""
     end_by_signals()
+    with to_people():
+        status = _status()
+        if not status and (lost := lost_result()):
+            complain(f"echostep: {lost}: what was printed is not whole")
+            status = 2
+    sys.exit(status)
+
+
+def _status() -> int:
+    """The exit status of the command, which is run."""
     try:
         app()
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else int(end.code is not None)
     except EchostepError as error:
-        print(f"echostep: {error}", file=sys.stderr)
-        sys.exit(2)
+        complain(f"echostep: {error}")
+        return 2
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         if package not in EXTRAS or not (words := lacks("this", package)):
             raise
-        print(f"echostep: {words}", file=sys.stderr)
-        sys.exit(2)
-    except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(0)
+        complain(f"echostep: {words}")
+        return 2
     except OSError as error:
-        print(f"echostep: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
-        sys.exit(2)
+        complain(f"echostep: {error.filename or 'a file'}: {error.strerror or error}")
+        return 2
     except KeyboardInterrupt:
-        sys.exit(130)
+        return 130
+    return 0

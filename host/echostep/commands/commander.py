@@ -6,13 +6,13 @@ In: the command's arguments and options. Out: a page, a table, a recording. Slow
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from echostep.commands.options import LOCAL, Host, Port, Seconds, TeamPlan, needs, page_address
+from echostep.printing.lines import complain
 
 app = typer.Typer()
 
@@ -70,6 +70,6 @@ def _plan_file(plan: Path, url: str, team: str | None, folder: Path) -> Path:
     if drawing_wearer(plan) is None:
         return plan
     broker = parse_endpoint(url) if url.startswith(tuple(f"{scheme}://" for scheme in BROKERS)) else None
-    path = plan_file(plan, broker, checked_name("--team", team) if team else "+", folder, partial(typer.echo, err=True))
+    path = plan_file(plan, broker, checked_name("--team", team) if team else "+", folder, complain)
     assert path is not None
     return path

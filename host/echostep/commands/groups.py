@@ -14,8 +14,6 @@ from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
 
-import typer
-
 from echostep.commands.options import (
     LOCAL,
     BeaconsPort,
@@ -40,6 +38,7 @@ from echostep.commands.options import (
     page_address,
 )
 from echostep.errors import EchostepError
+from echostep.printing.lines import say
 
 if TYPE_CHECKING:
     from echostep.output.foxglove_live import FoxgloveAddress
@@ -116,9 +115,9 @@ class Ports:
 
         ports = find_ports(self.mtx, self.foot)
         options = {"board": ports.board, "mtx": ports.mtx, "foot": ports.foot}
-        typer.echo("Ports: " + " ".join(f"--{name} {path}" for name, path in options.items() if path))
+        say("Ports: " + " ".join(f"--{name} {path}" for name, path in options.items() if path))
         if not ports.mtx and not ports.foot:
-            typer.echo("Neither an MTx nor a foot board was found.")
+            say("Neither an MTx nor a foot board was found.")
         return PortOptions(ports.board, ports.mtx, self.beacons, self.seconds, self.keep, ports.foot)
 
 

@@ -11,6 +11,8 @@ from typing import Annotated
 
 import typer
 
+from echostep.printing.lines import say
+
 app = typer.Typer()
 
 
@@ -29,7 +31,7 @@ def doctor(
     from echostep.commissioning import doctor as examination
 
     if udev:
-        typer.echo(examination.rules_text(), nl=False)
+        say(examination.rules_text().removesuffix("\n"))
     elif not examination.run(board, mtx, seconds, foot, electrical=electrical):
         raise typer.Exit(1)
 
@@ -44,7 +46,7 @@ def bench_report(
     """Collect what a new board tells of itself into one text file, to be sent in with measurements (firmware/bench.md)."""
     from echostep.commissioning import bench_report as bench
 
-    typer.echo(bench.write(board, foot, seconds, out))
+    say(bench.write(board, foot, seconds, out))
 
 
 @app.command()
@@ -58,11 +60,10 @@ def flash(
     ] = None,
 ) -> None:
     """Write the firmware to a board (needs avrdude)."""
-    from rich.console import Console
-
     from echostep.commissioning import flash as flashing
+    from echostep.printing.console import console_for_people
 
-    flashing.flash(port, hex_file, Console(soft_wrap=True, highlight=False))
+    flashing.flash(port, hex_file, console_for_people(highlight=False))
 
 
 @app.command()
@@ -92,11 +93,8 @@ def calibrate(
     ] = 10.0,
 ) -> None:
     """Calibrate gyros, mounting, compass and legs, or the accelerometers. Writes the results as settings."""
-    from rich.console import Console
-
     from echostep.commissioning import calibrate as calibration
+    from echostep.printing.console import console_for_people
 
     wearer = calibration.Wearer(thigh, shank, walked)
-    calibration.calibrate(
-        calibration.Ports(board, foot), parts or [], wearer, out, Console(soft_wrap=True, highlight=False)
-    )
+    calibration.calibrate(calibration.Ports(board, foot), parts or [], wearer, out, console_for_people(highlight=False))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from echostep.extras import PAGE, lacks, require
+from echostep.printing.lines import complain
 
 if TYPE_CHECKING:
     from echostep.page.server import Address
@@ -38,7 +39,7 @@ def page_address(page: bool | None, host: str, port: int | None) -> Address | No
     if page is False:
         return None
     if words := lacks("the page", *PAGE):
-        typer.echo(f"No page is served: {words}", err=True)
+        complain(f"No page is served: {words}")
         return None
     from echostep.page.server import Address
 

@@ -15,6 +15,7 @@ import typer
 from echostep.commands.options import needs
 from echostep.errors import EchostepError
 from echostep.extras import PAGE, lacks, require
+from echostep.printing.lines import say
 
 if TYPE_CHECKING:
     from echostep.plan.model import Plan
@@ -107,8 +108,8 @@ def import_(
     plan = with_questions(plan)
     save_plan(plan, out)
     for line in summary(plan, report):
-        print(line)
-    print(f"{out}{_pictured(plan, out) if picture else ''}{_asked(plan, out)}")
+        say(line)
+    say(f"{out}{_pictured(plan, out) if picture else ''}{_asked(plan, out)}")
 
 
 def _asked(plan: Plan, out: Path) -> str:
@@ -164,15 +165,15 @@ def check(
     findings = check_plan(plan)
     for finding in findings[:MOST_LINES]:
         x, y = finding.position_m
-        print(f"{finding.number}. {plan.levels[finding.level].name}, x {x:.2f} m, y {y:.2f} m: {finding.text}")
+        say(f"{finding.number}. {plan.levels[finding.level].name}, x {x:.2f} m, y {y:.2f} m: {finding.text}")
     if len(findings) > MOST_LINES:
-        print(f"... and {len(findings) - MOST_LINES} more")
+        say(f"... and {len(findings) - MOST_LINES} more")
     counts = Counter(finding.kind for finding in findings)
-    print(f"{file}: " + (", ".join(f"{count} x {kind}" for kind, count in counts.items()) or "nothing wrong"))
+    say(f"{file}: " + (", ".join(f"{count} x {kind}" for kind, count in counts.items()) or "nothing wrong"))
     if picture is not None:
         levels = sorted({finding.level for finding in findings}) or list(range(len(plan.levels)))
         if letters := draw_plan(plan, picture, levels, None, findings[:MOST_MARKS]):
-            print(f"{picture}{_without(letters)}")
+            say(f"{picture}{_without(letters)}")
     if findings:
         raise typer.Exit(1)
 
@@ -196,7 +197,7 @@ def show(
     plan = open_limited(file)
     levels = list(range(len(plan.levels))) if level is None else [_level(plan, level)]
     if letters := draw_plan(plan, out, levels, _bounds(bounds)):
-        print(f"{out}{_without(letters)}")
+        say(f"{out}{_without(letters)}")
 
 
 @app.command()
@@ -210,7 +211,7 @@ def overlay(
     from echostep.plan.pictures.overlay import write_overlays
 
     for made in write_overlays(open_limited(file), out):
-        print(f"{made.name}: {made.south:.7f} to {made.north:.7f} N, {made.west:.7f} to {made.east:.7f} E")
+        say(f"{made.name}: {made.south:.7f} to {made.north:.7f} N, {made.west:.7f} to {made.east:.7f} E")
 
 
 @app.command()

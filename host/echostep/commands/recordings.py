@@ -13,6 +13,8 @@ from typing import Annotated
 import typer
 
 from echostep.commands.options import Plan, RecordedSeed, SettingsFile
+from echostep.printing.lines import say
+from echostep.printing.people import outlast_output
 
 app = typer.Typer()
 
@@ -25,7 +27,7 @@ def info(file: Recording) -> None:
     """Show what a recording holds, and whether it is whole."""
     from echostep.recording.repair import contents
 
-    print("\n".join(contents.info(file)))
+    say(*contents.info(file))
 
 
 @app.command()
@@ -38,7 +40,7 @@ def cut(
     """Cut a piece out of a recording."""
     from echostep.recording.repair import edit
 
-    print("\n".join(edit.cut(file, begin_s, end_s, out)))
+    say(*edit.cut(file, begin_s, end_s, out))
 
 
 @app.command()
@@ -63,7 +65,8 @@ def export(
     from echostep.session.runs.replay import tracker_of
 
     tracking = TrackingOptions(plan, start, None, settings, seed)
-    print(export_track(file, plan, out, lambda recording, on: tracker_of(recording, on, tracking)))
+    outlast_output()
+    say(export_track(file, plan, out, lambda recording, on: tracker_of(recording, on, tracking)))
 
 
 @app.command()
@@ -71,4 +74,4 @@ def repair(file: Recording, out: Out) -> None:
     """Write what is readable of a damaged recording to a new one."""
     from echostep.recording.repair import edit
 
-    print("\n".join(edit.repair(file, out)))
+    say(*edit.repair(file, out))

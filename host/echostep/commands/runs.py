@@ -14,6 +14,7 @@ import typer
 from echostep.commands.groups import Output, Ports, Tracking, with_groups
 from echostep.commands.options import BoardCommand, Out, RecordedSeed, Seed
 from echostep.errors import EchostepError
+from echostep.printing.lines import say
 from echostep.simulation.kits import Kit
 
 if TYPE_CHECKING:
@@ -121,7 +122,7 @@ def _plan_file(plan: Path | None, outlet: Outlet | None, folder: Path) -> Path |
         return None
     from echostep.team.wearer_plan import plan_file
 
-    return plan_file(plan, outlet.broker if outlet else None, outlet.team if outlet else "", folder, typer.echo)
+    return plan_file(plan, outlet.broker if outlet else None, outlet.team if outlet else "", folder, say)
 
 
 def _recorded_plan(plan: Path | None) -> Path | None:

@@ -29,6 +29,7 @@ from echostep.commissioning.serial_ports import (
 )
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, FOOT, MTX
+from echostep.printing.console import console_for_people
 from echostep.recording.device import sender, wrong_device
 
 PROBE_S = 6.0
@@ -41,7 +42,7 @@ def run(
     board: str | None, mtx: str | None, seconds: float, foot: str | None = None, *, electrical: bool = False
 ) -> bool:
     """Check everything and print the report; returns whether there is no warning and no fault."""
-    console = Console(soft_wrap=True, highlight=False)
+    console = console_for_people(highlight=False)
     with listening_bar("Looking at the ports and listening: stand still", seconds, console):
         report = examine(board, mtx, seconds, foot, electrical=electrical)
     print_report(report, console)

@@ -27,6 +27,8 @@ from echostep.operation.recorded.tape import Keyframe, Tape
 from echostep.operation.views import Views, finish, open_page
 from echostep.page.protocol import FRAME_S
 from echostep.plan.model import Plan, load_plan
+from echostep.printing.console import console_for_people
+from echostep.printing.people import outlast_output
 from echostep.team.commander import table
 from echostep.team.endpoint import Endpoint, parse_endpoint
 from echostep.team.inbox import Inbox, ListenerThread, ReceivedMessage
@@ -44,7 +46,9 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
     """Show a team until Ctrl-C, or for `seconds`, and record it; then draw the picture and print JSON if asked for. `url`: or a recording."""
     if views.picture and views.picture.suffix not in (".png", ".svg"):
         raise EchostepError(f"--picture {views.picture}: expected a name that ends in .png or .svg")
-    console = Console(soft_wrap=True, stderr=views.as_json)
+    console = console_for_people(stderr=views.as_json)
+    if not views.as_json:
+        outlast_output()
     if "://" not in url:
         replay(Path(url), load_plan(plan_path), seconds, views, console)
         return

@@ -81,6 +81,10 @@ LOCATION = topic(
         position_covariance_type=WHOLE,
     ),
 )
+LOG = topic(
+    "/log", fields("foxglove.Log", timestamp=_TIME, level=WHOLE, message=TEXT, name=TEXT, file=TEXT, line=WHOLE)
+)
+WARNING = 3  # level of a log line [Foxglove, Log]
 
 Place = tuple[float, float, float]
 WALL, TRACK, ELLIPSE, LEFT_BEAM, RIGHT_BEAM = (
@@ -144,6 +148,12 @@ def location(
         "position_covariance_type": COVARIANCE_KNOWN,
     }
     return DerivedMessage(LOCATION, t_ns, body)
+
+
+def log_line(t_ns: int, text: str) -> DerivedMessage:
+    """A line on what is wrong with the run's output."""
+    body = {"timestamp": time_of(t_ns), "level": WARNING, "message": text, "name": "echostep", "file": "", "line": 0}
+    return DerivedMessage(LOG, t_ns, body)
 
 
 def scene(t_ns: int, **drawn: tuple[int, Color, Sequence[Place]]) -> DerivedMessage:

@@ -10,11 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table as TerminalTable
 
+from echostep.printing.console import PeopleConsole, console_for_people
+
 MIN_TABLE_WIDTH = 110  # characters of a table where the terminal is narrower or its width is unknown
-console = Console(soft_wrap=True)
+console = console_for_people()
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +34,7 @@ class Table:
             table.add_column(heading, justify="right" if k else "left", overflow="fold")
         for row in self.rows:
             table.add_row(*(_cell(row.get(key)) for key in self.columns))
-        Console(width=max(console.width, MIN_TABLE_WIDTH)).print(table)
+        PeopleConsole(width=max(console.width, MIN_TABLE_WIDTH)).print(table)
         for note in self.notes:
             console.print(note)
 

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.progress import Progress
 
 from echostep.arrays import Floats
@@ -30,6 +29,7 @@ from echostep.plan.georeference import EarthTransform
 from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import Plan
 from echostep.ports.chunks import Portion
+from echostep.printing.console import console_for_people
 from echostep.recording.clock import clock_of
 from echostep.recording.reading import Recording, open_recording
 from echostep.recording.recorder import Recorder
@@ -102,7 +102,7 @@ def moment(unix_s: float) -> str:
 
 def with_progress(recording: Recording, title: str) -> Iterator[Portion]:
     """The recording's portions, with a progress bar on a terminal."""
-    console = Console(stderr=True)
+    console = console_for_people(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task(title, total=1.0)
         for portion in recording.portions():

@@ -12,6 +12,7 @@ import hashlib
 import os
 import secrets
 import shutil
+import sys
 import threading
 from pathlib import Path
 from types import TracebackType
@@ -32,6 +33,7 @@ from echostep.page.web.connections import Connections
 from echostep.page.web.gated_server import GatedServer
 from echostep.plan.model import Level, Plan, load_plan, parse_plan
 from echostep.plan.writer import plan_json
+from echostep.printing.lines import say
 
 PAGE = Path(__file__).parent / "edit"
 SHARED = ("style.css", "icon.svg", "theme.js", "view.js")  # files of the live page
@@ -230,7 +232,8 @@ def edit_plan(plan: Path, picture: Path | None, port: int | None, *, browser: bo
     import webbrowser
 
     with EditServer(plan, picture, port) as server:
-        print(f"Draw {plan} at {server.url} (until Ctrl-C).", flush=True)
+        say(f"Draw {plan} at {server.url} (until Ctrl-C).")
+        sys.stdout.flush()
         if browser:
             webbrowser.open(server.url)
         server.wait()

@@ -74,7 +74,7 @@ class LivePage:
         self._mailbox = Mailbox(tracker.plan, title, replay=replay, keeps=keeps)
         self.truth: TruePath | None = None  # shown beside the estimates
         self.receipt_of: Callable[[int], str] | None = None  # delivery of a mayday; None: the run's reports go nowhere
-        self.team_fault: Callable[[], str] = str  # why reports do not go out at present
+        self.fault_sources: list[Callable[[], str]] = []  # what is wrong at present with what the run writes, in words
         self.acknowledged_by: Callable[[int], str | None] | None = (
             None  # name of the acknowledging commander, by the alarm's number
         )
@@ -191,8 +191,9 @@ class LivePage:
     def _state_fields(self) -> dict[str, Any]:
         """The fields of a scene that follow the tracker's state rather than an estimate."""
         state = self._tracker.state
+        fault = ". ".join(filter(None, (words() for words in self.fault_sources)))
         return {
-            "streams": self._rate_meter.measure(self._tracker, self._arrived_ns, self.team_fault()),
+            "streams": self._rate_meter.measure(self._tracker, self._arrived_ns, fault),
             "undo": None if self._replay else self._undo_clock.offer(state, time.monotonic_ns()),
             "echoes_fit": echoes_fit(state),
             "alarm": shown_alarm(self._tracker, receipt_of=self.receipt_of, acknowledged_by=self.acknowledged_by),

@@ -12,7 +12,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 
 from echostep.interruption import sleep
+from echostep.output.foxglove import log_line
 from echostep.ports.chunks import Chunk, Portion, portion_of
+from echostep.printing.people import output_faults
 from echostep.recording.recorder import Recorder
 from echostep.session.console import print_notices
 
@@ -51,10 +53,14 @@ def with_messages(
 def recorded(
     chunks: Iterable[Chunk | None], recorder: Recorder, *, wait_for_disk: bool = False
 ) -> Iterator[Chunk | None]:
-    """Write each chunk before it is passed on. `wait_for_disk`: for sources that can be slowed down."""
+    """Write each chunk before it is passed on, and a line on each fault of the output. `wait_for_disk`: for sources that can be slowed down."""
+    told = 0
     for chunk in chunks:
         if chunk is not None:
             recorder.write(chunk)
+            for fault in output_faults()[told:]:
+                recorder.write_derived([log_line(chunk.t_arrival_ns, fault)])
+                told += 1
             if wait_for_disk:
                 recorder.wait_for_disk(chunk)
         print_notices(recorder.notices)

@@ -4,14 +4,10 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import IO, cast
 
-from rich.console import Console
+from echostep.printing.console import console_for_people
 
-from echostep.interruption import SafeOutput
-
-_output = cast("IO[str]", SafeOutput())
-console = Console(soft_wrap=True, file=_output)  # each message stays on one line, whatever the width of the terminal
+console = console_for_people()
 
 
 def print_notices(notices: deque[str]) -> None:

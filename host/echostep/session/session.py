@@ -29,6 +29,7 @@ from echostep.ports.people.check_in import PERSON
 from echostep.ports.people.meeting import MEETING
 from echostep.ports.people.team_beacons import TEAM_BEACONS
 from echostep.ports.people.teammate import TEAM
+from echostep.printing.people import FaultNews, outlast_output
 from echostep.recording.clock import clock_of
 from echostep.recording.reading import Recording
 from echostep.recording.recorder import DerivedMessage, Recorder
@@ -80,6 +81,7 @@ class Session:
 
         `guide_to`: the destination as given. Raises EchostepError for one that there is not.
         """
+        outlast_output()
         self.tracker = tracker
         self.title = title
         self.source = source
@@ -147,6 +149,7 @@ class Session:
             shared=self._drawing,
         )
         console.print(f"The page: {page.url}", highlight=False)
+        page.fault_sources.append(FaultNews().words)
         self.page = opened.enter_context(page)
         self._sinks.append(PageSink(page))
         self.message_sources.append((PERSON, page.pop_check_ins))
@@ -177,7 +180,7 @@ class Session:
         self._sinks.append(ReportSink(publishing))
         if self.page:
             self.page.receipt_of = publishing.receipt
-            self.page.team_fault = lambda: publishing.fault
+            self.page.fault_sources.append(lambda: publishing.fault)
 
     def _open_foxglove(self, opened: ExitStack) -> None:
         if self.output.foxglove is None:

@@ -10,7 +10,7 @@ import json
 
 from docs.pages import DOCS, between_marks
 from echostep.output.derived import TOPICS
-from echostep.output.foxglove import FRAME, LOCATION, POSE, SCENE
+from echostep.output.foxglove import FRAME, LOCATION, LOG, POSE, SCENE
 from echostep.recording.recorder import Topic
 
 SHOWN_BY = {
@@ -18,6 +18,7 @@ SHOWN_BY = {
     FRAME.name: "the same as a frame that the 3D panel can follow",
     SCENE.name: "plan (once), track, 95 % ellipse, both echoes as beams; 3D panel",
     LOCATION.name: "the place on Earth with its covariance, when the plan is georeferenced; map panel",
+    LOG.name: "why the run's output could not be written any more; log panel",
 }
 
 
@@ -25,7 +26,7 @@ def page() -> str:
     """The page as it is, with its table of derived messages made anew."""
     rows = [
         f"| `{t.name}` | `{t.schema_name}` | {SHOWN_BY.get(t.name) or _fields(t)} |\n"
-        for t in (*TOPICS, POSE, FRAME, SCENE, LOCATION)
+        for t in (*TOPICS, POSE, FRAME, SCENE, LOCATION, LOG)
     ]
     table = "| topic | schema | |\n|---|---|---|\n" + "".join(rows)
     return between_marks((DOCS / "recordings.md").read_text(), table)

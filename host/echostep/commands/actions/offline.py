@@ -24,6 +24,8 @@ from echostep.offline.leg_track import track_default
 from echostep.offline.profiles import DEFAULT, method
 from echostep.output.leg_plot import draw_legs
 from echostep.output.track_plot import draw_foot
+from echostep.printing.lines import complain
+from echostep.printing.people import is_unread
 from echostep.recording.capture import Decoder, as_json, read_capture
 from echostep.recording.capture_summary import summary
 from echostep.session.console import console
@@ -97,8 +99,10 @@ def decode(path: Path, mode: str | None = None, settings: str | None = None) -> 
     decoder = Decoder(mt=MessageReader(formats))
     for message in read_capture(path, decoder):
         sys.stdout.write(json.dumps(as_json(message), allow_nan=False) + "\n")
+        if is_unread():
+            return
     for line in summary(decoder):
-        print(line, file=sys.stderr)
+        complain(line)
 
 
 def _bits(option: str, text: str | None, most: int) -> int | None:

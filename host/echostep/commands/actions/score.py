@@ -12,13 +12,13 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from rich.console import Console
 from rich.markup import escape
 
 from echostep.errors import EchostepError
 from echostep.output.score_page import ScoreReport, page, short_names
 from echostep.output.table import Table
 from echostep.plan.importers.limited import open_limited
+from echostep.printing.console import console_for_people
 from echostep.scorecard.card import score as score_track
 from echostep.scorecard.definitions import METRICS, as_text, notes
 from echostep.scorecard.track_columns import load_path
@@ -43,7 +43,7 @@ def score(
         json.dump(_tree(report, truth), sys.stdout, indent=1)
         sys.stdout.write("\n")
     else:
-        console = Console(soft_wrap=True, highlight=False)
+        console = console_for_people(highlight=False)
         for one in (true, *loaded):
             console.print(one.described(), markup=False)
         _table(report).print()

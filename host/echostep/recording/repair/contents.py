@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import Progress
 
 from echostep.board.messages import SCHEMA_HASH, Identity
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, FOOT, LATEST_NS, MTX
+from echostep.printing.console import console_for_people
 from echostep.recording.capture import Decoder
 from echostep.recording.damage.notes import MISPLACED, made_of, missing_ports
 from echostep.recording.mcap_records import port_of
@@ -223,7 +223,7 @@ def is_mended_by_repair(recovery: Recovery, contents: Contents) -> bool:
 
 def with_progress(recovery: Recovery, contents: Contents, title: str) -> Iterator[RecordedMessage]:
     """All messages with corrected arrival times, with a progress bar on a terminal."""
-    console = Console(stderr=True)
+    console = console_for_people(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task(title, total=1.0)
         for message_index, message in enumerate(contents.order.correct(recovery.messages())):

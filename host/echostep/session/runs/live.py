@@ -26,6 +26,7 @@ from echostep.ports.arrival_clock import SleepWatch, now_ns
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk
 from echostep.ports.serial_ports import SerialPorts, check_different
 from echostep.ports.usb_number import usb_number
+from echostep.printing.people import outlast_output
 from echostep.recording.recorder import Recorder
 from echostep.session.chunk_streams import portions_of, recorded, with_messages
 from echostep.session.console import console, print_notices
@@ -85,6 +86,7 @@ def _last_start(folder: Path, plan: Plan, board: str, settings: Settings) -> Sta
 
 def record(ports: PortOptions, out: Path) -> None:
     """Record the ports without tracking."""
+    outlast_output()
     warm_up()
     byte_count: Counter[str] = Counter()
     with closing(_open_ports(ports)) as opened:

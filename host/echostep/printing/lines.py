@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: MIT
+"""Lines for people: no letter of a name or a note does more than appear.
+
+In: texts, among them names in plans, recordings and messages. Out: lines on standard output or standard error. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+
+# Control characters [ECMA-48, C0 and C1] but the line feed and the tab; overrides of the direction [Unicode, UAX 9]; lone halves of letters
+HIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def shown(text: str) -> str:
+    """The text with `?` for each letter that a terminal would obey instead of showing it."""
+    return HIDDEN.sub("?", text)
+
+
+def say(*lines: str) -> None:
+    """Lines on standard output."""
+    print(*map(shown, lines), sep="\n")
+
+
+def complain(text: str) -> None:
+    """A line on standard error."""
+    print(shown(text), file=sys.stderr)
