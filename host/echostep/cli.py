@@ -18,6 +18,7 @@ from echostep.commands.studies import add_studies
 from echostep.errors import EchostepError
 from echostep.extras import EXTRAS, lacks
 from echostep.interruption import end_by_signals
+from echostep.printing.file_mode import share_files
 from echostep.printing.lines import complain, say
 from echostep.printing.people import lost_result, to_people
 
@@ -51,8 +52,12 @@ def options(
         bool,
         typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end."),
     ] = False,
+    share: Annotated[
+        bool, typer.Option("--share", help="Recordings and tracks may be read by other users, as the umask allows.")
+    ] = False,
 ) -> None:
     """Indoor pedestrian tracking."""
+    share_files(wanted=share)
 
 
 def main() -> None:

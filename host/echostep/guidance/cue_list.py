@@ -11,6 +11,7 @@ from pathlib import Path
 
 from echostep.guidance.cues import Cue
 from echostep.plan.routing import Route
+from echostep.printing.file_mode import claim
 
 CUE_COLUMNS = ("t_s", "kind", "arrow_rad", "left_m", "text", "spoken")
 
@@ -39,7 +40,7 @@ class CueList:
 
     def write(self, path: Path) -> None:
         """All cues as CSV."""
-        with path.open("w", newline="") as file:
+        with claim(path).open("w", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(CUE_COLUMNS)
             writer.writerows([getattr(cue, name) for name in CUE_COLUMNS] for cue in self.cues)

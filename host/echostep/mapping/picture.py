@@ -16,6 +16,7 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan.model import Level, Plan
 from echostep.plan.pictures.drawing import DOOR, OBSTACLE, WALL
+from echostep.printing.file_mode import claim
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,7 +46,7 @@ def draw_picture(path: Path, plan: Plan, walked_m: Sequence[Sequence[Floats]], b
         if count > 1:
             axes.set_title(f"floor {level.name}, {level.height_m:+.1f} m", fontsize="small")
     try:
-        figure.savefig(path)
+        figure.savefig(claim(path))
     except OSError as error:
         raise EchostepError(f"{path}: cannot write the picture: {error.strerror or error}") from error
 

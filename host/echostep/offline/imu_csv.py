@@ -22,6 +22,7 @@ from echostep.foot.steps import Track
 from echostep.offline.bursts import spread
 from echostep.offline.csv_table import CsvLimits, header_of, lines_of, number_of, open_samples, read_rows
 from echostep.offline.imu_checks import complaint, contradiction, end_sd_m, notes, sorted_by_time, whole_rows
+from echostep.printing.file_mode import claim
 
 COLUMNS = ("t_s", "ax", "ay", "az", "gx", "gy", "gz")
 MAG_COLUMNS = ("mx", "my", "mz")
@@ -79,7 +80,7 @@ def checked(track: Track, path: Path | str) -> Track:
 def write_foot_track(path: Path | str, track: Track) -> None:
     """`t_s,x,y,z,heading_rad,stance` for every sample; raises EchostepError when the file cannot be written."""
     try:
-        with Path(path).open("w", newline="") as file:
+        with claim(Path(path)).open("w", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(TRACK_COLUMNS)
             columns = (track.t_s, *track.position_m.T, track.heading_rad)

@@ -12,6 +12,7 @@ from pathlib import Path
 from echostep.errors import EchostepError
 from echostep.legs.stride import Flag, distance_sd_m
 from echostep.offline.leg_track import LegTrack
+from echostep.printing.file_mode import claim
 
 TRACK_COLUMNS = ("t_s", "distance_m", "speed_m_s", "heading_rad", "x", "y")
 PARTIAL = Flag.EDGE | Flag.STANDING | Flag.UNSEEN | Flag.BACKWARD | Flag.GAP  # not a whole stride of known length
@@ -25,7 +26,7 @@ FLAG_WORDS = {
 def write_leg_track(path: Path | str, track: LegTrack) -> None:
     """`TRACK_COLUMNS`, a row a sample (the paper's: ten a second); raises EchostepError when the file cannot be written."""
     try:
-        with Path(path).open("w", newline="") as file:
+        with claim(Path(path)).open("w", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(TRACK_COLUMNS)
             writer.writerows([f"{v:.6f}" for v in row] for row in track.rows.tolist())

@@ -15,6 +15,8 @@ from pathlib import Path
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from echostep.printing.file_mode import claim
+
 APPLICATION_ID, USER_VERSION = 0x47504B47, 10400  # "GPKG", 1.4 [table 1]
 WGS84 = 4326
 _WGS84_WKT = (
@@ -52,7 +54,7 @@ class Layer:
 def write_geopackage(path: Path, layers: Sequence[Layer]) -> None:
     """Write a new file; raises OSError or sqlite3.Error."""
     path.unlink(missing_ok=True)
-    connection = sqlite3.connect(path)
+    connection = sqlite3.connect(claim(path))
     try:
         connection.executescript(_TABLES)
         for layer in layers:

@@ -13,6 +13,7 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.legs.stride import Flag, Stride
 from echostep.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
+from echostep.printing.file_mode import claim
 
 PARTIAL_COLOUR = "#999999"
 
@@ -45,6 +46,6 @@ def draw_legs(path: Path, rows: Floats, strides: Sequence[Stride], title: str) -
         )  # fmt: skip
     side.set(xlabel="t / s", ylabel="stride / m (grey: edges and gaps)", xlim=(t_s[0], t_s[-1]), ylim=(0.0, None))
     try:
-        figure.savefig(path)
+        figure.savefig(claim(path))
     except OSError as error:
         raise EchostepError(f"{path}: cannot write the picture: {error.strerror}") from error

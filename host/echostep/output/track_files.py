@@ -30,6 +30,7 @@ from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import Plan
 from echostep.ports.chunks import Portion
 from echostep.printing.console import console_for_people
+from echostep.printing.file_mode import claim
 from echostep.recording.clock import clock_of
 from echostep.recording.reading import Recording, open_recording
 from echostep.recording.recorder import Recorder
@@ -70,7 +71,7 @@ def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recordi
                 estimates += tracker.take(portion)
             if not estimates:
                 raise EchostepError(f"{path}: no estimate: the foot never stood still, or no bytes of its sensor came")
-            FORMATS[out.suffix](out, TrackOnPlan(estimates, plan, moments_of(recording, tracker, estimates)))
+            FORMATS[out.suffix](claim(out), TrackOnPlan(estimates, plan, moments_of(recording, tracker, estimates)))
     except (OSError, sqlite3.Error) as error:
         raise EchostepError(f"{out}: cannot write: {getattr(error, 'strerror', None) or error}") from error
     return f"{out}: {len(estimates)} estimates, {estimates[-1].t_s - estimates[0].t_s if estimates else 0.0:.1f} s"

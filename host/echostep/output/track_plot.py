@@ -20,6 +20,7 @@ from echostep.localization.beacon_map import BeaconPlace, BeaconState
 from echostep.localization.estimate import Estimate
 from echostep.plan.model import Level, Plan
 from echostep.plan.routing import Route
+from echostep.printing.file_mode import claim
 from echostep.scorecard.truth import Truth
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ TRUTH_COLOUR, TRACK_COLOUR = "#009e73", "#0072b2"  # distinguishable with colour
 
 def write_track(path: Path, estimates: Sequence[Estimate]) -> None:
     """Write estimates as CSV; numbers read back to the same bits."""
-    with path.open("w", newline="") as file:
+    with claim(path).open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow([*COLUMNS, HYPOTHESES])
         for e in estimates:
@@ -81,7 +82,7 @@ def draw_track(
         _draw_guidance(axes, k, route, [b for b in beacons if b.level == k])
         if len(plan.levels) > 1:
             axes.set_title(plan.levels[k].name, loc="left", fontsize=9, parse_math=False)
-    figure.savefig(path)
+    figure.savefig(claim(path))
 
 
 def _draw_level(axes: Axes, level: Level, estimates: Sequence[Estimate], truth_m: Floats | None) -> None:
@@ -152,7 +153,7 @@ def draw_foot(path: Path, track: Track, title: str) -> None:
     above.legend(fontsize=8)
     side.plot(track.t_s, z, color=TRACK_COLOUR, linewidth=1)
     side.set(xlabel="t / s", ylabel="height / m")
-    figure.savefig(path)
+    figure.savefig(claim(path))
 
 
 def _height(level: Level) -> float:

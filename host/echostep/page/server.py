@@ -37,6 +37,7 @@ from echostep.page.web.connections import Connections
 from echostep.page.web.faults import Faults
 from echostep.page.web.gated_server import GatedServer
 from echostep.page.web.log_budget import logged_to
+from echostep.page.web.users import has_other_users
 from echostep.plan.model import Plan
 
 STATIC = Path(__file__).parent / "static"
@@ -89,7 +90,7 @@ class SocketServer(Generic[S]):
         self.sessions: set[S] = set()
         self._site = site
         self._listener = open_listener(address)
-        token = None if address.host in LOOPBACK else secrets.token_urlsafe(16)
+        token = None if address.host in LOOPBACK and not has_other_users() else secrets.token_urlsafe(16)
         self.url = _url(self._listener, token)
         self.connections = Connections(self._listener)
         self.access_control = AccessControl(self._application(token), token, self.connections, site.faults.tell)
@@ -100,7 +101,7 @@ class SocketServer(Generic[S]):
             ws_max_size=MOST_REQUEST, ws_per_message_deflate=False, timeout_graceful_shutdown=1,
         )  # fmt: skip
         self._server = GatedServer(settings, self.connections)
-        self._thread = threading.Thread(target=self._server.run, name=site.name, daemon=True)
+        self._thread = threading.Thread(target=self._serve, name=site.name, daemon=True)
         self._logged = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
@@ -113,6 +114,13 @@ class SocketServer(Generic[S]):
         self._thread.join(STOP_S)
         self._logged.close()
         self._listener.close()
+
+    def _serve(self) -> None:
+        """The thread."""
+        try:
+            self._server.run()
+        except Exception as error:  # whatever it is, the run needs no page
+            self._site.faults.note_end(error)
 
     @property
     def pages(self) -> int:

@@ -14,6 +14,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from echostep.errors import EchostepError
+from echostep.printing.file_mode import file_mode
 
 try:
     import fcntl
@@ -34,7 +35,7 @@ def create(path: Path) -> int:
         raise RecordingExistsError(f"{path}: exists, and is not overwritten: give another name")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), file_mode())
     except OSError as error:
         raise EchostepError(f"{path}: cannot write: {error.strerror}") from error
     with suppress(OSError):  # a file system without locks

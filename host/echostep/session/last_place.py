@@ -21,6 +21,7 @@ from echostep.localization.height.levels import ClimbSettings
 from echostep.localization.particles.start import Start
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan
+from echostep.printing.file_mode import claim
 from echostep.session.metadata import LAST, bounded, possible
 from echostep.tracker import Tracker
 from echostep.tracker.last_place import LastPlace, start_after
@@ -60,7 +61,7 @@ class PlaceKeeper:
         fields = {"utc": datetime.now(UTC).isoformat(), "plan_sha256": self._tracker.plan.digest, "board": self._board}
         written = self._path.with_suffix(".new")
         try:
-            written.write_text(json.dumps(fields | {"place": asdict(place)}))
+            claim(written).write_text(json.dumps(fields | {"place": asdict(place)}))
             written.replace(self._path)
         except OSError:
             return

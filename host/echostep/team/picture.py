@@ -13,6 +13,7 @@ from pathlib import Path
 from echostep.errors import EchostepError
 from echostep.localization.estimate import ellipse95
 from echostep.plan.model import Plan
+from echostep.printing.file_mode import claim
 from echostep.team.messages.report import Position
 from echostep.team.roster import Member, MemberState
 
@@ -51,7 +52,7 @@ def draw_team(path: Path, plan: Plan, members: Sequence[Member], now_s: float) -
                 _draw_member(axes, m.report.name, p, m.state(now_s), stacked)
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
-        figure.savefig(path)
+        figure.savefig(claim(path))
     except OSError as error:
         raise EchostepError(f"{path}: cannot write the picture: {error.strerror}") from error
 

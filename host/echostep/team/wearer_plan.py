@@ -15,6 +15,7 @@ from pathlib import Path
 
 from echostep.errors import EchostepError
 from echostep.plan.model import Plan
+from echostep.printing.file_mode import claim
 from echostep.team.endpoint import Endpoint
 from echostep.team.inbox import ListenerThread
 from echostep.team.messages.report import checked_name
@@ -87,7 +88,7 @@ def _kept(payload: bytes, name: str, folder: Path) -> Path:
                 raise EchostepError(f"{path}: holds something else, and is not overwritten: remove it")
             return path
         part = path.with_suffix(".part")
-        part.write_bytes(payload)
+        claim(part).write_bytes(payload)
         part.replace(path)
     except OSError as error:
         raise EchostepError(f"{path}: cannot write the drawing: {error.strerror or error}") from error

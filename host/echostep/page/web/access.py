@@ -3,8 +3,8 @@
 
 In: every request to the server. Out: the same request, or a refusal. Owns the count of refused requests; tells the connections
 when a request begins and ends. On the loopback interface a web page of
-another site must not reach the socket: `Host` must name this machine and `Origin` must be the page's own. On other interfaces the address contains
-a random token, and requests without it are refused.
+another site must not reach the socket: `Host` must name this machine and `Origin` must be the page's own. On other interfaces, and on a computer of
+several users, the address contains a random token, and requests without it are refused.
 
 Behind a proxy the page's own address may begin with https, and is in `X-Forwarded-Host` where the proxy puts its target into `Host`: a page of
 another site cannot set that header for a socket. What is refused for its address is told, for a proxy may be the reason.

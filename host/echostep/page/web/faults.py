@@ -23,7 +23,11 @@ class Faults:
 
     def note(self, error: BaseException) -> str:
         """The exception in words, with the line of code that raised it."""
-        return self.note_text(f"{type(error).__name__}: {str(error)[:200]}{_place(error)}")
+        return self.note_text(_described(error))
+
+    def note_end(self, error: BaseException) -> None:
+        """The server's thread has ended before the run."""
+        self.notices.append(f"The page is no longer served: {_described(error)}. The run goes on without it.")
 
     def tell(self, sentence: str) -> None:
         """A sentence that is no fault of the server, for the terminal."""
@@ -34,8 +38,12 @@ class Faults:
         text = f"The page's server has a fault: {what}"
         if text not in self._known and len(self._known) < MOST_KEPT:
             self._known.add(text)
-            self.notices.append(f"{text}. Please report it: echostep goes on without the page.")
+            self.notices.append(f"{text}. Please report it: the run goes on, and so does the page.")
         return text
+
+
+def _described(error: BaseException) -> str:
+    return f"{type(error).__name__}: {str(error)[:200]}{_place(error)}"
 
 
 def _place(error: BaseException) -> str:

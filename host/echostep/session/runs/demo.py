@@ -19,6 +19,7 @@ from echostep.page.elements.true_position import TruePath
 from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import Plan
 from echostep.ports.chunks import Chunk, Portion
+from echostep.printing.file_mode import claim
 from echostep.recording.recorder import Recorder
 from echostep.scorecard.truth import load_truth
 from echostep.session.chunk_streams import paced, portions_of, recorded, with_messages
@@ -115,7 +116,7 @@ def _track(
         with progress_line("Simulating the walk"):
             person = Person() if options.plan_path is None else Person(corner_m=TOUR_CORNER_M)
             scenario = Scenario(plan, waypoints, options.seed, boards[0], person, kit=options.kit, foot_board=boards[1])
-        scenario.write_truth(output.folder / "truth.csv")
+        scenario.write_truth(claim(output.folder / "truth.csv"))
         session.show_truth(TruePath.of(scenario.truth, plan))
         metadata = run_metadata(plan, start, options.seed, "simulated walk, simulated sensors", source=SIMULATED)
         with start_recording(output.folder / "walk.mcap", metadata) as recorder:

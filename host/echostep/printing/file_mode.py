@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: MIT
+"""Who may read the files of a run: its user alone, unless `--share` was given.
+
+In: a path that is about to be written. Out: a file of mode 0600 there. Owns the answer to `--share`.
+
+A recording is where a person was, second by second. The process's umask stays as it is: compiled kernels, which other users of an installation read,
+are written meanwhile.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+PRIVATE, SHARED = 0o600, 0o666  # of a new file; the umask may take away more
+_share: list[bool] = []  # not empty: `--share`
+
+
+def share_files(*, wanted: bool) -> None:
+    """New files may be read by others, as the umask allows, or not."""
+    _share[:] = [True] * wanted
+
+
+def file_mode() -> int:
+    """The mode of a new file."""
+    return SHARED if _share else PRIVATE
+
+
+def claim(path: Path) -> Path:
+    """Make the file where there is none, so that its mode is right before it has content; one that exists keeps its mode. Returns the path."""
+    os.close(os.open(path, os.O_WRONLY | os.O_CREAT, file_mode()))
+    return path
