@@ -40,10 +40,16 @@ def check(page: Any, plan: Plan, shot: Path) -> None:
         needle, heading = page.evaluate(POINTS, north)
         return needle, heading
 
+    def turn_north() -> None:
+        page.click("#north")
+
+    def press_n() -> None:
+        page.keyboard.press("n")
+
     needle, heading = angles()
     assert math.remainder(needle - heading, 360.0) == pytest.approx(0.0, abs=0.1)
     assert heading == pytest.approx(90.0 - math.degrees(north), abs=0.1)  # the building is drawn as on its plan
-    for act in (lambda: page.click("#north"), lambda: page.keyboard.press("n")):
+    for act in (turn_north, press_n):
         page.focus("#map")
         page.keyboard.press("[")
         wait_for(page, f"Math.abs(({POINTS})({north})[0]) > 10")
