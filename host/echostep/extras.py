@@ -13,6 +13,7 @@ from echostep.errors import EchostepError
 
 PAGE = ("starlette", "uvicorn", "websockets")
 EXTRAS = dict.fromkeys(PAGE, "page") | {
+    "cryptography": "pkcs12",
     "paho": "team",
     "pyproj": "plans",
     "ezdxf": "plans",

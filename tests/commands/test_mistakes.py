@@ -13,6 +13,9 @@ from pathlib import Path
 
 import pytest
 import trustme
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.serialization import BestAvailableEncryption
+from cryptography.hazmat.primitives.serialization.pkcs12 import serialize_key_and_certificates
 
 from board_runs import ROOT
 from command_line import echostep, interrupt_once_called
@@ -30,6 +33,7 @@ from xsens.mt_lines import on_a_terminal
 PLAN = ROOT / "host/echostep/plans/demo.json"
 WALK = ROOT / "tests/captures/walk.mcap"
 PAGE = ROOT / "host/docs/mistakes.md"
+ROWS = dict(re.findall(r"^\| ([^|]+) \| `([^`]+)`", PAGE.read_text(), flags=re.M))  # what is printed, by mistake
 Mistake = Callable[
     [Path, pytest.MonkeyPatch], dict[str, str]
 ]  # {"said": what is printed, and what to put capitals for}
@@ -138,10 +142,11 @@ def publishing(folder: Path, url: str) -> str:
 
 
 def pkcs12(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
+    key = ec.generate_private_key(ec.SECP256R1())
     path = folder / "client.p12"
-    path.write_bytes(b"\x30\x82\x0a\x00\x02\x01\x03")
+    path.write_bytes(serialize_key_and_certificates(None, key, None, None, BestAvailableEncryption(b"secret")))
     url = "cot+tls://127.0.0.1:8089"
-    return {"said": publishing(folder, f"{url}?cert={path}&key={path}"), "URL": url, "FILE": str(path)}
+    return {"said": publishing(folder, f"{url}?cert={path}"), "URL": url, "FILE": str(path)}
 
 
 def other_name(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
@@ -195,7 +200,7 @@ MISTAKES: dict[str, Mistake] = {
     "no right to open the port": no_rights,
     "the broker is not there": no_broker,
     "the broker refuses the reports": refused_reports,
-    "a certificate is PKCS #12": pkcs12,
+    "a certificate in PKCS #12 has a password of its own": pkcs12,
     "a certificate is for another name": other_name,
     "the disk is full": disk_full,
 }
@@ -219,5 +224,9 @@ def test_what_a_mistake_prints_stands_in_the_manual(
     said = values.pop("said")
     for name, value in values.items():
         said = said.replace(value, name)
-    rows = dict(re.findall(r"^\| ([^|]+) \| `([^`]+)`", PAGE.read_text(), flags=re.M))
-    assert rows.get(mistake) == said
+    assert ROWS.get(mistake) == said
+
+
+def test_each_row_of_the_manual_is_provoked_by_a_test() -> None:
+    assert list(ROWS) == list(MISTAKES)
+    assert PAGE.read_text().count("\n| ") == len(ROWS) + 1  # with the row of the heads

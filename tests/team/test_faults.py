@@ -98,11 +98,7 @@ def test_faults_of_the_network_say_where_to_look() -> None:
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        (
-            "client.p12",
-            b"\x30\x82\x0a\x00\x02\x01\x03",
-            r"is PKCS #12 or DER.*openssl pkcs12 -legacy -nodes -in client\.p12 -out client\.pem",
-        ),
+        ("client.p12", b"\x30\x82\x0a\x00\x02\x01\x03", r"is damaged, or is DER: openssl x509 -inform der"),
         ("empty.pem", b"", "holds no certificate and no key"),
         ("half.pem", b"-----BEGIN CERTIFICATE-----\nno\n-----END CERTIFICATE-----\n", "cannot use"),
     ],
@@ -119,5 +115,5 @@ def test_a_file_that_is_no_certificate_is_named_with_the_remedy(
 
 
 def test_a_name_needs_tls() -> None:
-    with pytest.raises(EchostepError, match="ca, cert, key and name are for cot"):
+    with pytest.raises(EchostepError, match="ca, cert, key, password and name are for cot"):
         parse_endpoint("cot+tcp://h?name=takserver")

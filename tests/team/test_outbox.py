@@ -256,7 +256,7 @@ def test_no_name_breaks_the_xml(name: str) -> None:
         ("mqtt://[::1", "not an address"),
         ("mqtt://host/path", "HOST"),
         ("mqtt://host?ca=x", "ca"),
-        ("mqtts://host?cert=x", "belong together"),
+        ("mqtts://host?key=x", "key belongs to a certificate"),
         ("mqtts://host?colour=red", "colour"),
         ("cot+udp://me:secret@host", "user"),
         ("ftp://me:secret@host", "ftp|expected"),

@@ -15,7 +15,7 @@ from echostep.extras import require
 from echostep.team.messages.report import checked_name
 
 PORTS = {"mqtt": 1883, "mqtts": 8883, "cot+udp": 6969, "cot+tcp": 8087, "cot+tls": 8089, "mesh": 0}
-FILES = ("ca", "cert", "key")
+FILES = ("ca", "cert", "key", "password")
 NAME = "name"  # that the server's certificate has, where it is not the host's
 BROKERS = ("mqtt", "mqtts")  # schemes of brokers, which keep messages
 PACKAGES = dict.fromkeys(PORTS, "pyproj") | {
@@ -27,7 +27,7 @@ PACKAGES = dict.fromkeys(PORTS, "pyproj") | {
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """A parsed URL; `files` are the PEM files for TLS by name: `ca` (default: the system's), `cert` and `key` of the client."""
+    """A parsed URL; `files` for TLS by name: `ca` (default: the system's), `cert` and `key` of the client, `password` of the key."""
 
     scheme: str
     host: str
@@ -79,10 +79,10 @@ def parse_endpoint(url: str, schemes: tuple[str, ...] = tuple(PORTS)) -> Endpoin
     )  # fmt: skip
     if (endpoint.files or certificate_name) and not endpoint.secure:
         raise EchostepError(
-            f"{shown}: ca, cert, key and name are for {'mqtts' if 'mqtt' in parts.scheme else 'cot+tls'}://"
+            f"{shown}: ca, cert, key, password and name are for {'mqtts' if 'mqtt' in parts.scheme else 'cot+tls'}://"
         )
-    if ("cert" in endpoint.files) != ("key" in endpoint.files):
-        raise EchostepError(f"{shown}: cert and key belong together")
+    if "key" in endpoint.files and "cert" not in endpoint.files:
+        raise EchostepError(f"{shown}: key belongs to a certificate: give cert=FILE too")
     if endpoint.user is not None and "mqtt" not in parts.scheme:
         raise EchostepError(f"{shown}: user and password are for mqtt:// and mqtts://")
     return endpoint
