@@ -11,15 +11,17 @@ from __future__ import annotations
 import errno
 import os
 import threading
+import time
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping
 from itertools import combinations
 from typing import TypeAlias
 
 import serial
+from serial import rfc2217
 
 from echostep.errors import EchostepError
-from echostep.ports.access import holders, refusal
+from echostep.ports.access import holders, is_url, refusal
 from echostep.ports.arrival_clock import now_ns
 from echostep.ports.chunks import Chunk, ChunkQueue
 from echostep.ports.port_faults import PORT_FAULTS
@@ -33,8 +35,10 @@ AnyPort: TypeAlias = "serial.SerialBase | UdpPort | TcpPort"
 IDLE_S = 0.05  # longest wait for a chunk; short, so that the set-up of the MTx repeats its requests in time
 READ_TIMEOUT_S = 0.1
 WRITE_TIMEOUT_S = 0.5
+TOGETHER_S = 0.002  # pyserial's thread hands the bytes of one segment over in less
 REOPEN_S = 0.5  # between two attempts to open a lost port
 JOIN_S = 2.0  # longest wait for the end of a reading thread
+SEE_PORTS = "see which ports there are: ls /dev/serial/by-id"
 MOST_NOTICES = 8  # kept; the oldest is dropped
 
 
@@ -110,10 +114,7 @@ class SerialPorts:
         while not self._stop.is_set():
             port = self._ports[name]
             try:
-                received = port.read(max(1, port.in_waiting))
-                # A read of a serial port that has waited returns its first byte alone.
-                if received and isinstance(port, serial.SerialBase) and (waiting := port.in_waiting):
-                    received += port.read(waiting)
+                received = _read_block(port)
             except (TypeError, *PORT_FAULTS) as error:  # TypeError: closed under a blocking read
                 url = self._reopen(name, url, baud, error)
                 continue
@@ -159,6 +160,18 @@ class SerialPorts:
         return url if place and os.path.realpath(url) == os.path.realpath(place) else place
 
 
+def _read_block(port: AnyPort) -> bytes:
+    """All bytes that wait, or the first that come; empty after `READ_TIMEOUT_S` without one."""
+    received = bytes(port.read(max(1, port.in_waiting)))
+    if not received or not isinstance(port, serial.SerialBase):
+        return received
+    # A read of a serial port that has waited returns its first byte alone; one of RFC 2217 gets its bytes singly from a thread.
+    if isinstance(port, rfc2217.Serial):
+        time.sleep(TOGETHER_S)
+    waiting = port.in_waiting
+    return received + bytes(port.read(waiting)) if waiting else received
+
+
 def check_different(urls: Mapping[str, str]) -> None:
     """Raise EchostepError when two names have the same port."""
     for (name, url), (other, again) in combinations(urls.items(), 2):
@@ -182,6 +195,5 @@ def _open(url: str, baud: int) -> AnyPort:
         if getattr(error, "errno", None) in (errno.EWOULDBLOCK, errno.EBUSY):
             held = ", ".join(holders(url)) or "a program of another user"
             raise EchostepError(f"{url} is in use by {held}: end that program, or give another port") from error
-        raise EchostepError(
-            f"{url}: cannot open the port: {error}; see which ports there are: ls /dev/serial/by-id"
-        ) from error
+        there = "is what gives the port (ser2net) running there?" if is_url(url) else SEE_PORTS
+        raise EchostepError(f"{url}: cannot open the port: {error}; {there}") from error

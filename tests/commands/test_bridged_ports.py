@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: MIT
+"""Both ports over a network: a live run tracks all of it, in blocks as large as those of the ports themselves; a wearer who stands and fits everywhere."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from board_runs import ROOT, needs_twin, tool
+from bridges import bridged
+from command_line import echostep, interrupt_after
+from echostep.recording.reading import open_recording
+from waiting import PATIENCE_S
+
+PLAN = ROOT / "host/echostep/plans/demo.json"
+LEAST_BYTES = 12  # of a chunk on average: a message or two; single bytes took 10 s of a run of 25 s
+pytestmark = [pytest.mark.twin, needs_twin]
+
+
+@contextmanager
+def twin(folder: Path, *options: str) -> Iterator[tuple[str, str]]:
+    """The ports of the board, real firmware in the simulator, and of a simulated MTx."""
+    command = [*tool("twin.run"), *options, "--out", str(folder)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
+        try:
+            assert running.stdout is not None
+            board, mtx = (running.stdout.readline().split()[1] for _ in range(2))
+            yield board, mtx
+        finally:
+            running.send_signal(signal.SIGINT)
+            running.wait(timeout=PATIENCE_S)
+
+
+@pytest.mark.filterwarnings("ignore:setDaemon:DeprecationWarning")  # in pyserial
+@pytest.mark.parametrize("scheme", ["socket", "rfc2217"])
+def test_a_run_over_the_network_is_read_in_blocks_and_tracked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheme: str
+) -> None:
+    interrupt_after(10, monkeypatch)
+    with (
+        twin(tmp_path) as (board_port, mtx_port),
+        bridged(board_port, scheme) as board,
+        bridged(mtx_port, scheme) as mtx,
+    ):
+        done = echostep(
+            "live", "--plan", PLAN, "--board", board, "--mtx", mtx, "--headless", "--out", tmp_path, "--seconds", PATIENCE_S,
+        )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "went away" not in done.stdout
+    assert int(re.findall(r"estimates: (\d+)", done.stdout)[0]) >= 10
+    chunks = [chunk for chunk in open_recording(tmp_path / "walk.mcap").chunks() if chunk.data]
+    assert {chunk.port for chunk in chunks} == {"board", "mtx"}
+    assert sum(len(chunk.data) for chunk in chunks) / len(chunks) > LEAST_BYTES
+
+
+def test_a_wearer_who_stands_where_many_places_fit_is_named_in_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    interrupt_after(10, monkeypatch)
+    with twin(tmp_path, "--still") as (board, mtx):
+        done = echostep(
+            "live", "--plan", PLAN, "--board", board, "--mtx", mtx, "--headless", "--start", "?", "--out", tmp_path,
+            "--seconds", PATIENCE_S,
+        )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    again = echostep("replay", tmp_path / "walk.mcap", "--plan", PLAN, "--headless", "--out", tmp_path / "again")
+    for printed in (done.stdout, again.stdout):
+        assert "end: place not known" in printed
+        assert "corridor" not in printed.lower()
