@@ -5,8 +5,8 @@ In: signals. Out: one KeyboardInterrupt, after which the run writes its files. O
 at once.
 
 An exception between two bytecodes would tear a portion: recorded but not tracked, or tracked but not written. So the loop of a run holds the signal
-back and asks for it between two portions. That also finds one that came earlier and was lost, where Python drops every exception: in finalizers, and
-in the callbacks of LLVM while a kernel is compiled or loaded.
+back, and its source asks for it between two portions; a live run then takes what its ports have received, and no more. That also finds one that came
+earlier and was lost, where Python drops every exception: in finalizers, and in the callbacks of LLVM while a kernel is compiled or loaded.
 """
 
 from __future__ import annotations
@@ -14,10 +14,12 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import TypeVar
 
+Item = TypeVar("Item")
 SIGNAL_POLL_S = 0.1  # a run that ends this late ends at once
 _asked = threading.Event()  # a signal has come since `end_by_signals`
 _holding = threading.Event()  # the first one is held back
@@ -36,7 +38,7 @@ def end_by_signals() -> None:
 
 @contextmanager
 def holding_signals() -> Iterator[None]:
-    """Hold the first signal back until `raise_held`."""
+    """Hold the first signal back: `is_asked` tells of it."""
     _holding.set()
     try:
         yield
@@ -44,17 +46,25 @@ def holding_signals() -> Iterator[None]:
         _holding.clear()
 
 
-def raise_held() -> None:
-    """Raise KeyboardInterrupt when a signal has come."""
-    if _asked.is_set():
-        raise KeyboardInterrupt
+def is_asked() -> bool:
+    """Whether a signal has come."""
+    return _asked.is_set()
+
+
+def until_asked(items: Iterable[Item]) -> Iterator[Item]:
+    """The items until a signal comes; for a source that would go on."""
+    for item in items:
+        yield item
+        if is_asked():
+            return
 
 
 def sleep(span_s: float) -> None:
     """Sleep; a signal that is held back ends it with KeyboardInterrupt."""
     ends_s = time.monotonic() + span_s
     while (left_s := ends_s - time.monotonic()) > 0.0:
-        raise_held()
+        if is_asked():
+            raise KeyboardInterrupt
         time.sleep(min(left_s, SIGNAL_POLL_S))
 
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A terminal, a pipe or a log that takes nothing ends no run: the walk is recorded, files and status are as always, and the recording says it once."""
+"""A terminal, a pipe or a log that takes nothing ends no run: the walk is recorded, files and status are as always.
+
+The recording says it once.
+"""
 
 from __future__ import annotations
 
@@ -23,6 +26,7 @@ from players import pseudo_terminal, python_board
 from waiting import PATIENCE_S, until
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
+FULL = Path("/dev/full")  # refuses every byte: no space left [full(4)]
 pytestmark = pytest.mark.process
 # Runs the program with files closed that its parent left open, as the shell does for >&-
 CLOSING = "import os, sys; [os.close(int(k)) for k in sys.argv[1]]; os.execv(sys.argv[2], sys.argv[2:])"
@@ -42,13 +46,13 @@ def output_of(kind: str) -> Iterator[IO[Any] | int]:
     """Where a run prints: `full` | `gone` | `stopped` (a terminal that nobody reads) | `closed`."""
     with contextlib.ExitStack() as stack:
         if kind == "full":
-            yield stack.enter_context(open("/dev/full", "w"))
+            yield stack.enter_context(FULL.open("w"))
         elif kind == "gone":
             yield stack.enter_context(unread_pipe())
         elif kind == "stopped":
             stack.enter_context(pseudo_terminal())
             _, name = stack.enter_context(pseudo_terminal())
-            yield stack.enter_context(open(name, "w"))
+            yield stack.enter_context(Path(name).open("w"))
         else:
             yield subprocess.DEVNULL
 
@@ -87,9 +91,9 @@ def test_a_run_outlasts_its_output(tmp_path: Path, kind: str, command: str) -> N
     assert command == "record" or (tmp_path / "track.csv").exists()
 
 
-def test_a_command_whose_result_is_lost_has_status_2(tmp_path: Path) -> None:
+def test_a_command_whose_result_is_lost_has_status_2() -> None:
     """As any compiler; a reader that had enough is no fault."""
-    with open("/dev/full", "w") as full:
+    with FULL.open("w") as full:
         done = subprocess.run([*PROGRAM, "--help"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert "No space left on device" in done.stderr

@@ -17,7 +17,7 @@ import pytest
 
 from board_runs import ROOT
 from command_line import PROGRAM, echostep
-from echostep.interruption import end_by_signals, holding_signals, raise_held, sleep
+from echostep.interruption import end_by_signals, holding_signals, is_asked, sleep
 from echostep.ports.chunks import Chunk
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import Recorder
@@ -81,7 +81,7 @@ def terminal_read(terminal: int) -> Iterator[Callable[[], None]]:
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("end", ["SIGTERM", "closed"])
+@pytest.mark.parametrize("end", ["SIGTERM", "SIGQUIT", "closed"])
 def test_a_live_run_ends_with_a_whole_recording(tmp_path: Path, end: str) -> None:
     """A terminal that is closed sends SIGHUP."""
     with live_on_a_terminal(tmp_path, signal.SIG_DFL) as (live, close):
@@ -138,7 +138,7 @@ def test_a_held_signal_ends_a_wait_and_a_second_ends_at_once() -> None:
     end_by_signals()
     try:
         with holding_signals():
-            raise_held()
+            assert not is_asked()
             signal.raise_signal(signal.SIGINT)
             with pytest.raises(KeyboardInterrupt):
                 sleep(PATIENCE_S)

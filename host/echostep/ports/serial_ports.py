@@ -14,6 +14,7 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from itertools import combinations
 from typing import TypeAlias
 
@@ -81,13 +82,23 @@ class SerialPorts:
         return tuple(self._ports)
 
     def chunks(self) -> Iterator[Chunk | None]:
-        """Chunks in order of arrival until `close`; None after `IDLE_S` without a chunk."""
+        """Chunks in order of arrival until `stop`, then those that have arrived; None after `IDLE_S` without a chunk."""
         while not self._stop.is_set():
             yield self._queue.get(IDLE_S)
             for port in [port for port, count in self._queue.dropped.items() if count > self._told[port]]:
                 if not self._told[port]:
                     self.notices.append(f"{port}: its bytes come faster than they are used; some are dropped")
                 self._told[port] = self._queue.dropped[port]
+        while (chunk := self._queue.get(0.0)) is not None:
+            yield chunk
+
+    def stop(self) -> None:
+        """Receive no more."""
+        if self._stop.is_set():
+            return
+        self._stop.set()
+        for thread in self._threads:
+            thread.join(timeout=JOIN_S)
 
     def send(self, port: str, sent: bytes) -> None:
         """Write to a port, for at most `WRITE_TIMEOUT_S`; a failure becomes a notice."""
@@ -102,10 +113,8 @@ class SerialPorts:
         self.urls[one], self.urls[other] = self.urls[other], self.urls[one]
 
     def close(self) -> None:
-        """Stop the threads and close the ports."""
-        self._stop.set()
-        for thread in self._threads:
-            thread.join(timeout=JOIN_S)
+        """Stop, and close the ports."""
+        self.stop()
         for port in self._ports.values():
             port.close()
 
@@ -121,6 +130,14 @@ class SerialPorts:
             if isinstance(port, UdpPort) and (news := port.news()):
                 self.notices.append(f"{name}: {news}")
             if received:
+                self._queue.put(Chunk(name, now_ns(), received))
+        self._read_rest(name)
+
+    def _read_rest(self, name: str) -> None:
+        """Put what the operating system has received before `stop` into the queue."""
+        with suppress(TypeError, *PORT_FAULTS):
+            port = self._ports[name]
+            if (waiting := port.in_waiting) and (received := port.read(waiting)):
                 self._queue.put(Chunk(name, now_ns(), received))
 
     def _reopen(self, name: str, url: str, baud: int, error: Exception) -> str:

@@ -20,7 +20,7 @@ from echostep.errors import EchostepError
 from echostep.extras import lacks
 from echostep.guidance.guided_rescue import GuidedRescue
 from echostep.guidance.guided_run import guidance_of
-from echostep.interruption import holding_signals, raise_held
+from echostep.interruption import holding_signals, is_asked
 from echostep.localization.estimate import Estimate
 from echostep.output.terminal import TerminalView
 from echostep.page.elements.true_position import TruePath
@@ -235,7 +235,7 @@ class Session:
         progress: Callable[[], float] | None = None,
         recorder: Recorder | None = None,
     ) -> None:
-        """Feed all portions; Ctrl-C ends the run as its last portion does.
+        """Feed all portions, until Ctrl-C ends their source; the second one ends the run at once.
 
         `progress` gives the finished fraction, 0 to 1. `recorder` gets the derived messages of each portion, after the portion was shown.
         """
@@ -252,9 +252,9 @@ class Session:
                     self.estimates += estimates
                     for sink in sinks:
                         sink.take(portion, estimates)
-                    raise_held()
             except KeyboardInterrupt:
                 self._interrupted = True
+        self._interrupted = self._interrupted or is_asked()
 
     def _local_sinks(self, view: TerminalView | None, recorder: Recorder | None) -> list[Sink]:
         """The terminal, and what is derived from estimates, for the recording and for viewers."""

@@ -15,6 +15,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from echostep.errors import EchostepError
+from echostep.interruption import until_asked
 from echostep.page.elements.true_position import TruePath
 from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import Plan
@@ -122,7 +123,7 @@ def _track(
         with start_recording(output.folder / "walk.mcap", metadata) as recorder:
             chunks = with_beacons(scenario, plan, options.seed) if options.guide else scenario.chunks()
             portions = _portions(chunks, session, recorder, speed)
-            session.track(portions, lambda: scenario.fraction, recorder)
+            session.track(until_asked(portions), lambda: scenario.fraction, recorder)
         print_notices(recorder.notices)
         session.finish("simulated walk", load_truth(output.folder / "truth.csv"))
         session.keep_page_open()

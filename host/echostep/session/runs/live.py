@@ -19,7 +19,7 @@ from echostep.board.frames import BoardReader, StaleFirmwareError, encode
 from echostep.board.messages import Identify
 from echostep.board.subscription import SUBSCRIBE, BoardSubscription
 from echostep.errors import EchostepError
-from echostep.interruption import holding_signals, raise_held
+from echostep.interruption import holding_signals, is_asked
 from echostep.localization.particles.start import Start
 from echostep.plan.model import Plan
 from echostep.ports.arrival_clock import SleepWatch, now_ns
@@ -101,7 +101,6 @@ def record(ports: PortOptions, out: Path) -> None:
             for chunk in with_bar(chunks, "recording; Ctrl-C ends it", _passed(ports.seconds)):
                 if chunk is not None:
                     byte_count[chunk.port] += len(chunk.data)
-                raise_held()
         print_notices(recorder.notices)
     from_gateway = f", {byte_count[GATEWAY]} from the gateway" if ports.beacons else ""
     foot = f"{byte_count[FOOT]} from the foot board" if ports.foot else f"{byte_count[MTX]} from the MTx"
@@ -148,7 +147,7 @@ def _recorded_chunks(
 
 
 def _chunks_for(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk | None]:
-    """Chunks of the ports for so many seconds, None: without end; None as a chunk when nothing came for a while."""
+    """Chunks of the ports for so many seconds, None: until a signal; then what has arrived. None as a chunk when nothing came for a while."""
     end_s = math.inf if seconds is None else time.monotonic() + seconds
     watch = SleepWatch()
     for chunk in ports.chunks():
@@ -156,8 +155,8 @@ def _chunks_for(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk | N
         if slept_s := watch.slept_s():
             console.print(f"The computer slept for {slept_s:.0f} s: nothing was received; the position is uncertain")
         yield chunk
-        if time.monotonic() >= end_s:
-            return
+        if is_asked() or time.monotonic() >= end_s:
+            ports.stop()
 
 
 def _with_subscription(chunks: Iterable[Chunk | None], ports: SerialPorts) -> Iterator[Chunk | None]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from echostep.interruption import until_asked
 from echostep.plan.model import Plan
 from echostep.recording.reading import Recording, open_recording
 from echostep.scorecard.truth import load_truth
@@ -50,7 +51,7 @@ def replay(path: Path, tracking: TrackingOptions, truth_path: Path | None, outpu
             portions = portions_of(paced(recording.chunks(), 1.0), VIEWED_PORTION)
         if not output.terminal:
             portions = with_bar(portions, f"tracking {path.name}", lambda: recording.fraction)
-        session.track(portions, lambda: recording.fraction)
+        session.track(until_asked(portions), lambda: recording.fraction)
         elapsed_s = time.perf_counter() - start_s
         for line in skipped(recording, tracker.streams):
             console.print(line, markup=False, highlight=False)

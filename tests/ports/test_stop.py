@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT
+"""The end of a live run loses nothing that had arrived: neither what waits in the queue nor what the operating system holds."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from command_line import echostep
+from echostep.ports.chunks import Chunk
+from echostep.ports.serial_ports import SerialPorts
+from echostep.recording.reading import open_recording
+from echostep.recording.recorder import Recorder
+from echostep.session.runs import live
+from players import pseudo_terminal
+from waiting import PATIENCE_S
+
+
+def test_what_has_arrived_comes_after_stop() -> None:
+    with pseudo_terminal() as (ours, port):
+        ports = SerialPorts({"board": port}, {"board": 115200})
+        chunks = ports.chunks()
+        os.write(ours, b"first")
+        received = b""
+        while not received:
+            received += getattr(next(chunks), "data", b"")
+        os.write(ours, b", second")
+        ports.stop()
+        os.write(ours, b", third")
+        received += b"".join(chunk.data for chunk in chunks if chunk)
+        ports.close()
+    assert received == b"first, second"
+
+
+@pytest.mark.parametrize("command", ["record", "live"])
+def test_a_signal_ends_a_run_that_is_behind_with_all_that_had_arrived(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    """The disk, or a kernel that is compiled, holds the run up while its port goes on."""
+    write, sent = Recorder.write, [b"begin"]
+    with pseudo_terminal() as (ours, port):
+
+        def held_up(recorder: Recorder, chunk: Chunk) -> None:
+            if chunk.port == "board" and len(sent) < 50:
+                for number in range(50):
+                    sent.append(f", {number}".encode())
+                    os.write(ours, sent[-1])
+                signal.raise_signal(signal.SIGTERM)
+            write(recorder, chunk)
+
+        monkeypatch.setattr(Recorder, "write", held_up)
+        monkeypatch.setattr(live, "_identify", lambda _ports: os.write(ours, sent[0]))  # the ports are open
+        where = ["--out", tmp_path / "walk.mcap"] if command == "record" else ["--headless", "--out", tmp_path]
+        done = echostep(command, "--board", port, "--seconds", PATIENCE_S, *where)
+    assert done.returncode == 0, done.stderr
+    recorded = b"".join(chunk.data for chunk in open_recording(tmp_path / "walk.mcap").chunks())
+    assert recorded == b"".join(sent)
