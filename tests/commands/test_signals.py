@@ -126,7 +126,7 @@ def test_an_interrupt_that_is_dropped_ends_the_run_all_the_same(
     with python_board() as port:
         done = echostep(command, "--board", port, "--seconds", PATIENCE_S, *more)
     assert done.returncode == 0, done.stderr
-    assert 3 <= len(written) < 10
+    assert written[-1].t_arrival_ns - written[2].t_arrival_ns < 0.5e9 * PATIENCE_S
     recording = open_recording(tmp_path / "walk.mcap")
     assert list(recording.chunks()) == written
     assert not recording.truncated

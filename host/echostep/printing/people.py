@@ -93,7 +93,7 @@ def lost_result() -> str:
     """Why what a command printed is lost, where that is its result; empty where it is not, or nobody wants it."""
     if not _open or _outlasting:
         return ""
-    _open[0].drain()
+    _open[0].flush()
     return _open[0].fault if _open[0].has_lost and not _open[0].is_gone else ""
 
 

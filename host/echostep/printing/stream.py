@@ -42,7 +42,7 @@ class PeopleStream(io.TextIOBase):
         self._buffer = bytearray()
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
-        self._busy = False  # the thread is writing
+        self._busy = self._ended = False  # the thread is writing; nothing more comes
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
@@ -106,12 +106,14 @@ class PeopleStream(io.TextIOBase):
             self._thread.start()
 
     def drain(self) -> None:
-        """Write the rest; after `outlast` wait for it for at most `DRAIN_S`."""
+        """Write the rest, the last; after `outlast` wait for it for at most `DRAIN_S`."""
         self.flush()
         end_s = time.monotonic() + DRAIN_S
         with self._changed:
             while self._thread and (self._buffer or self._busy) and (left_s := end_s - time.monotonic()) > 0.0:
                 self._changed.wait(left_s)
+            self._ended = True
+            self._changed.notify_all()
 
     def _run(self) -> None:
         """The thread."""
@@ -120,6 +122,8 @@ class PeopleStream(io.TextIOBase):
                 self._busy = False
                 self._changed.notify_all()
                 while not self._buffer:
+                    if self._ended:
+                        return
                     self._changed.wait()
                 data, self._busy = bytes(self._buffer), True
                 self._buffer.clear()
