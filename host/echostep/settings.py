@@ -75,6 +75,8 @@ def parse_settings(text: str, origin: str) -> Settings:
         return _settings_of(tomllib.loads(text))
     except ValueError as error:
         raise EchostepError(f"{origin}: {error}") from error
+    except RecursionError as error:
+        raise EchostepError(f"{origin}: its values are nested too deeply: settings are sections of numbers") from error
 
 
 def _settings_of(tree: dict[str, Any]) -> Settings:

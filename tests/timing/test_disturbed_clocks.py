@@ -172,3 +172,20 @@ def test_sleep_is_noticed() -> None:
     assert watch.slept_s() == pytest.approx(60.0, abs=0.1)
     assert watch.slept_s() == 0.0
     assert now_ns() <= now_ns()
+
+
+@pytest.mark.parametrize("wrapped", [False, True])
+@pytest.mark.parametrize("block_s", [1.5, 8.0])
+def test_messages_that_stand_twice_in_a_recording_move_no_time(block_s: float, wrapped: bool) -> None:
+    """Counter and arrival both are of a time that has passed: not a step of the host's clock by the 2,147 s after which the ticks come again."""
+    timeline = Timeline(MtxTiming())
+    since_s = 2147.48 - 12.0 if wrapped else 0.0
+    messages = [m for t in moments(since_s, since_s + 30.0) for m in both(t, 50.0 + t)]
+    again = messages[4000 - round(200 * block_s) : 4000]
+    found = times_of(timeline, messages[:4000] + again + messages[4000:])
+    second = found[4000 : 4000 + len(again)]
+    assert np.isnan(second[:-210]).all()
+    assert (second[~np.isnan(second)] > since_s + 20.0 - 1.1).all()  # of the last second it cannot be told
+    expected = times_of(Timeline(MtxTiming()), messages)
+    assert np.abs(np.delete(found, np.s_[4000 : 4000 + len(again)]) - expected).max() < 2e-3
+    assert (timeline.board_restarts, timeline.clock_steps) == (0, 0)

@@ -24,6 +24,7 @@ from echostep.commands.options import (
     Headless,
     Host,
     Keep,
+    Split,
     MtxPort,
     Name,
     OptionalPlan,
@@ -104,13 +105,16 @@ class Ports:
     beacons: BeaconsPort = None
     seconds: Seconds = None
     keep: Keep = None
+    split: Split = None
 
     def options(self) -> PortOptions:
         """The given ports; without the board's, all are searched for and printed."""
+        from echostep.recording.parts.splitting import parse_split
         from echostep.session.options import PortOptions
 
+        split = parse_split(self.split) if self.split is not None else None
         if self.board is not None:
-            return PortOptions(self.board, self.mtx, self.beacons, self.seconds, self.keep, self.foot)
+            return PortOptions(self.board, self.mtx, self.beacons, self.seconds, self.keep, self.foot, split)
         from echostep.commissioning.port_search import find_ports
 
         ports = find_ports(self.mtx, self.foot)
@@ -118,7 +122,7 @@ class Ports:
         say("Ports: " + " ".join(f"--{name} {path}" for name, path in options.items() if path))
         if not ports.mtx and not ports.foot:
             say("Neither an MTx nor a foot board was found.")
-        return PortOptions(ports.board, ports.mtx, self.beacons, self.seconds, self.keep, ports.foot)
+        return PortOptions(ports.board, ports.mtx, self.beacons, self.seconds, self.keep, ports.foot, split)
 
 
 @dataclass(frozen=True, slots=True)

@@ -139,6 +139,14 @@ Keep = Annotated[
         min=2,
     ),
 ]
+Split = Annotated[
+    str | None,
+    typer.Option(
+        "--split",
+        metavar="SIZE|TIME",
+        help="Begin a new file of the recording after so much, as 500MB, 2GB, 30min or 1h; replay takes them as one.",
+    ),
+]
 Publish = Annotated[
     list[str] | None,
     typer.Option(

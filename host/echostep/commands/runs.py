@@ -100,7 +100,10 @@ def record(
 @app.command()
 @with_groups
 def replay(
-    recording: Annotated[Path, typer.Argument(help="A recording (.mcap).")],
+    recording: Annotated[
+        list[Path],
+        typer.Argument(metavar="RECORDING...", help="A recording (.mcap), or all parts of one, or their folder."),
+    ],
     tracking: Tracking,
     output: Output,
     out: Out = Path("out/replay"),

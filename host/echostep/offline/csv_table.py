@@ -49,6 +49,13 @@ def header_of(first_line: str) -> tuple[list[str], str]:
     return [name.strip().strip('"') for name in first_line.split(separator)], separator
 
 
+def column_of(header: Sequence[str], name: str) -> int:
+    """Index of the column of this name, -1 where the file lacks it; raises ValueError when it has two."""
+    if header.count(name) > 1:
+        raise ValueError(f"two columns are named {name}: which one is meant? rename the other one")
+    return header.index(name) if name in header else -1
+
+
 def lines_of(file: TextIO, limits: CsvLimits, first: int = 1) -> Iterator[str]:
     """Lines of bounded length, the next one being number `first`; raises ValueError for a longer one."""
     number = first - 1

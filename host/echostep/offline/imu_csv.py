@@ -20,7 +20,7 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.foot.steps import Track
 from echostep.offline.bursts import spread
-from echostep.offline.csv_table import CsvLimits, header_of, lines_of, number_of, open_samples, read_rows
+from echostep.offline.csv_table import CsvLimits, column_of, header_of, lines_of, number_of, open_samples, read_rows
 from echostep.offline.imu_checks import complaint, contradiction, end_sd_m, notes, sorted_by_time, whole_rows
 from echostep.printing.file_mode import claim
 
@@ -67,7 +67,7 @@ def _table(lines: Iterator[str]) -> Floats:
         hint = ": the first line must name the columns" if all(map(math.isfinite, map(number_of, header))) else ""
         raise ValueError(f"no column {', '.join(missing)}{hint}; expected {','.join(COLUMNS)}[,mx,my,mz]")
     wanted = COLUMNS + MAG_COLUMNS if all(name in header for name in MAG_COLUMNS) else COLUMNS
-    return read_rows(lines, separator, [header.index(name) for name in wanted], len(COLUMNS), CsvLimits()).values
+    return read_rows(lines, separator, [column_of(header, name) for name in wanted], len(COLUMNS), CsvLimits()).values
 
 
 def checked(track: Track, path: Path | str) -> Track:

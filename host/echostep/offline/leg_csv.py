@@ -25,6 +25,7 @@ from echostep.offline.bursts import spread
 from echostep.offline.csv_table import (
     LONGEST_LINE,
     CsvLimits,
+    column_of,
     header_of,
     lines_of,
     open_samples,
@@ -114,7 +115,7 @@ def _table(file: TextIO, prefix: str) -> tuple[Floats, tuple[str, ...]]:
             f"or thigh_x,thigh_y,thigh_z and shank_x,shank_y,shank_z for gyros of three axes{_unit_hint(header)}"
         )
     wanted = [name for source in sources for name in source]
-    columns = [header.index(name) if name in header else -1 for name in (*wanted, *OPTIONAL)]
+    columns = [column_of(header, name) for name in (*wanted, *OPTIONAL)]
     values = read_rows(lines_of(file, CsvLimits(), first=2), separator, columns, len(wanted), CsvLimits()).values
     series, notes, at = [], [], 0
     for name, source in zip(COLUMNS, sources, strict=True):

@@ -32,7 +32,8 @@ from echostep.ports.chunks import Portion
 from echostep.printing.console import console_for_people
 from echostep.printing.file_mode import claim
 from echostep.recording.clock import clock_of
-from echostep.recording.reading import Recording, open_recording
+from echostep.recording.parts.joining import open_parts
+from echostep.recording.reading import Recording
 from echostep.recording.recorder import Recorder
 from echostep.tracker import Tracker
 
@@ -53,7 +54,7 @@ def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recordi
         raise EchostepError(f"{out}: unknown kind of file: choose from {', '.join(FORMATS)}")
     if out.suffix == ".parquet":
         require(str(out), "pyarrow")
-    recording, plan = open_recording(path), open_limited(plan_path)
+    recording, plan = open_parts([path]), open_limited(plan_path)
     if earth_of(plan) is None and out.suffix in NEEDS_GEOREFERENCE:
         raise EchostepError(
             f"{plan_path}: {out.suffix} needs a georeference: add longitude and latitude of the map's origin to the plan"

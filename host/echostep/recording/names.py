@@ -7,6 +7,7 @@ In: the name asked for, as `out/live/walk.mcap`. Out: a new file, as `out/live/w
 
 from __future__ import annotations
 
+import glob
 import os
 import re
 from contextlib import suppress
@@ -87,6 +88,9 @@ def remove_older(wanted: Path, keep: int) -> list[Path]:
             if not is_being_written(path):
                 path.unlink()
                 removed.append(path)
+                for part in path.parent.glob(f"{glob.escape(path.stem)}-part[0-9][0-9][0-9][0-9]{SUFFIX}"):
+                    part.unlink()
+                    removed.append(part)
     return removed
 
 

@@ -10,16 +10,21 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from echostep.recording.names import RecordingExistsError, new_name
+from echostep.recording.parts.splitting import SplitLimit, SplitRecorder
 from echostep.recording.recorder import Recorder
 
 TRIES = 10  # of a new name, while other processes take the same one; assumed
 
 
-def numbered_recorder(wanted: Path, metadata: Mapping[str, str]) -> Recorder:
-    """A recorder on a new file named after `wanted`; raises EchostepError."""
+def numbered_recorder(wanted: Path, metadata: Mapping[str, str], split: SplitLimit | None = None) -> Recorder:
+    """A recorder on a new file named after `wanted`, in parts by `split`; raises EchostepError."""
     for _ in range(TRIES - 1):
         try:
-            return Recorder(new_name(wanted), metadata)
+            return _recorder(new_name(wanted), metadata, split)
         except RecordingExistsError:
             continue
-    return Recorder(new_name(wanted), metadata)
+    return _recorder(new_name(wanted), metadata, split)
+
+
+def _recorder(path: Path, metadata: Mapping[str, str], split: SplitLimit | None) -> Recorder:
+    return SplitRecorder(path, metadata, split) if split else Recorder(path, metadata)

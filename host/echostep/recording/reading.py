@@ -27,7 +27,7 @@ from echostep.recording.damage.scan import map_file, next_valid_run, record_end
 from echostep.recording.mcap_records import HEAD_SIZE, MCAP_MAGIC, MESSAGE, decompress_chunk, parse_record
 from echostep.recording.message_runs import MessageRun, PortChannels, read_messages
 from echostep.recording.names import is_being_written
-from echostep.recording.recorder import DAMAGE_NAME, LIBRARY, METADATA_NAME
+from echostep.recording.recorder import DAMAGE_NAME, LIBRARY, METADATA_NAME, NEXT, PART_NAME
 
 
 @dataclass
@@ -49,6 +49,7 @@ class Recording:
     grows: bool = False  # it is being written: reading ends before an unfinished record
     resume: int = -1  # offset from which `portions_from` goes on behind the last portion; -1 inside a compressed chunk
     library: str = ""  # by which the file was written
+    goes_on_in: str = ""  # name of the file with the next part of the run
     before: list[str] = field(default_factory=list)  # damage of the recordings of which this one was made
     _intact: bool | None = None  # whether the checksum is right; None: unknown yet
     _channels: PortChannels = field(default_factory=PortChannels)
@@ -86,6 +87,10 @@ class Recording:
     def damaged(self) -> bool:
         """Whether something is wrong with this very file, which `repair` makes whole."""
         return bool(self.altered or self.damaged_bytes or self.unreadable_chunks or self.misplaced or self.truncated)
+
+    def to_repair(self) -> list[Path]:
+        """The files that `echostep repair` makes whole."""
+        return [self.path] if self.damaged else []
 
     def damage(self) -> list[str]:
         """What is wrong with the file, as sentences, once it was read; and what was wrong with those of which it was made."""
@@ -144,11 +149,14 @@ class Recording:
             yield record
 
     def _note(self, opcode: int, body: bytes) -> None:
-        """Keep the recorder's name, and earlier damage; the metadata are read when the recording is opened."""
+        """Keep the recorder's name, earlier damage, and which file goes on; the metadata are read when the recording is opened."""
         if opcode == Opcode.HEADER and (header := parse_record(Header, body)):
             self.library = header.library
-        if opcode == Opcode.METADATA and (stored := parse_record(Metadata, body)) and stored.name == DAMAGE_NAME:
-            self.before = list(stored.metadata.values())
+        if opcode == Opcode.METADATA and (stored := parse_record(Metadata, body)):
+            if stored.name == DAMAGE_NAME:
+                self.before = list(stored.metadata.values())
+            elif stored.name == PART_NAME:
+                self.goes_on_in = stored.metadata.get(NEXT, "")
 
     def _placed(self, runs: Iterator[MessageRun]) -> Iterator[Portion]:
         """The portions without messages that are not in their place; those of an intact file, or of another recorder, as they are."""

@@ -26,6 +26,8 @@ METADATA_NAME = "echostep"  # of the metadata record
 DAMAGE_NAME = (
     "echostep.damage"  # of a second one, at the end: what was wrong with the recording of which this one was made
 )
+PART_NAME = "echostep.part"  # of a record at the end of a part: which file goes on, as the value of `NEXT`
+RUN, PART, NEXT = "run", "part", "next"  # metadata keys of a recording in parts: its first file, the number of the part
 LIBRARY = "echostep"  # in the header: it numbers the messages of all channels together
 # Assumed, all of them.
 WAIT_NS = 500_000_000  # arrival time between two waits of `wait_for_disk`
@@ -74,16 +76,20 @@ class Recorder:
 
     def __init__(self, path: Path | str, metadata: Mapping[str, str]) -> None:
         """`metadata`: what a replay needs and a reader may want to know (start, seed, plan, note), as text."""
-        self._file = BackgroundWriter(path)
-        self._writer = begin_file(self._file)  # type: ignore[arg-type]  # the writer calls only `write` and `tell`
-        self._writer.add_metadata(METADATA_NAME, dict(metadata))
-        self._channels: dict[str, int] = {}  # by port or topic
-        self._sequence = 0
+        self._begin(BackgroundWriter(path), metadata)
         self._waited_ns: int | None = None  # arrival time of the chunk of the last wait
         self.lost_chunks = 0  # not recorded: more than `RAW_LIMIT` bytes waited for the disk
         self.skipped_messages = (
             0  # derived ones, not recorded: more than `DERIVED_LIMIT` bytes waited, or the disk is nearly full
         )
+
+    def _begin(self, file: BackgroundWriter, metadata: Mapping[str, str]) -> None:
+        """Write to this file from now on."""
+        self._file = file
+        self._writer = begin_file(file)  # type: ignore[arg-type]  # the writer calls only `write` and `tell`
+        self._writer.add_metadata(METADATA_NAME, dict(metadata))
+        self._channels: dict[str, int] = {}  # by port or topic
+        self._sequence = 0
 
     @property
     def path(self) -> Path:

@@ -18,7 +18,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.offline.csv_table import SEPARATORS, CsvLimits, lines_of, separator_of
+from echostep.offline.csv_table import GREATEST, SEPARATORS, CsvLimits, lines_of, separator_of
 
 MOST_ROWS = 1_000_000  # of a track: eight hours at 30 positions a second
 TUM = (
@@ -44,9 +44,14 @@ class CsvColumns:
     lines: tuple[int, ...]
 
     def find(self, names: Sequence[str]) -> str | None:
-        """The first of these names that a column has, small and capital letters being alike; None when none has."""
+        """The first of these names that a column has, capitals being alike; None when none has. Raises EchostepError when two have it."""
         written = {name.lower(): name for name in reversed(self.names)}
-        return next((written[name] for name in names if name in written), None)
+        found = next((written[name] for name in names if name in written), None)
+        if found is not None and sum(name.lower() == found.lower() for name in self.names) > 1:
+            raise EchostepError(
+                f"{self.path}:1: two columns are named {found}: which one is meant? rename the other one"
+            )
+        return found
 
     def texts(self, name: str) -> list[str]:
         """Cells of a column."""
@@ -76,6 +81,8 @@ class CsvColumns:
             raise EchostepError(f"{where}: {cell[:SHOWN]!r} is not a number") from error
         if not gaps and not math.isfinite(value):
             raise EchostepError(f"{where}: {cell[:SHOWN]!r} is not a finite number")
+        if math.isfinite(value) and abs(value) > GREATEST:
+            raise EchostepError(f"{where}: {cell[:SHOWN]!r} is greater than any number of a track, {GREATEST:g}")
         return value
 
 

@@ -6,6 +6,7 @@ In: truth.csv (`t_s,x,y,heading_rad`, the trunk, map frame) and estimates. Out: 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
+from echostep.offline.csv_table import GREATEST
 from echostep.scorecard.error_statistics import error_statistics
 
 NEARBY_S = 2.5  # estimates come at each step, and twice a second while standing
@@ -58,13 +60,16 @@ class Errors:
 def load_truth(path: Path | str) -> Truth:
     """Truth from a CSV file; raises EchostepError that names the file."""
     try:
-        table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+        with warnings.catch_warnings(action="ignore"):  # of a file without rows: said below
+            table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
     except OSError as error:
         raise EchostepError(f"{path}: cannot read the truth: {error}") from error
     except ValueError as error:
         raise EchostepError(f"{path}: not a truth file (t_s,x,y,...): {error}") from error
-    if table.shape[1] < 3 or not len(table) or not np.isfinite(table).all():
-        raise EchostepError(f"{path}: not a truth file: rows of t_s,x,y[,heading_rad] expected")
+    if table.shape[1] < 3 or not len(table) or not (np.abs(table) <= GREATEST).all():
+        raise EchostepError(
+            f"{path}: not a truth file: rows of t_s,x,y[,heading_rad] expected, numbers up to {GREATEST:g}"
+        )
     return Truth(table[:, 0], table[:, 1:3])
 
 

@@ -13,7 +13,6 @@ from echostep.localization.belief import DOUBTED
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.path import MeasuredSegment
 from echostep.recording.reading import Recording
-from echostep.recording.repair.contents import printable
 from echostep.tracker import Tracker
 from echostep.tracker.state import StreamState, TrackerState
 
@@ -110,6 +109,8 @@ def skipped(recording: Recording, streams: StreamState) -> list[str]:
         ),
     ]
     lines = [*damage, *(text for applies, text in facts if applies)]
-    lines = [printable(f"{recording.path}: {line}") for line in lines]
-    advice = f"  echostep repair {recording.path} -o OUT makes a whole file of what is readable"
-    return [*lines, advice] if recording.damaged else lines
+    lines = [f"{recording.path}: {line}" for line in lines]
+    advice = [
+        f"  echostep repair {path} -o OUT makes a whole file of what is readable" for path in recording.to_repair()
+    ]
+    return [*lines, *advice]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from echostep.output.foxglove_live import FoxgloveAddress
     from echostep.page.server import Address
+    from echostep.recording.parts.splitting import SplitLimit
     from echostep.team.endpoint import Outlet
 
 
@@ -56,3 +57,4 @@ class PortOptions:
     seconds: float | None = None  # None: until Ctrl-C
     keep: int | None = None  # recordings to keep in the folder; None: all
     foot: str | None = None  # of a foot board, in the place of an MTx
+    split: SplitLimit | None = None  # of the recording into parts

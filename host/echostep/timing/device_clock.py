@@ -5,7 +5,8 @@ In: counter values with their arrival times. Out: seconds since the device's fir
 
 Counters are protected by checksums, arrival times are not: a recording may have flipped bits, and a host that slept may have a clock that stood
 still. So a message whose counter goes on from the newest one keeps its time by the counter, whatever its arrival time; a message whose counter jumps
-needs an arrival time that agrees. What contradicts is counted. Only several arrival times that contradict in the same way are believed:
+needs an arrival time that agrees. One whose counter and arrival are both those of a time that has passed is dropped: a block of the recording was
+written twice, or in another's place. What contradicts is counted. Only several arrival times that contradict in the same way are believed:
 
     the counter fits a device that started since the newest message    a restart: the arrival time sets the new epoch
     the arrival is whole wraps of the counter later                    a gap
@@ -73,6 +74,8 @@ def read(clock: DeviceClock, value: int, t_arrival_ns: int, restarted: bool, lea
     delta = (value - clock.newest + back) % clock.modulus - back
     late_s = _elapsed_s(clock, t_arrival_ns) - delta * clock.unit_s
     wraps = max(round(late_s / (clock.modulus * clock.unit_s)), 0)
+    if _is_old(clock, delta, late_s):
+        return np.nan
     if not _agrees(clock, delta, late_s, wraps):
         return _contradiction(clock, value, delta, t_arrival_ns, restarted, leads)
     clock.run = 0
@@ -93,6 +96,20 @@ def _agrees(clock: DeviceClock, delta: int, late_s: float, wraps: int) -> bool:
         return False
     limit_s = AHEAD_S + RATE_ERROR * abs(late_s + delta * clock.unit_s)
     return abs(late_s - wraps * clock.modulus * clock.unit_s) <= limit_s
+
+
+@kernel
+def _is_old(clock: DeviceClock, delta: int, late_s: float) -> bool:
+    """Whether counter and arrival both are those of a time before the newest message: it stands twice in a recording, or in the wrong place.
+
+    A counter that seems to be `delta` ahead is then whole wraps less behind, and its arrival is as much earlier.
+    """
+    before_s = -(late_s + delta * clock.unit_s)
+    wrap_s = clock.modulus * clock.unit_s
+    wraps = round(-late_s / wrap_s)
+    if wraps < 1 or before_s <= AHEAD_S or delta * clock.unit_s <= SMOOTH_S:
+        return False
+    return abs(late_s + wraps * wrap_s) <= AHEAD_S + RATE_ERROR * before_s
 
 
 @kernel

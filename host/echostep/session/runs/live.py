@@ -70,7 +70,7 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -
         metadata = run_metadata(plan, tracker.start, seed, "live", settings_toml) | clock_metadata()
         session.arrivals.urls = opened.urls
         with session:
-            with start_recording(folder / "walk.mcap", metadata, ports.keep) as recorder:
+            with start_recording(folder / "walk.mcap", metadata, ports.keep, ports.split) as recorder:
                 chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session)
                 session.track(portions_of(chunks, 1), None, recorder)
             print_notices(recorder.notices)
@@ -93,7 +93,7 @@ def record(ports: PortOptions, out: Path) -> None:
         _identify(opened)
         metadata = version_metadata() | clock_metadata() | {"note": "recorded without tracking"}
         with (
-            start_recording(out, metadata, ports.keep) as recorder,
+            start_recording(out, metadata, ports.keep, ports.split) as recorder,
             suppress(KeyboardInterrupt),
             holding_signals(),
         ):

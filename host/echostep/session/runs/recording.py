@@ -11,13 +11,16 @@ from pathlib import Path
 
 from echostep.recording.names import link_newest, remove_older
 from echostep.recording.numbered import numbered_recorder
+from echostep.recording.parts.splitting import SplitLimit
 from echostep.recording.recorder import Recorder
 from echostep.session.console import console
 
 
-def start_recording(wanted: Path, metadata: Mapping[str, str], keep: int | None = None) -> Recorder:
-    """A recorder on a new file named after `wanted`; raises EchostepError. `keep`: remove the oldest until so many are left."""
-    recorder = numbered_recorder(wanted, metadata)
+def start_recording(
+    wanted: Path, metadata: Mapping[str, str], keep: int | None = None, split: SplitLimit | None = None
+) -> Recorder:
+    """A recorder on a new file named after `wanted`; raises EchostepError. `keep`: remove the oldest until so many are left. `split`: in parts."""
+    recorder = numbered_recorder(wanted, metadata, split)
     if link_newest(recorder.path, wanted):
         console.print(f"Recording: {recorder.path}, also named {wanted.name}", highlight=False)
     else:

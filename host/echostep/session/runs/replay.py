@@ -7,11 +7,13 @@ In: a recording, its plan. Out: track, summary, errors where the true path is gi
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from echostep.interruption import until_asked
 from echostep.plan.model import Plan
-from echostep.recording.reading import Recording, open_recording
+from echostep.recording.parts.joining import open_parts
+from echostep.recording.reading import Recording
 from echostep.scorecard.truth import load_truth
 from echostep.session.chunk_streams import paced, portions_of
 from echostep.session.console import console
@@ -28,9 +30,10 @@ from echostep.tracker import Tracker
 VIEWED_PORTION = 8  # chunks tracked at once while a viewer looks on: about 10 ms
 
 
-def replay(path: Path, tracking: TrackingOptions, truth_path: Path | None, output: OutputOptions) -> None:
-    """Track a recording; start, settings and seed are the recorded ones unless `tracking` gives others."""
-    recording, plan = open_recording(path), plan_of(tracking)
+def replay(paths: Sequence[Path], tracking: TrackingOptions, truth_path: Path | None, output: OutputOptions) -> None:
+    """Track a recording, in one file or in parts; start, settings and seed are the recorded ones unless `tracking` gives others."""
+    recording, plan = open_parts(paths), plan_of(tracking)
+    path = recording.path
     if plan.is_drawn and recording.metadata.get("plan_sha256", plan.digest) != plan.digest:
         console.print(f"Note: {tracking.plan_path} is not the plan that {path} was tracked on.")
     truth = load_truth(truth_path) if truth_path else None
