@@ -39,10 +39,10 @@ def _carry(port: str, connection: socket.socket, over: threading.Event, telnet: 
     tty.setraw(device)
     try:
         while not over.is_set():
-            ready, _, _ = select.select([device, connection], [], [], 0.1)
+            ready, _, _ = select.select([device, connection.fileno()], [], [], 0.1)
             if device in ready:
                 connection.sendall(outward(os.read(device, BLOCK)))
-            if connection in ready:
+            if connection.fileno() in ready:
                 received = connection.recv(BLOCK)
                 if not received:
                     return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Both ports over a network: a live run tracks all of it, in blocks as large as those of the ports themselves; a wearer who stands and fits everywhere."""
+"""Both ports over a network: a live run tracks all of it, in blocks as large as the ports' own; a wearer who stands and fits everywhere."""
 
 from __future__ import annotations
 

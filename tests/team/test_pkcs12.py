@@ -87,10 +87,13 @@ def tak(folder: Path) -> Iterator[tuple[int, list[bytes]]]:
 )
 def test_a_server_that_wants_a_certificate_accepts_it(folder: Path, query: str) -> None:
     context = tls_context(parse_endpoint(f"cot+tls://127.0.0.1?name=takserver&{query.format(folder)}"))
-    with tak(folder) as (port, received):
-        with socket.create_connection(("127.0.0.1", port)) as plain, context.wrap_socket(plain) as wrapped:
-            assert wrapped.recv(100) == b"welcome"  # with TLS 1.3 a refused certificate would show here
-            wrapped.sendall(b"an event")
+    with (
+        tak(folder) as (port, received),
+        socket.create_connection(("127.0.0.1", port)) as plain,
+        context.wrap_socket(plain) as wrapped,
+    ):
+        assert wrapped.recv(100) == b"welcome"  # with TLS 1.3 a refused certificate would show here
+        wrapped.sendall(b"an event")
     assert received == [b"an event"]
 
 

@@ -22,7 +22,8 @@ LARGEST_FILE = 1 << 20  # bytes, of certificates
 WORDS = {
     "KEY_VALUES_MISMATCH": "the key is not that of the certificate: give the two that were made together",
     "NO_START_LINE": "a file lacks its certificate or its key: look for -----BEGIN CERTIFICATE and -----BEGIN PRIVATE KEY",
-    "PEM_LIB": "a file lacks its certificate or its key (look for -----BEGIN CERTIFICATE and -----BEGIN PRIVATE KEY), is damaged, or has another password",
+    "PEM_LIB": "a file lacks its certificate or its key (look for -----BEGIN CERTIFICATE and -----BEGIN PRIVATE KEY), is damaged, or has "
+    "another password",
 }
 
 
