@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from msgspec import structs
 
 from echostep.operation import requests
+from echostep.operation.distress import ShownDistress, errand_to, shown_distress
 from echostep.operation.trails import Trails
 from echostep.operation.words import (
     ShownDetails,
@@ -34,7 +35,7 @@ from echostep.page.elements.marks import ShownMark
 from echostep.plan.model import Plan
 from echostep.team.commander import rejected, take_messages
 from echostep.team.inbox import Inbox, ReceivedMessage
-from echostep.team.messages.marks import Mark, MarkBoard, ack_message, is_shared
+from echostep.team.messages.marks import Mark, MarkBoard, ack_message, errand_message, is_shared
 from echostep.team.messages.report import BadReportError
 from echostep.team.roster import Member, MemberState, Roster
 
@@ -138,9 +139,15 @@ class Operation:
                 case requests.Unmark(identity) if identity in self._board.marks:
                     return structs.replace(self._board.marks[identity], removed=True).message
                 case requests.Acknowledge(number, by):
-                    for m in self.roster.members(now_s):
-                        if self._number(m) == number and (key := alarm_key(m)) is not None:
-                            return ack_message(key, by, unix_s)
+                    m = self._member(number, now_s)
+                    if m is not None and (key := alarm_key(m)) is not None:
+                        return ack_message(key, by, unix_s)
+                case requests.Send(number, to, by):
+                    rescuer, m = self._member(number, now_s), self._member(to, now_s)
+                    errand = errand_to(m, self.plan, now_s, by, unix_s) if m else None
+                    if rescuer is not None and errand is not None:
+                        return errand_message(rescuer.key, errand)
+                    return "Not sent: the place of the one in distress is not known on this plan."
         return "There is no such alarm, mark or floor any more."
 
     @property
@@ -156,9 +163,14 @@ class Operation:
             self._board.answers.clear()
         return answers
 
-    def _number(self, m: Member) -> int | None:
-        followed = self._followed.get(m.key)
-        return followed.number if followed else None
+    def _member(self, number: int, now_s: float) -> Member | None:
+        """The member with this number."""
+        return next((m for n, m in self._numbered(now_s) if n == number), None)
+
+    def _numbered(self, now_s: float) -> list[tuple[int, Member]]:
+        """All members with their numbers, the most urgent first."""
+        members = self.roster.members(now_s)
+        return [(followed.number, m) for m in members if (followed := self._followed.get(m.key)) is not None]
 
     def scene(self, now_s: float, unix_s: float, *, connected: bool = True) -> TableScene:
         """The scene at a time of the commander's clock.
@@ -181,12 +193,17 @@ class Operation:
     def details(self, number: int, now_s: float) -> ShownDetails | None:
         """Everything about one wearer; None when there is none with this number."""
         with self._lock:
-            for m in self.roster.members(now_s):
-                followed = self._followed.get(m.key)
-                if followed is not None and followed.number == number:
-                    history = tuple(reversed(followed.history or ()))
-                    return shown_details(number, m, self.plan, now_s, history, self.roster.duplicates(now_s))
-        return None
+            m = self._member(number, now_s)
+            if m is None:
+                return None
+            history = tuple(reversed(self._followed[m.key].history or ()))
+            return shown_details(number, m, self.plan, now_s, history, self.roster.duplicates(now_s))
+
+    def distress(self, number: int, now_s: float) -> ShownDistress | None:
+        """What a commander needs of one in distress; None of others."""
+        with self._lock:
+            m = self._member(number, now_s)
+            return shown_distress(m, self._numbered(now_s), self.plan, now_s, self._board) if m else None
 
     def _follow(self, now_s: float, unix_s: float) -> None:
         """Extend trails and histories; drop those of members that the roster has removed."""

@@ -49,6 +49,14 @@ class Acknowledge(msgspec.Struct, frozen=True, tag_field="kind", tag="acknowledg
     by: Person
 
 
+class Send(msgspec.Struct, frozen=True, tag_field="kind", tag="send"):
+    """Send a wearer to another one in distress."""
+
+    id: Number
+    to: Number
+    by: Person
+
+
 class Seek(msgspec.Struct, frozen=True, tag_field="kind", tag="seek"):
     """Show the moment so many seconds after the beginning of the operation."""
 
@@ -60,7 +68,7 @@ class Now(msgspec.Struct, frozen=True, tag_field="kind", tag="now"):
 
 
 TimeRequest = Seek | SetPlaying | SetSpeed | Now
-Action = SetMark | Unmark | Acknowledge
+Action = SetMark | Unmark | Acknowledge | Send
 TableRequest = FrameDrawn | Choose | TimeRequest | Action
 _REQUESTS = msgspec.json.Decoder(TableRequest)
 

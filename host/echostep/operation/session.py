@@ -136,9 +136,11 @@ class TableSession(GuardedSocket):
         begin, self._sent_s = self._trail_end, time.monotonic()
         lists = self._due or self._last is None or scene.rows is not self._last.rows
         trail, self._trail_end = operation.trail(begin, scene.t_s)
-        details = operation.details(self._chosen, scene.t_s) if lists and self._chosen is not None else None
+        chosen = self._chosen if lists else None
+        details = operation.details(chosen, scene.t_s) if chosen is not None else None
+        distress = operation.distress(chosen, scene.t_s) if chosen is not None else None
         marks = self._last is None or scene.marks is not self._last.marks
         latest = self._feed.latest or scene
         shown = self._view.shown(scene.t_s, sum(row.open_alarm for row in latest.rows)) if self._view else None
         self._last, self._due = scene, False
-        return wire.frame(scene, wire.TableParts(self._seq, trail, begin, lists, marks, details, shown))
+        return wire.frame(scene, wire.TableParts(self._seq, trail, begin, lists, marks, details, distress, shown))

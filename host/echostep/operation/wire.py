@@ -16,6 +16,7 @@ from typing import Literal
 
 import msgspec
 
+from echostep.operation.distress import ShownDistress
 from echostep.operation.operation import TableScene
 from echostep.operation.recorded.past import ShownTime
 from echostep.operation.words import ShownDetails, ShownWearer
@@ -41,7 +42,7 @@ class TableHello:
 class TableHeader:
     """One moment. `seq`: the page returns it when the frame is drawn. `list`, `marks`: None when the page has them already.
 
-    `trail_from` 0: trails begin anew. `details`: of the chosen wearer. `time`: of the time bar.
+    `trail_from` 0: trails begin anew. `details`, `distress`: of the chosen wearer. `time`: of the time bar.
     """
 
     seq: int
@@ -54,6 +55,7 @@ class TableHeader:
     refused: str
     connected: bool
     details: ShownDetails | None
+    distress: ShownDistress | None
     marks: tuple[ShownMark, ...] | None
     time: ShownTime | None
     kind: Literal["table"] = "table"
@@ -82,6 +84,7 @@ class TableParts:
     lists: bool
     marks: bool
     details: ShownDetails | None
+    distress: ShownDistress | None
     time: ShownTime | None
 
 
@@ -98,6 +101,7 @@ def frame(scene: TableScene, parts: TableParts) -> bytes:
         refused=scene.refused,
         connected=scene.connected,
         details=parts.details,
+        distress=parts.distress,
         marks=scene.marks if parts.marks else None,
         time=parts.time,
     )

@@ -20,7 +20,8 @@ from echostep.team.roster import Member, MemberState
 from echostep.wearer.falls import LYING_RAD, UPRIGHT_RAD
 
 STATES = {
-    MemberState.MAYDAY: "mayday", MemberState.LOST: "lost", MemberState.STALE: "silent", MemberState.UNCERTAIN: "uncertain",
+    MemberState.MAYDAY: "mayday", MemberState.ASKED: "asked after a fall",
+    MemberState.LOST: "lost", MemberState.STALE: "silent", MemberState.UNCERTAIN: "uncertain",
     MemberState.WAITING: "no position yet", MemberState.TRACKING: "", MemberState.ENDED: "run ended",
 }  # in words; a position that is tracked needs none  # fmt: skip
 COUNTED = {state: words or "tracked" for state, words in STATES.items()}  # in the summary
@@ -108,6 +109,8 @@ def shown_wearer(
     ack = board.acks.get(key) if key else None
     if ack:
         remarks.insert(0, f"acknowledged by {ack.by}")
+    if errand := board.errands.get(m.key):
+        remarks.insert(0, f"sent to {errand.to} by {errand.by}")
     is_open = key is not None and ack is None
     return ShownWearer(
         number, m.report.team, m.report.name, state.value, words, level_on(plan, m), tuple(remarks), is_open
@@ -143,7 +146,7 @@ def shown_details(
 ) -> ShownDetails:
     """All fields of the last report, in words."""
     r, p = m.report, m.position(now_s)
-    rows = [("alarm", alarm_words(replace(r.alarm, age_s=r.alarm.age_s + m.silent_s(now_s))))] if r.alarm else []
+    rows = [("alarm", current_alarm_words(m, now_s))] if r.alarm else []
     rows += [("state", m.state(now_s).value), ("heard", heard_words(m.silent_s(now_s)).removeprefix("heard "))]
     if p and not r.position:
         rows += [("place", "not known"), ("last known", ", ".join(filter(None, last_place_words(p))))]
@@ -161,6 +164,12 @@ def shown_details(
     rows += [("reports missed", str(m.missed)), ("source", r.source), ("run", r.run), ("version", r.version)]
     rows += [("note", note) for note in notes(m, plan, now_s, duplicates)]
     return ShownDetails(number, tuple(ShownFact(name, value) for name, value in rows), history)
+
+
+def current_alarm_words(m: Member, now_s: float) -> str:
+    """A member's alarm at a time of the commander's clock; empty without one."""
+    alarm = m.report.alarm
+    return alarm_words(replace(alarm, age_s=alarm.age_s + m.silent_s(now_s))) if alarm else ""
 
 
 def tilt_words(tilt_deg: float) -> str:

@@ -34,6 +34,7 @@ from echostep.page.mailbox import Mailbox
 from echostep.page.server import Address, PageServer
 from echostep.page.shared_drawing import SharedDrawing
 from echostep.path import MeasuredSegment
+from echostep.plan.routing import RoutePlace
 from echostep.ports.arrival_clock import now_ns
 from echostep.ports.chunks import BOARD, FOOT, MTX, Portion
 from echostep.tracker import Tracker
@@ -133,6 +134,11 @@ class LivePage:
     def set_marks(self, marks: tuple[ShownMark, ...]) -> None:
         """Show the commanders' marks on all pages."""
         self._mailbox.set_marks(marks)
+
+    def set_errand(self, x_m: float, y_m: float, level: int, text: str) -> None:
+        """Guide all pages to one in distress, and show who sent the wearer; a level that the plan has not is ignored."""
+        if level < len(self._tracker.plan.levels):
+            self._mailbox.set_goal(RoutePlace(x_m, y_m, level), text)
 
     def set_team(self, names: tuple[str, ...]) -> None:
         """Offer meetings with these teammates on all pages."""

@@ -85,6 +85,7 @@ class Mailbox:
         self._keeps = keeps
         self.latest: PageScene | None = None
         self.goal: RoutePlace | None = None
+        self.errand = ""  # who sent the wearer to the destination, in words
         self.marks: tuple[ShownMark, ...] = ()  # of the commanders; replaced, never changed
         self._drawings: tuple[
             ShownDrawing, ...
@@ -101,9 +102,9 @@ class Mailbox:
         self.latest = scene
         self._announce()
 
-    def set_goal(self, goal: RoutePlace | None) -> None:
-        """Set the destination of all pages and call `on_publish`; None ends the guidance to it."""
-        self.goal = goal
+    def set_goal(self, goal: RoutePlace | None, errand: str = "") -> None:
+        """Set the destination of all pages and call `on_publish`; None ends the guidance to it. `errand`: who sent the wearer there, in words."""
+        self.goal, self.errand = goal, errand
         self._announce()
 
     def set_marks(self, marks: tuple[ShownMark, ...]) -> None:

@@ -170,7 +170,8 @@ class CloudGrid:
 class FrameHeader:
     """One moment. `seq`: the page returns it when the frame is drawn. `goal`: the destination that was chosen on a page of this run.
 
-    `team`: names of the teammates for meetings, when they have changed; `met`: result of the newest meeting.
+    `errand`: who sent the wearer there, in words; empty when the wearer chose it. `team`: names of the teammates for meetings, when they have
+    changed; `met`: result of the newest meeting.
     """
 
     seq: int
@@ -185,6 +186,7 @@ class FrameHeader:
     beacons: tuple[BeaconMark, ...]
     guidance: ShownGuidance | None
     goal: RoutePlace | None
+    errand: str
     undo: UndoOffer | None
     play: PlayState | None
     truth: TruePosition | None
@@ -253,6 +255,7 @@ class FrameParts:
     particles: ParticleSample | None = None
     guidance: ShownGuidance | None = None
     goal: RoutePlace | None = None
+    errand: str = ""
     play: PlayState | None = None
     marks: tuple[ShownMark, ...] | None = None
     drawing: ShownDrawing | None = None
@@ -277,6 +280,7 @@ def frame(scene: PageScene, parts: FrameParts) -> bytes:
         beacons=scene.beacons,
         guidance=parts.guidance,
         goal=parts.goal,
+        errand=parts.errand,
         undo=scene.undo,
         play=parts.play,
         truth=scene.truth,

@@ -170,6 +170,7 @@ class PageSession(GuardedSocket):
             particles=scene.particles if scene.particles is not self._particles else None,
             guidance=self._guidance(scene),
             goal=self._mailbox.goal,
+            errand=self._mailbox.errand,
             play=self._cursor.state() if self._cursor else None,
             marks=self._mailbox.marks if self._marks is not self._mailbox.marks else None,
             drawing=(drawing or NO_DRAWING) if drawing is not self._drawing else None,

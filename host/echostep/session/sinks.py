@@ -97,15 +97,17 @@ class TeammateSink(Sink):
 
 
 class MarkSink(Sink):
-    """The commanders' marks, for the page."""
+    """The commanders' marks and the wearer's errand, for the page."""
 
     def __init__(self, marks: MarkFeed, page: LivePage) -> None:
         self._marks, self._page = marks, page
 
     def take(self, _portion: Portion, _estimates: list[Estimate], /) -> None:
-        """Show the marks when they have changed."""
+        """Show the marks when they have changed, and the way to the one in distress."""
         if (marks := self._marks.news()) is not None:
             self._page.set_marks(marks)
+        if errand := self._marks.new_errand():
+            self._page.set_errand(errand.x_m, errand.y_m, errand.level, errand.words)
 
 
 class DerivedSink(Sink):

@@ -40,7 +40,7 @@ DROPPED = (
 )  # in this order where the terminal is too narrow  # fmt: skip
 WORDS = ("name", "floor", "where", "nearest m")  # may be cut short at their end; a cut number would be another number
 STYLES = {
-    MemberState.MAYDAY: "bold blink white on red", MemberState.LOST: "bold white on red",
+    MemberState.MAYDAY: "bold blink white on red", MemberState.ASKED: "bold white on red", MemberState.LOST: "bold white on red",
     MemberState.STALE: "bold red", MemberState.UNCERTAIN: "yellow",
     MemberState.WAITING: "cyan", MemberState.TRACKING: "green", MemberState.ENDED: "grey62",
 }  # fmt: skip

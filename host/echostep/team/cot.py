@@ -115,7 +115,7 @@ def alarm_words(alarm: ReportedAlarm) -> str:
     if alarm.kind == "over":
         return f"mayday over for {alarm.age_s:.0f} s"
     kind = "asked whether all is well" if alarm.kind == "asking" else "mayday"
-    age = f"{alarm.age_s:.0f} s"
+    age = f"{alarm.age_s:.0f} s" if alarm.age_s < 120.0 else f"{alarm.age_s / 60.0:.0f} min"
     why = {"no motion": f"no motion for {age}", "fall": f"fall {age} ago", "help": f"asked for help {age} ago"}
     return f"{kind}: {why[alarm.reason]}"
 

@@ -19,7 +19,8 @@ from echostep.team.roster import Member, MemberState
 
 LABEL_DISTANCE_M = 1.5  # labels of members closer than this are stacked
 COLOURS = {  # distinguishable with colour blindness [Okabe and Ito 2008]
-    MemberState.MAYDAY: "#d55e00", MemberState.LOST: "#d55e00", MemberState.STALE: "#cc79a7", MemberState.UNCERTAIN: "#e69f00",
+    MemberState.MAYDAY: "#d55e00", MemberState.ASKED: "#d55e00", MemberState.LOST: "#d55e00",
+    MemberState.STALE: "#cc79a7", MemberState.UNCERTAIN: "#e69f00",
     MemberState.WAITING: "#56b4e9", MemberState.TRACKING: "#009e73", MemberState.ENDED: "#888888",
 }  # fmt: skip
 

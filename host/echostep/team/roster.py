@@ -43,6 +43,7 @@ class MemberState(StrEnum):
     """State of a member, the most urgent first."""
 
     MAYDAY = "mayday"
+    ASKED = "asked"  # after a fall
     LOST = "lost"
     STALE = "stale"
     UNCERTAIN = "uncertain"
@@ -92,6 +93,8 @@ class Member:
             return MemberState.ENDED
         if self.report.alarm and self.report.alarm.kind == "mayday":
             return MemberState.MAYDAY
+        if self.report.alarm and (self.report.alarm.kind, self.report.alarm.reason) == ("asking", "fall"):
+            return MemberState.ASKED
         if self.report.status == "lost":
             return MemberState.LOST
         if self.presence == "broken" or self.silent_s(now_s) > self.stale_after_s:
@@ -154,7 +157,7 @@ class Roster:
             p, state = m.report.position, m.state(now_s)
             silence = (
                 m.silent_s(now_s)
-                if state in (MemberState.MAYDAY, MemberState.LOST, MemberState.STALE)
+                if state in (MemberState.MAYDAY, MemberState.ASKED, MemberState.LOST, MemberState.STALE)
                 and m.silent_s(now_s) > m.stale_after_s
                 else 0.0
             )

@@ -4,7 +4,7 @@
 import { put } from './text.js';
 
 const MOST_BUTTONS = 3;
-const URGENT = ['mayday', 'lost', 'stale'];
+const URGENT = ['mayday', 'asked', 'lost', 'stale'];
 const $ = (id) => document.getElementById(id);
 
 export class Floors {

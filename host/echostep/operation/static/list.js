@@ -3,13 +3,14 @@
 
 import { put } from './text.js';
 
-export const SIGNS = { mayday: '▲', lost: '✕', stale: '◌', uncertain: '◐', waiting: '○', tracking: '●', ended: '■' };
-const URGENT = ['mayday', 'lost', 'stale'];
+export const SIGNS = { mayday: '▲', asked: '△', lost: '✕', stale: '◌', uncertain: '◐', waiting: '○', tracking: '●', ended: '■' };
+const URGENT = ['mayday', 'asked', 'lost', 'stale'];
 const $ = (id) => document.getElementById(id);
 
 export class List {
-  constructor(onChoose) {
-    Object.assign(this, { onChoose, items: new Map(), rows: [], states: new Map(), chosen: null });
+  // `onChoose(id)`, `onSend(id)`: a wearer is chosen; is sent to the chosen one
+  constructor(onChoose, onSend) {
+    Object.assign(this, { onChoose, onSend, items: new Map(), rows: [], states: new Map(), chosen: null });
     $('close').onclick = () => this.choose(null);
   }
 
@@ -57,6 +58,9 @@ export class List {
     $('details').hidden = id === null;
     this.shownDetails = null;
     this.head();
+    $('all').open = !['mayday', 'asked'].includes(this.rows.find((row) => row.id === id)?.state);
+    $('distress').hidden = true;
+    $('said').hidden = false;
     $('facts').replaceChildren();
     $('history').replaceChildren();
     if (id !== null) $('close').focus();
@@ -71,22 +75,39 @@ export class List {
     $('acknowledge').hidden = !row?.open_alarm;
   }
 
-  details(details) {
+  details(details, distress) {
     if (!details || details.id !== this.chosen) return;
     this.head();
+    this.distress(distress);
     const text = JSON.stringify(details);
     if (text === this.shownDetails) return;
     this.shownDetails = text;
-    $('facts').replaceChildren(...details.facts.flatMap(({ name, value }) => [['dt', name], ['dd', value]].map(([tag, of]) => {
-      const element = document.createElement(tag);
-      element.textContent = of;
-      return element;
-    })));
+    $('facts').replaceChildren(...facts(details.facts));
     $('history').replaceChildren(...details.history.map(({ unix_s, text: what }) => {
       const item = document.createElement('li');
       item.textContent = `${new Date(1000 * unix_s).toLocaleTimeString('en-GB')} ${what}`;
       return item;
     }));
+  }
+
+  // What is needed to help: the place, since when, the nearest stairs, and a button for each of the nearest wearers.
+  distress(distress) {
+    const text = JSON.stringify(distress);
+    if ($('distress').hidden === !distress && text === this.shownDistress) return;
+    this.shownDistress = text;
+    $('distress').hidden = !distress;
+    $('said').hidden = Boolean(distress);  // the same in more detail
+    if (!distress) return;
+    const { place, since, stairs, rescuers } = distress;
+    $('needs').replaceChildren(...facts([['place', place], ['since', since], ['stairs', stairs || 'none on this plan'], ['nearest', rescuers.length ? '' : 'nobody with a position on this plan']]
+      .filter(([, value]) => value).map(([name, value]) => ({ name, value }))));
+    rescuers.forEach(({ id, name, words, sent }, k) => {
+      const item = $('rescuers').children[k] ?? $('rescuers').appendChild(rescuer()), button = item.firstChild;
+      put(button, `${sent ? '✓ ' : ''}Send ${name}${sent ? ' again' : ''}`);
+      put(item.lastChild, [words, sent].filter(Boolean).join(', '));
+      button.onclick = () => this.onSend(id);
+    });
+    while ($('rescuers').children.length > rescuers.length) $('rescuers').lastChild.remove();
   }
 
   // A wearer who has become lost or silent is said once, others are not.
@@ -96,4 +117,20 @@ export class List {
     this.states = new Map(rows.map(({ id, state }) => [id, state]));
     if (said.length) put($('live'), said.slice(0, 3).join('. '));
   }
+}
+
+// Terms and descriptions of a list.
+function facts(rows) {
+  return rows.flatMap(({ name, value }) => [['dt', name], ['dd', value]].map(([tag, of]) => {
+    const element = document.createElement(tag);
+    element.textContent = of;
+    return element;
+  }));
+}
+
+function rescuer() {
+  const item = document.createElement('li'), button = document.createElement('button');
+  button.type = 'button';
+  item.append(button, document.createElement('span'));
+  return item;
 }

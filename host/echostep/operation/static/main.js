@@ -7,6 +7,7 @@ import { Link } from '../static/link.js';
 import { PlanView } from '../static/plan.js';
 import { startTheme } from '../static/theme.js';
 import { View } from '../static/view.js';
+import { Alarm } from './alarm.js';
 import { Floors } from './floors.js';
 import { List } from './list.js';
 import { Painter } from './paint.js';
@@ -21,7 +22,8 @@ const $ = (id) => document.getElementById(id);
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas')), trails = new Trails($('trails'), $('trails-next'));
 const scene = { places: new Map(), rows: [], marks: [], level: 0, chosen: null };
 const floors = new Floors((level) => showLevel(level));
-const list = new List(choose);
+const list = new List(choose, (id) => sheet.signed((by) => link.send('send', { id, to: scene.chosen, by })));
+const alarm = new Alarm(view, { show: goTo, open: (id) => list.choose(id), level: () => wantedLevel, showLevel, floor: (level) => plan.levels[level].name });
 let plan = null, wantedLevel = 0, fitted = false, isAsked = false, drawnStamp = -1, undrawn = [], found = false;
 
 const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onState: connection, parse: parseFrame });
@@ -40,7 +42,7 @@ async function hello(message) {
   trails.clear();
   timeBar.again();
   $('title').textContent = `${message.title}: ${plan.name}`;
-  document.title = message.title;
+  alarm.entitle(message.title);
   floors.plan(plan.levels);
   if (scene.chosen !== null) link.send('choose', { id: scene.chosen });
   await showLevel(Math.min(scene.level, plan.levels.length - 1));
@@ -80,19 +82,21 @@ function frame(received) {
     floors.show(scene.level, scene.rows);
     findFirst();
   }
+  if (received.list) alarm.update(received.list, scene.places, received.time, timeBar.isPast);
   if (received.marks) scene.marks = received.marks;
-  list.details(received.details);
+  list.details(received.details, received.distress);
   status(received);
-  undrawn.push(received.seq);
   scene.frame = received;
+  if (document.hidden) link.send('drawn', { seq: received.seq });  // nothing is drawn, but a mayday must still sound
+  else undrawn.push(received.seq);
   ask();
 }
 
 function status({ summary, refused, connected }) {
   put($('mark'), connected ? '●' : '✕');
   if ($('words').dataset.status !== (connected ? 'tracking' : 'broken')) $('words').dataset.status = connected ? 'tracking' : 'broken';
-  const past = timeBar.isPast ? 'the past: ' : '', text = past + (connected ? summary : `no connection to the broker: the last known state. ${summary}`);
-  put($('status-text'), text);
+  put($('status-text'), connected ? 'connected' : 'no connection to the broker: the last known state');
+  put($('summary'), (timeBar.isPast ? 'the past: ' : '') + summary);
   const why = refused ? `rejected: ${refused}` : '';
   put($('refused'), why);
   if ($('refused').hidden !== !why) $('refused').hidden = !why;
@@ -111,9 +115,13 @@ function choose(id) {
   ask();
   link.send('choose', { id });
   const place = scene.places.get(id);
-  if (!place) return;
-  if (place.level !== wantedLevel) showLevel(place.level);
-  view.keep(place.x, place.y);
+  if (place) goTo(place);
+}
+
+// The floor and the place of a wearer come into view.
+function goTo({ x, y, level }) {
+  if (level !== wantedLevel) showLevel(level);
+  view.keep(x, y);
 }
 
 function fault(text) {

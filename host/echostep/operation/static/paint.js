@@ -6,8 +6,8 @@ import { Sprites } from './sprites.js';
 import { trace } from './trails.js';
 
 const COLOURS = ['trail', 'here', 'halo', 'bad', 'fair', 'good', 'ink', 'faint', 'goal', 'expected'];
-const OF_STATE = { mayday: 'bad', lost: 'bad', stale: 'bad', uncertain: 'fair', waiting: 'faint', tracking: 'good', ended: 'faint' };
-const URGENT = ['mayday', 'lost', 'stale'];
+const OF_STATE = { mayday: 'bad', asked: 'bad', lost: 'bad', stale: 'bad', uncertain: 'fair', waiting: 'faint', tracking: 'good', ended: 'faint' };
+const URGENT = ['mayday', 'asked', 'lost', 'stale'];
 const WIDEST_M = 60;  // radius that is still drawn
 const WIDEST_SPRITE_PX = 80;  // radius of a circle that is kept as a picture
 const SIGN_PX = 8, ARROW_PX = SIGN_PX + 9, MAYDAY_PX = SIGN_PX + 19;
@@ -79,11 +79,11 @@ export class Painter {
     pen.fill();
   }
 
-  // Triangle: mayday. Filled: tracking. Half: uncertain. Cross: lost. Hollow: silent. Square: ended.
+  // Triangle: mayday; hollow: asked after a fall. Filled: tracking. Half: uncertain. Cross: lost. Hollow: silent. Square: ended.
   sign(pen, state, colour) {
     pen.beginPath();
     if (state === 'ended') pen.rect(-6, -6, 12, 12);
-    else if (state === 'mayday') for (const [x, y] of [[0, -14], [13, 9], [-13, 9], [0, -14]]) pen.lineTo(x, y);
+    else if (['mayday', 'asked'].includes(state)) for (const [x, y] of [[0, -14], [13, 9], [-13, 9], [0, -14]]) pen.lineTo(x, y);
     else pen.arc(0, 0, SIGN_PX, 0, 2 * Math.PI);
     pen.fillStyle = ['tracking', 'mayday'].includes(state) ? colour : this.colour.halo;
     pen.strokeStyle = this.colour.halo;

@@ -101,6 +101,7 @@ function frame(received) {
   undrawn.push(received.seq);
   speech.alarm(received.play ? null : received.alarm);
   if (!received.alarm) speech.update(received.guidance);
+  if (!received.play && !received.alarm) speech.sent(received.errand);
   dirty = true;
 }
 

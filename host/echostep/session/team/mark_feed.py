@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The mark feed: marks that commanders have set, and the acknowledgements of this run's alarms, for the page of a wearer's run.
+"""The mark feed: marks that commanders have set, the acknowledgements of this run's alarms, and its errand, for the page of a wearer's run.
 
-In: the team subscription. Out: marks on this plan, when they change; names of commanders. Owns the board of received marks.
+In: the team subscription. Out: marks on this plan, when they change; names of commanders; an errand, when it is new. Owns the board of
+received marks.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from echostep.page.elements.marks import ShownMark
 from echostep.session.team.subscription import LOOK_S, TeamSubscription
 from echostep.team.endpoint import Outlet
 from echostep.team.inbox import ReceivedMessage
-from echostep.team.messages.marks import MARKS, MarkBoard, acks_of
+from echostep.team.messages.marks import MARKS, Errand, MarkBoard, acks_of, errand_of
 from echostep.team.messages.report import BadReportError
 
 
@@ -24,13 +25,14 @@ class MarkFeed:
     def __init__(self, subscription: TeamSubscription, outlet: Outlet, run: str, plan_sha256: str) -> None:
         """`outlet`, `run`: under which names this wearer's alarms are published."""
         self.rejected: Counter[str] = Counter()
-        self._team, self._name, self._run = outlet.team, outlet.name, run
+        self._key = outlet.team, outlet.name, run
         self._plan_sha256 = plan_sha256
         self._board = MarkBoard()
         self._shown: tuple[ShownMark, ...] = ()
+        self._errand: Errand | None = None  # the last one that was given
         self._looked_s = -math.inf
         self._subscription = subscription
-        subscription.add([MARKS, acks_of(outlet.team, outlet.name)], self._receive)
+        subscription.add([MARKS, acks_of(outlet.team, outlet.name), errand_of(self._key)], self._receive)
 
     def news(self) -> tuple[ShownMark, ...] | None:
         """All marks on this plan; None when they are the same as before. Never waits."""
@@ -48,8 +50,17 @@ class MarkFeed:
 
     def acknowledged_by(self, number: int) -> str | None:
         """The commander that acknowledged the alarm of this number, as of the last call of `news`."""
-        ack = self._board.acks.get((self._team, self._name, f"{self._run}-{number}"))
+        team, name, run = self._key
+        ack = self._board.acks.get((team, name, f"{run}-{number}"))
         return ack.by if ack else None
+
+    def new_errand(self) -> Errand | None:
+        """To whom a commander has sent this wearer on this plan, as of the last call of `news`; each errand is given once."""
+        errand = self._board.errands.get(self._key)
+        if errand is None or errand == self._errand or errand.plan_sha256 != self._plan_sha256:
+            return None
+        self._errand = errand
+        return errand
 
     def _receive(self, message: ReceivedMessage) -> None:
         try:

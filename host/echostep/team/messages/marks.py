@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Shared state of the commanders: marks on the plan, and acknowledgements of alarms. The broker retains it, so it is the same for all.
+"""Shared state of the commanders: marks on the plan, acknowledgements of alarms, errands. The broker retains it, so it is the same for all.
 
-In: retained messages from untrusted senders, on `echostep-table/mark/<id>` and `echostep-table/ack/<team>/<wearer>/<run>-<number>`; an empty one
-removes. Out: `Mark`s and `Ack`s, and the messages for new ones. Owns those that are known; their number is bounded.
+In: retained messages from untrusted senders, on `echostep-table/mark/<id>`, `echostep-table/ack/<team>/<wearer>/<run>-<number>` and
+`echostep-table/errand/<team>/<wearer>/<run>`; an empty one removes. Out: `Mark`s, `Ack`s and `Errand`s, and the messages for new ones. Owns those
+that are known; their number is bounded.
 
-The removal of a mark stays as a retained message: the state of a mark only goes from set to removed; of several acknowledgements
-the earliest counts. So what each commander knows can be sent again in any order, also to a broker that has lost its messages (`Restorer`), and all
-come to one state: an outdated message is answered with the newer state, for the broker keeps the last one.
+The removal of a mark stays as a retained message: the state of a mark only goes from set to removed; of several acknowledgements the earliest counts,
+of the errands of one run the latest. So what each commander knows can be sent again in any order, also to a broker that has lost its messages
+(`Restorer`), and all come to one state: an outdated message is answered with the newer state, for the broker keeps the last one.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from echostep.team.messages.report import BadReportError, Metres, check_name, de
 
 ROOT = "echostep-table"
 MARKS, ALL = f"{ROOT}/mark/#", f"{ROOT}/#"
-MOST_MARKS, MOST_ACKS = 256, 1024  # further ones are refused
+MOST_MARKS, MOST_ACKS, MOST_ERRANDS = 256, 1024, 256  # further ones are refused
 MOST_ANSWERS = 64  # that wait; further ones replace the oldest
 MOST_REMOVED = 1024  # removed marks that are remembered, the newest ones
 MarkKind = Literal["cleared", "hazard", "meeting"]
@@ -62,9 +63,29 @@ class Ack(msgspec.Struct, frozen=True):
     unix_s: Annotated[float, Meta(ge=0.0, le=1e11)]
 
 
+class Errand(msgspec.Struct, frozen=True):
+    """A wearer is sent to another one in distress. `to`: that wearer's name; `where`: the place in words; `by`: the sender, at `unix_s`."""
+
+    echostep_errand: Literal[1]
+    to: Person
+    where: Annotated[str, Meta(max_length=200)]
+    x_m: Metres
+    y_m: Metres
+    level: Level
+    by: Person
+    unix_s: Annotated[float, Meta(ge=0.0, le=1e11)]
+    plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+
+    @property
+    def words(self) -> str:
+        """For the wearer who is sent."""
+        return f"{self.by} sends you to {self.to}, in distress{f': {self.where}' if self.where else ''}"
+
+
 AlarmKey = tuple[str, str, str]  # team, wearer, "<run>-<number>"
+RunKey = tuple[str, str, str]  # team, wearer, run
 T = TypeVar("T")
-_MARK, _ACK = msgspec.json.Decoder(Mark), msgspec.json.Decoder(Ack)
+_MARK, _ACK, _ERRAND = msgspec.json.Decoder(Mark), msgspec.json.Decoder(Ack), msgspec.json.Decoder(Errand)
 
 
 def ack_message(key: AlarmKey, by: str, unix_s: float) -> tuple[str, bytes]:
@@ -77,13 +98,23 @@ def acks_of(team: str, name: str) -> str:
     return f"{ROOT}/ack/{team}/{name}/+"
 
 
+def errand_message(key: RunKey, errand: Errand) -> tuple[str, bytes]:
+    """Topic and payload of an errand of the wearer of this run."""
+    return errand_of(key), msgspec.json.encode(errand)
+
+
+def errand_of(key: RunKey) -> str:
+    """Topic of the errand of one run."""
+    return f"{ROOT}/errand/{'/'.join(key)}"
+
+
 def is_shared(topic: str | None) -> bool:
     """Whether a topic is one of this module's."""
     return topic is not None and topic.startswith(f"{ROOT}/")
 
 
 class MarkBoard:
-    """`receive` takes messages; `marks` and `acks` are what they amount to; `removed`: marks that were there.
+    """`receive` takes messages; `marks`, `acks` and `errands` are what they amount to; `removed`: marks that were there.
 
     `answers`: messages for the broker, which keeps older ones.
     """
@@ -92,12 +123,14 @@ class MarkBoard:
         self.marks: dict[str, Mark] = {}
         self.removed: dict[str, Mark] = {}
         self.acks: dict[AlarmKey, Ack] = {}
+        self.errands: dict[RunKey, Errand] = {}
         self.answers: deque[tuple[str, bytes]] = deque(maxlen=MOST_ANSWERS)
 
     def copy(self) -> MarkBoard:
         """A board of the same state that changes by itself."""
         made = MarkBoard()
         made.marks, made.removed, made.acks = dict(self.marks), dict(self.removed), dict(self.acks)
+        made.errands = dict(self.errands)
         return made
 
     @property
@@ -107,6 +140,8 @@ class MarkBoard:
             yield mark.message
         for key, ack in self.acks.items():
             yield ack_message(key, ack.by, ack.unix_s)
+        for key, errand in self.errands.items():
+            yield errand_message(key, errand)
 
     def receive(self, topic: str, payload: bytes) -> None:
         """Take one message; raises BadReportError with the reason of its rejection."""
@@ -116,6 +151,8 @@ class MarkBoard:
                 self._receive_mark(identity, payload)
             case ["ack", team, name, alarm]:
                 self._receive_ack((team, name, alarm), payload)
+            case ["errand", team, name, run]:
+                self._receive_errand((team, name, run), payload)
             case _:
                 raise BadReportError("unknown topic")
 
@@ -144,10 +181,7 @@ class MarkBoard:
         self.marks[identity] = mark
 
     def _receive_ack(self, key: AlarmKey, payload: bytes) -> None:
-        for name in key[:2]:
-            check_name(name)
-        if len(key[2]) > 32:
-            raise BadReportError("unknown topic")
+        _check_key(key)
         if not payload:
             self.acks.pop(key, None)
             return
@@ -161,6 +195,30 @@ class MarkBoard:
             self.answers.append(ack_message(key, known.by, known.unix_s))
         else:
             self.acks[key] = ack
+
+    def _receive_errand(self, key: RunKey, payload: bytes) -> None:
+        _check_key(key)
+        if not payload:
+            self.errands.pop(key, None)
+            return
+        errand = _decoded(payload, _ERRAND, "errand")
+        if not all(map(is_printable, (errand.by, errand.to, errand.where))):
+            raise BadReportError("unprintable text")
+        known = self.errands.get(key)
+        if known is None and len(self.errands) >= MOST_ERRANDS:
+            raise BadReportError(f"more than {MOST_ERRANDS} errands")
+        if known is not None and (known.unix_s, known.by) > (errand.unix_s, errand.by):
+            self.answers.append(errand_message(key, known))
+        else:
+            self.errands[key] = errand
+
+
+def _check_key(key: tuple[str, str, str]) -> None:
+    """Raises BadReportError for a topic that names no wearer."""
+    for name in key[:2]:
+        check_name(name)
+    if len(key[2]) > 32:
+        raise BadReportError("unknown topic")
 
 
 def _decoded(payload: bytes, decoder: msgspec.json.Decoder[T], what: str) -> T:

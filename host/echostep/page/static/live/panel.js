@@ -9,6 +9,7 @@ const SPOKEN_MS = 8000;  // shortest time between two positions for a screen rea
 const FASTEST_RAD_S = Math.PI;  // of the guidance arrow's turn
 const MOST_BUTTONS = 3;  // floors as buttons on a phone; more of them are a list
 const LEAST_RAD = 0.01;  // the arrow ignores smaller changes
+const LONG = 26, VERY_LONG = 60;  // letters of a status that is written smaller
 const $ = (id) => document.getElementById(id);
 const put = (id, text) => { if ($(id).textContent !== text) $(id).textContent = text; };  // unchanged text causes no new layout
 
@@ -42,7 +43,7 @@ export class Panel {
     }));
   }
 
-  frame({ told: estimate, words: said, streams, guidance, goal, beams, beacons, play, ended, alarm }) {
+  frame({ told: estimate, words: said, streams, guidance, goal, beams, beacons, play, ended, alarm, errand }) {
     const status = ended ? 'ended' : estimate?.status ?? 'waiting', words = ended ? `ended: ${ended}${play ? '. ▶ plays it again' : ''}` : said;
     this.status(status, words);
     put('place', estimate ? positionText(estimate, this.plan.levels) : '');
@@ -54,6 +55,8 @@ export class Panel {
     $('wrong').hidden = !streams?.wrong;
     put('beacons', beaconText(beacons));
     $('beacons').hidden = !beacons.length;
+    put('errand', errand);
+    $('errand').hidden = !errand;
     this.alarm(alarm);
     this.guidance(guidance);
     this.goal(goal);
@@ -123,7 +126,7 @@ export class Panel {
   }
 
   status(status, words) {
-    $('words').dataset.status = status;
+    Object.assign($('words').dataset, { status, long: words.length > VERY_LONG ? 'very' : String(words.length > LONG) });
     $('mark').textContent = MARKS[status];
     put('status-text', words);
   }

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// A mayday that arrives: it sounds and vibrates, the title blinks and the header is red until it is acknowledged; its floor and place come into view, and
+// one tap leads back to what was seen before.
+
+import { Bell } from '../static/bell.js';
+import { put } from './text.js';
+
+const BLINK_MS = 1000;  // assumed; slower than the 3 flashes a second of WCAG 2.3.1
+const $ = (id) => document.getElementById(id);
+
+export class Alarm {
+  // `view` of the map; `show(place)`: its floor and place come into view; `open(id)`: the details; `level()`, `showLevel(level)`: of the map; `floor(level)`: its name
+  constructor(view, { show, open, level, showLevel, floor }) {
+    Object.assign(this, { view, show, open, level, showLevel, floor, bell: new Bell($('invitation')), title: document.title, open_ids: null, count: 0, shown: null, before: null, blink: null, isTurned: false, named: '' });
+    this.bell.invite(true, 'This page cannot sound before it is tapped: tap here');
+    $('mayday-open').onclick = () => this.open(this.shown);
+    $('mayday-back').onclick = () => this.back();
+  }
+
+  // Rows of the list, the place of each wearer, and the time bar: while the past is shown a mayday of now sounds, but the map stays.
+  update(rows, places, time, isPast) {
+    const open = rows.filter(({ open_alarm }) => open_alarm), count = isPast ? time?.open_alarms ?? 0 : open.length;
+    if (isPast) {
+      if (count > this.count) this.bell.ring();
+    } else {
+      const first = this.open_ids === null, come = open.filter(({ id }) => !first && !this.open_ids.has(id));
+      this.open_ids = new Set(open.map(({ id }) => id));
+      if (come.length) this.arrive(come[0], places.get(come[0].id));
+      if (this.shown !== null && !this.open_ids.has(this.shown)) this.hide();
+    }
+    this.count = count;
+    this.named = isPast || !open.length ? '' : ` ${open[0].name}`;
+    this.mark();
+  }
+
+  arrive(row, place) {
+    this.bell.ring();
+    this.before ??= { level: this.level(), x: this.view.x, y: this.view.y, scale: this.view.scale, turn: this.view.turn };
+    this.shown = row.id;
+    put($('mayday-text'), `▲ ${row.name}: mayday, ${place ? this.floor(place.level) : 'place not known'}`);
+    $('mayday').hidden = false;
+    $('mayday-back').hidden = !place;
+    if (place) this.show(place);
+  }
+
+  back() {
+    const { before } = this;
+    this.hide();
+    if (!before) return;
+    const { level, ...seen } = before;
+    this.showLevel(level);
+    Object.assign(this.view, seen);
+    this.view.changed();
+  }
+
+  hide() {
+    Object.assign(this, { shown: null, before: null });
+    $('mayday').hidden = true;
+  }
+
+  // The red header, and the title that blinks.
+  mark() {
+    const on = this.count > 0;
+    if (document.body.dataset.alarm !== String(on)) document.body.dataset.alarm = String(on);
+    if (on && this.blink === null) this.blink = setInterval(() => this.turn(), BLINK_MS);
+    if (on || this.blink === null) return;
+    clearInterval(this.blink);
+    this.blink = null;
+    this.isTurned = true;
+    this.turn();
+  }
+
+  turn() {
+    this.isTurned = !this.isTurned;
+    document.title = this.isTurned ? `▲ MAYDAY${this.named}` : this.title;
+  }
+
+  entitle(title) {
+    this.title = title;
+    if (!this.isTurned) document.title = title;
+  }
+}
