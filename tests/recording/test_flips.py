@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import random
 import struct
 from dataclasses import replace
 from functools import cache
@@ -10,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from echostep.localization.estimate import Estimate
+from echostep.localization.estimate import TRACKING_M, Estimate
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.recording.mcap_records import HEAD_SIZE
@@ -20,7 +21,17 @@ from echostep.recording.repair.contents import info
 from echostep.recording.repair.edit import repair
 from echostep.session.losses import skipped
 from echostep.tracker import Tracker
-from reliability.flip_recording import Replayed, arrival_offsets, compare, draw_flips, flip_once, replay
+from places import PLAN
+from reliability.damaged_blocks import KINDS, damage_once
+from reliability.flip_recording import (
+    Replayed,
+    arrival_offsets,
+    compare,
+    draw_flips,
+    flip_once,
+    record_walk,
+    replay,
+)
 from walks import DEMO, walk_chunks
 
 SECONDS = 8.0
@@ -125,3 +136,15 @@ def test_no_flip_ends_a_track_early_without_a_word(tmp_path: Path) -> None:
         flip = flip_once(content, where, load_plan(DEMO), expected, tmp_path)
         assert not flip.bad
         assert flip.said
+
+
+@pytest.mark.long
+def test_no_damaged_block_is_tracked_over_and_each_is_told(tmp_path: Path) -> None:
+    """The small version of the second half of `make flips`: each kind of damage once."""
+    record_walk(tmp_path / "walk.mcap", SECONDS)
+    content, plan, rng = (tmp_path / "walk.mcap").read_bytes(), load_plan(PLAN), random.Random(2)
+    expected = replay(tmp_path / "walk.mcap", plan).estimates
+    for kind in KINDS:
+        distance_m, told = damage_once(content, kind, rng, plan, expected, tmp_path)
+        assert distance_m < TRACKING_M, kind
+        assert told, kind
