@@ -24,6 +24,7 @@ CLOSE_M = 0.01  # half the width of the widest crack between two pieces of a wal
 FLAT_M = 0.005  # greatest distance of a curve from the straight pieces that replace it
 SLIVER_M2 = 1e-3  # smaller areas are dropped
 GRID_M = 1e-3  # coordinates are rounded to it
+ACROSS_M = 3e-3  # a line nearer to a door's end than this, across it, is the jamb there: coordinates are rounded to a third of it
 HALF_CUT_M = 0.05  # half the width of the strip along a door in which walls drawn as lines are cut
 TOUCH_M = 2e-3  # a face nearer to a wall than this belongs to the wall, not to a window
 FLECK_M = 0.02  # shorter pieces of window count as wall
@@ -89,19 +90,20 @@ class DrawnLevel:
 
 
 def cut(line: BaseGeometry, openings: list[BaseGeometry], jambs: list[BaseGeometry]) -> BaseGeometry:
-    """A line without its parts inside the openings; ends of walls that lie across a door's end, as the jambs do, stay."""
+    """A line without its parts inside the openings; what lies across a door's end, as the jambs do, stays."""
     if not openings:
         return line
-    return shapely.union_all(
-        [line.difference(shapely.union_all(openings)), line.intersection(shapely.union_all(jambs))]
-    )
+    across = pieces([line.intersection(shapely.union_all(jambs))])
+    kept = [part for part in across if part.length > 6.0 * ACROSS_M]  # of a line along the door a third of that is inside
+    return joined(shapely.union_all([line.difference(shapely.union_all(openings)), *kept]))
 
 
 def _across(door: LineString) -> BaseGeometry:
-    """The two short lines across the ends of a door's line."""
+    """The two narrow strips across the ends of a door's line: as wide as the rounding of coordinates."""
     (x0, y0), (x1, y1) = door.coords
     u, v = HALF_CUT_M * (y0 - y1) / door.length, HALF_CUT_M * (x1 - x0) / door.length
-    return shapely.MultiLineString([((x - u, y - v), (x + u, y + v)) for x, y in ((x0, y0), (x1, y1))])
+    ends = [LineString([(x - u, y - v), (x + u, y + v)]) for x, y in ((x0, y0), (x1, y1))]
+    return shapely.MultiPolygon([end.buffer(ACROSS_M, cap_style="flat") for end in ends])
 
 
 def pieces(shapes: Iterable[BaseGeometry]) -> list[BaseGeometry]:

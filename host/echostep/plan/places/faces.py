@@ -49,7 +49,7 @@ class Faces:
 def find_faces(level: Level) -> Faces:
     """The faces between the walls, windows, obstacles and doors of a level."""
     doors = np.array([door.line for door in level.doors]).reshape(-1, 4)
-    lines = np.concatenate((extend(level.solid, TOUCH_M), extend(doors, JAMB_M)))
+    lines = np.concatenate((extend(level.solid, TOUCH_M), extend(doors, JAMB_M), _ticks(doors)))
     noded = shapely.union_all(shapely.linestrings(lines.reshape(-1, 2, 2))) if len(lines) else shapely.MultiLineString()
     areas = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
     areas = areas[shapely.area(areas) > SMALLEST_M2]
@@ -61,6 +61,13 @@ def extend(segments: Floats, by_m: float) -> Floats:
     along = segments[:, 2:] - segments[:, :2]
     along = along / np.hypot(*along.T)[:, None] * by_m
     return np.concatenate((segments[:, :2] - along, segments[:, 2:] + along), axis=1)
+
+
+def _ticks(doors: Floats) -> Floats:
+    """Short lines across both ends of doors (n, 4) -> (2n, 4): a wall that continues a door in line may lie beside it by the rounding."""
+    along = doors[:, 2:] - doors[:, :2]
+    across = (along / np.hypot(*along.T)[:, None] * TOUCH_M)[:, ::-1] * (-1.0, 1.0)
+    return np.concatenate([np.concatenate((end - across, end + across), axis=1) for end in (doors[:, :2], doors[:, 2:])])
 
 
 def connected_groups(plan: Plan, faces: Sequence[Faces]) -> dict[Face, Face]:

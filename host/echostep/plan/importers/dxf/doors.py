@@ -27,22 +27,25 @@ WIDEST_M = 12.0  # of a door without a swing: gates
 LEAST_SHARE, MOST_SHARE = 0.6, 1.3  # width of a gap by the width of the leaf in it; assumed
 CORNER_M = 0.2  # from a door in a corner to the axis of a thick wall there; assumed
 MOST_OFF_M = 0.3  # from both jambs together; assumed
+TIP_M = 0.1  # of a sliding leaf that is seen in its gap at least; assumed
 FRAME_M = 0.2  # by which a gap may be wider beyond that: frame; assumed
 BESIDE_M = 6.0  # greatest width of a hole in which a door stands beside a window; assumed
 THICKEST_M = 0.5  # of a wall that is drawn through a door
-SAME_M = 0.25  # two doors with nearer middles are one; assumed
+SAME_M = 0.25  # two doors with nearer middles are one, and two lines across one wall; assumed
+NEAR_JAMB_M = 0.02  # faces with less distance need no end between them
 Line = tuple[float, float, float, float]
 
 
 @dataclass(slots=True)
 class PlacedDoors:
-    """Doors in walls; `cuts`: areas of walls that are drawn through them, the `cut_doors`.
+    """Doors in walls; `jambs`: ends of the walls beside them, from face to face; `cuts`: areas of walls that are drawn through the `cut_doors`.
 
     `strays`: middles of symbols in no wall, and what would be their doors.
     `marks`: number of small shapes that are no doors: frames of numbers, jambs.
     """
 
     doors: list[Door] = field(default_factory=list)
+    jambs: list[LineString] = field(default_factory=list)
     cuts: list[BaseGeometry] = field(default_factory=list)
     cut_doors: list[Line] = field(default_factory=list)
     strays: list[tuple[Point, Line]] = field(default_factory=list)
@@ -50,25 +53,26 @@ class PlacedDoors:
 
     def add(self, symbol: Symbol, walls: WallBands) -> None:
         """Place the doors of a symbol."""
-        lines = list(_lines(symbol, walls))
+        lines = list(_lines(symbol, walls)) or list(_lines(symbol, walls.wider()))
         if not lines and not (symbol.swings or _is_long(symbol.lines)):
             self.marks += 1
         elif not lines:
             middle = shapely.union_all(symbol.lines).envelope.centroid
             self.strays.append(((round(middle.x, 2), round(middle.y, 2)), _drawn_line(symbol)))
         for line in _joined(lines):
-            if not any(_same(line, other.line) for other in self.doors):
+            width_m = math.dist(line[:2], line[2:])
+            if walls.gap(line[:2], _along(line), width_m / 2, width_m) is not None:
+                self._place(line, walls)
+            elif not self._has(line):
                 self.doors.append(Door(line))
-                width_m = math.dist(line[:2], line[2:])
-                if walls.gap(line[:2], _along(line), width_m / 2, width_m) is None:
-                    self.cuts.append(walls.faces(line, THICKEST_M))
-                    self.cut_doors.append(line)
+                self.cuts.append(walls.faces(line, THICKEST_M))
+                self.cut_doors.append(line)
 
     def add_swing(self, swing: Swing, walls: WallBands) -> Line | None:
         """Place a swing that lies on no layer of doors, if it fits a gap exactly; returns the gap, None where it does not."""
-        line = _exact(swing, walls)
-        if line is not None and not any(_same(line, other.line) for other in self.doors):
-            self.doors.append(Door(line))
+        line = _exact(swing, walls) or _exact(swing, walls.wider())
+        if line is not None:
+            self._place(line, walls)
         return line
 
     def add_pair(self, symbol: Symbol, walls: WallBands) -> Line | None:
@@ -81,9 +85,33 @@ class PlacedDoors:
         gap = walls.gap(lines[0][:2], _along(lines[0]), width_m / 2, width_m)
         if gap is None or abs(gap.begin_m) > BY_M or abs(gap.end_m - width_m) > BY_M:
             return None
-        if not any(_same(lines[0], other.line) for other in self.doors):
-            self.doors.append(Door(lines[0]))
+        self._place(lines[0], walls)
         return lines[0]
+
+    def _has(self, line: Line) -> bool:
+        return any(_same(line, other.line) for other in self.doors)
+
+    def _place(self, line: Line, walls: WallBands) -> None:
+        """Add a door in a gap, in the middle of the wall where its symbol is drawn beside it, and the ends of the wall."""
+        (u, v), ends = _along(line), (line[:2], line[2:])
+        spans = [walls.wall_at(end, (side * u, side * v)) for end, side in zip(ends, (-1, 1), strict=True)]
+        left = [
+            None if span is None else (span if side > 0 else (-span[1], -span[0]))
+            for span, side in zip(spans, (-1, 1), strict=True)
+        ]
+        found = [span for span in left if span is not None]
+        off = (
+            0.0
+            if any(low <= 0.0 <= high for low, high in found)
+            else sum(low + high for low, high in found) / (2 * len(found) or 1)
+        )
+        moved = _line((line[0] - off * v, line[1] + off * u), (u, v), 0.0, math.dist(*ends))
+        if self._has(moved):
+            return
+        self.doors.append(Door(moved))
+        for (x, y), span in zip(ends, left, strict=True):
+            if span is not None and span[1] - span[0] > NEAR_JAMB_M:
+                self.jambs.append(LineString([(x - o * v, y + o * u) for o in span]))
 
     def questions(self) -> Iterator[Question]:
         """What a person should look at: symbols in no wall, and doors that a wall is drawn through."""
@@ -117,6 +145,10 @@ def _drawn_line(symbol: Symbol) -> Line:
 
 def _meeting(swing: Swing, swings: Sequence[Swing]) -> Swing:
     """A swing without a drawn leaf whose arc meets that of the other leaf: there both are closed."""
+    for k, end in enumerate(swing.ends):  # a leaf that swings both ways is drawn closed, with two arcs
+        same = (other for other in swings if other is not swing and math.dist(other.hinge, swing.hinge) < BY_M)
+        if any(math.dist(end, other) < BY_M for one in same for other in one.ends):
+            return replace(swing, leaf=1 - k)
     if swing.leaf is None:
         for k, end in enumerate(swing.ends):
             others = (other_end for other in swings if other is not swing for other_end in other.ends)
@@ -171,15 +203,33 @@ def _of_line(lines: Sequence[LineString], walls: WallBands) -> Line | None:
         return None
     along = _unit(a, b)
     gap = walls.gap(a, along, length / 2, length)
-    if gap is not None and _fits(gap, length):
-        return _line(a, along, gap.begin_m, gap.end_m)
+    if gap is not None and _fits(gap, length) and _is_square(shut := _line(a, along, gap.begin_m, gap.end_m), walls):
+        return shut
     for hinge in (a, b):
         for u in walls.directions(hinge):
             leaf = walls.gap(hinge, u, length / 2, 2 * length)
             if leaf is not None and _fits(leaf, length):
                 return _line(hinge, u, leaf.begin_m, leaf.end_m)
+    tips = [_at_tip(a, along, length, walls), _at_tip(b, (-along[0], -along[1]), length, walls)]
+    if len(found := [tip for tip in tips if tip is not None]) == 1:
+        return found[0]
     corner = next((line for hinge, end in ((a, b), (b, a)) if (line := _across_leaf(hinge, end, walls))), None)
     return corner or ((*a, *b) if gap is None and walls.is_at_wall(a) and walls.is_at_wall(b) else None)
+
+
+def _is_square(line: Line, walls: WallBands) -> bool:
+    """Whether a wall at an end of a door's line goes on along it or at right angles: a leaf drawn half open may fit between two walls askew."""
+    (u, v), ends = _along(line), (line[:2], line[2:])
+    found = [direction for end in ends for direction in walls.directions(end)]
+    return any(min(abs(a * v - b * u), abs(a * u + b * v)) < 0.1 for a, b in found)
+
+
+def _at_tip(begin: Point, along: Point, length: float, walls: WallBands) -> Line | None:
+    """The gap that the far end of a panel reaches into: a sliding leaf, drawn half open or inside the wall."""
+    gap = walls.gap(begin, along, length - TIP_M, 2 * length)
+    if gap is None or gap.begin_m < TIP_M or not LEAST_SHARE * length <= gap.width_m <= MOST_SHARE * length + FRAME_M:
+        return None
+    return _line(begin, along, gap.begin_m, gap.end_m)
 
 
 def _across_leaf(hinge: Point, end: Point, walls: WallBands) -> Line | None:
@@ -229,10 +279,11 @@ def _ends(line: Line) -> tuple[tuple[Point, Point], tuple[Point, Point]]:
 
 
 def _same(one: Line, other: Line) -> bool:
-    """Whether two lines are one door: their middles lie together, and they point the same way."""
-    middles = [((x0 + x1) / 2, (y0 + y1) / 2) for x0, y0, x1, y1 in (one, other)]
+    """Whether two lines are one door: their middles lie together, along them or across one wall, and they point the same way."""
+    (x, y), (p, q) = (((x0 + x1) / 2, (y0 + y1) / 2) for x0, y0, x1, y1 in (one, other))
     (a, b), (c, d) = _along(one), _along(other)
-    return math.dist(*middles) < SAME_M and abs(a * d - b * c) < 0.5
+    along, across = abs((p - x) * a + (q - y) * b), abs((q - y) * a - (p - x) * b)
+    return along < SAME_M and across < THICKEST_M and abs(a * d - b * c) < 0.5
 
 
 def _line(at: Point, along: Point, begin_m: float, end_m: float) -> Line:

@@ -29,7 +29,16 @@ from echostep.plan.importers.dxf.layers import pieces_of
 from echostep.plan.importers.dxf.rooms import rooms_of
 from echostep.plan.importers.dxf.sheet import Sheet, read_sheet
 from echostep.plan.importers.dxf.storeys import alignment, bounds_of, lies_over, storey_boxes, window_words
-from echostep.plan.importers.dxf.symbols import LEAF_M, Swing, Symbol, draws_open_leaf, is_swing, symbol_of, symbols_of
+from echostep.plan.importers.dxf.symbols import (
+    LEAF_M,
+    Swing,
+    Symbol,
+    draws_open_leaf,
+    is_swing,
+    paired,
+    symbol_of,
+    symbols_of,
+)
 from echostep.plan.importers.hints import Hints
 from echostep.plan.importers.report import ImportReport
 from echostep.plan.model import ConnectorKind, Plan, Question
@@ -160,7 +169,7 @@ def _drawn_level(storey: _Storey, drawn: DrawnLevel, report: ImportReport) -> Dr
     doors = _doors(storey, report)
     drawn.doors, drawn.cuts = doors.doors, doors.cuts
     drawn.questions = [*doors.questions(), *_left_out_walls(storey)]
-    drawn.walls, drawn.windows = list(storey.lines("walls", "columns")), list(storey.lines("windows"))
+    drawn.walls, drawn.windows = [*storey.lines("walls", "columns"), *doors.jambs], list(storey.lines("windows"))
     drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(_noded(storey.lines("obstacles")))))
     rooms = rooms_of(sheet.kinds["rooms"], storey.frame, sheet.file, report)
     drawn.rooms = [room for room in rooms if storey.holds(Point(room.at_m))]
@@ -182,7 +191,8 @@ def _without_lines(storey: _Storey, report: ImportReport) -> None:
 def _doors(storey: _Storey, report: ImportReport) -> PlacedDoors:
     """Doors on their layers, then swings on others, or among the walls, that fit a gap exactly."""
     placed = PlacedDoors()
-    curves = [pair for pair in (*storey.sheet.others, *storey.sheet.kinds["walls"]) if pair[0].dxftype() in CURVES]
+    kinds = storey.sheet.kinds
+    curves = [p for p in (*storey.sheet.others, *kinds["walls"], *kinds["windows"]) if p[0].dxftype() in CURVES]
     swings = [(*pair, symbol) for pair in curves if is_swing(symbol := symbol_of(storey.of(pair[0])))]
     storey.swings.update(id(entity) for entity, *_ in swings)  # no walls while the doors are looked for
     walls = WallBands(storey.lines("walls", "columns", "windows"))
@@ -231,8 +241,9 @@ def _swings_elsewhere(
 
 
 def _take_leaves(storey: _Storey, leaves: list[tuple[Swing, tuple[float, float]]]) -> None:
-    """Leaves that are drawn open among the walls, beside a swing that is a door, are no walls."""
-    drawn = [(entity, lines) for entity, _ in storey.sheet.kinds["walls"] if (lines := storey.of(entity))]
+    """Leaves that are drawn open among the walls or windows, beside a swing that is a door, are neither."""
+    kinds = storey.sheet.kinds
+    drawn = [(entity, lines) for entity, _ in (*kinds["walls"], *kinds["windows"]) if (lines := storey.of(entity))]
     tree = shapely.STRtree([lines[0] for _, lines in drawn]) if leaves else shapely.STRtree([])
     for swing, closed in leaves:
         for k in tree.query(Point(swing.hinge), predicate="dwithin", distance=LEAF_M):
@@ -270,7 +281,7 @@ def _symbols(storey: _Storey) -> list[Symbol]:
             symbols += [symbol_of(lines)] if lines else []
         else:
             loose += storey.of(entity)
-    return [*symbols, *symbols_of(loose)]
+    return paired([*symbols, *symbols_of(loose)])
 
 
 def _parts(block: Any, file: Path, depth: int = DEEPEST_SYMBOL) -> list[Any]:

@@ -25,6 +25,7 @@ FLAT_M = 0.005  # greatest distance of an arc from the straight pieces that repl
 FAR_M = 1e4  # larger coordinates are of a national grid: the origin is then moved to the first wall
 STRAY_M = 1e8  # a line beyond is no building, in whatever grid: twice around the Earth
 STRAY = LineString([(0.0, 0.0), (STRAY_M, 0.0)])  # in the place of a line beyond
+THINNEST_M = 0.03  # a polyline of more width is drawn as thick as its wall, of less: with a pen; assumed
 THICKEST_M = 1.2  # a hatch that is nowhere wider fills a wall or a column, a wider one a floor; assumed
 ASKEW = 0.5  # sine of the angle between a multiline and its stored offsets below which these are wrong; at right corners it is 0.71
 PROXY_LINES = ("LINE", "ARC", "CIRCLE", "LWPOLYLINE", "POLYLINE")
@@ -64,6 +65,8 @@ class DrawingFrame:
             lines = [line for path in paths(entity) if (line := self._flat(path)) is not None]
         except (TypeError, ValueError, ArithmeticError, IndexError, AttributeError, KeyError, DXFError):
             return []
+        if (width_m := _width(entity) * self.scale_m) > THINNEST_M:
+            return _thick(lines, width_m)
         return _thin(lines) if entity.dxftype() in ("HATCH", "MPOLYGON") else lines
 
     def lines(self, entity: Any, file: Path) -> list[LineString]:
@@ -112,6 +115,27 @@ def corners(entity: Any) -> list[Floats]:
     except (TypeError, ValueError, ArithmeticError, IndexError, AttributeError, KeyError, DXFError):
         return []
     return [points for row in found if np.isfinite(points := np.array(row, dtype=np.float64)).all() and len(row) > 1]
+
+
+def _width(entity: Any) -> float:
+    """The width of a polyline that is drawn with one width all along, in drawing units; 0 of others."""
+    if entity.dxftype() == "LWPOLYLINE":
+        same = entity.dxf.get("const_width", 0.0)
+        widths = [(same, same)] if same else [tuple(point) for point in entity.get_points("se")]
+    elif entity.dxftype() == "POLYLINE" and entity.has_width:
+        start, end = entity.dxf.default_start_width, entity.dxf.default_end_width
+        widths = [(v.dxf.get("start_width", start), v.dxf.get("end_width", end)) for v in entity.vertices]
+    else:
+        return 0.0
+    known = {float(width) for pair in widths for width in pair}
+    return known.pop() if len(known) == 1 else 0.0
+
+
+def _thick(lines: list[LineString], width_m: float) -> list[LineString]:
+    """Outlines of lines that are drawn with a width."""
+    areas = (line.buffer(width_m / 2, cap_style="flat", join_style="mitre") for line in lines)
+    parts = [part for area in areas for part in shapely.get_parts(area) if not part.is_empty]
+    return [LineString(ring.coords) for part in parts for ring in (part.exterior, *part.interiors)]
 
 
 def _askew(mline: Any) -> bool:

@@ -22,6 +22,9 @@ from echostep.plan.importers.dxf.layers import pieces_of
 BAND_M = 0.1  # half the width of the band along a door's line in which walls count; assumed
 NEAR_M = 0.35  # greatest distance of a hinge from the wall that it hangs on: frame and lining; assumed
 JAMB_M = 0.3  # shorter pieces of a wall give no direction: its ends, jambs, linings; assumed
+THICKEST_M = 0.6  # of a wall with a door; assumed
+STOP_M, FLAT_M = 0.03, 2e-3  # a wall stops so near to a door's end; faces with less distance are one
+WIDE_BAND_M = 0.2  # half the thickness of an outer wall, and a little; assumed
 BY_M = 0.15  # a point nearer to a wall than this is at it
 Point = tuple[float, float]
 
@@ -42,7 +45,8 @@ class Gap:
 class WallBands:
     """The walls of a level, to be asked for gaps."""
 
-    def __init__(self, walls: Sequence[LineString]) -> None:
+    def __init__(self, walls: Sequence[LineString], band_m: float = BAND_M) -> None:
+        self.band_m = band_m
         self.pieces = pieces_of(walls)
         self.pieces = self.pieces[np.hypot(*(self.pieces[:, 2:] - self.pieces[:, :2]).T) > 0.0]
         self._lines = shapely.linestrings(self.pieces.reshape(-1, 2, 2))
@@ -55,7 +59,7 @@ class WallBands:
         """
         x, y = at
         u, v = along
-        band = _band(x, y, u, v, middle_m - reach_m, middle_m + reach_m)
+        band = self._band(x, y, u, v, middle_m - reach_m, middle_m + reach_m)
         begin, end = -math.inf, math.inf
         for k in self._tree.query(band, predicate="intersects"):
             for low, high in _intervals(self._lines[k].intersection(band), x, y, u, v):
@@ -66,6 +70,30 @@ class WallBands:
                 else:
                     end = min(end, low)
         return Gap(begin, end) if end - begin > 0.0 else None
+
+    def _band(self, x: float, y: float, u: float, v: float, begin: float, end: float) -> Polygon:
+        corners = [(begin, -self.band_m), (end, -self.band_m), (end, self.band_m), (begin, self.band_m)]
+        return Polygon([(x + s * u - t * v, y + s * v + t * u) for s, t in corners])
+
+    def wider(self) -> WallBands:
+        """The same walls, looked at in a band that reaches from a face to the axis that a thick wall is drawn by."""
+        return WallBands(shapely.linestrings(self.pieces.reshape(-1, 2, 2)).tolist(), WIDE_BAND_M)
+
+    def wall_at(self, end: Point, outward: Point) -> tuple[float, float] | None:
+        """Of the wall that stops at a door's end and goes on in the direction `outward`: the offsets (m) of both its faces to the left of `outward`.
+
+        Both are one for a wall that is drawn as one line; None where no wall stops.
+        """
+        near = self.pieces[self._tree.query(shapely.Point(end), predicate="dwithin", distance=THICKEST_M)]
+        if not len(near):
+            return None
+        rows = (near.reshape(-1, 2, 2) - end) @ np.array([outward, (-outward[1], outward[0])]).T
+        rows = rows[
+            np.arange(len(rows))[:, None], np.argsort(rows[:, :, 0], axis=1)
+        ]  # each begins with its end nearer to the door
+        (begin, off), far = rows[:, 0].T, rows[:, 1]
+        stops = (np.abs(begin) < STOP_M) & (far[:, 0] > STOP_M) & (np.abs(far[:, 1] - off) < 0.1 * (far[:, 0] - begin))
+        return _faces(np.sort(off[stops]))
 
     def directions(self, at: Point) -> list[Point]:
         """Unit vectors along the walls near a point, each both ways, without repetition, the nearest wall first."""
@@ -100,9 +128,17 @@ class WallBands:
         return Polygon([(x0 + s * u - t * v, y0 + s * v + t * u) for s, t in corners])
 
 
-def _band(x: float, y: float, u: float, v: float, begin: float, end: float) -> Polygon:
-    corners = [(begin, -BAND_M), (end, -BAND_M), (end, BAND_M), (begin, BAND_M)]
-    return Polygon([(x + s * u - t * v, y + s * v + t * u) for s, t in corners])
+def _faces(offsets: Floats) -> tuple[float, float] | None:
+    """The two offsets of the wall that a door's end lies in: the nearest ones on both its sides, else the two nearest ones."""
+    if not len(offsets):
+        return None
+    below, above = offsets[offsets < -FLAT_M], offsets[offsets > FLAT_M]
+    if len(below) and len(above) and above[0] - below[-1] < THICKEST_M:
+        return float(below[-1]), float(above[0])
+    first = offsets[np.abs(offsets).argmin()]
+    others = offsets[(np.abs(offsets - first) > FLAT_M) & (np.abs(offsets - first) < THICKEST_M)]
+    second = others[np.abs(others - first).argmin()] if len(others) else first
+    return float(min(first, second)), float(max(first, second))
 
 
 def _intervals(part: BaseGeometry, x: float, y: float, u: float, v: float) -> list[tuple[float, float]]:

@@ -57,5 +57,5 @@ def _named(entity: Any, frame: DrawingFrame) -> Room | None:
     if entity.dxftype() not in TEXTS:
         return None
     words = " ".join((entity.plain_text() if entity.dxftype() == "MTEXT" else entity.dxf.text).split())[:80]
-    x, y = frame.metres(entity.dxf.insert)
+    x, y = frame.metres(entity.dxf.insert if entity.dxftype() == "MTEXT" else entity.ocs().to_wcs(entity.dxf.insert))
     return Room(words, (round(x, 3), round(y, 3))) if words and max(abs(x), abs(y)) < LIMIT_M else None

@@ -85,6 +85,22 @@ def symbols_of(lines: Sequence[LineString]) -> list[Symbol]:
     return [symbol_of(group) for group in groups.values()]
 
 
+def paired(symbols: Sequence[Symbol]) -> list[Symbol]:
+    """Symbols, those of one leaf each whose arcs meet as one: a double door that is drawn as two blocks."""
+    single = [symbol for symbol in symbols if len(symbol.swings) == 1]
+    left = [symbol for symbol in symbols if len(symbol.swings) != 1]
+    ends = shapely.points(np.array([symbol.swings[0].ends for symbol in single]).reshape(-1, 2))
+    near = shapely.STRtree(ends).query(ends, predicate="dwithin", distance=LEAF_M) if single else ()
+    taken: set[int] = set()
+    for k, other in sorted({(int(a) // 2, int(b) // 2) for a, b in zip(*near, strict=True)} if single else ()):
+        one, two = single[k].swings[0], single[other].swings[0]
+        apart = math.dist(one.hinge, two.hinge)
+        if k < other and not taken & {k, other} and abs(apart - one.radius_m - two.radius_m) < LEAF_M:
+            taken |= {k, other}
+            left.append(Symbol(single[k].lines + single[other].lines, (one, two)))
+    return left + [symbol for k, symbol in enumerate(single) if k not in taken]
+
+
 def swings_in(line: LineString) -> Iterator[Swing]:
     """The swings along a polyline."""
     points = shapely.get_coordinates(line)

@@ -64,6 +64,9 @@ def scale_of(
         words = " and ".join(USUAL[key].words.format(_metres(lengths[key] * METRES[stated])) for key in wrong[:2])
         ask = f"is it in {NAMES[sensible]}? {advice} (or --units {stated} if it is right)" if sensible else advice
         raise EchostepError(f"{file}: the drawing states {NAMES[stated]} ($INSUNITS), but then {words}: {ask}")
+    if wrong:
+        words = " and ".join(USUAL[key].words.format(_metres(lengths[key] * METRES[stated])) for key in wrong[:2])
+        report.doubt(f"{file.name}: {words} in {NAMES[stated]} as stated, and no other unit is better: --scale?")
     if sensible and _oddity(lengths, METRES[stated]) - _oddity(lengths, METRES[sensible]) > MUCH_ODDER:
         sizes = f"{_size(lengths, stated)} long in {NAMES[stated]} as stated, {_size(lengths, sensible)} in {NAMES[sensible]}"
         report.doubt(f"{file.name} would be a more usual building in another unit: {sizes}: --units {sensible}?")
