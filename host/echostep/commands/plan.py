@@ -56,7 +56,7 @@ def import_(
         typer.Option(
             "--scale",
             metavar="M|X0,Y0,X1,Y1=M",
-            help="DXF: metres a unit, or the distance of two known points in metres.",
+            help="DXF, pictures: metres a unit (a pixel), or the distance of two known points in metres.",
         ),
     ] = None,
     window: Annotated[

@@ -94,7 +94,9 @@ def cut(line: BaseGeometry, openings: list[BaseGeometry], jambs: list[BaseGeomet
     if not openings:
         return line
     across = pieces([line.intersection(shapely.union_all(jambs))])
-    kept = [part for part in across if part.length > 6.0 * ACROSS_M]  # of a line along the door a third of that is inside
+    kept = [
+        part for part in across if part.length > 6.0 * ACROSS_M
+    ]  # of a line along the door a third of that is inside
     return joined(shapely.union_all([line.difference(shapely.union_all(openings)), *kept]))
 
 

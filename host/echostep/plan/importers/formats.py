@@ -20,14 +20,28 @@ from echostep.plan.importers.report import ImportReport
 from echostep.plan.model import Plan, load_plan
 from echostep.plan.writer import plan_json
 
-DRAW_OVER = "a picture: echostep plan edit PLAN --picture {} draws over it"
+PICTURES = (
+    ".png",
+    ".jpg",
+    ".jpeg",
+    ".pgm",
+    ".ppm",
+    ".pbm",
+    ".bmp",
+    ".tif",
+    ".tiff",
+    ".gif",
+    ".webp",
+)  # traced with --scale
+TRACE = (
+    "a picture: --scale X0,Y0,X1,Y1=M traces what is dark in it (two points in pixels, their distance in metres), "
+    "or echostep plan edit PLAN --picture FILE draws over it (PNG, JPEG)"
+)
 NEXT_STEPS = {  # formats that are not read, and what to do
-    **dict.fromkeys((".png", ".jpg", ".jpeg", ".svg"), DRAW_OVER.format("FILE")),
-    **dict.fromkeys(
-        (".pgm", ".ppm", ".pbm", ".bmp", ".tif", ".tiff", ".gif", ".webp", ".heic"),
-        f"{DRAW_OVER.format('FILE.png')}, once it is saved as PNG; a map of ROS is imported by its map.yaml",
-    ),
-    ".pdf": f"PDF: make a picture of its page (pdftoppm -png -r 150 FILE page), then it is {DRAW_OVER.format('page-1.png')}",
+    **dict.fromkeys(PICTURES, f"{TRACE}; a map of ROS is imported by its map.yaml"),
+    ".svg": "SVG: save it as DXF (Inkscape: Save a Copy, Desktop Cutting Plotter), or echostep plan edit PLAN --picture FILE draws over it",
+    ".heic": f"save it as PNG or JPEG, then it is {TRACE}",
+    ".pdf": f"PDF: make a picture of its page (pdftoppm -png -r 150 FILE page), then page-1.png is {TRACE}",
     ".dwg": "DWG: save it as DXF (in AutoCAD SAVEAS, or with the free ODA File Converter)",
     ".dgn": "DGN: save it as DXF",
     ".dwf": "DWF: save the drawing that it was made of as DXF",
@@ -69,8 +83,9 @@ def import_plan(
         "--layer": hints.layers,
         "--align": hints.align,
     }
+    suffix = path.suffix.casefold()
     given = [option for option, value in {**drawn, "--level": hints.level_names}.items() if value]
-    if given and path.suffix.casefold() != ".dxf":
+    if given and suffix != ".dxf" and not (suffix in PICTURES and given == ["--scale"]):
         raise EchostepError(
             f"{path}: {' and '.join(given)} {'is' if len(given) == 1 else 'are'} for drawings (DXF) alone"
         )
@@ -108,6 +123,8 @@ def _imported(path: Path, hints: Hints, above: Sequence[Path], report: ImportRep
         plan = _module("nodelink").import_nodelink(path / "core.txt" if path.is_dir() else path)
     elif suffix in (".yaml", ".yml"):
         plan = _module("raster.ros_map").import_ros_map(path, report)
+    elif suffix in PICTURES and hints.scale_m is not None:
+        plan = _module("raster.picture").import_picture(path, hints.scale_m, report)
     elif not path.exists():
         raise EchostepError(f"{path}: no such file")
     else:

@@ -10,20 +10,16 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import numpy as np
 from shapely.affinity import affine_transform
 
-from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.extras import require
 from echostep.plan.importers.drawn_level import DrawnLevel
-from echostep.plan.importers.parsing import read_bytes, read_text
-from echostep.plan.importers.raster.tracing import trace
+from echostep.plan.importers.parsing import read_text
+from echostep.plan.importers.raster.tracing import grey, trace
 from echostep.plan.importers.report import ImportReport
 from echostep.plan.model import Plan
 from echostep.plan.plan_file import LIMIT_M
 
-MOST_PIXELS = 100_000_000
 OCCUPIED = 0.65  # default of map_server
 LARGEST_PIXEL_M = 10.0
 
@@ -38,7 +34,7 @@ def import_ros_map(path: Path, report: ImportReport) -> Plan:
         raise EchostepError(f"{path}: resolution: expected metres a pixel, more than 0")
     x, y, yaw = _origin(path, fields)
     picture = path.parent / fields["image"]
-    probability = 1.0 - _grey(picture) / 255.0
+    probability = 1.0 - grey(picture) / 255.0
     if _number(path, fields, "negate", 1.0, 0.0):
         probability = 1.0 - probability
     try:
@@ -56,22 +52,6 @@ def import_ros_map(path: Path, report: ImportReport) -> Plan:
         "traced from what a robot saw: furniture and people are walls too, and doors that stood open are gaps; echostep plan edit corrects it"
     )
     return Plan(path.stem, (drawn.level(),), None, "")
-
-
-def _grey(path: Path) -> Floats:
-    """The picture's grey values (rows from the top, columns), 0 black to 255 white; transparent pixels are unknown, as grey."""
-    require(f"{path}: a picture", "PIL")
-    from PIL import Image
-
-    read_bytes(path)
-    Image.MAX_IMAGE_PIXELS = MOST_PIXELS
-    try:
-        with Image.open(path) as image:
-            if image.width * image.height > MOST_PIXELS:
-                raise EchostepError(f"{path}: more than {MOST_PIXELS // 10**6} million pixels: cut it to the building")
-            return np.asarray(image.convert("L"), dtype=np.float64)
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise EchostepError(f"{path}: not a picture that can be read: {str(error)[:200]}") from error
 
 
 def _fields(path: Path) -> dict[str, str]:

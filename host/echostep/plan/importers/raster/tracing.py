@@ -1,20 +1,43 @@
 # SPDX-License-Identifier: MIT
-"""Pixels that are walls -> outlines.
+"""A picture's grey values; pixels that are walls -> outlines.
 
-In: a boolean picture. Out: polygons in pixels, x right, y up, the origin at the lower left corner. Owns what counts as noise.
+In: a file; a boolean picture. Out: grey values; polygons in pixels, x right, y up, the origin at the lower left corner. Owns what counts as noise.
 """
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from echostep.arrays import Bools
+from echostep.arrays import Bools, Floats
+from echostep.errors import EchostepError
+from echostep.extras import require
+from echostep.plan.importers.parsing import read_bytes
+
+MOST_PIXELS = 100_000_000
 
 STAIR = 1.0  # pixels by which an outline may leave the pixels' edges: a slanting wall is a stair of pixels
 LEAST_PIXELS = 4.0  # smaller groups are noise of the sensor; assumed
 MOST_RUNS = 2_000_000
+
+
+def grey(path: Path) -> Floats:
+    """The picture's grey values (rows from the top, columns), 0 black to 255 white; transparent pixels are unknown, as grey."""
+    require(f"{path}: a picture", "PIL")
+    from PIL import Image
+
+    read_bytes(path)
+    Image.MAX_IMAGE_PIXELS = MOST_PIXELS
+    try:
+        with Image.open(path) as image:
+            if image.width * image.height > MOST_PIXELS:
+                raise EchostepError(f"{path}: more than {MOST_PIXELS // 10**6} million pixels: cut it to the building")
+            return np.asarray(image.convert("L"), dtype=np.float64)
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise EchostepError(f"{path}: not a picture that can be read: {str(error)[:200]}") from error
 
 
 def trace(walls: Bools) -> tuple[list[Polygon], int]:
