@@ -16,7 +16,10 @@ from board_runs import ROOT, needs_twin, tool
 from bridges import bridged
 from command_line import echostep, interrupt_after
 from echostep.recording.reading import open_recording
+from echostep.xsens import PROJECT
+from echostep_studies.simulation.devices.mtx_setup import MtxDevice
 from waiting import PATIENCE_S
+from xsens.mt_lines import on_a_terminal
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
 LEAST_BYTES = 12  # of a chunk on average: a message or two; single bytes took 10 s of a run of 25 s
@@ -37,7 +40,7 @@ def twin(folder: Path, *options: str) -> Iterator[tuple[str, str]]:
             running.wait(timeout=PATIENCE_S)
 
 
-@pytest.mark.filterwarnings("ignore:setDaemon:DeprecationWarning")  # in pyserial
+@pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # in pyserial
 @pytest.mark.parametrize("scheme", ["socket", "rfc2217"])
 def test_a_run_over_the_network_is_read_in_blocks_and_tracked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheme: str
@@ -62,8 +65,9 @@ def test_a_run_over_the_network_is_read_in_blocks_and_tracked(
 def test_a_wearer_who_stands_where_many_places_fit_is_named_in_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("echostep.xsens.configuration.setup.TIMEOUT_S", 10.0)  # the device shares this process
     interrupt_after(10, monkeypatch)
-    with twin(tmp_path, "--still") as (board, mtx):
+    with twin(tmp_path, "--still") as (board, _), on_a_terminal(MtxDevice(PROJECT)) as mtx:
         done = echostep(
             "live", "--plan", PLAN, "--board", board, "--mtx", mtx, "--headless", "--start", "?", "--out", tmp_path,
             "--seconds", PATIENCE_S,

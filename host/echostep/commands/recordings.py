@@ -24,9 +24,13 @@ Out = Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="The recor
 
 @app.command()
 def info(file: Recording) -> None:
-    """Show what a recording holds, and whether it is whole."""
+    """Show what a recording holds, and whether it is whole; of another file, what it is and which command reads it."""
+    from echostep.commands.actions.foreign import foreign
+    from echostep.errors import EchostepError
     from echostep.recording.repair import contents
 
+    if what := foreign(file):
+        raise EchostepError(f"{file}: no recording but {what}")
     say(*contents.info(file))
 
 

@@ -21,6 +21,7 @@ from echostep.errors import EchostepError
 
 LONGEST_LINE = 10_000  # characters: no line of numbers is longer
 EARLY_ROWS = 2000  # rows after which a file of garbage is given up
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # byte order marks [Unicode 2.13]: Excel's "Unicode text"
 SEPARATORS = ",;\t"
 MOST_BAD = 0.5  # share of rows without a number in a required column
 GREATEST = 1e19  # of any number: nanoseconds since 1970 have 19 digits
@@ -77,7 +78,9 @@ class CsvTable:
 def open_samples(path: Path | str, read: Callable[[TextIO], Result]) -> Result:
     """Result of `read` on the file; OSError and ValueError become an EchostepError that names the file."""
     try:
-        with Path(path).open(newline=None, encoding="utf-8-sig", errors="replace") as file:
+        with Path(path).open("rb") as begin:
+            encoding = "utf-16" if begin.read(2) in UTF_16 else "utf-8-sig"
+        with Path(path).open(newline=None, encoding=encoding, errors="replace") as file:
             return read(file)
     except OSError as error:
         raise EchostepError(f"{path}: cannot read the samples: {error.strerror}") from error

@@ -10,5 +10,5 @@ try:
 except ImportError:  # Windows has no termios
     _terminal_error = OSError  # type: ignore[misc, assignment]
 
-PORT_FAULTS = (serial.SerialException, OSError, ValueError, _terminal_error)
-"""ValueError: a setting or a URL that pyserial refuses."""
+PORT_FAULTS = (serial.SerialException, OSError, ValueError, NotImplementedError, _terminal_error)
+"""ValueError: a setting or a URL that pyserial refuses. NotImplementedError: a setting that a kind of URL lacks."""

@@ -205,8 +205,9 @@ def _open(url: str, baud: int) -> AnyPort:
             return UdpPort(url)
         if url.startswith("socket://"):
             return TcpPort(url, WRITE_TIMEOUT_S)
+        write_timeout_s = None if url.startswith("rfc2217://") else WRITE_TIMEOUT_S  # pyserial has a fixed one there
         return serial.serial_for_url(
-            url, baudrate=baud, timeout=READ_TIMEOUT_S, write_timeout=WRITE_TIMEOUT_S, exclusive=True
+            url, baudrate=baud, timeout=READ_TIMEOUT_S, write_timeout=write_timeout_s, exclusive=True
         )
     except PORT_FAULTS as error:
         if getattr(error, "errno", None) in (errno.EWOULDBLOCK, errno.EBUSY):

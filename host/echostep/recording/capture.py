@@ -61,7 +61,7 @@ def read_capture(path: Path | str, decoder: Decoder | None = None) -> Iterator[M
             recorded = file.read(len(MCAP_MAGIC)) == MCAP_MAGIC
     except OSError as error:
         raise EchostepError(f"{path}: cannot read the capture: {error.strerror}") from error
-    port = "" if recorded else _port_of(path)
+    port = "" if recorded else _port_that_sends(path)
     decoder.mt.formats.learn(FrameReader(LONGEST).feed(_head(_chunks(path, port)), ended=True))
     for name, received in _chunks(path, port):
         yield from decoder.feed(name, received)
@@ -91,16 +91,21 @@ def _head(chunks: Iterable[tuple[str, bytes]]) -> bytes:
     return bytes(head)
 
 
-def _port_of(path: Path) -> str:
-    """The port whose reader understands more bytes of the first blocks in which one is understood; raises EchostepError when none is."""
+def port_of_bytes(path: Path) -> str | None:
+    """The port whose reader understands more bytes of the first blocks in which one is understood; None when none is."""
     board, mt = BoardReader(), FrameReader(LONGEST)
     for received in _blocks(path):
         understood = {BOARD: BOARD_FRAME * len(board.feed(received)), MTX: _bytes_of_frames(mt, received)}
         if any(understood.values()):
             return max(understood, key=lambda port: understood[port])
-    if _bytes_of_frames(mt, b"", ended=True):
-        return MTX
-    raise EchostepError(f"{path}: neither board frames nor Xbus frames nor an MCAP recording")
+    return MTX if _bytes_of_frames(mt, b"", ended=True) else None
+
+
+def _port_that_sends(path: Path) -> str:
+    """The same; raises EchostepError for None."""
+    if (port := port_of_bytes(path)) is None:
+        raise EchostepError(f"{path}: neither board frames nor Xbus frames nor an MCAP recording")
+    return port
 
 
 def _bytes_of_frames(reader: FrameReader, received: bytes, *, ended: bool = False) -> int:

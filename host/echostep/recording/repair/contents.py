@@ -80,15 +80,19 @@ class Contents:
         """Count one message."""
         port = port_of(message.channel)
         if not port:
+            self._span(message.t_ns)
             self.derived[message.channel.topic] = self.derived.get(message.channel.topic, 0) + 1
             return
         self.out_of_order += message.t_ns < self.last_ns - BETWEEN_PORTS_NS
-        self.first_ns, self.last_ns = min(self.first_ns, message.t_ns), max(self.last_ns, message.t_ns)
+        self._span(message.t_ns)
         self.ports.setdefault(port, PortContents()).add(message)
         undecoded = self._undecoded.setdefault(port, bytearray())
         undecoded += message.body
         if len(undecoded) >= DECODED_AT_ONCE:
             self._decode(port, undecoded)
+
+    def _span(self, t_ns: int) -> None:
+        self.first_ns, self.last_ns = min(self.first_ns, t_ns), max(self.last_ns, t_ns)
 
     def finish(self) -> None:
         """Decode the remaining bytes; call it after the last `add`."""
@@ -172,6 +176,8 @@ def _port_lines(contents: Contents) -> list[str]:
     if FOOT in contents.ports:
         foot = contents.decoder.foot.counts
         lines.append(f"  foot board frames: {foot.good} good, {foot.rejected} bad, {foot.lost} lost")
+    if not contents.ports:
+        lines.append("  no bytes of a board or an MT: not a walk that echostep can replay; Foxglove and PlotJuggler show it")
     if contents.derived:
         lines.append("  derived: " + ", ".join(f"{name} {count}" for name, count in sorted(contents.derived.items())))
     return lines
