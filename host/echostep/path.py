@@ -129,7 +129,7 @@ class MeasuredSegment:
 
     `t_s`, `ranger` (0 looks left, 1 right) and `range_m` (NaN: no echo) are (n,). `height_m` (k,): heights by pressure in the same time.
     `ranger_part`: kind of ranger of the last ping, as the board has named it [protocol/messages.toml, part]; 0: not named, or no ping.
-    `board_restarts`: of the board before the last height, which may then be another barometer's.
+    `barometer_starts`: how often the heights have begun anew before these, by a restart of the board, which may be another one, or by a reset value.
     `ahead_rad`: how far both rangers look ahead of abeam.
     """
 
@@ -139,7 +139,7 @@ class MeasuredSegment:
     range_m: Floats
     height_m: Floats = field(default_factory=lambda: np.zeros(0))
     ranger_part: int = 0
-    board_restarts: int = 0
+    barometer_starts: int = 0
     ahead_rad: float = 0.0
 
     @property

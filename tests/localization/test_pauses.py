@@ -22,16 +22,16 @@ FIRST_M = 100.0  # height by pressure on the lowest floor
 SETTINGS = FilterSettings(CloudSettings(searching=5_000))  # the search is not what is judged here
 
 
-def standing(t0_s: float, height_m: float, board_restarts: int = 0) -> MeasuredSegment:
+def standing(t0_s: float, height_m: float, barometer_starts: int = 0) -> MeasuredSegment:
     """Half a second in the lift, with five heights by pressure."""
     path = PathSegment(t0_s, t0_s + 0.5, 0.0, 0.0, 0.0, 0.0, 0.001, 0.0, 0)
     heights_m = np.full(5, height_m)
     return MeasuredSegment(
-        path, np.zeros(0), np.zeros(0, np.int64), np.zeros(0), heights_m, board_restarts=board_restarts
+        path, np.zeros(0), np.zeros(0, np.int64), np.zeros(0), heights_m, barometer_starts=barometer_starts
     )
 
 
-def levels_after_ride(height_m: float, board_restarts: int) -> tuple[float, ...]:
+def levels_after_ride(height_m: float, barometer_starts: int) -> tuple[float, ...]:
     """Probability of each level after 3 s in the lift on the lowest floor, a pause, and 3 s at a height by pressure."""
     laid_out = lay_out_levels(tower(3))
     building = Building(laid_out.walls, laid_out.sheet)
@@ -40,7 +40,7 @@ def levels_after_ride(height_m: float, board_restarts: int) -> tuple[float, ...]
         tracked.update(standing(0.5 * k, FIRST_M))
     begin_s = 3.0 + PAUSE_S
     for k in range(6):
-        levels = tracked.update(standing(begin_s + 0.5 * k, height_m, board_restarts)).levels
+        levels = tracked.update(standing(begin_s + 0.5 * k, height_m, barometer_starts)).levels
     return levels
 
 

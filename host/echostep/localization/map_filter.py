@@ -94,7 +94,7 @@ class MapFilter:
         self._gaps = Gaps()
         self._way = RecentWay()  # since the last gap
         self._riding = RidingHeight(HEIGHT_SD_M)
-        self._board_restarts = 0  # before the last height by pressure
+        self._barometer_starts = 0  # before the last height by pressure
         self._met = MeetingMemory(self._pings.odometer)
         self.beacon_map = BeaconMap(building.walls, self._settings.beacons, rng)
         if start.after_pause:
@@ -208,10 +208,10 @@ class MapFilter:
         self.search = self._new_search(Start(near=near, air=air), walk_heading_rad)
 
     def _follow_barometer(self, measured: MeasuredSegment) -> None:
-        """Let the lag of the height by pressure drift over a pause; forget it after a restart of the board, which may be another board."""
-        anew = len(measured.height_m) > 0 and measured.board_restarts != self._board_restarts
+        """Let the lag of the height by pressure drift over a pause; forget it where the heights begin anew."""
+        anew = len(measured.height_m) > 0 and measured.barometer_starts != self._barometer_starts
         if anew:
-            self._board_restarts = measured.board_restarts
+            self._barometer_starts = measured.barometer_starts
         for each in self._clouds():
             if anew:
                 each.cloud.forget_lag()
@@ -219,6 +219,8 @@ class MapFilter:
                 each.cloud.let_lag_drift(self._gaps.pause_s)
         if anew:
             self._riding.forget()
+            if self._height is not None:
+                self._height.forget_lag()
         self._riding.add(measured.height_m, self._gaps.pause_s + measured.segment.t1_s - measured.segment.t0_s)
 
     def _scatter(self, segment: PathSegment, change: HeightChange) -> None:

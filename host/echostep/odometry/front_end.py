@@ -41,6 +41,7 @@ from echostep.foot.steps import Foot, FootEvents, FootSettings, Step
 from echostep.foot.trunk_path import GaitSettings, TrunkPath
 from echostep.legs.heading import CompassErrors
 from echostep.legs.trunk_path import GyroBlock, WearerSettings
+from echostep.odometry.barometer_start import BarometerStart
 from echostep.odometry.foot_legs_handover import FootLegsHandover
 from echostep.odometry.foot_source import ICM20649_NOISE, FootSamples, FootSource
 from echostep.odometry.gyro_blocks import GyroBlocks
@@ -69,6 +70,7 @@ class FrontEndCounts:
     bad_times: int = 0
     bad_arrivals: int = 0  # messages whose arrival time contradicts their counter; most keep their time by the counter
     clock_steps: int = 0  # of the host's clock
+    barometer_jumps: int = 0  # right after its start: the heights before them are not used
 
 
 class FrontEnd:
@@ -99,6 +101,7 @@ class FrontEnd:
         self._ranger = ranger
         self._ranger_parts = np.zeros((1, 2), np.int64)  # left, right, by the newest report
         self._gyro_blocks = GyroBlocks(gyro or GyroSettings(), errors.belt)
+        self._barometer = BarometerStart()
         self._synchronizer = Synchronizer(math.radians(ranger.ahead_deg))
         self._unknown_ports = 0
         self._bad_times = 0
@@ -119,6 +122,7 @@ class FrontEnd:
             self._bad_times,
             timeline.contradicted,
             timeline.clock_steps,
+            self._barometer.jumps,
         )
 
     def process(self, portion: Portion) -> list[MeasuredSegment | Dropout]:
@@ -205,8 +209,9 @@ class FrontEnd:
         height["t_s"] = times.board_s[height_row]
         height["value_m"] = heights(samples)
         height["source"] = BAROMETER
-        height["board_restarts"] = times.board_restarts[height_row]
         valid = ~np.isnan(height["t_s"]) & ~np.isnan(height["value_m"])
+        starts = self._barometer.starts(height["t_s"][valid], height["value_m"][valid], times.board_restarts[height_row[valid]])
+        height["barometer_starts"][valid] = starts
         frame_row = np.concatenate([ping_row[usable], height_row[valid]])
         order = np.argsort(frame_row, kind="stable")
         measurements = np.concatenate([pings[usable], height[valid]])[order]

@@ -30,7 +30,7 @@ class _Measurement(Protocol):
     value_m: float  # range of a ping, NaN without an echo, or height by pressure
     source: int  # ranger of a ping (0 looks left, 1 right), or BAROMETER
     ranger_part: int  # of a ping: kind of its ranger; 0: not named
-    board_restarts: int  # of a height: restarts of the board before it
+    barometer_starts: int  # of a height: how often the heights have begun anew before it
 
 
 MEASUREMENT = record_dtype(_Measurement)
@@ -161,17 +161,18 @@ def _pieces(
 
 
 def _measured(segment: PathSegment, measurements: Records, ahead_rad: float) -> MeasuredSegment:
-    """A segment with its pings, and apart from them the heights."""
+    """A segment with its pings, and apart from them the heights since the newest beginning of heights."""
     is_ping = measurements["source"] != BAROMETER
-    ranger_part, restarts = measurements["ranger_part"][is_ping], measurements["board_restarts"][~is_ping]
+    ranger_part, heights = measurements["ranger_part"][is_ping], measurements[~is_ping]
+    starts = int(heights["barometer_starts"][-1]) if len(heights) else 0
     return MeasuredSegment(
         segment,
         measurements["t_s"][is_ping],
         measurements["source"][is_ping],
         measurements["value_m"][is_ping],
-        measurements["value_m"][~is_ping],
+        heights["value_m"][heights["barometer_starts"] == starts],
         int(ranger_part[-1]) if len(ranger_part) else 0,
-        int(restarts[-1]) if len(restarts) else 0,
+        starts,
         ahead_rad,
     )
 

@@ -100,6 +100,7 @@ def skipped(recording: Recording, streams: StreamState) -> list[str]:
             f"{front_end.bad_arrivals} arrival times contradict the devices' counters and were not used",
         ),
         (front_end.clock_steps, f"the host's clock stepped or stood still {front_end.clock_steps} times"),
+        (front_end.barometer_jumps, "the barometer's first readings were not air pressure and were not used"),
         (front_end.bad_times, f"{front_end.bad_times} messages had impossible times and were dropped"),
         (front_end.unknown_ports, f"{front_end.unknown_ports} chunks came from unknown ports"),
         (streams.board.rejected, f"{streams.board.rejected} damaged frames of the board were dropped"),

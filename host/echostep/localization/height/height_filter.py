@@ -75,6 +75,10 @@ class RelativeHeight:
         self._state = np.zeros(2)
         self._covariance = np.diag([0.0, UNKNOWN_M**2])
 
+    def forget_lag(self) -> None:
+        """The heights by pressure begin anew: those to come may be another barometer's."""
+        self._covariance = np.diag([self._covariance[HEIGHT, HEIGHT], UNKNOWN_M**2])
+
     @property
     def height_m(self) -> float:
         """Above the start."""
