@@ -19,14 +19,12 @@ setup: $(READY) ## make .venv with the host package, its tests and its tools
 $(READY): host/pyproject.toml host/studies/pyproject.toml
 	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || tools/apt.sh python3-venv
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c host/tested-versions.txt -e 'host[dev]' -e 'host/studies[cluster]' || { \
-		echo "The package index lacks some tested version: installing the newest ones."; \
-		$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[dev]' -e 'host/studies[cluster]'; }
+	tools/setup.sh $(BIN)
 	touch $@
 
 firmware: ## build the firmware (firmware/build/echostep.elf and .hex) and put it into the host package
 	$(MAKE) -C firmware
-	cp firmware/build/echostep.hex $(SHIPPED)
+	cp firmware/build/echostep.hex firmware/build/echostep.hex.sha256 $(dir $(SHIPPED))
 
 twin: $(READY) ## play board and MTx on two pseudo terminals until Ctrl-C; STILL=1: a wearer who does what calibrate asks; KIT=2026: two boards
 	@tools/apt.sh $(APT_PACKAGES)
@@ -101,8 +99,9 @@ site: $(READY) ## the manual as a site with search in out/site (open out/site/in
 	$(BIN)/sphinx-build -q -n -W --keep-going -c tools/docs/manual -d out/site-cache . out/site
 	@echo "out/site/index.html"
 
-lock: $(READY) ## write the installed versions to host/tested-versions.txt, after the tests have passed
-	$(TOOL) release.tested_versions
+lock: $(READY) ## write the installed versions and their hashes to host/tested-versions.txt, after the tests have passed (needs the network)
+	@[ -x $(VENV)/lock/bin/uv ] || { $(PYTHON) -m venv $(VENV)/lock && $(VENV)/lock/bin/pip install --quiet --disable-pip-version-check uv; }
+	$(TOOL) release.tested_versions --uv $(VENV)/lock/bin/uv
 
 audit: $(READY) ## known faults of the tested versions (pip-audit; needs the network)
 	@[ -x $(VENV)/audit/bin/pip-audit ] || { $(PYTHON) -m venv $(VENV)/audit && $(VENV)/audit/bin/pip install --quiet --disable-pip-version-check pip-audit; }
@@ -132,6 +131,9 @@ soak: $(READY) ## eight simulated hours of the firmware through the live pipelin
 	$(MAKE) --quiet -C tools/twin
 	$(TOOL) reliability.soak $(if $(HOURS),--hours $(HOURS))
 
+calls: $(READY) ## each call of the operating system fails in turn, in each command that runs: output, files, ports, sockets; on from where it stopped
+	$(TOOL) reliability.calls.campaign
+
 kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording
 	$(TOOL) reliability.kill_recorder
 
@@ -152,4 +154,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: operation help setup firmware twin demo real quick test suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak kill flips hardware docs site licences lock audit flash clean
+.PHONY: operation help setup firmware twin demo real quick test suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak calls kill flips hardware docs site licences lock audit flash clean

@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
 import re
+import shutil
 import subprocess
 import termios
 import threading
@@ -217,3 +219,27 @@ def test_the_shipped_firmware_belongs_to_this_host() -> None:
 def test_a_line_of_avrdude_that_goes_on_is_passed_on_whole() -> None:
     said = "Connecting to programmer: .\navrdude: error: butterfly programmer uses avr_write_page() but does not provide\n         a cmd() method.\n"
     assert _error_line(said) == "error: butterfly programmer uses avr_write_page() but does not provide a cmd() method."
+
+
+def test_the_shipped_firmware_has_its_digest_beside_it(tmp_path: Path) -> None:
+    assert check_digest(SHIPPED) == hashlib.sha256(SHIPPED.read_bytes()).hexdigest()
+    assert SHIPPED.with_name("echostep.hex.sha256").exists()
+    own = tmp_path / "own.hex"
+    shutil.copy(SHIPPED, own)
+    assert check_digest(own) == check_digest(SHIPPED)  # nothing beside it says otherwise
+
+
+@pytest.mark.process
+def test_firmware_with_another_digest_is_not_written(tmp_path: Path) -> None:
+    """Altered, and still valid Intel HEX: by `echostep flash` and by `make flash`."""
+    altered, (path, log) = tmp_path / "echostep.hex", fake_avrdude(tmp_path, GOOD)
+    shutil.copy(SHIPPED.with_name("echostep.hex.sha256"), tmp_path)
+    altered.write_text(SHIPPED.read_text().lower())
+    assert check_hex(altered) == check_hex(SHIPPED)
+    with pseudo_terminal() as (_, port):
+        ours = flash("--port", port, "--hex", altered, path=path)
+        makes = make_flash(port, path, altered)
+    for done in (ours, makes):
+        assert done.returncode == 2
+        assert "its SHA-256 is" in done.stderr
+    assert not log.exists()

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""The versions of all packages with which the tests have passed (`make lock`), as constraints for pip.
+"""The versions of all packages with which the tests have passed (`make lock`), with the hashes of their files, as requirements for pip.
 
-In: the installed packages. Out: host/tested-versions.txt. Owns that file. `make setup` installs these versions where the package index has them;
-`make audit` looks for known faults of them.
+In: the installed packages; the package index, which uv asks for the hashes. Out: host/tested-versions.txt. Owns that file. `make setup` installs
+these versions where the package index has them; `make audit` looks for known faults of them.
 """
 
 from __future__ import annotations
 
 import argparse
+import platform
+import subprocess
 import sys
 
 from packaging.utils import canonicalize_name
@@ -16,20 +18,32 @@ from places import ROOT
 from release.licences import for_developers
 
 FILE = ROOT / "host/tested-versions.txt"
-HEAD = "# The versions with which the tests have passed. Made by make lock; make setup installs them, make audit checks them.\n"
+HEAD = (
+    "# Versions with which the tests have passed, and the hashes of their files: "
+    "written by make lock, installed by make setup, checked by make audit.\n"
+)
 
 
-def text() -> str:
+def versions() -> str:
     """A line for each package that echostep and its tests need."""
     packages = for_developers().items()
-    return HEAD + "".join(f"{canonicalize_name(name)}=={package.version}\n" for name, package in packages)
+    return "".join(f"{canonicalize_name(name)}=={package.version}\n" for name, package in packages)
+
+
+def with_hashes(lines: str, uv: str) -> str:
+    """The same lines, each followed by the hashes of all files of that version, whatever system and Python they are for."""
+    options = ("--quiet", "--no-deps", "--generate-hashes", "--no-header", "--no-annotate", "--python-version")
+    command = [uv, "pip", "compile", *options, platform.python_version(), "-"]
+    return subprocess.run(command, input=lines, capture_output=True, text=True, check=True).stdout
 
 
 def main() -> int:
     """Write the file."""
-    argparse.ArgumentParser(description=__doc__.partition("\n")[0]).parse_args()
-    FILE.write_text(text())
-    print(f"{FILE}: {len(text().splitlines()) - 1} packages")
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--uv", default="uv", help="the program that asks the package index (default uv)")
+    lines = versions()
+    FILE.write_text(HEAD + with_hashes(lines, parser.parse_args().uv))
+    print(f"{FILE}: {len(lines.splitlines())} packages")
     return 0
 
 

@@ -7,6 +7,7 @@ In: the host package. Out: one line per stage with its time; exit status 1 when 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import os
 import subprocess
 import sys
@@ -88,6 +89,7 @@ def main() -> int:
         try:
             wheel = build(folder)
             print_stage(f"{wheel.name}, {wheel.stat().st_size / 1024:.0f} KB")
+            print_stage(f"SHA-256 {hashlib.sha256(wheel.read_bytes()).hexdigest()}")
             programs = environment(folder / "fresh", wheel, borrow=False)
             size = sum(f.stat().st_size for f in (folder / "fresh").rglob("*") if f.is_file())
             print_stage(f"installed without compiler; {size / 1e6:.0f} MB with all dependencies")

@@ -7,6 +7,7 @@ Owns the process of avrdude, which implements the bootloader's protocol (avr109)
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import select
@@ -47,11 +48,11 @@ def flash(port: str | None, hex_file: Path | None, console: Console) -> None:
     if avrdude is None:
         raise EchostepError("avrdude is not installed: sudo apt install avrdude (macOS: brew install avrdude)")
     with _hex(hex_file) as path:
-        size = check_hex(path)
+        size, digest = check_hex(path), check_digest(path)
         board_port = port or _find_board()
         for finding in access_findings("board", board_port):
             raise EchostepError(str(finding))
-        console.print(f"{path.name}, {size} bytes, to {board_port}")
+        console.print(f"{path.name}, {size} bytes, SHA-256 {digest}, to {board_port}", highlight=False)
         bootloader = enter_bootloader(board_port)
         console.print(f"bootloader at {bootloader}")
         write(avrdude, bootloader, path)
@@ -89,6 +90,17 @@ def check_hex(path: Path) -> int:
     if not ended or size == 0:
         raise EchostepError(f"{path}: {'ends too early' if not ended else 'holds no program'}; build it: make firmware")
     return size
+
+
+def check_digest(path: Path) -> str:
+    """SHA-256 of a file; raises EchostepError when it is not the one that the build has written beside it, where there is one."""
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    beside = path.with_name(f"{path.name}.sha256")
+    if beside.exists() and (expected := beside.read_text(errors="replace").partition(" ")[0].strip()) != digest:
+        raise EchostepError(
+            f"{path}: its SHA-256 is {digest}, and {beside.name} says {expected[:64]}: build it anew: make firmware"
+        )
+    return digest
 
 
 def _find_board() -> str:
