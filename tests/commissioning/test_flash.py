@@ -22,7 +22,7 @@ from board_runs import ELF, ROOT
 from command_line import echostep
 from echostep.board import messages as m
 from echostep.board.frames import encode
-from echostep.commissioning.flash import _error_line, check_hex
+from echostep.commissioning.flash import _error_line, check_digest, check_hex
 from echostep.errors import EchostepError
 from players import pseudo_terminal
 from waiting import PATIENCE_S
