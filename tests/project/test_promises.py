@@ -16,7 +16,8 @@ from board_runs import ROOT
 TABLES = {
     "host/docs/recordings.md": "What is promised",
 }
-NAMED = re.compile(r"`([\w/]+\.py)::(\w+)`")  # a test, its file from tests/ on
+SECURITY = "host/SECURITY.md"  # several tables, whose last column names the test; what is not defended has none
+NAMED = re.compile(r"`(?:tests/)?([\w/]+\.py)::(\w+)`")  # a test, its file from tests/ on
 
 
 @cache
@@ -43,7 +44,14 @@ def test_each_promise_names_its_tests(page: str) -> None:
     assert not [promise for promise, shown_by in rows if not NAMED.search(shown_by)]
 
 
-@pytest.mark.parametrize("page", TABLES)
+def test_each_promise_of_security_names_its_test() -> None:
+    promised = (ROOT / SECURITY).read_text().partition("## Not defended")[0]
+    rows = [line for line in promised.splitlines() if line.startswith("| ") and not line.endswith("| test |")]
+    assert len(rows) > 30
+    assert not [row for row in rows if not NAMED.search(row.rsplit(" | ", 1)[1])]
+
+
+@pytest.mark.parametrize("page", [*TABLES, SECURITY])
 def test_the_named_tests_exist(page: str) -> None:
     for file, name in NAMED.findall((ROOT / page).read_text()):
         path = ROOT / "tests" / file

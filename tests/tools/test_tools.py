@@ -35,6 +35,7 @@ STARTED_BY = {
     "release.wheel": "tools/test_wheel.py",
     "reliability.faults": HERE,
     "reliability.flip_recording": HERE,
+    "reliability.calls.campaign": "tools/test_calls.py",
     "reliability.fuzz.codec": HERE,
     "reliability.fuzz.host": HERE,
     "reliability.fuzz.mtx": HERE,

@@ -67,10 +67,20 @@ def test_a_fault_reaches_the_log_once_and_every_page_in_words(monkeypatch: pytes
         assert len(server.shared.faults.notices) == 1
         assert "ZeroDivisionError" in server.shared.faults.notices[0]
         assert "test_page_wire.py, line" in server.shared.faults.notices[0]
+        assert server.shared.faults.notices[0].endswith("the run goes on, and so does the page.")
         monkeypatch.undo()
         mailbox.publish(scene())
         with opened(server) as page:
             assert json.loads(page.recv(timeout=PATIENCE_S))["kind"] == "hello"
+
+
+def test_the_end_of_the_servers_thread_is_told_and_no_traceback() -> None:
+    with served() as (server, _):
+        server._server.run = broken  # type: ignore[method-assign]
+        server._serve()
+        (notice,) = server.shared.faults.notices
+    assert notice.startswith("The page is no longer served: ZeroDivisionError: division by zero")
+    assert notice.endswith("The run goes on without it.")
 
 
 def broken(*_: object, **__: object) -> None:
