@@ -90,7 +90,7 @@ def test_a_name_in_a_plan_that_no_file_can_hold_is_named(letter: str, where: str
     tree = json.loads(DEMO.read_text())
     owner = {"plan": tree, "level": tree["levels"][0], "room": tree["levels"][0]["rooms"][0]}[where]
     owner["name"] = f"a{letter}b"
-    with pytest.raises(ValueError, match="name: .* is not a text without control characters"):
+    with pytest.raises(ValueError, match=r"name: .* is not a text without control characters"):
         parse_plan(json.dumps(tree).encode())
 
 

@@ -32,7 +32,7 @@ SETTINGS = FilterSettings(CloudSettings(searching=5_000))  # the search is not w
 def starts(heights_m: list[float], restarts: list[int] | None = None) -> list[int]:
     """Of readings ten times a second, in two portions."""
     start, half = BarometerStart(), len(heights_m) // 2
-    t_s, counted = 0.1 * np.arange(len(heights_m)), np.array(restarts or [0] * len(heights_m))
+    t_s, counted = np.asarray(0.1 * np.arange(len(heights_m)), np.float64), np.array(restarts or [0] * len(heights_m))
     parts = (slice(0, half), slice(half, None))
     return [k for part in parts for k in start.starts(t_s[part], np.array(heights_m)[part], counted[part]).tolist()]
 
@@ -66,7 +66,11 @@ def test_the_front_end_counts_it_and_says_so() -> None:
 
 def test_a_segment_has_the_heights_since_the_newest_beginning() -> None:
     readings = np.zeros(4, MEASUREMENT)
-    readings["source"], readings["value_m"], readings["barometer_starts"] = BAROMETER, [RESET_M, RESET_M, 3.0, 3.1], [0, 0, 1, 1]
+    readings["source"], readings["value_m"], readings["barometer_starts"] = (
+        BAROMETER,
+        [RESET_M, RESET_M, 3.0, 3.1],
+        [0, 0, 1, 1],
+    )
     segment = PathSegment(0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.001, 0.0, 0)
     measured = _measured(segment, readings, 0.0)
     assert (measured.height_m.tolist(), measured.barometer_starts) == ([3.0, 3.1], 1)
@@ -78,7 +82,9 @@ def test_a_ride_is_seen_although_the_first_readings_were_wrong() -> None:
     building = Building(laid_out.walls, laid_out.sheet)
     tracked = MapFilter(building, Start(Pose(*LIFT_AT, 0.0, 0), 0.05), 0.0, np.random.default_rng(1), SETTINGS)
     ride_m = np.linspace(0.0, 2.0 * STOREY_M, 14).tolist()
-    for k, height_m in enumerate([RESET_M, *[100.0] * 12, *(100.0 + np.array(ride_m)).tolist(), *[100.0 + 2.0 * STOREY_M] * 12]):
+    for k, height_m in enumerate(
+        [RESET_M, *[100.0] * 12, *(100.0 + np.array(ride_m)).tolist(), *[100.0 + 2.0 * STOREY_M] * 12]
+    ):
         path = PathSegment(0.5 * k, 0.5 * k + 0.5, 0.0, 0.0, 0.0, 0.0, 0.001, 0.0, 0)
         none, five = np.zeros(0), np.full(5, height_m)
         measured = MeasuredSegment(path, none, np.zeros(0, np.int64), none, five, barometer_starts=int(k > 0))

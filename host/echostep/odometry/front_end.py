@@ -210,7 +210,9 @@ class FrontEnd:
         height["value_m"] = heights(samples)
         height["source"] = BAROMETER
         valid = ~np.isnan(height["t_s"]) & ~np.isnan(height["value_m"])
-        starts = self._barometer.starts(height["t_s"][valid], height["value_m"][valid], times.board_restarts[height_row[valid]])
+        starts = self._barometer.starts(
+            height["t_s"][valid], height["value_m"][valid], times.board_restarts[height_row[valid]]
+        )
         height["barometer_starts"][valid] = starts
         frame_row = np.concatenate([ping_row[usable], height_row[valid]])
         order = np.argsort(frame_row, kind="stable")

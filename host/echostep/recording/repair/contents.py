@@ -177,7 +177,9 @@ def _port_lines(contents: Contents) -> list[str]:
         foot = contents.decoder.foot.counts
         lines.append(f"  foot board frames: {foot.good} good, {foot.rejected} bad, {foot.lost} lost")
     if not contents.ports:
-        lines.append("  no bytes of a board or an MT: not a walk that echostep can replay; Foxglove and PlotJuggler show it")
+        lines.append(
+            "  no bytes of a board or an MT: not a walk that echostep can replay; Foxglove and PlotJuggler show it"
+        )
     if contents.derived:
         lines.append("  derived: " + ", ".join(f"{name} {count}" for name, count in sorted(contents.derived.items())))
     return lines
