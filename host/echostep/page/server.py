@@ -46,7 +46,7 @@ PORT = 8420
 MOST_PAGES = 32  # open at the same time; further ones are refused
 TRY_AGAIN_LATER = 1013  # WebSocket close code [IANA]
 STOP_S = 5.0  # time for the thread to end
-BACKLOG = 64  # connections that wait to be accepted
+BACKLOG = 320  # connections that wait to be accepted: as many as are accepted at once
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,6 +79,14 @@ def test_connections_faster_than_the_budget_wait(monkeypatch: pytest.MonkeyPatch
         assert server.connections.closed == 0
 
 
+def test_forty_pages_that_open_at_once_wait_for_no_budget(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each for what it needs to be drawn; what is beyond the budget would wait for a quarter of an hour."""
+    monkeypatch.setattr(connections, "ACCEPTS_A_SECOND", 0.001)
+    with served() as (server, _):
+        for part in ("", "static/main.js", "walls/0", "static/theme.js"):
+            assert all(fetched(f"{server.url}{part}").status == 200 for _ in range(40))
+
+
 def test_the_libraries_log_lines_have_a_budget(capsys: pytest.CaptureFixture[str]) -> None:
     with served() as (server, _):
         for k in range(1000):
