@@ -47,6 +47,12 @@ def pytest_configure(config: pytest.Config) -> None:
         config.cache.set(COMPILED, state)
 
 
+@pytest.fixture(autouse=True)
+def _computer_of_one_user(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever accounts this computer has: they would put a token into the addresses of pages."""
+    monkeypatch.setattr("echostep.page.web.users.has_other_users", lambda: False)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Marks by rule."""
     for item in items:

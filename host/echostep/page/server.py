@@ -32,12 +32,12 @@ from echostep.page.mailbox import Mailbox
 from echostep.page.requests import MOST_REQUEST
 from echostep.page.session import PageSession
 from echostep.page.shared import PageCounts, Shared
+from echostep.page.web import users
 from echostep.page.web.access import LOOPBACK, AccessControl
 from echostep.page.web.connections import Connections
 from echostep.page.web.faults import Faults
 from echostep.page.web.gated_server import GatedServer
 from echostep.page.web.log_budget import logged_to
-from echostep.page.web.users import has_other_users
 from echostep.plan.model import Plan
 
 STATIC = Path(__file__).parent / "static"
@@ -90,7 +90,7 @@ class SocketServer(Generic[S]):
         self.sessions: set[S] = set()
         self._site = site
         self._listener = open_listener(address)
-        token = None if address.host in LOOPBACK and not has_other_users() else secrets.token_urlsafe(16)
+        token = None if address.host in LOOPBACK and not users.has_other_users() else secrets.token_urlsafe(16)
         self.url = _url(self._listener, token)
         self.connections = Connections(self._listener)
         self.access_control = AccessControl(self._application(token), token, self.connections, site.faults.tell)

@@ -83,7 +83,7 @@ def test_forty_pages_that_open_at_once_wait_for_no_budget(monkeypatch: pytest.Mo
     """Each for what it needs to be drawn; what is beyond the budget would wait for a quarter of an hour."""
     monkeypatch.setattr(connections, "ACCEPTS_A_SECOND", 0.001)
     with served() as (server, _):
-        for part in ("", "static/main.js", "walls/0", "static/theme.js"):
+        for part in ("", "static/main.js", "lines/0", "static/theme.js"):
             assert all(fetched(f"{server.url}{part}").status == 200 for _ in range(40))
 
 

@@ -9,6 +9,7 @@ import pwd
 import pytest
 
 from echostep.page.web import users
+from echostep.page.web.users import has_other_users
 from page.frames import fetched, served
 
 
@@ -28,12 +29,12 @@ def test_a_person_with_a_shell_is_another_user(
     monkeypatch.setattr(
         pwd, "getpwall", lambda: [account("root", 0, "/bin/sh"), account("one", 1234 if uid < 0 else uid, shell)]
     )
-    assert users.has_other_users() == counts
+    assert has_other_users() == counts
 
 
 @pytest.mark.parametrize("several", [True, False])
 def test_a_computer_of_several_users_asks_for_the_token(monkeypatch: pytest.MonkeyPatch, several: bool) -> None:
-    monkeypatch.setattr("echostep.page.server.has_other_users", lambda: several)
+    monkeypatch.setattr(users, "has_other_users", lambda: several)
     with served() as (server, _):
         assert server.url.startswith("http://127.0.0.1:")
         assert (server.url.count("/") == 4) == several
