@@ -137,8 +137,9 @@ calls: $(READY) ## each call of the operating system fails in turn, in each comm
 kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording
 	$(TOOL) reliability.kill_recorder
 
-flips: $(READY) ## flip 314 random bits of a recording, one at a time: what becomes of the track, and what the replay says
+flips: $(READY) ## flip 314 random bits of a recording, one at a time, and damage 108 blocks: what becomes of the track, and what the replay says
 	$(TOOL) reliability.flip_recording
+	$(TOOL) reliability.damaged_blocks
 
 hardware: $(READY) ## checks the nets of the wiring; the printed boxes: STL in out/hardware, checked to be closed, and their pictures; not built yet
 	@tools/apt.sh openscad || echo "OpenSCAD is not installed, and this user may not install it."

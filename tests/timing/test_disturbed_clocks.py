@@ -189,3 +189,14 @@ def test_messages_that_stand_twice_in_a_recording_move_no_time(block_s: float, w
     expected = times_of(Timeline(MtxTiming()), messages)
     assert np.abs(np.delete(found, np.s_[4000 : 4000 + len(again)]) - expected).max() < 2e-3
     assert (timeline.board_restarts, timeline.clock_steps) == (0, 0)
+
+
+@pytest.mark.parametrize("arrival_ns", [1 << 62, 1 << 58, 1 << 53])
+def test_one_impossible_arrival_beside_a_counter_that_jumps_moves_no_time(arrival_ns: int) -> None:
+    """Of a block from elsewhere: so late that whole wraps of the counter, at the rate of some crystal, would reach any arrival."""
+    timeline = Timeline(MtxTiming())
+    messages = [m for t in moments(0.0, 40.0) for m in both(t, 50.0 + t)]
+    found = times_of(timeline, [*messages[:4000], (BOARD, ticks(31.0), arrival_ns, PLAIN), *messages[4000:]])
+    assert np.isnan(found[4000])
+    expected = times_of(Timeline(MtxTiming()), messages)
+    assert np.abs(np.delete(found, 4000) - expected).max() < 2e-3

@@ -33,6 +33,7 @@ STARTED_BY = {
     "release.same_bits": HERE,
     "release.tested_versions": HERE,
     "release.wheel": "tools/test_wheel.py",
+    "reliability.damaged_blocks": "recording/test_flips.py",
     "reliability.faults": HERE,
     "reliability.flip_recording": HERE,
     "reliability.calls.campaign": "tools/test_calls.py",

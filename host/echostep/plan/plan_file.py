@@ -20,14 +20,9 @@ Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M, description=f"a finite n
 Deviation = Annotated[float, Meta(ge=0.0, le=LIMIT_M, description=f"a finite number from 0 to {LIMIT_M:.0f} m")]
 Longitude = Annotated[float, Meta(ge=-180.0, le=180.0, description="a finite number within 180 degrees east")]
 Latitude = Annotated[float, Meta(ge=-90.0, le=90.0, description="a finite number within 90 degrees north")]
-# A text that can be written as UTF-8 and as XML: without lone surrogates and control characters but tab and line ends [XML 1.0, 2.2]
-Text = Annotated[
-    str,
-    Meta(
-        pattern=r"^[^\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]*$",
-        description="a text without control characters",
-    ),
-]
+# What UTF-8 and XML cannot hold: lone surrogates, and control characters but tab and line ends [XML 1.0, 2.2]
+UNWRITABLE = r"\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff"
+Text = Annotated[str, Meta(pattern=rf"^[^{UNWRITABLE}]*$", description="a text without control characters")]
 Reference = Annotated[Text | int, Meta(description="the name or the index of a level")]
 Point = Annotated[tuple[Metres, Metres], Meta(description="[x, y] in metres")]
 Outline = Annotated[list[Point], Meta(description="a list of corners, [x, y] in metres")]

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
 from echostep.errors import EchostepError
 from echostep.plan.model import FORMAT_VERSION, Connector, Door, Georeference, Level, Plan, Pose, Question, Room
+from echostep.plan.plan_file import UNWRITABLE
 
 
 def save_plan(plan: Plan, path: Path | str) -> None:
@@ -25,7 +27,7 @@ def save_plan(plan: Plan, path: Path | str) -> None:
 
 def plan_json(plan: Plan) -> str:
     """The text of plan.json."""
-    tree: dict[str, Any] = {"echostep_plan": FORMAT_VERSION, "name": plan.name}
+    tree: dict[str, Any] = {"echostep_plan": FORMAT_VERSION, "name": _text(plan.name)}
     if plan.uncertainty_m is not None:
         tree["uncertainty_m"] = plan.uncertainty_m
     if plan.georeference is not None:
@@ -38,8 +40,13 @@ def plan_json(plan: Plan) -> str:
     return _lines(tree) + "\n"
 
 
+def _text(name: str) -> str:
+    """A name as a plan can hold it; those of an imported file may have any letters."""
+    return re.sub(f"[{UNWRITABLE}]", " ", name)
+
+
 def _level(level: Level) -> dict[str, Any]:
-    tree: dict[str, Any] = {"name": level.name, "height_m": level.height_m, "walls": level.walls.tolist()}
+    tree: dict[str, Any] = {"name": _text(level.name), "height_m": level.height_m, "walls": level.walls.tolist()}
     if len(level.windows):
         tree["windows"] = level.windows.tolist()
     if len(level.doubtful):
@@ -54,18 +61,18 @@ def _level(level: Level) -> dict[str, Any]:
 
 
 def _door(door: Door) -> dict[str, Any]:
-    return {"line": list(door.line), "state": door.state} | ({"name": door.name} if door.name else {})
+    return {"line": list(door.line), "state": door.state} | ({"name": _text(door.name)} if door.name else {})
 
 
 def _question(question: Question) -> dict[str, Any]:
     lines = [list(line) for line in question.lines_m]
     return {
-        "text": question.text, "about": question.about, "at": list(question.at_m), "lines": lines, "proposed": question.is_proposed,
+        "text": _text(question.text), "about": question.about, "at": list(question.at_m), "lines": lines, "proposed": question.is_proposed,
     }  # fmt: skip
 
 
 def _room(room: Room) -> dict[str, Any]:
-    return {"name": room.name, "at": list(room.at_m)} | (
+    return {"name": _text(room.name), "at": list(room.at_m)} | (
         {} if room.outline_m is None else {"outline": room.outline_m.tolist()}
     )
 
@@ -73,7 +80,7 @@ def _room(room: Room) -> dict[str, Any]:
 def _connector(connector: Connector) -> dict[str, Any]:
     return {
         "kind": connector.kind,
-        "name": connector.name,
+        "name": _text(connector.name),
         "levels": list(connector.levels),
         "outline": connector.outline_m.tolist(),
     }

@@ -29,6 +29,7 @@ AHEAD_S = 1.0  # a counter further ahead of its arrival contradicts it; the arri
 BEHIND_S = 1.0  # greatest age of a message relative to the newest one: a ping is sent after its ranging
 SMOOTH_S = 1.0  # a counter that is at most this far from the newest goes on from it
 RATE_ERROR = 400e-6  # s/s, greatest difference of two crystals over a gap
+MOST_OF_A_WRAP = 0.125  # of the tolerance: beyond it, after a week, any arrival would agree with some number of wraps
 BACKLOG_S = 1.0  # late arrivals of a counter that goes on are believed after so long: a process that was stopped reads its backlog in less
 
 
@@ -91,11 +92,16 @@ def _elapsed_s(clock: DeviceClock, t_arrival_ns: int) -> float:
 
 @kernel
 def _agrees(clock: DeviceClock, delta: int, late_s: float, wraps: int) -> bool:
-    """Whether an arrival is about where a counter `delta` counts from the newest one puts it; whole wraps of one that goes on need confirmation."""
+    """Whether an arrival is about where a counter `delta` counts from the newest one puts it.
+
+    Whole wraps need confirmation where the counter goes on, and where they are so many that any arrival would agree.
+    """
     if wraps > 0 and delta * clock.unit_s <= SMOOTH_S:
         return False
-    limit_s = AHEAD_S + RATE_ERROR * abs(late_s + delta * clock.unit_s)
-    return abs(late_s - wraps * clock.modulus * clock.unit_s) <= limit_s
+    limit_s, wrap_s = AHEAD_S + RATE_ERROR * abs(late_s + delta * clock.unit_s), clock.modulus * clock.unit_s
+    if wraps > 0 and limit_s > MOST_OF_A_WRAP * wrap_s:
+        return False
+    return abs(late_s - wraps * wrap_s) <= limit_s
 
 
 @kernel
