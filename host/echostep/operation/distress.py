@@ -100,12 +100,14 @@ def _away_m(plan: Plan, a: Position, b: Position | None) -> float:
 
 
 def _away_words(a: Position, b: Position | None) -> str:
-    """How far away a wearer is: "12 m, 1 floor below"."""
+    """How far away a wearer is: "12 m", on another floor "1 floor below, 12 m aside"."""
     if b is None:
         return ""
     floors = b.floor - a.floor
-    climb = f", {abs(floors)} floor{'s' * (abs(floors) > 1)} {'above' if floors > 0 else 'below'}" if floors else ""
-    return f"{metres(math.hypot(a.x_m - b.x_m, a.y_m - b.y_m))}{climb}"
+    aside = metres(math.hypot(a.x_m - b.x_m, a.y_m - b.y_m))
+    if not floors:
+        return aside
+    return f"{abs(floors)} floor{'s' * (abs(floors) > 1)} {'above' if floors > 0 else 'below'}, {aside} aside"
 
 
 def _sent_words(m: Member, o: Member, board: MarkBoard) -> str:
