@@ -159,7 +159,12 @@ def test_a_commander_answers_a_mayday(browser: Any, name: str, tmp_path: Path) -
     team, last = team_on(spot), len(spot.plan.levels) - 1
     sent: list[tuple[str, bytes]] = []
     with ServedTeam(team) as served:
-        served.page.feed.send = lambda topic, payload: not sent.append((topic, payload))
+
+        def send(topic: str, payload: bytes) -> bool:
+            sent.append((topic, payload))
+            return True
+
+        served.page.feed.send = send
 
         def arrives() -> None:
             """What the broker distributes."""
