@@ -44,11 +44,11 @@ def test_the_command_serves_what_a_tracker_reports(tmp_path: Path) -> None:
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "PYTHONUNBUFFERED": "1"}
         running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
         assert running.stderr
-        found = re.search(r"http://127\.0\.0\.1:\d+/", running.stderr.readline())
+        found = re.search(r"(http://127\.0\.0\.1:\d+)/\S*", running.stderr.readline())
         assert found
         box = box_to(broker.url)
         box.offer(report("anna", position=replace(POSITION, protection_m=0.4)))
-        with connect(socket_of(found[0]), origin=Origin(found[0].rstrip("/"))) as page:
+        with connect(socket_of(found[0]), origin=Origin(found[1])) as page:
             hello = json.loads(page.recv(PATIENCE_S))
             assert (hello["kind"], hello["plan"]["name"]) == ("hello", "Demo office")
 
