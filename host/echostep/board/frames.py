@@ -151,6 +151,11 @@ class BoardReader:
         """Counts since the start."""
         return FrameCounts(*self._tally[:_SEQUENCE].tolist())
 
+    @property
+    def pending(self) -> int:
+        """Bytes of the unfinished frame."""
+        return len(self._rest)
+
     def feed(self, received: bytes) -> list[Message]:
         """Messages completed by these bytes; raises StaleFirmwareError when the board has another schema."""
         return self.frames(received).messages()

@@ -89,19 +89,20 @@ def open_samples(path: Path | str, read: Callable[[TextIO], Result]) -> Result:
 
 
 def read_rows(
-    lines: Iterator[str], separator: str, columns: Sequence[int], required: int, limits: CsvLimits
+    lines: Iterator[str], header: tuple[list[str], str], columns: Sequence[int], required: int, limits: CsvLimits
 ) -> CsvTable:
     """Rows of the lines after the header; empty lines are skipped. `columns`: index of each wanted column, -1 for one that the file lacks.
 
-    With `limits.early_rows`, raises ValueError when fewer than two rows exist, or when most of them lack a number in one of the first `required`
+    A row with more cells than the header has names counts as one without numbers: a decimal comma between commas moves all cells behind it. With `limits.early_rows`, raises ValueError when fewer than two rows exist, or when most of them lack a number in one of the first `required`
     columns.
     """
-    values, numbers, bad = array("d"), array("q"), 0
+    (names, separator), values, numbers, bad = header, array("d"), array("q"), 0
     for number, line in enumerate(lines, start=2):
         if not line.strip():
             continue
         cells = (line.replace(",", ".") if separator == ";" else line).split(separator)
-        row = [number_of(cells[k]) if 0 <= k < len(cells) else math.nan for k in columns]
+        fits = not any(map(str.strip, cells[len(names) :]))
+        row = [number_of(cells[k]) if fits and 0 <= k < len(cells) else math.nan for k in columns]
         values.extend(row)
         numbers.append(number)
         bad += not all(map(math.isfinite, row[:required]))
@@ -117,7 +118,9 @@ def _check_share(rows: int, bad: int) -> None:
     if rows < 2:
         raise ValueError("no samples")
     if bad > MOST_BAD * rows:
-        raise ValueError(f"{100 * bad / rows:.0f} % of the first {rows} rows have no number in some column")
+        raise ValueError(
+            f"{100 * bad / rows:.0f} % of the first {rows} rows have no number in some column, or more cells than the first line has names"
+        )
 
 
 def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, too_fast: str) -> str:

@@ -52,16 +52,19 @@ def load_imu(path: Path | str) -> Imu:
 
 def _mended_table(file: TextIO) -> tuple[Floats, tuple[str, ...]]:
     """Usable rows (n, 7) or (n, 10) in order of time, and notes on what was mended; raises ValueError for samples that cannot be used."""
-    table, holes = whole_rows(_table(lines_of(file, CsvLimits())))
+    table, left_out = _table(lines_of(file, CsvLimits()))
+    table, holes = whole_rows(table)
+    if empty := int(np.isnan(table[:, len(COLUMNS) :]).any(axis=1).sum()):
+        left_out = (f"{empty} rows without a number of the magnetometer: used without it",)
     table, mended = sorted_by_time(table)
     table[:, 0], spreading = spread(table[:, 0])
     if wrong := complaint(table, COLUMNS):
         raise ValueError(wrong)
-    return table, (*holes, *mended, *spreading)
+    return table, (*holes, *left_out, *mended, *spreading)
 
 
-def _table(lines: Iterator[str]) -> Floats:
-    """The columns (n, 7), or (n, 10) with a magnetometer."""
+def _table(lines: Iterator[str]) -> tuple[Floats, tuple[str, ...]]:
+    """The columns (n, 7), or (n, 10) with a magnetometer, and a note on one that is not whole."""
     header, separator = header_of(next(lines, ""))
     if missing := [name for name in COLUMNS if name not in header]:
         hint = ": the first line must name the columns" if all(map(math.isfinite, map(number_of, header))) else ""

@@ -95,7 +95,7 @@ def _mended_table(file: TextIO, prefix: str) -> tuple[Floats, tuple[str, ...]]:
     table[:, TIME], spreading = spread(table[:, TIME])
     if wrong := complaint(table):
         raise ValueError(wrong)
-    return table, (*holes, *mended, *spreading, *mounted)
+    return table, (*holes, *_empty_cells(table), *mended, *spreading, *mounted)
 
 
 def _table(file: TextIO, prefix: str) -> tuple[Floats, tuple[str, ...]]:
@@ -128,6 +128,16 @@ def _table(file: TextIO, prefix: str) -> tuple[Floats, tuple[str, ...]]:
         series.append(column)
         notes.append(note)
     return np.column_stack([*series, values[:, at:]]), tuple(notes)
+
+
+def _empty_cells(table: Floats) -> tuple[str, ...]:
+    """Notes on rows (n, 5) without a number of belt or compass, where others have one."""
+    missing = np.isnan(table[:, BELT:]).sum(axis=0).tolist()
+    return tuple(
+        f"{rows} rows without a number in {name}: taken as {instead}"
+        for rows, name, instead in zip(missing, OPTIONAL, ("no turning", "no reading"), strict=True)
+        if 0 < rows < len(table)
+    )
 
 
 def _about_walking_axis(name: str, t_s: Floats, rates: Floats) -> tuple[Floats, str]:

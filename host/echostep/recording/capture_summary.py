@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from echostep.board.frames import FrameCounts
+from echostep.board.frames import BoardReader
 from echostep.recording.capture import Decoder
 from echostep.xsens.frames import BUS_ID
 from echostep.xsens.message import MessageReader
@@ -17,7 +17,7 @@ from echostep.xsens.reader import MtxCounts
 
 def summary(decoder: Decoder) -> list[str]:
     """A line on each board's frames, lines on the MT's frames, on the format of legacy data, and on what the tracker would use."""
-    lines = [*_board_lines("Board", decoder.board.counts), *_board_lines("Foot board", decoder.foot.counts)]
+    lines = [*_board_lines("Board", decoder.board), *_board_lines("Foot board", decoder.foot)]
     if decoder.mt.names:
         lines += [_frames_line(decoder.mt), *_format_lines(decoder.mt), *_gap_lines(decoder.mt), _tracker_line(decoder)]
     elif decoder.mt.counts.skipped_bytes:
@@ -40,8 +40,9 @@ def _reasons(counts: tuple[tuple[int, str], ...]) -> str:
     return _joined([f"{count} {reason}" for count, reason in counts if count])
 
 
-def _board_lines(name: str, counts: FrameCounts) -> Iterator[str]:
+def _board_lines(name: str, reader: BoardReader) -> Iterator[str]:
     """The frames of a board; nothing when there were none, good or bad."""
+    counts = reader.counts
     if not counts.good and not counts.rejected:
         return
     reasons = _reasons(
@@ -53,7 +54,8 @@ def _board_lines(name: str, counts: FrameCounts) -> Iterator[str]:
         )
     )
     rejected = f", {counts.rejected} were rejected ({reasons})" if counts.rejected else ", none was rejected"
-    yield f"{name}: {counted(counts.good, 'frame')} read{rejected}; by the sequence numbers {counts.lost} never came."
+    end = f" {counted(reader.pending, 'byte')} at the end are no whole frame." if reader.pending else ""
+    yield f"{name}: {counted(counts.good, 'frame')} read{rejected}; by the sequence numbers {counts.lost} never came.{end}"
 
 
 def _frames_line(reader: MessageReader) -> str:
@@ -93,8 +95,14 @@ def _gap_lines(reader: MessageReader) -> Iterator[str]:
 
 def _tracker_line(decoder: Decoder) -> str:
     """What the tracker would make of the same bytes."""
-    counts: MtxCounts = decoder.tracked.counts
-    refused = _reasons(
+    counts = decoder.tracked.counts
+    refused = refusals(counts)
+    return f"The tracker would use {counted(counts.good, 'sample')}" + (f" and refuse {refused}." if refused else ".")
+
+
+def refusals(counts: MtxCounts) -> str:
+    """Samples that the tracker does not use, by reason; empty for none."""
+    return _reasons(
         (
             (counts.incomplete, "without counter, accel or gyro"),
             (counts.bad_length, "of another length"),
@@ -106,4 +114,3 @@ def _tracker_line(decoder: Decoder) -> str:
             (counts.bad_counter, "with a counter that does not follow"),
         )
     )
-    return f"The tracker would use {counted(counts.good, 'sample')}" + (f" and refuse {refused}." if refused else ".")

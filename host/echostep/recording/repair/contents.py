@@ -171,8 +171,9 @@ def _port_lines(contents: Contents) -> list[str]:
             f"  firmware: {contents.firmware or 'the board did not say'}; this host: protocol 0x{SCHEMA_HASH:08X}"
         )
     if MTX in contents.ports:
+        refused = f", refused: {words}" if (words := refusals(mtx)) else ""
         rate = f" ({mtx.good / contents.seconds:.1f}/s)" if contents.seconds > 0.0 else ""
-        lines.append(f"  MTx samples: {mtx.good}{rate}, {mtx.bad_checksum} bad checksums")
+        lines.append(f"  MTx samples: {mtx.good}{rate}, {mtx.bad_checksum} bad checksums{refused}")
     if FOOT in contents.ports:
         foot = contents.decoder.foot.counts
         lines.append(f"  foot board frames: {foot.good} good, {foot.rejected} bad, {foot.lost} lost")

@@ -77,7 +77,7 @@ def _table(lines: Iterator[str]) -> tuple[Floats, Ints]:
     if twice := [name for name in (*COLUMNS, TEMPERATURE) if header.count(name) > 1]:
         raise ValueError(f"line 1: column {twice[0]} is there twice")
     columns = [header.index(name) if name in header else -1 for name in (*COLUMNS, TEMPERATURE)]
-    table = read_rows(lines, separator, columns, len(COLUMNS), LIMITS)
+    table = read_rows(lines, (header, separator), columns, len(COLUMNS), LIMITS)
     if len(table.line) < 2:
         raise ValueError("no samples: two rows at least are needed under the names of the columns")
     return table.values, table.line
