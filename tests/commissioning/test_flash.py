@@ -37,6 +37,10 @@ GOOD = (
     'bar Writing; bar Reading; echo "avrdude: 12028 bytes of flash verified" >&2; echo "avrdude done.  Thank you." >&2'
 )
 BAD = 'bar Writing; bar Reading; echo "avrdude: verification error, first mismatch at byte 0x0100" >&2; exit 1'
+MODEM_MANAGER = (
+    'echo "Connecting to programmer: ." >&2; echo "avrdude: error: butterfly programmer uses avr_write_page() but does not provide" >&2; '
+    'echo "         a cmd() method." >&2; echo "avrdude: butterfly_recv(): programmer is not responding" >&2; exit 1'
+)
 DEAF = 'echo "avrdude: butterfly_recv(): programmer is not responding" >&2; exit 1'
 
 
@@ -109,7 +113,14 @@ def test_a_board_is_touched_written_verified_and_answers(tmp_path: Path) -> None
 
 
 @pytest.mark.process
-@pytest.mark.parametrize(("body", "words"), [(BAD, "verification error"), (DEAF, "programmer is not responding")])
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        (BAD, "verification error"),
+        (DEAF, "programmer is not responding"),
+        (MODEM_MANAGER, "butterfly programmer uses avr_write_page() but does not provide a cmd() method."),
+    ],
+)
 def test_what_avrdude_says_is_passed_on(tmp_path: Path, body: str, words: str) -> None:
     path, log = fake_avrdude(tmp_path, body)
     with board(tmp_path / "port", log):

@@ -134,5 +134,5 @@ def test_what_is_left_out_is_counted(tmp_path: Path, reader: str) -> None:
 
 def test_a_table_with_decimal_commas_between_commas_is_refused(tmp_path: Path) -> None:
     rows = [[cell.replace(".", ",") for cell in row] for row in foot_rows()]
-    with pytest.raises(EchostepError, match="more cells than the first line has names"):
+    with pytest.raises(EchostepError, match="more cells than there are names"):
         load_imu(table(tmp_path, "t_s,ax,ay,az,gx,gy,gz", rows, {}))

@@ -251,6 +251,28 @@ def test_a_report_goes_from_node_to_node(air: Air) -> None:
 
 
 @pytest.mark.long
+def test_a_node_that_answers_late_is_connected_and_gets_the_report(air: Air, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It boots: its port is there, it answers only after the first attempt to connect has been given up."""
+    monkeypatch.setattr(mesh, "ANSWER_S", 1)
+    node, words = air.node(), list[str]()
+    heed, heard = node._heed, list[Any]()
+    monkeypatch.setattr(node, "_heed", heard.append)
+    box = Outbox(MeshTransport(parse_endpoint(f"mesh://{node.port}"), ("red", "kim"), words.append), "mesh", words.append)
+    box.offer(report("kim"))
+    assert until(lambda: any("no Meshtastic node answers" in line for line in words)), words
+    assert heard
+    monkeypatch.setattr(node, "_heed", heed)
+
+    def arrived() -> bool:
+        box.offer(report("kim"))
+        return bool(air.sent)
+
+    assert until(arrived), words
+    box.close()
+    assert any("connected again" in line for line in words)
+
+
+@pytest.mark.long
 def test_twenty_wearers_on_pseudo_terminals(air: Air) -> None:
     """Twenty nodes and the commander's: three reports of each; never more than 20 s between two of one wearer."""
     inbox, words = Inbox(), list[str]()

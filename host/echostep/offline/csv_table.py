@@ -93,8 +93,8 @@ def read_rows(
 ) -> CsvTable:
     """Rows of the lines after the header; empty lines are skipped. `columns`: index of each wanted column, -1 for one that the file lacks.
 
-    A row with more cells than the header has names counts as one without numbers: a decimal comma between commas moves all cells behind it. With `limits.early_rows`, raises ValueError when fewer than two rows exist, or when most of them lack a number in one of the first `required`
-    columns.
+    A row with more cells than the header has names counts as one without numbers: a decimal comma between commas moves all cells behind it. With
+    `limits.early_rows`, raises ValueError when fewer than two rows exist, or when most of them lack a number in one of the first `required` columns.
     """
     (names, separator), values, numbers, bad = header, array("d"), array("q"), 0
     for number, line in enumerate(lines, start=2):
@@ -119,7 +119,7 @@ def _check_share(rows: int, bad: int) -> None:
         raise ValueError("no samples")
     if bad > MOST_BAD * rows:
         raise ValueError(
-            f"{100 * bad / rows:.0f} % of the first {rows} rows have no number in some column, or more cells than the first line has names"
+            f"{100 * bad / rows:.0f} % of the first {rows} rows have no number in some column, or more cells than there are names"
         )
 
 
