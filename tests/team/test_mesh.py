@@ -257,7 +257,9 @@ def test_a_node_that_answers_late_is_connected_and_gets_the_report(air: Air, mon
     node, words = air.node(), list[str]()
     heed, heard = node._heed, list[Any]()
     monkeypatch.setattr(node, "_heed", heard.append)
-    box = Outbox(MeshTransport(parse_endpoint(f"mesh://{node.port}"), ("red", "kim"), words.append), "mesh", words.append)
+    box = Outbox(
+        MeshTransport(parse_endpoint(f"mesh://{node.port}"), ("red", "kim"), words.append), "mesh", words.append
+    )
     box.offer(report("kim"))
     assert until(lambda: any("no Meshtastic node answers" in line for line in words)), words
     assert heard
