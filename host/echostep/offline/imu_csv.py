@@ -70,7 +70,10 @@ def _table(lines: Iterator[str]) -> tuple[Floats, tuple[str, ...]]:
         hint = ": the first line must name the columns" if all(map(math.isfinite, map(number_of, header))) else ""
         raise ValueError(f"no column {', '.join(missing)}{hint}; expected {','.join(COLUMNS)}[,mx,my,mz]")
     wanted = COLUMNS + MAG_COLUMNS if all(name in header for name in MAG_COLUMNS) else COLUMNS
-    return read_rows(lines, separator, [column_of(header, name) for name in wanted], len(COLUMNS), CsvLimits()).values
+    columns = [column_of(header, name) for name in wanted]
+    half = [name for name in MAG_COLUMNS if name in header and name not in wanted]
+    left_out = (f"{', '.join(half)} without the other axes of the magnetometer: left out",) if half else ()
+    return read_rows(lines, (header, separator), columns, len(COLUMNS), CsvLimits()).values, left_out
 
 
 def checked(track: Track, path: Path | str) -> Track:

@@ -116,7 +116,8 @@ def _table(file: TextIO, prefix: str) -> tuple[Floats, tuple[str, ...]]:
         )
     wanted = [name for source in sources for name in source]
     columns = [column_of(header, name) for name in (*wanted, *OPTIONAL)]
-    values = read_rows(lines_of(file, CsvLimits(), first=2), separator, columns, len(wanted), CsvLimits()).values
+    lines = lines_of(file, CsvLimits(), first=2)
+    values = read_rows(lines, (header, separator), columns, len(wanted), CsvLimits()).values
     series, notes, at = [], [], 0
     for name, source in zip(COLUMNS, sources, strict=True):
         rates = values[:, at : at + len(source)]

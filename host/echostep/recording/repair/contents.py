@@ -17,6 +17,7 @@ from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, FOOT, LATEST_NS, MTX
 from echostep.printing.console import console_for_people
 from echostep.recording.capture import Decoder
+from echostep.recording.capture_summary import refusals
 from echostep.recording.damage.notes import MISPLACED, made_of, missing_ports
 from echostep.recording.mcap_records import port_of
 from echostep.recording.repair.arrival_order import ArrivalOrder
