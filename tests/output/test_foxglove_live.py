@@ -17,7 +17,7 @@ from typing import Any
 
 import jsonschema
 import pytest
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
@@ -162,6 +162,21 @@ def test_only_this_computer_is_served_unless_a_host_is_given() -> None:
         port = int(server.url.rpartition(":")[2])
         with socket.socket() as other, pytest.raises(OSError, match="refused"):
             other.connect(("127.0.0.2", port))
+
+
+@pytest.mark.parametrize(
+    "offered", [["foxglove.sdk.v1"], ["foxglove.websocket.v1", "foxglove.sdk.v1"], ["foxglove.websocket.v1"]]
+)
+def test_viewers_are_served_as_the_manual_says(offered: list[str]) -> None:
+    """The older subprotocol alone is refused; when that changes, so must host/docs/recordings.md."""
+    subprotocols = [Subprotocol(name) for name in offered]
+    with FoxgloveServer(FoxgloveAddress("127.0.0.1", 0), "a test") as server:
+        if PROTOCOL in offered:
+            with connect(server.url, subprotocols=subprotocols) as viewer:
+                assert viewer.subprotocol == PROTOCOL
+        else:
+            with pytest.raises(InvalidStatus), connect(server.url, subprotocols=subprotocols):
+                pass
 
 
 @pytest.mark.parametrize("text", ["", "x", "host:", "1:70000", "8765x", "-1"])
