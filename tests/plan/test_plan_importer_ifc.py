@@ -285,3 +285,47 @@ def test_a_packed_model(tmp_path: Path) -> None:
             (tmp_path / name).write_bytes(raw)
         with pytest.raises(EchostepError, match=named):
             import_plan(tmp_path / name)
+
+
+def concrete_kinds(kind: str) -> list[str]:
+    """The classes of IFC4 below one that a model can have."""
+
+    def below(declaration: Any) -> list[Any]:
+        return [declaration, *(inner for one in declaration.subtypes() for inner in below(one))]
+
+    declared = ifcopenshell.ifcopenshell_wrapper.schema_by_name("IFC4").declaration_by_name(kind)
+    return [one.name() for one in below(declared) if not one.is_abstract()]
+
+
+@pytest.mark.long
+def test_every_class_of_elements_is_used_or_counted(tmp_path: Path) -> None:
+    """One element of each class of IFC4, all far above the storeys; those that are no bodies of a building, as openings, are not counted."""
+    model = Model()
+    ground = model.storey("Ground", 0.0)
+    model.contain(ground, model.box("IfcWall", (0, 0, 0), (8, 0.2, 2.6)))
+    silent = {
+        kind
+        for parent in ("IfcFeatureElement", "IfcPort", "IfcVirtualElement", "IfcElementComponent")
+        for kind in concrete_kinds(parent)
+    }
+    kinds = sorted({*concrete_kinds("IfcElement"), "IfcSpace"} - silent)
+    for kind in kinds:
+        model.box(kind, (0, 0, 50.0), (2, 0.2, 2.0))
+    plan, report = imported(model, tmp_path)
+    assert len(kinds) > 100
+    assert len(plan.levels[0].walls) == 4
+    assert {what.split()[0] for what in report.left_out} == set(kinds)
+    assert sum(report.left_out.values()) == len(kinds)
+
+
+def test_what_lies_on_one_level_alone_is_counted(tmp_path: Path) -> None:
+    model = Model()
+    for k in range(2):
+        model.storey(f"Floor {k}", 3.0 * k)
+        model.box("IfcWall", (0, 0, 3.0 * k), (8, 0.2, 2.6))
+    model.box("IfcStairFlight", (1, 1, 0), (1, 2, 1.0))
+    model.box("IfcTransportElement", (4, 1, 0), (1, 1, 6.0)).PredefinedType = "ESCALATOR"
+    model.box("IfcTransportElement", (6, 1, 0), (1, 1, 6.0)).PredefinedType = "ELEVATOR"
+    plan, report = imported(model, tmp_path)
+    assert [connector.kind for connector in plan.connectors] == ["lift"]
+    assert report.left_out == {"stairs on one level only": 1, "IfcTransportElement that is no lift": 1}

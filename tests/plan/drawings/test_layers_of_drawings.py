@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from ezdxf.filemanagement import new
+from ezdxf.math import Matrix44
 
 from echostep.errors import EchostepError
 from echostep.plan.importers.dxf.layers import LAYERS, meaning, patterns_of
@@ -43,6 +44,16 @@ def length_m(plan: Plan) -> float:
     return float(np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum())
 
 
+def body(entity: Any) -> None:
+    """The text of a body, which nobody reads: without any the entity is not written."""
+    entity.sat = ["400 0 1 0", "nobody reads this"]
+
+
+def mesh(entity: Any) -> None:
+    with entity.edit_data() as data:
+        data.vertices, data.faces = [(1, 1, 0), (2, 1, 0), (2, 2, 0)], [(0, 1, 2)]
+
+
 def test_every_kind_of_entity_is_a_wall_or_counted(tmp_path: Path) -> None:
     """What goes in against what comes out: each entity on a layer of walls gives lines or a count, each on another layer a count."""
     doc, space = sheet()
@@ -61,7 +72,23 @@ def test_every_kind_of_entity_is_a_wall_or_counted(tmp_path: Path) -> None:
         "MLINE": lambda x: space.add_mline([(x, 20), (x, 24)], dxfattribs=WALL | {"scale_factor": 0.2}),
         "HATCH": lambda x: space.add_hatch(dxfattribs=WALL).paths.add_polyline_path(corners((x, 20, x + 0.2, 24)), is_closed=True),
     }  # fmt: skip
+    lines |= {
+        "HELIX": lambda x: space.add_helix(0.5, 1, 2, dxfattribs=WALL).transform(Matrix44.translate(x, 22, 0)),
+        "MPOLYGON": lambda x: space.add_mpolygon(dxfattribs=WALL).paths.add_polyline_path(corners((x, 20, x + 0.2, 24)), is_closed=True),
+    }  # fmt: skip
     counted: dict[str, Callable[[], Any]] = {
+        "3DSOLID": lambda: body(space.add_3dsolid(dxfattribs=WALL)),
+        "REGION": lambda: body(space.add_region(dxfattribs=WALL)),
+        "BODY": lambda: body(space.add_body(dxfattribs=WALL)),
+        "DIMENSION": lambda: space.add_linear_dim((0, 12), (0, 10), (5, 10), dxfattribs=WALL).render(),
+        "LEADER": lambda: space.add_leader([(1, 1), (2, 2), (3, 2)], dxfattribs=WALL),
+        "SHAPE": lambda: space.add_shape("X", dxfattribs=WALL),
+        "ATTDEF": lambda: space.add_attdef("T", (1, 1), "x", dxfattribs=WALL),
+        "MESH": lambda: mesh(space.add_mesh(dxfattribs=WALL)),
+        "POLYLINE": lambda: space.add_polymesh((3, 3), dxfattribs=WALL),
+        "IMAGE": lambda: space.add_image(doc.add_image_def("a.png", (9, 9)), (1, 1), (3, 3), dxfattribs=WALL),
+        "PDFUNDERLAY": lambda: space.add_underlay(doc.add_underlay_def("a.pdf"), (1, 1), dxfattribs=WALL),
+        "INSERT without contents": lambda: space.add_blockref(doc.blocks.new("EMPTY").name, (1, 1), dxfattribs=WALL),
         "TEXT": lambda: space.add_text("W1", dxfattribs=WALL),
         "MTEXT": lambda: space.add_mtext("W2", dxfattribs=WALL),
         "POINT": lambda: space.add_point((1, 1), dxfattribs=WALL),
@@ -86,6 +113,14 @@ def test_every_kind_of_entity_is_a_wall_or_counted(tmp_path: Path) -> None:
         {"LINE on FURNITURE": 3, "CIRCLE on FURNITURE": 1}
     )
     assert report.left_out == dict(expected)
+
+
+def test_a_block_that_is_not_in_the_file_is_counted(tmp_path: Path) -> None:
+    doc, space = sheet()
+    house(space)
+    for _ in range(2):
+        space.add_blockref("NOT IN THE FILE", (1, 1), dxfattribs=WALL)
+    assert imported(doc, tmp_path)[1].left_out == {"INSERT (damaged)": 2}
 
 
 def test_a_hatch_with_islands_adds_no_walls(tmp_path: Path) -> None:

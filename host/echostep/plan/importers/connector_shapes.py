@@ -11,13 +11,14 @@ from collections.abc import Sequence
 from shapely.geometry import Polygon
 
 from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, ring
+from echostep.plan.importers.report import ImportReport
 from echostep.plan.model import Connector
 
 SHARED = 0.4  # shapes that share more than this part of the smaller area are one staircase; assumed
 
 
-def join_connectors(drawn_levels: Sequence[DrawnLevel]) -> tuple[Connector, ...]:
-    """The connectors between levels; the outline is the intersection of their shapes."""
+def join_connectors(drawn_levels: Sequence[DrawnLevel], report: ImportReport) -> tuple[Connector, ...]:
+    """The connectors between levels; the outline is the intersection of their shapes. What joins no two levels is reported."""
     chains: list[_ConnectorChain] = []
     for i, drawn in enumerate(drawn_levels):
         for shape in drawn.connectors:
@@ -27,6 +28,8 @@ def join_connectors(drawn_levels: Sequence[DrawnLevel]) -> tuple[Connector, ...]
             else:
                 chain.add(shape, i)
     joining = [chain for chain in chains if len(chain.levels) > 1]
+    for chain in chains:
+        report.leave_out(f"{chain.kind} on one level only", len(chain.levels) == 1)
     return tuple(_connector(chain, joining) for chain in joining)
 
 

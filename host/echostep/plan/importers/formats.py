@@ -120,7 +120,7 @@ def _imported(path: Path, hints: Hints, above: Sequence[Path], report: ImportRep
     elif _is_imdf(path):
         plan = _module("imdf.venue").import_imdf(path, height_m, hints.doors_m, report)
     elif path.name == "core.txt" or (path / "core.txt").exists():
-        plan = _module("nodelink").import_nodelink(path / "core.txt" if path.is_dir() else path)
+        plan = _module("nodelink").import_nodelink(path / "core.txt" if path.is_dir() else path, report)
     elif suffix in (".yaml", ".yml"):
         plan = _module("raster.ros_map").import_ros_map(path, report)
     elif suffix in PICTURES and hints.scale_m is not None:

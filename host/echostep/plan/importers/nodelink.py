@@ -20,6 +20,7 @@ from echostep.errors import EchostepError
 from echostep.plan.importers.connector_shapes import join_connectors
 from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas
 from echostep.plan.importers.parsing import read_text
+from echostep.plan.importers.report import ImportReport
 from echostep.plan.model import Plan
 from echostep.plan.plan_file import LIMIT_M
 
@@ -35,7 +36,7 @@ class Node(NamedTuple):
     y_m: float
 
 
-def import_nodelink(core: Path) -> Plan:
+def import_nodelink(core: Path, report: ImportReport) -> Plan:
     """Import the building of a core.txt; raises EchostepError that names the file and the line."""
     settings = {row[0]: row[1:] for _, row in _rows(core, 1)}
     levels = int(_setting(core, settings, "floor", MOST_FLOORS))
@@ -48,8 +49,12 @@ def import_nodelink(core: Path) -> Plan:
             raise EchostepError(f"{where}: a wall from floor {a.layer} to floor {b.layer}")
         if a[1:] != b[1:]:
             drawn_levels[a.layer].walls.append(LineString((a[1:], b[1:])))
-    _stairs(core, settings, nodes, drawn_levels)
-    return Plan(core.parent.name, tuple(s.level() for s in drawn_levels), None, "", join_connectors(drawn_levels))
+        else:
+            report.leave_out("link without length")
+    _stairs(core, settings, nodes, drawn_levels, report)
+    return Plan(
+        core.parent.name, tuple(s.level() for s in drawn_levels), None, "", join_connectors(drawn_levels, report)
+    )
 
 
 def _nodes(path: Path, levels: int, scale_m: float) -> dict[str, Node]:
@@ -66,7 +71,13 @@ def _nodes(path: Path, levels: int, scale_m: float) -> dict[str, Node]:
     return {key: node._replace(y_m=round(node.y_m - lowest, 3)) for key, node in nodes.items()}
 
 
-def _stairs(core: Path, settings: dict[str, list[str]], nodes: dict[str, Node], drawn_levels: list[DrawnLevel]) -> None:
+def _stairs(
+    core: Path,
+    settings: dict[str, list[str]],
+    nodes: dict[str, Node],
+    drawn_levels: list[DrawnLevel],
+    report: ImportReport,
+) -> None:
     """Stairs for each arrow inside a zone, to the levels that the arrow points to."""
     zones: list[tuple[int, Polygon]] = []
     for where, row in _rows(_beside(core, settings, "polygon"), 3, skip=1):
@@ -75,6 +86,8 @@ def _stairs(core: Path, settings: dict[str, list[str]], nodes: dict[str, Node], 
             raise EchostepError(f"{where}: a zone needs three nodes or more, all on one floor")
         if row[1] == ZONE_WITH_STAIRS:
             zones += [(corners[0].layer, area) for area in areas([Polygon([node[1:] for node in corners])])]
+        else:
+            report.leave_out(f"zone of type {row[1][:20]}")
     for where, row in _rows(_beside(core, settings, "arrow"), 4, skip=1):
         a, b = (_node(nodes, text, where) for text in row[2:4])
         middle = LineString((a[1:], b[1:])).interpolate(0.5, normalized=True)
@@ -85,6 +98,8 @@ def _stairs(core: Path, settings: dict[str, list[str]], nodes: dict[str, Node], 
         levels = tuple(a.layer + step for step in steps if 0 <= a.layer + step < len(drawn_levels))
         if zone is not None:
             drawn_levels[a.layer].connectors.append(ConnectorShape("stairs", "", zone, levels))
+        else:
+            report.leave_out("arrow in no zone of stairs")
 
 
 def _rows(path: Path, least: int, skip: int = 0) -> Iterator[tuple[str, list[str]]]:

@@ -78,7 +78,7 @@ def import_wrld(path: Path, storey_height_m: float, report: ImportReport) -> Pla
         tuple(drawn.level() for drawn in drawn_levels),
         None,
         "",
-        join_connectors(drawn_levels),
+        join_connectors(drawn_levels, report),
         georeference,
     )
 

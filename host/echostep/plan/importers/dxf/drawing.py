@@ -97,7 +97,9 @@ def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Pla
         _drawn_level(storey, DrawnLevel(name, round(i * hints.storey_height_m, 6)), report)
         for i, (storey, name) in enumerate(zip(storeys, names, strict=False))
     ]
-    return Plan(files[0].stem, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels))
+    return Plan(
+        files[0].stem, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels, report)
+    )
 
 
 def _names(files: Sequence[Path], levels: int) -> list[str]:

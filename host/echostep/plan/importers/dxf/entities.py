@@ -22,6 +22,7 @@ from echostep.plan.importers.report import ImportReport
 MOST_PARTS = 300_000  # entities in blocks
 DEEPEST_BLOCK = 16
 REMOVED = re.compile(r"Removed invalid DXF entity (\w+)\(")  # of ezdxf about entities of a kind that it does not know
+DELETED = re.compile(r"Deleted entity (\w+)\(")  # of ezdxf about entities that refer to nothing
 
 
 def read_drawing(file: Path, report: ImportReport) -> Any:
@@ -40,6 +41,8 @@ def read_drawing(file: Path, report: ImportReport) -> Any:
     if not len(drawing.modelspace()) and auditor.has_errors:
         raise EchostepError(f"{file}: the drawing is damaged: {auditor.errors[0].message[:200]}")
     for fix in auditor.fixes:
+        if deleted := DELETED.search(fix.message):
+            report.leave_out(f"{deleted[1][:40]} (damaged)")
         if removed := REMOVED.search(fix.message):
             report.leave_out(f"{removed[1][:40]} (object of another program)")
             report.doubt(
@@ -83,8 +86,11 @@ class VisibleEntities:
                 if self._is_reference(entity):
                     continue
             yield entity, layer
-            if is_block and depth < DEEPEST_BLOCK and not whole(layer):
-                stack += [(part, layer, depth + 1) for part in parts(entity, self._file)]
+            if is_block and not whole(layer):
+                inner = parts(entity, self._file) if depth < DEEPEST_BLOCK else []
+                stack += [(part, layer, depth + 1) for part in inner]
+                if not inner and not entity.attribs:
+                    self._report.leave_out(f"INSERT without contents on {layer[:40]}")
 
     def _is_reference(self, insert: Any) -> bool:
         """Whether a block is a file of its own; notes the file."""

@@ -22,6 +22,7 @@ from echostep.plan.importers.ifc.model import open_model, storeys_of
 from echostep.plan.importers.report import ImportReport
 from echostep.plan.model import ConnectorKind, Door, Georeference, Plan
 
+NO_STOREY = "at the height of no storey"
 CUT_M = 1.0  # height of the cut above the floor: about that of the rangers
 WALLS = ("IfcWall", "IfcColumn", "IfcCurtainWall", "IfcPlate", "IfcMember")
 CONNECTOR_KINDS: dict[str, ConnectorKind] = {
@@ -40,7 +41,8 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
     count = 0
     for body in shapes.bodies(elements, report):
         count += 1
-        _place(drawn_levels, body)
+        if why := _place(drawn_levels, body):
+            report.leave_out(f"{body.element.is_a()} {why}")
     _doors(model, drawn_levels, shapes, report)
     _tell(model, report)
     if not any(drawn.walls for drawn in drawn_levels):
@@ -51,7 +53,12 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
     projects = model.by_type("IfcProject")
     name = str((projects[0].LongName or projects[0].Name) if projects else "") or path.stem
     return Plan(
-        name[:80], tuple(s.level() for s in drawn_levels), None, "", join_connectors(drawn_levels), _georeference(model)
+        name[:80],
+        tuple(s.level() for s in drawn_levels),
+        None,
+        "",
+        join_connectors(drawn_levels, report),
+        _georeference(model),
     )
 
 
@@ -66,7 +73,7 @@ def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: I
             continue
         levels = [drawn for drawn in drawn_levels if door.z_m[0] <= drawn.height_m + CUT_M <= door.z_m[1]]
         if not levels:
-            report.leave_out(f"{element.is_a()} at the height of no storey")
+            report.leave_out(f"{element.is_a()} {NO_STOREY}")
         for drawn in levels:
             drawn.doors.append(Door(door.line, name=str(element.Name or "")[:80]))
 
@@ -81,38 +88,41 @@ def _tell(model: Any, report: ImportReport) -> None:
             report.leave_out(element.is_a())
 
 
-def _place(drawn_levels: list[DrawnLevel], body: SolidBody) -> None:
-    """Add an element to the levels that it is on."""
+def _place(drawn_levels: list[DrawnLevel], body: SolidBody) -> str:
+    """Add an element to the levels that it is on; returns why it is on none, empty when it is on one."""
     kind = next(kind for kind in SEEN if body.element.is_a(kind))
     low, high = body.z_m
     name = str(getattr(body.element, "LongName", None) or getattr(body.element, "Name", None) or "")[:80]
     if kind in CONNECTOR_KINDS:
-        _place_way(drawn_levels, body, CONNECTOR_KINDS[kind], name)
-        return
+        return _place_way(drawn_levels, body, CONNECTOR_KINDS[kind], name)
+    placed = False
     for drawn in drawn_levels:
         z = drawn.height_m + CUT_M
         if not low <= z <= high:
             continue
+        placed = True
         if kind in WALLS:
             drawn.walls += body.cut(z)
         elif kind == "IfcWindow":
             drawn.windows.append(body.above())
         else:
             drawn.rooms += [room(name or "room", area) for area in body.cut(z)]
+    return "" if placed else NO_STOREY
 
 
-def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorKind, name: str) -> None:
-    """Add stairs, a ramp or a lift to all levels between its lowest and its highest corner."""
+def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorKind, name: str) -> str:
+    """As `_place`, for stairs, a ramp or a lift: on all levels between its lowest and its highest corner."""
     if kind == "lift" and str(getattr(body.element, "PredefinedType", "ELEVATOR")) not in (
         "ELEVATOR",
         "None",
         "NOTDEFINED",
     ):
-        return
+        return "that is no lift"
     low, high = body.z_m
     passed = [i for i, drawn in enumerate(drawn_levels) if low - 0.5 <= drawn.height_m <= high + 0.5]
     for i in passed:
         drawn_levels[i].connectors.append(ConnectorShape(kind, name, body.above(), tuple(passed)))
+    return "" if passed else NO_STOREY
 
 
 def _georeference(model: Any) -> Georeference | None:

@@ -140,6 +140,7 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
         _outline(drawn, next(level for level in levels if level.key == key))
         for unit in units[key]:
             _unit(drawn, unit, [one.shape for one in openings[key]])
+        report.leave_out("unit without an area", sum(not areas([unit.shape]) for unit in units[key]))
         if doors_m is not None:
             _assume_doors(drawn, units[key], openings[key], doors_m)
     fixtures = _by_level(_features(archive, "fixture", earth) + _features(archive, "kiosk", earth), drawn_levels)
@@ -147,21 +148,18 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
         for fixture in fixtures[key]:
             if "kiosk" in fixture.where or fixture.category in SOLID_FIXTURES:
                 drawn.obstacles += areas([fixture.shape])
+                report.leave_out("fixture or kiosk without an area", not areas([fixture.shape]))
             else:
                 report.leave_out(f"fixture {fixture.category}")
-    _relationships(
-        archive,
-        earth,
-        {unit.key: (order.index(key), unit) for key in order for unit in units[key]},
-        list(drawn_levels.values()),
-    )
+    numbered = {unit.key: (order.index(key), unit) for key in order for unit in units[key]}
+    _relationships(archive, earth, numbered, list(drawn_levels.values()), report)
     name = next((venue.name for venue in _features(archive, "venue", earth)), "") or path.stem
     return Plan(
         name,
         tuple(s.level() for s in drawn_levels.values()),
         None,
         "",
-        join_connectors(list(drawn_levels.values())),
+        join_connectors(list(drawn_levels.values()), report),
         georeference,
     )
 
@@ -295,11 +293,16 @@ def _opens(area: Polygon, one: BaseGeometry) -> bool:
 
 
 def _relationships(
-    archive: Archive, earth: EarthTransform, units: dict[str, tuple[int, Feature]], drawn_levels: list[DrawnLevel]
+    archive: Archive,
+    earth: EarthTransform,
+    units: dict[str, tuple[int, Feature]],
+    drawn_levels: list[DrawnLevel],
+    report: ImportReport,
 ) -> None:
     """Levels of stairs and lifts whose units do not lie above each other: from the archive's relationships."""
     for one in _features(archive, "relationship", earth):
         if one.category not in CONNECTOR_KINDS:
+            report.leave_out(f"relationship {one.category[:40]}")
             continue
         between = one.about.get("intermediary")
         ends = [one.about.get("origin"), one.about.get("destination"), *(between if isinstance(between, list) else [])]

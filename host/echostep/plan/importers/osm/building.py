@@ -62,10 +62,16 @@ def import_osm(path: Path, storey_height_m: float, report: ImportReport) -> Plan
     _spaces(site, elements)
     _doors(site, elements, report)
     _lifts(site, elements)
+    _other(elements, report)
     drawn_levels = [site.drawn_levels[level] for level in levels]
     name = next((tags["name"] for *_, tags in elements.lines() if "building" in tags and "name" in tags), path.stem)
     return Plan(
-        name, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels), georeference
+        name,
+        tuple(drawn.level() for drawn in drawn_levels),
+        None,
+        "",
+        join_connectors(drawn_levels, report),
+        georeference,
     )
 
 
@@ -83,6 +89,22 @@ def _without_level(elements: Elements, report: ImportReport) -> None:
             f"{len(names)} {kind}{'' if one or kind == 'stairs' else 's'} {'has' if one else 'have'} no level and "
             f"{'was' if one else 'were'} left out ({', '.join(names[:5])}): tag level=* and download it again"
         )
+
+
+def _other(elements: Elements, report: ImportReport) -> None:
+    """Report elements with tags that plans do not have: shops, furniture, footpaths, groups."""
+    walls = ("room", "wall", "column", "pillar", "area", "corridor", "level")
+    for _, _, tags in elements.lines():
+        if tags and _way(tags) is None and tags.get("building", "no") == "no" and tags.get("indoor") not in walls:
+            report.leave_out("way that is no wall, room, corridor or stairs")
+    for _, tags in elements.nodes():
+        if _way(tags) is None and not _is_door(tags):
+            report.leave_out("node that is no door, stairs or lift")
+    report.leave_out("relation that is no multipolygon", elements.other_relations)
+
+
+def _is_door(tags: Tags) -> bool:
+    return "door" in tags or "entrance" in tags or tags.get("indoor") == "door"
 
 
 def _origin(elements: Elements, path: Path) -> Georeference:
@@ -151,7 +173,7 @@ def _wall(site: OsmSite, elements: Elements, nodes: list[int], levels: list[floa
 def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
     """Add a door for each node with a door tag, on each level where the node lies on a wall."""
     for node, tags in elements.nodes():
-        if "door" not in tags and "entrance" not in tags and tags.get("indoor") != "door":
+        if not _is_door(tags):
             continue
         own = levels_of(tags, f"node {node}") or site.order
         if not any((level, node) in site.walls_at for level in own):

@@ -59,6 +59,7 @@ class Elements:
     way_tags: dict[int, Tags] = field(default_factory=dict)
     relations: list[tuple[int, list[tuple[int, str]], Tags]] = field(default_factory=list)
     at_m: dict[int, tuple[float, float]] = field(default_factory=dict)
+    other_relations: int = 0
 
     def lines(self) -> Iterator[tuple[str, list[int], Tags]]:
         """Name, nodes and tags of ways, and of the rings of multipolygons; only lines of two nodes or more. Inner rings have no name."""
@@ -160,7 +161,7 @@ def _json_number(text: str | None) -> Any:
 
 
 def _add(elements: Elements, row: Any) -> None:
-    """Check an element (as in Overpass JSON) and add it; relations other than multipolygons are left out."""
+    """Check an element (as in Overpass JSON) and add it; relations other than multipolygons are counted."""
     row = typed(row, "elements", dict)
     kind, key = row.get("type"), row.get("id")
     if isinstance(key, bool) or not isinstance(key, int):
@@ -182,6 +183,8 @@ def _add(elements: Elements, row: Any) -> None:
         ]
         ways = [(_ref(m.get("ref"), where), str(m.get("role"))) for m in members if m.get("type") == "way"]
         elements.relations.append((key, ways, tags))
+    elif kind == "relation":
+        elements.other_relations += 1
 
 
 def _degrees(row: dict[str, Any], where: str) -> tuple[float, float]:
