@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,8 +46,8 @@ class Gap:
 class WallBands:
     """The walls of a level, to be asked for gaps."""
 
-    def __init__(self, walls: Sequence[LineString], band_m: float = BAND_M) -> None:
-        self.band_m = band_m
+    def __init__(self, walls: Sequence[LineString]) -> None:
+        self.band_m = BAND_M
         self.pieces = pieces_of(walls)
         self.pieces = self.pieces[np.hypot(*(self.pieces[:, 2:] - self.pieces[:, :2]).T) > 0.0]
         self._lines = shapely.linestrings(self.pieces.reshape(-1, 2, 2))
@@ -77,7 +78,9 @@ class WallBands:
 
     def wider(self) -> WallBands:
         """The same walls, looked at in a band that reaches from a face to the axis that a thick wall is drawn by."""
-        return WallBands(shapely.linestrings(self.pieces.reshape(-1, 2, 2)).tolist(), WIDE_BAND_M)
+        wide = copy(self)
+        wide.band_m = WIDE_BAND_M
+        return wide
 
     def wall_at(self, end: Point, outward: Point) -> tuple[float, float] | None:
         """Of the wall that stops at a door's end and goes on in the direction `outward`: the offsets (m) of both its faces to the left of `outward`.
