@@ -15,7 +15,7 @@ import typer
 
 from echostep.commands import beacons, commander, files, hardware, plan, recordings, runs
 from echostep.commands.studies import add_studies
-from echostep.errors import EchostepError
+from echostep.errors import EchostepError, words_of
 from echostep.extras import EXTRAS, lacks
 from echostep.interruption import end_by_signals
 from echostep.printing.file_mode import share_files
@@ -78,7 +78,7 @@ def _status() -> int:
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else int(end.code is not None)
     except EchostepError as error:
-        complain(f"echostep: {error}")
+        complain(f"echostep: {words_of(error)}")
         return 2
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
@@ -87,7 +87,7 @@ def _status() -> int:
         complain(f"echostep: {words}")
         return 2
     except OSError as error:
-        complain(f"echostep: {error.filename or 'a file'}: {error.strerror or error}")
+        complain(f"echostep: {words_of(error)}")
         return 2
     except KeyboardInterrupt:
         return 130

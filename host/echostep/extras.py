@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from echostep.errors import EchostepError
 
 PAGE = ("starlette", "uvicorn", "websockets")
-EXTRAS = dict.fromkeys(PAGE, "page") | {
+EXTRAS = dict.fromkeys((*PAGE, "segno"), "page") | {
     "cryptography": "pkcs12",
     "paho": "team",
     "pyproj": "plans",

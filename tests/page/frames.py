@@ -94,9 +94,9 @@ def next_frame(page: ClientConnection) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def served(mailbox: Mailbox | None = None) -> Iterator[tuple[PageServer, Mailbox]]:
+def served(mailbox: Mailbox | None = None, address: Address = LOCAL) -> Iterator[tuple[PageServer, Mailbox]]:
     mailbox = mailbox or Mailbox(PLAN, "test", replay=False)
-    with PageServer(mailbox, LOCAL) as server:
+    with PageServer(mailbox, address) as server:
         yield server, mailbox
 
 

@@ -41,9 +41,10 @@ def open_page(
     if views.page is None:
         return None
     from echostep.operation.page import TablePage
+    from echostep.page.web.addresses import print_page
 
     page = opened.enter_context(TablePage(operation, title, views.page, tape))
-    console.print(f"The page: {page.url}", highlight=False)
+    print_page(console, page.server.urls)
     return page
 
 

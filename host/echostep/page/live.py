@@ -47,6 +47,7 @@ STEPLESS_S = 6.0  # with bytes but without an estimate: the same; longer than th
 SHOWN_S = 1.5  # an echo line is shown for this long
 OPENING_S = 5.0  # longest wait for a browser that was started
 OPENING_POLL_S = 0.05
+TOLD_S = 2.0  # longest wait for pages to be told of an error
 MOST_KEPT = 2000  # particles in each scene of a replay
 
 
@@ -158,6 +159,13 @@ class LivePage:
     def end(self, summary: str) -> None:
         """End the run: pages show its end and its summary; a run with stored scenes can be replayed."""
         self._mailbox.end(summary)
+
+    def fail(self, words: str) -> None:
+        """An error ends the run: pages show it; waits until they have it, for at most `TOLD_S`."""
+        self._mailbox.fail(words)
+        end_s = time.monotonic() + TOLD_S
+        while self.pages and time.monotonic() < end_s:
+            time.sleep(OPENING_POLL_S)
 
     def pop_check_ins(self) -> Iterator[bytes]:
         """Check-ins and undoings that pages have made since the last call, encoded as the tracker takes them."""

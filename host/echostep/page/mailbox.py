@@ -82,6 +82,7 @@ class Mailbox:
         self.history = SceneHistory()
         self.replay = replay
         self.summary: str | None = None  # how well the run went, once it is over
+        self.failure = ""  # the error that ends the run, in words
         self._keeps = keeps
         self.latest: PageScene | None = None
         self.goal: RoutePlace | None = None
@@ -138,6 +139,11 @@ class Mailbox:
         """The run is over; a history that was kept is played from now on."""
         self.summary = summary
         self.replay = self.replay or (self._keeps and len(self.history) > 0)
+        self._announce()
+
+    def fail(self, words: str) -> None:
+        """An error ends the run."""
+        self.failure = words
         self._announce()
 
     def add_check_in(self, check_in: CheckIn | Undo | Call) -> bool:

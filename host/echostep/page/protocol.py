@@ -92,9 +92,10 @@ class Refused:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """The server has a fault, in words; it closes the socket after this message."""
+    """The server has a fault, or the run was ended by an error, in words; the socket is closed after this message."""
 
     reason: str
+    ended: bool = False
     kind: Literal["failed"] = "failed"
 
 

@@ -34,6 +34,7 @@ from echostep.page.session import PageSession
 from echostep.page.shared import PageCounts, Shared
 from echostep.page.web import users
 from echostep.page.web.access import LOOPBACK, AccessControl
+from echostep.page.web.addresses import page_urls
 from echostep.page.web.connections import Connections
 from echostep.page.web.faults import Faults
 from echostep.page.web.gated_server import GatedServer
@@ -91,7 +92,7 @@ class SocketServer(Generic[S]):
         self._site = site
         self._listener = open_listener(address)
         token = None if address.host in LOOPBACK and not users.has_other_users() else secrets.token_urlsafe(16)
-        self.url = _url(self._listener, token)
+        self.urls = page_urls(*self._listener.getsockname()[:2], token)  # the likeliest first
         self.connections = Connections(self._listener)
         self.access_control = AccessControl(self._application(token), token, self.connections, site.faults.tell)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -121,6 +122,11 @@ class SocketServer(Generic[S]):
             self._server.run()
         except Exception as error:  # whatever it is, the run needs no page
             self._site.faults.note_end(error)
+
+    @property
+    def url(self) -> str:
+        """Address of the page for a browser."""
+        return self.urls[0]
 
     @property
     def pages(self) -> int:
@@ -214,14 +220,6 @@ class PageServer(SocketServer[PageSession]):
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._mailbox.on_publish = None
         super().__exit__(kind, error, at)
-
-
-def _url(listener: socket.socket, token: str | None) -> str:
-    """Address of the page for a browser; a socket on all interfaces is named by the host."""
-    host, port = listener.getsockname()[:2]
-    name = socket.gethostname() if host in ("0.0.0.0", "::") else host
-    name = f"[{name}]" if ":" in name else name
-    return f"http://{name}:{port}/" + (f"{token}/" if token else "")
 
 
 def open_listener(address: Address) -> socket.socket:

@@ -127,6 +127,9 @@ class PageSession(GuardedSocket):
             if (early_s := due_s - time.monotonic()) > 0.0:
                 await asyncio.sleep(early_s)
             self._news.clear()
+            if self._mailbox.failure:
+                await self.tell(protocol.encode(protocol.Failed(self._mailbox.failure, ended=True)))
+                return
             if self._cursor is None and self._mailbox.replay:
                 await self._begin_replay()
             if self._mailbox.summary is not None and not self._told_end:

@@ -16,7 +16,7 @@ from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from echostep.errors import EchostepError
+from echostep.errors import EchostepError, words_of
 from echostep.extras import lacks
 from echostep.guidance.guided_rescue import GuidedRescue
 from echostep.guidance.guided_run import guidance_of
@@ -111,6 +111,8 @@ class Session:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        if self.page and error is not None and not isinstance(error, KeyboardInterrupt):
+            self.page.fail(words_of(error))
         self._opened.__exit__(kind, error, at)
 
     def _open_drawing(self, opened: ExitStack) -> None:
@@ -138,6 +140,7 @@ class Session:
         if address is None:
             return
         from echostep.page.live import LivePage
+        from echostep.page.web.addresses import print_page
 
         page = LivePage(
             self.tracker,
@@ -148,7 +151,7 @@ class Session:
             keeps=self.source == "simulated",
             shared=self._drawing,
         )
-        console.print(f"The page: {page.url}", highlight=False)
+        print_page(console, page.server.urls)
         page.fault_sources.append(FaultNews().words)
         self.page = opened.enter_context(page)
         self._sinks.append(PageSink(page))
@@ -281,10 +284,19 @@ class Session:
         result = Result(title, self.estimates, truth, elapsed_s, losses, silent)
         write_results(self.output.folder, self.tracker, self.guided, result)
 
-    def keep_page_open(self) -> None:
-        """Serve the page after the run: while a browser shows it, or until Ctrl-C if that was asked for."""
+    def keep_page_open(self, again: str = "") -> None:
+        """Serve the page after the run: while a browser shows it, or until Ctrl-C if that was asked for.
+
+        `again`: the command that shows the run again; it is printed where no browser shows the page.
+        """
         page, stays = self.page, self.output.page_stays
-        if page is None or self._interrupted or not (stays or page.pages):
+        if page is None or self._interrupted:
+            return
+        if not (stays or page.pages):
+            if again:
+                console.print(
+                    f"No browser shows the page. To see the walk again: {again}", highlight=False, markup=False
+                )
             return
         end = "until" if stays else "while it is open, or until"
         console.print(f"The page stays at {page.url} {end} Ctrl-C.", highlight=False)

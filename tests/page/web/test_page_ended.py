@@ -3,15 +3,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from echostep import cli
+from echostep.errors import EchostepError
 from echostep.page.elements.true_position import TruePath
 from echostep.page.live import LivePage
-from echostep.ports.chunks import portion_of
+from echostep.ports.chunks import Portion, portion_of
+from echostep.session.options import OutputOptions
+from echostep.session.session import Session
 from echostep.tracker import Tracker
 from page.browser import LOCAL, PLAN, SETTLED, opened_page, wait_for
 from walks import walk_chunks
@@ -48,6 +53,54 @@ def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any, tmp
         page.click("#play")
         wait_for(page, f"{STATUS} === 'tracking' && echostep.last.play.playing && !echostep.last.ended")
         page.context.close()
+
+
+@pytest.mark.parametrize(
+    ("size", "error"),
+    [
+        ("phone", EchostepError("/dev/ttyACM0: the firmware is older than this program: echostep flash writes it")),
+        ("desk", OSError(28, "No space left on device", "out/live/walk.mcap")),
+    ],
+)
+def test_an_error_that_ends_the_run_is_on_the_page_in_the_words_of_the_terminal(
+    browser: Any,
+    tmp_path: Path,
+    size: str,
+    error: Exception,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pages: list[Any] = []
+
+    def portions(url: str) -> Iterator[Portion]:
+        pages.append(opened_page(browser, viewport=SIZES[size]))
+        pages[0].goto(url)
+        chunks = walk_chunks()
+        for k in range(0, len(chunks), 500):
+            yield portion_of(chunks[k : k + 500])
+        wait_for(pages[0], "echostep.last?.told")
+        raise error
+
+    def run() -> None:
+        output = OutputOptions(tmp_path, terminal=False, page=LOCAL)
+        with Session(Tracker(PLAN, seed=1), "echostep live", "live", output) as session:
+            assert session.page
+            session.track(portions(session.page.url))
+
+    monkeypatch.setattr(cli, "app", run)
+    with pytest.raises(SystemExit):
+        cli.main()
+    said = capsys.readouterr().err.removeprefix("echostep: ").strip()
+    (page,) = pages
+    wait_for(
+        page, f"{STATUS} === 'ended' && document.getElementById('status-text').textContent === 'ended by an error'"
+    )
+    assert page.inner_text("#fault") == said
+    page.evaluate("echostep.link.wait = 50")
+    wait_for(page, "echostep.link.failures > 4")  # the server is away; that it does not answer is no other error
+    page.screenshot(path=tmp_path / f"failed-{size}.png")
+    assert page.inner_text("#fault") == said
+    page.context.close()
 
 
 def rgb(colour: str) -> str:

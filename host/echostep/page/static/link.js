@@ -7,7 +7,7 @@ const REFUSALS = 4;  // connections in a row that failed, after two seconds, bef
 export class Link {
   // `parse`: bytes of a frame -> frame.
   constructor({ onHello, onFrame, onRefused, onFailed, onConsidered, onState, parse = parseFrame }) {
-    Object.assign(this, { onHello, onFrame, onRefused, onFailed, onConsidered, onState, parse, wait: 250, failures: 0 });
+    Object.assign(this, { onHello, onFrame, onRefused, onFailed, onConsidered, onState, parse, wait: 250, failures: 0, explained: false });
     this.open();
   }
 
@@ -20,7 +20,7 @@ export class Link {
     this.socket.onclose = () => {
       this.onState(false);
       this.failures += 1;
-      if (this.failures === REFUSALS) this.onFailed('No connection to the tracker: has it ended? A proxy must pass WebSockets, and the browser\'s Host or X-Forwarded-Host.');
+      if (this.failures === REFUSALS && !this.explained) this.onFailed('No connection to the tracker: has it ended? A proxy must pass WebSockets, and the browser\'s Host or X-Forwarded-Host.');
       setTimeout(() => this.open(), this.wait);
       this.wait = Math.min(2 * this.wait, LONGEST_WAIT_MS);
     };
@@ -30,13 +30,15 @@ export class Link {
     if (message.kind === 'hello') {
       this.wait = 250;
       this.failures = 0;
+      this.explained = false;
       this.onState(true);
       this.onHello(message);
     } else if (message.kind === 'refused') this.onRefused(message.reason);
     else if (message.kind === 'considered') this.onConsidered(message);
     else if (message.kind === 'failed') {
       this.wait = LONGEST_WAIT_MS;
-      this.onFailed(message.reason);
+      this.explained = true;  // what is then not answered is no news
+      this.onFailed(message.reason, message.ended);
     }
   }
 

@@ -19,14 +19,14 @@ const $ = (id) => document.getElementById(id);
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas'));
 const panel = new Panel((level) => { setFollows(false); showLevel(level); });
 const scene = { frame: null, cloud: null, drawing: null, marks: [], trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0 };
-let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, metNumber = 0, invited = false, connected = false, awake = false;
+let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, metNumber = 0, invited = false, connected = false, broken = false, awake = false;
 
 const taps = new Taps(view, {
   send: (kind, fields) => link.send(kind, fields), changed: () => { scene.tapped = taps.ghost; dirty = true; }, mayCheckIn: () => !$('here').hidden,
   keptHeading: () => (scene.frame?.told?.heading_known ? scene.frame.told.heading_rad : null),
 });
 const link = new Link({
-  onHello: hello, onFrame: frame, onRefused: (reason) => hint(reason, 6000), onFailed: (reason) => panel.fault(reason), onConsidered: (answer) => taps.considered(answer), onState: connection,
+  onHello: hello, onFrame: frame, onRefused: (reason) => hint(reason, 6000), onFailed: failed, onConsidered: (answer) => taps.considered(answer), onState: connection,
 });
 const speech = new Speech($('speech'), $('sentence'), $('invitation'), $('unspoken'));
 const showLegend = startLegend($('legend-button'), LIVE);
@@ -83,7 +83,14 @@ async function showLevel(level) {
 
 function connection(open) {
   connected = open;
-  if (!open) panel.status('waiting', 'not connected');
+  if (open) broken = false;
+  else panel.status(broken ? 'ended' : 'waiting', broken ? 'ended by an error' : 'not connected');
+}
+
+// `ended`: the reason is the error that ended the run.
+function failed(reason, ended) {
+  broken = Boolean(ended);
+  panel.fault(reason);
 }
 
 // Store a frame; it is drawn with the next animation frame. A hidden page draws nothing, so it reports no frame as drawn and gets no more of them.

@@ -44,6 +44,7 @@ WATCHED_SPEED = 4.0  # times real time, on a terminal: a walk of 90 s is seen in
 WATCHED_PORTION = 16
 UNSEEN_PORTION = 1000  # chunks that are tracked together when nothing shows the run: fewer calls
 FOOT_BOARD = 2  # seed of its simulator: another board than the belt's
+_DEMO_PLAN = files("echostep") / "plans" / "demo.json"
 TOUR_CORNER_M = 0.3  # how far corners are cut on a tour: doors of any plan are passed without touching them
 
 
@@ -80,7 +81,7 @@ def demo(options: DemoOptions, output: OutputOptions) -> None:
 def _plan_file(options: DemoOptions) -> AbstractContextManager[Path]:
     """The plan's file; that of the demo may be inside an archive."""
     path = options.plan_path
-    return as_file(files("echostep") / "plans" / "demo.json") if path is None else nullcontext(path)
+    return as_file(_DEMO_PLAN) if path is None else nullcontext(path)
 
 
 def _board(options: DemoOptions) -> Board:
@@ -126,7 +127,15 @@ def _track(
             session.track(until_asked(portions), lambda: scenario.fraction, recorder)
         print_notices(recorder.notices)
         session.finish("simulated walk", load_truth(output.folder / "truth.csv"))
-        session.keep_page_open()
+        session.keep_page_open(_again(recorder.path, options))
+
+
+def _again(recording: Path, options: DemoOptions) -> str:
+    """The command that plays a demo's recording on the page."""
+    plan = options.plan_path or Path(str(_DEMO_PLAN))
+    here = Path.cwd()
+    paths = [str(p.resolve().relative_to(here) if p.resolve().is_relative_to(here) else p) for p in (recording, plan)]
+    return shlex.join(["echostep", "replay", paths[0], "--plan", paths[1], "--page"])
 
 
 def _place_text(plan: Plan, waypoints: Sequence[Waypoint]) -> str:
