@@ -92,7 +92,8 @@ class SocketServer(Generic[S]):
         self._site = site
         self._listener = open_listener(address)
         token = None if address.host in LOOPBACK and not users.has_other_users() else secrets.token_urlsafe(16)
-        self.urls = page_urls(*self._listener.getsockname()[:2], token)  # the likeliest first
+        host, port = self._listener.getsockname()[:2]
+        self.urls = page_urls(host, port, token)  # the likeliest first
         self.connections = Connections(self._listener)
         self.access_control = AccessControl(self._application(token), token, self.connections, site.faults.tell)
         self._loop: asyncio.AbstractEventLoop | None = None
