@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import re
 import subprocess
@@ -13,13 +14,15 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from rich.console import Console
 
-from board_runs import ROOT
+from board_runs import ROOT, quiet_rows
 from command_line import echostep
 from echostep.board import messages as m
 from echostep.board.calibration import GyroSettings, gyro_rates
-from echostep.commissioning.calibrate import STILL_S, TURN_S, WALK_S
-from echostep.commissioning.fitting import fit_compass, fit_gyros, fit_legs, fit_mounting, still_bias
+from echostep.commissioning.calibrate import STILL_S, TURN_S, WALK_S, Ports, Wearer
+from echostep.commissioning.calibrate import calibrate as calibrate_parts
+from echostep.commissioning.fitting import doubt, fit_compass, fit_gyros, fit_legs, fit_mounting, still_bias
 from echostep.commissioning.probe import ProbeResult, _Probe
 from echostep.errors import EchostepError
 from echostep.legs.kinematics import LegLengths
@@ -30,7 +33,7 @@ from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.devices.board_sensors import Adis16100Model
 from echostep.simulation.people.walker import Person, walk
 from echostep_studies.simulation.devices.rehearsal import Act, Rehearsal
-from players import pseudo_terminal, python_board
+from players import pseudo_terminal, python_board, some_noise
 
 COUNT_RAD_S = math.radians(0.2439)
 
@@ -58,20 +61,30 @@ def turn(seconds: float, degrees: float, reversed_: bool = False) -> ProbeResult
     return heard(rate, np.minimum(np.floor(bearing), 3599))
 
 
+USUAL = {"thigh": 9, "calf": -12, "belt": 5}  # biases in counts
+
+
+def usual(rows: NDArray[Any], start_ms: int) -> None:
+    """A quiet person whose gyros have biases that are usual."""
+    some_noise(rows, start_ms)
+    for name, count in USUAL.items():
+        rows[name] += count - quiet_rows(1)[name][0]
+
+
 @pytest.mark.long
 def test_biases_go_into_a_file_that_the_tracker_reads(tmp_path: Path) -> None:
     out = tmp_path / "me.toml"
     out.write_text("[foot]\nheight_m = 1.8\n\n[gyro]\nbelt_reversed = true\n")
-    with python_board() as port:
+    with python_board(usual) as port:
         done = calibrate("gyros", "--board", port, "--out", out)
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
     settings = parse_settings(out.read_text(), "me.toml")
     assert settings.foot.height_m == 1.8  # what was there stays
     assert settings.gyro.belt_reversed
-    for name, counts in (("thigh", 41), ("calf", -82), ("belt", 5)):
+    for name, counts in USUAL.items():
         assert getattr(settings.gyro, f"{name}_bias_rad_s") == pytest.approx(counts * COUNT_RAD_S, abs=0.0015)
-    assert re.search(r"thigh \+(9\.9|10\.0)\d degrees/s \(noise 0\.[56]\d\)", done.stdout), done.stdout
+    assert re.search(r"thigh \+2\.[12]\d degrees/s \(noise 0\.[56]\d\)", done.stdout), done.stdout
 
 
 @pytest.mark.parametrize("reversed_", [False, True])
@@ -156,6 +169,51 @@ def test_who_moves_is_told() -> None:
         fit_gyros(heard(rng.normal(400.0, 2.5, 2_000)))
     with pytest.raises(EchostepError, match="no gyro gives values"):
         fit_gyros(ProbeResult())
+
+
+EVEN = np.arange(2_000) * 0.0 + 19.7 / 0.2439  # counts of a turn at 19.7 degrees/s
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"gyro": {"belt_bias_rad_s": math.radians(19.7)}}, r"belt gyro: a bias of \+19.7 degrees/s"),
+        ({"wearer": {"leg_scale": 2.1}}, r"legs: strides 2.10 times as long"),
+        ({"gyro": {"calf_bias_rad_s": math.radians(-4.0), "belt_reversed": True}, "wearer": {"leg_scale": 1.2}}, r"^$"),
+    ],
+)
+def test_values_that_hardly_anybody_has_are_doubted(values: dict[str, dict[str, float | bool]], words: str) -> None:
+    assert re.search(words, doubt(values))
+
+
+@pytest.mark.parametrize("answer", ["y", "", None])
+def test_an_even_turn_is_no_bias_unless_a_person_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answer: str | None
+) -> None:
+    """`answer` None: nobody is at the terminal."""
+    out, asked = tmp_path / "me.toml", []
+
+    def said(prompt: str = "") -> str:
+        asked.append(prompt)
+        return answer or ""
+
+    console = Console(file=io.StringIO(), soft_wrap=True)
+    monkeypatch.setattr(console, "input", said)
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(isatty=lambda: answer is not None))
+    monkeypatch.setattr("echostep.commissioning.calibrate.find_boards", lambda *_: ("x", None))
+    monkeypatch.setattr("echostep.commissioning.calibrate.access_findings", lambda *_: [])
+    monkeypatch.setattr("echostep.commissioning.calibrate._probe", lambda *_: heard(EVEN))
+    wearer = Wearer(0.43, 0.43, 10.0)
+    if answer == "y":
+        calibrate_parts(Ports("x"), ["gyros"], wearer, out, console)
+        assert parse_settings(out.read_text(), "me.toml").gyro.belt_bias_rad_s == pytest.approx(
+            math.radians(19.7), abs=0.01
+        )
+    else:
+        with pytest.raises(EchostepError, match=r"a turn at an even pace looks like that.*nothing was written of it"):
+            calibrate_parts(Ports("x"), ["gyros"], wearer, out, console)
+        assert not out.exists()
+    assert bool([prompt for prompt in asked if "Write it all the same? [y/N]" in prompt]) is (answer is not None)
 
 
 def test_a_start_or_a_cough_in_between_does_no_harm() -> None:

@@ -18,7 +18,7 @@ from echostep.board import messages as m
 from echostep.board.faults.health import Severity
 from echostep.board.frames import encode
 from echostep.commissioning import serial_ports as ports
-from echostep.commissioning.diagnosis import Diagnosis, judge_board
+from echostep.commissioning.diagnosis import Diagnosis, judge_board, judge_mtx
 from echostep.commissioning.doctor import examine
 from echostep.commissioning.probe import ProbeResult, _Probe, drift_of
 from echostep.commissioning.serial_ports import PortSeen, Role
@@ -147,6 +147,21 @@ def test_an_mtx_that_is_silent_is_a_finding() -> None:
     with pseudo_terminal() as (_, port):
         report = examine(None, port, 2.5)
     assert any(f.subject == "MTx" and f.severity is Severity.FAULT for f in report.findings), report.findings
+
+
+@pytest.mark.parametrize(
+    ("arrived_s", "words"), [([], "no sample was received"), ([1.0, 1.01], "only 2 samples were received")]
+)
+def test_an_mtx_that_answers_but_measures_nothing_says_so(arrived_s: list[float], words: str) -> None:
+    """What was said while it was set up is no fault."""
+    probed = ProbeResult(seconds=6.0, mtx_messages=["MTx: configured: 100 Hz"], mtx_times_s=arrived_s)
+    probed.bytes_of["mtx"] = 400
+    report = Diagnosis()
+    judge_mtx(report, probed, with_board=False)
+    (finding,) = report.findings
+    assert finding.what.startswith(words)
+    assert (finding.severity, finding.subject) == (Severity.FAULT, "MTx")
+    assert "configured" not in str(finding)
 
 
 def test_nothing_plugged_in(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,7 +2,7 @@
 """The twin in real time: a simulated walk in the demo building, the board and the MTx on two pseudo terminals (`make twin`).
 
 In: the ELF and the twin; the MTx begins with its factory settings and accepts its configuration. Out: two ports for `echostep live`, and the
-true path in out/twin/truth.csv. The walk begins when the board's port is opened, and is repeated until Ctrl-C. With
+true path in out/twin/truth.csv. The walk begins when the board's port is opened, each time anew, and is repeated until Ctrl-C. With
 `--beacons udp://127.0.0.1:9000` a simulated gateway sends the readings of beacons along the walk to that port. With `--still`
 the wearer moves as `echostep calibrate` requests; boxes of the kit of 2026 lie as `calibrate accelerometers` requests. Owns both pseudo terminals.
 """
@@ -107,6 +107,20 @@ class PtyBoard:
                 pipe.close()
 
 
+class Gateway:
+    """The clock of the beacons' gateway beside a walk; once the walk is `left`, its thread ends."""
+
+    def __init__(self, board: PtyBoard) -> None:
+        self._board = board
+        self.left = False
+
+    def now_s(self) -> float:
+        """Board time; raises SystemExit, which ends a thread silently, when the walk was left."""
+        if self.left:
+            raise SystemExit
+        return self._board.t_s
+
+
 class PtyMtx:
     """A simulated MTx on a pseudo terminal, which answers the host's requests."""
 
@@ -164,10 +178,9 @@ def wait_for_opening(board: PtyBoard, mtx: PtyMtx, expected: Callable[[], bool] 
         time.sleep(IDLE_MS * 1e-3)
 
 
-def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> None:
-    """Play one walk in real time."""
-    for _ in playing(scenario, board, mtx):
-        pass
+def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> bool:
+    """Play one walk in real time; returns whether it was played to its end: it is left when the program closes the board's port."""
+    return all(board.is_open for _ in playing(scenario, board, mtx))
 
 
 def playing(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> Iterator[float]:
@@ -194,8 +207,8 @@ def playing(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> Iterator[float]
         yield now_s
 
 
-def play_2026(plan: Plan, seed: int, board: PtyBoard, foot_board: PtyBoard, truth: Path) -> None:
-    """Wait for an opening of the board's port, then play one walk with both boards of 2026 in real time."""
+def play_2026(plan: Plan, seed: int, board: PtyBoard, foot_board: PtyBoard, truth: Path) -> bool:
+    """Wait for an opening of the board's port, then play one walk with both boards of 2026 in real time; returns as `play` does."""
     scenario = Scenario(plan, DEMO_WAYPOINTS, seed, board, kit=Kit.OF_2026, foot_board=foot_board)
     foot = scenario.foot
     assert isinstance(foot, FootBoardPort)
@@ -208,8 +221,11 @@ def play_2026(plan: Plan, seed: int, board: PtyBoard, foot_board: PtyBoard, trut
     for start in range(0, len(scenario.walk.t_s), BLOCK_MS):
         board.advance(scenario.sensors.rows(start, start + BLOCK_MS))
         foot_board.advance(foot.sensors.rows(start, start + BLOCK_MS))
+        if not board.is_open:
+            return False
         due_s = max(due_s + BLOCK_MS * 1e-3, time.monotonic() - LATE_S)
         time.sleep(max(0.0, due_s - time.monotonic()))
+    return True
 
 
 def run_2026(seed: int, out: Path, *, once: bool) -> int:
@@ -222,8 +238,7 @@ def run_2026(seed: int, out: Path, *, once: bool) -> int:
               f"  .venv/bin/echostep live --plan {path} --board {boards[0].port} --foot {boards[1].port}\n\nCtrl-C ends.", flush=True)  # fmt: skip
     try:
         while True:
-            play_2026(plan, seed, *boards, out / "truth.csv")
-            if once:
+            if play_2026(plan, seed, *boards, out / "truth.csv") and once:
                 break
     except KeyboardInterrupt:
         pass
@@ -321,15 +336,18 @@ def main() -> int:
         if options.still:
             rehearse(Rehearsal(plan, options.seed, board), board, mtx)
         while True:
-            scenario = demo_scenario(plan, options.seed, board)
+            scenario, gateway = demo_scenario(plan, options.seed, board), None
             wait_for_opening(board, mtx)
             truth = options.out / "truth.csv"
             scenario.write_truth(truth, board.t_s)
             if options.beacons:
-                arguments = (path, truth, options.beacons, SPACING_M, 1.0, options.seed, lambda: board.t_s)
+                gateway = Gateway(board)
+                arguments = (path, truth, options.beacons, SPACING_M, 1.0, options.seed, gateway.now_s)
                 threading.Thread(target=simulate_gateway, args=arguments, daemon=True).start()
-            play(scenario, board, mtx)
-            if options.once:
+            ended = play(scenario, board, mtx)
+            if gateway:
+                gateway.left = not ended
+            if ended and options.once:
                 break
     except KeyboardInterrupt:
         pass

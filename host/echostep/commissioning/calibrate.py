@@ -20,7 +20,7 @@ from rich.console import Console
 
 from echostep.board.calibration import GYROS
 from echostep.board.faults.health import Severity, board_findings
-from echostep.commissioning.fitting import Fit, fit_compass, fit_gyros, fit_legs, fit_mounting
+from echostep.commissioning.fitting import Fit, Values, doubt, fit_compass, fit_gyros, fit_legs, fit_mounting
 from echostep.commissioning.listening_bar import listening_bar
 from echostep.commissioning.port_search import find_boards
 from echostep.commissioning.poses import described, measure_poses
@@ -108,6 +108,7 @@ def calibrate(ports: Ports, names: list[str], wearer: Wearer, out: Path, console
         for part in (part for part in parts if part.request == request):
             values_of_section, line = part.fit(probed, _known(sections, out), wearer)
             console.print(line)
+            _check_usual(values_of_section, console)
             for section, values in values_of_section.items():
                 sections.setdefault(section, {}).update(values)
             _write(out, sections)
@@ -147,6 +148,13 @@ def _check_wearer(wearer: Wearer) -> None:
 def _wait(console: Console) -> None:
     if sys.stdin.isatty():
         console.input("Press Enter to begin. ")
+
+
+def _check_usual(values: dict[str, Values], console: Console) -> None:
+    """Ask a person before values are written that are hardly true; raises EchostepError where nobody can be asked, or who is does not want them."""
+    words = doubt(values)
+    if words and not (sys.stdin.isatty() and console.input(f"{words}. Write it all the same? [y/N] ").lower() == "y"):
+        raise EchostepError(f"{words}; nothing was written of it")
 
 
 def _probe(port: str, seconds: float, text: str, console: Console) -> ProbeResult:

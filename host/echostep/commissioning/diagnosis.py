@@ -227,14 +227,22 @@ def _clock_findings(drift: Drift, subject: str) -> list[Finding]:
     return findings
 
 
+def _mtx_fault(probed: ProbeResult) -> str:
+    """Why there is no rate of samples. What was said while it was set up is a fault only where nothing came."""
+    if probed.mtx_fault or not probed.bytes_of[MTX]:
+        return probed.mtx_fault or (probed.mtx_messages or ["nothing was received"])[-1]
+    count = len(probed.mtx_times_s)
+    few = f"only {count} sample{'s were' if count > 1 else ' was'}" if count else "no sample was"
+    return f"{few} received, though it answers: is it in measurement mode? unplug it and plug it in again"
+
+
 def judge_mtx(report: Diagnosis, probed: ProbeResult, *, with_board: bool) -> None:
     """Add facts and findings on the MTx; `with_board`: a board that times its SyncOut was probed too."""
     for message in probed.mtx_messages:
         report.lines.append(f"MTx       {message.removeprefix('MTx: ')}")
     rate_hz, wanted_hz = probed.mtx_hz, MtxTiming().rate_hz
     if probed.mtx_fault or not probed.bytes_of[MTX] or math.isnan(rate_hz):
-        fault = probed.mtx_fault or (probed.mtx_messages or ["no sample was received"])[-1]
-        what, _, remedy = fault.removeprefix("MTx: ").partition(": ")
+        what, _, remedy = _mtx_fault(probed).removeprefix("MTx: ").partition(": ")
         report.findings.append(
             Finding(Severity.FAULT, "MTx", what, remedy or "check its supply, its cable and the port")
         )

@@ -34,6 +34,8 @@ STILL_SD_RAD_S = math.radians(
 )  # of a piece at rest; noise of an ADIS16100 is 0.6 degrees/s in 40 Hz, a swaying wearer gives more
 STILL_SPREAD_RAD_S = math.radians(1.0)  # largest distance of a piece's mean from the median of the means
 BIAS_MAX_RAD_S = math.radians(30.0)
+USUAL_BIAS_DEG_S = 5.0  # five standard deviations of parts at room temperature (1 degree/s, as simulated; assumed)
+USUAL_SCALE = (0.7, 1.4)  # of strides by legs whose lengths are known to a few centimetres; assumed
 LEAST_STILL = 0.6  # share of pieces at rest
 FULL_TURN_RAD = math.radians(300.0)  # a turn of 360 degrees, not quite finished
 SWAPPED_RATIO = 1.15  # of the rates' sd, thigh to calf; in walking the shank turns faster than the thigh
@@ -113,6 +115,22 @@ def fit_gyros(probed: ProbeResult) -> Fit:
     if not values:
         raise EchostepError("no gyro gives values: run echostep doctor")
     return {"gyro": values}, "Bias: " + ", ".join(parts)
+
+
+def doubt(values: dict[str, Values]) -> str:
+    """Why fitted values are hardly those of a part or a person, and what to repeat; empty where nothing is odd."""
+    for name in GYROS:
+        bias = math.degrees(values.get("gyro", {}).get(f"{name}_bias_rad_s", 0.0))
+        if abs(bias) > USUAL_BIAS_DEG_S:
+            why = (
+                f"a bias of {bias:+.1f} degrees/s is more than a sound gyro has; a turn at an even pace looks like that"
+            )
+            return f"{name} gyro: {why}: stand still, or lay everything on a table, and do it again"
+    scale = values.get("wearer", {}).get("leg_scale", 1.0)
+    if not USUAL_SCALE[0] <= scale <= USUAL_SCALE[1]:
+        why = f"strides {scale:.2f} times as long as the legs' lengths give are nobody's"
+        return f"legs: {why}: check --walked, --thigh and --shank, walk straight on, and do it again"
+    return ""
 
 
 def _turn(probed: ProbeResult, settings: Settings) -> tuple[Floats, Floats, Floats, Floats]:

@@ -16,7 +16,14 @@ from echostep.arrays import Bools, Floats, Ints, spans
 from echostep.mapping.graph.companions import ALONG_SD_RAD, course_of
 from echostep.mapping.graph.graph import Graph
 from echostep.mapping.graph.nodes import Pings
-from echostep.mapping.walls.evidence import add_crossings, cell_counts, explained_by_ends, is_straight, ping_poses
+from echostep.mapping.walls.evidence import (
+    add_crossings,
+    add_sights,
+    cell_counts,
+    explained_by_ends,
+    is_straight,
+    ping_poses,
+)
 from echostep.mapping.walls.lines import Lines, find_lines, joined
 from echostep.mapping.walls.segments import ACROSS, ANY, ASKEW, Run, find_runs, meets, segments_of
 from echostep.mapping.walls.wall_sd import wall_sds
@@ -79,6 +86,7 @@ def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
     straight = _selected(lines, aligned)
     cells = cell_counts(straight, poses, pings.range_m, free, ahead)
     add_crossings(straight, paths, cells)
+    add_sights(straight, poses, pings.range_m, ahead, cells)
     candidates = find_runs(cells, ACROSS if lines.aligned.any() else ANY)
     runs = _without_lone(candidates, straight, LONE_M, placed_pings, cells.of)
     if not aligned.all():
@@ -87,12 +95,14 @@ def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
         askew = _selected(lines, ~aligned)
         more = cell_counts(askew, poses, pings.range_m, free, ahead)
         add_crossings(askew, paths, more)
+        add_sights(askew, poses, pings.range_m, ahead, more)
         candidates = _without_lone(find_runs(more, ASKEW), askew, LONE_ASKEW_M, placed_pings, more.of)
         with_runs = sorted({run.line for run in candidates})
         both = joined(straight, _selected(askew, np.isin(np.arange(len(askew.rho_m)), with_runs)))
         runs += [run._replace(line=len(straight.rho_m) + with_runs.index(run.line)) for run in candidates]
         cells = cell_counts(both, poses, pings.range_m, np.ones(len(poses), np.bool_), ahead)
         add_crossings(both, paths, cells)
+        add_sights(both, poses, pings.range_m, ahead, cells)
         straight = both
     walls = segments_of(straight, runs, cells)
     return Drawing(walls, wall_sds(graph, pings, poses, straight, runs, cells.of), paths)

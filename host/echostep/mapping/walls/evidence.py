@@ -21,6 +21,7 @@ from echostep.mapping.graph.nodes import Pings
 from echostep.mapping.walls.lines import Lines
 
 CELL_M = 0.05
+SMOOTH = 2  # cells to either side that a ping speaks for: 8.5 cm between two pings of a ranger at 1.2 m/s
 MARGIN_M = 2.0  # of cells beyond the extent of a line's fragments
 FITS_M = 0.1  # of a range from the distance of the line
 BEYOND_M = 0.18  # a range longer by more than so much passed through the cell
@@ -29,6 +30,8 @@ BEYOND_M = 0.5  # beyond the extent of its fragments, within which a line explai
 HALF_TRUNK_M, CROSSED = 0.25, 100.0  # the path leads through an opening at least so wide; weight of that against pings
 CORNER_M = 0.15  # of a range from the distance of a corner
 TURNING_RAD = math.radians(15.0)  # turn of a stride
+SIGHT_M = 1.0  # behind a line: more than the thickness of walls, and than the error of its place; assumed
+DOOR_M = 0.9  # clear width of a door that wheelchairs pass [DIN 18040-1]; that of a door which was only seen is assumed
 SURE_RAD, SURE_M = math.radians(15.0), 3.0  # within which a wall is hardly ever missed
 
 
@@ -93,6 +96,35 @@ def _add_crossings(lines: Lines, path_m: Floats, cells: Cells) -> None:
             if low < high:
                 cells.passed[line, low:high] += CROSSED
                 cells.heard[line, low:high] = 0.0
+
+
+def add_sights(lines: Lines, poses: Floats, range_m: Floats, straight: Bools, cells: Cells) -> None:
+    """Cells of lines through which a ranger has seen are open, a door's width about the middle of what it saw.
+
+    Beside a door the edges of its jambs answer within FITS_M of the wall's distance: only a few pings through its middle tell it from a wall.
+    """
+    half = round(0.5 * DOOR_M / CELL_M)
+    for line in range(len(cells.size)):
+        seen = _seen_through(lines, line, poses, range_m, straight)
+        for group in np.split(seen, np.flatnonzero(np.diff(seen) > 0.5 * DOOR_M) + 1) if len(seen) else ():
+            middle = int((group.mean() - cells.first_m[line]) / CELL_M)
+            low, high = middle - half, middle + half
+            within = 2 * half <= low and high + 2 * half <= cells.size[line]
+            if not within or group[-1] - group[0] > DOOR_M or (cells.passed[line, low:high] >= CROSSED).any():
+                continue  # wider than a door: no wall; or walked through
+            if cells.heard[line, low - half : low].any() and cells.heard[line, high : high + half].any():
+                cells.passed[line, low + SMOOTH : high - SMOOTH] += CROSSED
+                cells.heard[line, low:high] = 0.0
+
+
+def _seen_through(lines: Lines, line: int, poses: Floats, range_m: Floats, straight: Bools) -> Floats:
+    """Places along a line, ascending, at which a ranger looked at it squarely and detected something SIGHT_M behind it, or more."""
+    c, s = math.cos(lines.normal_rad[line]), math.sin(lines.normal_rad[line])
+    distance = lines.rho_m[line] - c * poses[:, 0] - s * poses[:, 1]
+    off_axis = wrap(lines.normal_rad[line] + np.where(distance < 0.0, math.pi, 0.0) - poses[:, 2])
+    through = (np.abs(distance) < SURE_M) & (range_m > np.abs(distance) + SIGHT_M)
+    places: Floats = np.sort((c * poses[:, 1] - s * poses[:, 0])[through & straight & (np.abs(off_axis) < SURE_RAD)])
+    return places
 
 
 @kernel

@@ -13,10 +13,9 @@ import numpy as np
 
 from echostep.arrays import Floats, spans
 from echostep.mapping.graph.spots import SPOT_HALF_M
-from echostep.mapping.walls.evidence import CELL_M, CROSSED, Cells
+from echostep.mapping.walls.evidence import CELL_M, CROSSED, SMOOTH, Cells
 from echostep.mapping.walls.lines import Lines
 
-SMOOTH = 2  # cells to either side that a ping speaks for: 8.5 cm between two pings of a ranger at 1.2 m/s
 HEARD_ODDS, PASSED_ODDS = 1.0, 0.6  # weight of a ping from a cell, and of one that passed it
 BRIDGE_M, SILENT_BRIDGE_M = 0.3, 1.5  # longest gap that is closed: at any evidence, and where no ping passed
 # Farthest to the wall that an end is extended to, where no ping passed: a corridor and the corner that was cut
