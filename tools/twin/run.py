@@ -44,6 +44,7 @@ from places import OUT, TWIN
 
 BLOCK_MS, IDLE_MS = 10, 50
 FOOT_BOARD = 2  # seed of the one on the foot
+LEFT = "the board's port was closed: its next opening begins the walk anew"
 LATE_S = 0.5  # a delay behind real time that is reported
 
 
@@ -238,8 +239,11 @@ def run_2026(seed: int, out: Path, *, once: bool) -> int:
               f"  .venv/bin/echostep live --plan {path} --board {boards[0].port} --foot {boards[1].port}\n\nCtrl-C ends.", flush=True)  # fmt: skip
     try:
         while True:
-            if play_2026(plan, seed, *boards, out / "truth.csv") and once:
+            ended = play_2026(plan, seed, *boards, out / "truth.csv")
+            if ended and once:
                 break
+            if not ended:
+                print(LEFT, flush=True)
     except KeyboardInterrupt:
         pass
     finally:
@@ -349,6 +353,8 @@ def main() -> int:
                 gateway.left = not ended
             if ended and options.once:
                 break
+            if not ended:
+                print(LEFT, flush=True)
     except KeyboardInterrupt:
         pass
     finally:
