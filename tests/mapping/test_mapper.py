@@ -20,6 +20,7 @@ from echostep.mapping.walls.drawing import Drawing, draw
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.check import check_plan
 from echostep.plan.model import NO_PLAN, Pose, load_plan
+from echostep.plan.places.gaps import door_gaps
 from echostep.session.metadata import run_metadata
 from echostep.session.runs.recording import start_recording
 from echostep.simulation.devices.board import PythonBoard
@@ -62,6 +63,17 @@ def test_the_office_is_drawn(walk: SimulatedWalk, mapped: Mapped) -> None:
     assert check_plan(plan) == []
     assert plan.uncertainty_m is not None
     assert 0.01 < plan.uncertainty_m < 0.2
+
+
+def test_doors_that_were_only_passed_are_openings(walk: SimulatedWalk, mapped: Mapped) -> None:
+    """Five of the office's seven: two were walked through, three seen through; of the others no echo came back, and they are drawn as wall."""
+    plan, _ = plan_of(mapped, walk.pose_at(walk.segments[0].segment.t0_s), "drawn")
+    drawn = np.array([door.line for door in plan.levels[0].doors])
+    middles = 0.5 * (drawn[:, :2] + drawn[:, 2:])
+    doors = np.array([door.line for door in door_gaps(PLAN.levels[0])])
+    assert len(doors) == 7
+    away_m = [np.hypot(*(middles - middle).T).min() for middle in 0.5 * (doors[:, :2] + doors[:, 2:])]
+    assert sum(away < 0.2 for away in away_m) == 5, away_m
 
 
 def test_walls_are_known_as_well_as_the_path_that_drew_them(mapped: Mapped) -> None:
