@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from PIL import Image
 
 from echostep.arrays import Ints
+from echostep.localization.estimate import TrackStatus
 from echostep.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
 from echostep.plan.model import load_plan
 from echostep.simulation.devices.board import PythonBoard
@@ -57,6 +59,13 @@ def test_each_frame_shows_truth_estimate_ellipse_and_particles(walk: list[walk_p
     for colour in (TRACK_COLOUR, TRUTH_COLOUR, walk_picture.PARTICLE_COLOUR):
         assert pixels_of(last, colour) > 30, colour
     assert np.any(np.asarray(first) != np.asarray(last))
+
+
+def test_while_no_position_is_claimed_none_is_drawn(walk: list[walk_picture.Moment]) -> None:
+    lost = replace(walk[-1], estimate=replace(walk[-1].estimate, status=TrackStatus.LOST))
+    claimed, unclaimed = walk_picture.frames([walk[-1], lost], PLAN)
+    assert pixels_of(unclaimed, TRACK_COLOUR) < pixels_of(claimed, TRACK_COLOUR) - 30
+    assert pixels_of(unclaimed, walk_picture.PARTICLE_COLOUR) > 30
 
 
 def test_the_true_position_is_that_of_the_estimates_moment(walk: list[walk_picture.Moment]) -> None:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.estimate import Estimate
+from echostep.localization.estimate import Estimate, claims_place
 from echostep.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan, load_plan
@@ -98,8 +98,9 @@ def frames(walk: Sequence[Moment], plan: Plan) -> list[Image]:
         x_m, y_m = moment.estimate.x_m, moment.estimate.y_m
         near.set(xlim=(x_m - NEAR_M, x_m + NEAR_M), ylim=(y_m - NEAR_M, y_m + NEAR_M))
         off_m = math.dist((x_m, y_m), moment.truth_m)
+        error = f"error {off_m:.2f} m" if claims_place(moment.estimate.status) else "no position is claimed"
         whole.set_title(f"a simulated walk, {moment.estimate.t_s:.0f} s", fontsize=12)
-        near.set_title(f"{2 * NEAR_M:g} m of it: error {off_m:.2f} m", fontsize=12)
+        near.set_title(f"{2 * NEAR_M:g} m of it: {error}", fontsize=12)
         canvas.draw()
         pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
     return pictures
@@ -145,8 +146,13 @@ def _update(artists: dict[str, Any], walked: Sequence[Moment]) -> None:
     """Move the artists to the newest moment."""
     now = walked[-1]
     shape = now.estimate.ellipse95
+    claimed = np.array(
+        [(m.estimate.x_m, m.estimate.y_m) if claims_place(m.estimate.status) else (np.nan,) * 2 for m in walked]
+    )
+    for name in ("position", "ellipse"):  # as on the page: without a place nothing is drawn that looks like one
+        artists[name].set_visible(claims_place(now.estimate.status))
     artists["truth"].set_data(*np.array([m.truth_m for m in walked]).T)
-    artists["estimate"].set_data(*np.array([(m.estimate.x_m, m.estimate.y_m) for m in walked]).T)
+    artists["estimate"].set_data(*claimed.T)
     artists["particles"].set_data(*now.particles_m.T)
     artists["true position"].set_data([now.truth_m[0]], [now.truth_m[1]])
     artists["position"].set_data([now.estimate.x_m], [now.estimate.y_m])
