@@ -34,6 +34,8 @@ void pressure_start(uint32_t now)
 static void report(uint32_t now, const struct pressure_step *step)
 {
 	struct msg_pressure m = { now, step->pressure, step->temperature };
+	if (step->wrong_bits)
+		status_failed(DEVICE_PRESSURE, FAULT_BAD_VALUE);
 	status_ok(DEVICE_PRESSURE);
 	link_send(MSG_PRESSURE, msg_pack_pressure(link_body(), &m));
 }

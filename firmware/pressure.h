@@ -3,6 +3,7 @@
 #ifndef ECHOSTEP_PRESSURE_H
 #define ECHOSTEP_PRESSURE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 /* Finds and starts the barometer in 5 ms; the first sample comes after about 0.2 s. */
@@ -15,6 +16,7 @@ uint32_t pressure_run(uint32_t now);
 struct pressure_step {
 	uint32_t pressure;   /* counts of 0.25 Pa; 0: this step has measured none */
 	int16_t temperature; /* counts of 0.05 degC */
+	bool wrong_bits;     /* beside a pressure: its identity was not what it is */
 	uint8_t fault;       /* FAULT_*; not FAULT_NONE: the barometer must be sought anew */
 };
 

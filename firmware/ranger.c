@@ -93,6 +93,7 @@ static void schedule_next(struct ranger *r, uint32_t now)
 	r->tries = 0;
 	r->pinging = false;
 	r->pinged = first_kind(r);
+	r->ranging.fault = FAULT_NO_ANSWER;
 }
 
 static void report(const struct ranger *r, uint8_t outcome, uint16_t time_of_flight_us)
@@ -150,7 +151,19 @@ static void try_again(struct ranger *r, uint32_t now)
 		r->pinged++;
 		return;
 	}
-	miss(r, now, FAULT_NO_ANSWER);
+	miss(r, now, r->ranging.fault);
+}
+
+/* On a bus that is stuck nothing can be sought: what is left is a pulse ranger, which needs none. */
+static void fail_or_seek_on(struct ranger *r, uint32_t now)
+{
+	if (r->kind != UNKNOWN || r->pinged == PULSE || r->ranging.fault != FAULT_BUS_STUCK) {
+		fail(r, now, r->ranging.fault);
+		return;
+	}
+	r->pinged = PULSE;
+	r->pinging = false;
+	r->due = now;
 }
 
 /* The echo line is high: held by a module that has heard no echo, pulled up because nothing is plugged in, or stuck. */
@@ -161,7 +174,7 @@ static void hold(struct ranger *r, uint32_t now)
 		r->due = now + HOLD_TICKS;
 		return;
 	}
-	miss(r, now, parts_in(r->index) == PART_PULSE ? FAULT_ALWAYS_READY : FAULT_NO_ANSWER);
+	miss(r, now, parts_in(r->index) == PART_PULSE ? FAULT_ALWAYS_READY : r->ranging.fault);
 }
 
 static void trigger(struct ranger *r, uint32_t now)
@@ -197,7 +210,7 @@ static void advance(struct ranger *r, uint32_t now)
 		succeed(r, now);
 		break;
 	case RANGING_FAILED:
-		fail(r, now, r->ranging.fault);
+		fail_or_seek_on(r, now);
 		break;
 	case RANGING_REFUSED:
 		try_again(r, now);
@@ -225,6 +238,7 @@ static void start_one(uint8_t index, uint32_t slot)
 	if (!r->pinging) {
 		r->due = slot + jitter();
 		r->pinged = first_kind(r);
+		r->ranging.fault = FAULT_NO_ANSWER;
 	}
 }
 

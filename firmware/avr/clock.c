@@ -6,15 +6,16 @@
 #include "shared.h"
 
 #ifndef CLOCK_START
-#define CLOCK_START 0u /* tests start the clock near its wraps */
+#define CLOCK_START 0ul /* ticks; tests start the clock near its wraps */
 #endif
 
-static volatile uint16_t overflows = CLOCK_START;
+static volatile uint16_t overflows = (uint16_t)(CLOCK_START >> 16);
 
 void clock_start(void)
 {
 	TCCR1A = 0;
-	TCCR1B = BIT(CS11);                          /* 16 MHz / 8 */
+	TCCR1B = BIT(CS11);            /* 16 MHz / 8 */
+	TCNT1 = (uint16_t)CLOCK_START; /* the bootloader leaves the timer anywhere */
 	TIFR1 = BIT(ICF1) | BIT(OCF1A) | BIT(TOV1); /* the bootloader leaves flags */
 	TIMSK1 = BIT(OCIE1A) | BIT(TOIE1);
 }

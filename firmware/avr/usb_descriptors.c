@@ -19,7 +19,7 @@ static const uint8_t device_descriptor[] PROGMEM = {
 #define CONFIGURATION_SIZE 67
 static const uint8_t configuration_descriptor[] PROGMEM = {
 	9, 2, CONFIGURATION_SIZE, 0, 2, 1, 0, 0x80, 50,      /* two interfaces, bus powered, 100 mA */
-	9, 4, 0, 0, 1, 2, 2, 1, 0,                           /* communications interface, abstract control model */
+	9, 4, 0, 0, 1, 2, 2, 0, 0,                           /* communications interface, abstract control model, no AT commands */
 	5, 0x24, 0, 0x10, 0x01,                              /* CDC 1.10 */
 	5, 0x24, 1, 0, 1,                                    /* no call management */
 	4, 0x24, 2, 2,                                       /* line coding and line state */
