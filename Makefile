@@ -126,10 +126,10 @@ faults: $(READY) ## each fault of the twin and of the host during one walk: what
 	$(MAKE) --quiet -C tools/twin
 	$(TOOL) reliability.faults --page
 
-soak: $(READY) ## eight simulated hours of the firmware through the live pipeline: memory, losses, the clock's wraps, replay; HOURS=0.05 for less
+soak: $(READY) ## eight simulated hours of the firmware through the live pipeline: memory, losses, the clock's wraps, replay; HOURS=0.05 for less; WRAP=whole
 	$(MAKE) --quiet -C firmware
 	$(MAKE) --quiet -C tools/twin
-	$(TOOL) reliability.soak $(if $(HOURS),--hours $(HOURS))
+	$(TOOL) reliability.soak $(if $(HOURS),--hours $(HOURS)) $(if $(WRAP),--wrap $(WRAP))
 
 calls: $(READY) ## each call of the operating system fails in turn, in each command that runs: output, files, ports, sockets; on from where it stopped
 	$(TOOL) reliability.calls.campaign

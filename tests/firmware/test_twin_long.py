@@ -4,62 +4,70 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from board_runs import ROOT, TWIN, Bench, kinds, needs_twin, pings
+from board_runs import TWIN, Bench, kinds, needs_twin, pings
 from echostep.board import messages as m
 from echostep.board.subscription import SUBSCRIBE
 from echostep.simulation.devices.board import BoardProcess
 from echostep.simulation.stimulus import NO_SYNC, ROW
-from waiting import PATIENCE_S
+from twin.late_clock import HALF_WRAP, TICKS_S, TIMER_WRAP, WRAP, late_firmware
 
 pytestmark = needs_twin
-HALF_WRAP_S = 2**31 / 2e6  # after which a comparison of two times turns round [firmware/board.h]
-START_BEFORE_S = 4.0
+HALF_WRAP_S = HALF_WRAP / TICKS_S
 SECOND = np.zeros(1_000, ROW)
 SECOND["own_us"], SECOND["sync_us"] = 500, NO_SYNC
 
 
-def firmware_whose_clock_starts_at(overflows: int, folder: Path) -> Path:
-    """The firmware with another first value of the upper half of its clock."""
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of the firmware that is built again; make rebuilds only the clock for each start."""
     if not shutil.which("avr-gcc"):
         pytest.skip("avr-gcc is missing")
-    build = [
-        "make",
-        "-s",
-        "-C",
-        ROOT / "firmware",
-        f"BUILD={folder}",
-        f"CLOCK_START={overflows}u",
-        folder / "echostep.elf",
-    ]
-    subprocess.run(list(map(str, build)), check=True, timeout=PATIENCE_S)
-    return folder / "echostep.elf"
+    return tmp_path_factory.mktemp("late")
 
 
-@pytest.mark.parametrize("wrap_s", [HALF_WRAP_S, 2 * HALF_WRAP_S])
-def test_nothing_happens_when_the_clock_wraps(tmp_path: Path, wrap_s: float) -> None:
+# Seconds from the start to the wrap: while parts are sought, during the self-test, and while all are read.
+@pytest.mark.parametrize("before_s", [0.06, 0.6, 4.0])
+@pytest.mark.parametrize("wrap", [HALF_WRAP, WRAP])
+def test_nothing_happens_when_the_clock_wraps(folder: Path, wrap: int, before_s: float) -> None:
     """17.9 minutes after the start comparisons of times turn round, after 35.8 the clock itself."""
-    elf = firmware_whose_clock_starts_at(int((wrap_s - START_BEFORE_S) * 2e6) >> 16, tmp_path)
-    for kit in ("papers", "2026"):
-        bench = Bench(BoardProcess([str(TWIN), "--elf", str(elf)]))
-        bench.fault(f"kit={kit}")
-        bench.run(300)
-        bench.ask(SUBSCRIBE)
-        bench.run(1_500)
-        ticks = bench.status.ticks
-        rates = [kinds(bench.run(1_000)) for _ in range(4)]
-        bench.board.close()
-        assert (bench.status.ticks ^ ticks) >> 31  # the wrap lies between
+    start = wrap - int(before_s * TICKS_S)
+    for kit in ("papers", "2026", "foot"):
+        status = check_run(late_firmware(start, folder / str(start)), kit)
+        assert (status.ticks ^ start) >> 31  # the wrap lies between
+
+
+@pytest.mark.parametrize("start", [TIMER_WRAP - 1, TIMER_WRAP - 40, TIMER_WRAP - 4_000, 3 * TIMER_WRAP // 2])
+def test_the_timer_may_start_anywhere(folder: Path, start: int) -> None:
+    """The bootloader leaves Timer1 at any value, also just before it wraps."""
+    check_run(late_firmware(start, folder / str(start)), "2026")
+
+
+def check_run(elf: Path, kit: str) -> m.Status:
+    """Six seconds after a start: all that is wanted comes, nothing is lost. The last status."""
+    bench = Bench(BoardProcess([str(TWIN), "--elf", str(elf)]))
+    bench.fault(f"kit={kit}")
+    bench.run(300)
+    bench.ask(SUBSCRIBE)
+    bench.run(1_500)
+    rates = [kinds(bench.run(1_000)) for _ in range(4)]
+    bench.board.close()
+    assert {rate["Status"] for rate in rates} == {1}
+    if kit == "foot":
+        assert min(rate["Foot"] for rate in rates) >= 220
+        assert {x.errors for x in bench.messages if isinstance(x, m.FootHealth)} == {0}
+    else:
         assert min(rate["Ping"] for rate in rates) >= 29
         assert {rate["Gyros"] for rate in rates} <= {199, 200, 201}
-        assert {rate["Status"] for rate in rates} == {1}
         assert min(rate["Pressure"] for rate in rates) >= 8
-        assert not any(v for k, v in bench.status._asdict().items() if k.startswith(("dropped_", "errors_")))
+        assert not any(v for k, v in bench.status._asdict().items() if k.startswith("errors_"))
+    assert not any(v for k, v in bench.status._asdict().items() if k.startswith("dropped_"))
+    assert bench.reader.counts.lost == bench.reader.counts.rejected == 0
+    return bench.status
 
 
 @pytest.fixture

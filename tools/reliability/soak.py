@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A working day through the real firmware and the host's live pipeline: memory, losses, the wrap of the board's clock, and the replay.
 
-A stray edge a minute is on the input of SyncOut. In: the ELF and the twin; simulated hours. Out: figures with their limits, PASS or FAIL; exit
+A stray edge a minute is on the input of SyncOut; the board's clock starts `BEFORE_WRAP_S` before a wrap. In: the sources of the firmware, and the twin; simulated hours. Out: figures with their limits, PASS or FAIL; exit
 status 1 when one is missed. Owns the limits.
 
 The stages are those of `echostep live` from the ports on: check-ins, recording, subscription, tracker, page with a client, derived messages. In
@@ -42,13 +42,14 @@ from echostep.tracker import Tracker
 from places import OUT, PLAN, TWIN
 from reliability.campaign import options, report
 from reliability.long_tour import LongTour, TracedBoard
+from twin.late_clock import HALF_WRAP, TICKS_S, WRAP, late_firmware
 
 SEED = 1
 PORTION = 100  # chunks that are tracked together: about a tenth of a second
 SAMPLE_S = 60.0  # simulated, between two looks at the memory
 SETTLED_S = 1800.0  # from then on memory must not grow
-TICKS_S = 2_000_000  # of the board's clock [host/docs/design/time-and-frames.md]
-WRAP = 1 << 32
+BEFORE_WRAP_S = 60.0  # a stray edge lies before and behind it
+WRAPS = {"half": HALF_WRAP, "whole": WRAP}  # where comparisons of two times turn round, and where the clock itself does
 # Limits: what a day of 24 h may cost.
 HOST_MB_H, TWIN_MB_H = 8.0, 0.1
 SURE_M = 1.0
@@ -174,6 +175,14 @@ def run(seconds: float, folder: Path, board: TracedBoard | None = None, began_s:
     return measured
 
 
+def run_before_wrap(seconds: float, folder: Path, wrap: int, before_s: float = BEFORE_WRAP_S) -> Measured:
+    """`run` with the real firmware, whose clock starts so many seconds before it reaches `wrap`."""
+    start = wrap - round(before_s * TICKS_S)
+    elf = late_firmware(start, folder / "firmware")
+    board = BoardProcess([TWIN[0], "--elf", str(elf), "--seed", str(SEED)])
+    return run(seconds, folder, board, start / TICKS_S)
+
+
 def losses(tracker: Tracker) -> dict[str, int]:
     """Everything that counts a loss, of board, MTx and host, by name."""
     streams = tracker.streams
@@ -236,9 +245,14 @@ def figures(measured: Measured) -> list[tuple[str, str, str, bool | None]]:
 
 
 def main() -> int:
-    asked = options(__doc__, hours=(8.0, "simulated"), out=(OUT / "soak", "folder"))
+    asked = options(
+        __doc__,
+        hours=(8.0, "simulated"),
+        out=(OUT / "soak", "folder"),
+        wrap=([*WRAPS][0], "of the board's clock, before which it starts: half, whole"),
+    )
     asked.out.mkdir(parents=True, exist_ok=True)
-    measured = run(3600.0 * asked.hours, asked.out)
+    measured = run_before_wrap(3600.0 * asked.hours, asked.out, WRAPS[asked.wrap])
     measured.replays = replays(asked.out)
     return report(f"{asked.hours:g} simulated hours", figures(measured))
 

@@ -59,6 +59,7 @@ bool pin_is_pulled_up(char port, uint8_t pin);
 
 /* Sets the level that a chip drives onto a pin. Against an output of the processor: trace `contention on`. */
 void drive_pin(char port, uint8_t pin, bool level);
+bool pin_is_held(char port, uint8_t pin, bool level); /* a chip drives it to this level */
 void release_pin(char port, uint8_t pin); /* no chip drives it: its pull-up, or a zero */
 
 /* Replaces the functions that the program's reads and writes of a register call. */
@@ -106,6 +107,13 @@ enum { USB_STEPS_END = 0xFE, USB_STEP_BUS_RESET = 0xFF };
 const uint8_t *usb_system_step(unsigned step);
 int usb_system_first_size(void);
 bool usb_host_system(const char *value);
+
+/* usb_hub.c: what a hub in between changes. */
+unsigned usb_hub_debounce_ms(void);
+unsigned usb_hub_frame(void);
+void usb_hub_take(const uint8_t *bytes, unsigned length);
+void usb_hub_clear(void);
+bool usb_hub_fault(const char *value);
 
 /* usb_host.c: enumerates the device, opens the port, moves bytes. */
 void usb_host_start(void);   /* after power-up: registers its timer */
@@ -251,6 +259,12 @@ void hang_millisecond(void);
 void hang_spi_selected(void);
 void hang_end(void);
 bool hang_fault(const char *value);
+
+/* jtag.c */
+void jtag_init(void);
+void jtag_reset(void);
+bool jtag_owns_analog_pins(void);
+bool jtag_fault(const char *value);
 
 /* signature.c */
 void signature_init(void);

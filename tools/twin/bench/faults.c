@@ -36,6 +36,8 @@ static bool host_fault(const char *name, const char *value)
 {
 	if (!strcmp(name, "host_system"))
 		return usb_host_system(value);
+	if (!strcmp(name, "host_hub"))
+		return usb_hub_fault(value);
 	if (strcmp(name, "host"))
 		return false;
 	usb_host_stall(!strcmp(value, "stall"));

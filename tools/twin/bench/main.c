@@ -125,6 +125,11 @@ void drive_pin(char port, uint8_t pin, bool level)
 		bench_trace("contention on P%c%u", port, pin);
 }
 
+bool pin_is_held(char port, uint8_t pin, bool level)
+{
+	return (driven[port - 'B'].mask >> pin & 1) && (driven[port - 'B'].value >> pin & 1) == level;
+}
+
 void release_pin(char port, uint8_t pin)
 {
 	driven[port - 'B'].mask &= (uint8_t)~(1u << pin);

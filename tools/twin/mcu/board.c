@@ -11,7 +11,7 @@
 #include "twin.h"
 
 enum { MCUSR = 0x54, USBCON = 0xD8, USBE = 0x80 };
-enum { DDRB = 0x24, PORTB, DDRC = 0x27, DDRD = 0x2A, PORTD, RX_LED = 0x01, L_LED = 0x80, TX_LED = 0x20 };
+enum { DDRB = 0x24, PORTB, DDRC = 0x27, PORTC, DDRD = 0x2A, PORTD, RX_LED = 0x01, L_LED = 0x80, TX_LED = 0x20 };
 enum { POWER_ON = 1, EXTERNAL = 2, BROWN_OUT = 4, WATCHDOG = 8 };
 
 #define BOOTLOADER_MS 8000u
@@ -24,6 +24,8 @@ enum { POWER_ON = 1, EXTERNAL = 2, BROWN_OUT = 4, WATCHDOG = 8 };
 static bool with_bootloader = true, plugged = true;
 static uint8_t next_cause = POWER_ON;
 static unsigned bootloader_ms; /* left */
+static bool echo_resistor = true; /* in series in ECHO_R, as wired in firmware/hardware */
+static bool led_shorted;
 
 static void power_devices(void)
 {
@@ -94,6 +96,8 @@ static void after_reset(avr_t *a)
 	uint8_t cause = next_cause;
 
 	hang_end();
+	jtag_reset();
+	led_shorted = false;
 	if (supply_took_memory() || (cause & POWER_ON)) {
 		scramble_memory();
 		cause = POWER_ON;
@@ -115,6 +119,26 @@ static void after_reset(avr_t *a)
 		usb_host_unplug();
 }
 
+static void drive_leds(void)
+{
+	avr->data[DDRB] |= RX_LED;
+	avr->data[DDRC] |= L_LED;
+	avr->data[DDRD] |= TX_LED;
+}
+
+/* While the bootloader waits, its LED breathes: PC7 is driven high and low by turns, against what drives the right echo line. */
+static void breathe(void)
+{
+	bool level = bootloader_ms & 1;
+
+	drive_leds();
+	avr->data[PORTC] = (uint8_t)((avr->data[PORTC] & ~L_LED) | (level ? L_LED : 0));
+	if (echo_resistor || led_shorted || !pin_is_held('C', 7, !level))
+		return;
+	led_shorted = true;
+	bench_trace("contention on PC7, by the bootloader");
+}
+
 void board_reset(uint8_t cause)
 {
 	next_cause = cause;
@@ -130,9 +154,8 @@ static void end_bootloader(void)
 {
 	start_program();
 	avr->data[USBCON] |= USBE; /* the bootloader leaves the controller on, detached */
-	avr->data[DDRB] |= RX_LED;
-	avr->data[DDRC] |= L_LED;
-	avr->data[DDRD] |= TX_LED;
+	avr->data[PORTC] &= (uint8_t)~L_LED;
+	drive_leds();
 	timer_flags_left_over();
 	bench_trace("program starts");
 }
@@ -141,6 +164,8 @@ bool board_runs(void)
 {
 	if (bootloader_ms && plugged && !supply_in_brown_out() && --bootloader_ms == 0)
 		end_bootloader();
+	if (bootloader_ms && plugged)
+		breathe();
 	if (!plugged || supply_in_brown_out() || bootloader_ms)
 		return false;
 	if (supply_is_unreliable())
@@ -184,6 +209,12 @@ bool board_fault(const char *name, const char *value)
 		return supply_fuse(value);
 	if (!strcmp(name, "cpu"))
 		return hang_fault(value);
+	if (!strcmp(name, "jtag_fuse"))
+		return jtag_fault(value);
+	if (!strcmp(name, "echo_resistor")) {
+		echo_resistor = !strcmp(value, "1000");
+		return echo_resistor || !strcmp(value, "none");
+	}
 	if (!strcmp(name, "bootloader")) {
 		with_bootloader = !strcmp(value, "caterina");
 		return with_bootloader || !strcmp(value, "none");
@@ -194,6 +225,7 @@ bool board_fault(const char *name, const char *value)
 void board_init(void)
 {
 	signature_init();
+	jtag_init();
 	supply_init();
 	avr->reset = after_reset;
 	after_reset(avr);

@@ -80,6 +80,7 @@ static void trigger_changed(struct avr_irq_t *irq, uint32_t level, void *param)
 	bool was = r->trigger;
 
 	(void)irq;
+	level = level && !jtag_owns_analog_pins();
 	r->trigger = level;
 	if (level && !was)
 		r->triggered_at = avr->cycle;

@@ -13,7 +13,6 @@
 #define IDLE_MS 3    /* without traffic, then a device is suspended */
 #define RESUME_MS 30 /* resume signal and recovery */
 #define STAGE_LIMIT_MS 500   /* for each stage of a request */
-#define PACKETS_PER_FRAME 19 /* maximum of full speed */
 #define DTR_RTS 3
 #define TWIGGLE_MS 50
 
@@ -71,6 +70,10 @@ static void trace_descriptor(void)
 {
 	char text[64] = "";
 
+	if (request[3] == 1 && received >= 18)
+		bench_trace("usb release %x.%02x", descriptor[13], descriptor[12]);
+	if (request[3] == 2 && received >= 18)
+		bench_trace("usb first interface: class %02x protocol %02x", descriptor[14], descriptor[16]);
 	if (request[3] == 1 && received >= 18)
 		bench_trace("usb class %02x subclass %02x serial string %u", descriptor[4], descriptor[5], descriptor[16]);
 	if (request[3] != 3 || request[2] != 3)
@@ -190,14 +193,14 @@ static void move_bulk(void)
 	}
 	if (!is_open || stalled)
 		return;
-	for (int k = 0; k < PACKETS_PER_FRAME && bench_has_room(); k++) {
+	for (unsigned k = usb_hub_frame(); k && bench_has_room(); k--) {
 		int length = usb_cable_in(in_endpoint, bytes);
 
 		if (length == USB_REPEATED || length == USB_SILENCE)
 			continue;
 		if (length < 0)
 			break;
-		bench_sent(bytes, (unsigned)length);
+		usb_hub_take(bytes, (unsigned)length);
 	}
 }
 
@@ -228,7 +231,7 @@ static void watch(void)
 	} else if (state == DETACHED) {
 		state = DEBOUNCING;
 		waited_ms = 0;
-	} else if (state == DEBOUNCING && ++waited_ms >= DEBOUNCE_MS) {
+	} else if (state == DEBOUNCING && ++waited_ms >= DEBOUNCE_MS + usb_hub_debounce_ms()) {
 		reset_bus();
 		state = ENUMERATING;
 		step = 0;
@@ -276,6 +279,7 @@ static avr_cycle_count_t poll(avr_t *a, avr_cycle_count_t when, void *param)
 
 void usb_host_start(void)
 {
+	usb_hub_clear();
 	state = DETACHED;
 	requesting = is_open = false;
 	outbox_length = 0;
@@ -284,6 +288,7 @@ void usb_host_start(void)
 
 void usb_host_unplug(void)
 {
+	usb_hub_clear();
 	state = DETACHED;
 	requesting = is_open = false;
 	outbox_length = 0;
@@ -291,6 +296,7 @@ void usb_host_unplug(void)
 
 void usb_host_reset(void)
 {
+	usb_hub_clear();
 	if (state != DETACHED)
 		state = DEBOUNCING;
 	waited_ms = 0;
