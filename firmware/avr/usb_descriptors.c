@@ -7,7 +7,7 @@
 #include "../version.h"   /* release number */
 #include "usb.h"
 
-/* pid.codes reserves 0x1209:0x0001 for tests. */
+/* pid.codes reserves 0x1209:0x0001 for tests; hosts know the board by its strings of maker and product. */
 static const uint8_t device_descriptor[] PROGMEM = {
 	18, 1, 0x00, 0x02,      /* USB 2.0 */
 	2, 2, 0, EP_SIZE,       /* class and subclass by which Windows 10 and later load their driver, usbser.sys */

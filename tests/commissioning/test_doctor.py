@@ -227,11 +227,12 @@ def test_the_udev_rules_are_printed_and_recognised(tmp_path: Path) -> None:
 
 
 def test_roles_by_usb_identifiers() -> None:
-    assert ports._role(0x1209, 1, "sensor board") is ports._role(0x1209, 1, None) is Role.BOARD
-    assert ports._role(0x1209, 1, "a camera") is Role.OTHER
-    assert ports._role(0x2341, 0x0036, None) is Role.BOOTLOADER
-    assert ports._role(0x0403, 0xD388, None) is Role.MTX
-    assert ports._role(0x1A86, 0x7523, None) is Role.OTHER
+    assert ports._role(0x1209, 1, "echostep", "sensor board") is ports._role(0x1209, 1, None, None) is Role.BOARD
+    assert ports._role(0x1209, 0xEC05, "echostep", "sensor board") is Role.BOARD  # with an identifier of its own
+    assert ports._role(0x1209, 1, "other", "a camera") is Role.OTHER
+    assert ports._role(0x2341, 0x0036, None, None) is Role.BOOTLOADER
+    assert ports._role(0x0403, 0xD388, None, None) is Role.MTX
+    assert ports._role(0x1A86, 0x7523, None, None) is Role.OTHER
 
 
 def answers_of(ppm: float, late_s: Callable[[int], float]) -> ProbeResult:

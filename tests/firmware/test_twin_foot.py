@@ -165,6 +165,7 @@ def test_a_wrong_part_is_named_and_the_board_stays_a_belt_board(bench: Bench) ->
     assert (parts.part_foot, parts.identity_foot) == (m.Part.NONE, 0xEA)
     assert not samples(found)
     assert kinds(found)["Gyros"]
+    assert any(text.startswith("thigh gyro: an ICM-20948 answers at its chip select") for text in bench.all_findings)
 
 
 def test_a_part_that_is_plugged_in_later_is_found(bench: Bench) -> None:

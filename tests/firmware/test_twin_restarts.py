@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from board_runs import Bench, kinds, needs_twin
+from board_runs import Bench, kinds, needs_twin, pings
 from echostep.board import messages as m
 
 pytestmark = needs_twin
@@ -144,3 +144,26 @@ def test_only_a_host_that_subscribes_gets_the_new_message(bench: Bench) -> None:
     bench.fault("reset=watchdog")
     bench.run(100)
     assert "BoardHealth" not in kinds(bench.run(2_000))  # the host must ask again
+
+
+@pytest.mark.parametrize(("resistor", "meet"), [("1000", 0), ("none", 1)])
+def test_the_bootloaders_led_meets_the_right_ranger_without_its_resistor(resistor: str, meet: int) -> None:
+    """While it waits, PC7 is driven against Echo; afterwards the ranger answers, as the firmware has made the pin an input again."""
+    bench = Bench()
+    bench.fault("kit=2026")
+    bench.fault(f"echo_resistor={resistor}")
+    bench.run(1_000)
+    bench.fault("reset=external")
+    bench.run(BOOTLOADER_MS + 1_000)
+    found = pings(bench.run(1_000), m.Ranger.RIGHT)
+    bench.board.close()
+    assert len(traced(bench, "contention on PC7, by the bootloader")) == meet
+    assert {p.outcome for p in found} == {m.Outcome.ECHO}
+
+
+def test_a_board_whose_jtag_fuse_is_programmed_has_its_triggers(bench: Bench) -> None:
+    """JTAG owns A0 to A3 until the firmware has switched it off."""
+    bench.fault("kit=2026")
+    bench.fault("jtag_fuse=programmed")
+    bench.run(1_500)
+    assert {p.outcome for p in bench.run(500) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}

@@ -8,8 +8,9 @@ import re
 import numpy as np
 import pytest
 
-from board_runs import ELF, TWIN, Bench, kinds, needs_twin, pings, quiet_rows
+from board_runs import ELF, ROOT, TWIN, Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
+from echostep.board.subscription import SUBSCRIBE
 from echostep.simulation.devices.board import BoardProcess
 
 pytestmark = needs_twin
@@ -30,6 +31,34 @@ def test_windows_finds_its_driver_and_two_boards_differ() -> None:
         serials += traces(bench, "serial number [0-9A-F]{20}$")
         assert not traces(bench, "written at once")
     assert len(set(serials)) == 2
+
+
+def test_the_version_is_that_of_the_header(bench: Bench) -> None:
+    """In `identity`, and as the release of the USB descriptor; no modem's commands are promised, so that no modem manager asks for any."""
+    header = (ROOT / "firmware/version.h").read_text()
+    version = tuple(int(re.search(rf"{name} (\d+)", header)[1]) for name in ("MAJOR", "MINOR", "PATCH"))  # type: ignore[index]
+    identity = next(x for x in bench.run(300) if isinstance(x, m.Identity))
+    assert (identity.version_major, identity.version_minor, identity.version_patch) == version
+    assert traces(bench, f"^usb release {version[0]}[.]{version[1]}{version[2]}$")
+    assert traces(bench, "^usb first interface: class 02 protocol 00$")
+
+
+def test_a_hub_in_between_costs_a_millisecond(bench: Bench) -> None:
+    bench.fault("host_hub=on")
+    bench.run(1_000)
+    bench.fault("usb=unplug")
+    bench.run(100)
+    bench.fault("usb=plug")
+    found = bench.run(1_500)
+    assert kinds(found)["Ping"] >= 28
+    answered = []
+    for token in range(20):
+        bench.ask(m.ClockQuery(token))
+        answered += [[x.token for x in bench.run(1) if isinstance(x, m.ClockReply)] for _ in range(3)]
+    assert not any(answered[::3])  # directly, it comes within the first one
+    assert sum(answered, []) == [*range(20)]
+    assert bench.reader.counts.lost == bench.reader.counts.rejected == 0
+    assert not any(v for k, v in bench.status._asdict().items() if k.startswith("dropped_"))
 
 
 @pytest.mark.parametrize("request_again", ["configure", "interface"])
@@ -94,6 +123,28 @@ def test_a_bus_hung_at_power_up(bench: Bench, line: str) -> None:
         bench.fault("scl=ok")
     bench.run(500)
     assert {p.outcome for p in pings(bench.run(500), m.Ranger.LEFT)} == {m.Outcome.ECHO}
+
+
+def test_pulse_rangers_are_found_beside_a_bus_that_is_stuck_from_the_start(bench: Bench) -> None:
+    bench.fault("kit=2026")
+    bench.fault("sda=stuck_forever")
+    bench.run(300)
+    bench.ask(SUBSCRIBE)
+    bench.run(1_500)
+    found = bench.run(1_000)
+    assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
+    assert kinds(found)["Ping"] >= 28
+    assert bench.parts.part_ranger_left == bench.parts.part_ranger_right == m.Part.PULSE
+    assert bench.status.fault_compass == m.Fault.BUS_STUCK
+
+
+def test_a_ranger_on_a_bus_that_is_stuck_from_the_start_is_named_so(bench: Bench) -> None:
+    bench.fault("sda=stuck_forever")
+    bench.run(3_000)
+    assert bench.status.fault_ranger_left == bench.status.fault_ranger_right == m.Fault.BUS_STUCK
+    bench.fault("sda=ok")
+    bench.run(1_500)
+    assert {p.outcome for p in bench.run(500) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
 
 
 def test_plugs_that_are_exchanged(bench: Bench) -> None:

@@ -116,6 +116,16 @@ def test_an_echo_line_needs_its_resistors_other_end() -> None:
     assert "2026, net ECHO_L_1K: it ends nowhere" in problems(cut)
 
 
+def test_an_output_on_the_pin_of_the_bootloaders_led_is_a_problem() -> None:
+    ranger = device("2026", "right ranger")
+    (text,) = (
+        text
+        for text in problems(with_device("2026", replace(ranger, pins=ranger.pins | {"Echo": "ECHO_R"})))
+        if "bootloader" in text
+    )
+    assert "net ECHO_R: the bootloader drives PC7 for its LED: 1 kohm in series is missing" in text
+
+
 def test_an_adis16100_beside_breakout_boards_of_2026_is_a_problem() -> None:
     """What the README says of mixed kits."""
     mixed = with_device("2026", device("papers", "calf"))

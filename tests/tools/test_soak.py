@@ -19,9 +19,10 @@ from echostep.simulation.devices.board import PythonBoard, Sent
 from echostep.simulation.stimulus import NO_SYNC
 from echostep.xsens import MtxReader
 from reliability import long_tour, soak
+from twin.late_clock import HALF_WRAP, TICKS_S, WRAP
 
 ROUND = ((16.0, 7.5), (24.0, 7.5), (24.0, 2.0), (2.0, 2.0), (2.0, 7.5), (16.0, 7.5))
-WRAP_S = soak.WRAP / soak.TICKS_S
+WRAP_S = WRAP / TICKS_S
 
 
 class LateBoard(PythonBoard):
@@ -55,7 +56,7 @@ def test_seconds_of_the_real_firmware(tmp_path: Path) -> None:
 
 
 @needs_twin
-@pytest.mark.parametrize(("wrap", "wraps"), [(soak.HALF_WRAP, 0), (soak.WRAP, 1)])
+@pytest.mark.parametrize(("wrap", "wraps"), [(HALF_WRAP, 0), (WRAP, 1)])
 def test_seconds_of_the_real_firmware_around_a_wrap_of_its_clock(tmp_path: Path, wrap: int, wraps: int) -> None:
     check(soak.run_before_wrap(8.0, tmp_path, wrap, 4.0), tmp_path, wraps)
 

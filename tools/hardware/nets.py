@@ -20,6 +20,7 @@ PROCESSOR_V = 5.0  # level of its outputs
 PULL_UP_OHM = (20e3, 50e3)  # of the processor [ATmega32U4 data sheet, table 29-1]
 # What it reads for certain: 0.2 VCC - 0.1 V and 0.2 VCC + 0.9 V [the same, from memory]
 LOW_MAX_V, HIGH_MIN_V = 0.9, 1.9
+BOOTLOADER_DRIVES = ("PC7", "PB0", "PD5")  # for 8 s, its LEDs [Caterina.h of Leonardo and Micro; tools/twin/mcu/board.c]
 
 
 def problems(board: WiredBoard) -> list[str]:
@@ -79,6 +80,8 @@ def _of_net(board: WiredBoard, net: str) -> Iterator[str]:
     either = any(kind == "io" for _, _, kind in ends) or (processor is not None and processor.direction == "io")
     if fixed > 1 or (fixed and shared):
         yield "it has several drivers"
+    if processor and processor.port in BOOTLOADER_DRIVES and (fixed or shared):
+        yield f"the bootloader drives {processor.port} for its LED: 1 kohm in series is missing"
     if not (fixed or shared or either or _is_driven_through(board, net)):
         yield "nothing drives it"
     if shared and processor and not all(_is_certain(idle_v(board, net, ohm)) for ohm in PULL_UP_OHM):

@@ -23,8 +23,8 @@ RULES = "99-echostep.rules"
 RULE_FOLDERS = tuple(
     map(Path, ("/etc/udev/rules.d", "/run/udev/rules.d", "/usr/lib/udev/rules.d", "/lib/udev/rules.d"))
 )
-BOARD_IDS = {(0x1209, 0x0001)}  # which pid.codes reserves for tests: others use them too, so that the name counts
-BOARD_PRODUCT = "sensor board"  # [firmware/avr/usb_descriptors.c]
+BOARD_NAMES = ("echostep", "sensor board")  # maker and product: they count, whatever the identifier is [firmware/avr/usb_descriptors.c]
+BOARD_IDS = {(0x1209, 0x0001)}  # where the system tells no names; pid.codes reserves it for tests, and others use it too
 BOOTLOADER_IDS = {(0x2341, 0x0036), (0x2341, 0x0037), (0x2A03, 0x0036), (0x2A03, 0x0037), (0x1B4F, 0x9205)}
 SKETCH_IDS = {(0x2341, 0x8036), (0x2341, 0x8037), (0x2A03, 0x8036), (0x2A03, 0x8037), (0x1B4F, 0x9206)}
 FTDI, XSENS = 0x0403, 0x2639
@@ -62,16 +62,16 @@ class PortSeen:
 def list_seen() -> list[PortSeen]:
     """The USB serial ports of this computer."""
     return [
-        PortSeen(port.device, _role(port.vid, port.pid, port.product), port.description or "", port.serial_number or "")
+        PortSeen(port.device, _role(port.vid, port.pid, port.manufacturer, port.product), port.description or "", port.serial_number or "")
         for port in sorted(list_ports.comports())
         if port.vid is not None
     ]
 
 
-def _role(vendor: int, product: int, name: str | None) -> Role:
-    if (vendor, product) in BOARD_IDS and name not in (None, BOARD_PRODUCT):
-        return Role.OTHER
-    for role, identifiers in ((Role.BOARD, BOARD_IDS), (Role.BOOTLOADER, BOOTLOADER_IDS), (Role.SKETCH, SKETCH_IDS)):
+def _role(vendor: int, product: int, maker: str | None, name: str | None) -> Role:
+    if (maker, name) == BOARD_NAMES or ((vendor, product) in BOARD_IDS and name is None):
+        return Role.BOARD
+    for role, identifiers in ((Role.BOOTLOADER, BOOTLOADER_IDS), (Role.SKETCH, SKETCH_IDS)):
         if (vendor, product) in identifiers:
             return role
     return Role.MTX if vendor == XSENS or (vendor == FTDI and product in FTDI_IDS) else Role.OTHER

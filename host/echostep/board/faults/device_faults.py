@@ -24,7 +24,15 @@ from echostep.board.faults.findings import (
     part_in,
     status_field,
 )
-from echostep.board.faults.part_faults import SIX_AXES_RESPONSES, SIX_AXES_TESTS, foot_text, mixed_rangers, part_text
+from echostep.board.faults.part_faults import (
+    LIKE_FOOT_PARTS,
+    SIX_AXES_RESPONSES,
+    SIX_AXES_TESTS,
+    foot_text,
+    mixed_rangers,
+    part_text,
+    strange_foot_text,
+)
 from echostep.board.messages import (
     GYRO_HEALTH_INVALID,
     Fault,
@@ -89,8 +97,18 @@ def device_findings(reports: BoardReports, status: Status) -> list[Finding]:
     failed = [d for d in failed if not refused & d]
     pulses = _union(d for d in Healthy if part_in(reports, d) is Part.PULSE)
     common, explained = _common_causes(status, failed, on & ~pulses)
+    strange = _strange_foot(reports, status) if Healthy.THIGH in failed else []
+    explained |= Healthy.THIGH if strange else Healthy(0)
     single = [_device_finding(reports, d, Fault(status_field(status, "fault", d))) for d in failed if not explained & d]
-    return mixed + common + single
+    return mixed + strange + common + single
+
+
+def _strange_foot(reports: BoardReports, status: Status) -> list[Finding]:
+    """A finding on a part at the thigh's chip select that is like a foot board's, and that the firmware has not accepted."""
+    parts, mute = reports.parts, status_field(status, "fault", Healthy.THIGH) == Fault.NO_ANSWER
+    if parts is None or not mute or parts.part_foot != Part.NONE or parts.identity_foot not in LIKE_FOOT_PARTS:
+        return []
+    return [Finding(Severity.FAULT, "thigh gyro", *strange_foot_text(parts.identity_foot))]
 
 
 def _mixed_rangers(reports: BoardReports, failed: list[Healthy]) -> tuple[list[Finding], Healthy]:

@@ -61,6 +61,7 @@ _WANTED = {
     Healthy.PRESSURE: "0x60 is a BMP390",
     Healthy.COMPASS: "0x3D is a LIS3MDL",
 }  # identities of the parts that the firmware knows, by place
+LIKE_FOOT_PARTS = {0xE0: "ICM-20648", 0xE1: "ICM-20649", 0xEA: "ICM-20948"}  # by WHO_AM_I; 0xE0 from memory
 
 
 SIX_AXES_TESTS = {  # what is wrong and the remedy, by the outcome of the self-test
@@ -89,6 +90,14 @@ def mixed_rangers(left: Part, right: Part) -> tuple[str, str]:
 def foot_text(fault: Fault) -> tuple[str, str]:
     """What is wrong with the part of a foot board and the remedy."""
     return _ICM20649.get(fault, (f"failed ({fault.name.lower().replace('_', ' ')})", _SPI))
+
+
+def strange_foot_text(identity: int) -> tuple[str, str]:
+    """What is wrong with a part at the thigh's chip select that names itself like a foot board's, and the remedy."""
+    what = f"an {LIKE_FOOT_PARTS[identity]} answers at its chip select (D8, identity register 0x{identity:02X})"
+    if identity == 0xE1:
+        return f"{what}, but its other registers are not those of one", f"{_AGAIN}; {_SPI}"
+    return f"{what}: the firmware does not know it", "plug in an LSM6DSO, or on a foot board an ICM-20649"
 
 
 def part_text(part: Part, identity: int, device: Healthy, fault: Fault) -> tuple[str, str] | None:
