@@ -43,7 +43,6 @@
 static enum spi_protocol protocol; /* slow until the chip is known: an SCP1000 may be there */
 static bool measuring;
 static uint32_t earliest, deadline; /* of the next sample, ticks */
-static uint32_t check_due;          /* of the next look at its identity, ticks */
 static float t1, t2, t3, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11; /* PAR_T1 ... PAR_P11 [8.4] */
 
 /* The first byte of a reply is a dummy. */
@@ -161,22 +160,12 @@ static uint8_t measure(uint32_t now)
 	write8(REGISTER_CONFIG, IIR_3);
 	write8(REGISTER_PWR_CTRL, PRESSURE_AND_TEMPERATURE_NORMAL);
 	measuring = true;
-	check_due = now;
 	return await_sample(now);
 }
 
 static uint32_t raw_of(const uint8_t *bytes)
 {
 	return (uint32_t)bytes[2] << 16 | (uint16_t)(bytes[1] << 8 | bytes[0]);
-}
-
-/* A sample has no checksum: once a second wrong bits are sought where the content is known. */
-static bool check_bits(uint32_t now)
-{
-	if (!ticks_reached(now, check_due))
-		return false;
-	check_due = now + TICKS_PER_S;
-	return read8(REGISTER_CHIP_ID) != CHIP_ID;
 }
 
 static uint8_t sample(uint32_t now, struct pressure_step *out)
@@ -191,7 +180,7 @@ static uint8_t sample(uint32_t now, struct pressure_step *out)
 		return FAULT_BAD_VALUE;
 	out->pressure = (uint32_t)(pa * COUNTS_PER_PA + 0.5f);
 	out->temperature = (int16_t)(t * COUNTS_PER_DEGREE);
-	out->wrong_bits = check_bits(now);
+	out->wrong_bits = read8(REGISTER_CHIP_ID) != CHIP_ID; /* a sample has no checksum: wrong bits show where the content is known */
 	return await_sample(now);
 }
 

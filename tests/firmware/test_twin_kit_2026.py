@@ -94,10 +94,11 @@ def test_a_bmp390_that_fails_is_named_and_comes_back(barometer: Bench, kind: str
 
 
 def test_wrong_bits_from_a_bmp390_are_counted_and_named(barometer: Bench) -> None:
-    """Once a second its identity is read again; what was measured beside them is sent."""
+    """Its identity is read again with each sample; what was measured beside them is sent."""
     barometer.fault("spi_errors=30")
     found = barometer.run(20_000)
-    assert [x for x in barometer.all_findings if x.startswith("barometer (BMP390): sent wrong bits") and "SPI wires" in x]
+    words = "barometer (BMP390): sent wrong bits"
+    assert [x for x in barometer.all_findings if x.startswith(words) and "SPI wires" in x]
     assert kinds(found)["Pressure"] > 100
 
 
