@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the firmware's and the twin's sources and pages promise of themselves: sources of models, statements to be measured, a read with interrupts off."""
+"""What the firmware's and the twin's sources and pages promise of themselves: sources of models, statements to be measured, atomic reads."""
 
 from __future__ import annotations
 
@@ -42,7 +42,9 @@ def test_each_model_cites_a_place_or_stands_in_the_list_from_memory() -> None:
 
 
 @needs_twin
-@pytest.mark.skipif(not shutil.which("avr-objdump"), reason="avr-objdump is missing (make test installs it when it may)")
+@pytest.mark.skipif(
+    not shutil.which("avr-objdump"), reason="avr-objdump is missing (make test installs it when it may)"
+)
 def test_both_timers_are_read_with_interrupts_off() -> None:
     """An interrupt between the two readings would shift all stamps of the right ranger."""
     command = ["avr-objdump", "-d", str(ELF)]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A working day through the real firmware and the host's live pipeline: memory, losses, the wrap of the board's clock, and the replay.
 
-A stray edge a minute is on the input of SyncOut; the board's clock starts `BEFORE_WRAP_S` before a wrap. In: the sources of the firmware, and the twin; simulated hours. Out: figures with their limits, PASS or FAIL; exit
-status 1 when one is missed. Owns the limits.
+A stray edge a minute is on the input of SyncOut; the board's clock starts `BEFORE_WRAP_S` before a wrap. In: the sources of the firmware, and the
+twin; simulated hours. Out: figures with their limits, PASS or FAIL; exit status 1 when one is missed. Owns the limits.
 
 The stages are those of `echostep live` from the ports on: check-ins, recording, subscription, tracker, page with a client, derived messages. In
 the place of the ports are the twin's and the MTx's bytes in simulated time, as fast as they are used, and `PORTION` chunks are tracked
@@ -249,7 +249,7 @@ def main() -> int:
         __doc__,
         hours=(8.0, "simulated"),
         out=(OUT / "soak", "folder"),
-        wrap=([*WRAPS][0], "of the board's clock, before which it starts: half, whole"),
+        wrap=(next(iter(WRAPS)), "of the board's clock, before which it starts: half, whole"),
     )
     asked.out.mkdir(parents=True, exist_ok=True)
     measured = run_before_wrap(3600.0 * asked.hours, asked.out, WRAPS[asked.wrap])

@@ -23,8 +23,13 @@ RULES = "99-echostep.rules"
 RULE_FOLDERS = tuple(
     map(Path, ("/etc/udev/rules.d", "/run/udev/rules.d", "/usr/lib/udev/rules.d", "/lib/udev/rules.d"))
 )
-BOARD_NAMES = ("echostep", "sensor board")  # maker and product: they count, whatever the identifier is [firmware/avr/usb_descriptors.c]
-BOARD_IDS = {(0x1209, 0x0001)}  # where the system tells no names; pid.codes reserves it for tests, and others use it too
+BOARD_NAMES = (
+    "echostep",
+    "sensor board",
+)  # maker and product: they count, whatever the identifier is [firmware/avr/usb_descriptors.c]
+BOARD_IDS = {
+    (0x1209, 0x0001)
+}  # where the system tells no names; pid.codes reserves it for tests, and others use it too
 BOOTLOADER_IDS = {(0x2341, 0x0036), (0x2341, 0x0037), (0x2A03, 0x0036), (0x2A03, 0x0037), (0x1B4F, 0x9205)}
 SKETCH_IDS = {(0x2341, 0x8036), (0x2341, 0x8037), (0x2A03, 0x8036), (0x2A03, 0x8037), (0x1B4F, 0x9206)}
 FTDI, XSENS = 0x0403, 0x2639
@@ -62,7 +67,12 @@ class PortSeen:
 def list_seen() -> list[PortSeen]:
     """The USB serial ports of this computer."""
     return [
-        PortSeen(port.device, _role(port.vid, port.pid, port.manufacturer, port.product), port.description or "", port.serial_number or "")
+        PortSeen(
+            port.device,
+            _role(port.vid, port.pid, port.manufacturer, port.product),
+            port.description or "",
+            port.serial_number or "",
+        )
         for port in sorted(list_ports.comports())
         if port.vid is not None
     ]
