@@ -35,6 +35,26 @@ def test_what_has_arrived_comes_after_stop() -> None:
     assert received == b"first, second"
 
 
+def test_a_port_whose_close_fails_is_closed_once() -> None:
+    """A second close would hit another file that has the number meanwhile."""
+    with pseudo_terminal() as (_, port):
+        ports = SerialPorts({"board": port}, {"board": 115200})
+        opened = ports._ports["board"]
+        close, closed = opened.close, list[int]()
+
+        def failing() -> None:
+            if opened.fd is not None:
+                closed.append(opened.fd)
+                raise OSError(5, "Input/output error")
+
+        opened.close = failing
+        ports.close()
+        ports.close()
+        assert len(closed) == 1
+        opened.fd = closed[0]
+        close()
+
+
 @pytest.mark.parametrize("command", ["record", "live"])
 def test_a_signal_ends_a_run_that_is_behind_with_all_that_had_arrived(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str

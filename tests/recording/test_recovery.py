@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import random
 import resource
@@ -15,6 +16,7 @@ import pytest
 
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
+from echostep.recording.background_writer import BackgroundWriter
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import RAW_LIMIT, Recorder
 from reliability.kill_recorder import kill_once
@@ -75,6 +77,22 @@ def test_a_full_disk_is_announced_and_keeps_what_it_has(tmp_path: Path) -> None:
     assert (tmp_path / "a.mcap").stat().st_size == 20_000
     assert chunks == [Chunk("mtx", n * 1_000_000, bytes(100)) for n in range(len(chunks))]
     assert len(chunks) > 140
+
+
+def test_a_file_whose_close_fails_is_told_and_ends_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    writer = BackgroundWriter(tmp_path / "a.mcap")
+    writer.write(b"bytes")
+    file, close = writer._file, os.close
+
+    def failing(number: int) -> None:
+        close(number)
+        if number == file:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "close", failing)
+    writer.close()
+    assert list(writer.notices) == [f"{tmp_path / 'a.mcap'}: the disk is full; it may not be whole"]
+    assert (tmp_path / "a.mcap").read_bytes() == b"bytes"
 
 
 def test_a_disk_that_stands_still_does_not_keep_the_tracker_waiting(

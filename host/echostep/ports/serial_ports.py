@@ -66,7 +66,7 @@ class SerialPorts:
                 self._ports[name] = _open(url, baud[name])
         except EchostepError:
             for port in self._ports.values():
-                port.close()
+                _close(port)
             raise
         self._numbers = {name: usb_number(url) for name, url in urls.items()}
         self.notices: deque[str] = deque(maxlen=MOST_NOTICES)
@@ -116,7 +116,7 @@ class SerialPorts:
         """Stop, and close the ports."""
         self.stop()
         for port in self._ports.values():
-            port.close()
+            _close(port)
 
     def _read(self, name: str, url: str, baud: int) -> None:
         """The thread of one port: put its chunks into the queue until `close`."""
@@ -150,7 +150,7 @@ class SerialPorts:
             else f" ({getattr(error, 'strerror', '') or error})"
         )
         self.notices.append(f"{name}: {url} went away{why}: it is opened again as soon as it is back")
-        self._ports[name].close()
+        _close(self._ports[name])
         self.lost.add(name)
         while not self._stop.wait(REOPEN_S):
             place = self._place_of(name, url)
@@ -175,6 +175,15 @@ class SerialPorts:
             return url
         place = port_of_number(number)
         return url if place and os.path.realpath(url) == os.path.realpath(place) else place
+
+
+def _close(port: AnyPort) -> None:
+    """Close a port; one whose close fails is closed all the same [close(2)], and a second attempt could hit the number of another file."""
+    try:
+        port.close()
+    except PORT_FAULTS:
+        if isinstance(port, serial.Serial):
+            port.fd = None
 
 
 def _read_block(port: AnyPort) -> bytes:

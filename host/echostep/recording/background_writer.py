@@ -71,15 +71,19 @@ class BackgroundWriter:
                 self._lock.wait(min(left_s, WRITE_S))
 
     def close(self) -> None:
-        """Write the rest of the buffer and close the file; a notice tells how many bytes the disk refused."""
+        """Write the rest of the buffer and close the file; a notice tells how many bytes the disk refused, and that it refused to close."""
         with self._lock:
             self._closing = True
             self._lock.notify_all()
         self._thread.join(CLOSE_S)
         if self.unwritten_bytes:
             self.notices.append(f"{self.path}: the last {self.unwritten_bytes} bytes are not on the disk")
-        if not self._thread.is_alive():
+        if self._thread.is_alive():
+            return
+        try:
             os.close(self._file)
+        except OSError as error:  # it is closed all the same [close(2)]
+            self.notices.append(f"{self.path}: {_reason(error)}; it may not be whole")
 
     def _run(self) -> None:
         """The thread: write the buffer until `close` is called, and once more after it."""

@@ -61,9 +61,10 @@ def write_results(folder: Path, tracker: Tracker, guided: CueList | None, result
         console.print(
             "No estimate: the foot never stood still, or no bytes of its sensor came; without one, no stride was seen."
         )
-        return
     if failure:
         raise failure
+    if not result.estimates:
+        return
     drawn = "" if undrawn else " and track.png"
     console.print(f"files: track.csv{drawn} in {folder}")
     if undrawn:

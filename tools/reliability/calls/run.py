@@ -28,6 +28,7 @@ from reliability.calls.cases import Case
 from reliability.calls.shim import Failure, calls_made
 
 PATIENCE_S = 90.0  # after which a run counts as hanging: some fifty times as long as one takes
+TOLD = ("are not on the disk", "were not recorded", "it may not be whole")  # of a recording that the disk refused
 CRASHED = 70  # exit status of a run with an exception that no code handles [sysexits.h, EX_SOFTWARE]
 
 
@@ -158,8 +159,8 @@ def faults_of(case: Case, failure: Failure, outcome: Outcome, sound: Outcome) ->
     if outcome.status == 0:
         if missing := sound.files.keys() - outcome.files.keys():
             faults.append(f"no {', '.join(sorted(missing))}")
-        if outcome.truncated:
-            faults.append("a recording is not whole")
+        if outcome.truncated and not any(words in outcome.printed for words in TOLD):
+            faults.append("a recording is not whole, and nothing says so")
         if case.repeats and (
             other := [n for n in sound.files if outcome.files.get(n, sound.files[n]) != sound.files[n]]
         ):
