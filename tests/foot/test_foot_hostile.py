@@ -13,6 +13,7 @@ from hypothesis.extra.numpy import arrays
 
 from echostep.arrays import Floats
 from echostep.foot.steps import Foot, walk_track
+from echostep.path import UNOBSERVED_SD_M
 from foot import foot_walks as fw
 from foot.navigation import moves, same, walking
 
@@ -58,6 +59,17 @@ def test_a_gap_makes_it_unsure_and_it_recovers(gap_s: float) -> None:
     assert len(after) == 6
     assert np.hypot(*np.array([step.move_m for step in after])[:, :2].T) == pytest.approx(np.full(6, 1.3), abs=0.03)
     assert max(step.covariance[0, 0] for step in after) < 0.05
+
+
+def test_a_hole_in_a_swing_is_no_observed_step() -> None:
+    """A tenth of a second without samples: the step was a metre off, and was said to be known to 0.2 m."""
+    t, accel, gyro = walking(12)
+    swing = 2.0 + 3 * 1.1 + 0.3
+    kept = (t < swing) | (t > swing + 0.12)
+    track = walk_track(t[kept], accel[kept], gyro[kept])
+    (across,) = (step for step in track.steps if step.t_start_s < swing < step.t_end_s)
+    assert track.counts.gaps == 1
+    assert across.covariance[0, 0] > UNOBSERVED_SD_M**2
 
 
 def test_a_clock_that_is_set_back_is_followed() -> None:

@@ -45,6 +45,9 @@ SETTLE_S = 0.2  # after so much rest the step before it has been corrected
 LEAVE_S = 0.15  # a stance ends after so long without rest: no swing is shorter
 PERIOD_GAIN = 0.003  # relative change of the running median per sample
 GAP_S = 0.25  # shorter gaps are propagated over
+MOVING_GAP_S = (
+    0.08  # the same, of a foot that moves: it changes its speed by metres per second in a tenth of a second; assumed
+)
 STRAY_SAMPLES = 20  # so many samples in a row with earlier times: the clock was set back
 WALK_M_S = 1.5  # mean speed of a foot while samples are missing, 1 sd
 MAX_ACCEL_M_S2, MAX_RATE_RAD_S = 1e3, 1e2  # beyond any foot
@@ -68,7 +71,8 @@ def process(foot: ZuptInsState, samples: Samples, output: Output) -> int:
     for k in range(len(t_s)):
         if _usable(s, t_s[k], accel[k], gyro[k]):
             dt = t_s[k] - s.t_s if s.samples > 1 else 0.0
-            if s.samples > 1 and not 0.0 < dt <= GAP_S:
+            bridged_s = MOVING_GAP_S if s.levelled and s.rest_s == 0.0 else GAP_S
+            if s.samples > 1 and not 0.0 < dt <= bridged_s:
                 event_count = _restart(s, nav, sums, compass, dt, events, event_count)
                 dt = 0.0
             sample = ImuSample(dt, t_s[k], accel[k], gyro[k])
