@@ -154,4 +154,5 @@ def test_on_real_feet_the_toe_looks_where_they_walk() -> None:
             if math.hypot(*step.move_m[:2]) > 0.6 and abs(turned) < 1.5:
                 toe = heading + 0.5 * turned
                 travel.append(math.remainder(math.atan2(step.move_m[1], step.move_m[0]) - toe, 2.0 * math.pi))
-        assert abs(np.median(travel)) < math.radians(20.0), (recording.group, recording.name)
+        if travel:  # a shuffling foot makes no long step
+            assert abs(np.median(travel)) < math.radians(20.0), (recording.group, recording.name)

@@ -60,7 +60,7 @@ def test_rows_have_the_promised_form(rows: list[Row]) -> None:
     for row in rows:
         assert set(row) == {"set", "recording", "metric", "value", "distance_m", "peer", "peer_name"}
         assert math.isfinite(row["value"])
-        assert row["set"] == "live" or row["distance_m"] > 5.0
+        assert row["set"] == "live" or row["distance_m"] > 4.0
         assert (row["peer"] is None) == (row["peer_name"] is None)
 
 
@@ -69,6 +69,14 @@ def test_motion_capture(rows: list[Row]) -> None:
     assert median(values(rows, "vicon", "2D RMSE")) <= 0.055
     assert max(values(rows, "vicon", "2D RMSE")) <= 0.10
     assert max(values(rows, "vicon", "stride length MAE")) <= 0.029  # the best of the peers' six
+
+
+@needs_recordings
+def test_hurried_running_and_shuffling_feet(rows: list[Row]) -> None:
+    assert (
+        max(values(rows, "vicon_more", "height RMSE")) <= 0.35
+    )  # 0.94 before a runner's drift was set back; 0.15 is wanted
+    assert max(values(rows, "vicon_more", "2D RMSE")) <= 0.26  # 0.36 before; 0.15 is wanted
 
 
 @needs_recordings

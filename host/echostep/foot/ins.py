@@ -322,6 +322,15 @@ def turn(nav: Nav, centre: Floats, angle: float) -> None:
 
 
 @lean_kernel
+def reset_height(nav: Nav, height_m: float) -> None:
+    """Set the height to that of a level floor, and correct nothing by it: the drift of a runner's steps has a bias, which is not modelled."""
+    axis = POS + 2
+    nav.P[axis, :] = 0.0
+    nav.P[:, axis] = 0.0
+    nav.P[axis, axis], nav.position[2] = nav.noise.flat_m**2, height_m
+
+
+@lean_kernel
 def reset_reference(nav: Nav) -> None:
     """Make the present position and yaw the reference: their errors belong to the steps already reported."""
     for component in (POS, POS + 1, POS + 2, TILT + 2):

@@ -25,7 +25,7 @@ FLANK_S = 0.015  # on either side of a plateau
 STEEP = 3.0  # least slope of a flank, in units of the greatest of a flat rate
 NEAR = 0.94  # least height of a plateau, as a share of the greatest rate of the axis so far
 LONGEST_STEP_S = 0.03  # between two samples of a plateau
-UNSURE = 0.3  # sd of the angle, as a share of it
+UNSURE = 1.0  # sd of the angle, as a share of it: a heel strike has two peaks, and the flanks show one
 
 
 @lean_kernel

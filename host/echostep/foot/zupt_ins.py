@@ -46,7 +46,7 @@ LEAVE_S = 0.15  # a stance ends after so long without rest: no swing is shorter
 PERIOD_GAIN = 0.003  # relative change of the running median per sample
 GAP_S = 0.25  # shorter gaps are propagated over
 MOVING_GAP_S = (
-    0.08  # the same, of a foot that moves: it changes its speed by metres per second in a tenth of a second; assumed
+    0.08  # the same, of a foot that moves: its speed changes by metres per second in a tenth of a second; assumed
 )
 STRAY_SAMPLES = 20  # so many samples in a row with earlier times: the clock was set back
 WALK_M_S = 1.5  # mean speed of a foot while samples are missing, 1 sd
@@ -59,6 +59,8 @@ STILL_TILT_RAD, UNSURE_TILT_RAD = 0.05, 0.3
 UNSURE_YAW_RAD2_S = 1.0
 DOUBT_S = 0.1  # of stances against the innovation gate: the level is wrong
 FLAT_M = 0.04  # a step that rises less is on a level floor, not on a stair, kerb or ramp
+FLAT_SDS = 2.0  # a rise within so many of its standard deviations is drift: of a runner's step, whose sd is 0.05 to 0.1 m, always downwards
+RISER_M = 0.15  # a greater rise may be a stair: least riser of ISO 21542
 
 
 @lean_kernel
@@ -217,6 +219,8 @@ def _navigate(
         rise_m = nav.position[2] - s.origin[2]
         if abs(rise_m) < FLAT_M:
             ins.update(nav, POS + 2, -rise_m, nav.noise.flat_m**2)
+        elif abs(rise_m) < min(FLAT_SDS * math.sqrt(nav.P[POS + 2, POS + 2]), RISER_M):
+            ins.reset_height(nav, s.origin[2])
         event_count = _begin_stance(s, nav, t_s - s.rest_s, events, event_count)
     return event_count
 

@@ -18,11 +18,12 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.foot.steps import Track
-from echostep_studies.bench.recordings.foot_metrics import FootFigure, climb, closure, mocap, outbound, survey
+from echostep_studies.bench.recordings.foot_metrics import FootFigure, climb, closure, mocap, mocap_3d, outbound, survey
 from echostep_studies.frame.recordings import Sets
 
 G_M_S2 = 9.80665
 MIRROR = np.array([1.0, -1.0])  # a frame with z down has y to the right
+MIRROR_3D = np.array([1.0, -1.0, 1.0])  # these trials have y to the right and z up
 OPENSHOE_TICK_S = 1.0 / 19_660_800  # of its sample counter
 OPENSHOE_PERIOD = 78_720
 OPENSHOE_FIELDS = 17
@@ -60,6 +61,14 @@ def _vicon(path: Path) -> Iterator[FootRecording]:
     name = path.stem.removesuffix("_LLIO")
     judge = partial(mocap, t_s=t_s, truth_m=truth, at=at, peer=VICON_PEERS.get(name))
     yield FootRecording("vicon", name, t_s, imu[:, :3], imu[:, 3:], judge, None, t_s, truth)
+
+
+def _vicon_more(path: Path) -> Iterator[FootRecording]:
+    """More trials of the same feet with motion capture in three dimensions: hurried, running, shuffling."""
+    mat = _mat(path)
+    t_s, imu, truth = mat["ts"].ravel(), mat["imu"], mat["gt"] * MIRROR_3D
+    judge = partial(mocap_3d, t_s=t_s, truth_m=truth)
+    yield FootRecording("vicon_more", path.stem, t_s, imu[:, :3], imu[:, 3:], judge, None, t_s, truth[:, :2])
 
 
 def hallway(path: Path) -> Iterator[FootRecording]:
@@ -137,6 +146,7 @@ OPENSHOE_PEERS: Peers = {"2": ("openshoe", 0.67), "31": ("openshoe", 0.39), "44"
 XIO_PEERS: Peers = {"short_walk": ("pyshoe", 0.035)}
 SETS: Sets[FootRecording] = (
     ("vicon", "vicon_pyshoe/*.mat", _vicon),
+    ("vicon_more", "vicon_more/*.mat", _vicon_more),
     ("hallway", "gx5_gcp/*_LLIO.mat", hallway),
     ("openshoe", "openshoe/*.txt", _openshoe),
     ("xio", "xio_ngimu/*.csv", _xio),

@@ -64,6 +64,16 @@ def mocap(
     ]
 
 
+def mocap_3d(track: Track, *, t_s: Floats, truth_m: Floats) -> list[FootFigure]:
+    """Against motion capture truth_m (n, 3), z up, at every t_s (n,); heights are compared about their means."""
+    error = track.position_m[:, 2] - truth_m[:, 2]
+    return [
+        FootFigure("2D RMSE", rmse(places(track, t_s), truth_m[:, :2])),
+        FootFigure("height RMSE", float(np.std(error))),
+        FootFigure("height at the end", float(error[-1] - error[0])),
+    ]
+
+
 def survey(
     track: Track, *, name: str, t_s: Floats, truth_m: Floats, peer: tuple[str, float] | None
 ) -> list[FootFigure]:
