@@ -21,7 +21,7 @@ from page.browser import READY, loaded_page, overflow, wait_for
 from page.frames import scene, served, told
 from plan.imported_plans import seven_floors
 
-SIZES = ((1280, 800), (360, 740), (740, 360), (320, 256), (1920, 1080))
+SIZES = ((1280, 800), (360, 740), (740, 360), (320, 256), (1920, 1080), (900, 500))
 LOW = ((740, 360), (320, 256))  # a phone held sideways, and 1280 x 1024 at 400 %
 TABLE_READY = "echostep.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
 BOX = "JSON.stringify(document.querySelector('#map').getBoundingClientRect())"
