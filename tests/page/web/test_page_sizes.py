@@ -21,7 +21,7 @@ from page.browser import READY, loaded_page, overflow, wait_for
 from page.frames import scene, served, told
 from plan.imported_plans import seven_floors
 
-SIZES = ((1280, 800), (360, 740), (740, 360), (320, 256), (1920, 1080), (900, 500))
+SIZES = ((1280, 800), (360, 740), (740, 360), (320, 256), (1920, 1080), (1100, 640))
 LOW = ((740, 360), (320, 256))  # a phone held sideways, and 1280 x 1024 at 400 %
 TABLE_READY = "echostep.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
 BOX = "JSON.stringify(document.querySelector('#map').getBoundingClientRect())"
@@ -35,6 +35,11 @@ UNREACHED = """(() => {
         const isCut = element.tagName === 'BUTTON' && element.scrollWidth > element.clientWidth + 1;
         if (isCut && getComputedStyle(element).textOverflow !== 'ellipsis') wrong.push(`${name} is too narrow`);
         element.scrollIntoView({ block: 'center' });
+        for (const box of [document.documentElement, document.body]) {
+            if (getComputedStyle(box).overflowY !== 'hidden' || !box.scrollTop) continue;  // a script may scroll it, a finger may not
+            wrong.push(`${name} is beyond the window`);
+            box.scrollTop = 0;
+        }
         const { left, top, width, height } = element.getBoundingClientRect(), hit = document.elementFromPoint(left + width / 2, top + height / 2);
         if (!element.contains(hit)) wrong.push(`${name} is under ${hit?.id || hit?.tagName}`);
         if (width < 24 || height < 24) wrong.push(`${name} is too small`);
