@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import signal
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -39,7 +40,7 @@ def test_a_port_whose_close_fails_is_closed_once() -> None:
     """A second close would hit another file that has the number meanwhile."""
     with pseudo_terminal() as (_, port):
         ports = SerialPorts({"board": port}, {"board": 115200})
-        opened = ports._ports["board"]
+        opened: Any = ports._ports["board"]
         close, closed = opened.close, list[int]()
 
         def failing() -> None:
