@@ -129,6 +129,17 @@ def test_maxsonars_are_expected_to_ping_less_often() -> None:
     assert [f.severity for f in rate_findings(heard, expected_rates(heard) | {"Ping": 9.0})] == [Severity.FAULT]
 
 
+@pytest.mark.parametrize(
+    ("identity", "what"),
+    [(0xE1, "an ICM-20649 answers at its chip select"), (0xEA, "an ICM-20948 answers"), (0x5A, "does not answer")],
+)
+def test_a_foots_part_at_the_thigh_that_was_not_accepted_is_named(identity: int, what: str) -> None:
+    parts = m.Parts(**dict.fromkeys(m.Parts._fields, 0) | {"identity_foot": identity})
+    mute = status(healthy=0x7F & ~m.Healthy.THIGH, errors_thigh=9, fault_thigh=m.Fault.NO_ANSWER)
+    (finding,) = board_findings(words(mute, parts))
+    assert str(finding).startswith(f"thigh gyro: {what}")
+
+
 def test_temperature_of_a_gyro() -> None:
     assert gyro_celsius(m.GyroHealth(0, 0, -34, 2, 0, 0)) == pytest.approx(20.06, abs=0.01)
 
