@@ -292,6 +292,7 @@ class SyncEdges:
         self._period_s = self._nominal_s
         self._first: tuple[int, float] | None = None
         self._newest: tuple[int, float] | None = None  # unwrapped edge, time
+        self._strays = self._strays_in_row = 0  # edges that belong to no sample, although the board has counted them
 
     @property
     def locked(self) -> bool:
@@ -299,7 +300,17 @@ class SyncEdges:
         return self._offset is not None
 
     def add(self, edge: int, t_s: float) -> None:
-        """Keep an edge (u16 count) and its time."""
+        """Keep an edge (u16 count) and its time; one that comes too early is no sample's, and later counts are one less."""
+        if self._offset is not None and self._newest is not None and self._first is not None:
+            steps = (edge - self._strays - self._newest[0]) & 0xFFFF
+            known = self._newest[0] - self._first[0] >= self.VOTES
+            if known and 0 < steps < self.VOTES and t_s < self._newest[1] + (steps - 0.2) * self._period_s:
+                self._strays, self._strays_in_row = self._strays + 1, self._strays_in_row + 1
+                if self._strays_in_row > 3:
+                    self.forget()
+                return
+        self._strays_in_row = 0
+        edge = (edge - self._strays) & 0xFFFF
         if self._newest is None or t_s - self._newest[1] > self.KEPT * self._nominal_s:
             unwrapped = edge
             self._first = (unwrapped, t_s)

@@ -134,6 +134,23 @@ def test_lost_edges_are_bridged() -> None:
     assert np.abs(found[100:] - t[100:]).max() <= 20e-6
 
 
+@pytest.mark.parametrize(("within", "moved_s"), [(0.1, 20e-6), (0.5, 20e-6), (0.95, 0.6e-3)])
+def test_a_stray_edge_moves_no_sample(within: float, moved_s: float) -> None:
+    """Interference at a share `within` of a period, which the board counts as an edge; just before an edge it is taken for it."""
+    timeline, messages, count = Timeline(MtxTiming()), list[Message](), 0
+    t, arrival = samples(1_000, 50.0, 7.1, 1.0, 4)
+    for n in range(len(t)):
+        messages.append(edge(count, t[n]))
+        messages.append((MTX, n & 0xFFFF, int(arrival[n]), PLAIN))
+        count += 1
+        if n in (300, 301, 500, 800):
+            messages.append(edge(count, t[n] + 0.01 * within))
+            count += 1
+    found = of_mtx(tell(timeline, messages), messages)
+    assert np.abs(found[100:] - t[100:]).max() <= moved_s
+    assert timeline.stray_edges == 4
+
+
 def test_without_a_board_the_counter_is_the_clock() -> None:
     found = tell(Timeline(MtxTiming(rate_hz=200.0)), [(MTX, n, n * 5 * MS, PLAIN) for n in range(10)])
     assert np.allclose(np.diff(np.array(found, float)), 0.005)

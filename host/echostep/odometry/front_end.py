@@ -71,6 +71,7 @@ class FrontEndCounts:
     bad_arrivals: int = 0  # messages whose arrival time contradicts their counter; most keep their time by the counter
     clock_steps: int = 0  # of the host's clock
     barometer_jumps: int = 0  # right after its start: the heights before them are not used
+    stray_edges: int = 0  # on the board's SyncOut input, none of the MTx's
 
 
 class FrontEnd:
@@ -123,6 +124,7 @@ class FrontEnd:
             timeline.contradicted,
             timeline.clock_steps,
             self._barometer.jumps,
+            timeline.stray_edges,
         )
 
     def process(self, portion: Portion) -> list[MeasuredSegment | Dropout]:

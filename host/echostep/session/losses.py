@@ -101,6 +101,10 @@ def skipped(recording: Recording, streams: StreamState) -> list[str]:
         ),
         (front_end.clock_steps, f"the host's clock stepped or stood still {front_end.clock_steps} times"),
         (front_end.barometer_jumps, "the barometer's first readings were not air pressure and were not used"),
+        (
+            front_end.stray_edges,
+            f"{front_end.stray_edges} edges on the SyncOut input were none of the MTx's and were not used",
+        ),
         (front_end.bad_times, f"{front_end.bad_times} messages had impossible times and were dropped"),
         (front_end.unknown_ports, f"{front_end.unknown_ports} chunks came from unknown ports"),
         (streams.board.rejected, f"{streams.board.rejected} damaged frames of the board were dropped"),

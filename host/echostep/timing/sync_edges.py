@@ -7,6 +7,9 @@ In: edges that the board has timed; sample counters with their time by arrival. 
 The MTx gives one edge per sample, so counter - edge count is a constant offset (mod 65536), which is unknown at first. Each sample votes for the
 offset of the edge nearest to its time by arrival. An offset with more than half of the last `VOTES` votes is locked. Then the time of a sample is
 the time of its edge; if the board has not reported that edge, it is extrapolated from the newest edge by the measured period.
+
+An edge that comes too early is none of the MTx's, but interference on the wire: it is left out, and the count goes on without it. Taken for a sample,
+it would move the times of half a second by a period, and turn a swinging foot by 0.1 rad.
 """
 
 from __future__ import annotations
@@ -22,6 +25,8 @@ VOTES = 50  # samples: half a second at 100 Hz
 KEPT = 256  # edges in the ring: more than two seconds at 100 Hz
 OUTDATED_PERIODS = 1e3  # farther from the newest edge than this, a sample has no time by edges, assumed
 MATCH_PERIODS = 100  # largest distance of a matching edge from the time by arrival, assumed
+EARLY_PERIODS = 0.2  # an edge that comes more than this before its time is a stray one; crystals and stamps differ by 1e-4 of a period
+MOST_STRAYS = 3  # in a row; more of them are a clock that has changed, assumed
 
 
 class SyncEdges(Protocol):
@@ -40,6 +45,9 @@ class SyncEdges(Protocol):
     voted: int  # votes since the reset
     locked: int
     offset: int  # counter minus edge count (mod 65536), once locked
+    strays: int  # stray edges since the reset, which the board has counted too
+    strays_in_row: int
+    all_strays: int  # since the beginning
 
 
 EDGES = record_dtype(SyncEdges, edge=KEPT, t_s=KEPT, vote=VOTES)
@@ -56,12 +64,21 @@ def new_edges(period_s: float) -> Any:
 def reset(s: SyncEdges) -> None:
     """Discard all edges and votes, after a restart of the board or the MTx."""
     s.period_s = s.nominal_s
-    s.seen = s.voted = s.locked = 0
+    s.seen = s.voted = s.locked = s.strays = s.strays_in_row = 0
 
 
 @kernel
 def add(s: SyncEdges, edge: int, t_s: float) -> None:
-    """Add an edge (u16 count) and its time, and measure the period."""
+    """Add an edge (u16 count) and its time, and measure the period; a stray edge is counted and left out."""
+    if _is_stray(s, (edge - s.strays - s.newest) & 0xFFFF, t_s):
+        s.strays += 1
+        s.strays_in_row += 1
+        s.all_strays += 1
+        if s.strays_in_row > MOST_STRAYS:
+            reset(s)
+        return
+    s.strays_in_row = 0
+    edge = (edge - s.strays) & 0xFFFF
     if s.seen == 0 or t_s - s.newest_s > KEPT * s.nominal_s:
         s.newest = s.first = edge
         s.first_s = t_s
@@ -74,6 +91,13 @@ def add(s: SyncEdges, edge: int, t_s: float) -> None:
     if s.newest - s.first >= VOTES:
         period_s = (t_s - s.first_s) / (s.newest - s.first)
         s.period_s = period_s if period_s > 0.0 else s.nominal_s
+
+
+@kernel
+def _is_stray(s: SyncEdges, steps: int, t_s: float) -> bool:
+    """Whether an edge, by its count so many after the newest one, comes too early for it."""
+    measured = s.locked == 1 and s.newest - s.first >= VOTES
+    return measured and 0 < steps < VOTES and t_s < s.newest_s + (steps - EARLY_PERIODS) * s.period_s
 
 
 @kernel

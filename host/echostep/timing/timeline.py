@@ -108,6 +108,11 @@ class Timeline:
         """Steps of the host's clock, or times for which it stood still."""
         return int(self._board["steps"] + self._mtx["steps"])
 
+    @property
+    def stray_edges(self) -> int:
+        """Edges on the board's SyncOut input that were none of the MTx's."""
+        return int(self._edges["all_strays"])
+
     def arrival_ns(self, t_s: float) -> int:
         """Arrival time, on the host's clock, of undelayed bytes about `t_s`; 0 before any message."""
         clock = self._board if self._board["started"] else self._mtx
