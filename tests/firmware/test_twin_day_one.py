@@ -25,7 +25,7 @@ DAY_ONE = [
     (("kit=foot", "icm20649=zeros"), "SPI bus: no part answers on SPI, and MISO is low"),
     (("kit=2026", "imu_thigh=absent"), "thigh gyro: does not answer"),
     (("kit=2026", "imu_calf=no_self_test"), "calf gyro (LSM6DSO): failed its self-test"),
-    (("kit=2026", "spi_errors=100"), "calf gyro (LSM6DSO): sent wrong bits"),
+    (("kit=2026", "spi_errors=100"), "belt gyro (LSM6DSO): sent wrong bits"),
     (("kit=2026", "pulse_left=absent", "hum=50"), "D4: is open"),
     (("kit=2026", "pulse_left=held"), "left ranger: receives no echo"),
     (("kit=2026", "sda=stuck_forever"), "SDA: is held low (D2)"),

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: MIT
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The firmware with a clock that starts near one of its wraps.
 
 In: the clock's first value, ticks. Out: an ELF in the given folder. Owns where the wraps are.
@@ -12,11 +12,8 @@ from pathlib import Path
 from places import ROOT
 
 TICKS_S = 2_000_000  # of the board's clock [host/docs/design/time-and-frames.md]
-TIMER_WRAP, HALF_WRAP, WRAP = (
-    1 << 16,
-    1 << 31,
-    1 << 32,
-)  # of Timer1; where comparisons of two times turn round; of the clock
+# Of Timer1; where comparisons of two times turn round; of the clock
+TIMER_WRAP, HALF_WRAP, WRAP = 1 << 16, 1 << 31, 1 << 32
 BUILD_MAX_S = 120.0
 
 

@@ -234,6 +234,7 @@ void pty_poll(void);
 void board_init(void); /* the first power-up */
 void board_power(bool on);
 void board_reset(uint8_t cause); /* MCUSR bits */
+bool has_series_resistor(char port, uint8_t pin); /* that keeps two outputs on its net apart */
 bool board_runs(void);           /* once a millisecond: whether the program runs; without power, and in the bootloader, it does not */
 void board_watchdog(void);
 bool board_fault(const char *name, const char *value);

@@ -57,7 +57,7 @@ def test_a_drawing_is_a_plan() -> None:
         (drawing(walls=[[0, 0, 1, 0], [9_000, 0, 9_001, 0]]), "m from end to end"),
         (drawing(walls=[[0, 0, 1, 0]] * (MOST_WALLS + 1)), "10001 walls, more than 10000"),
         (drawing(storeys=MOST_STOREYS + 1), "65 storeys, more than 64"),
-        (drawing(name="\x1b[2Janna"), "not printable"),
+        (drawing(name="\x1b[2Janna"), "without control characters"),
         (b" " * (MOST_BYTES + 1), "bytes, more than"),
     ],
 )

@@ -121,7 +121,7 @@ void drive_pin(char port, uint8_t pin, bool level)
 	apply_driven(port);
 	if (!pin_is_output(port, pin))
 		raise_level(port, pin, level);
-	else if (level != !!(port_registers(port)[1] & bit))
+	else if (level != !!(port_registers(port)[1] & bit) && !has_series_resistor(port, pin))
 		bench_trace("contention on P%c%u", port, pin);
 }
 

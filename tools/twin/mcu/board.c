@@ -126,6 +126,11 @@ static void drive_leds(void)
 	avr->data[DDRD] |= TX_LED;
 }
 
+bool has_series_resistor(char port, uint8_t pin)
+{
+	return echo_resistor && port == 'C' && pin == 7;
+}
+
 /* While the bootloader waits, its LED breathes: PC7 is driven high and low by turns, against what drives the right echo line. */
 static void breathe(void)
 {
