@@ -58,11 +58,15 @@ def test_a_cut_file_gives_what_came_before_the_cut(tmp_path: Path, draw: st.Data
 @settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_damage_never_raises_anything_else(tmp_path: Path, draw: st.DataObject) -> None:
     damaged = bytearray(write(tmp_path / "a.mcap", CHUNKS[:40]))
-    for _ in range(draw.draw(st.integers(1, 6))):
+    changed = draw.draw(st.integers(1, 6))
+    for _ in range(changed):
         damaged[draw.draw(st.integers(0, len(damaged) - 1))] = draw.draw(st.integers(0, 255))
     (tmp_path / "bad.mcap").write_bytes(damaged)
     with contextlib.suppress(EchostepError):
-        assert list(open_recording(tmp_path / "bad.mcap").chunks()) == recovered_chunks(tmp_path / "bad.mcap")
+        found, recovered = list(open_recording(tmp_path / "bad.mcap").chunks()), recovered_chunks(tmp_path / "bad.mcap")
+        assert len(found) >= len(recovered) - changed  # a message whose number is damaged is out of order, and left out
+        rest = iter(recovered)
+        assert all(chunk in rest for chunk in found)
 
 
 def recovered_chunks(path: Path) -> list[Chunk]:

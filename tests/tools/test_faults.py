@@ -39,7 +39,16 @@ def test_the_matrix_has_a_fault_of_each_switch() -> None:
     without_an_effect_alone = {"reset", "brown_out_fuse", "usb"}
     of_another_board = {"icm20649"}  # tests/firmware/test_twin_foot.py
     # tests/firmware
-    of_the_wiring = {"miso_undefined", "miso_resistor", "spi_errors", "twi_errors", "hum", "glitch", "echo_resistor", "jtag_fuse"}
+    of_the_wiring = {
+        "miso_undefined",
+        "miso_resistor",
+        "spi_errors",
+        "twi_errors",
+        "hum",
+        "glitch",
+        "echo_resistor",
+        "jtag_fuse",
+    }
     of_the_host = {"host_system", "host_hub"}  # tests/firmware/test_twin_usb.py
     assert known - used <= like_others | without_an_effect_alone | of_another_board | of_the_wiring | of_the_host
 
