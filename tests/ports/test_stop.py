@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 
 from command_line import echostep
-from echostep.ports.chunks import Chunk
+from echostep.ports.chunks import Chunk, ChunkQueue
 from echostep.ports.serial_ports import SerialPorts
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import Recorder
 from echostep.session.runs import live
 from players import pseudo_terminal
-from waiting import PATIENCE_S
+from waiting import PATIENCE_S, until
 
 
 def test_what_has_arrived_comes_after_stop() -> None:
@@ -61,7 +61,7 @@ def test_a_signal_ends_a_run_that_is_behind_with_all_that_had_arrived(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
     """The disk, or a kernel that is compiled, holds the run up while its port goes on."""
-    write, sent = Recorder.write, [b"begin"]
+    write, put, sent, queued = Recorder.write, ChunkQueue.put, [b"begin"], list[bytes]()
     with pseudo_terminal() as (ours, port):
 
         def held_up(recorder: Recorder, chunk: Chunk) -> None:
@@ -69,9 +69,16 @@ def test_a_signal_ends_a_run_that_is_behind_with_all_that_had_arrived(
                 for number in range(50):
                     sent.append(f", {number}".encode())
                     os.write(ours, sent[-1])
+                # A pseudo terminal hands over later what is written: a busy computer takes its time.
+                assert until(lambda: b"".join(queued) == b"".join(sent))
                 signal.raise_signal(signal.SIGTERM)
             write(recorder, chunk)
 
+        def counted(queue: ChunkQueue, chunk: Chunk) -> None:
+            queued.append(chunk.data)
+            put(queue, chunk)
+
+        monkeypatch.setattr(ChunkQueue, "put", counted)
         monkeypatch.setattr(Recorder, "write", held_up)
         monkeypatch.setattr(live, "_identify", lambda _ports: os.write(ours, sent[0]))  # the ports are open
         where = ["--out", tmp_path / "walk.mcap"] if command == "record" else ["--headless", "--out", tmp_path]
