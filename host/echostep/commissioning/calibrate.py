@@ -151,7 +151,7 @@ def _wait(console: Console) -> None:
 
 
 def _check_usual(values: dict[str, Values], console: Console) -> None:
-    """Ask a person before values are written that are hardly true; raises EchostepError where nobody can be asked, or who is does not want them."""
+    """Improbable values are written only after a `y` on the terminal; without a terminal or that answer, raises EchostepError."""
     words = doubt(values)
     if words and not (sys.stdin.isatty() and console.input(f"{words}. Write it all the same? [y/N] ").lower() == "y"):
         raise EchostepError(f"{words}; nothing was written of it")

@@ -23,13 +23,10 @@ RULES = "99-echostep.rules"
 RULE_FOLDERS = tuple(
     map(Path, ("/etc/udev/rules.d", "/run/udev/rules.d", "/usr/lib/udev/rules.d", "/lib/udev/rules.d"))
 )
-BOARD_NAMES = (
-    "echostep",
-    "sensor board",
-)  # maker and product: they count, whatever the identifier is [firmware/avr/usb_descriptors.c]
-BOARD_IDS = {
-    (0x1209, 0x0001)
-}  # where the system tells no names; pid.codes reserves it for tests, and others use it too
+# Maker and product: they count, whatever the identifier is [firmware/avr/usb_descriptors.c]
+BOARD_NAMES = ("echostep", "sensor board")
+# Where the system tells no names; pid.codes reserves it for tests, and others use it too
+BOARD_IDS = {(0x1209, 0x0001)}
 BOOTLOADER_IDS = {(0x2341, 0x0036), (0x2341, 0x0037), (0x2A03, 0x0036), (0x2A03, 0x0037), (0x1B4F, 0x9205)}
 SKETCH_IDS = {(0x2341, 0x8036), (0x2341, 0x8037), (0x2A03, 0x8036), (0x2A03, 0x8037), (0x1B4F, 0x9206)}
 FTDI, XSENS = 0x0403, 0x2639

@@ -322,17 +322,22 @@ def turn(nav: Nav, centre: Floats, angle: float) -> None:
 
 
 @lean_kernel
+def decouple(nav: Nav, component: int, variance: float) -> None:
+    """Give the error state `component` this variance, and no covariance with any other."""
+    nav.P[component, :] = 0.0
+    nav.P[:, component] = 0.0
+    nav.P[component, component] = variance
+
+
+@lean_kernel
 def reset_height(nav: Nav, height_m: float) -> None:
     """Set the height to that of a level floor, and correct nothing by it: the drift of a runner's steps has a bias, which is not modelled."""
-    axis = POS + 2
-    nav.P[axis, :] = 0.0
-    nav.P[:, axis] = 0.0
-    nav.P[axis, axis], nav.position[2] = nav.noise.flat_m**2, height_m
+    decouple(nav, POS + 2, nav.noise.flat_m**2)
+    nav.position[2] = height_m
 
 
 @lean_kernel
 def reset_reference(nav: Nav) -> None:
     """Make the present position and yaw the reference: their errors belong to the steps already reported."""
     for component in (POS, POS + 1, POS + 2, TILT + 2):
-        nav.P[component, :] = 0.0
-        nav.P[:, component] = 0.0
+        decouple(nav, component, 0.0)

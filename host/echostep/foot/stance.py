@@ -210,10 +210,8 @@ def may_ride(rate2: float, force2: float) -> bool:
 @lean_kernel
 def follow_floor(nav: Nav, expected: Vector, variance: float) -> None:
     """A floor accelerates with the foot that stands on it: reset the vertical velocity, so that neither level nor biases are corrected by it."""
-    axis = VEL + UP
-    for j in range(ins.SIZE):
-        nav.P[axis, j] = nav.P[j, axis] = 0.0
-    nav.P[axis, axis], nav.velocity[UP] = variance, expected[UP]
+    ins.decouple(nav, VEL + UP, variance)
+    nav.velocity[UP] = expected[UP]
 
 
 @lean_kernel

@@ -45,9 +45,8 @@ SETTLE_S = 0.2  # after so much rest the step before it has been corrected
 LEAVE_S = 0.15  # a stance ends after so long without rest: no swing is shorter
 PERIOD_GAIN = 0.003  # relative change of the running median per sample
 GAP_S = 0.25  # shorter gaps are propagated over
-MOVING_GAP_S = (
-    0.08  # the same, of a foot that moves: its speed changes by metres per second in a tenth of a second; assumed
-)
+# The same, of a foot that moves: its speed changes by metres per second in a tenth of a second; assumed
+MOVING_GAP_S = 0.08
 STRAY_SAMPLES = 20  # so many samples in a row with earlier times: the clock was set back
 WALK_M_S = 1.5  # mean speed of a foot while samples are missing, 1 sd
 MAX_ACCEL_M_S2, MAX_RATE_RAD_S = 1e3, 1e2  # beyond any foot

@@ -101,7 +101,7 @@ def _tracker_line(decoder: Decoder) -> str:
 
 
 def refusals(counts: MtxCounts) -> str:
-    """Samples that the tracker does not use, by reason; empty for none."""
+    """Numbers of the samples that the tracker does not use, each with its cause; empty for none."""
     return _reasons(
         (
             (counts.incomplete, "without counter, accel or gyro"),

@@ -16,11 +16,8 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.serialization.pkcs12 import PKCS12KeyAndCertificates
 
 DER_SEQUENCE = b"\x30"  # how PKCS #12 begins, and DER
-USUAL = (
-    None,
-    b"",
-    b"atakatak",
-)  # passwords of a file whose own is not given; the last: of every file that a TAK server makes [TAK, makeCert.sh]
+# Passwords of a file whose own is not given; the last: of every file that a TAK server makes [TAK, makeCert.sh]
+USUAL = (None, b"", b"atakatak")
 
 
 def identity(content: bytes, password: bytes | None, file_name: str, cover: bytes) -> bytes:

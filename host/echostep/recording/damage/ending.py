@@ -30,9 +30,8 @@ FOOTER_SIZE = 20  # bytes of its body: begin of the summary u64, begin of its of
 DATA_END_SIZE = 4  # bytes of its body: the checksum, 0 for none
 CRC_SIZE = 4
 CHECKSUM_BYTES = 1 << 20  # of one call: Ctrl-C is seen between two
-MAGIC_BITS = (
-    8  # a beginning that differs from the magic bytes in no more bits is a damaged one, not another format; assumed
-)
+# A beginning that differs from the magic bytes in no more bits is a damaged one, not another format; assumed
+MAGIC_BITS = 8
 
 
 @dataclass(frozen=True, slots=True)

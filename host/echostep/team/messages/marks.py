@@ -13,7 +13,7 @@ of the errands of one run the latest. So what each commander knows can be sent a
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal, TypeVar
 
 import msgspec
@@ -85,6 +85,7 @@ class Errand(msgspec.Struct, frozen=True):
 AlarmKey = tuple[str, str, str]  # team, wearer, "<run>-<number>"
 RunKey = tuple[str, str, str]  # team, wearer, run
 T = TypeVar("T")
+K = TypeVar("K")
 _MARK, _ACK, _ERRAND = msgspec.json.Decoder(Mark), msgspec.json.Decoder(Ack), msgspec.json.Decoder(Errand)
 
 
@@ -164,8 +165,7 @@ class MarkBoard:
         mark = _decoded(payload, _MARK, "mark")
         if mark.id != identity:
             raise BadReportError("mark and topic contradict each other")
-        if not is_printable(mark.by):
-            raise BadReportError("unprintable text")
+        _check_printable(mark.by)
         if identity in self.removed:
             if not mark.removed:  # sent by a commander who had not heard that it was removed
                 self.answers.append(self.removed[identity].message)
@@ -176,8 +176,7 @@ class MarkBoard:
                 self.removed.pop(next(iter(self.removed)))
             self.removed[identity] = mark
             return
-        if identity not in self.marks and len(self.marks) >= MOST_MARKS:
-            raise BadReportError(f"more than {MOST_MARKS} marks")
+        _check_room(self.marks, identity, MOST_MARKS, "marks")
         self.marks[identity] = mark
 
     def _receive_ack(self, key: AlarmKey, payload: bytes) -> None:
@@ -186,11 +185,9 @@ class MarkBoard:
             self.acks.pop(key, None)
             return
         ack = _decoded(payload, _ACK, "acknowledgement")
-        if not is_printable(ack.by):
-            raise BadReportError("unprintable text")
+        _check_printable(ack.by)
+        _check_room(self.acks, key, MOST_ACKS, "acknowledgements")
         known = self.acks.get(key)
-        if known is None and len(self.acks) >= MOST_ACKS:
-            raise BadReportError(f"more than {MOST_ACKS} acknowledgements")
         if known is not None and (known.unix_s, known.by) < (ack.unix_s, ack.by):
             self.answers.append(ack_message(key, known.by, known.unix_s))
         else:
@@ -202,15 +199,25 @@ class MarkBoard:
             self.errands.pop(key, None)
             return
         errand = _decoded(payload, _ERRAND, "errand")
-        if not all(map(is_printable, (errand.by, errand.to, errand.where))):
-            raise BadReportError("unprintable text")
+        _check_printable(errand.by, errand.to, errand.where)
+        _check_room(self.errands, key, MOST_ERRANDS, "errands")
         known = self.errands.get(key)
-        if known is None and len(self.errands) >= MOST_ERRANDS:
-            raise BadReportError(f"more than {MOST_ERRANDS} errands")
         if known is not None and (known.unix_s, known.by) > (errand.unix_s, errand.by):
             self.answers.append(errand_message(key, known))
         else:
             self.errands[key] = errand
+
+
+def _check_printable(*texts: str) -> None:
+    """Raises BadReportError for a text with letters that are not printed."""
+    if not all(map(is_printable, texts)):
+        raise BadReportError("unprintable text")
+
+
+def _check_room(known: Mapping[K, object], key: K, most: int, what: str) -> None:
+    """Raises BadReportError for a new key where `most` are known."""
+    if key not in known and len(known) >= most:
+        raise BadReportError(f"more than {most} {what}")
 
 
 def _check_key(key: tuple[str, str, str]) -> None:

@@ -6,6 +6,7 @@ In: a file; a boolean picture. Out: grey values; polygons in pixels, x right, y 
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -29,10 +30,10 @@ def grey(path: Path) -> Floats:
     require(f"{path}: a picture", "PIL")
     from PIL import Image
 
-    read_bytes(path)
+    content = read_bytes(path)
     Image.MAX_IMAGE_PIXELS = MOST_PIXELS
     try:
-        with Image.open(path) as image:
+        with Image.open(BytesIO(content)) as image:
             if image.width * image.height > MOST_PIXELS:
                 raise EchostepError(f"{path}: more than {MOST_PIXELS // 10**6} million pixels: cut it to the building")
             return np.asarray(image.convert("L"), dtype=np.float64)
