@@ -17,6 +17,9 @@ export class Asking {
 
   get index() { return this.open.findIndex(([, question]) => question === this.shown); }
 
+  // The question in the panel: the shown one, or the first where that was answered or undone.
+  get current() { return this.index < 0 ? this.open[0]?.[1] ?? null : this.shown; }
+
   // Show a question, on its level; without one: the first.
   show(question, goes = true) {
     const found = this.open.find(([, other]) => other === question) ?? this.open[0];
@@ -60,8 +63,9 @@ export class Asking {
     else this.desk.say('No wall here that is long enough: click on a wall');
   }
 
-  // Whether a question is shown; goes to its level.
+  // Whether there is a question; goes to its level.
   here() {
+    this.shown = this.current;
     const found = this.open.find(([, question]) => question === this.shown);
     if (found) this.sheet.k = found[0];
     return Boolean(found);
@@ -69,12 +73,11 @@ export class Asking {
 
   // Show the state of the questions: after any change, undo included.
   paint() {
-    const { open } = this;
-    if (this.index < 0) this.shown = open[0]?.[1] ?? null;
+    const { open, current } = this;
     byId('questions').hidden = !open.length;
-    byId('asked').textContent = this.shown ? `${this.index + 1} of ${open.length}: ${this.shown.text}` : '';
-    byId('answer-move').disabled = this.shown?.about === 'wall';
-    byId('answer-yes').textContent = this.shown?.proposed ? 'Add' : 'Keep';
-    byId('answer-no').textContent = this.shown?.proposed ? 'Drop' : 'Delete';
+    byId('asked').textContent = current ? `${open.findIndex(([, question]) => question === current) + 1} of ${open.length}: ${current.text}` : '';
+    byId('answer-move').disabled = current?.about === 'wall';
+    byId('answer-yes').textContent = current?.proposed ? 'Add' : 'Keep';
+    byId('answer-no').textContent = current?.proposed ? 'Drop' : 'Delete';
   }
 }

@@ -46,7 +46,7 @@ function changed() {
 function draw() {
   waiting = false;
   asking.paint();
-  paint({ shown: asking.shown, level: tools.level, picture: tools.picture, view, chosen: tools.chosen, draft: tools.draft, measure: Boolean(tools.live), cross: tools.cross, points: tools.points });
+  paint({ shown: asking.current, level: tools.level, picture: tools.picture, view, chosen: tools.chosen, draft: tools.draft, measure: Boolean(tools.live), cross: tools.cross, points: tools.points });
   for (const button of document.querySelectorAll('[data-tool]')) button.setAttribute('aria-pressed', String(button.dataset.tool === tools.name));
   byId('step-back').disabled = !sheet.past.length;
   byId('step-forth').disabled = !sheet.future.length;
