@@ -101,8 +101,9 @@ TOPICS: tuple[Topic, ...] = (ESTIMATE, STEP, *ECHO, PRESSURE, STATUS)
 class Derived:
     """Derives the messages of each portion; `take` is called after `Tracker.take` of the same portion."""
 
-    def __init__(self, tracker: Tracker) -> None:
-        self._tracker = tracker
+    def __init__(self, tracker: Tracker, log_offset_ns: int = 0) -> None:
+        """`log_offset_ns`: times of the messages minus those of the arrivals."""
+        self._tracker, self._log_offset_ns = tracker, log_offset_ns
         tracker.arrival_ns(0.0)  # compiles its kernel before the run starts
         self._earth = None if lacks("/location", "pyproj") else earth_of(tracker.plan)
         # The board's bytes are decoded a second time here: `Tracker.take` cuts a portion at check-ins and beacon readings, and its front end
@@ -119,7 +120,7 @@ class Derived:
         from_board = portion.of(BOARD)
         if from_board.received:
             frames = self._board.frames(from_board.received)
-            t_ns = portion.t_arrival_ns[from_board.rows_of(frames.end)]
+            t_ns = portion.t_arrival_ns[from_board.rows_of(frames.end)] + self._log_offset_ns
             notes += self._echoes(frames, t_ns) + _pressures(frames, t_ns) + self._status(frames, t_ns)
         for estimate in estimates:
             notes += self._estimate(estimate)
@@ -160,7 +161,7 @@ class Derived:
         numbers = {k: v for k, v in dataclasses.asdict(e).items() if not isinstance(v, float) or math.isfinite(v)}
         if not {"t_s", "x_m", "y_m", "heading_rad"} <= numbers.keys():
             return []
-        t_ns = self._tracker.arrival_ns(e.t_s)
+        t_ns = self._tracker.arrival_ns(e.t_s) + self._log_offset_ns
         ellipse = e.ellipse95
         body = {
             **numbers,

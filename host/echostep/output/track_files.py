@@ -136,8 +136,8 @@ def _flat(columns: Columns) -> Columns:
 
 def _record(recording: Recording, tracker: Tracker, out: Path, estimates: list[Estimate]) -> None:
     """Write the recorded bytes again, with the messages derived from them now."""
-    derived = Derived(tracker)
     with Recorder(out, recording.metadata) as recorder:
+        derived = Derived(tracker, recorder.log_offset_ns)
         for portion in with_progress(recording, f"tracking {recording.path.name}"):
             for chunk in portion.chunks():
                 recorder.write(chunk)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from mcap.records import Header, Metadata
 from echostep.arrays import Octets
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk, Portion
+from echostep.recording.clock import log_offset_ns
 from echostep.recording.damage.ending import Ending, begins_as_mcap, checksum_matches, read_ending
 from echostep.recording.damage.notes import MISPLACED, made_of, missing_ports
 from echostep.recording.damage.placing import Placement
@@ -51,6 +52,7 @@ class Recording:
     library: str = ""  # by which the file was written
     goes_on_in: str = ""  # name of the file with the next part of the run
     before: list[str] = field(default_factory=list)  # damage of the recordings of which this one was made
+    _log_offset_ns: int = 0  # log time minus arrival time
     _intact: bool | None = None  # whether the checksum is right; None: unknown yet
     _channels: PortChannels = field(default_factory=PortChannels)
     _ports: set[str] = field(default_factory=set)  # with messages
@@ -79,6 +81,7 @@ class Recording:
                 deque(self._records_in_chunk(record[1], channels), maxlen=0)
             if isinstance(record, MessageRun) or record[0] == Opcode.CHUNK:
                 break
+            self._note(*record)
         for record in self._from(file, offset, channels):
             if isinstance(record, MessageRun):
                 yield record.portion
@@ -149,11 +152,13 @@ class Recording:
             yield record
 
     def _note(self, opcode: int, body: bytes) -> None:
-        """Keep the recorder's name, earlier damage, and which file goes on; the metadata are read when the recording is opened."""
+        """Keep the recorder's name, its clock, earlier damage, and which file goes on; other metadata are read when the recording is opened."""
         if opcode == Opcode.HEADER and (header := parse_record(Header, body)):
             self.library = header.library
         if opcode == Opcode.METADATA and (stored := parse_record(Metadata, body)):
-            if stored.name == DAMAGE_NAME:
+            if stored.name == METADATA_NAME:
+                self._log_offset_ns = log_offset_ns(stored.metadata)
+            elif stored.name == DAMAGE_NAME:
                 self.before = list(stored.metadata.values())
             elif stored.name == PART_NAME:
                 self.goes_on_in = stored.metadata.get(NEXT, "")
@@ -201,7 +206,7 @@ class Recording:
         while offset < len(file):
             run, offset = read_messages(file, offset, channels)
             if run:
-                yield offset, run
+                yield offset, self._on_arrival_clock(run)
             end = record_end(file, offset, channels.known)
             if end < 0 and offset < len(file) and self.grows:
                 return
@@ -217,6 +222,15 @@ class Recording:
             else:
                 continue
             offset = end
+
+    def _on_arrival_clock(self, run: MessageRun) -> MessageRun:
+        """The messages with their arrival times; where the metadata's clock cannot be true, log times stay: a constant shift harms nothing."""
+        portion, offset_ns = run.portion, self._log_offset_ns
+        if not offset_ns or np.median(portion.t_arrival_ns) < offset_ns:
+            self._log_offset_ns = 0
+            return run
+        t_arrival_ns = np.maximum(portion.t_arrival_ns - offset_ns, 0)
+        return MessageRun(replace(portion, t_arrival_ns=t_arrival_ns), run.sequence)
 
 
 def open_recording(path: Path | str) -> Recording:

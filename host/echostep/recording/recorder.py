@@ -20,6 +20,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from echostep.ports.chunks import Chunk
 from echostep.recording.background_writer import BackgroundWriter
+from echostep.recording.clock import log_offset_ns, with_log_time
 from echostep.recording.mcap_records import RAW_ENCODING
 
 METADATA_NAME = "echostep"  # of the metadata record
@@ -46,7 +47,7 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class DerivedMessage:
-    """One derived message; `t_ns` on the clock of the arrivals."""
+    """One derived message; `t_ns` in UTC where the run knows the time of day, else on the clock of the arrivals."""
 
     topic: Topic
     t_ns: int
@@ -87,7 +88,9 @@ class Recorder:
         """Write to this file from now on."""
         self._file = file
         self._writer = begin_file(file)  # type: ignore[arg-type]  # the writer calls only `write` and `tell`
-        self._writer.add_metadata(METADATA_NAME, dict(metadata))
+        fields = with_log_time(metadata)
+        self.log_offset_ns = log_offset_ns(fields)  # log time minus arrival time
+        self._writer.add_metadata(METADATA_NAME, fields)
         self._channels: dict[str, int] = {}  # by port or topic
         self._sequence = 0
 
@@ -112,7 +115,7 @@ class Recorder:
             self.lost_chunks += 1
             return
         channel = self._channels.get(chunk.port) or self._register_port(chunk.port)
-        self._add_message(channel, chunk.t_arrival_ns, chunk.data)
+        self._add_message(channel, chunk.t_arrival_ns + self.log_offset_ns, chunk.data)
 
     def wait_for_disk(self, chunk: Chunk) -> None:
         """Wait for the file once per `WAIT_NS` of arrival time; for sources that can be slowed down."""

@@ -59,7 +59,7 @@ def recorded(
         if chunk is not None:
             recorder.write(chunk)
             for fault in output_faults()[told:]:
-                recorder.write_derived([log_line(chunk.t_arrival_ns, fault)])
+                recorder.write_derived([log_line(chunk.t_arrival_ns + recorder.log_offset_ns, fault)])
                 told += 1
             if wait_for_disk:
                 recorder.wait_for_disk(chunk)

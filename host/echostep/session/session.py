@@ -30,7 +30,7 @@ from echostep.ports.people.meeting import MEETING
 from echostep.ports.people.team_beacons import TEAM_BEACONS
 from echostep.ports.people.teammate import TEAM
 from echostep.printing.people import FaultNews, outlast_output
-from echostep.recording.clock import clock_of
+from echostep.recording.clock import clock_of, utc_offset_ns
 from echostep.recording.reading import Recording
 from echostep.recording.recorder import DerivedMessage, Recorder
 from echostep.scorecard.truth import Truth
@@ -267,7 +267,9 @@ class Session:
         elif self.guided:
             sinks.append(SpokenCueSink(self.guided))
         if writers := [*([recorder.write_derived] if recorder else []), *self._writers]:
-            sinks.append(DerivedSink(self.tracker, writers))
+            known_ns = utc_offset_ns(self.recorded.metadata) if self.recorded else None
+            offset_ns = recorder.log_offset_ns if recorder else known_ns or 0
+            sinks.append(DerivedSink(self.tracker, writers, offset_ns))
             if self.tracker.plan.georeference and (words := lacks("/location", "pyproj")):
                 console.print(f"Longitude and latitude are left out: {words}", markup=False, highlight=False)
         return sinks

@@ -113,8 +113,10 @@ class MarkSink(Sink):
 class DerivedSink(Sink):
     """Messages that are derived from estimates, for the recording and for viewers."""
 
-    def __init__(self, tracker: Tracker, writers: Sequence[Callable[[list[DerivedMessage]], None]]) -> None:
-        self._derived, self._writers = Derived(tracker), writers
+    def __init__(
+        self, tracker: Tracker, writers: Sequence[Callable[[list[DerivedMessage]], None]], log_offset_ns: int = 0
+    ) -> None:
+        self._derived, self._writers = Derived(tracker, log_offset_ns), writers
 
     def take(self, portion: Portion, estimates: list[Estimate], /) -> None:
         """Write the messages of a portion."""

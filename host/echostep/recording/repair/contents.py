@@ -6,7 +6,7 @@ In: a recording. Out: a summary as lines of text. Owns nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from echostep.ports.chunks import BOARD, FOOT, LATEST_NS, MTX
 from echostep.printing.console import console_for_people
 from echostep.recording.capture import Decoder
 from echostep.recording.capture_summary import refusals
+from echostep.recording.clock import log_offset_ns, utc_offset_ns
 from echostep.recording.damage.notes import MISPLACED, made_of, missing_ports
 from echostep.recording.mcap_records import port_of
 from echostep.recording.repair.arrival_order import ArrivalOrder
@@ -152,7 +153,18 @@ def _head(recovery: Recovery, contents: Contents) -> list[str]:
             lines.append(
                 f"  {key}: {value if len(value) < LONGEST_VALUE and chr(10) not in value else _indented(value)}"
             )
-    return lines
+    return [*lines, *_time_line(recovery.metadata)]
+
+
+def _time_line(metadata: Mapping[str, str]) -> list[str]:
+    """What viewers show as the time of a message, where it is not the time of day; nothing of another program's file."""
+    if not metadata or log_offset_ns(metadata):
+        return []
+    if utc_offset_ns(metadata) is None:
+        return ["  times: no time of day was recorded; viewers show the seconds of the run, in 1970"]
+    return [
+        "  times: of a clock that begins with the computer; echostep export FILE --plan PLAN -o NEW.mcap writes UTC"
+    ]
 
 
 def _indented(text: str) -> str:
