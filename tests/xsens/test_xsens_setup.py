@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from echostep.xsens import PROJECT, MtxReader, OutputFormat, encode_frame
 from echostep.xsens.configuration.requests import project_requests, reset_heading, set_rate
 from echostep.xsens.configuration.setup import FIRST_TRIES, TIMEOUT_S, MtxSetup, State
+from echostep.xsens.frames import FrameReader
 from echostep_studies.simulation.devices.mtx_setup import FACTORY, DeviceState, MtxDevice
 from xsens.mt_lines import SAMPLE, STEP_S, Line
 
@@ -188,6 +189,19 @@ class Successor(MtxDevice):
             self.configuration = payload
             return encode_frame(0xC1, payload)
         return encode_frame(0x42, b"\x04") if mid in (0x04, 0xD0, 0xD2, 0xD4) else super()._answer(mid, payload)
+
+
+def test_a_device_that_answers_too_late_is_told_from_a_deaf_one() -> None:
+    """It answers each request after 1.2 s: the line works, and what to do is said."""
+    setup, reader, answers = MtxSetup(project_requests(100.0), 100.0), FrameReader(), list[tuple[float, bytes]]()
+    for now_s in (k * STEP_S for k in range(round(8.0 / STEP_S))):
+        due = b"".join(answer for due_s, answer in answers if due_s <= now_s)
+        answers = [(due_s, answer) for due_s, answer in answers if due_s > now_s]
+        for frame in reader.feed(setup.advance(due, now_s)):
+            answers.append((now_s + 1.2, encode_frame(frame.mid + 1)))
+    assert setup.state is State.WRONG_MODE
+    assert "within 1 s. Take its supply away, give it again and start once more, or set it once" in setup.verdict
+    assert "line from host" not in setup.verdict
 
 
 def test_sync_out_is_wanted_but_not_needed() -> None:

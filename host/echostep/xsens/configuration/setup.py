@@ -44,6 +44,7 @@ RATE_SPAN_S = 0.5  # least time over which a rate is measured; assumed
 BACKLOG_S = 0.2  # measurements of this time are not used for the rate: buffered ones come at once
 MAX_MEASUREMENTS = 1000  # kept for the rate; assumed
 
+CHECK_LINE = "Check the line from host to MTx (its RX)"
 BY_HAND = "set it once with Xsens' MT Manager to calibrated data + orientation as quaternion + sample counter, float, {rate:g} Hz, 115200 Bd"
 
 
@@ -180,10 +181,10 @@ class MtxSetup:
             self.remarks.append(f"{request.name} was not answered")
             self._next_request(now_s)
         elif request is GO_TO_CONFIG or request is GO_TO_MEASUREMENT:
-            self._failure = self._failure or f"it does not answer {request.name}"
+            self._failure = self._failure or f"it does not answer {request.name}{self._within}"
             self._conclude_unanswered()
         else:
-            self._abandon(f"it does not answer {request.name}", now_s)
+            self._abandon(f"it does not answer {request.name}{self._within}", now_s)
 
     def _abandon(self, why: str, now_s: float) -> None:
         """Skip the remaining requests and start the measurement with the present settings."""
@@ -219,6 +220,11 @@ class MtxSetup:
         return ""
 
     @property
+    def _within(self) -> str:
+        """How long an answer was waited for, where the device has answered before: it is slow, not deaf."""
+        return f" within {TRIES * TIMEOUT_S:g} s" if self._acknowledged else ""
+
+    @property
     def product(self) -> str:
         """Product code of the device; "" until it is received."""
         return product_text(self._answers.get(REQUEST_PRODUCT.name, b""))
@@ -240,7 +246,8 @@ class MtxSetup:
             return "MTx: does not answer, but sends what is needed: it is used as it is, and asked again"
         if self.state is State.WRONG_MODE:
             fault = f", and sends {self._stream_fault()}" if self._measurements and self._stream_fault() else ""
-            return f"MTx: {self._failure}{fault}. Check the line from host to MTx (its RX), or {by_hand}"
+            check = "Take its supply away, give it again and start once more" if self._acknowledged else CHECK_LINE
+            return f"MTx: {self._failure}{fault}. {check}, or {by_hand}"
         if self.state is State.SILENT and self._received:
             return f"MTx: {self._received} bytes were received, but no frame: check that this is the MTx's port and that its rate is 115200 Bd"
         if self.state is State.SILENT:
