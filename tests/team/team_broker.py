@@ -7,6 +7,7 @@ import shutil
 import signal
 import socket
 import subprocess
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Self
 
@@ -21,20 +22,25 @@ needs_broker = pytest.mark.skipif(MOSQUITTO is None, reason="mosquitto is not in
 
 
 class Certificates:
-    """An authority, a server that it knows by 127.0.0.1, a client that it knows."""
+    """An authority, a server that it knows by 127.0.0.1, one by another name, a client that it knows, and one of either whose time is over."""
 
     def __init__(self, folder: Path) -> None:
         authority = trustme.CA()
-        self.ca, self.server, self.client, self.stranger = (
-            folder / f"{n}.pem" for n in ("ca", "server", "client", "stranger")
+        self.ca, self.server, self.client, self.stranger, self.elsewhere, self.old, self.old_client = (
+            folder / f"{n}.pem" for n in ("ca", "server", "client", "stranger", "elsewhere", "old", "old_client")
         )
         authority.cert_pem.write_to_path(str(self.ca))
-        for path, issuer, name in (
-            (self.server, authority, "127.0.0.1"),
-            (self.client, authority, "anna@example.org"),
-            (self.stranger, trustme.CA(), "eve@example.org"),
+        yesterday = datetime.now(UTC) - timedelta(days=1)
+        for path, issuer, name, end in (
+            (self.server, authority, "127.0.0.1", None),
+            (self.client, authority, "anna@example.org", None),
+            (self.stranger, trustme.CA(), "eve@example.org", None),
+            (self.elsewhere, authority, "broker.example", None),
+            (self.old, authority, "127.0.0.1", yesterday),
+            (self.old_client, authority, "anna@example.org", yesterday),
         ):
-            issuer.issue_cert(name).private_key_and_cert_chain_pem.write_to_path(str(path))
+            made = issuer.issue_cert(name, not_after=end)
+            made.private_key_and_cert_chain_pem.write_to_path(str(path))
 
     def query(self, client: Path | None = None) -> str:
         """The part of a URL that names the files."""
@@ -82,6 +88,11 @@ class Broker:
             self._running.terminate()
             self._running.wait(PATIENCE_S)
             self._running = None
+
+    def reload(self) -> None:
+        """It reads passwords and access rules anew."""
+        assert self._running
+        self._running.send_signal(signal.SIGHUP)
 
     def freeze(self) -> None:
         """It lives but does nothing."""

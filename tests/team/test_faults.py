@@ -81,7 +81,7 @@ def test_a_certificate_of_another_name_is_named_and_its_name_can_be_given(files:
 def test_an_unknown_authority_and_a_port_without_tls_are_named(files: dict[str, Path]) -> None:
     with tak(files) as port:
         said = fault(f"cot+tls://127.0.0.1:{port}?name=takserver")
-    assert said.endswith("does not know: give the authority's file with ca=FILE")
+    assert said.endswith("does not know: give the file of the authority that has signed it with ca=FILE")
     with tak(files, tls=False) as port:
         assert "does not speak TLS" in fault(f"cot+tls://127.0.0.1:{port}?ca={files['ca']}")
 

@@ -192,7 +192,10 @@ def test_tls_with_client_certificates(tmp_path: Path, certificates: Certificates
         words = []
         box = box_to(url, words)
         assert until(lambda: words)
-        assert "an authority that this computer does not know: give the authority's file with ca=FILE" in words[0]
+        assert (
+            "an authority that this computer does not know: give the file of the authority that has signed it with ca=FILE"
+            in words[0]
+        )
         box.close()
     with pytest.raises(EchostepError, match="no such file"):
         box_to("mqtts://127.0.0.1?ca=/no/such.pem")

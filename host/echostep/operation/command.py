@@ -152,7 +152,10 @@ def _follow(run: _Run, page: TablePage | None, console: Console, seconds: float,
                     while notices:
                         console.print(notices.popleft(), markup=False)
                 if page:
-                    page.publish(operation.scene(now_s, time.time(), connected=run.receiver.connected))
+                    receiver = run.receiver
+                    page.publish(
+                        operation.scene(now_s, time.time(), connected=receiver.connected, fault=receiver.fault)
+                    )
                 if draws and now_s - table_s >= TABLE_S:
                     table_s = now_s
                     shown.update(drawn(console.height), refresh=True)

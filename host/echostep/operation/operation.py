@@ -49,7 +49,7 @@ Key = tuple[str, str, str]  # team, name, run
 class TableScene:
     """One moment. `places`: rows of float32, one for each wearer on this plan (`Operation.scene`). `rows`: the list, the most urgent first.
 
-    `summary`: number of members in each state; `refused`: rejected messages, in words.
+    `summary`: number of members in each state; `refused`: rejected messages, in words; `fault`: of the connection, in words.
     """
 
     t_s: float
@@ -59,6 +59,7 @@ class TableScene:
     summary: str
     refused: str
     connected: bool
+    fault: str
     marks: tuple[ShownMark, ...] = ()
 
 
@@ -172,7 +173,7 @@ class Operation:
         members = self.roster.members(now_s)
         return [(followed.number, m) for m in members if (followed := self._followed.get(m.key)) is not None]
 
-    def scene(self, now_s: float, unix_s: float, *, connected: bool = True) -> TableScene:
+    def scene(self, now_s: float, unix_s: float, *, connected: bool = True, fault: str = "") -> TableScene:
         """The scene at a time of the commander's clock.
 
         Rows of its `places`: wearer, x, y, level, heading (NaN: not known), 95 % radius, protection radius (NaN: none).
@@ -183,7 +184,7 @@ class Operation:
                 self._list(members, now_s)
             places, refused = self._places(members, now_s), rejected(self.roster)
             words = summary_words(members, now_s)
-            return TableScene(now_s, unix_s, places, self._rows, words, refused, connected, self._marks())
+            return TableScene(now_s, unix_s, places, self._rows, words, refused, connected, fault, self._marks())
 
     def trail(self, begin: int, now_s: float) -> tuple[bytes, int]:
         """Rows of the trails from point number `begin` on, and the number of the next point."""

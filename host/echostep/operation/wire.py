@@ -54,6 +54,7 @@ class TableHeader:
     summary: str
     refused: str
     connected: bool
+    fault: str
     details: ShownDetails | None
     distress: ShownDistress | None
     marks: tuple[ShownMark, ...] | None
@@ -100,6 +101,7 @@ def frame(scene: TableScene, parts: TableParts) -> bytes:
         summary=scene.summary,
         refused=scene.refused,
         connected=scene.connected,
+        fault=scene.fault,
         details=parts.details,
         distress=parts.distress,
         marks=scene.marks if parts.marks else None,

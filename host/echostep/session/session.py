@@ -211,6 +211,8 @@ class Session:
         self._read_team(subscription, outlet, publishing.run)
         opened.callback(subscription.close)
         subscription.open()
+        if self.page:  # a broker that is not there is told once
+            self.page.fault_sources.append(lambda: "" if publishing.fault else subscription.fault)
 
     def _read_team(self, subscription: TeamSubscription, outlet: Outlet, run: str) -> None:
         """Read teammates and beacons; the place of the wearer whom a rescuer is guided to; and for a page the commanders' marks."""

@@ -20,6 +20,7 @@ from uuid import NAMESPACE_URL, uuid5
 from xml.etree import ElementTree
 
 from echostep.team.endpoint import Endpoint
+from echostep.team.faults import ENDED, opening_words
 from echostep.team.messages.report import Report, ReportedAlarm, ReportedPlace
 from echostep.team.outbox import Delivery
 from echostep.team.tls import tls_context
@@ -203,8 +204,10 @@ class StreamTransport:
                 socket.SOL_SOCKET, socket.SO_SNDBUF, 16_384
             )  # bytes; small, because events in the buffer get outdated
             self._socket = self._tls.wrap_socket(plain, server_hostname=self._endpoint.host) if self._tls else plain
-        except OSError:
+        except OSError as error:
             plain.close()
+            if isinstance(error, ENDED):
+                raise ConnectionError(opening_words(error, secure=self._endpoint.secure)) from error
             raise
 
     def send(self, report: Report) -> Delivery:

@@ -34,6 +34,22 @@ CLIENT_REFUSED = (
     "CERTIFICATE_EXPIRED",
 )
 
+ENDED = (ConnectionResetError, BrokenPipeError, ConnectionAbortedError, ssl.SSLEOFError, ssl.SSLZeroReturnError)
+NO_ANSWER = "what listens there ends the connection instead of answering: "
+PLAIN_ENDED = f"{NO_ANSWER}is it the right port, and one without TLS? One with TLS needs mqtts:// or cot+tls://"
+TLS_ENDED = f"{NO_ANSWER}is it the port of its TLS (one without needs mqtt:// or cot+tcp://)?"
+CLIENT_REFUSAL = (
+    "the server refuses this computer's certificate, or wants one: "
+    "give cert=FILE&key=FILE that its authority has signed, and that is valid today"
+)
+
+
+def opening_words(error: BaseException, *, secure: bool) -> str:
+    """An error of a connection that is being opened, by TLS if `secure`, as a sentence."""
+    if isinstance(error, ENDED):
+        return TLS_ENDED if secure else PLAIN_ENDED
+    return in_words(error)
+
 
 def in_words(error: BaseException) -> str:
     """An error of a connection as a sentence; of an unknown one its own text."""
@@ -59,7 +75,10 @@ def _verification(error: ssl.SSLCertVerificationError) -> str:
     if error.verify_code in (EXPIRED, NOT_YET):
         return "the server's certificate is not valid today: renew it, or set this computer's clock"
     if error.verify_code in UNKNOWN_AUTHORITY:
-        return "the server's certificate is of an authority that this computer does not know: give the authority's file with ca=FILE"
+        return (
+            "the server's certificate is of an authority that this computer does not know: "
+            "give the file of the authority that has signed it with ca=FILE"
+        )
     return f"the server's certificate is refused: {error.verify_message}"
 
 
@@ -68,5 +87,5 @@ def _tls(error: ssl.SSLError) -> str:
     if any(part in reason for part in NO_TLS):
         return "what listens there does not speak TLS: give mqtt:// or cot+tcp://, or the port of its TLS"
     if "ALERT" in reason and any(part in reason for part in CLIENT_REFUSED):
-        return "the server refuses this computer's certificate, or wants one: give cert=FILE&key=FILE that its authority has signed"
+        return CLIENT_REFUSAL
     return f"TLS failed: {reason or error}"

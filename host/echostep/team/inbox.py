@@ -70,8 +70,8 @@ class Inbox:
 class Subscription(Protocol):
     """Where messages come from: a broker, or a radio."""
 
-    def open(self) -> None:
-        """Connect; raises OSError."""
+    def open(self) -> str:
+        """Connect; returns what is refused of it, in words, empty if nothing; raises OSError."""
 
     def run_once(self, timeout_s: float) -> None:
         """Wait for one message and pass it on; raises OSError when the connection is broken."""
@@ -84,10 +84,17 @@ class Subscription(Protocol):
 
 
 class ListenerThread:
-    """Runs a listener in a thread until `close`, and connects again after each break."""
+    """Runs a listener in a thread until `close`, and connects again after each break.
+
+    `fault`: why nothing, or not all, comes and goes at present; empty while all does.
+    """
 
     def __init__(self, listener: Subscription, print_line: Callable[[str], None]) -> None:
         self.connected = False
+        self.fault = ""
+        self._refused = ""  # of the subscription
+        self._told: set[str] = set()
+        self._failures = 0  # to connect, in a row
         self._outgoing: deque[tuple[str, bytes]] = deque()
         self._tries = 0  # to publish the first of these
         self._listener, self._print_line = listener, print_line
@@ -113,25 +120,42 @@ class ListenerThread:
         self._thread.join(12.0)
 
     def _work(self) -> None:
-        failures = 0
         while not self._closing.is_set():
             try:
-                self._listener.open()
-                if failures:
-                    self._print_line("connected again")
-                failures, self.connected = 0, True
-                while not self._closing.is_set():
-                    while self._outgoing:
-                        self._publish_first()
-                    self._listener.run_once(PACKET_WAIT_S)
+                self._exchange(self._listener.open())
             except Exception as error:  # any fault is printed, then the connection is tried again
-                self.connected = False
-                self._listener.close()
-                if failures == 0:
-                    self._print_line(f"{in_words(error)}; trying again")
-                self._closing.wait(RETRY_PAUSES_S[min(failures, len(RETRY_PAUSES_S) - 1)])
-                failures += 1
+                self._handle_break(error)
         self._listener.close()
+
+    def _exchange(self, refused: str) -> None:
+        """Pass messages both ways until `close`; `refused`: of the subscription, in words. Raises OSError when the connection breaks."""
+        self.connected = True
+        self._listener.run_once(PACKET_WAIT_S)  # a connection that breaks at once is none
+        if self._failures:
+            self._print_line("connected again")
+        self._failures, self._refused = 0, refused
+        self._tell(refused)
+        while not self._closing.is_set():
+            while self._outgoing:
+                self._publish_first()
+            self._listener.run_once(PACKET_WAIT_S)
+
+    def _handle_break(self, error: Exception) -> None:
+        """Close the connection and wait before the next try; the first failure of a series is printed."""
+        self.connected = False
+        self._listener.close()
+        self.fault = in_words(error)
+        if self._failures == 0:
+            self._print_line(f"{self.fault}; trying again")
+        self._closing.wait(RETRY_PAUSES_S[min(self._failures, len(RETRY_PAUSES_S) - 1)])
+        self._failures += 1
+
+    def _tell(self, fault: str) -> None:
+        """Keep a fault of a connection that works otherwise; each is printed once."""
+        self.fault = fault
+        if fault and fault not in self._told:
+            self._told.add(fault)
+            self._print_line(fault)
 
     def _publish_first(self) -> None:
         """Publish the message that has waited longest; after MOST_TRIES it is given up. Raises OSError."""
@@ -141,7 +165,7 @@ class ListenerThread:
             self._listener.publish(topic, payload)
         except PermissionError as error:
             self._drop_first()
-            self._print_line(f"the broker does not accept what is sent on {topic} ({error}): check its access rules")
+            self._tell(f"the broker does not accept what is sent on {topic} ({error}): check its access rules")
             return
         except OSError:
             if self._tries >= MOST_TRIES:
@@ -151,6 +175,7 @@ class ListenerThread:
                 )
             raise
         self._drop_first()
+        self.fault = self._refused
 
     def _drop_first(self) -> None:
         self._outgoing.popleft()

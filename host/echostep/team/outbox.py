@@ -126,9 +126,6 @@ class Outbox:
                 if not self._open:
                     self._transport.open()
                     self._open = True
-                    if self._failures:
-                        self._print_state("connected again")
-                    self._failures = 0
                 self._send_next()
             except Exception as error:  # any fault is printed, and tracking goes on
                 self._handle_break(error)
@@ -147,7 +144,9 @@ class Outbox:
                 with self._changed:
                     self._queue.appendleft(entry)
             raise
-        self.fault = ""
+        if self._failures:
+            self._print_state("connected again")
+        self.fault, self._failures = "", 0
         alarm = entry[1].alarm
         if alarm and delivery is not Delivery.LEFT_OUT:
             self.delivered = alarm, delivery

@@ -200,8 +200,9 @@ class Refusing:
         self.taken: list[bytes] = []
         self._poison = poison
 
-    def open(self) -> None:
+    def open(self) -> str:
         self.opened += 1
+        return ""
 
     def run_once(self, timeout_s: float) -> None:
         """Nothing comes."""

@@ -92,12 +92,12 @@ function frame(received) {
   ask();
 }
 
-function status({ summary, refused, connected }) {
+function status({ summary, refused, connected, fault }) {
   put($('mark'), connected ? '●' : '✕');
   if ($('words').dataset.status !== (connected ? 'tracking' : 'broken')) $('words').dataset.status = connected ? 'tracking' : 'broken';
   put($('status-text'), connected ? 'connected' : 'no connection to the broker: the last known state');
   put($('summary'), (timeBar.isPast ? 'the past: ' : '') + summary);
-  const why = refused ? `rejected: ${refused}` : '';
+  const why = [fault, refused && `rejected: ${refused}`].filter(Boolean).join('; ');
   put($('refused'), why);
   if ($('refused').hidden !== !why) $('refused').hidden = !why;
 }

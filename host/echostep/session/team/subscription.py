@@ -42,6 +42,12 @@ class TeamSubscription:
             lambda text: self._print_line(f"{self._broker}: team: {text}"),
         )
 
+    @property
+    def fault(self) -> str:
+        """Why nothing, or not all, of the team comes and goes at present; empty while all does."""
+        fault = self._receiver.fault if self._receiver else ""
+        return f"{self._broker}: team: {fault}" if fault else ""
+
     def look(self) -> None:
         """Pass the messages that have come since the last call to their readers; never waits."""
         messages, dropped = self._inbox.take_all()

@@ -169,9 +169,10 @@ class MeshListener:
         self._unpacker = Unpacker(plan)
         self._node: MeshNode | None = None
 
-    def open(self) -> None:
+    def open(self) -> str:
         """Connect to the node; raises OSError."""
         self._node = MeshNode(self._endpoint.host)
+        return ""
 
     def run_once(self, timeout_s: float) -> None:
         """Wait for one packet and pass it on; raises OSError when the connection is broken."""

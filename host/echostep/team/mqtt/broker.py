@@ -18,7 +18,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
 from echostep.team.endpoint import Endpoint
-from echostep.team.faults import in_words
+from echostep.team.faults import CLIENT_REFUSAL, ENDED, PLAIN_ENDED, opening_words
 
 ANSWER_S = 5.0  # longest wait for an answer of the broker
 KEEPALIVE_S = 6  # the broker sends the last will after 1.5 times as long [MQTT 3.1.1, 3.1.2.10]
@@ -75,13 +75,27 @@ def connect(client: paho.Client, endpoint: Endpoint, most_bytes: int = MAX_PACKE
     try:
         client.connect(endpoint.host, endpoint.port, keepalive=KEEPALIVE_S, properties=properties)
     except (OSError, ValueError) as error:
-        raise ConnectionError(in_words(error)) from error
+        raise ConnectionError(opening_words(error, secure=endpoint.secure)) from error
     try:
         run_until(client, lambda: client.is_connected() or bool(refused), "the broker does not answer")
     except OSError as error:
-        raise RefusedError(refused[0] if refused else str(error)) from error
+        if not refused:
+            ended = CLIENT_REFUSAL if endpoint.secure else PLAIN_ENDED
+            raise RefusedError(ended if isinstance(error, ENDED) else str(error)) from error
     if refused:
-        raise RefusedError(f"the broker refuses: {refused[0]}")
+        raise RefusedError(_refusal(endpoint, refused[0]))
+
+
+def _refusal(endpoint: Endpoint, reason: str) -> str:
+    """A refusal of the broker, in its words, and for the usual ones what to do."""
+    words = f"the broker refuses {user_words(endpoint)} ({reason})"
+    is_of_user = any(part in reason.lower() for part in ("authori", "user name"))
+    return f"{words}: check user and password, {endpoint.scheme}://USER:PASSWORD@HOST" if is_of_user else words
+
+
+def user_words(endpoint: Endpoint) -> str:
+    """As whom a client connects."""
+    return f"user {endpoint.user}" if endpoint.user else "a client without a user name"
 
 
 def run_until(client: paho.Client, done: Callable[[], bool], timeout_message: str) -> None:
@@ -102,7 +116,7 @@ def run_once(client: paho.Client, timeout_s: float) -> None:
     except CLIENT_ERRORS as error:
         raise ConnectionError(f"the broker sends a malformed packet: {error}") from error
     if code != paho.MQTT_ERR_SUCCESS:
-        raise ConnectionError(f"the connection broke: {paho.error_string(code)}")
+        raise ConnectionResetError(f"the connection broke: {paho.error_string(code)}")
 
 
 def publish(client: paho.Client, topic: str, payload: bytes) -> bool:

@@ -29,6 +29,7 @@ from echostep.team.mqtt.broker import (
     publish,
     run_once,
     run_until,
+    user_words,
 )
 from echostep.team.outbox import Delivery
 from echostep.team.tls import tls_context
@@ -88,9 +89,8 @@ class MqttTransport:
         try:
             return publish(self._client, f"{self._topic}/{leaf}", payload)
         except UnwantedError as error:
-            user = f"user {self._endpoint.user}" if self._endpoint.user else "a client without a user name"
             raise UnwantedError(
-                f"the broker does not let {user} publish as {self._team}/{self._name} ({error}): "
+                f"the broker does not let {user_words(self._endpoint)} publish as {self._team}/{self._name} ({error}): "
                 "check --team, --name and the broker's access rules"
             ) from error
 
@@ -111,8 +111,11 @@ class Listener:
         self._client: paho.Client | None = None
         self._use_mqtt5 = True
 
-    def open(self) -> None:
-        """Connect and subscribe; raises OSError. After a refusal the next call uses the other version of MQTT (5 or 3.1.1)."""
+    def open(self) -> str:
+        """Connect and subscribe; returns which topics the broker refuses, in words; raises OSError, also when it refuses all.
+
+        After a refusal of the connection the next call uses the other version of MQTT (5 or 3.1.1).
+        """
         client = make_client(self._endpoint, self._tls, "", newest=self._use_mqtt5)
         client.on_message = self._message
         self._client = client
@@ -125,10 +128,13 @@ class Listener:
         client.on_subscribe = lambda _c, _u, _m, codes, _p: answers.append([code.is_failure for code in codes])
         client.subscribe([(topic, 0) for topic in self._topics])
         run_until(client, lambda: bool(answers), "the broker does not answer")
-        if refused := [topic for topic, is_refused in zip(self._topics, answers[0], strict=False) if is_refused]:
-            raise ConnectionError(
-                f"the broker refuses the subscription to {', '.join(refused)}: check user and password"
-            )
+        refused = [topic for topic, is_refused in zip(self._topics, answers[0], strict=False) if is_refused]
+        if not refused:
+            return ""
+        words = f"the broker refuses {user_words(self._endpoint)} the subscription to {', '.join(refused)}: check its access rules, and the user"
+        if len(refused) == len(self._topics):
+            raise ConnectionError(words)
+        return words
 
     def run_once(self, timeout_s: float) -> None:
         """Wait for one packet and process it; raises OSError when the connection is broken."""
