@@ -11,6 +11,7 @@ import hashlib
 import queue
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from echostep.errors import EchostepError
@@ -43,38 +44,49 @@ def plan_file(
     if broker is None:
         raise EchostepError(f"--plan {PREFIX}{name} needs the team's broker, mqtt://HOST: a run names it by --publish")
     print_line(f"Waiting for {name}'s drawing from {broker}, at most {WAIT_S:.0f} s")
-    payload = _fetched(broker, drawing_topic(team, name), print_line)
-    if payload is None:
-        raise EchostepError(
-            f"--plan {PREFIX}{name}: no drawing came from {broker} in {WAIT_S:.0f} s: "
-            f"does {name} walk without a plan, and publish to this broker as this team?"
-        )
-    try:
-        drawn = checked_drawing(payload)
-    except EchostepError as error:
-        raise EchostepError(f"--plan {PREFIX}{name}: the drawing on {broker} is not used: {error}") from error
+    payload, drawn = _fetched(broker, name, team, print_line)
     path = _kept(payload, name, folder)
     print_line(f"{_described(drawn)}: {path}")
     return path
 
 
-def _fetched(broker: Endpoint, topic: str, print_line: PrintLine) -> bytes | None:
-    """The first payload on a topic that is not empty; None after WAIT_S."""
+def _fetched(broker: Endpoint, name: str, team: str, print_line: PrintLine) -> tuple[bytes, Plan]:
+    """The first drawing that can be used; what cannot is told once, and a newer one is waited for. Raises EchostepError after WAIT_S."""
     from echostep.team.mqtt.publisher import Listener
 
-    payloads = queue.SimpleQueue[bytes]()
-    listener = Listener(broker, [topic], lambda _topic, payload, _retained: payloads.put(payload), MOST_BYTES + 1024)
+    newest = queue.Queue[bytes](maxsize=1)  # of a flood one drawing waits
+    listener = Listener(
+        broker, [drawing_topic(team, name)], lambda *message: _put(newest, message[1]), MOST_BYTES + 1024
+    )
     receiver = ListenerThread(listener, lambda text: print_line(f"{broker}: {text}"))
-    end_s = time.monotonic() + WAIT_S
+    end_s, unused = time.monotonic() + WAIT_S, ""
     try:
         while (left_s := end_s - time.monotonic()) > 0.0:
-            if payload := payloads.get(timeout=left_s):
-                return payload
+            payload = newest.get(timeout=left_s)
+            try:
+                return payload, checked_drawing(payload)
+            except EchostepError as error:
+                if not unused:
+                    print_line(f"{name}'s drawing on {broker} is not used, waiting for another: {error}")
+                unused = str(error)
     except queue.Empty:
         pass
     finally:
         receiver.close()
-    return None
+    if unused:
+        raise EchostepError(f"--plan {PREFIX}{name}: the drawing on {broker} is not used: {unused}")
+    raise EchostepError(
+        f"--plan {PREFIX}{name}: no drawing came from {broker} in {WAIT_S:.0f} s: "
+        f"does {name} walk without a plan, and publish to this broker as this team?"
+    )
+
+
+def _put(newest: queue.Queue[bytes], payload: bytes) -> None:
+    """Put a payload in the place of the one before; an empty one is what a broker sends when it was told to forget."""
+    if payload:
+        with suppress(queue.Empty):
+            newest.get_nowait()
+        newest.put_nowait(payload)
 
 
 def _kept(payload: bytes, name: str, folder: Path) -> Path:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ from echostep.team.wearer_plan import drawing_wearer, plan_file
 from team.network import box_to
 from team.team_broker import Broker, needs_broker
 from team.team_reports import report
-from waiting import until
+from waiting import PATIENCE_S, until
 
 WALLS = [[0.0, 0.0, 9.0, 0.0], [0.0, 2.0, 9.0, 2.0]]
 
@@ -37,6 +38,14 @@ def drawing(walls: Any = WALLS, storeys: int = 1, name: str = "drawn by anna", *
     levels = [{"name": str(k), "height_m": 3.0 * k, "walls": walls, "rooms": []} for k in range(storeys)]
     tree = {"echostep_plan": 1, "name": name, "uncertainty_m": 0.05, "levels": levels}
     return json.dumps(tree | {"start": {"x": 1.0, "y": 1.0, "heading_deg": 90.0}} | more).encode()
+
+
+CORNERS = [[k % 9, 7 * k % 9] for k in range(7500)]
+
+
+def level(**parts: Any) -> bytes:
+    """A drawing of two walls with other parts."""
+    return drawing(levels=[{"walls": WALLS, **parts}])
 
 
 def test_a_drawing_is_a_plan() -> None:
@@ -58,6 +67,15 @@ def test_a_drawing_is_a_plan() -> None:
         (drawing(walls=[[0, 0, 1, 0]] * (MOST_WALLS + 1)), "10001 walls, more than 10000"),
         (drawing(storeys=MOST_STOREYS + 1), "65 storeys, more than 64"),
         (drawing(name="\x1b[2Janna"), "without control characters"),
+        (level(rooms=[{"name": "\u202eanna", "at": [1, 1]}]), "a name in it is not printable"),
+        (level(rooms=[{"name": "a", "at": [1, 1]}] * 2001), "2001 doors, rooms, connectors and the like, more than"),
+        (level(rooms=[{"name": "a", "at": [90_000, 1]}]), "m from end to end"),
+        (level(doors=[{"line": [0, 0, 0, 90_000]}]), "m from end to end"),
+        (level(doubtful=[[0, 0, 0, 90_000]]), "m from end to end"),
+        (level(obstacles=[[[0, 0], [9, 0], [9, 90_000]]]), "m of wall, more than"),
+        (level(rooms=[{"name": "a", "at": [1, 1], "outline": CORNERS}] * 2), "15000 corners of outlines, more than"),
+        (drawing(start={"x": 90_000.0, "y": 1.0, "heading_deg": 90.0}), "m from end to end"),
+        (drawing(walls=[[0, 0.01 * k, 4, 4 - 0.01 * k] for k in range(500)]), "of its walls meet or cross"),
         (b" " * (MOST_BYTES + 1), "bytes, more than"),
     ],
 )
@@ -168,7 +186,10 @@ def test_a_commander_sees_those_who_are_on_a_drawing(tmp_path: Path, monkeypatch
 
 
 @needs_broker
-def test_a_hostile_drawing_ends_the_command_in_a_sentence_and_leaves_no_file(tmp_path: Path) -> None:
+def test_a_hostile_drawing_ends_the_command_in_a_sentence_and_leaves_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wearer_plan, "WAIT_S", 1.0)
     with Broker(tmp_path) as broker:
         keep(broker, drawing(walls=[[0, 0, "x", 0]]))
         arguments = ("--plan", "wearer:anna", "--publish", broker.url, "--name", "bo", "--team", "red", "--out", "out")
@@ -177,6 +198,23 @@ def test_a_hostile_drawing_ends_the_command_in_a_sentence_and_leaves_no_file(tmp
     assert done.stderr.startswith(f"echostep: --plan wearer:anna: the drawing on {broker.url} is not used: levels[0]")
     assert len(done.stderr.strip().splitlines()) == 1
     assert not list(tmp_path.glob("**/drawing-*"))
+
+
+@needs_broker
+def test_drawings_that_cannot_be_used_are_told_once_and_the_next_is_taken(tmp_path: Path) -> None:
+    """They change quickly, and of those that wait only the newest is looked at."""
+    said: list[str] = []
+    with Broker(tmp_path) as broker:
+        keep(broker, b"\xff")
+        with ThreadPoolExecutor(1) as pool:
+            path = pool.submit(fetcher(broker, tmp_path / "out", said), "red")
+            assert until(lambda: any("not used" in line for line in said))
+            for k in range(200):
+                keep(broker, drawing(walls=[[0, 0, 60_000 + k, 0]]))
+            keep(broker, drawing())
+            assert path.result(PATIENCE_S).read_bytes() == drawing()
+    assert len([line for line in said if "not used, waiting for another: not a plan" in line]) == 1
+    assert len(said) == 3
 
 
 @needs_broker
