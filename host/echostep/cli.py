@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The command line: `echostep demo | live | record | replay | map | score | foot | legs | doctor | flash | calibrate | decode` and more.
 
-In: the command's arguments and options. Out: files, views, an exit status (0: done; 2: a mistake, named in one line). Owns nothing.
+In: the command's arguments and options. Out: files, views, an exit status (0: done; 1: done, but a recording lacks something; 2: a
+mistake, named in one line). Owns nothing.
 The commands are declared in `commands/`. Modules that are slow to import are imported inside the command that needs them, so that `--help` answers
 at once.
 """
@@ -15,7 +16,7 @@ import typer
 
 from echostep.commands import beacons, commander, files, hardware, plan, recordings, runs
 from echostep.commands.studies import add_studies
-from echostep.errors import EchostepError, words_of
+from echostep.errors import EchostepError, IncompleteError, words_of
 from echostep.extras import EXTRAS, lacks
 from echostep.interruption import end_by_signals
 from echostep.printing.file_mode import share_files
@@ -79,7 +80,7 @@ def _status() -> int:
         return end.code if isinstance(end.code, int) else int(end.code is not None)
     except EchostepError as error:
         complain(f"echostep: {words_of(error)}")
-        return 2
+        return 1 if isinstance(error, IncompleteError) else 2
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         if package not in EXTRAS or not (words := lacks("this", package)):

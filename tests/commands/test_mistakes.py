@@ -185,6 +185,8 @@ def disk_full(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
     patch.setattr("echostep.recording.background_writer.CLOSE_S", 0.5)
     with python_board() as port:
         done = echostep("record", "--board", port, "--out", folder / "walk.mcap", "--seconds", PATIENCE_S)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1), done.stderr
+    assert done.stderr.endswith(".mcap: the recording is not whole; all else was done\n")
     said = next(line for line in done.stdout.splitlines() if "tracking goes on" in line)
     return {"said": re.sub(r"\S+\.mcap", "FILE", said)}
 

@@ -15,12 +15,15 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
+from unittest import mock
 
 import pytest
 from mcap.reader import make_reader
 
 from board_runs import ROOT
-from command_line import PROGRAM
+from command_line import PROGRAM, interrupt_once_called
+from echostep.cli import main
+from echostep.operation.page import TablePage
 from echostep.recording.reading import open_recording
 from players import pseudo_terminal, python_board
 from waiting import PATIENCE_S, until
@@ -29,6 +32,7 @@ PLAN = ROOT / "host/echostep/plans/demo.json"
 FULL = Path("/dev/full")  # refuses every byte: no space left [full(4)]
 pytestmark = pytest.mark.process
 # Runs the program with files closed that its parent left open, as the shell does for >&-
+COMMAND = ("command", "mqtt://127.0.0.1:9", "--plan", str(PLAN), "--port", "0")
 CLOSING = "import os, sys; [os.close(int(k)) for k in sys.argv[1]]; os.execv(sys.argv[2], sys.argv[2:])"
 
 
@@ -89,6 +93,22 @@ def test_a_run_outlasts_its_output(tmp_path: Path, kind: str, command: str) -> N
     assert all(said in line for line in lines) if said else not lines
     assert not said or any(line.startswith("standard output") for line in lines)
     assert command == "record" or (tmp_path / "track.csv").exists()
+
+
+def test_the_commanders_page_and_recording_tell_that_nothing_is_printed_any_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[str] = []
+    monkeypatch.setattr(TablePage, "publish", lambda _, scene: shown.append(scene.fault))
+    interrupt_once_called(TablePage, "publish", monkeypatch, lambda *_: "standard output" in shown[-1])
+    with FULL.open("w") as full, mock.patch.object(sys, "stdout", full):
+        monkeypatch.setattr(sys, "argv", ["echostep", *COMMAND, "--out", str(tmp_path / "o.mcap")])
+        with pytest.raises(SystemExit) as end:
+            main()
+    assert end.value.code == 0
+    assert shown[-1].endswith("standard output: No space left on device")
+    (walk,) = tmp_path.glob("o-*.mcap")
+    assert log_lines(walk) == ["standard output: No space left on device"]
 
 
 def test_a_command_whose_result_is_lost_has_status_2() -> None:

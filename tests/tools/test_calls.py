@@ -48,7 +48,12 @@ def test_a_call_that_fails_ends_no_run_with_an_exception(tmp_path: Path, command
         (replace(SOUND, files={}), "files", "no track.csv"),
         (replace(SOUND, files={"track.csv": "other"}), "files", "other than without a fault: track.csv"),
         (replace(SOUND, truncated=True), "files", "not whole"),
-        (replace(SOUND, truncated=True, printed="the last 9 bytes are not on the disk"), "files", ""),
+        (replace(SOUND, truncated=True, printed="the last 9 bytes are not on the disk"), "files", "exit status say so"),
+        (
+            replace(SOUND, truncated=True, status=1, printed="the last 9 bytes are not on the disk\nechostep: x"),
+            "files",
+            "",
+        ),
     ],
 )
 def test_what_must_not_be_is_seen(outcome: Outcome, kind: str, named: str) -> None:

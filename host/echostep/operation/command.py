@@ -28,7 +28,7 @@ from echostep.operation.views import Views, finish, open_page
 from echostep.page.protocol import FRAME_S
 from echostep.plan.model import Plan, load_plan
 from echostep.printing.console import console_for_people
-from echostep.printing.people import outlast_output
+from echostep.printing.people import FaultNews, outlast_output, output_faults
 from echostep.team.commander import table
 from echostep.team.endpoint import Endpoint, parse_endpoint
 from echostep.team.inbox import Inbox, ListenerThread, ReceivedMessage
@@ -71,6 +71,7 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
             _follow(run, page, console, math.inf if seconds is None else seconds, views)
         run.look(time.monotonic())
     finish(operation, time.monotonic(), views)
+    recorder.check_whole()
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +93,7 @@ class _Run:
             restore(self.restorer, self.operation, self.receiver, believed, now_s)
         roster = self.operation.roster
         self.recorder.add(believed)
+        self.recorder.add_faults(now_s, output_faults())
         self.recorder.add_condition(now_s, unix_s, roster.received, roster.rejected, connected=connected)
         if self.tape.note(now_s, len(believed)):
             self.tape.keep(Keyframe(now_s, unix_s, self.recorder.offset, connected, self.operation.copy()))
@@ -133,7 +135,7 @@ def _follow(run: _Run, page: TablePage | None, console: Console, seconds: float,
     due_s, table_s, operation = time.monotonic(), -math.inf, run.operation
     end_s = due_s + seconds
     pause_s = FRAME_S if page else TABLE_S
-    draws = console.is_terminal and not views.as_json
+    draws, news = console.is_terminal and not views.as_json, FaultNews()
 
     def drawn(lines: int | None) -> Group:
         connected = run.receiver.connected
@@ -153,9 +155,8 @@ def _follow(run: _Run, page: TablePage | None, console: Console, seconds: float,
                         console.print(notices.popleft(), markup=False)
                 if page:
                     receiver = run.receiver
-                    page.publish(
-                        operation.scene(now_s, time.time(), connected=receiver.connected, fault=receiver.fault)
-                    )
+                    fault = ". ".join(filter(None, (receiver.fault, news.words())))
+                    page.publish(operation.scene(now_s, time.time(), connected=receiver.connected, fault=fault))
                 if draws and now_s - table_s >= TABLE_S:
                     table_s = now_s
                     shown.update(drawn(console.height), refresh=True)

@@ -49,7 +49,7 @@ Key = tuple[str, str, str]  # team, name, run
 class TableScene:
     """One moment. `places`: rows of float32, one for each wearer on this plan (`Operation.scene`). `rows`: the list, the most urgent first.
 
-    `summary`: number of members in each state; `refused`: rejected messages, in words; `fault`: of the connection, in words.
+    `summary`: number of members in each state; `refused`: rejected messages, in words; `fault`: of connection and output, in words.
     """
 
     t_s: float

@@ -34,6 +34,7 @@ class BackgroundWriter:
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         self.notices: deque[str] = deque(maxlen=MOST_NOTICES)
+        self.is_whole = True  # until the disk has refused bytes for good
         self.failed = False  # the disk refused the bytes of the last write
         self.nearly_full = False  # less than `RESERVE_BYTES` are free
         self._file = create(self.path)
@@ -77,12 +78,14 @@ class BackgroundWriter:
             self._lock.notify_all()
         self._thread.join(CLOSE_S)
         if self.unwritten_bytes:
+            self.is_whole = False
             self.notices.append(f"{self.path}: the last {self.unwritten_bytes} bytes are not on the disk")
         if self._thread.is_alive():
             return
         try:
             os.close(self._file)
         except OSError as error:  # it is closed all the same [close(2)]
+            self.is_whole = False
             self.notices.append(f"{self.path}: {_reason(error)}; it may not be whole")
 
     def _run(self) -> None:

@@ -18,6 +18,7 @@ from typing import IO, Any, Self
 
 from mcap.writer import CompressionType, IndexType, Writer
 
+from echostep.errors import IncompleteError
 from echostep.ports.chunks import Chunk
 from echostep.recording.background_writer import BackgroundWriter
 from echostep.recording.clock import log_offset_ns, with_log_time
@@ -103,6 +104,16 @@ class Recorder:
     def offset(self) -> int:
         """Bytes of the file so far, those that wait for the disk among them."""
         return self._file.tell()
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the disk has all chunks, once the recorder is closed."""
+        return self._file.is_whole and not self.lost_chunks
+
+    def check_whole(self) -> None:
+        """Raises IncompleteError when the closed recording lacks something; `notices` tell why."""
+        if not self.is_whole:
+            raise IncompleteError(f"{self.path}: the recording is not whole; all else was done")
 
     @property
     def notices(self) -> deque[str]:

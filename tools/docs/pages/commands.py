@@ -23,7 +23,8 @@ def page() -> str:
     parts = [
         "# Commands\n",
         MADE,
-        "`echostep COMMAND --help` says the same. A mistake ends with one line and exit status 2.\n",
+        "`echostep COMMAND --help` says the same. A mistake ends with one line and exit status 2. A run that was done to its "
+        "end, but whose recording lacks something (a full disk), ends with one line and exit status 1.\n",
     ]
     for name, call in sorted(commands("echostep", app)):
         parts.append(f"## {name}\n\n{inspect.cleandoc(call.__doc__ or '')}\n")

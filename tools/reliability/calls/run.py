@@ -150,17 +150,17 @@ def faults_of(case: Case, failure: Failure, outcome: Outcome, sound: Outcome) ->
         faults.append("it did not end")
     if outcome.crashes or outcome.status == CRASHED or "Traceback" in outcome.printed:
         faults.append(f"an exception that no code handles: {outcome.crashes.strip().splitlines()[-1:]}")
-    if outcome.status not in (None, 0, 2) or (failure.kind == "output" and outcome.status != sound.status):
+    if outcome.status not in (None, 0, 1, 2) or (failure.kind == "output" and outcome.status != sound.status):
         faults.append(f"exit status {outcome.status}")
-    if outcome.status == 2 and failure.kind != "output" and not case.on_terminal:
+    if outcome.status in (1, 2) and failure.kind != "output" and not case.on_terminal:
         lines = [line for line in outcome.printed.splitlines() if line.startswith("echostep: ")]
         if len(lines) != 1:
             faults.append(f"an error without its one line: {lines}")
-    if outcome.status == 0:
+    if outcome.status in (0, 1):
         if missing := sound.files.keys() - outcome.files.keys():
             faults.append(f"no {', '.join(sorted(missing))}")
-        if outcome.truncated and not any(words in outcome.printed for words in TOLD):
-            faults.append("a recording is not whole, and nothing says so")
+        if outcome.truncated and not (outcome.status and any(words in outcome.printed for words in TOLD)):
+            faults.append("a recording is not whole, and not both its words and the exit status say so")
         if case.repeats and (
             other := [n for n in sound.files if outcome.files.get(n, sound.files[n]) != sound.files[n]]
         ):

@@ -23,6 +23,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from echostep.output.foxglove import log_line
 from echostep.plan.model import Plan
 from echostep.ports.chunks import Chunk
 from echostep.recording.numbered import numbered_recorder
@@ -93,6 +94,7 @@ class OperationRecorder:
         self._condition: Condition | None = None
         self._counted_s = -math.inf
         self._newest_ns = 0
+        self._faults = 0  # of the output, that are recorded
 
     @property
     def path(self) -> Path:
@@ -120,9 +122,18 @@ class OperationRecorder:
             self._condition, self._counted_s = new, now_s
             self._write(now_s, new)
 
+    def add_faults(self, now_s: float, faults: Sequence[str]) -> None:
+        """Record why an output takes nothing any more, each fault once."""
+        self._recorder.write_derived(log_line(round(now_s * 1e9), fault) for fault in faults[self._faults :])
+        self._faults = len(faults)
+
     def close(self) -> None:
         """Write the end of the file."""
         self._recorder.close()
+
+    def check_whole(self) -> None:
+        """Raises IncompleteError when the closed recording lacks something."""
+        self._recorder.check_whole()
 
     def _write(self, t_s: float, record: Heard | Condition) -> None:
         self._newest_ns = max(self._newest_ns, round(t_s * 1e9))  # times of a port never decrease

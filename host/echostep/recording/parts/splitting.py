@@ -56,6 +56,11 @@ class SplitRecorder(Recorder):
         super().__init__(path, {**self._run_metadata, PART: "1"})
 
     @property
+    def is_whole(self) -> bool:
+        """The same of all parts."""
+        return super().is_whole and all(file.is_whole for file, _ in self._closing)
+
+    @property
     def notices(self) -> deque[str]:
         """Messages about the disk, of all parts; the caller prints and clears them."""
         for file, _ in self._closing:

@@ -128,6 +128,7 @@ def _track(
         print_notices(recorder.notices)
         session.finish("simulated walk", load_truth(output.folder / "truth.csv"))
         session.keep_page_open(_again(recorder.path, options))
+    recorder.check_whole()
 
 
 def _again(recording: Path, options: DemoOptions) -> str:

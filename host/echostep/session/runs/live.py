@@ -75,6 +75,7 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -
                 session.track(portions_of(chunks, 1), None, recorder)
             print_notices(recorder.notices)
             session.finish("live")
+        recorder.check_whole()
 
 
 def _last_start(folder: Path, plan: Plan, board: str, settings: Settings) -> Start:
@@ -105,6 +106,7 @@ def record(ports: PortOptions, out: Path) -> None:
     from_gateway = f", {byte_count[GATEWAY]} from the gateway" if ports.beacons else ""
     foot = f"{byte_count[FOOT]} from the foot board" if ports.foot else f"{byte_count[MTX]} from the MTx"
     console.print(f"{recorder.path}: {byte_count[BOARD]} bytes from the board, {foot}{from_gateway}")
+    recorder.check_whole()
 
 
 def _passed(seconds: float | None) -> Callable[[], float | None]:
