@@ -34,6 +34,7 @@ STARTED_BY = {
     "release.tested_versions": HERE,
     "release.wheel": "tools/test_wheel.py",
     "reliability.damaged_blocks": "recording/test_flips.py",
+    "reliability.demo_loops": "tools/test_long_runs.py",
     "reliability.faults": HERE,
     "reliability.flip_recording": HERE,
     "reliability.calls.campaign": "tools/test_calls.py",
@@ -44,6 +45,7 @@ STARTED_BY = {
     "reliability.soak": "tools/test_soak.py",
     "reliability.team_load": HERE,
     "reliability.team_operation": "tools/test_operation_tool.py",
+    "reliability.viewers": "tools/test_long_runs.py",
     "twin.measure": HERE,
     "twin.run": "commands/test_live.py",
 }

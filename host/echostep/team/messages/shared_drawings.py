@@ -43,8 +43,9 @@ def checked_drawing(payload: bytes) -> Plan:
         raise EchostepError(str(error)) from error
     if not plan.is_drawn:
         raise EchostepError("it shows no wall")
-    parts = [part for level in plan.levels for part in (level, *level.rooms, *level.doors)]
-    names = (plan.name, *(part.name for part in (*parts, *plan.connectors)))
+    names = [plan.name, *(stairs.name for stairs in plan.connectors)]
+    for level in plan.levels:
+        names += [level.name, *(room.name for room in level.rooms), *(door.name for door in level.doors)]
     if not all(map(is_printable, names)):
         raise EchostepError("a name in it is not printable")
     _check_size(plan)
