@@ -90,6 +90,8 @@ def test_nothing_else_does(kept: Kept, board: str) -> None:
     assert start.pose is not None
     assert start.after_pause
     assert "does not tell the storey" in words
+    assert ("60 s ago" in words) == (kept.utc < NOW)
+    assert ("clock was set back" in words) == (kept.utc > NOW)
 
 
 def test_another_plan_is_refused() -> None:

@@ -40,6 +40,7 @@ from echostep.team.messages.report import BadReportError
 from echostep.team.roster import Member, MemberState, Roster
 
 LIST_S = 0.5  # between two versions of the list: words are read, not watched
+NEWER_S = 1e-3  # by which an errand is newer than the one that it replaces
 MOST_EVENTS = 64  # of a wearer's history
 SHOWN_STATUS = {"tracking", "uncertain"}  # of which a trail is drawn
 Key = tuple[str, str, str]  # team, name, run
@@ -145,7 +146,9 @@ class Operation:
                         return ack_message(key, by, unix_s)
                 case requests.Send(number, to, by):
                     rescuer, m = self._member(number, now_s), self._member(to, now_s)
-                    errand = errand_to(m, self.plan, now_s, by, unix_s) if m else None
+                    known = self._board.errands.get(rescuer.key) if rescuer else None
+                    newer_s = known.unix_s + NEWER_S if known else 0.0  # however this clock was set back
+                    errand = errand_to(m, self.plan, now_s, by, max(unix_s, newer_s)) if m else None
                     if rescuer is not None and errand is not None:
                         return errand_message(rescuer.key, errand)
                     return "Not sent: the place of the one in distress is not known on this plan."

@@ -90,9 +90,13 @@ def _open_sender(to: str) -> tuple[Callable[[bytes], object], Callable[[], None]
             f"{to}: cannot send there: {error}; expected udp://HOST:PORT or udp://HOST:PORT?key=FILE"
         ) from error
 
+    counter = 0
+
     def send(frame: bytes) -> None:
+        nonlocal counter
+        # The counter must grow over restarts of the gateway, and when the clock is set back: a real one without a clock stores it.
+        counter = max(counter + 1, time.time_ns())
         with suppress(ConnectionRefusedError):  # no program has opened the port yet
-            # The counter must grow over restarts of the gateway: a real one without a clock stores it.
-            datagrams.send(frame if key is None else seal(key, frame, time.time_ns()))
+            datagrams.send(frame if key is None else seal(key, frame, counter))
 
     return send, datagrams.close
