@@ -73,6 +73,12 @@ def busy_s(process: int) -> float:
     return (int(fields[11]) + int(fields[12])) / TICKS
 
 
+def wait_for(page: Any, holds: str) -> None:
+    """Wait until an expression holds; the page's policy refuses what Playwright's own waiting would evaluate there."""
+    while not page.evaluate(holds):
+        page.wait_for_timeout(100)
+
+
 def watch(seconds: float, pages: list[Any], processes: list[int]) -> tuple[Floats, Floats, Floats]:
     """Rows of time and memory of the processes; answers in ms (looks, replay pages); frames drawn of each page. The last page is the commander's."""
     began, rows, answers = time.monotonic(), [], []
@@ -111,8 +117,8 @@ def run(minutes: float, browsers: int, walk: Path, folder: Path) -> list[Figure]
         for page, address in zip(pages, [page_url] * browsers + [table_url], strict=True):
             page.on("pageerror", lambda error: wrong.append(str(error)))
             page.goto(address)
-            page.wait_for_function("window.echostep?.frames > 0", timeout=0)
-        pages[0].wait_for_function("Number(document.querySelector('#time').max) > 1", timeout=0)
+            wait_for(page, "window.echostep?.frames > 0")
+        wait_for(pages[0], "Number(document.querySelector('#time').max) > 1")
         processes = [replay.pid, command.pid]
         before, began = [busy_s(p) for p in processes], time.monotonic()
         rows, answers, rates_hz = watch(60.0 * minutes, pages, processes)
