@@ -21,6 +21,7 @@ EXTRAS = dict.fromkeys((*PAGE, "segno"), "page") | {
     "matplotlib": "plots",
     "PIL": "plots",
     "pyarrow": "parquet",
+    "pandas": "pandas",
     "ifcopenshell": "ifc",
     "foxglove": "foxglove",
     "meshtastic": "mesh",

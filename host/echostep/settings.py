@@ -29,7 +29,19 @@ from echostep.timing.timeline import MtxTiming
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Everything that can be set, by stage."""
+    """Everything that can be set, by stage; the values: [settings.md](settings.md).
+
+    >>> import echostep
+    >>> from dataclasses import replace
+    >>> settings = echostep.Settings()
+    >>> settings.cloud.size
+    660
+    >>> fewer = replace(settings, cloud=replace(settings.cloud, size=300))
+    >>> fewer
+    Settings(cloud=CloudSettings(size=300))
+    >>> echostep.replay("walk.mcap", "demo.json", settings=fewer)
+    <Walk 'walk.mcap': 5 estimates, 2.0 s, 100% tracking, on 'Demo office'>
+    """
 
     mtx: MtxTiming = field(default_factory=MtxTiming)
     ranger: RangerSettings = field(default_factory=RangerSettings)
@@ -47,6 +59,12 @@ class Settings:
     climb: ClimbSettings = field(default_factory=ClimbSettings)
     wearer: WearerSettings = field(default_factory=WearerSettings)
 
+    def __repr__(self) -> str:
+        """The values that are not the default."""
+        sections = ((f.name, getattr(self, f.name)) for f in dataclasses.fields(self))
+        given = [f"{name}={_changed(section)}" for name, section in sections if section != type(section)()]
+        return f"Settings({', '.join(given)})"
+
     @property
     def iron(self) -> CompassErrors | None:
         """Errors of the compass; None when it was not calibrated."""
@@ -56,6 +74,14 @@ class Settings:
     def imus(self) -> Imus:
         """Errors of the six-axis parts whose forces are used."""
         return Imus(self.foot_imu, self.belt_imu)
+
+
+def _changed(section: Any) -> str:
+    """A section as it is written in Python, with the values that are not the default."""
+    default = type(section)()
+    values = {f.name: getattr(section, f.name) for f in dataclasses.fields(section)}
+    given = [f"{name}={value!r}" for name, value in values.items() if value != getattr(default, name)]
+    return f"{type(section).__name__}({', '.join(given)})"
 
 
 RENAMED = {("echo", "short"): "hidden"}  # fields of older recordings, by their present names

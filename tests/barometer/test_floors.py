@@ -278,14 +278,16 @@ def write(path: Path, samples: Pressures, factor: float = 1.0, seconds: float = 
 
 def test_the_command_tells_floors_and_stays(tmp_path: Path) -> None:
     source, out = write(tmp_path / "up.csv", record(stairs_up())), tmp_path / "floors.csv"
-    result = CliRunner().invoke(app, ["floors", str(source), "--heights", "0,3.5", "--out", str(out), "--plot"])
+    options = ["--heights", "0,3.5", "--out", str(out), "--picture", str(picture := tmp_path / "floors.svg")]
+    result = CliRunner().invoke(app, ["floors", str(source), *options])
     assert result.exit_code == 0, result.output
     assert "climbed 3.5 m up, 0.0 m down" in result.output
     lines = out.read_text().splitlines()
     assert lines[0] == "t_s,floor,probability,height_m"
     assert len(lines) == 1 + len(stairs_up())
     assert [line.split(",")[1] for line in (lines[1], lines[-1])] == ["0", "1"]
-    assert out.with_suffix(".png").stat().st_size > 1000
+    assert "height / m" in picture.read_text()
+    assert f"floors: {out}, picture: {picture}" in result.output
 
 
 @pytest.mark.long

@@ -310,8 +310,9 @@ def test_the_command_and_its_calibration(tmp_path: Path) -> None:
     shown = CliRunner().invoke(app, [*base, "--walked", "10"])
     assert shown.exit_code == 0
     scale = shown.output.split("--scale ")[1].split()[0]
-    again = CliRunner().invoke(app, [*base, "--scale", scale, "--plot"])
-    assert out.with_suffix(".png").read_bytes()[:4] == b"\x89PNG"
+    again = CliRunner().invoke(app, [*base, "--scale", scale, "--picture", str(picture := tmp_path / "legs.pdf")])
+    assert picture.read_bytes()[:4] == b"%PDF"
+    assert f"track: {out}, picture: {picture}" in again.output.replace("\n", "")
     assert "stride 1: " in again.output
     assert "beginning or end of a walk" in again.output
     assert "10.00 m" in again.output

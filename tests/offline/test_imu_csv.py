@@ -88,7 +88,7 @@ def foot(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_walk_is_tracked_and_drawn(tmp_path: Path, table: np.ndarray) -> None:
-    done = run(write(tmp_path, table), "--plot")
+    done = run(write(tmp_path, table), "--picture", str(tmp_path / "track.png"))
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader((tmp_path / "track.csv").read_text().splitlines()))
     assert len(rows) == len(table)

@@ -228,8 +228,11 @@ def test_pictures(tmp_path: Path) -> None:
     first = (tmp_path / "plan.svg").read_bytes()
     draw_plan(plan, tmp_path / "plan.svg", [0])
     assert b"<svg" in first
-    with pytest.raises(EchostepError, match=r"\.png or \.svg"):
-        draw_plan(plan, tmp_path / "plan.pdf", [0])
+    assert first == (tmp_path / "plan.svg").read_bytes()
+    for label in ("x / m", "y / m", "wall", "start"):
+        assert f"<!-- {label} -->".encode() in first
+    with pytest.raises(EchostepError, match=r"\.svg or \.pdf"):
+        draw_plan(plan, tmp_path / "plan.gif", [0])
     with pytest.raises(EchostepError, match="cannot write"):
         draw_plan(plan, tmp_path / "none" / "plan.png", [0])
 
@@ -270,6 +273,7 @@ def test_commands(tmp_path: Path) -> None:
     assert bad.exit_code == 1
     assert "1. g, x 1.00 m, y 0.00 m: walls almost meet: 0.050 m apart" in bad.output
     assert (tmp_path / "bad.png").stat().st_size > 1000
+    assert f"picture: {tmp_path / 'bad.png'}\n" in bad.output
     shown = run(app, ["plan", "show", str(DEMO), "-o", str(tmp_path / "show.svg"), "--level", "Ground floor"])
     assert shown.exit_code == 0
     for wrong in (["--level", "7"], ["--bounds", "1,2,3"], ["--bounds", "1,2,0,3"], ["--bounds", "1,2,nan,3"]):

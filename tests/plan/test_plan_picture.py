@@ -41,11 +41,14 @@ def test_letters_that_no_font_has_are_named_in_one_line(tmp_path: Path, monkeypa
     assert done.returncode == 0
     assert (
         done.stdout
-        == f"{tmp_path / 'x.png'}; no font here has the letters 室械機: install one that does (fonts-noto-cjk, fonts-noto)\n"
+        == f"picture: {tmp_path / 'x.png'}; no font here has the letters 室械機: install one that does (fonts-noto-cjk, fonts-noto)\n"
     )
     assert not done.stderr
     plan_of(tmp_path, "Büro, Šatna, Кухня, Αίθουσα")
-    assert command_line.echostep("plan", "show", tmp_path / "plan.json", "-o", tmp_path / "x.png").stdout == ""
+    assert (
+        command_line.echostep("plan", "show", tmp_path / "plan.json", "-o", tmp_path / "x.png").stdout
+        == f"picture: {tmp_path / 'x.png'}\n"
+    )
 
 
 def test_a_font_that_has_the_letters_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

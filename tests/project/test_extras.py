@@ -179,8 +179,8 @@ WALK = CAPTURES / "walk.mcap"
     ("matplotlib", ("plan", "overlay", DEMO, "-o", "x.kmz")),
     ("matplotlib", ("command", "x.mcap", *PLAN, "--picture", "x.png")),
     ("matplotlib", ("score", "x.csv", "--truth", "x.csv", "--html", "x.html")),
-    ("matplotlib", ("foot", "x.csv", "--plot")),
-    ("matplotlib", ("legs", "x.csv", "--thigh", "0.4", "--shank", "0.4", "--plot")),
+    ("matplotlib", ("foot", "x.csv", "--picture", "x.pdf")),
+    ("matplotlib", ("legs", "x.csv", "--thigh", "0.4", "--shank", "0.4", "--picture", "x.pdf")),
 ])  # fmt: skip
 def test_a_command_that_lacks_a_package_says_which_before_it_begins(
     package: str, words: tuple[object, ...], monkeypatch: pytest.MonkeyPatch, tmp_path: Path

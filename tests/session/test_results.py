@@ -41,7 +41,7 @@ def test_a_picture_that_cannot_be_written_is_one_error_after_the_summary(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "track.png").mkdir()
-    with pytest.raises(EchostepError, match="cannot draw the track: Is a directory"):
+    with pytest.raises(EchostepError, match="cannot write the picture: Is a directory"):
         results.write_results(tmp_path, TRACKER, None, results.Result("walk", [told(t_s=1.0)]))
     assert "estimates: 1" in capsys.readouterr().out
     assert (tmp_path / "track.csv").exists()

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from echostep.commands.options import LOCAL, Host, Port, Seconds, TeamPlan, needs, page_address
+from echostep.commands.options import LOCAL, Host, Port, Seconds, TeamPlan, page_address, picture_file
 from echostep.printing.lines import complain
 
 app = typer.Typer()
@@ -37,8 +37,8 @@ def command(
         typer.Option(
             "--picture",
             metavar="FILE",
-            help="Draw the team on its plan at the end: .png or .svg.",
-            callback=needs("matplotlib"),
+            help="Draw the team on its plan at the end (PNG, SVG, PDF).",
+            callback=picture_file,
         ),
     ] = None,
     as_json: Annotated[

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from echostep.commands.options import needs
+from echostep.commands.options import needs, picture_file
 from echostep.extras import require
 
 app = typer.Typer()
@@ -30,7 +30,7 @@ def map_command(
     picture: Annotated[
         Path | None,
         typer.Option(
-            "--picture", metavar="FILE", callback=needs("matplotlib"), help="Draw plan and path there (PNG, SVG)."
+            "--picture", metavar="FILE", callback=picture_file, help="Draw plan and path there (PNG, SVG, PDF)."
         ),
     ] = None,
 ) -> None:
@@ -51,14 +51,15 @@ def foot(
             "--profile", metavar="NAME", help="default, or fischer2008: that paper's dead reckoning (echostep-studies)."
         ),
     ] = "default",
-    plot: Annotated[
-        bool, typer.Option("--plot", callback=needs("matplotlib"), help="Draw the track as PNG, beside the CSV.")
-    ] = False,
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", metavar="FILE", callback=picture_file, help="Draw the track there (PNG, SVG, PDF)."),
+    ] = None,
 ) -> None:
     """Zero-velocity navigation of a recorded foot IMU."""
     from echostep.commands.actions import offline
 
-    offline.foot(imu, out, profile, plot=plot)
+    offline.foot(imu, out, profile, picture)
 
 
 @app.command()
@@ -86,15 +87,17 @@ def legs(
         float | None,
         typer.Option("--walked", metavar="M", help="The true length of this walk: print the wearer's scale."),
     ] = None,
-    plot: Annotated[
-        bool,
-        typer.Option("--plot", callback=needs("matplotlib"), help="Draw track and strides as PNG, beside the CSV."),
-    ] = False,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            "--picture", metavar="FILE", callback=picture_file, help="Draw track and strides there (PNG, SVG, PDF)."
+        ),
+    ] = None,
 ) -> None:
     """Distance, strides and track from recorded leg gyros: on thigh and shank, and on the belt if there is one."""
     from echostep.commands.actions import offline
 
-    offline.legs(samples, out, offline.LegOptions(thigh, shank, profile, scale, walked), plot=plot)
+    offline.legs(samples, out, offline.LegOptions(thigh, shank, profile, scale, walked), picture)
 
 
 @app.command()

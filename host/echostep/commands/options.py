@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from echostep.extras import PAGE, lacks, require
+from echostep.picture_files import check_picture
 from echostep.printing.lines import complain
 
 if TYPE_CHECKING:
@@ -30,6 +31,14 @@ def needs(package: str) -> Callable[[typer.CallbackParam, Value], Value]:
         return value
 
     return checked
+
+
+def picture_file(option: typer.CallbackParam, path: Path | None) -> Path | None:
+    """A callback of an option that names a picture: its kind can be drawn, before anything else is done."""
+    if path is not None:
+        require(option.opts[0], "matplotlib")
+        check_picture(path)
+    return path
 
 
 def page_address(page: bool | None, host: str, port: int | None) -> Address | None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from echostep.commands.options import needs
+from echostep.commands.options import picture_file
 from echostep.errors import EchostepError
 from echostep.extras import PAGE, lacks, require
 from echostep.printing.lines import say
@@ -151,9 +151,7 @@ def check(
     file: PlanFile,
     picture: Annotated[
         Path | None,
-        typer.Option(
-            "--picture", metavar="FILE", callback=needs("matplotlib"), help="Draw what is wrong (.png, .svg)."
-        ),
+        typer.Option("--picture", metavar="FILE", callback=picture_file, help="Draw what is wrong (PNG, SVG, PDF)."),
     ] = None,
 ) -> None:
     """Tell what is wrong with a plan: exit status 0 when nothing is, 1 when something is."""
@@ -172,8 +170,7 @@ def check(
     say(f"{file}: " + (", ".join(f"{count} x {kind}" for kind, count in counts.items()) or "nothing wrong"))
     if picture is not None:
         levels = sorted({finding.level for finding in findings}) or list(range(len(plan.levels)))
-        if letters := draw_plan(plan, picture, levels, None, findings[:MOST_MARKS]):
-            say(f"{picture}{_without(letters)}")
+        say(f"picture: {picture}{_without(draw_plan(plan, picture, levels, None, findings[:MOST_MARKS]))}")
     if findings:
         raise typer.Exit(1)
 
@@ -181,7 +178,7 @@ def check(
 @app.command()
 def show(
     file: PlanFile,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The picture to write (.png, .svg).")],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The picture to write (PNG, SVG, PDF).")],
     level: Annotated[
         str | None, typer.Option("--level", metavar="NAME", help="One level, by name or index; all without it.")
     ] = None,
@@ -196,8 +193,7 @@ def show(
 
     plan = open_limited(file)
     levels = list(range(len(plan.levels))) if level is None else [_level(plan, level)]
-    if letters := draw_plan(plan, out, levels, _bounds(bounds)):
-        say(f"{out}{_without(letters)}")
+    say(f"picture: {out}{_without(draw_plan(plan, out, levels, _bounds(bounds)))}")
 
 
 @app.command()
@@ -212,6 +208,7 @@ def overlay(
 
     for made in write_overlays(open_limited(file), out):
         say(f"{made.name}: {made.south:.7f} to {made.north:.7f} N, {made.west:.7f} to {made.east:.7f} E")
+    say(f"overlay: {out}")
 
 
 @app.command()

@@ -8,13 +8,15 @@ Owns the state of the kernel `zupt_ins`. Walk frame: levelled, z up, origin and 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
+from echostep.extras import lacks
 from echostep.foot import ins, stance, zupt_ins, zupt_state
 from echostep.foot.magnetometer import MEASURED, TRUSTED, new_compass
+from echostep.foot.picture import foot_figure
 from echostep.foot.zupt_state import (
     COVARIANCE,
     END_S,
@@ -30,6 +32,7 @@ from echostep.foot.zupt_state import (
     START_S,
     TOE,
 )
+from echostep.picture_files import svg_text
 
 NO_MAG: Floats = np.empty((0, 3))  # in the place of magnetometer samples
 
@@ -62,7 +65,7 @@ class Step:
     t_start_s: float
     t_end_s: float
     move_m: tuple[float, float, float]
-    covariance: Floats
+    covariance: Floats = field(repr=False)
     heading_rad: float
     heading_sd_rad: float
     toe_rad: float | None = None
@@ -86,7 +89,9 @@ class FootCounts:
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """A whole walk: `t_s` (n,), `position_m` (n, 3), `heading_rad` (n,), `stance` (n,) bool, the events and the counts.
+    """A whole walk; a notebook shows it as a picture.
+
+    `t_s` (n,), `position_m` (n, 3), `heading_rad` (n,), `stance` (n,) bool, the events and the counts.
 
     `toe_known`: yaw zero is the direction of the toe when the foot was levelled (`alignment.aligned`); otherwise it is arbitrary.
     `compass`: stances in which the magnetometer was trusted, and in which it was read.
@@ -100,6 +105,16 @@ class Track:
     counts: FootCounts
     toe_known: bool = False
     compass: tuple[int, int] = (0, 0)
+
+    def __repr__(self) -> str:
+        """Steps, duration and length."""
+        length_m = sum(math.hypot(*step.move_m[:2]) for step in self.steps)
+        span_s = float(self.t_s[-1] - self.t_s[0]) if len(self.t_s) else 0.0
+        return f"<Track: {len(self.steps)} steps, {span_s:.1f} s, {length_m:.1f} m>"
+
+    def _repr_svg_(self) -> str | None:
+        """The track as a picture; None, so that the repr is shown, without matplotlib."""
+        return None if lacks("a picture", "matplotlib") else svg_text(foot_figure(self, "foot"))
 
     @property
     def steps(self) -> list[Step]:

@@ -104,6 +104,15 @@ class Estimate:
     `protection_m`: radius on that level beyond which the error is with probability RISK, infinite where none is that safe. `right`: probability that
     the cloud is right; `plan_fits`: that the plan is the building's; `outside`: that the trunk is outside of the building.
     `hypotheses`: the likely places of a cloud wider than SPREAD_M, or on several levels, the likeliest first.
+
+    >>> import echostep
+    >>> last = echostep.replay("walk.mcap", "demo.json").estimates[-1]
+    >>> last
+    <Estimate at 2.67 s: x 2.00 m, y 7.50 m, level 0, 95 % within 0.42 m, heading 0 deg, tracking>
+    >>> last.status == "tracking"
+    True
+    >>> round(last.ellipse95.minor_m, 2)
+    0.31
     """
 
     t_s: float
@@ -125,6 +134,13 @@ class Estimate:
     hypotheses: tuple[LikelyPlace, ...] = ()
     plan_fits: float = 1.0
     outside: float = 0.0
+
+    def __repr__(self) -> str:
+        """Time, place with its 95 % radius, heading, status."""
+        return (
+            f"<Estimate at {self.t_s:.2f} s: x {self.x_m:.2f} m, y {self.y_m:.2f} m, level {self.level}, "
+            f"95 % within {self.ellipse95.major_m:.2f} m, heading {math.degrees(self.heading_rad):.0f} deg, {self.status.value}>"
+        )
 
     @property
     def ellipse95(self) -> Ellipse:

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.errors import EchostepError
+from echostep.picture_files import check_picture, save_picture
 from echostep.plan.model import Level, Plan
 from echostep.plan.pictures.drawing import DOOR, OBSTACLE, WALL
-from echostep.printing.file_mode import claim
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +31,7 @@ def draw_picture(path: Path, plan: Plan, walked_m: Sequence[Sequence[Floats]], b
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    check_kind(path)
+    check_picture(path)
     points = [paths for paths_of in walked_m for paths in paths_of]
     points += [level.walls.reshape(-1, 2) for level in (*plan.levels, *built)]
     low, high = np.concatenate(points).min(0) - 0.5, np.concatenate(points).max(0) + 0.5
@@ -45,10 +44,7 @@ def draw_picture(path: Path, plan: Plan, walked_m: Sequence[Sequence[Floats]], b
         _draw_level(axes, level, walked_m[count - 1 - k], built[count - 1 - k] if built else None)
         if count > 1:
             axes.set_title(f"floor {level.name}, {level.height_m:+.1f} m", fontsize="small")
-    try:
-        figure.savefig(claim(path))
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the picture: {error.strerror or error}") from error
+    save_picture(figure, path)
 
 
 def _draw_level(axes: Axes, level: Level, walked_m: Sequence[Floats], built: Level | None) -> None:
@@ -70,13 +66,7 @@ def _draw_level(axes: Axes, level: Level, walked_m: Sequence[Floats], built: Lev
         LineCollection(_lines(doors), colors=DOOR, linewidths=1.2, linestyles=":", label="walked through")
     )
     axes.legend(loc="upper right", fontsize="small")
-    axes.set(xlabel="x, m", ylabel="y, m")
-
-
-def check_kind(path: Path) -> None:
-    """Raises EchostepError unless the file's name is that of a kind of picture that can be drawn."""
-    if path.suffix.casefold() not in (".png", ".svg"):
-        raise EchostepError(f"{path}: cannot draw this kind of picture: give a name that ends in .png or .svg")
+    axes.set(xlabel="x / m", ylabel="y / m")
 
 
 def _lines(segments: Floats) -> list[Floats]:

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING
 from rich.console import Console, Group
 from rich.live import Live
 
-from echostep.errors import EchostepError
 from echostep.operation.operation import Operation
 from echostep.operation.recorded.record import OperationRecorder
 from echostep.operation.recorded.replay import replay
@@ -44,8 +43,6 @@ TABLE_S = 0.25  # between two drawings of the table; assumed
 
 def command(plan_path: Path, url: str, team: str | None, seconds: float | None, views: Views, out: Path) -> None:
     """Show a team until Ctrl-C, or for `seconds`, and record it; then draw the picture and print JSON if asked for. `url`: or a recording."""
-    if views.picture and views.picture.suffix not in (".png", ".svg"):
-        raise EchostepError(f"--picture {views.picture}: expected a name that ends in .png or .svg")
     console = console_for_people(stderr=views.as_json)
     if not views.as_json:
         outlast_output()

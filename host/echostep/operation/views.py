@@ -17,6 +17,7 @@ from rich.console import Console
 
 from echostep.operation.operation import Operation
 from echostep.operation.recorded.tape import Tape
+from echostep.printing.lines import complain, say
 from echostep.team.commander import as_tree
 from echostep.team.picture import draw_team
 
@@ -53,6 +54,8 @@ def finish(operation: Operation, now_s: float, views: Views) -> None:
     roster, plan = operation.roster, operation.plan
     if views.picture:
         draw_team(views.picture, plan, roster.members(now_s), now_s)
+        tell = complain if views.as_json else say
+        tell(f"picture: {views.picture}")
     if views.as_json:
         json.dump(as_tree(roster, plan, now_s), sys.stdout, indent=2)
         sys.stdout.write("\n")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The picture of a recorded leg's track.
 
-In: rows of a track, strides. Out: a PNG. Owns nothing.
+In: rows of a track, strides. Out: a PNG, SVG or PDF. Owns nothing.
 """
 
 from __future__ import annotations
@@ -10,16 +10,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from echostep.arrays import Floats
-from echostep.errors import EchostepError
 from echostep.legs.stride import Flag, Stride
 from echostep.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
-from echostep.printing.file_mode import claim
+from echostep.picture_files import save_picture
 
 PARTIAL_COLOUR = "#999999"
 
 
 def draw_legs(path: Path, rows: Floats, strides: Sequence[Stride], title: str) -> None:
-    """Draw the path from above with the ends of strides, and the length of each stride over time, as PNG.
+    """Draw the path from above with the ends of strides, and the length of each stride over time.
 
     `rows` (n, 6): time, distance, speed, heading, x, y. Raises EchostepError when the file cannot be written.
     """
@@ -30,7 +29,7 @@ def draw_legs(path: Path, rows: Floats, strides: Sequence[Stride], title: str) -
     FigureCanvasAgg(figure)
     above, side = figure.subplots(2, 1, height_ratios=(2, 1))
     t_s, x, y = rows[:, 0], rows[:, 4], rows[:, 5]
-    above.plot(x, y, color=TRACK_COLOUR, linewidth=1)
+    above.plot(x, y, color=TRACK_COLOUR, linewidth=1, label="track")
     ends = t_s.searchsorted([s.t_end_s for s in strides if s.length_m > 0.0]).clip(0, len(t_s) - 1)
     above.plot(x[ends], y[ends], ".", color=TRUTH_COLOUR, markersize=5, label="end of a stride")
     above.plot(x[:1], y[:1], "k^", label="start")
@@ -44,8 +43,8 @@ def draw_legs(path: Path, rows: Floats, strides: Sequence[Stride], title: str) -
             0.5 * (stride.t_start_s + stride.t_end_s), stride.length_m, 0.9 * (stride.t_end_s - stride.t_start_s), color=colour,
             yerr=stride.length_sd_m, error_kw={"elinewidth": 0.8},
         )  # fmt: skip
-    side.set(xlabel="t / s", ylabel="stride / m (grey: edges and gaps)", xlim=(t_s[0], t_s[-1]), ylim=(0.0, None))
-    try:
-        figure.savefig(claim(path))
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the picture: {error.strerror}") from error
+    side.bar([], [], color=TRACK_COLOUR, label="stride, 1 sd")
+    side.bar([], [], color=PARTIAL_COLOUR, label="at an edge or a gap")
+    side.legend(fontsize=8)
+    side.set(xlabel="t / s", ylabel="stride / m", xlim=(t_s[0], t_s[-1]), ylim=(0.0, None))
+    save_picture(figure, path)

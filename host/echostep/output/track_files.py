@@ -70,12 +70,17 @@ def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recordi
         else:
             for portion in with_progress(recording, f"tracking {path.name}"):
                 estimates += tracker.take(portion)
-            if not estimates:
-                raise EchostepError(f"{path}: no estimate: the foot never stood still, or no bytes of its sensor came")
+            refuse_none(estimates, path)
             FORMATS[out.suffix](claim(out), TrackOnPlan(estimates, plan, moments_of(recording, tracker, estimates)))
     except (OSError, sqlite3.Error) as error:
         raise EchostepError(f"{out}: cannot write: {getattr(error, 'strerror', None) or error}") from error
     return f"{out}: {len(estimates)} estimates, {estimates[-1].t_s - estimates[0].t_s if estimates else 0.0:.1f} s"
+
+
+def refuse_none(estimates: list[Estimate], path: Path) -> None:
+    """Raises EchostepError for a recording without estimates."""
+    if not estimates:
+        raise EchostepError(f"{path}: no estimate: the foot never stood still, or no bytes of its sensor came")
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""track.csv and track.png of a run, and the picture of a foot's track.
+"""track.csv and track.png of a run.
 
-In: a plan, estimates, the true path where it is known. Out: CSV and PNG files. Owns nothing.
+In: a plan, estimates, the true path where it is known. Out: CSV files and pictures. Owns nothing.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.foot.steps import Track
 from echostep.localization.beacon_map import BeaconPlace, BeaconState
 from echostep.localization.estimate import Estimate
+from echostep.picture_files import save_picture
 from echostep.plan.model import Level, Plan
 from echostep.plan.routing import Route
 from echostep.printing.file_mode import claim
@@ -25,6 +25,7 @@ from echostep.scorecard.truth import Truth
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 COLUMNS = (
@@ -67,7 +68,15 @@ def draw_track(
     path: Path, plan: Plan, estimates: Sequence[Estimate], truth: Truth | None, title: str,
     route: Route | None = None, beacons: Sequence[BeaconPlace] = (),
 ) -> None:  # fmt: skip
-    """Draw plan, true path, route, beacons, estimates and 95 % ellipses as PNG: one panel for each visited level, the lowest at the bottom."""
+    """Draw plan, true path, route, beacons, estimates and 95 % ellipses as PNG, SVG or PDF, by the ending of the name."""
+    save_picture(track_figure(plan, estimates, truth, title, route, beacons), path)
+
+
+def track_figure(
+    plan: Plan, estimates: Sequence[Estimate], truth: Truth | None, title: str,
+    route: Route | None = None, beacons: Sequence[BeaconPlace] = (),
+) -> Figure:  # fmt: skip
+    """The picture: one panel for each visited level, the lowest at the bottom."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -82,7 +91,7 @@ def draw_track(
         _draw_guidance(axes, k, route, [b for b in beacons if b.level == k])
         if len(plan.levels) > 1:
             axes.set_title(plan.levels[k].name, loc="left", fontsize=9, parse_math=False)
-    figure.savefig(claim(path))
+    return figure
 
 
 def _draw_level(axes: Axes, level: Level, estimates: Sequence[Estimate], truth_m: Floats | None) -> None:
@@ -135,25 +144,6 @@ def _with_gaps(rows: Sequence[tuple[float, float, float]]) -> Floats:
     breaks = np.flatnonzero(np.diff(table[:, 0]) > GAP_S) + 1
     positions: Floats = np.insert(table[:, 1:], breaks, np.nan, axis=0)
     return positions
-
-
-def draw_foot(path: Path, track: Track, title: str) -> None:
-    """Draw the foot's path from above and its height over time, stances as dots, as PNG."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 7), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
-    above, side = figure.subplots(2, 1, height_ratios=(3, 1))
-    x, y, z = track.position_m.T
-    above.plot(x, y, color=TRACK_COLOUR, linewidth=1)
-    above.plot(x[track.stance], y[track.stance], ".", color=TRUTH_COLOUR, markersize=3, label="foot stands")
-    above.plot(x[:1], y[:1], "k^", label="start")
-    above.set(aspect="equal", title=title, xlabel="x / m", ylabel="y / m")
-    above.legend(fontsize=8)
-    side.plot(track.t_s, z, color=TRACK_COLOUR, linewidth=1)
-    side.set(xlabel="t / s", ylabel="height / m")
-    figure.savefig(claim(path))
 
 
 def _height(level: Level) -> float:

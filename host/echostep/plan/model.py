@@ -20,6 +20,7 @@ from msgspec import UNSET
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.extras import lacks
 from echostep.fields import checked, short
 from echostep.plan import plan_file
 from echostep.plan.plan_file import ConnectorFields, DoorFields, LevelFields, PlanFields, QuestionFields, RoomFields
@@ -41,7 +42,7 @@ class Room:
 
     name: str
     at_m: tuple[float, float]
-    outline_m: Floats | None = field(default=None, compare=False)
+    outline_m: Floats | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +91,10 @@ class Level:
     doubtful: Floats = field(default_factory=_no_segments)
     questions: tuple[Question, ...] = ()
 
+    def __repr__(self) -> str:
+        """Name, height and size."""
+        return f"<Level {short(self.name)}, {self.height_m:g} m: {len(self.walls)} walls, {len(self.rooms)} rooms>"
+
     @property
     def solid(self) -> Floats:
         """All segments that block people and echoes, (n + k + ..., 4): walls, then windows, then the sides of obstacles."""
@@ -105,7 +110,7 @@ class Connector:
     kind: ConnectorKind
     name: str
     levels: tuple[int, ...]
-    outline_m: Floats
+    outline_m: Floats = field(repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +135,10 @@ class Georeference:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A building. `digest`: SHA-256 of the file. `uncertainty_m`: standard deviation of the walls' positions, None where unknown."""
+    """A building; a notebook shows it as a picture.
+
+    `digest`: SHA-256 of the file. `uncertainty_m`: standard deviation of the walls' positions, None where unknown.
+    """
 
     name: str
     levels: tuple[Level, ...]
@@ -139,6 +147,20 @@ class Plan:
     connectors: tuple[Connector, ...] = ()
     georeference: Georeference | None = None
     uncertainty_m: float | None = None
+
+    def __repr__(self) -> str:
+        """Name and size."""
+        names = ", ".join(level.name for level in self.levels)
+        walls, rooms = (sum(len(getattr(level, kind)) for level in self.levels) for kind in ("walls", "rooms"))
+        return f"<Plan {short(self.name)}: {short(names)}; {walls} walls, {rooms} rooms>"
+
+    def _repr_svg_(self) -> str | None:
+        """All levels as a picture, for a notebook; None, so that the repr is shown, without matplotlib."""
+        if lacks("a picture", "matplotlib"):
+            return None
+        from echostep.plan.pictures.drawing import plan_svg
+
+        return plan_svg(self)
 
     @property
     def is_drawn(self) -> bool:

@@ -31,11 +31,26 @@ CHUNK_BYTES = 100  # of memory that a chunk takes besides its bytes, about
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """Bytes of one read of a port; `t_arrival_ns` is on the host's clock (`arrival_clock`), or on the simulated or recorded one."""
+    """Bytes of one read of a port; `t_arrival_ns` is on the host's clock (`arrival_clock`), or on the simulated or recorded one.
+
+    The ports are `board`, `mtx` or `foot`, and `gateway`. Bytes are cut anywhere: a frame may begin in one chunk and end in the next one.
+
+    >>> import echostep
+    >>> chunk = echostep.Chunk("board", 1_500_000_000, bytes(28))
+    >>> chunk
+    <Chunk 'board': 28 bytes at 1.500000 s>
+    >>> tracker = echostep.Tracker(echostep.plan.load_plan("demo.json"))
+    >>> tracker.feed(chunk)  # no estimate yet
+    []
+    """
 
     port: str
     t_arrival_ns: int
     data: bytes
+
+    def __repr__(self) -> str:
+        """Port, number of bytes, time of arrival."""
+        return f"<Chunk {self.port!r}: {len(self.data)} bytes at {1e-9 * self.t_arrival_ns:.6f} s>"
 
 
 @dataclass(frozen=True, slots=True)

@@ -91,8 +91,8 @@ def _draw(
     beacons = tracker.beacon_places(result.estimates[-1].t_s) if result.estimates else []
     try:
         draw_track(folder / "track.png", tracker.plan, result.estimates, result.truth, title, route, beacons)
-    except OSError as error:
-        return EchostepError(f"{folder}: cannot draw the track: {error.strerror}")
+    except EchostepError as error:
+        return error
     return None
 
 

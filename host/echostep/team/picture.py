@@ -1,21 +1,24 @@
 # SPDX-License-Identifier: MIT
 """A picture of the team on its plan.
 
-In: a plan, members. Out: a PNG or SVG. Owns nothing.
+In: a plan, members. Out: a PNG, SVG or PDF. Owns nothing.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from echostep.errors import EchostepError
 from echostep.localization.estimate import ellipse95
+from echostep.picture_files import save_picture
 from echostep.plan.model import Plan
-from echostep.printing.file_mode import claim
 from echostep.team.messages.report import Position
 from echostep.team.roster import Member, MemberState
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 LABEL_DISTANCE_M = 1.5  # labels of members closer than this are stacked
 COLOURS = {  # distinguishable with colour blindness [Okabe and Ito 2008]
@@ -51,14 +54,21 @@ def draw_team(path: Path, plan: Plan, members: Sequence[Member], now_s: float) -
                 stacked = sum(math.dist(label, (p.x_m, p.y_m)) < LABEL_DISTANCE_M for label in labels)
                 labels.append((p.x_m, p.y_m))
                 _draw_member(axes, m.report.name, p, m.state(now_s), stacked)
+        if placed:
+            _draw_legend(axes, {m.state(now_s) for m in placed})
     path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        figure.savefig(claim(path))
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the picture: {error.strerror}") from error
+    save_picture(figure, path)
 
 
-def _draw_member(axes, name: str, p: Position, need: MemberState, stacked: int) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _draw_legend(axes: Axes, states: Collection[MemberState]) -> None:
+    """The colour of each state that is drawn."""
+    for state, colour in COLOURS.items():
+        if state in states:
+            axes.plot([], [], "o", color=colour, markersize=6, label=f"{state}, 95 % ellipse")
+    axes.legend(loc="upper right", fontsize=8)
+
+
+def _draw_member(axes: Axes, name: str, p: Position, need: MemberState, stacked: int) -> None:
     """Draw one member; its label is moved up by `stacked` lines, one for each label near it."""
     from matplotlib.patches import Ellipse as Patch
 

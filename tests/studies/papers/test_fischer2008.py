@@ -273,14 +273,14 @@ def test_without_a_magnetometer_the_paper_s_profile_says_so(tmp_path: Path, caps
     t, accel, gyro, _, _ = walked()
     table = np.column_stack([t, noisy(accel), noisy(gyro)])
     path = write_csv(tmp_path / "imu.csv", "t_s,ax,ay,az,gx,gy,gz", table)
-    run_foot(path, tmp_path / "track.csv", "fischer2008", plot=True)
+    run_foot(path, tmp_path / "track.csv", "fischer2008", tmp_path / "track.png")
     assert "without its magnetometer" in capsys.readouterr().out
     assert (tmp_path / "track.png").stat().st_size > 10_000
 
 
 def test_an_unknown_profile_is_one_line_that_lists_those_that_exist(samples: Path, tmp_path: Path) -> None:
     with pytest.raises(EchostepError, match=r"--profile girard.*default, fischer2008") as error:
-        run_foot(samples, tmp_path / "track.csv", "girard", plot=False)
+        run_foot(samples, tmp_path / "track.csv", "girard", None)
     assert "\n" not in str(error.value)
     assert not (tmp_path / "track.csv").exists()
 

@@ -47,12 +47,18 @@ def page() -> str:
 def _entry(name: str, value: Any) -> str:
     """One name: heading, docstring, public methods."""
     described = callable(value) and get_origin(value) is not Literal
-    text = inspect.cleandoc(value.__doc__ or "") if described else f"`{value!r}`".replace("typing.", "")
+    text = fenced(inspect.cleandoc(value.__doc__ or "")) if described else f"`{value!r}`".replace("typing.", "")
     if described and text.startswith(f"{name}("):
         text = ""  # a dataclass or tuple without a docstring of its own
     methods = "".join(_methods(value)) if inspect.isclass(value) else ""
     call = f"```python\n{signature}\n```\n\n" if (signature := _signature(name, value)) else ""
     return f"### {name}\n\n{call}{text}\n{methods}"
+
+
+def fenced(text: str) -> str:
+    """A docstring with its examples, which begin with `>>>` and end with an empty line, as code blocks."""
+    parts = text.split("\n\n")
+    return "\n\n".join(f"```python\n{part}\n```" if part.startswith(">>>") else part for part in parts)
 
 
 def _methods(value: type) -> Iterator[str]:

@@ -18,7 +18,7 @@ from echostep.mapping.graph.directions import LEAST_EVIDENCE
 from echostep.mapping.joining import Join, join_walks
 from echostep.mapping.known_plan import plan_as_walk
 from echostep.mapping.mapper import Mapped, drawn, solve_walk
-from echostep.mapping.picture import check_kind, draw_picture
+from echostep.mapping.picture import draw_picture
 from echostep.mapping.plan import Walked, plan_of
 from echostep.mapping.walls.completion import complete
 from echostep.path import MeasuredSegment
@@ -54,6 +54,7 @@ def map_recordings(paths: Sequence[Path], plan_path: Path | None, out: Path, pic
     save_plan(plan, out)
     if picture is not None:
         draw_picture(picture, plan, walked_m)
+        lines.append(f"picture: {picture}")
     for line in [*lines, f"{out}: check and mend it with echostep plan edit {out}"]:
         _say(line)
 
@@ -106,7 +107,7 @@ def _solved(recording: Recording) -> Mapped:
 
 
 def _check_files(paths: Sequence[Path], out: Path, picture: Path | None) -> None:
-    """Raises EchostepError where what is written would replace a recording, a walk is given twice, or the picture is of no known kind."""
+    """Raises EchostepError where what is written would replace a recording, or a walk is given twice."""
     walks = [path.resolve() for path in paths]
     for k, path in enumerate(paths):
         if walks[k] in walks[:k]:
@@ -114,8 +115,6 @@ def _check_files(paths: Sequence[Path], out: Path, picture: Path | None) -> None
     for written in (out, picture):
         if written is not None and written.resolve() in walks:
             raise EchostepError(f"{written}: this is the recording: give the result another name")
-    if picture is not None:
-        check_kind(picture)
 
 
 def segments_of(recording: Recording) -> list[MeasuredSegment]:

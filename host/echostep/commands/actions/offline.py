@@ -13,6 +13,7 @@ from pathlib import Path
 
 from echostep.errors import EchostepError
 from echostep.foot.alignment import aligned
+from echostep.foot.picture import draw_foot
 from echostep.foot.steps import Track, walk_track
 from echostep.legs.stride import StrideSettings
 from echostep.offline.imu_csv import Imu, checked, describe_track, load_imu, write_foot_track
@@ -23,7 +24,6 @@ from echostep.offline.leg_summary import describe_legs, describe_strides, write_
 from echostep.offline.leg_track import track_default
 from echostep.offline.profiles import DEFAULT, method
 from echostep.output.leg_plot import draw_legs
-from echostep.output.track_plot import draw_foot
 from echostep.printing.lines import complain
 from echostep.printing.people import is_unread
 from echostep.recording.capture import Decoder, as_json, read_capture
@@ -35,7 +35,7 @@ from echostep.xsens.output_formats import OutputFormats
 SCALE_RANGE = (0.5, 2.0)  # of --scale: beyond it the lengths of the leg are wrong
 
 
-def foot(path: Path, out: Path, profile: str, *, plot: bool) -> None:
+def foot(path: Path, out: Path, profile: str, picture: Path | None) -> None:
     """Track a recorded foot IMU with this project's method or that of a paper."""
     track_recording = method("foot", profile, _own_track)
     imu = load_imu(path)
@@ -44,9 +44,14 @@ def foot(path: Path, out: Path, profile: str, *, plot: bool) -> None:
     track = track_recording(imu, path.name)
     write_foot_track(out, track)
     console.print(f"{path.name}: {describe_track(track)}")
-    if plot:
-        draw_foot(out.with_suffix(".png"), track, path.name)
-        console.print(f"{out} and {out.with_suffix('.png')}")
+    if picture is not None:
+        draw_foot(picture, track, path.name)
+    _tell_files(out, picture)
+
+
+def _tell_files(out: Path, picture: Path | None) -> None:
+    """Where the results went."""
+    console.print(f"track: {out}" + (f", picture: {picture}" if picture else ""), markup=False)
 
 
 def _own_track(imu: Imu, name: str) -> Track:
@@ -64,7 +69,7 @@ class LegOptions:
     walked_m: float | None = None
 
 
-def legs(paths: list[Path], out: Path, options: LegOptions, *, plot: bool = False) -> None:
+def legs(paths: list[Path], out: Path, options: LegOptions, picture: Path | None = None) -> None:
     """Track a recorded leg, or both of one person, with this project's method or that of a paper."""
     profile, scale = options.profile, options.scale
     track_leg = method("legs", profile, track_default)
@@ -85,9 +90,9 @@ def legs(paths: list[Path], out: Path, options: LegOptions, *, plot: bool = Fals
     for line in describe_strides(track):
         console.print(line)
     console.print(f"{path.name}: {describe_legs(track)}")
-    if plot:
-        draw_legs(out.with_suffix(".png"), track.rows, track.strides, path.name)
-        console.print(f"{out} and {out.with_suffix('.png')}")
+    if picture is not None:
+        draw_legs(picture, track.rows, track.strides, path.name)
+    _tell_files(out, picture)
     if options.walked_m is not None:
         factor = calibrated_scale(track.distance_m, options.walked_m)
         console.print(f"--scale {(scale or 1.0) * factor:.4f} makes this walk {options.walked_m:g} m long")

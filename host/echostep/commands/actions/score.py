@@ -19,6 +19,7 @@ from echostep.output.score_page import ScoreReport, page, short_names
 from echostep.output.table import Table
 from echostep.plan.importers.limited import open_limited
 from echostep.printing.console import console_for_people
+from echostep.printing.lines import complain, say
 from echostep.scorecard.card import score as score_track
 from echostep.scorecard.definitions import METRICS, as_text, notes
 from echostep.scorecard.track_columns import load_path
@@ -49,6 +50,7 @@ def score(
         _table(report).print()
     if html:
         _write(html, page(report))
+        (complain if as_json else say)(f"page: {html}")
 
 
 def _table(report: ScoreReport) -> Table:

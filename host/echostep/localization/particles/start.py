@@ -7,7 +7,7 @@ In: a `Start`. Out: poses drawn from it. Owns nothing.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -42,6 +42,15 @@ class Start:
     `near` a pose, if there is one, at the height `near_z_m` (on stairs it is between two levels): with level ANY_LEVEL, above and below it too, with
     any heading. `air`: what is known of the heights by pressure.
     `after_pause`: at the pose an earlier run ended, and the wearer may have gone on since, so the whole building is searched beside it.
+
+    >>> import echostep
+    >>> echostep.Start()  # anywhere in the building
+    Start()
+    >>> at_the_door = echostep.Start(echostep.plan.Pose(2.0, 7.5, 0.0), sd_m=0.5)
+    >>> at_the_door
+    Start(pose=Pose(x_m=2.0, y_m=7.5, heading_rad=0.0, level=0), sd_m=0.5)
+    >>> echostep.replay("walk.mcap", "demo.json", start=at_the_door)
+    <Walk 'walk.mcap': 5 estimates, 2.0 s, 100% tracking, on 'Demo office'>
     """
 
     pose: Pose | None = None
@@ -53,6 +62,12 @@ class Start:
     near_z_m: float | None = None
     air: Air | None = None
     after_pause: bool = False
+
+    def __repr__(self) -> str:
+        """The fields that are not the default."""
+        given = [(f.name, getattr(self, f.name)) for f in fields(self) if getattr(self, f.name) is not f.default]
+        words = [f"room_m=<{len(value)} corners>" if name == "room_m" else f"{name}={value!r}" for name, value in given]
+        return f"Start({', '.join(words)})"
 
 
 def draw_poses(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of plans, PNG or SVG: rooms, walls, windows, doors, stairs and lifts, and the findings of the check.
+"""Pictures of plans, PNG, SVG or PDF: rooms, walls, windows, doors, stairs and lifts, and the findings of the check.
 
 In: a `Plan`, levels, a rectangle, findings. Out: a file. Owns the colours.
 """
@@ -14,7 +14,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from echostep.errors import EchostepError
+from echostep.picture_files import check_picture, save_picture, svg_text
 from echostep.plan.cropping import Bounds, extent, within
 from echostep.plan.model import Connector, Level, Plan, Pose, Room
 from echostep.plan.pictures.labels import Label, draw_labels, fonts_for
@@ -22,12 +22,15 @@ from echostep.plan.places.faces import find_faces
 from echostep.plan.places.spaces import MOST_WALLS
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from echostep.plan.places.findings import PlanFinding
 
 WALL, WINDOW, DOOR, OBSTACLE = "#333333", "#56b4e9", "#d55e00", "#bbbbbb"
 ROOM, ROOM_NAME = "#f3efe6", "#555555"
 WAY, WAY_NAME = "#009e73", "#00553e"  # stairs, lifts and ramps
 WRONG = "#d0021b"
+SOFTWARE = "echostep plan"  # in the header of a PNG: by it `plan import` knows its own pictures
 WIDTH_PX = 1500  # least width of a picture
 LEVEL_WIDTH_PX = 900  # least width of a level
 GROUND = (1.0, 1.0, 1.0, 0.85)  # of a picture that lies on a map
@@ -62,9 +65,17 @@ def draw_plan(
 
     Returns the letters of names that no installed font has.
     """
+    check_picture(path)
     with fonts_for(_texts(plan, levels)) as missing:
-        _draw_levels(plan, path, levels, bounds, findings)
+        save_picture(_figure(plan, levels, bounds, findings), path, software=SOFTWARE, private=False)
     return missing
+
+
+def plan_svg(plan: Plan) -> str:
+    """All levels as SVG, for a notebook."""
+    levels = range(len(plan.levels))
+    with fonts_for(_texts(plan, levels)):
+        return svg_text(_figure(plan, levels, None, ()))
 
 
 def _texts(plan: Plan, levels: Sequence[int]) -> Iterator[str]:
@@ -75,15 +86,11 @@ def _texts(plan: Plan, levels: Sequence[int]) -> Iterator[str]:
     yield from (connector.name for connector in plan.connectors)
 
 
-def _draw_levels(
-    plan: Plan, path: Path, levels: Sequence[int], bounds: Bounds | None, findings: Sequence[PlanFinding]
-) -> None:
+def _figure(plan: Plan, levels: Sequence[int], bounds: Bounds | None, findings: Sequence[PlanFinding]) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    if path.suffix.casefold() not in (".png", ".svg"):
-        raise EchostepError(f"{path}: cannot draw this kind of picture: give a name that ends in .png or .svg")
     columns = math.ceil(math.sqrt(len(levels)))
     wide_px = max(WIDTH_PX, LEVEL_WIDTH_PX * columns)
     rows = math.ceil(len(levels) / columns)
@@ -99,15 +106,13 @@ def _draw_levels(
     for number, i in enumerate(levels):
         drawn[i] = figure.add_subplot(rows, columns, number + 1, aspect="equal")
         _draw_level(drawn[i], plan, i, view, [f for f in findings if f.level == i])
+    _draw_legend(figure, plan, levels)
     layout.execute(figure)
     figure.set_layout_engine("none")
     for i, axes in drawn.items():
         axes.apply_aspect()
         _draw_names(axes, plan, i, view, [f for f in findings if f.level == i])
-    try:
-        figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else {"Software": "echostep plan"})
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the picture: {error.strerror or error}") from error
+    return figure
 
 
 def draw_bare_level(plan: Plan, level: int, bounds: Bounds, pixels_per_m: float, file: IO[bytes]) -> None:
@@ -203,6 +208,27 @@ def _draw_names(axes: Any, plan: Plan, level_index: int, view: View, findings: S
         axes.title.set_text(f"{axes.title.get_text()} ({left_out} {what} not fit: --bounds shows a part larger)")
 
 
+def _draw_legend(figure: Figure, plan: Plan, levels: Sequence[int]) -> None:
+    """What each colour is, of the kinds that these levels have, below the picture."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    seen = [plan.levels[i] for i in levels]
+    ways = any(set(connector.levels) & set(levels) for connector in plan.connectors)
+    has_start = plan.start is not None and plan.start.level in levels
+    kinds = (
+        (Line2D([], [], color=WALL, label="wall"), any(len(level.walls) for level in seen)),
+        (Line2D([], [], color=WINDOW, label="window"), any(len(level.windows) for level in seen)),
+        (Line2D([], [], color=DOOR, label="door"), any(level.doors for level in seen)),
+        (Line2D([], [], color=OBSTACLE, label="doubtful wall"), any(len(level.doubtful) for level in seen)),
+        (Patch(color=OBSTACLE, label="obstacle"), any(level.obstacles for level in seen)),
+        (Patch(color=WAY, alpha=0.3, label="stairs, lift, ramp"), ways),
+        (Line2D([], [], color=WAY, marker=(3, 0, 0), linestyle="", label="start"), has_start),
+    )
+    if handles := [handle for handle, is_drawn in kinds if is_drawn]:
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=7, frameon=False)
+
+
 def _draw_start(axes: Any, start: Pose) -> None:
     """A triangle at the start that points along its heading."""
     marker = (3, 0, math.degrees(start.heading_rad) - 90)
@@ -215,6 +241,8 @@ def _draw_frame(axes: Any, level: Level, view: View) -> None:
     axes.set_xlim(x0, x1)
     axes.set_ylim(y0, y1)
     axes.set_title(shown(f"{level.name}, {level.height_m:g} m"), size=9, parse_math=False)
+    axes.set_xlabel("x / m", size=6, color="#888888")
+    axes.set_ylabel("y / m", size=6, color="#888888")
     axes.tick_params(labelsize=6, colors="#888888")
     for side in axes.spines.values():
         side.set_color("#dddddd")

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from echostep.interruption import until_asked
-from echostep.plan.model import Plan
+from echostep.localization.particles.start import Start
+from echostep.plan.model import Plan, Pose
 from echostep.recording.parts.joining import open_parts
 from echostep.recording.reading import Recording
 from echostep.scorecard.truth import load_truth
@@ -24,7 +25,7 @@ from echostep.session.progress import with_bar
 from echostep.session.results import output_folder
 from echostep.session.runs.starts import check_start
 from echostep.session.session import Session
-from echostep.settings import parse_settings, read_settings
+from echostep.settings import Settings, parse_settings, read_settings
 from echostep.tracker import Tracker
 
 VIEWED_PORTION = 8  # chunks tracked at once while a viewer looks on: about 10 ms
@@ -62,15 +63,21 @@ def replay(paths: Sequence[Path], tracking: TrackingOptions, truth_path: Path | 
         session.keep_page_open()
 
 
-def tracker_of(recording: Recording, plan: Plan, tracking: TrackingOptions) -> Tracker:
-    """A tracker with the recorded start, settings and seed unless `tracking` gives others.
+def tracker_of(
+    recording: Recording,
+    plan: Plan,
+    tracking: TrackingOptions,
+    start: Pose | Start | None = None,
+    settings: Settings | None = None,
+) -> Tracker:
+    """A tracker with the recorded start, settings and seed unless they are given, as text by `tracking` or as objects.
 
     Raises EchostepError when one of them is missing or damaged.
     """
     metadata, path = recording.metadata, recording.path
     settings_path = tracking.settings_path
     text = read_settings(settings_path) if settings_path else metadata.get("settings_toml", "")
-    settings = parse_settings(text, str(settings_path or path))
-    start = start_given(tracking, plan) or recorded_start(metadata, path)
+    settings = settings or parse_settings(text, str(settings_path or path))
+    start = start or start_given(tracking, plan) or recorded_start(metadata, path)
     seed = recorded_seed(metadata, path) if tracking.seed is None else tracking.seed
     return Tracker(plan, start, settings, seed, waits=metadata.get("start") == CHECK_IN_START)

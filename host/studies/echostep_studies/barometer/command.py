@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from echostep.commands.options import needs
+from echostep.commands.options import picture_file
 
 
 def floors(
@@ -28,11 +28,12 @@ def floors(
     start: Annotated[
         int | None, typer.Option("--start", metavar="FLOOR", help="Floor at the start, if known.", min=0)
     ] = None,
-    plot: Annotated[
-        bool, typer.Option("--plot", callback=needs("matplotlib"), help="Draw the floors as PNG, beside the CSV.")
-    ] = False,
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", metavar="FILE", callback=picture_file, help="Draw the floors there (PNG, SVG, PDF)."),
+    ] = None,
 ) -> None:
     """Floors of a recorded barometer. Writes t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
     from echostep_studies.barometer import floors_command
 
-    floors_command.floors(pressure, heights, out, start, plot=plot)
+    floors_command.floors(pressure, heights, out, start, picture)

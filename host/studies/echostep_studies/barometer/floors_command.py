@@ -13,6 +13,7 @@ from rich.console import Console
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.picture_files import save_picture
 from echostep_studies.barometer.altitude import BarometerSettings, Pressures
 from echostep_studies.barometer.floor_filter import FloorFilter, Floors, checked_heights
 from echostep_studies.barometer.floor_record import describe, find_storeys, noise_of_record, thinned
@@ -22,7 +23,7 @@ console = Console(soft_wrap=True, highlight=False)
 MOST_POINTS = 5000  # about, of a curve in the picture
 
 
-def floors(path: Path, heights: str, out: Path, start: int | None, *, plot: bool) -> None:
+def floors(path: Path, heights: str, out: Path, start: int | None, picture: Path | None) -> None:
     """Write the floors of a record and print the stays; raises EchostepError for options or samples that cannot be used."""
     given_m = None if heights.strip().lower() == "auto" else parse_heights(heights)
     if start is not None and given_m is None:
@@ -37,10 +38,9 @@ def floors(path: Path, heights: str, out: Path, start: int | None, *, plot: bool
     if given_m is None:
         console.print("floors found: --heights " + ",".join(f"{h:g}" for h in floors_.heights_m))
     console.print(describe(floors_), markup=False)
-    if plot:
-        picture = out.with_suffix(".png")
+    if picture is not None:
         draw_floors(picture, floors_, path.name)
-        console.print(f"{out} and {picture} written", markup=False)
+    console.print(f"floors: {out}" + (f", picture: {picture}" if picture else ""), markup=False)
 
 
 def record_floors(samples: Pressures, heights_m: Floats, start: int | None = None) -> Floors:
@@ -76,7 +76,7 @@ def parse_heights(text: str) -> Floats:
 
 
 def draw_floors(path: Path, floors: Floors, title: str) -> None:
-    """Write a PNG with the height over time, the heights of the floors, and the probability of each floor."""
+    """Draw the height over time, the heights of the floors, and the probability of each floor."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -97,7 +97,8 @@ def draw_floors(path: Path, floors: Floors, title: str) -> None:
         alpha=0.5,
         label="floor",
     )
-    above.set(title=title, ylabel="height / m")
+    above.set_title(title, parse_math=False)
+    above.set(ylabel="height / m")
     above.legend(fontsize=8)
     mesh = below.imshow(
         floors.probability[few].T, origin="lower", aspect="auto", vmin=0.0, vmax=1.0, cmap="Blues", interpolation="nearest",
@@ -105,7 +106,4 @@ def draw_floors(path: Path, floors: Floors, title: str) -> None:
     )  # fmt: skip
     below.set(xlabel="t / s", ylabel="floor")
     figure.colorbar(mesh, ax=below, label="probability")
-    try:
-        figure.savefig(path)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the picture: {error.strerror}") from error
+    save_picture(figure, path)
