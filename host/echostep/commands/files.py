@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from echostep.commands.options import needs, picture_file
+from echostep.commands.options import Columns, Units, needs, picture_file
 from echostep.extras import require
 
 app = typer.Typer()
@@ -55,11 +55,14 @@ def foot(
         Path | None,
         typer.Option("--picture", metavar="FILE", callback=picture_file, help="Draw the track there (PNG, SVG, PDF)."),
     ] = None,
+    columns: Columns = None,
+    units: Units = None,
 ) -> None:
     """Zero-velocity navigation of a recorded foot IMU."""
     from echostep.commands.actions import offline
+    from echostep.offline.foreign_columns import parse_naming
 
-    offline.foot(imu, out, profile, picture)
+    offline.foot(imu, out, profile, picture, parse_naming(columns, units))
 
 
 @app.command()
@@ -93,11 +96,15 @@ def legs(
             "--picture", metavar="FILE", callback=picture_file, help="Draw track and strides there (PNG, SVG, PDF)."
         ),
     ] = None,
+    columns: Columns = None,
+    units: Units = None,
 ) -> None:
     """Distance, strides and track from recorded leg gyros: on thigh and shank, and on the belt if there is one."""
     from echostep.commands.actions import offline
+    from echostep.offline.foreign_columns import parse_naming
 
-    offline.legs(samples, out, offline.LegOptions(thigh, shank, profile, scale, walked), picture)
+    naming = parse_naming(columns, units)
+    offline.legs(samples, out, offline.LegOptions(thigh, shank, profile, scale, walked), picture, naming)
 
 
 @app.command()

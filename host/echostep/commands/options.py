@@ -55,6 +55,18 @@ def page_address(page: bool | None, host: str, port: int | None) -> Address | No
     return Address(host, port)
 
 
+Columns = Annotated[
+    str | None,
+    typer.Option(
+        "--columns",
+        metavar="OURS=THEIRS,...",
+        help="Names of the file's columns, as t_s=time,gx=gyro_x; those of common loggers are known without.",
+    ),
+]
+Units = Annotated[
+    str | None,
+    typer.Option("--units", metavar="UNIT,...", help="Units of the file: ms, us, ns; g, mg; deg/s, deg; hPa, kPa."),
+]
 LOCAL = "127.0.0.1"
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
 TeamPlan = Annotated[

@@ -89,15 +89,18 @@ def open_samples(path: Path | str, read: Callable[[TextIO], Result]) -> Result:
 
 
 def read_rows(
-    lines: Iterator[str], header: tuple[list[str], str], columns: Sequence[int], required: int, limits: CsvLimits
-) -> CsvTable:
-    """Rows of the lines after the header; empty lines are skipped. `columns`: index of each wanted column, -1 for one that the file lacks.
+    lines: Iterator[str], header: tuple[list[str], str], columns: Sequence[int], required: int, limits: CsvLimits,
+    first: int = 2,
+) -> CsvTable:  # fmt: skip
+    """Rows of the lines after the header, from line `first` on; empty lines are skipped.
+
+    `columns`: index of each wanted column, -1 for one that the file lacks.
 
     A row with more cells than the header has names counts as one without numbers: a decimal comma between commas moves all cells behind it. With
     `limits.early_rows`, raises ValueError when fewer than two rows exist, or when most of them lack a number in one of the first `required` columns.
     """
     (names, separator), values, numbers, bad = header, array("d"), array("q"), 0
-    for number, line in enumerate(lines, start=2):
+    for number, line in enumerate(lines, start=first):
         if not line.strip():
             continue
         cells = (line.replace(",", ".") if separator == ";" else line).split(separator)

@@ -11,6 +11,7 @@ import csv
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TextIO
 
@@ -20,7 +21,8 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.foot.steps import Track
 from echostep.offline.bursts import spread
-from echostep.offline.csv_table import CsvLimits, column_of, header_of, lines_of, number_of, open_samples, read_rows
+from echostep.offline.csv_table import CsvLimits, column_of, lines_of, number_of, open_samples, read_rows
+from echostep.offline.foreign_columns import ADVICE, OWN, Naming, read_header
 from echostep.offline.imu_checks import complaint, contradiction, end_sd_m, notes, sorted_by_time, whole_rows
 from echostep.printing.file_mode import claim
 
@@ -43,16 +45,16 @@ class Imu:
     notes: tuple[str, ...] = ()
 
 
-def load_imu(path: Path | str) -> Imu:
+def load_imu(path: Path | str, naming: Naming = OWN) -> Imu:
     """Samples of a CSV file; raises EchostepError that names the file and what is wrong with which column."""
-    table, mended = open_samples(path, _mended_table)
+    table, mended = open_samples(path, partial(_mended_table, naming=naming))
     mag = table[:, 7:10] if table.shape[1] > len(COLUMNS) else None
     return Imu(table[:, 0], table[:, 1:4], table[:, 4:7], mag, (*mended, *notes(table, COLUMNS)))
 
 
-def _mended_table(file: TextIO) -> tuple[Floats, tuple[str, ...]]:
+def _mended_table(file: TextIO, naming: Naming) -> tuple[Floats, tuple[str, ...]]:
     """Usable rows (n, 7) or (n, 10) in order of time, and notes on what was mended; raises ValueError for samples that cannot be used."""
-    table, left_out = _table(lines_of(file, CsvLimits()))
+    table, left_out = _table(lines_of(file, CsvLimits()), naming)
     table, holes = whole_rows(table)
     if empty := int(np.isnan(table[:, len(COLUMNS) :]).any(axis=1).sum()):
         left_out = (f"{empty} rows without a number of the magnetometer: used without it",)
@@ -63,17 +65,19 @@ def _mended_table(file: TextIO) -> tuple[Floats, tuple[str, ...]]:
     return table, (*holes, *left_out, *mended, *spreading)
 
 
-def _table(lines: Iterator[str]) -> tuple[Floats, tuple[str, ...]]:
-    """The columns (n, 7), or (n, 10) with a magnetometer, and a note on one that is not whole."""
-    header, separator = header_of(next(lines, ""))
+def _table(lines: Iterator[str], naming: Naming) -> tuple[Floats, tuple[str, ...]]:
+    """The columns (n, 7), or (n, 10) with a magnetometer, in SI units, and notes on where they come from and on one that is not whole."""
+    head = read_header(lines, naming)
+    header = head.names
     if missing := [name for name in COLUMNS if name not in header]:
         hint = ": the first line must name the columns" if all(map(math.isfinite, map(number_of, header))) else ""
-        raise ValueError(f"no column {', '.join(missing)}{hint}; expected {','.join(COLUMNS)}[,mx,my,mz]")
+        raise ValueError(f"no column {', '.join(missing)}{hint}; expected {','.join(COLUMNS)}[,mx,my,mz]{ADVICE}")
     wanted = COLUMNS + MAG_COLUMNS if all(name in header for name in MAG_COLUMNS) else COLUMNS
     columns = [column_of(header, name) for name in wanted]
     half = [name for name in MAG_COLUMNS if name in header and name not in wanted]
     left_out = (f"{', '.join(half)} without the other axes of the magnetometer: left out",) if half else ()
-    return read_rows(lines, (header, separator), columns, len(COLUMNS), CsvLimits()).values, left_out
+    rows = read_rows(lines, (header, head.separator), columns, len(COLUMNS), CsvLimits(), head.line + 1)
+    return head.in_si(rows.values, wanted), (*head.notes, *left_out)
 
 
 def checked(track: Track, path: Path | str) -> Track:

@@ -23,15 +23,14 @@ from echostep.legs.clipping import find_clipping_limits, repair_clipping
 from echostep.legs.mounting import walking_axis
 from echostep.offline.bursts import spread
 from echostep.offline.csv_table import (
-    LONGEST_LINE,
     CsvLimits,
     column_of,
-    header_of,
     lines_of,
     open_samples,
     rate_complaint,
     read_rows,
 )
+from echostep.offline.foreign_columns import ADVICE, OWN, Naming, read_header
 from echostep.offline.imu_checks import BACK_SHARE, MISSING_SHARE, RATE_RANGE_HZ, missing_share, sorted_by_time
 
 COLUMNS = ("t_s", "thigh_rad_s", "shank_rad_s")
@@ -63,32 +62,32 @@ class LegSamples:
         return not bool(np.isnan(self.belt).all() and np.isnan(self.compass).all())
 
 
-def load_pair(paths: Sequence[Path]) -> tuple[LegSamples, ...]:
+def load_pair(paths: Sequence[Path], naming: Naming = OWN) -> tuple[LegSamples, ...]:
     """Samples of one leg or of both, from one file or two; the notes on the other leg say so. Raises EchostepError."""
     if len(paths) > 2:
         raise EchostepError(f"{len(paths)} files: a person has two legs, give one file or two")
-    if len(paths) == 1 and not open_samples(paths[0], _has_other):
-        return (load_legs(paths[0]),)
-    other = load_legs(paths[-1], OTHER if len(paths) == 1 else "")
-    return load_legs(paths[0]), replace(other, notes=tuple(f"other leg: {note}" for note in other.notes))
+    if len(paths) == 1 and not open_samples(paths[0], partial(_has_other, naming=naming)):
+        return (load_legs(paths[0], "", naming),)
+    other = load_legs(paths[-1], OTHER if len(paths) == 1 else "", naming)
+    return load_legs(paths[0], "", naming), replace(other, notes=tuple(f"other leg: {note}" for note in other.notes))
 
 
-def _has_other(file: TextIO) -> bool:
+def _has_other(file: TextIO, naming: Naming) -> bool:
     """Whether the header names columns of the other leg."""
-    return any(name.startswith(OTHER) for name in header_of(file.readline(LONGEST_LINE))[0])
+    return any(name.startswith(OTHER) for name in read_header(lines_of(file, CsvLimits()), naming).names)
 
 
-def load_legs(path: Path | str, prefix: str = "") -> LegSamples:
+def load_legs(path: Path | str, prefix: str = "", naming: Naming = OWN) -> LegSamples:
     """Samples of the leg whose columns have this prefix; raises EchostepError that names the file and what is wrong with which column."""
-    table, mended = open_samples(path, partial(_mended_table, prefix=prefix))
+    table, mended = open_samples(path, partial(_mended_table, prefix=prefix, naming=naming))
     later = np.concatenate([[True], table[1:, TIME] > np.maximum.accumulate(table[:-1, TIME])])
     t_s, thigh, shank, belt, compass = table[later].T
     return LegSamples(t_s, thigh, shank, belt, compass, (*mended, *_notes(table)))
 
 
-def _mended_table(file: TextIO, prefix: str) -> tuple[Floats, tuple[str, ...]]:
+def _mended_table(file: TextIO, prefix: str, naming: Naming) -> tuple[Floats, tuple[str, ...]]:
     """Usable rows (n, 5) in order of time, and notes on what was mended; raises ValueError for samples that cannot be used."""
-    table, mounted = _table(file, prefix)
+    table, mounted = _table(file, prefix, naming)
     whole = np.isfinite(table[:, : len(COLUMNS)]).all(axis=1)
     holes = () if whole.all() else (f"{int((~whole).sum())} rows without a number in some column: skipped",)
     table, mended = sorted_by_time(table[whole])
@@ -98,9 +97,11 @@ def _mended_table(file: TextIO, prefix: str) -> tuple[Floats, tuple[str, ...]]:
     return table, (*holes, *_empty_cells(table), *mended, *spreading, *mounted)
 
 
-def _table(file: TextIO, prefix: str) -> tuple[Floats, tuple[str, ...]]:
-    """The columns (n, 5), NaN for a column that the file lacks and for a cell without a number; notes on the axes of sensors with three."""
-    header, separator = header_of(file.readline(LONGEST_LINE))
+def _table(file: TextIO, prefix: str, naming: Naming) -> tuple[Floats, tuple[str, ...]]:
+    """The columns (n, 5) in SI units, NaN for a missing column and for a cell without a number; notes on the axes of sensors with three."""
+    lines = lines_of(file, CsvLimits())
+    head = read_header(lines, naming)
+    header = head.names
     if prefix:
         hidden = tuple(name.split("_")[0] for name in COLUMNS[1:])  # of the first leg
         header = ["" if name.startswith(hidden) else name.removeprefix(prefix) for name in header]
@@ -112,12 +113,13 @@ def _table(file: TextIO, prefix: str) -> tuple[Floats, tuple[str, ...]]:
     if missing := [name for source in sources for name in source if name not in header]:
         raise ValueError(
             f"no column {', '.join(prefix + name for name in missing)}; the first line must name {','.join(COLUMNS)}[,{','.join(OPTIONAL)}], "
-            f"or thigh_x,thigh_y,thigh_z and shank_x,shank_y,shank_z for gyros of three axes{_unit_hint(header)}"
+            f"or thigh_x,thigh_y,thigh_z and shank_x,shank_y,shank_z for gyros of three axes{ADVICE}{_unit_hint(header)}"
         )
     wanted = [name for source in sources for name in source]
     columns = [column_of(header, name) for name in (*wanted, *OPTIONAL)]
-    lines = lines_of(file, CsvLimits(), first=2)
-    values = read_rows(lines, (header, separator), columns, len(wanted), CsvLimits()).values
+    rows = read_rows(lines, (header, head.separator), columns, len(wanted), CsvLimits(), head.line + 1)
+    named = [prefix + name if prefix + name in head.names else name for name in (*wanted, *OPTIONAL)]
+    values = head.in_si(rows.values, named)
     series, notes, at = [], [], 0
     for name, source in zip(COLUMNS, sources, strict=True):
         rates = values[:, at : at + len(source)]

@@ -16,6 +16,7 @@ from echostep.foot.alignment import aligned
 from echostep.foot.picture import draw_foot
 from echostep.foot.steps import Track, walk_track
 from echostep.legs.stride import StrideSettings
+from echostep.offline.foreign_columns import OWN, Naming
 from echostep.offline.imu_csv import Imu, checked, describe_track, load_imu, write_foot_track
 from echostep.offline.leg_csv import load_pair
 from echostep.offline.leg_lengths import calibrated_scale, checked_lengths
@@ -35,10 +36,10 @@ from echostep.xsens.output_formats import OutputFormats
 SCALE_RANGE = (0.5, 2.0)  # of --scale: beyond it the lengths of the leg are wrong
 
 
-def foot(path: Path, out: Path, profile: str, picture: Path | None) -> None:
+def foot(path: Path, out: Path, profile: str, picture: Path | None, naming: Naming = OWN) -> None:
     """Track a recorded foot IMU with this project's method or that of a paper."""
     track_recording = method("foot", profile, _own_track)
-    imu = load_imu(path)
+    imu = load_imu(path, naming)
     for note in imu.notes:
         console.print(f"{path.name}: {note}")
     track = track_recording(imu, path.name)
@@ -69,14 +70,14 @@ class LegOptions:
     walked_m: float | None = None
 
 
-def legs(paths: list[Path], out: Path, options: LegOptions, picture: Path | None = None) -> None:
+def legs(paths: list[Path], out: Path, options: LegOptions, picture: Path | None = None, naming: Naming = OWN) -> None:
     """Track a recorded leg, or both of one person, with this project's method or that of a paper."""
     profile, scale = options.profile, options.scale
     track_leg = method("legs", profile, track_default)
     if scale is not None and not SCALE_RANGE[0] < scale < SCALE_RANGE[1]:
         raise EchostepError(f"--scale {scale:g}: expected about 1, as --walked prints it")
     lengths = checked_lengths(options.thigh_m, options.shank_m, scale or 1.0)
-    path, pair = paths[0], load_pair(paths)
+    path, pair = paths[0], load_pair(paths, naming)
     for note in (note for leg in pair for note in leg.notes):
         console.print(f"{path.name}: {note}")
     if lengths.measured_to_floor and profile == DEFAULT:

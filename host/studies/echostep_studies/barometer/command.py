@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from echostep.commands.options import picture_file
+from echostep.commands.options import Columns, Units, picture_file
 
 
 def floors(
@@ -32,8 +32,11 @@ def floors(
         Path | None,
         typer.Option("--picture", metavar="FILE", callback=picture_file, help="Draw the floors there (PNG, SVG, PDF)."),
     ] = None,
+    columns: Columns = None,
+    units: Units = None,
 ) -> None:
     """Floors of a recorded barometer. Writes t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
+    from echostep.offline.foreign_columns import parse_naming
     from echostep_studies.barometer import floors_command
 
-    floors_command.floors(pressure, heights, out, start, picture)
+    floors_command.floors(pressure, heights, out, start, picture, parse_naming(columns, units))

@@ -13,6 +13,7 @@ from rich.console import Console
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.offline.foreign_columns import OWN, Naming
 from echostep.picture_files import save_picture
 from echostep_studies.barometer.altitude import BarometerSettings, Pressures
 from echostep_studies.barometer.floor_filter import FloorFilter, Floors, checked_heights
@@ -23,14 +24,14 @@ console = Console(soft_wrap=True, highlight=False)
 MOST_POINTS = 5000  # about, of a curve in the picture
 
 
-def floors(path: Path, heights: str, out: Path, start: int | None, picture: Path | None) -> None:
+def floors(path: Path, heights: str, out: Path, start: int | None, picture: Path | None, naming: Naming = OWN) -> None:
     """Write the floors of a record and print the stays; raises EchostepError for options or samples that cannot be used."""
     given_m = None if heights.strip().lower() == "auto" else parse_heights(heights)
     if start is not None and given_m is None:
         raise EchostepError("--start is an index into --heights: with --heights auto there are none yet")
     if start is not None and given_m is not None and not 0 <= start < len(given_m):
         raise EchostepError(f"--start {start}: the floors of --heights are 0 to {len(given_m) - 1}")
-    record = load_pressures(path)
+    record = load_pressures(path, naming)
     for note in record.notes:
         console.print(f"{path}: {note}", markup=False)
     floors_ = _floors_of(path, record.samples, given_m, start)

@@ -18,7 +18,8 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
 from echostep.errors import EchostepError
-from echostep.offline.csv_table import MOST_BAD, CsvLimits, header_of, lines_of, open_samples, rate_complaint, read_rows
+from echostep.offline.csv_table import MOST_BAD, CsvLimits, lines_of, open_samples, rate_complaint, read_rows
+from echostep.offline.foreign_columns import ADVICE, OWN, Naming, read_header
 from echostep_studies.barometer.altitude import (
     COLDEST_C,
     FASTEST_PA_S,
@@ -62,28 +63,29 @@ class PressureRecord:
     notes: tuple[str, ...]
 
 
-def load_pressures(path: Path | str) -> PressureRecord:
+def load_pressures(path: Path | str, naming: Naming = OWN) -> PressureRecord:
     """Samples of a CSV file; raises EchostepError that names the file, the line and the field."""
-    return open_samples(path, lambda file: _checked(*_table(lines_of(file, LIMITS))))
+    return open_samples(path, lambda file: _checked(*_table(lines_of(file, LIMITS), naming)))
 
 
-def _table(lines: Iterator[str]) -> tuple[Floats, Ints]:
-    """Time, pressure and temperature (n, 3), NaN where there is no number, and the line number of each row (n,)."""
-    header, separator = header_of(next(lines, ""))
+def _table(lines: Iterator[str], naming: Naming) -> tuple[Floats, Ints, tuple[str, ...]]:
+    """Time, pressure and temperature (n, 3) in s, Pa, degC, NaN where there is no number; the line number of each row (n,); where they come from."""
+    head = read_header(lines, naming)
+    header, wanted = head.names, (*COLUMNS, TEMPERATURE)
     if missing := [name for name in COLUMNS if name not in header]:
         raise ValueError(
-            f"line 1: no column {', '.join(missing)}; the first line must name t_s,pressure_pa[,temperature_c]"
+            f"line 1: no column {', '.join(missing)}; the first line must name t_s,pressure_pa[,temperature_c]{ADVICE}"
         )
-    if twice := [name for name in (*COLUMNS, TEMPERATURE) if header.count(name) > 1]:
+    if twice := [name for name in wanted if header.count(name) > 1]:
         raise ValueError(f"line 1: column {twice[0]} is there twice")
-    columns = [header.index(name) if name in header else -1 for name in (*COLUMNS, TEMPERATURE)]
-    table = read_rows(lines, (header, separator), columns, len(COLUMNS), LIMITS)
+    columns = [header.index(name) if name in header else -1 for name in wanted]
+    table = read_rows(lines, (header, head.separator), columns, len(COLUMNS), LIMITS, head.line + 1)
     if len(table.line) < 2:
         raise ValueError("no samples: two rows at least are needed under the names of the columns")
-    return table.values, table.line
+    return head.in_si(table.values, wanted), table.line, head.notes
 
 
-def _checked(table: Floats, lines: Ints) -> PressureRecord:
+def _checked(table: Floats, lines: Ints, source: tuple[str, ...]) -> PressureRecord:
     """The usable samples of a table (n, 3) with line numbers (n,); raises ValueError when too few are usable, or when the unit is wrong."""
     table, lines, notes = _usable_rows(table, lines)
     _check_rate(table[:, TIME])
@@ -91,7 +93,7 @@ def _checked(table: Floats, lines: Ints) -> PressureRecord:
     if np.ptp(table[:, PRESSURE]) == 0.0:
         raise ValueError("pressure_pa never changes: is the sensor read?")
     temperature, more = _temperatures(table[:, AIR_TEMPERATURE], lines)
-    return PressureRecord(Pressures(table[:, TIME], table[:, PRESSURE], temperature), (*notes, *more))
+    return PressureRecord(Pressures(table[:, TIME], table[:, PRESSURE], temperature), (*source, *notes, *more))
 
 
 def _usable_rows(table: Floats, lines: Ints) -> tuple[Floats, Ints, tuple[str, ...]]:
