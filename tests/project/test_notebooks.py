@@ -70,9 +70,8 @@ def test_the_page_lists_them() -> None:
 @pytest.mark.long
 def test_a_first_track(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     names, shown = run("first_track", monkeypatch, tmp_path)
-    plan, walk = (
-        next(value for value in shown if isinstance(value, kind)) for kind in (echostep.plan.Plan, echostep.Walk)
-    )
+    (walk,) = [value for value in shown if isinstance(value, echostep.Walk)]
+    (plan,) = [value for value in shown if isinstance(value, echostep.plan.Plan)]
     for pictured in (plan, walk):
         assert "</svg>" in (pictured._repr_svg_() or "")
     assert repr(walk).startswith("<Walk 'walk.mcap (simulated)': ")

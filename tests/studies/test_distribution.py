@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import configparser
+import re
 import subprocess
 import sys
 import zipfile
@@ -17,7 +18,7 @@ from echostep.cli import app
 from echostep.commands import studies
 from echostep.errors import EchostepError
 from echostep.offline import profiles
-from echostep_studies.commands import STUDIES, StudyCommand
+from echostep_studies.commands import OURS, PAPERS, REAL, STUDIES, StudyCommand
 
 PACKAGE = ROOT / "host/studies/echostep_studies"
 
@@ -78,6 +79,16 @@ def test_each_command_has_its_help(row: StudyCommand) -> None:
     done = CliRunner().invoke(app, ["evaluate", row.name, "--help"], env={"COLUMNS": "150"})
     assert done.exit_code == 0, done.output
     assert all(f"--{option.name.replace('_', '-')}" in done.output for option in row.options)
+
+
+def test_the_help_lists_every_study_once_in_its_group_with_a_duration() -> None:
+    done = CliRunner().invoke(app, ["evaluate", "--help"], env={"COLUMNS": "100"})
+    assert [group for group in (PAPERS, OURS, REAL) if f"\n{group}:\n" not in done.output] == []
+    listed = re.findall(r"^  (\w+)  +\S", done.output.partition(f"{PAPERS}:")[2], flags=re.M)
+    assert listed == [row.name for group in (PAPERS, OURS, REAL) for row in STUDIES if row.group == group]
+    assert sorted(listed) == sorted(row.name for row in STUDIES)
+    words = " ".join(done.output.split())
+    assert all(f"{row.help} {row.duration}" in words for row in STUDIES)
 
 
 def test_without_a_command_run_nothing_heavy_is_imported() -> None:

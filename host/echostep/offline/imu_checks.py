@@ -115,12 +115,12 @@ def _unit_complaint(table: Floats) -> str:
     """Message for forces in g or without gravity, and for rates in deg/s."""
     force = _resting_force(table)
     if G_RANGE[0] <= force <= G_RANGE[1]:
-        return f"ax, ay, az look like g (at rest they are {force:.2f}): multiply them by 9.80665"
+        return f"ax, ay, az look like g (at rest they are {force:.2f}): multiply them by 9.80665, or say --units g"
     if not GRAVITY_RANGE_M_S2[0] <= force <= GRAVITY_RANGE_M_S2[1]:
         return f"ax, ay, az are {force:.3g} at rest, gravity is 9.8 m/s2: wrong unit, or gravity was removed"
     fastest = float(np.quantile(np.abs(table[:, RATE]), FASTEST_QUANTILE))
     if fastest > FASTEST_FOOT_RAD_S:
-        return f"gx, gy, gz reach {fastest:.0f}, no foot turns so fast in rad/s: in deg/s? multiply them by pi/180"
+        return f"gx, gy, gz reach {fastest:.0f}, no foot turns so fast in rad/s: in deg/s? multiply them by pi/180, or say --units deg/s"
     return ""
 
 

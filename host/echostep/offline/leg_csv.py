@@ -168,7 +168,11 @@ def _about_walking_axis(name: str, t_s: Floats, rates: Floats) -> tuple[Floats, 
 def _unit_hint(header: list[str]) -> str:
     """Advice for a header with a column in degrees; empty without one."""
     degrees = [name for name in header if "deg" in name.lower()]
-    return f"; {degrees[0]} looks like degrees: multiply by pi/180 and name it rad" if degrees else ""
+    return (
+        f"; {degrees[0]} looks like degrees: multiply by pi/180 and name it rad, or give --columns and --units"
+        if degrees
+        else ""
+    )
 
 
 def complaint(table: Floats) -> str:
@@ -209,10 +213,10 @@ def _unit_complaint(table: Floats) -> str:
         rates = table[np.isfinite(table[:, column]), column]
         if len(rates) and float(np.quantile(np.abs(rates), 0.99)) > FASTEST_LEG_RAD_S:
             fastest = float(np.abs(rates).max())
-            return f"{name} reaches {fastest:.0f}, no leg turns so fast in rad/s: in deg/s? multiply it by pi/180"
+            return f"{name} reaches {fastest:.0f}, no leg turns so fast in rad/s: in deg/s? multiply it by pi/180, or say --units deg/s"
     compass = np.abs(table[np.isfinite(table[:, COMPASS]), COMPASS])
     if len(compass) and float(compass.max()) > MOST_TURNS * 2.0 * math.pi:
-        return f"compass_rad reaches {float(compass.max()):.0f}: in degrees? multiply it by pi/180"
+        return f"compass_rad reaches {float(compass.max()):.0f}: in degrees? multiply it by pi/180, or say --units deg"
     return ""
 
 

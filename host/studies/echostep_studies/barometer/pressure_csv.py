@@ -18,6 +18,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
 from echostep.errors import EchostepError
+from echostep.offline import foreign_columns
 from echostep.offline.csv_table import MOST_BAD, CsvLimits, lines_of, open_samples, rate_complaint, read_rows
 from echostep.offline.foreign_columns import ADVICE, OWN, Naming, read_header
 from echostep_studies.barometer.altitude import (
@@ -165,8 +166,9 @@ def _check_unit(pressure: Floats, lines: Ints) -> None:
         return
     for unit, factor in UNITS:
         if USUAL_PA[0] <= middle * factor <= USUAL_PA[1]:
+            option = f", or say --units {unit}" if unit in foreign_columns.UNITS else ""
             raise ValueError(
-                f"line {lines[0]}: pressure_pa is {pressure[0]:g}: is it in {unit}? multiply it by {factor:g} to have pascals"
+                f"line {lines[0]}: pressure_pa is {pressure[0]:g}: is it in {unit}? multiply it by {factor:g} to have pascals{option}"
             )
     raise ValueError(
         f"line {lines[0]}: pressure_pa is {pressure[0]:g}, not the pressure of air: pascals are expected, about 100000"

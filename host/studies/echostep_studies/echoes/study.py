@@ -16,7 +16,7 @@ import numpy as np
 from msgspec import UNSET, UnsetType
 
 from echostep.localization.echoes.likelihood import EchoSettings, echo_model
-from echostep.output.table import Table, console
+from echostep.output.table import Table
 from echostep.simulation.world.acoustics import SRF02, directivity_db
 from echostep.walls.echo_sources import Walls
 from echostep_studies.echoes.effects import Effect, pipe_range_m, simulated_effects
@@ -72,9 +72,7 @@ def one_run(seed: int, *, fit: bool) -> list[EchoesRow]:
 
 def draw_figures(folder: Path, seed: int, _rows: list[EchoesRow]) -> None:
     """The picture of all effects."""
-    path = folder / "figures1-5.png"
-    draw_effects(path, simulated_effects(seed))
-    console.print(f"{path}")
+    draw_effects(folder / "figures1-5.png", simulated_effects(seed))
 
 
 def _tables(rows: list[EchoesRow], _request: StudyRequest) -> list[Table]:

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from echostep.errors import EchostepError
 from echostep.foot.steps import Track
-from echostep.output.table import console
 from echostep_studies.bench.recordings.feet import FootRecording
 from echostep_studies.bench.recordings.foot_metrics import align, places
+from echostep_studies.frame.pictures import save
 
 
 def draw_tracks(path: Path, recordings: list[FootRecording], tracks: list[Track]) -> None:
-    """Every track from above, on its truth where that is a path, as one PNG."""
+    """Every track from above, on its truth where that is a path, as one picture."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Sheet
+    from matplotlib.lines import Line2D
 
     from echostep.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
 
@@ -33,9 +33,7 @@ def draw_tracks(path: Path, recordings: list[FootRecording], tracks: list[Track]
             axes.plot(*recording.truth_m.T, color=TRUTH_COLOUR, linewidth=3, alpha=0.5)
             xy = align(places(track, recording.truth_t_s), recording.truth_m)
         axes.plot(*xy.T, color=TRACK_COLOUR, linewidth=1)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        sheet.savefig(path)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the picture: {error.strerror}") from error
-    console.print(f"{path}: tracks blue, truth green")
+        axes.set(xlabel="x / m", ylabel="y / m")
+    handles = [Line2D([], [], color=TRACK_COLOUR, label="track"), Line2D([], [], color=TRUTH_COLOUR, label="truth")]
+    sheet.legend(handles=handles, loc="outside lower center", ncols=2)
+    save(sheet, path)

@@ -46,7 +46,7 @@ def draw_returns(path: Path, world: BeaconGround, returns: Mapping[str, Return])
         ax.plot(*world.trail[-1], "s", color=ORANGE, ms=9, label="exit")
         result = "exit reached" if walk.arrived else f"exit not reached: ended {walk.end_m:.0f} m from it"
         ax.set_title(f"{TITLES[name]}: {result}", fontsize=10)
-        ax.set_aspect("equal")
+        ax.set(aspect="equal", xlabel="x / m", ylabel="y / m")
         ax.tick_params(labelsize=7)
     axes[0][0].legend(loc="upper left", fontsize=8)
     figure.suptitle("Simulated guided returns; red: magnetic sources (after Fischer et al. 2008)")

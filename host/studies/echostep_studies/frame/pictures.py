@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of the studies, for people: PNG files; colours that the colour-blind can tell apart [Okabe and Ito 2008].
+"""Pictures of the studies, for people: PNG, and PDF beside it; colours that the colour-blind can tell apart [Okabe and Ito 2008].
 
 In: what a study has seen. Out: files. Owns nothing. matplotlib is loaded when a picture is drawn.
 """
@@ -14,6 +14,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.output.table import console
+from echostep.picture_files import save_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,6 +57,8 @@ def _walls(ax: Axes, walls: Floats) -> None:
     ax.set_xlim(low[0] - 0.7, high[0] + 0.7)
     ax.set_ylim(low[1] - 0.7, high[1] + 0.7)
     ax.set_aspect("equal")
+    ax.set_xlabel("x / m", fontsize=7)
+    ax.set_ylabel("y / m", fontsize=7)
     ax.tick_params(labelsize=7)
 
 
@@ -62,15 +66,18 @@ def axes_of(rows: int, columns: int, inches: tuple[float, float]) -> tuple[Figur
     """A figure of rows x columns axes."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=inches, layout="constrained")
+    figure = Figure(figsize=inches, dpi=110, layout="constrained")
     axes: Any = figure.subplots(rows, columns, squeeze=False)
     return figure, axes
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a PNG; raises EchostepError when that is not possible."""
+    """Write a PNG, and a PDF beside it, and print where; raises EchostepError when that is not possible."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=110)
     except OSError as error:
         raise EchostepError(f"{path}: cannot write the picture: {error.strerror}") from error
+    beside = path.with_suffix(".pdf")
+    for written in (path, beside):
+        save_picture(figure, written, private=False)
+    console.print(f"picture: {path}, {beside.name}", markup=False, highlight=False, soft_wrap=True)

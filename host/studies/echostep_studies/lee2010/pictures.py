@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.errors import EchostepError
 from echostep.simulation.people.walker import Walk
+from echostep_studies.frame.pictures import save
 from echostep_studies.lee2010.methods import METHODS, MethodTrack, floors_of, with_plan
 from echostep_studies.lee2010.walks import (
     STOREY_M,
@@ -50,12 +50,9 @@ def draw(folder: Path, seed: int) -> None:
     chunks = chunks_of(lap, plan.levels, seed)
     round_ = measure(chunks, seed)
     tracks = _tracks(lap, round_) | {"default+plan": with_plan(plan, chunks, round_, start_of(lap), seed)}
-    try:
-        _lap(folder / "figure6.png", lap, tracks)
-        _pressure(folder / "figure7.png", down.pressure, descent)
-        _three(folder / "figure8.png", descent, _tracks(descent, down), floors)
-    except OSError as error:
-        raise EchostepError(f"{folder}: cannot write the pictures: {error.strerror}") from error
+    _lap(folder / "figure6.png", lap, tracks)
+    _pressure(folder / "figure7.png", down.pressure, descent)
+    _three(folder / "figure8.png", descent, _tracks(descent, down), floors)
 
 
 def _tracks(walked: Walk, measured: MeasuredWalk) -> dict[str, MethodTrack]:
@@ -118,4 +115,4 @@ def _three(path: Path, descent: Walk, tracks: dict[str, MethodTrack], floors: Fl
 def _finish(figure: Any, axes: Any, path: Path) -> None:
     axes.legend(fontsize=9)
     axes.grid(alpha=0.25)
-    figure.savefig(path)
+    save(figure, path)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from echostep.errors import EchostepError
+from echostep_studies.frame.pictures import save
 from echostep_studies.simulation.fischer_trails import TRAILS, Trail, measure_trail, walk_trail
 from echostep_studies.trails.walks import METHODS, RATES_HZ, JudgedTrack, judge, track
 
@@ -41,12 +41,9 @@ TITLES = {
 def draw_trails(folder: Path, seed: int) -> None:
     """One run of every trail, each in a picture of its own and all in one; raises EchostepError when a file cannot be written."""
     walks = {trail.name: _walks(trail, seed) for trail in TRAILS}
-    try:
-        for trail in TRAILS:
-            _draw(folder / f"trail-{trail.name}.png", (trail,), walks, _size_inches(trail, walks[trail.name]))
-        _draw(folder / "trails.png", TRAILS, walks, (15.0, 17.0))
-    except OSError as error:
-        raise EchostepError(f"{folder}: cannot write the pictures: {error.strerror}") from error
+    for trail in TRAILS:
+        _draw(folder / f"trail-{trail.name}.png", (trail,), walks, _size_inches(trail, walks[trail.name]))
+    _draw(folder / "trails.png", TRAILS, walks, (15.0, 17.0))
 
 
 def _walks(trail: Trail, seed: int) -> dict[str, JudgedTrack]:
@@ -79,7 +76,7 @@ def _draw(
         axes.set_aspect("equal", adjustable="box" if len(some) == 1 else "datalim")
     drawn, labels = grid.ravel()[-1].get_legend_handles_labels()
     figure.legend(drawn, labels, loc="outside lower center", ncols=len(labels), fontsize=9)
-    figure.savefig(path)
+    save(figure, path)
 
 
 def _draw_trail(axes: Any, trail: Trail, walks: dict[str, JudgedTrack]) -> None:
