@@ -23,20 +23,20 @@ PAPERS, OURS, REAL = "The papers' experiments, simulated", "Ours, simulated", "R
 
 
 class InGroups(typer.core.TyperGroup):
-    """Lists the studies in their groups, each with its whole help and its duration."""
+    """Lists the studies in their groups, each with its whole help and its number of runs."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 (called by typer)
         """Written by --help below the options."""
         for group in (PAPERS, OURS, REAL):
             with formatter.section(group):
-                formatter.write_dl([(row.name, f"{row.help} {row.duration}") for row in STUDIES if row.group == group])
+                formatter.write_dl([(row.name, row.described) for row in STUDIES if row.group == group])
 
 
 app = typer.Typer(
     cls=InGroups,
     no_args_is_help=True,
     help="The papers' experiments and ours, with figures and plots. "
-    "Durations: of one core with the options' defaults, kernels compiled; the runs are shared by all cores.",
+    "The number of runs is the default of --runs; a look takes --runs 2, and a bar shows the time that remains.",
 )
 
 Options = tuple[Parameter, ...]
@@ -79,27 +79,19 @@ def _usual(name: str, runs: int, words: str, *own: Parameter) -> Options:
 
 @dataclass(frozen=True, slots=True)
 class StudyCommand:
-    """One row: `help`, the options in the order of --help, and what imports the study and makes it of a request and the options given.
-
-    `minutes` of one core for the default runs, by the CPU time of one run (notebook page evaluate-durations); None: it depends on the data.
-    """
+    """One row: `help`, the options in the order of --help, and what imports the study and makes it of a request and the options given."""
 
     name: str
     group: str
-    minutes: float | None
     help: str
     options: Options
     study: Callable[[StudyRequest, Given], Study[Any, Any]]
 
     @property
-    def duration(self) -> str:
-        """In words."""
-        if self.minutes is None:
-            return "Duration: by the data."
-        if self.minutes < 1.0:
-            return "Less than a minute."
-        hours = self.minutes / 60.0
-        return f"About {hours:.0f} h." if hours >= 1.5 else f"About {self.minutes:.0f} min."
+    def described(self) -> str:
+        """Its help, and how many runs it makes by default."""
+        runs = [option.default for option in self.options if option.name == "runs"]
+        return f"{self.help} {runs[0]} runs." if runs else self.help
 
 
 def _of(module: str) -> Any:
@@ -110,28 +102,28 @@ def _of(module: str) -> Any:
 STUDIES = (
     StudyCommand(
         "girard2011",
-        PAPERS, None,
+        PAPERS,
         "The 52 steps of Girard et al. 2011, their systems and ours, and what they could not handle (simulated).",
         _usual("girard2011", 200, "Walks to simulate."),
         lambda _request, _given: _of("girard2011.study").STUDY,
     ),
     StudyCommand(
         "kits",
-        OURS, None,
+        OURS,
         "The 52 steps of Girard et al. 2011 with each kind of ranger and of foot (simulated; only SRF02 and MTx were ever worn).",
         _usual("kits", 100, "Walks to simulate."),
         lambda _request, _given: _of("girard2011.kits").STUDY,
     ),
     StudyCommand(
         "echoes",
-        OURS, None,
+        OURS,
         "Echoes of simulated rangers, and how well the tracker's likelihood predicts them.",
         (SEED, JSON, _out("echoes"), _option("fit", bool, False, "Fit the likelihood's settings to simulated pings (minutes).")),
         lambda _request, given: _of("echoes.study").echoes_study(fit=given["fit"]),
     ),
     StudyCommand(
         "incapacity",
-        OURS, None,
+        OURS,
         "Delay of the alarm for an incapacitated wearer, and rate of false alarms (simulated; recordings where they are).",
         (
             _runs(1000, "Wearers who cannot move."), _option("days", int, 5, "Working days of eight hours.", least=0), SEED, JSON,
@@ -141,21 +133,21 @@ STUDIES = (
     ),
     StudyCommand(
         "lee2010",
-        PAPERS, None,
+        PAPERS,
         "The lap, the floors and the 3D track of Lee and Lee 2010, by their method and by ours (simulated).",
         _usual("lee2010", 100, "People to simulate."),
         lambda _request, _given: _of("lee2010.study").STUDY,
     ),
     StudyCommand(
         "trails",
-        PAPERS, None,
+        PAPERS,
         "The trails of Fischer et al. 2008, by their dead reckoning and by ours (simulated).",
         _usual("trails", 10, "Walks of each trail, each by another person."),
         lambda _request, _given: _of("trails.study").STUDY,
     ),
     StudyCommand(
         "legs",
-        OURS, None,
+        OURS,
         "Walks of 5 m by many simulated people, and what each fault of the sensors does; with --data, real legs against the feet.",
         _usual("legs", 100, "People to simulate.", _data("Real legs instead: folder of the public recordings.")),
         lambda _request, given: (
@@ -164,28 +156,28 @@ STUDIES = (
     ),
     StudyCommand(
         "gaits",
-        OURS, None,
+        OURS,
         "Walking, hurrying, crawling, sidestepping, stairs and ladders, by the foot alone and by one leg alone (simulated).",
         _usual("gaits", 20, "Courses in each manner."),
         lambda _request, _given: _of("gaits.study").STUDY,
     ),
     StudyCommand(
         "floors",
-        OURS, None,
+        OURS,
         "Floors by pressure under weather, doors and fans, by stairs and lift (simulated).",
         _usual("floors", 50, "Runs of 20 minutes."),
         lambda _request, _given: _of("floors.study").STUDY,
     ),
     StudyCommand(
         "storeys",
-        OURS, None,
+        OURS,
         "Walks through all floors of a building by stairs and lift (simulated).",
         _usual("storeys", 10, "Walks through each building.", WESTPORT),
         lambda _request, given: _of("floors.storeys").storeys_study(given["data"]),
     ),
     StudyCommand(
         "feet",
-        REAL, None,
+        REAL,
         "The foot on real recordings, one setting for all, beside the peers' figures.",
         (
             _data("Folder of the public recordings.", Parameter.empty), JSON,
@@ -196,35 +188,35 @@ STUDIES = (
     ),
     StudyCommand(
         "fischer2008",
-        PAPERS, None,
+        PAPERS,
         "The guided returns of Fischer et al. 2008: dead reckoning, their fusion and ours, and every sweep (simulated).",
         _usual("fischer2008", 1000, "Guided returns to simulate."),
         lambda request, _given: _of("fischer2008.study").fischer2008_study(request.runs, request.seed),
     ),
     StudyCommand(
         "anywhere",
-        OURS, None,
+        OURS,
         "Wrong and unknown starts, kidnappings, wrong plans, poor echoes: found or not, and what is claimed (simulated).",
         _usual("anywhere", 200, "Walks of each row.", WESTPORT, _rows("kidnap/*")),
         lambda _request, given: _of("anywhere.study").anywhere_study(given["data"], given["rows"]),
     ),
     StudyCommand(
         "operation",
-        OURS, None,
+        OURS,
         "Three storeys in every manner of moving, a battery changed on the way, scored by ISO/IEC 18305 (simulated).",
         _usual("operation", 10, "Operations of twenty minutes."),
         lambda _request, _given: _of("operation.study").operation_study(),
     ),
     StudyCommand(
         "team",
-        OURS, None,
+        OURS,
         "Five wearers, one at a wrong start, each alone and told of its meetings by tap or radio range (simulated).",
         _usual("team", 10, "Teams of five wearers.", _rows("*/tap")),
         lambda _request, given: _of("team.study").team_study(given["rows"]),
     ),
     StudyCommand(
         "clutter",
-        REAL, None,
+        REAL,
         "Laser scans of real buildings as pings: furniture, people and doors that the plan does not have.",
         (
             _data("Folder of CARMEN logs: *.log, *.log.gz.", Parameter.empty),
@@ -234,14 +226,14 @@ STUDIES = (
     ),
     StudyCommand(
         "importers",
-        REAL, None,
+        REAL,
         "Drawings, models and maps of a folder, imported without options: time, sizes, counts, doors in gaps, enclosed rooms.",
         (_data("Folder of DXF, IFC, IMDF, OpenStreetMap, ROS or WRLD files, searched with its folders.", Parameter.empty), JSON),
         lambda _request, given: _of("importers.study").importers_study(given["data"]),
     ),
     StudyCommand(
         "noplan",
-        OURS, None,
+        OURS,
         "Buildings drawn from a walk without a plan, beside FootSLAM; a second person on the drawing (simulated).",
         _usual("noplan", 50, "Walks of each row.", WESTPORT, _rows("*/10min")),
         lambda request, given: _of("noplan.study").noplan_study(given["data"], given["rows"], request),
