@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`echostep demo`, `live`, `record` and `replay`: runs that track or record a wearer.
+"""`echostep demo`, `live`, `record`, `replay` and `page`: runs that track or record a wearer.
 
 In: the command's arguments and options. Out: files, views. Slow imports wait until a command runs.
 """
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from echostep.commands.groups import Output, Ports, Tracking, with_groups
-from echostep.commands.options import BoardCommand, Out, RecordedSeed, Seed
+from echostep.commands.options import LOCAL, BoardCommand, Host, Out, Port, RecordedSeed, Seed, page_address
 from echostep.errors import EchostepError
 from echostep.printing.lines import say
 from echostep.simulation.kits import Kit
@@ -117,6 +117,23 @@ def replay(
 
     outputs = output.options(out, stays_on_terminal=True)
     replay_run.replay(recording, tracking.options(_recorded_plan(tracking.plan), seed), truth, outputs)
+
+
+@app.command()
+def page(
+    host: Host = LOCAL,
+    port: Port = None,
+    browser: Annotated[
+        bool,
+        typer.Option("--open/--no-open", help="Open the page in a browser where there is one.", show_default=False),
+    ] = True,
+) -> None:
+    """Play recordings that are dropped onto a page."""
+    address = page_address(True, host, port)
+    from echostep.session.runs.dropped import serve_drops
+
+    assert address
+    serve_drops(address, browser=browser)
 
 
 def _plan_file(plan: Path | None, outlet: Outlet | None, folder: Path) -> Path | None:

@@ -20,6 +20,7 @@ from echostep.page.web.faults import Faults
 MOST_UNDRAWN = 2  # frames that are sent but not reported as drawn
 MOST_REQUESTS_A_SECOND = 240  # a page that sends more is disconnected
 POLICY_VIOLATION, INTERNAL_ERROR = 1008, 1011  # WebSocket close codes [RFC 6455, 7.4.1]
+SERVICE_RESTART = 1012  # [IANA]
 
 
 class GuardedSocket(ABC):
@@ -46,6 +47,11 @@ class GuardedSocket(ABC):
     def wake(self) -> None:
         """Look for something new to send."""
         self._news.set()
+
+    async def disconnect(self) -> None:
+        """End the connection; the page comes back for what is served then."""
+        with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+            await self._socket.close(SERVICE_RESTART)
 
     async def run(self) -> None:
         """Serve until the page disconnects or sends too many requests; a fault is logged and sent to the page."""

@@ -58,7 +58,7 @@ class LivePage:
         self,
         tracker: Tracker,
         title: str,
-        address: Address,
+        address: Address | PageServer,
         guided: CueList | None = None,
         *,
         replay: bool = False,
@@ -67,6 +67,7 @@ class LivePage:
     ) -> None:
         """`guided` must have been made before: then it watches the tracker first, and its cue exists when the page gets an estimate.
 
+        `address`: or a server that shows this page while it is entered, and goes on after it.
         `keeps`: keep the scenes of a live run, so that it can be played again after `end`. `shared` gets the plan of what a walk without one draws.
         """
         self._tracker = tracker
@@ -80,7 +81,8 @@ class LivePage:
         self.acknowledged_by: Callable[[int], str | None] | None = (
             None  # name of the acknowledging commander, by the alarm's number
         )
-        self.server = PageServer(self._mailbox, address)
+        self._owns_server = isinstance(address, Address)
+        self.server = PageServer(self._mailbox, address) if isinstance(address, Address) else address
         self._model = echo_model(tracker.settings.echo)
         self._rate_meter = StreamRateMeter()
         self._rates_ns = 0  # times of the last measurement of rates, of the last bytes, of those of MTx or board, of the last estimate
@@ -120,7 +122,10 @@ class LivePage:
 
     def __enter__(self) -> Self:
         self._tracker.watchers.append(self._watch)
-        self.server.__enter__()
+        if self._owns_server:
+            self.server.__enter__()
+        else:
+            self.server.show(self._mailbox)
         if not self._tracker.plan.is_drawn:
             fail = self.server.shared.faults.note_text
             self._drawing = DrawingProcess(self._mailbox.add_drawing, fail, live=not self._replay, shared=self._shared)
@@ -130,7 +135,8 @@ class LivePage:
         self._tracker.watchers.remove(self._watch)
         if self._drawing:
             self._drawing.close()
-        self.server.__exit__(kind, error, at)
+        if self._owns_server:
+            self.server.__exit__(kind, error, at)
 
     def set_marks(self, marks: tuple[ShownMark, ...]) -> None:
         """Show the commanders' marks on all pages."""

@@ -17,6 +17,7 @@ from typing import TypeVar
 from echostep.page.elements.drawn_walls import ShownDrawing
 from echostep.page.elements.marks import ShownMark
 from echostep.page.elements.scene import PageScene
+from echostep.page.over_time import OverTime
 from echostep.plan.model import Plan
 from echostep.plan.routing import RoutePlace
 from echostep.ports.people.check_in import Call, CheckIn, Undo
@@ -80,6 +81,7 @@ class Mailbox:
         self.title = title
         self.trail = PageTrail()
         self.history = SceneHistory()
+        self.over_time = OverTime(tuple(level.name for level in plan.levels))
         self.replay = replay
         self.summary: str | None = None  # how well the run went, once it is over
         self.failure = ""  # the error that ends the run, in words
@@ -131,7 +133,8 @@ class Mailbox:
         self._announce()
 
     def keep(self, scene: PageScene) -> None:
-        """Add the scene of an estimate to the history that is played after `end`, if the run keeps one."""
+        """Add the scene of an estimate to what is shown over time, and to the history that is played after `end`, if the run keeps one."""
+        self.over_time.add(scene)
         if self._keeps and not self.replay:
             self.history.add(scene)
 

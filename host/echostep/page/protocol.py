@@ -31,10 +31,12 @@ from echostep.page.elements.stream_rates import StreamRates
 from echostep.page.elements.taps import Considered
 from echostep.page.elements.true_position import TruePosition
 from echostep.page.elements.undo_offer import UndoOffer
+from echostep.page.over_time import COLUMNS, Event, OverTime
 from echostep.page.replay_cursor import PlayState
 from echostep.plan.model import Plan
 from echostep.plan.pictures.symbols import level_lines, way_names
 from echostep.plan.places.bearing import KNOWN_HEADING_RAD, north_rad
+from echostep.plan.places.globe import Globe, globe_of
 from echostep.plan.routing import RoutePlace
 
 FRAME_S = 1.0 / 30.0  # shortest time between two frames
@@ -64,21 +66,23 @@ class LevelLabels:
 
 @dataclass(frozen=True, slots=True)
 class PlanLabels:
-    """A plan without its lines. `north_rad`: direction of north on it, counter-clockwise from the map's x axis."""
+    """A plan without its lines. `north_rad`: direction of north on it, counter-clockwise from the map's x axis. `globe`: where it is on the Earth."""
 
     name: str
     digest: str
     north_rad: float
     levels: tuple[LevelLabels, ...]
+    globe: Globe | None
 
 
 @dataclass(frozen=True, slots=True)
 class Hello:
-    """The first message to a page. `replay`: the run is a replay."""
+    """The first message to a page. `replay`: the run is a replay. `takes_files`: the page plays recordings that are dropped onto it."""
 
     title: str
     replay: bool
     plan: PlanLabels
+    takes_files: bool = False
     kind: Literal["hello"] = "hello"
 
 
@@ -217,10 +221,11 @@ def encode(message: Message) -> str:
     return _ENCODER.encode(message).decode()
 
 
-def hello(plan: Plan, title: str, *, replay: bool) -> Hello:
+def hello(plan: Plan, title: str, *, replay: bool, takes_files: bool = False) -> Hello:
     """The first message of a run on this plan."""
     levels = tuple(_labels(plan, k) for k in range(len(plan.levels)))
-    return Hello(title, replay, PlanLabels(plan.name, plan.digest, north_rad(plan), levels))
+    shown = PlanLabels(plan.name, plan.digest, north_rad(plan), levels, globe_of(plan))
+    return Hello(title, replay, shown, takes_files)
 
 
 def _labels(plan: Plan, k: int) -> LevelLabels:
@@ -235,6 +240,23 @@ def lines(plan: Plan, level: int) -> bytes:
     by_kind = level_lines(plan, level)
     rows = np.concatenate(list(by_kind.values())).astype("<f4").tobytes()
     return packed({kind: len(lines) for kind, lines in by_kind.items()}, rows)
+
+
+@dataclass(frozen=True, slots=True)
+class OverTimePart:
+    """The header of an answer about a run over time: `rows` of float32 from row `begin` on (`page/over_time.py`), and all events."""
+
+    begin: int
+    rows: int
+    columns: int
+    events: tuple[Event, ...]
+
+
+def over_time(run: OverTime, begin: int) -> bytes:
+    """What a run was like from row number `begin` on: a header and rows of float32."""
+    end = len(run)
+    begin = min(begin, end)
+    return packed(OverTimePart(begin, end - begin, COLUMNS, run.events), run.part(begin, end))
 
 
 @dataclass(frozen=True, slots=True)

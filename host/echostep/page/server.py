@@ -12,7 +12,7 @@ import secrets
 import socket
 import threading
 from collections.abc import AsyncIterator, Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Generic, Protocol, Self, TypeVar
@@ -39,6 +39,7 @@ from echostep.page.web.connections import Connections
 from echostep.page.web.faults import Faults
 from echostep.page.web.gated_server import GatedServer
 from echostep.page.web.log_budget import logged_to
+from echostep.page.web.uploads import Uploads
 from echostep.plan.model import Plan
 
 STATIC = Path(__file__).parent / "static"
@@ -63,6 +64,9 @@ class SocketSession(Protocol):
 
     def wake(self) -> None:
         """Look for something new to send."""
+
+    async def disconnect(self) -> None:
+        """End the connection; the page comes back for what is served then."""
 
     async def run(self) -> None:
         """Serve until the page disconnects."""
@@ -157,6 +161,7 @@ class SocketServer(Generic[S]):
             Route("/", self._index),
             Route("/lines/{level:int}", self._lines),
             WebSocketRoute("/socket", self._socket),
+            *self._own_routes(),
             *(Mount(f"/{name}", StaticFiles(directory=folder)) for name, folder in self._site.folders.items()),
         ]
         return Starlette(
@@ -164,6 +169,10 @@ class SocketServer(Generic[S]):
             lifespan=self._lifespan,
             exception_handlers={Exception: self._fail},
         )
+
+    def _own_routes(self) -> list[Route]:
+        """What this site serves beside."""
+        return []
 
     async def _fail(self, _: Request, error: Exception) -> Response:
         """Log a fault and answer with it."""
@@ -200,19 +209,50 @@ class SocketServer(Generic[S]):
 
 
 class PageServer(SocketServer[PageSession]):
-    """Serves the scenes of a mailbox until it is closed; raises EchostepError when it cannot listen at the address."""
+    """Serves the scenes of a mailbox until it is closed; raises EchostepError when it cannot listen at the address.
 
-    def __init__(self, mailbox: Mailbox, address: Address = Address()) -> None:
-        self.shared = shared = Shared.of(mailbox.plan)
-        self._mailbox = mailbox
+    `uploads` takes files that are dropped onto the page; None: it takes none.
+    """
+
+    def __init__(self, mailbox: Mailbox, address: Address = Address(), uploads: Uploads | None = None) -> None:
+        self.shared = shared = Shared.of(mailbox.plan, takes_files=uploads is not None)
+        self._mailbox, self._uploads = mailbox, uploads
+        self._disconnecting: set[asyncio.Task[None]] = set()
 
         def session(socket: WebSocket) -> PageSession:
-            return PageSession(socket, mailbox, shared)
+            return PageSession(socket, self._mailbox, self.shared)
 
         folders = {"static": STATIC}
         index = STATIC / "index.html"
         site = PageSite("echostep page", mailbox.plan, index, folders, session, shared.faults, shared.counts)
         super().__init__(site, address)
+
+    def _own_routes(self) -> list[Route]:
+        uploads = self._uploads
+        posts = {"/file": uploads.take, "/without-plan": uploads.play_without_plan} if uploads else {}
+        return [
+            Route("/over-time/{begin:int}", self._over_time),
+            *(Route(path, take, methods=["POST"]) for path, take in posts.items()),
+        ]
+
+    async def _over_time(self, request: Request) -> Response:
+        """What the run was like, from row number `begin` on."""
+        answer = protocol.over_time(self._mailbox.over_time, request.path_params["begin"])
+        return Response(answer, media_type="application/octet-stream")
+
+    def show(self, mailbox: Mailbox) -> None:
+        """Serve another mailbox from now on: pages that are open come back for it. May be called from any thread."""
+        self._mailbox.on_publish, mailbox.on_publish = None, self.request_wake
+        self._mailbox, self.shared = mailbox, self.shared.on(mailbox.plan)
+        self._site = replace(self._site, plan=mailbox.plan)
+        if (loop := self._loop) is not None:
+            loop.call_soon_threadsafe(self._disconnect)
+
+    def _disconnect(self) -> None:
+        for session in self.sessions:
+            task = asyncio.create_task(session.disconnect())
+            self._disconnecting.add(task)
+            task.add_done_callback(self._disconnecting.discard)
 
     def __enter__(self) -> Self:
         self._mailbox.on_publish = self.request_wake

@@ -57,7 +57,9 @@ class PageSession(GuardedSocket):
         self._frame_due = True  # the page needs a frame, even of the same scene
 
     async def _greet(self) -> None:
-        hello = protocol.hello(self._mailbox.plan, self._mailbox.title, replay=self._cursor is not None)
+        mailbox, shared = self._mailbox, self._shared
+        replay = self._cursor is not None
+        hello = protocol.hello(mailbox.plan, mailbox.title, replay=replay, takes_files=shared.takes_files)
         await self.tell(protocol.encode(hello))
 
     async def _begin_replay(self) -> None:

@@ -6,7 +6,7 @@ In: a plan. Out: `Shared`. Owns the counts over all pages.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from echostep.page.elements.guidance import RouteFinder
 from echostep.page.elements.taps import Taps
@@ -25,14 +25,19 @@ class PageCounts:
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """One search for routes, one judge of check-ins, one list of faults, and the counts."""
+    """One search for routes, one judge of check-ins, one list of faults, and the counts. `takes_files`: files may be dropped onto the pages."""
 
     route_finder: RouteFinder
     taps: Taps
     faults: Faults = field(default_factory=Faults)
     counts: PageCounts = field(default_factory=PageCounts)
+    takes_files: bool = False
 
     @classmethod
-    def of(cls, plan: Plan) -> Shared:
+    def of(cls, plan: Plan, *, takes_files: bool = False) -> Shared:
         """For the pages of a run on this plan."""
-        return cls(RouteFinder(plan), Taps(plan))
+        return cls(RouteFinder(plan), Taps(plan), takes_files=takes_files)
+
+    def on(self, plan: Plan) -> Shared:
+        """For the same pages, which show a run on another plan from now on."""
+        return replace(self, route_finder=RouteFinder(plan), taps=Taps(plan))

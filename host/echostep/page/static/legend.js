@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The legend: what each sign on the map means; a dialog that a button or the key L opens, on the wearer's and the commander's page.
+// The legend: what each sign on the map means, and the keys; a dialog that a button or the keys L and ? open, on the wearer's and the commander's page.
 
 const line = (d, colour = 'wall', width = 1.5, more = '') => `<path d="${d}" fill="none" stroke="var(--${colour})" stroke-width="${width}" ${more}/>`;
 const shape = (d, colour, fill = colour) => `<path d="${d}" fill="${fill === 'none' ? 'none' : `var(--${fill})`}" stroke="var(--${colour})" stroke-width="2"/>`;
@@ -43,6 +43,9 @@ export const LIVE = [
   ]],
   ['Marks', MARKS],
 ];
+const MOVES = { 'arrow keys': 'move the map', '+ −': 'zoom', '[ ]': 'rotate', N: 'north up', W: 'the whole floor', 'L ?': 'this', Escape: 'cancel, close' };
+export const LIVE_KEYS = { ...MOVES, F: 'follow', H: 'I am here: a cross', G: 'go to: a cross', D: 'measure a distance', Enter: 'take the cross', ', .': 'turn the heading', C: 'charts', T: 'more' };
+export const COMMAND_KEYS = { ...MOVES, M: 'mark the middle' };
 export const COMMAND = [
   ['The building', BUILDING],
   ['Wearers', [
@@ -54,16 +57,20 @@ export const COMMAND = [
   ['Marks', MARKS],
 ];
 
-// A dialog with these groups of [picture, words]; returns what opens it.
-export function startLegend(button, groups) {
+// A dialog with these groups of [picture, words] and the keys; returns what opens it, at the keys or at its beginning.
+export function startLegend(button, groups, keys) {
   const dialog = document.createElement('dialog');
   dialog.id = 'legend';
   dialog.setAttribute('aria-label', 'Legend');
   const rows = (entries) => entries.map(([picture, words]) => `<li><svg viewBox="-16 -12 32 24" aria-hidden="true">${picture}</svg><span>${words}</span></li>`).join('');
-  dialog.innerHTML = `<form method="dialog"><h2>Legend</h2><button aria-label="Close">✕</button></form><div tabindex="0" role="group" aria-label="Signs">${groups.map(([title, entries]) => `<h3>${title}</h3><ul>${rows(entries)}</ul>`).join('')}</div>`;
+  const names = Object.entries(keys).map(([key, words]) => `<li><kbd>${key}</kbd><span>${words}</span></li>`).join('');
+  dialog.innerHTML = `<form method="dialog"><h2>Legend</h2><button aria-label="Close">✕</button></form><div tabindex="0" role="group" aria-label="Signs">${groups.map(([title, entries]) => `<h3>${title}</h3><ul>${rows(entries)}</ul>`).join('')}<h3 id="keys-title">Keys on the map</h3><ul>${names}</ul></div>`;
   dialog.onclick = ({ target }) => { if (target === dialog) dialog.close(); };  // beside it
   document.body.append(dialog);
-  const open = () => dialog.showModal();
-  button.onclick = open;
+  const open = (atKeys) => {
+    dialog.showModal();
+    document.getElementById(atKeys ? 'keys-title' : 'legend').scrollIntoView();
+  };
+  button.onclick = () => open(false);
   return open;
 }

@@ -2,7 +2,7 @@
 // The live page: connects the link to the server, the map, the panel and the user's actions. *Level*: index into the plan's levels; *floor*: its name on the page.
 
 import { Gestures } from './gestures.js';
-import { LIVE, startLegend } from './legend.js';
+import { LIVE, LIVE_KEYS, startLegend } from './legend.js';
 import { stayAwake } from './live/awake.js';
 import { Link } from './link.js';
 import { Painter } from './live/paint.js';
@@ -11,6 +11,15 @@ import { PlanView } from './plan.js';
 import { Replay } from './live/replay.js';
 import { Speech } from './live/speech.js';
 import { Taps } from './live/taps.js';
+import { Charts } from './tools/charts.js';
+import { Drops } from './tools/drop.js';
+import { Globe } from './tools/globe.js';
+import { readLink } from './tools/hash.js';
+import { Layers } from './tools/layers.js';
+import { Measure } from './tools/measure.js';
+import { titled } from './tools/titles.js';
+import { Tools } from './tools/tools.js';
+import { inUnits } from './tools/units.js';
 import { startTheme } from './theme.js';
 import { View } from './view.js';
 
@@ -18,26 +27,31 @@ const $ = (id) => document.getElementById(id);
 
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas'));
 const panel = new Panel((level) => { setFollows(false); showLevel(level); });
-const scene = { frame: null, cloud: null, drawing: null, marks: [], trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0 };
-let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, metNumber = 0, invited = false, connected = false, broken = false, awake = false;
+const scene = { frame: null, cloud: null, drawing: null, marks: [], trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0, layers: new Layers(), measure: new Measure() };
+let plan = null, title = '', mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, metNumber = 0, invited = false, connected = false, broken = false, awake = false, globe = null, linked = readLink(location.hash);
 
 const taps = new Taps(view, {
   send: (kind, fields) => link.send(kind, fields), changed: () => { scene.tapped = taps.ghost; dirty = true; }, mayCheckIn: () => !$('here').hidden,
+  globe: () => globe,
   keptHeading: () => (scene.frame?.told?.heading_known ? scene.frame.told.heading_rad : null),
 });
 const link = new Link({
   onHello: hello, onFrame: frame, onRefused: (reason) => hint(reason, 6000), onFailed: failed, onConsidered: (answer) => taps.considered(answer), onState: connection,
 });
 const speech = new Speech($('speech'), $('sentence'), $('invitation'), $('unspoken'));
-const showLegend = startLegend($('legend-button'), LIVE);
+const showLegend = startLegend($('legend-button'), LIVE, LIVE_KEYS);
 const replay = new Replay((kind, fields) => link.send(kind, fields));
+const drops = new Drops(hint), charts = new Charts($('charts'), () => painter.colour, seek);
+const tools = new Tools({ view, scene, planView, layers: scene.layers, charts, hint, enter, seek, changed: redraw, plan: () => plan, globe: () => globe, takesFiles: () => drops.takes });
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
 const drawn = (window.echostep = { frames: 0, view, scene, link, last: null });  // read by tests
 
 async function hello(message) {
-  if (plan && plan.digest !== message.plan.digest) startAnew();
+  if (plan && (plan.digest !== message.plan.digest || title !== message.title)) startAnew();
+  title = message.title;
   plan = message.plan;
+  globe = plan.globe ? new Globe(plan.globe) : null;
   view.north = plan.north_rad;
   scene.trail.count = 0;
   scene.drawing = null;
@@ -49,13 +63,34 @@ async function hello(message) {
     view.resize($('map').clientWidth, $('map').clientHeight);
     fitted = false;
   }
-  $('here').hidden = $('sheet-here').hidden = $('help').hidden = message.replay;
-  if (message.replay) panel.team([]);
+  const isLive = !message.replay && !message.takes_files;
+  $('here').hidden = $('sheet-here').hidden = $('help').hidden = !isLive;
+  drops.show(message.takes_files, !message.replay);
+  if (!isLive) panel.team([]);
   else if (!awake) stayAwake();
-  awake ||= !message.replay;
-  speech.invite(!message.replay);
+  awake ||= isLive;
+  speech.invite(isLive);
   taps.reconnected();
-  await showLevel(Math.min(scene.level, plan.levels.length - 1));
+  charts.clear();
+  await showLevel(Math.min(linked ? linked.level : scene.level, plan.levels.length - 1));
+  if (linked) goToLink();
+}
+
+// The view of the link by which the page was opened; its moment comes when the replay has got so far.
+function goToLink() {
+  setFollows(false);
+  const { x, y, scale, turn } = linked;
+  Object.assign(view, { x, y, scale, turn });
+  fitted = true;
+  view.changed();
+  if (linked.t_s === null) linked = null;
+}
+
+function seek(t_s) { link.send('seek', { t_s }); }
+
+function redraw() {
+  dirty = true;
+  view.changed();
 }
 
 // Another run on another plan answers at this address: what was chosen on the old plan means nothing on it.
@@ -63,6 +98,7 @@ function startAnew() {
   Object.assign(scene, { frame: null, cloud: null, level: 0 });
   fitted = false;
   taps.drop();
+  scene.measure.clear();
   replay.forget();
 }
 
@@ -137,7 +173,8 @@ function draw() {
     panel.scale(view);
     drawnStamp = view.stamp;
   }
-  if (mode && !$('cross').hidden) aim(view.toMap(view.width / 2, view.height / 2), mode === 'here' ? turned : null);
+  if (mode && mode !== 'measure' && !$('cross').hidden) aim(view.toMap(view.width / 2, view.height / 2), mode === 'here' ? turned : null);
+  $('rooms').toggleAttribute('hidden', !scene.layers.shows('names'));
   planView.names(view, estimate?.placed && estimate.level === scene.level ? view.toScreen(estimate.x_m, estimate.y_m) : null);
   painter.paint(view, scene);
   if (dirty && scene.frame && plan) {
@@ -146,6 +183,8 @@ function draw() {
     taps.undoable(scene.frame.undo);
     panel.floors(scene.level, estimate);
     replay.frame(scene.frame.play);
+    charts.frame(scene.frame.play);
+    if (linked && scene.frame.play?.end_s >= linked.t_s) { link.send('play', { playing: false }); seek(linked.t_s); linked = null; }
     if (!estimate && !invited && scene.frame.words.startsWith('tap')) { invited = true; enter('here'); }
   }
   dirty = false;
@@ -156,7 +195,7 @@ function draw() {
   }
 }
 
-// Modes: null, 'here' (a tap gives the wearer's position, a drag the heading too), 'go' (a tap gives the destination).
+// Modes: null, 'here' (a tap gives the wearer's position, a drag the heading too), 'go' (a tap gives the destination), 'measure' (two taps).
 function enter(next, byKey = false) {
   mode = next;
   taps.drop();
@@ -164,14 +203,15 @@ function enter(next, byKey = false) {
   $('map').classList.toggle('takes', mode !== null);
   $('cross').hidden = !(mode && byKey);
   $('goal').value = mode === 'go' ? 'map' : scene.frame?.goal ? panel.optionOf(scene.frame.goal) : '';
-  hint(mode === 'here' ? 'Stand still. Tap where you are, drag in the direction you face.' : mode === 'go' ? 'Tap where you want to go.' : '');
+  hint(mode === 'here' ? 'Stand still. Tap where you are, drag in the direction you face.' : mode === 'go' ? 'Tap where you want to go.' : mode === 'measure' ? 'Tap two places.' : '');
+  if (mode === 'measure') scene.measure.clear();
   view.changed();
 }
 
 let hintEnds = 0;
 function hint(text, for_ms = 0) {
   clearTimeout(hintEnds);
-  $('hint').textContent = text;
+  $('hint').textContent = inUnits(text);
   $('hint').hidden = !text;
   if (for_ms) hintEnds = setTimeout(() => hint(''), for_ms);
 }
@@ -186,17 +226,26 @@ function posed(position, heading_rad) {
   $('sheet-here').focus({ preventScroll: true });
 }
 
-function tapped(position) { taps.put(position, null, scene.level, true); }
+function tapped(position) {
+  if (mode === 'measure') return measured(position);
+  taps.put(position, null, scene.level, true);
+}
+
+function measured(position) {
+  scene.measure.add(position, scene.level);
+  hint(scene.measure.text ? `Distance: ${scene.measure.text}. Escape ends measuring.` : 'Tap the second place.');
+  dirty = true;
+}
 
 function go([x_m, y_m], level) { link.send('go_to', { x_m, y_m, level }); }
 
 function key(name) {
   const middle = view.toMap(view.width / 2, view.height / 2);
   const actions = {
-    l: showLegend, n: () => view.northUp(), w: fitWhole, f: toggleFollow,
+    l: () => showLegend(false), '?': () => showLegend(true), t: () => tools.open(), c: () => tools.setCharts(!charts.on), d: () => enter('measure', true), n: () => view.northUp(), w: fitWhole, f: toggleFollow,
     h: () => !$('here').hidden && enter('here', true), g: () => enter('go', true),
-    Escape: () => enter(null),
-    Enter: () => mode && posed(middle, mode === 'here' ? turned : null),
+    Escape: () => { scene.measure.clear(); enter(null); },
+    Enter: () => (mode === 'measure' ? measured(middle) : mode && posed(middle, mode === 'here' ? turned : null)),
     ',': () => { turned += Math.PI / 12; dirty = true; }, '.': () => { turned -= Math.PI / 12; dirty = true; },
   };
   actions[name]?.();
@@ -225,7 +274,7 @@ function toggleFollow() {
   if (follows && estimate && !view.shows(planView.box)) view.centre(estimate.x_m, estimate.y_m);
 }
 
-new Gestures($('map'), view, { takesPose: () => mode !== null, tapped, posing: aim, posed, key, moved: () => { setFollows(false); taps.moved(); } });
+new Gestures($('map'), view, { takesPose: () => mode === 'here' || mode === 'go', tapped, posing: aim, posed, key, moved: () => { setFollows(false); taps.moved(); } });
 $('here').onclick = (e) => enter(mode === 'here' ? null : 'here', e.detail === 0);
 $('follow').onclick = () => toggleFollow();
 $('closer').onclick = () => view.zoom(1.4);
@@ -255,7 +304,8 @@ $('sheet-go').onclick = () => {
 };
 window.addEventListener('error', ({ message }) => panel.fault(`This page has a fault: ${message}. Reload it.`));
 window.addEventListener('unhandledrejection', ({ reason }) => panel.fault(`This page has a fault: ${reason?.message ?? reason}. Reload it.`));
-startTheme($('theme'), () => { painter.recolour(); dirty = true; view.changed(); });
+startTheme($('theme'), () => { painter.recolour(); charts.paint(); redraw(); });
 view.resize($('map').clientWidth, $('map').clientHeight);
 new ResizeObserver(([{ contentRect }]) => view.resize(contentRect.width, contentRect.height)).observe($('map'));
 requestAnimationFrame(draw);
+titled({ 'legend-button': 'L, ?', north: 'N', whole: 'W', follow: 'F', here: 'H', goal: 'G', 'tools-button': 'T', 'tool-measure': 'D', 'tool-charts': 'C', closer: '+', farther: '−' });

@@ -9,12 +9,12 @@ const KEPT_PX = 22;  // distance of names from the wearer
 
 export class PlanView {
   constructor(wallsGroup, roomsGroup) {
-    Object.assign(this, { wallsGroup, roomsGroup, tiles: [], rooms: [], kept: null, box: [0, 0, 10, 10], isEmpty: true });
+    Object.assign(this, { wallsGroup, roomsGroup, tiles: [], rooms: [], lines: {}, kept: null, box: [0, 0, 10, 10], isEmpty: true });
   }
 
   // `bytes`: of the server's lines/N; stairs and lifts keep their names where a room's would cover one.
   show(bytes, { rooms, ways }) {
-    const lines = linesOf(bytes);
+    const lines = this.lines = linesOf(bytes);
     this.tiles = Object.entries(lines).flatMap(([kind, rows]) => tilesOf(rows, kind));
     this.box = boxOf(lines, [...rooms, ...ways]);
     this.isEmpty = this.box === NOTHING_DRAWN;

@@ -19,10 +19,12 @@ export class Painter {
   recolour() {
     const style = getComputedStyle(document.documentElement);
     this.colour = Object.fromEntries(
-      ['cloud', 'trail', 'here', 'halo', 'left', 'right', 'expected', 'goal', 'beacon', 'bad', 'ink', 'good', 'wall'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+      ['cloud', 'trail', 'here', 'halo', 'left', 'right', 'expected', 'goal', 'beacon', 'bad', 'ink', 'good', 'wall', 'faint', 'line'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
   }
 
+  // `scene.layers` says what is drawn.
   paint(view, scene) {
+    const shows = (layer) => scene.layers.shows(layer);
     const sharp = window.devicePixelRatio || 1, { canvas, pen } = this;
     const width = Math.round(view.width * sharp), height = Math.round(view.height * sharp);
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
@@ -30,17 +32,17 @@ export class Painter {
     pen.clearRect(0, 0, view.width, view.height);
     pen.lineJoin = pen.lineCap = 'round';
     if (scene.drawing) paintDrawing(pen, view, scene.drawing, this.colour);
-    if (scene.cloud) this.particles(view, scene.cloud, scene.level);
-    this.trail(view, scene.trail, scene.level, scene.drawing?.trail_count ?? 0);
-    paintMarks(pen, view, scene.marks, scene.level, this.colour);
+    if (scene.cloud && shows('cloud')) this.particles(view, scene.cloud, scene.level);
+    if (shows('trail')) this.trail(view, scene.trail, scene.level, scene.drawing?.trail_count ?? 0);
+    if (shows('marks')) paintMarks(pen, view, scene.marks, scene.level, this.colour);
     const { told: estimate } = scene.frame ?? {};
     const { guidance, goal } = scene.frame ?? {}, path = guidance && estimate?.placed && estimate.level === scene.level ? guidance.path : [];
     if (path.length > 1) this.line(path.map(([x, y]) => view.toScreen(x, y)), this.colour.goal, 3, [8, 7]);
     if (goal?.level === scene.level) this.flag(view, [goal.x_m, goal.y_m]);
     else if (path.length && !guidance.own) this.flag(view, path.at(-1));
-    this.beacons(view, (scene.frame?.beacons ?? []).filter((beacon) => beacon.level === scene.level));
+    if (shows('beacons')) this.beacons(view, (scene.frame?.beacons ?? []).filter((beacon) => beacon.level === scene.level));
     if (estimate?.placed && estimate.level === scene.level) {  // without a place nothing is drawn that looks like one
-      for (const line of scene.frame.beams) this.echoLine(view, line);
+      if (shows('echoes')) for (const line of scene.frame.beams) this.echoLine(view, line);
       this.protection(view, estimate);
       this.ellipse(view, estimate);
       this.wearer(view, estimate);
@@ -49,6 +51,7 @@ export class Painter {
     const truth = scene.frame?.truth;
     if (truth && truth.level === scene.level) this.truth(view, truth);
     if (scene.tapped) this.pose(view, scene.tapped);
+    scene.measure.paint(pen, view, scene.level, this.colour);
   }
 
   // The true position of a simulation: a diamond with its name.

@@ -3,6 +3,7 @@
 
 import { drawnText } from './drawing.js';
 import { marksText } from '../marks.js';
+import { inUnits, scaleBar } from '../tools/units.js';
 
 const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕', ended: '■' };
 const SPOKEN_MS = 8000;  // shortest time between two positions for a screen reader
@@ -11,7 +12,7 @@ const MOST_BUTTONS = 3;  // floors as buttons on a phone; more of them are a lis
 const LEAST_RAD = 0.01;  // the arrow ignores smaller changes
 const LONG = 26, VERY_LONG = 60;  // letters of a status that is written smaller
 const $ = (id) => document.getElementById(id);
-const put = (id, text) => { if ($(id).textContent !== text) $(id).textContent = text; };  // unchanged text causes no new layout
+const put = (id, metric) => { const text = inUnits(metric); if ($(id).textContent !== text) $(id).textContent = text; };  // unchanged text causes no new layout
 
 export class Panel {
   constructor(onFloor) {
@@ -147,9 +148,9 @@ export class Panel {
   }
 
   scale(view) {
-    const longest = 90 / view.scale, unit = 10 ** Math.floor(Math.log10(longest)), length = [5, 2, 1].find((k) => k * unit <= longest) * unit;
-    $('bar').style.width = `${length * view.scale}px`;
-    $('bar-text').textContent = length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;
+    const { px, text } = scaleBar(view);
+    $('bar').style.width = `${px}px`;
+    $('bar-text').textContent = text;
     $('needle').style.transform = `rotate(${-view.tilt}rad)`;
   }
 
@@ -158,7 +159,7 @@ export class Panel {
     const now = performance.now(), { spoken } = this;
     if (text === spoken.text || (status === spoken.status && now - spoken.at < SPOKEN_MS)) return;
     this.spoken = { at: now, status, text };
-    $('live').textContent = text;
+    $('live').textContent = inUnits(text);
   }
 }
 

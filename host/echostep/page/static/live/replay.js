@@ -38,7 +38,8 @@ export class Replay {
     $('clock').textContent = text;
     bar.setAttribute('aria-valuetext', text);
     $('play').textContent = playing ? '❚❚' : '▶';
-    $('play').setAttribute('aria-label', playing ? 'Pause' : 'Play');
+    $('play').title = playing ? 'Pause' : 'Play';
+    $('play').setAttribute('aria-label', $('play').title);
   }
 }
 

@@ -3,6 +3,7 @@
 // What a browser has not begun to speak is written on the page with the reason. A screen reader gets each sentence of the guidance in any case.
 
 import { Bell } from '../bell.js';
+import { inUnits } from '../tools/units.js';
 
 const BEGINS_MS = 2500;  // after which a sentence that has not begun is reported as not spoken; assumed
 const CUT_OFF = ['canceled', 'interrupted'];  // errors of a sentence that a newer one replaced [Web Speech API]
@@ -35,7 +36,7 @@ export class Speech {
     const now = guidance?.spoken ? { text: guidance.spoken, at_s: guidance.spoken_s, own: guidance.own } : null, { last } = this;
     if (now?.text === last?.text && now?.at_s === last?.at_s && now?.own === last?.own) return;
     this.last = now;
-    this.region.textContent = now?.text ?? '';
+    this.region.textContent = inUnits(now?.text ?? '');
     if (this.on) this.say(now?.text);
   }
 
@@ -64,7 +65,7 @@ export class Speech {
     if (!window.speechSynthesis) return text && this.fail('this browser cannot speak');
     window.speechSynthesis.cancel();
     if (!text) return;
-    const sentence = this.sentence = new SpeechSynthesisUtterance(text);  // kept in a field: browsers drop a sentence without a reference
+    const sentence = this.sentence = new SpeechSynthesisUtterance(inUnits(text));  // kept in a field: browsers drop a sentence without a reference
     sentence.lang = 'en';
     sentence.onstart = () => { clearTimeout(this.late); this.fail(''); };
     sentence.onerror = ({ error }) => { if (!CUT_OFF.includes(error)) this.fail(error === 'not-allowed' ? 'the browser forbids it before the first tap' : `the browser says ${error}`); };

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
 // A position that is being entered: its ghost on the map, what it would do in words, its confirmation; and the undoing of the last one.
 
+import { inUnits } from '../tools/units.js';
+
 const $ = (id) => document.getElementById(id);
 const FINGER_PX = 20;  // standard deviation of a tap on the screen
 const LEAST_SD_M = 0.3;  // of a check-in
 
 export class Taps {
-  // `desk`: send(kind, fields), changed(), keptHeading() -> radians or null, mayCheckIn() -> whether the run takes positions
+  // `desk`: send(kind, fields), changed(), globe() -> of the plan or null, keptHeading() -> radians or null, mayCheckIn() -> whether the run takes positions
   constructor(view, desk) {
     Object.assign(this, { view, desk, ghost: null, asked: 0 });
     $('sheet-here').onclick = () => this.confirm();
@@ -30,13 +32,20 @@ export class Taps {
     $('sheet-go').hidden = !goes;
     $('sheet-here').hidden = !this.desk.mayCheckIn();
     $('sheet-here').disabled = true;
-    $('sheet-text').textContent = '';
+    this.said = '';
+    this.say();
     if (this.desk.mayCheckIn()) {
       this.asked++;
       this.desk.send('consider', this.fields);
     }
     this.showSheet();
     this.desk.changed();
+  }
+
+  // What it would do, and where on the Earth it is.
+  say() {
+    const { x_m, y_m } = this.ghost;
+    $('sheet-text').textContent = inUnits([this.said, this.desk.globe()?.words(x_m, y_m)].filter(Boolean).join(' '));
   }
 
   get sd() { return Math.max(LEAST_SD_M, FINGER_PX / this.view.scale); }
@@ -49,7 +58,8 @@ export class Taps {
     this.asked = Math.max(this.asked - 1, 0);
     if (this.asked || this.ghost?.level !== level) return;  // an answer to an older question
     Object.assign(this.ghost, { x_m, y_m });
-    $('sheet-text').textContent = text;
+    this.said = text;
+    this.say();
     $('sheet-here').disabled = !possible;
     this.showSheet();
     this.desk.changed();

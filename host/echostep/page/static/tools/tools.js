@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+// The dialog "More": layers, charts, measuring, link, picture, GeoJSON, units, full screen; what happened on the walk, and what the page has said.
+
+import { geojson, picture, save } from './export.js';
+import { linkOf } from './hash.js';
+import { Heard } from './heard.js';
+import { LAYERS } from './layers.js';
+import { chooseUnit, chosenUnit } from './units.js';
+
+const $ = (id) => document.getElementById(id);
+const BUTTONS = { measure: 'Measure', charts: 'Charts', link: 'Copy a link', picture: 'Picture (PNG)', geojson: 'GeoJSON', full: 'Full screen', files: 'Open files…' };
+const HTML = `<form method="dialog"><h2>More</h2><button aria-label="Close">✕</button></form>
+<div tabindex="0" role="group" aria-label="Tools">
+  <p class="row">${Object.entries(BUTTONS).map(([name, text]) => `<button id="tool-${name}" type="button">${text}</button>`).join('')}
+    <label for="unit" class="unseen">Lengths in</label><select id="unit"><option value="m">metres</option><option value="ft">feet</option></select></p>
+  <h3 id="layers-title">Layers</h3>
+  <ul role="group" aria-labelledby="layers-title">${Object.entries(LAYERS).map(([name, text]) => `<li><label><input type="checkbox" id="layer-${name}"> ${text}</label></li>`).join('')}</ul>
+  <h3>What happened</h3><ol id="events"></ol>
+  <h3>What this page said</h3><ol id="heard"></ol>
+</div>`;
+
+export class Tools {
+  // `page`: view, scene, planView, layers, charts, plan(), globe(), hint(text, ms), enter(mode), changed(), seek(t_s)
+  constructor(page) {
+    this.page = page;
+    const dialog = this.dialog = document.createElement('dialog');
+    dialog.id = 'tools';
+    dialog.setAttribute('aria-label', 'More');
+    dialog.innerHTML = HTML;
+    dialog.onclick = ({ target }) => { if (target === dialog) dialog.close(); };  // beside it
+    document.body.append(dialog);
+    new Heard($('messages'), $('heard'));
+    this.wire();
+    this.wireLayers();
+    this.setCharts(stored() === 'on');
+    page.charts.onEvents = (events) => this.events(events);
+  }
+
+  wire() {
+    const { page, dialog } = this, does = { measure: () => page.enter('measure'), charts: () => this.setCharts(!page.charts.on), link: () => this.link(), picture: () => this.picture(), geojson: () => this.geojson(), full: () => this.full(), files: () => $('drop-file').click() };
+    for (const [name, act] of Object.entries(does)) $(`tool-${name}`).onclick = () => { dialog.close(); act(); };
+    $('tools-button').onclick = () => this.open();
+    $('tool-full').hidden = !document.documentElement.requestFullscreen;
+    $('unit').value = chosenUnit();
+    $('unit').onchange = () => { chooseUnit($('unit').value); page.changed(); };
+  }
+
+  wireLayers() {
+    const { layers, changed } = this.page;
+    for (const name of Object.keys(LAYERS)) {
+      $(`layer-${name}`).checked = layers.shows(name);
+      $(`layer-${name}`).onchange = ({ target }) => { layers.set(name, target.checked); changed(); };
+    }
+  }
+
+  open() {
+    $('tool-files').hidden = !this.page.takesFiles();
+    this.dialog.showModal();
+  }
+
+  setCharts(on) {
+    const { charts } = this.page;
+    charts.on = on;
+    $('charts').hidden = !on;
+    $('tool-charts').setAttribute('aria-pressed', String(on));
+    try { localStorage.setItem('charts', on ? 'on' : 'off'); } catch { /* private browsing */ }
+    charts.paint();
+  }
+
+  link() {
+    const { view, scene, hint } = this.page, link = linkOf(view, scene.level, scene.frame?.play?.t_s ?? null);
+    history.replaceState(null, '', link);
+    const byHand = () => hint('The link is in the address bar.', 8000);
+    if (!navigator.clipboard) return byHand();  // browsers give it to this computer and to https only
+    navigator.clipboard.writeText(link).then(() => hint('The link to this view is copied.', 6000), byHand);
+  }
+
+  async picture() {
+    const { view } = this.page;
+    save(await picture(view, $('walls'), $('canvas'), $('rooms')), 'echostep.png');
+  }
+
+  geojson() {
+    const { scene, planView, plan, globe, hint } = this.page, { rooms } = plan().levels[scene.level];
+    const made = geojson({ lines: planView.lines, level: scene.level, rooms, trail: scene.trail, estimate: scene.frame?.told, globe: globe() });
+    save(new Blob([JSON.stringify(made)], { type: 'application/geo+json' }), 'echostep.geojson');
+    if (made.coordinates) hint('This plan has no georeference: the file is in metres of the plan.', 8000);
+  }
+
+  full() {
+    const done = document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen();
+    done.catch(() => this.page.hint('The browser does not allow full screen here.', 6000));
+  }
+
+  // What happened, as a list and as ticks on the time bar; in a replay each leads to its moment.
+  events(events) {
+    const { play } = this.page.scene.frame ?? {}, begin = play?.begin_s ?? events[0]?.t_s ?? 0, whole = play ? Math.max(play.end_s - begin, 1e-3) : 1;
+    $('events').replaceChildren(...events.map(({ t_s, text }) => {
+      const item = document.createElement('li'), at = `${Math.floor((t_s - begin) / 60)}:${String(Math.floor((t_s - begin) % 60)).padStart(2, '0')} ${text}`;
+      if (!play) item.textContent = at;
+      else {
+        const button = document.createElement('button');
+        Object.assign(button, { type: 'button', textContent: at, onclick: () => { this.dialog.close(); this.page.seek(t_s); } });
+        item.append(button);
+      }
+      return item;
+    }));
+    $('ticks').replaceChildren(...(play ? events : []).map(({ t_s, text }) => {
+      const tick = document.createElement('span');
+      tick.title = text;
+      tick.style.left = `${100 * (t_s - begin) / whole}%`;
+      return tick;
+    }));
+  }
+}
+
+function stored() {
+  try { return localStorage.getItem('charts'); } catch { return null; }
+}
