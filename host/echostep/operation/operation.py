@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from msgspec import structs
 
 from echostep.operation import requests
+from echostep.operation.crews import CrewLog
 from echostep.operation.distress import ShownDistress, errand_to, shown_distress
 from echostep.operation.trails import Trails
 from echostep.operation.words import (
@@ -35,6 +36,7 @@ from echostep.page.elements.marks import ShownMark
 from echostep.plan.model import Plan
 from echostep.team.commander import rejected, take_messages
 from echostep.team.inbox import Inbox, ReceivedMessage
+from echostep.team.messages.crews import Crew
 from echostep.team.messages.marks import Mark, MarkBoard, ack_message, errand_message, is_shared
 from echostep.team.messages.report import BadReportError
 from echostep.team.roster import Member, MemberState, Roster
@@ -62,6 +64,7 @@ class TableScene:
     connected: bool
     fault: str
     marks: tuple[ShownMark, ...] = ()
+    crews: tuple[Crew, ...] = ()
 
 
 @dataclass(slots=True)
@@ -79,8 +82,10 @@ class Operation:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.roster = Roster()
+        self.crew_log = CrewLog()
         self._board = MarkBoard()
         self._shown_marks: tuple[ShownMark, ...] = ()
+        self._crews: tuple[Crew, ...] = ()
         self._trails = Trails()
         self._followed: dict[Key, _Followed] = {}
         self._next_number = 1
@@ -123,11 +128,14 @@ class Operation:
 
     def _receive_shared(self, topic: str, payload: bytes) -> bool:
         self.roster.received += 1
+        crews, identity = self._board.crews.known, topic.rpartition("/")[2]
+        before = crews.get(identity)
         try:
             self._board.receive(topic, payload)
         except BadReportError as error:
             self.roster.count_rejected(str(error))
             return False
+        self.crew_log.note(before, crews.get(identity))
         self._changed = True
         return True
 
@@ -144,15 +152,29 @@ class Operation:
                     m = self._member(number, now_s)
                     if m is not None and (key := alarm_key(m)) is not None:
                         return ack_message(key, by, unix_s)
-                case requests.Send(number, to, by):
-                    rescuer, m = self._member(number, now_s), self._member(to, now_s)
-                    known = self._board.errands.get(rescuer.key) if rescuer else None
-                    newer_s = known.unix_s + NEWER_S if known else 0.0  # however this clock was set back
-                    errand = errand_to(m, self.plan, now_s, by, max(unix_s, newer_s)) if m else None
-                    if rescuer is not None and errand is not None:
-                        return errand_message(rescuer.key, errand)
-                    return "Not sent: the place of the one in distress is not known on this plan."
+                case requests.Send():
+                    return self._send(request, unix_s, now_s)
+                case requests.SetCrew() | requests.CrewDoes():
+                    return self._change_crew(request, unix_s)
         return "There is no such alarm, mark or floor any more."
+
+    def _send(self, request: requests.Send, unix_s: float, now_s: float) -> tuple[str, bytes] | str:
+        rescuer, m = self._member(request.id, now_s), self._member(request.to, now_s)
+        known = self._board.errands.get(rescuer.key) if rescuer else None
+        newer_s = known.unix_s + NEWER_S if known else 0.0  # however this clock was set back
+        errand = errand_to(m, self.plan, now_s, request.by, max(unix_s, newer_s)) if m else None
+        if rescuer is not None and errand is not None:
+            return errand_message(rescuer.key, errand)
+        return "Not sent: the place of the one in distress is not known on this plan."
+
+    def _change_crew(self, request: requests.SetCrew | requests.CrewDoes, unix_s: float) -> tuple[str, bytes] | str:
+        if isinstance(request, requests.SetCrew):
+            name, members, air_min, by = request.name, request.members, request.air_min, request.by
+            return Crew(1, secrets.token_hex(4), name, members, air_min, by, unix_s).message
+        if (crew := self._board.crews.known.get(request.id)) is None:
+            return "There is no such crew any more."
+        after = crew.after(request.does, request.by, unix_s)
+        return after.message if after else "The crew has done that already."
 
     @property
     def shared(self) -> tuple[tuple[str, bytes], ...]:
@@ -179,7 +201,7 @@ class Operation:
     def scene(self, now_s: float, unix_s: float, *, connected: bool = True, fault: str = "") -> TableScene:
         """The scene at a time of the commander's clock.
 
-        Rows of its `places`: wearer, x, y, level, heading (NaN: not known), 95 % radius, protection radius (NaN: none).
+        Rows of its `places`: wearer, x, y, level, heading, 95 % radius, protection radius (NaN: not known, none).
         """
         with self._lock:
             members = self.roster.members(now_s)
@@ -187,7 +209,9 @@ class Operation:
                 self._list(members, now_s)
             places, refused = self._places(members, now_s), rejected(self.roster)
             words = summary_words(members, now_s)
-            return TableScene(now_s, unix_s, places, self._rows, words, refused, connected, fault, self._marks())
+            return TableScene(
+                now_s, unix_s, places, self._rows, words, refused, connected, fault, self._marks(), self._shown_crews()
+            )
 
     def trail(self, begin: int, now_s: float) -> tuple[bytes, int]:
         """Rows of the trails from point number `begin` on, and the number of the next point."""
@@ -251,13 +275,21 @@ class Operation:
             self._shown_marks = shown
         return self._shown_marks
 
+    def _shown_crews(self) -> tuple[Crew, ...]:
+        """All crews; the same object while they are the same."""
+        if (crews := tuple(self._board.crews.known.values())) != self._crews:
+            self._crews = crews
+        return self._crews
+
     def _places(self, members: list[Member], now_s: float) -> bytes:
         rows = array("f")
         for m in members:
             p, level, followed = m.position(now_s), level_on(self.plan, m), self._followed.get(m.key)
             if p is None or level is None or followed is None:
                 continue
-            heading = math.nan if p.heading_rad is None else p.heading_rad
-            protection = math.nan if p.protection_m is None else p.protection_m
-            rows.extend((followed.number, p.x_m, p.y_m, level, heading, p.radius95_m, protection))
+            claimed = m.report.position is not None  # of a place that was last known nothing is claimed but the place
+            heading = p.heading_rad if claimed and p.heading_rad is not None else math.nan
+            protection = p.protection_m if claimed and p.protection_m is not None else math.nan
+            radius = p.radius95_m if claimed else math.nan
+            rows.extend((followed.number, p.x_m, p.y_m, level, heading, radius, protection))
         return rows.tobytes()

@@ -14,6 +14,7 @@ from msgspec import Meta
 from echostep.page.requests import MOST_REQUEST, FrameDrawn, SetPlaying, SetSpeed
 from echostep.plan.plan_file import Metres
 from echostep.ports.people.payloads import Level, decoded
+from echostep.team.messages.crews import AirMinutes, Does, Members
 from echostep.team.messages.marks import Identity, MarkKind, Person
 from echostep.team.messages.report import is_printable
 
@@ -57,6 +58,23 @@ class Send(msgspec.Struct, frozen=True, tag_field="kind", tag="send"):
     by: Person
 
 
+class SetCrew(msgspec.Struct, frozen=True, tag_field="kind", tag="crew"):
+    """Make a crew."""
+
+    name: Person
+    members: Members
+    air_min: AirMinutes
+    by: Person
+
+
+class CrewDoes(msgspec.Struct, frozen=True, tag_field="kind", tag="crew_does"):
+    """A crew has entered, answered a check or left."""
+
+    id: Identity
+    does: Does
+    by: Person
+
+
 class Seek(msgspec.Struct, frozen=True, tag_field="kind", tag="seek"):
     """Show the moment so many seconds after the beginning of the operation."""
 
@@ -68,7 +86,7 @@ class Now(msgspec.Struct, frozen=True, tag_field="kind", tag="now"):
 
 
 TimeRequest = Seek | SetPlaying | SetSpeed | Now
-Action = SetMark | Unmark | Acknowledge | Send
+Action = SetMark | Unmark | Acknowledge | Send | SetCrew | CrewDoes
 TableRequest = FrameDrawn | Choose | TimeRequest | Action
 _REQUESTS = msgspec.json.Decoder(TableRequest)
 
@@ -76,5 +94,7 @@ _REQUESTS = msgspec.json.Decoder(TableRequest)
 def parse_request(text: str | None) -> TableRequest | None:
     """The request in a text from a page; None when it is not a valid one."""
     request = None if text is None else decoded(text, _REQUESTS, MOST_REQUEST)
-    by = getattr(request, "by", "x")
-    return request if is_printable(by) and by.strip() else None
+    texts = [getattr(request, "by", "x")]
+    if isinstance(request, SetCrew):
+        texts += [request.name, *request.members]
+    return request if all(is_printable(text) and text.strip() for text in texts) else None

@@ -140,7 +140,10 @@ class TableSession(GuardedSocket):
         details = operation.details(chosen, scene.t_s) if chosen is not None else None
         distress = operation.distress(chosen, scene.t_s) if chosen is not None else None
         marks = self._last is None or scene.marks is not self._last.marks
+        crews = self._last is None or scene.crews is not self._last.crews
         latest = self._feed.latest or scene
         shown = self._view.shown(scene.t_s, sum(row.open_alarm for row in latest.rows)) if self._view else None
         self._last, self._due = scene, False
-        return wire.frame(scene, wire.TableParts(self._seq, trail, begin, lists, marks, details, distress, shown))
+        return wire.frame(
+            scene, wire.TableParts(self._seq, trail, begin, lists, marks, crews, details, distress, shown)
+        )

@@ -23,6 +23,7 @@ from echostep.operation.words import ShownDetails, ShownWearer
 from echostep.page.elements.marks import ShownMark
 from echostep.page.protocol import PlanLabels, Refused, hello, packed
 from echostep.plan.model import Plan
+from echostep.team.messages.crews import Crew
 
 PLACE_BYTES, TRAIL_BYTES = 7 * 4, 5 * 4
 
@@ -40,7 +41,7 @@ class TableHello:
 
 @dataclass(frozen=True, slots=True)
 class TableHeader:
-    """One moment. `seq`: the page returns it when the frame is drawn. `list`, `marks`: None when the page has them already.
+    """One moment. `seq`: the page returns it when the frame is drawn. `list`, `marks`, `crews`: None when the page has them already.
 
     `trail_from` 0: trails begin anew. `details`, `distress`: of the chosen wearer. `time`: of the time bar.
     """
@@ -58,6 +59,7 @@ class TableHeader:
     details: ShownDetails | None
     distress: ShownDistress | None
     marks: tuple[ShownMark, ...] | None
+    crews: tuple[Crew, ...] | None
     time: ShownTime | None
     kind: Literal["table"] = "table"
 
@@ -76,7 +78,7 @@ def table_hello(plan: Plan, title: str) -> TableHello:
 class TableParts:
     """What a frame has beside its scene, for one page. `trail`: rows, the first of which has the number `trail_from`.
 
-    `lists`, `marks`: these are new.
+    `lists`, `marks`, `crews`: these are new.
     """
 
     seq: int
@@ -84,6 +86,7 @@ class TableParts:
     trail_from: int
     lists: bool
     marks: bool
+    crews: bool
     details: ShownDetails | None
     distress: ShownDistress | None
     time: ShownTime | None
@@ -105,6 +108,7 @@ def frame(scene: TableScene, parts: TableParts) -> bytes:
         details=parts.details,
         distress=parts.distress,
         marks=scene.marks if parts.marks else None,
+        crews=scene.crews if parts.crews else None,
         time=parts.time,
     )
     return packed(header, scene.places + parts.trail)

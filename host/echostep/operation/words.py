@@ -111,6 +111,8 @@ def shown_wearer(
         remarks.insert(0, f"acknowledged by {ack.by}")
     if errand := board.errands.get(m.key):
         remarks.insert(0, f"sent to {errand.to} by {errand.by}")
+    if crew := board.crews.of_member(m.report.name):
+        remarks.insert(0, f"crew {crew.name}{' inside' * crew.is_inside}")
     is_open = key is not None and ack is None
     return ShownWearer(
         number, m.report.team, m.report.name, state.value, words, level_on(plan, m), tuple(remarks), is_open

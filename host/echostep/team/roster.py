@@ -24,7 +24,7 @@ from echostep.team.messages.report import (
     decode,
     decode_presence,
 )
-from echostep.team.outbox import aged
+from echostep.team.outbox import aged, without_place
 
 MAX_MEMBERS = 256
 MAX_REASONS = 64
@@ -177,6 +177,8 @@ class Roster:
     def _receive_report(self, team: str, name: str, r: Report, retained: bool, now_s: float, unix_s: float) -> None:
         if (r.team, r.name) != (team, name):
             raise BadReportError("name and topic contradict each other")
+        if r.status == "lost" and r.position is not None:  # of another sender: a place that it knew last, no claim
+            r = without_place(r, r.position)
         key = (team, name, r.run)
         ahead_s = r.sent_s - unix_s
         if retained and ahead_s < -MAX_RETAINED_S:

@@ -2,12 +2,14 @@
 // The commander's page: connects the link to the server, the map and the list.
 
 import { Gestures } from '../static/gestures.js';
-import { COMMAND, startLegend } from '../static/legend.js';
+import { COMMAND, COMMAND_KEYS, startLegend } from '../static/legend.js';
 import { Link } from '../static/link.js';
 import { PlanView } from '../static/plan.js';
 import { startTheme } from '../static/theme.js';
 import { View } from '../static/view.js';
+import { titled } from '../static/tools/titles.js';
 import { Alarm } from './alarm.js';
+import { Crews } from './crews.js';
 import { Floors } from './floors.js';
 import { List } from './list.js';
 import { Painter } from './paint.js';
@@ -28,7 +30,7 @@ let plan = null, wantedLevel = 0, fitted = false, isAsked = false, drawnStamp = 
 
 const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onState: connection, parse: parseFrame });
 const sheet = new Sheet((kind, fields) => link.send(kind, fields), hint);
-const showLegend = startLegend($('legend-button'), COMMAND);
+const showLegend = startLegend($('legend-button'), COMMAND, COMMAND_KEYS), crews = new Crews((act) => sheet.signed(act), (kind, fields) => link.send(kind, fields));
 const timeBar = new TimeBar((kind, fields) => link.send(kind, fields));
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
@@ -84,6 +86,7 @@ function frame(received) {
   }
   if (received.list) alarm.update(received.list, scene.places, received.time, timeBar.isPast);
   if (received.marks) scene.marks = received.marks;
+  crews.show(received.crews, received.unix_s, timeBar.isPast);
   list.details(received.details, received.distress);
   status(received);
   scene.frame = received;
@@ -186,7 +189,7 @@ function hint(text) {
 
 function key(name) {
   const middle = [view.width / 2, view.height / 2];
-  const does = { m: () => { place(view.toMap(...middle), middle); $('mark-cleared').focus(); }, l: showLegend, n: () => view.northUp(), w: () => view.fit(planView.box), Escape: () => { sheet.close(); list.choose(null); } }[name.length === 1 ? name.toLowerCase() : name];
+  const does = { m: () => { place(view.toMap(...middle), middle); $('mark-cleared').focus(); }, l: () => showLegend(false), '?': () => showLegend(true), p: () => $('crews-button').click(), n: () => view.northUp(), w: () => view.fit(planView.box), Escape: () => { sheet.close(); list.choose(null); } }[name.length === 1 ? name.toLowerCase() : name];
   does?.();
   return Boolean(does);
 }
@@ -203,3 +206,4 @@ view.onChanged = ask;
 startTheme($('theme'), () => { painter.recolour(); view.changed(); });
 view.resize($('map').clientWidth, $('map').clientHeight);
 new ResizeObserver(([{ contentRect }]) => view.resize(contentRect.width, contentRect.height)).observe($('map'));
+titled({ 'legend-button': 'L, ?', north: 'N', whole: 'W', 'crews-button': 'P' });

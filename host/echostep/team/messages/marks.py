@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Shared state of the commanders: marks on the plan, acknowledgements of alarms, errands. The broker retains it, so it is the same for all.
+"""Shared state of the commanders: marks on the plan, acknowledgements of alarms, errands, crews. The broker retains it, so it is the same for all.
 
 In: retained messages from untrusted senders, on `echostep-table/mark/<id>`, `echostep-table/ack/<team>/<wearer>/<run>-<number>` and
 `echostep-table/errand/<team>/<wearer>/<run>`; an empty one removes. Out: `Mark`s, `Ack`s and `Errand`s, and the messages for new ones. Owns those
@@ -20,6 +20,7 @@ import msgspec
 from msgspec import Meta
 
 from echostep.ports.people.payloads import Level
+from echostep.team.messages.crews import Crews
 from echostep.team.messages.report import BadReportError, Metres, check_name, decode_as, is_printable
 
 ROOT = "echostep-table"
@@ -115,7 +116,7 @@ def is_shared(topic: str | None) -> bool:
 
 
 class MarkBoard:
-    """`receive` takes messages; `marks`, `acks` and `errands` are what they amount to; `removed`: marks that were there.
+    """`receive` takes messages; `marks`, `acks`, `errands` and `crews` are what they amount to; `removed`: marks that were there.
 
     `answers`: messages for the broker, which keeps older ones.
     """
@@ -125,13 +126,14 @@ class MarkBoard:
         self.removed: dict[str, Mark] = {}
         self.acks: dict[AlarmKey, Ack] = {}
         self.errands: dict[RunKey, Errand] = {}
+        self.crews = Crews()
         self.answers: deque[tuple[str, bytes]] = deque(maxlen=MOST_ANSWERS)
 
     def copy(self) -> MarkBoard:
         """A board of the same state that changes by itself."""
         made = MarkBoard()
         made.marks, made.removed, made.acks = dict(self.marks), dict(self.removed), dict(self.acks)
-        made.errands = dict(self.errands)
+        made.errands, made.crews = dict(self.errands), self.crews.copy()
         return made
 
     @property
@@ -143,6 +145,8 @@ class MarkBoard:
             yield ack_message(key, ack.by, ack.unix_s)
         for key, errand in self.errands.items():
             yield errand_message(key, errand)
+        for crew in self.crews.known.values():
+            yield crew.message
 
     def receive(self, topic: str, payload: bytes) -> None:
         """Take one message; raises BadReportError with the reason of its rejection."""
@@ -154,6 +158,8 @@ class MarkBoard:
                 self._receive_ack((team, name, alarm), payload)
             case ["errand", team, name, run]:
                 self._receive_errand((team, name, run), payload)
+            case ["crew", identity]:
+                self.crews.receive(identity, payload, self.answers)
             case _:
                 raise BadReportError("unknown topic")
 
