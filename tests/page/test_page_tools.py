@@ -18,7 +18,7 @@ from echostep.page.elements.scene import PageScene
 from echostep.page.elements.stream_rates import StreamRates
 from echostep.page.mailbox import Mailbox
 from echostep.page.server import PageServer
-from echostep.plan.model import Georeference
+from echostep.plan.model import Georeference, Plan
 from page.browser import LOCAL, READY, loaded_page, overflow, picture, spot, wait_for
 from page.frames import PLAN, scene, told
 from page.web.test_page_sizes import SIZES, UNREACHED
@@ -27,6 +27,7 @@ from waiting import until
 DESK = {"viewport": {"width": 1280, "height": 800}}
 HINT = "document.querySelector('#hint').textContent"
 RATES = StreamRates(100.0, 30.0, 0, 0, 0, True, 0, "")
+LOOSE = replace(PLAN, georeference=None, digest="9" * 64)
 PLACED = replace(PLAN, georeference=Georeference(44.4, 33.3, 0.3), digest="8" * 64)
 DONE = "echostep.scene.frame.play?.end_s === 120"
 
@@ -46,7 +47,7 @@ def moment(t_s: float) -> PageScene:
     )
 
 
-def walked(plan: Any = PLAN) -> Mailbox:
+def walked(plan: Plan = LOOSE) -> Mailbox:
     """A replay of two minutes."""
     mailbox = Mailbox(plan, "A walk", replay=True)
     for t_s in np.arange(0.0, 121.0):
@@ -191,7 +192,7 @@ def test_the_view_is_saved_as_a_picture_and_as_geojson(browser: Any, url: str, t
             page.evaluate("document.querySelector('#canvas').width"),
             page.evaluate("document.querySelector('#canvas').height"),
         )
-        colours = {made.convert("RGB").getpixel((x, y)) for x in range(made.width) for y in range(0, made.height, 3)}
+        colours = {colour for _, colour in made.convert("RGB").getcolors(made.width * made.height)}
         assert {(0x34, 0x3A, 0x40), (0xF4, 0xF5, 0xF7)} <= colours  # walls on the ground
     made_of = json.loads(saved(page, "#tool-geojson", tmp_path).read_text())
     assert made_of["coordinates"].startswith("metres of the plan")
@@ -214,11 +215,11 @@ def test_a_georeferenced_plan_gives_longitude_latitude_and_mgrs(browser: Any, tm
         said = page.inner_text("#sheet-text")
         place = GroundPlane(PLACED).place(4.0, 7.5, 0.0, None)
         lat, lon = (float(part.strip(" °")) for part in said.split("·")[0].split(","))
-        assert (lat, lon) == (pytest.approx(place.lat, abs=2e-6), pytest.approx(place.lon, abs=2e-6))
+        assert (lat, lon) == (pytest.approx(place.lat_deg, abs=2e-6), pytest.approx(place.lon_deg, abs=2e-6))
         features = json.loads(saved(page, "#tool-geojson", tmp_path).read_text())
         assert "coordinates" not in features
         (position,) = (f for f in features["features"] if f["properties"]["kind"] == "position")
-        assert position["geometry"]["coordinates"] == pytest.approx([place.lon, place.lat], abs=2e-4)
+        assert position["geometry"]["coordinates"] == pytest.approx([place.lon_deg, place.lat_deg], abs=2e-4)
         for zone, band, easting, northing, wanted in MGRS:
             found = page.evaluate(
                 "async (a) => (await import(new URL('static/tools/globe.js', document.baseURI))).mgrs(...a)",

@@ -72,7 +72,9 @@ def test_a_newcomer_looks_around(browser: Any, name: str, tmp_path: Path) -> Non
                 page.click("#sheet-close")
                 other_floor(page, spot.plan)
                 page.click("#whole")
+                page.click("#tools-button")
                 page.select_option("#theme", "dark")
+                page.keyboard.press("Escape")
             look("1-dark")
             visit.walk(0.5)
             for page in pages:

@@ -28,7 +28,7 @@ const $ = (id) => document.getElementById(id);
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas'));
 const panel = new Panel((level) => { setFollows(false); showLevel(level); });
 const scene = { frame: null, cloud: null, drawing: null, marks: [], trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0, layers: new Layers(), measure: new Measure() };
-let plan = null, title = '', mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, metNumber = 0, invited = false, connected = false, broken = false, awake = false, globe = null, linked = readLink(location.hash);
+let plan = null, title = '', mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, metNumber = 0, invited = false, connected = false, broken = false, awake = false, globe = null, linked = readLink(location.hash), moment = linked?.t_s ?? null;
 
 const taps = new Taps(view, {
   send: (kind, fields) => link.send(kind, fields), changed: () => { scene.tapped = taps.ghost; dirty = true; }, mayCheckIn: () => !$('here').hidden,
@@ -83,7 +83,7 @@ function goToLink() {
   Object.assign(view, { x, y, scale, turn });
   fitted = true;
   view.changed();
-  if (linked.t_s === null) linked = null;
+  linked = null;
 }
 
 function seek(t_s) { link.send('seek', { t_s }); }
@@ -184,7 +184,7 @@ function draw() {
     panel.floors(scene.level, estimate);
     replay.frame(scene.frame.play);
     charts.frame(scene.frame.play);
-    if (linked && scene.frame.play?.end_s >= linked.t_s) { link.send('play', { playing: false }); seek(linked.t_s); linked = null; }
+    if (moment !== null && scene.frame.play?.end_s >= moment) { link.send('play', { playing: false }); seek(moment); moment = null; }
     if (!estimate && !invited && scene.frame.words.startsWith('tap')) { invited = true; enter('here'); }
   }
   dirty = false;

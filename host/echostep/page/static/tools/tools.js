@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The dialog "More": layers, charts, measuring, link, picture, GeoJSON, units, full screen; what happened on the walk, and what the page has said.
+// The dialog "More": colours, layers, charts, measuring, link, picture, GeoJSON, units, full screen; what happened on the walk, and what the page has said.
 
 import { geojson, picture, save } from './export.js';
 import { linkOf } from './hash.js';
@@ -12,9 +12,10 @@ const BUTTONS = { measure: 'Measure', charts: 'Charts', link: 'Copy a link', pic
 const HTML = `<form method="dialog"><h2>More</h2><button aria-label="Close">✕</button></form>
 <div tabindex="0" role="group" aria-label="Tools">
   <p class="row">${Object.entries(BUTTONS).map(([name, text]) => `<button id="tool-${name}" type="button">${text}</button>`).join('')}
-    <label for="unit" class="unseen">Lengths in</label><select id="unit"><option value="m">metres</option><option value="ft">feet</option></select></p>
+    <label for="unit" class="unseen">Lengths in</label><select id="unit"><option value="m">metres</option><option value="ft">feet</option></select>
+    <label for="theme" class="unseen">Colours</label><select id="theme"><option value="auto">auto</option><option value="bright">bright</option><option value="dark">dark</option><option value="contrast">high contrast</option></select></p>
   <h3 id="layers-title">Layers</h3>
-  <ul role="group" aria-labelledby="layers-title">${Object.entries(LAYERS).map(([name, text]) => `<li><label><input type="checkbox" id="layer-${name}"> ${text}</label></li>`).join('')}</ul>
+  <ul aria-labelledby="layers-title">${Object.entries(LAYERS).map(([name, text]) => `<li><label><input type="checkbox" id="layer-${name}"> ${text}</label></li>`).join('')}</ul>
   <h3>What happened</h3><ol id="events"></ol>
   <h3>What this page said</h3><ol id="heard"></ol>
 </div>`;
@@ -61,7 +62,7 @@ export class Tools {
   setCharts(on) {
     const { charts } = this.page;
     charts.on = on;
-    $('charts').hidden = !on;
+    $('over-time').hidden = !on;
     $('tool-charts').setAttribute('aria-pressed', String(on));
     try { localStorage.setItem('charts', on ? 'on' : 'off'); } catch { /* private browsing */ }
     charts.paint();
