@@ -191,6 +191,7 @@ def test_a_recording_becomes_a_plan_that_tracks(tmp_path: Path) -> None:
     done = echostep("map", recorder.path, "-o", "plan.json", "--picture", "plan.png", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "returns to known places" in done.stdout
+    assert "picture: plan.png\n" in done.stdout
     assert (tmp_path / "plan.png").stat().st_size > 10_000
     checked = echostep("plan", "check", "plan.json", cwd=tmp_path)
     assert checked.returncode == 0, checked.stdout

@@ -95,7 +95,8 @@ def test_the_page_in_a_browser(browser: Any, folder: Path, tmp_path: Path, width
     from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
 
     html = tmp_path / "score.html"
-    assert echostep("score", folder / "ours.csv", "--truth", folder / "truth.csv", "--html", html).returncode == 0
+    done = echostep("score", folder / "ours.csv", "--truth", folder / "truth.csv", "--html", html)
+    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, f"page: {html}")
     page = browser.new_page(viewport={"width": width, "height": 900})
     try:
         page.goto(html.as_uri())

@@ -278,6 +278,8 @@ def test_an_address_with_everything() -> None:
 def test_the_picture_of_a_team(tmp_path_factory: pytest.TempPathFactory) -> None:
     folder = tmp_path_factory.mktemp("team")
     roster = heard(said(), said("$x_1$", status="lost"), said("w", status="waiting", position=None))
-    for name in ("team.png", "team.svg"):
+    for name in ("team.png", "team.svg", "team.pdf"):
         draw_team(folder / name, load_plan(PLAN), roster.members(NOW), NOW)
         assert (folder / name).stat().st_size > 10_000
+    for label in ("tracking, 95 % ellipse", "x / m"):
+        assert f"<!-- {label} -->" in (folder / "team.svg").read_text()
