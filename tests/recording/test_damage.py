@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
+from command_line import echostep
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import Chunk
 from echostep.recording.damage.placing import Placement
@@ -26,7 +27,7 @@ from echostep.recording.repair.edit import cut, repair
 from echostep.session.losses import skipped
 from echostep.tracker import Tracker
 from reliability.flip_recording import arrival_offsets
-from walks import DEMO
+from walks import DEMO, walk_chunks
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(1200)]
 CHUNKS_A_SECOND = 50
@@ -76,6 +77,23 @@ def test_a_flipped_bit_of_what_we_write_costs_less_than_a_second(tmp_path: Path,
         path.write_bytes(flipped(whole, rng.randrange(8, len(whole)), rng.randrange(8)))
         found = read(path)[1]
         assert sum(chunk in set(found) for chunk in CHUNKS) > len(CHUNKS) - CHUNKS_A_SECOND
+
+
+def test_a_flipped_bit_of_what_export_writes_costs_less_than_a_second(tmp_path: Path) -> None:
+    """Of the ports; a derived message costs itself, and is made again."""
+    walk, chunks = tmp_path / "walk.mcap", walk_chunks(8.0)
+    with Recorder(walk, {"seed": "3"}) as recorder:
+        for chunk in chunks:
+            recorder.write(chunk)
+    done = echostep("export", walk, "--plan", DEMO, "--start", "?", "-o", tmp_path / "out.mcap")
+    assert done.returncode == 0, done.stderr
+    whole, rng, path = (tmp_path / "out.mcap").read_bytes(), random.Random(1), tmp_path / "flip.mcap"
+    assert len(whole) > 1.2 * walk.stat().st_size  # it has derived messages
+    a_second = max(sum(0 <= c.t_arrival_ns - begin.t_arrival_ns < 10**9 for c in chunks) for begin in chunks[::50])
+    for _ in range(40):
+        path.write_bytes(flipped(whole, rng.randrange(8, len(whole)), rng.randrange(8)))
+        found = set(read(path)[1])
+        assert sum(chunk in found for chunk in chunks) > len(chunks) - a_second
 
 
 def channel_flip(whole: bytes) -> bytes:

@@ -39,6 +39,7 @@ from team.team_reports import report
 from walks import DEMO, walk_chunks
 
 KEY = bytes(range(32))
+FLOOR = "floor1.geojson"  # of the seven
 PLAN = """{"echostep_plan":1,"name":"p","levels":[{"name":"g","height_m":0,"walls":[[0,0,4,0],[4,0,4,4],[4,4,0,4],[0,4,0,0]],
 "rooms":[{"name":"r","at":[1,1],"outline":[[0,0],[2,0],[2,2]]}],"doors":[{"line":[1,0,2,0]}],"obstacles":[[[1,1],[2,1],[2,2]]]}],
 "start":{"x":0.5,"y":0.5,"heading_deg":0},"georeference":{"origin":[8,53]},"uncertainty_m":0.1}"""
@@ -121,6 +122,21 @@ def write_drawing(folder: Path) -> Path:
     return folder / "a.dxf"
 
 
+def write_model(folder: Path) -> Path:
+    """A house of two storeys with a door, a window and stairs."""
+    from plan.test_plan_importer_ifc import write_house  # needs ifcopenshell
+
+    return write_house(folder)
+
+
+def import_floor(data: bytes) -> object:
+    """Import the seven floors with these bytes as one of them."""
+    with TemporaryDirectory() as folder:
+        main = write_seven_floors(Path(folder))
+        main.with_name(FLOOR).write_bytes(data)
+        return import_plan(main)
+
+
 def csv(header: str, *columns: float, rate_hz: float = 100.0) -> Callable[[], bytes]:
     """A table of 150 rows: sines about each of these values."""
     rows = [
@@ -151,9 +167,8 @@ TARGETS: dict[str, Target] = {
     "dxf": Target(written(write_drawing), file("a.dxf", import_plan)),
     "osm": Target(OSM.encode, file("a.osm", import_plan)),
     "wrld": Target(written(write_seven_floors), file("main.json", import_plan)),
-    "ifc": Target(
-        lambda: b"ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n#1=IFCWALL('a',$);\nENDSEC;\n", file("a.ifc", import_plan)
-    ),
+    "wrld-floor": Target(written(lambda folder: write_seven_floors(folder).with_name(FLOOR)), import_floor),
+    "ifc": Target(written(write_model), file("a.ifc", import_plan)),
     "legs": Target(csv("t_s,thigh_rad_s,shank_rad_s", 0.0, 0.1), file("a.csv", load_legs)),
     "imu": Target(csv("t_s,ax,ay,az,gx,gy,gz", 0.0, 0.0, 9.8, 0.0, 0.0, 0.0), file("a.csv", load_imu)),
     "pressure": Target(csv("t_s,pressure_pa", 101_325.0, rate_hz=10.0), file("a.csv", load_pressures)),
