@@ -19,6 +19,7 @@ from echostep.commands.studies import add_studies
 from echostep.errors import EchostepError, IncompleteError, words_of
 from echostep.extras import EXTRAS, lacks
 from echostep.interruption import end_by_signals
+from echostep.printing.compiling import tell_of_compiling
 from echostep.printing.file_mode import share_files
 from echostep.printing.lines import complain, say
 from echostep.printing.people import lost_result, to_people
@@ -64,6 +65,7 @@ def options(
 def main() -> None:
     """Entry point: a mistake ends with one line and status 2; signals end a run after its files are written."""
     end_by_signals()
+    tell_of_compiling()
     with to_people():
         status = _status()
         if not status and (lost := lost_result()):

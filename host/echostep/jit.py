@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """How kernels are compiled: the only place that configures numba.
 
-In: functions. Out: the same, compiled when first called and cached in the folder that `kernel_cache` names. Owns the options.
+In: functions. Out: the same, compiled when first called and cached in the folder that `kernel_cache` names; the commands are told of each. Owns the
+options.
 
 numba counts references to every array that one kernel hands to another, atomically. In kernels that run once per sample or particle that takes longer
 than their work: `lean_kernel` counts none, so it returns numbers or tuples of them and makes no arrays. numba has no public option for this.
@@ -14,9 +15,10 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 from numba import config, njit
+from numba.core import event
 from numba.np import linalg
 
-from echostep.kernel_cache import cache_folder
+from echostep.kernel_cache import cache_folder, on_compiling
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -54,6 +56,26 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
         return cast("Function", njit(**options)(function))
     finally:
         setting["CACHE_DIR"] = before
+
+
+class _Compilations(event.Listener):
+    """Reports each kernel that is compiled because no cache has it; those that it calls are compiled within."""
+
+    def __init__(self) -> None:
+        self._depth = 0
+
+    def on_start(self, _event: event.Event) -> None:
+        """A kernel, or one that it calls."""
+        self._depth += 1
+        if self._depth == 1 and on_compiling:
+            on_compiling[-1]()
+
+    def on_end(self, _event: event.Event) -> None:
+        """The end of it, also by an error."""
+        self._depth -= 1
+
+
+event.register("numba:compile", _Compilations())
 
 
 def _defer_blas() -> None:

@@ -17,6 +17,7 @@ import re
 import stat
 import sys
 import tempfile
+from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -25,6 +26,7 @@ PACKAGE = str(Path(__file__).parent)
 IMPORT = re.compile(rb"^ *(?:from ([\w.]+) import (\([^)]*\)|.*)|import ([\w.]+))", re.MULTILINE)
 WORD = re.compile(rb"\w+")
 DIGITS = 16  # of the digest, hexadecimal
+on_compiling: list[Callable[[], None]] = []  # the newest is called before a kernel is compiled; the commands show it
 _roots = {__package__: PACKAGE}  # name -> folder of the packages whose imports are followed
 
 
@@ -85,6 +87,8 @@ def _temporary_folder() -> Path:
         folder.mkdir(mode=0o700)
         print(f"echostep: no home that can be written: compiled kernels are kept in {folder}", file=sys.stderr)
     state = folder.lstat()
+    if not hasattr(os, "getuid"):  # Windows: the temporary folder is the user's own
+        return folder
     if stat.S_ISDIR(state.st_mode) and state.st_uid == owner and not state.st_mode & 0o022:
         return folder
     made = Path(tempfile.mkdtemp(prefix="echostep-kernels-"))

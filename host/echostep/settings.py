@@ -90,7 +90,7 @@ RENAMED = {("echo", "short"): "hidden"}  # fields of older recordings, by their 
 def read_settings(path: Path | str) -> str:
     """TOML text of a settings file; raises EchostepError that names the file."""
     try:
-        return Path(path).read_text()
+        return Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise EchostepError(f"{path}: cannot read the settings: {error}") from error
 

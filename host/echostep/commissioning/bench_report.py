@@ -45,7 +45,7 @@ def write(board: str | None, foot: str | None, seconds: float, out: Path) -> str
     if not report.probed:
         raise EchostepError(str(report.findings[0]) if report.findings else "no board has answered")
     try:
-        out.write_text("\n".join(text(report)) + "\n")
+        out.write_text("\n".join(text(report)) + "\n", encoding="utf-8")
     except OSError as error:
         raise EchostepError(f"cannot write {out}: {error.strerror}") from None
     return f"{out}: fill in the lines of the measurements (firmware/bench.md) and send it in"

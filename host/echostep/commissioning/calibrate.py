@@ -204,6 +204,6 @@ def _write(out: Path, sections: Sections) -> None:
     parse_settings(text, str(out))
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(text)
+        out.write_text(text, encoding="utf-8")
     except OSError as error:
         raise EchostepError(f"{out}: cannot write the settings: {error.strerror}") from error

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import select
 import shutil
 import subprocess
 import time
@@ -18,6 +17,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from importlib.resources import as_file, files
 from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Thread
+from typing import IO
 
 import serial
 from rich.console import Console
@@ -36,6 +38,7 @@ PROBE_S = 1.2
 ACCESS_S = 2.0  # longest wait for udev to set the permissions of the port
 POLL_S = 0.05
 AVRDUDE_S = 120.0
+READER_S = 2.0  # for the last of avrdude's output; assumed
 FLASH_MAX = 32768 - 4096  # bytes; the bootloader occupies the rest of the ATmega32U4
 FULL_BAR = 50  # characters of avrdude's progress bar
 MODEMS = "if ModemManager runs here, it talks to new ports: install the udev rules (echostep doctor --udev)"
@@ -172,25 +175,33 @@ def _output(command: list[str]) -> Iterator[str]:
     child = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     assert child.stdout is not None
     output, deadline = b"", time.monotonic() + AVRDUDE_S
+    portions: SimpleQueue[bytes] = SimpleQueue()
+    reader = Thread(target=_read_all, args=(child.stdout, portions), daemon=True)  # Windows cannot wait for a pipe
+    reader.start()
     try:
-        while True:
-            ready, _, _ = select.select([child.stdout], [], [], max(0.0, deadline - time.monotonic()))
-            if not ready:
-                raise EchostepError(f"avrdude did not end in {AVRDUDE_S:.0f} s: unplug the board and plug it in again")
-            received = os.read(child.stdout.fileno(), 4096)
-            if not received:
-                break
+        while received := portions.get(timeout=max(0.0, deadline - time.monotonic())):
             output += received
             yield output.decode(errors="replace")
         if status := child.wait(timeout=5.0):
             raise EchostepError(
                 f"avrdude failed (status {status}): {_error_line(output.decode(errors='replace'))}; {PRESS}; {MODEMS}"
             )
+    except Empty as error:
+        late = f"avrdude did not end in {AVRDUDE_S:.0f} s: unplug the board and plug it in again"
+        raise EchostepError(late) from error
     finally:
         if child.poll() is None:
             child.kill()
             child.wait()
+        reader.join(timeout=READER_S)
         child.stdout.close()
+
+
+def _read_all(pipe: IO[bytes], portions: SimpleQueue[bytes]) -> None:
+    """What comes through a pipe, to its end: an empty portion."""
+    while received := os.read(pipe.fileno(), 4096):
+        portions.put(received)
+    portions.put(b"")
 
 
 def _error_line(output: str) -> str:

@@ -124,7 +124,7 @@ def latency_findings(subject: str, port: str, system: Path = Path("/sys")) -> li
 
 def rules_text() -> str:
     """The udev rules that come with this package."""
-    return (files("echostep") / "firmware" / RULES).read_text()
+    return (files("echostep") / "firmware" / RULES).read_text(encoding="utf-8")
 
 
 def rules_findings(folders: tuple[Path, ...] = RULE_FOLDERS) -> list[Finding]:
@@ -135,6 +135,6 @@ def rules_findings(folders: tuple[Path, ...] = RULE_FOLDERS) -> list[Finding]:
         what = "are not installed: no stable names (/dev/echostep, /dev/echostep-mtx), no low latency for the MTx"
         return [Finding(Severity.NOTE, "udev rules", what, remedy)]
     with contextlib.suppress(OSError, UnicodeDecodeError):
-        if rules.read_text().strip() == rules_text().strip():
+        if rules.read_text(encoding="utf-8", errors="replace").strip() == rules_text().strip():
             return []
     return [Finding(Severity.NOTE, "udev rules", f"{rules} is of another version", remedy)]

@@ -40,7 +40,7 @@ class CueList:
 
     def write(self, path: Path) -> None:
         """All cues as CSV."""
-        with claim(path).open("w", newline="") as file:
+        with claim(path).open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(CUE_COLUMNS)
             writer.writerows([getattr(cue, name) for name in CUE_COLUMNS] for cue in self.cues)

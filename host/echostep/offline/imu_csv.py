@@ -90,7 +90,7 @@ def checked(track: Track, path: Path | str) -> Track:
 def write_foot_track(path: Path | str, track: Track) -> None:
     """`t_s,x,y,z,heading_rad,stance` for every sample; raises EchostepError when the file cannot be written."""
     try:
-        with claim(Path(path)).open("w", newline="") as file:
+        with claim(Path(path)).open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(TRACK_COLUMNS)
             columns = (track.t_s, *track.position_m.T, track.heading_rad)

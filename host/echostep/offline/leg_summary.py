@@ -26,7 +26,7 @@ FLAG_WORDS = {
 def write_leg_track(path: Path | str, track: LegTrack) -> None:
     """`TRACK_COLUMNS`, a row a sample (the paper's: ten a second); raises EchostepError when the file cannot be written."""
     try:
-        with claim(Path(path)).open("w", newline="") as file:
+        with claim(Path(path)).open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(TRACK_COLUMNS)
             writer.writerows([f"{v:.6f}" for v in row] for row in track.rows.tolist())

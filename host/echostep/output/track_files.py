@@ -157,7 +157,7 @@ def _record(recording: Recording, tracker: Tracker, out: Path, estimates: list[E
 
 def _write_csv(out: Path, track: TrackOnPlan) -> None:
     columns = _flat(columns_of(track.estimates, track.plan))
-    with out.open("w", newline="") as file:
+    with out.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         writer.writerows(zip(*columns.values(), strict=True))

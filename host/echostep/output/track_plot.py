@@ -57,7 +57,7 @@ TRUTH_COLOUR, TRACK_COLOUR = "#009e73", "#0072b2"  # distinguishable with colour
 
 def write_track(path: Path, estimates: Sequence[Estimate]) -> None:
     """Write estimates as CSV; numbers read back to the same bits."""
-    with claim(path).open("w", newline="") as file:
+    with claim(path).open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow([*COLUMNS, HYPOTHESES])
         for e in estimates:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import errno
 import os
+import sys
 import threading
 import time
 from collections import Counter, deque
@@ -39,7 +40,9 @@ WRITE_TIMEOUT_S = 0.5
 TOGETHER_S = 0.002  # pyserial's thread hands the bytes of one segment over in less
 REOPEN_S = 0.5  # between two attempts to open a lost port
 JOIN_S = 2.0  # longest wait for the end of a reading thread
-SEE_PORTS = "see which ports there are: ls /dev/serial/by-id"
+SEE_PORTS = "see which ports there are: " + (
+    "ls /dev/serial/by-id" if sys.platform == "linux" else "python -m serial.tools.list_ports"
+)
 MOST_NOTICES = 8  # kept; the oldest is dropped
 
 

@@ -38,6 +38,8 @@ class PeopleStream(io.TextIOBase):
         self.on_fault: Callable[[str], None] | None = None  # is called once with the fault, by the thread that writes
         self._stream = stream
         self._file = _file_of(stream)
+        if self._file is None and isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors=self.errors)
         self._on_terminal = stream is not None and stream.isatty()
         self._buffer = bytearray()
         self._changed = threading.Condition()

@@ -61,7 +61,7 @@ class PlaceKeeper:
         fields = {"utc": datetime.now(UTC).isoformat(), "plan_sha256": self._tracker.plan.digest, "board": self._board}
         written = self._path.with_suffix(".new")
         try:
-            claim(written).write_text(json.dumps(fields | {"place": asdict(place)}))
+            claim(written).write_text(json.dumps(fields | {"place": asdict(place)}), encoding="utf-8")
             written.replace(self._path)
         except OSError:
             return

@@ -13,6 +13,7 @@ from typing import TypeVar
 
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+from echostep.printing.compiling import counting_compiled
 from echostep.session.console import console
 
 SHOWN_AFTER_S = 2.0  # elsewhere than on a terminal: what ends before needs no line
@@ -21,7 +22,7 @@ Item = TypeVar("Item")
 
 @contextmanager
 def progress_line(text: str) -> Iterator[None]:
-    """Show what is being done while the block runs."""
+    """Show what is being done while the block runs, and how many kernels it has compiled."""
     if not console.is_terminal:
         timer = Timer(SHOWN_AFTER_S, console.print, [f"{text} ..."])
         timer.daemon = True
@@ -34,8 +35,9 @@ def progress_line(text: str) -> Iterator[None]:
     with Progress(
         SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console, transient=True
     ) as bars:
-        bars.add_task(text, total=None)
-        yield
+        task = bars.add_task(text, total=None)
+        with counting_compiled(lambda count: bars.update(task, description=f"{text}: {count} compiled")):
+            yield
 
 
 def with_bar(items: Iterable[Item], text: str, fraction: Callable[[], float | None]) -> Iterator[Item]:
