@@ -59,9 +59,9 @@ def is_ours(frame: FrameType) -> bool:
 class AsOnWindows(ModuleType):
     """A module that lacks names for the package, and has other values for it."""
 
-    def __new__(cls, *_: Any) -> Any:
+    def __new__(cls, *named: Any) -> Any:
         """A plain one: Python makes new modules as `type(sys)`."""
-        return ModuleType.__new__(ModuleType)
+        return ModuleType(*named)
 
     def __getattribute__(self, name: str) -> Any:
         module = _MODULES[id(self)]
