@@ -75,7 +75,7 @@ class _Compilations(event.Listener):
         self._depth -= 1
 
 
-event.register("numba:compile", _Compilations())
+event.register("numba:compile", _Compilations())  # type: ignore[no-untyped-call]
 
 
 def _defer_blas() -> None:
