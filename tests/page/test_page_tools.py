@@ -119,7 +119,7 @@ def test_charts_show_the_walk_and_what_happened(browser: Any, url: str, tmp_path
     wait_for(page, "Math.abs(echostep.last.play.t_s - 30) < 0.5")
     page.focus("#map")
     page.keyboard.press("t")
-    picture(page, "tools", tmp_path)
+    page.screenshot(path=tmp_path / "tools.png")
     page.click("#events button:has-text('lost')")
     wait_for(page, "echostep.last.play.t_s === 60")
     picture(page, "charts", tmp_path)
@@ -158,7 +158,7 @@ def test_two_taps_measure(browser: Any, url: str, tmp_path: Path) -> None:
         page.mouse.click(*spot(page, *place))
     wait_for(page, f"/^Distance: (4.9|5.0)\\d m/.test({HINT})")
     assert until(lambda: painted(page, "goal", 3.5, 9.5))
-    picture(page, "measure", tmp_path)
+    page.screenshot(path=tmp_path / "measure.png")
     assert page.is_hidden("#sheet")  # the taps did nothing else
     page.focus("#map")
     page.keyboard.press("Escape")
@@ -305,3 +305,21 @@ def test_the_tools_and_the_charts_keep_nobody_out(
     page.context.close()
     assert found.violations_count == 0, found.generate_report()
     assert again.violations_count == 0, again.generate_report()
+
+
+def test_it_can_be_installed_as_an_app(browser: Any, url: str) -> None:
+    """Chromium reads the manifest and finds no reason against it but that this window is in incognito mode; nothing is fetched from elsewhere."""
+    asked: list[str] = []
+    page = loaded_page(browser, url, DESK, READY)
+    page.on("request", lambda request: asked.append(request.url))
+    page.reload()
+    wait_for(page, READY)
+    devtools = page.context.new_cdp_session(page)
+    manifest = devtools.send("Page.getAppManifest")
+    assert manifest["errors"] == []
+    assert json.loads(manifest["data"])["name"] == "echostep"
+    why = [error["errorId"] for error in devtools.send("Page.getInstallabilityErrors")["installabilityErrors"]]
+    assert set(why) <= {"in-incognito"}
+    assert asked
+    assert all(address.startswith(url) for address in asked)  # it works without the internet
+    page.context.close()

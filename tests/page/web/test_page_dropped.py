@@ -23,7 +23,7 @@ from echostep.plan.writer import plan_json
 from echostep.recording.recorder import Recorder
 from echostep.session.metadata import run_metadata
 from echostep.session.runs import dropped
-from page.browser import loaded_page, overflow, picture, wait_for
+from page.browser import loaded_page, overflow, wait_for
 from page.frames import PLAN, scene, served
 from page.web.test_page_sizes import SIZES, UNREACHED
 from waiting import PATIENCE_S
@@ -104,7 +104,7 @@ def test_a_recording_of_another_building_waits_for_its_plan(
         page = loaded_page(browser, url, DESK, WAITS)
         drop(page, walk)
         wait_for(page, f"{SAID} === 'walk.mcap: now drop its plan (Other building).'")
-        picture(page, "drop", tmp_path)
+        page.screenshot(path=tmp_path / "drop.png")
         page.set_input_files("#drop-file", plan)  # by the button
         wait_for(page, f"{HINT} === 'Note: Other building is not the plan that this was tracked on.'")
         wait_for(page, PLAYS.format("walk.mcap (simulated): Other building"))
