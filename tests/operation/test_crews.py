@@ -18,7 +18,7 @@ from echostep.operation.crews import HEAD, CrewLog
 from echostep.team.messages.crews import MOST_CREWS, Crew, Crews
 from echostep.team.messages.report import BadReportError
 from operation.teams import TOWER, ServedTeam, Team, place, whole_team
-from operation.test_table_page import LOOKS, PICTURES, table
+from operation.test_table_page import LOOKS, shot, table
 from page.browser import loaded_page, overflow, wait_for
 from page.web.test_page_sizes import SIZES, TABLE_READY, UNREACHED
 
@@ -186,7 +186,7 @@ def test_a_commander_with_crews(browser: Any, monkeypatch: pytest.MonkeyPatch, t
         assert "inside 4:30, not asked yet, planned air 7:30 left: ask now" in page.inner_text(
             "#crew-list li:first-child"
         )
-        page.screenshot(path=(PICTURES or tmp_path) / "table-crews.png")
+        shot(page, "crews", tmp_path)
         page.click("#crew-list li:first-child [data-does=check]")
         wait_for(page, f"{BUTTON} === 'Crews 2' && {LIST}.includes('answered 0:00 ago')")
         pass_time(8.0)

@@ -215,7 +215,7 @@ def test_a_georeferenced_plan_gives_longitude_latitude_and_mgrs(browser: Any, tm
         said = page.inner_text("#sheet-text")
         place = GroundPlane(PLACED).place(4.0, 7.5, 0.0, None)
         lat, lon = (float(part.strip(" °")) for part in said.split("·")[0].split(","))
-        assert (lat, lon) == (pytest.approx(place.lat_deg, abs=2e-6), pytest.approx(place.lon_deg, abs=2e-6))
+        assert [lat, lon] == pytest.approx([place.lat_deg, place.lon_deg], abs=2e-6)
         features = json.loads(saved(page, "#tool-geojson", tmp_path).read_text())
         assert "coordinates" not in features
         (position,) = (f for f in features["features"] if f["properties"]["kind"] == "position")
