@@ -29,7 +29,7 @@ def test_the_fallen_the_lost_and_the_silent_come_first_each_in_words() -> None:
     assert "mayday: no motion for 40 s" in rows[0].notes
     kim, anna = rows[1], next(row for row in rows if row.name == "Anna")
     assert kim.words.startswith("lost, ")
-    assert kim.words.endswith("±8.0 m, heard 2 s ago")
+    assert kim.words == "lost, last known 0 s ago, Ground floor, in corridor, heard 2 s ago"  # no claim of a place
     assert anna.words.endswith("within 0.4 m, heard 2 s ago")
     assert anna.words.startswith(f"{TOWER.levels[1].name}, ")
     assert rows[2].words.startswith("silent, ")

@@ -253,7 +253,7 @@ class Operation:
         state = m.state(now_s)
         if state is followed.state or followed.history is None:
             return
-        p = m.report.position
+        p = m.report.last_known
         where = ", ".join(filter(None, (p.floor_name, p.where))) if p else ""
         followed.history.append(ShownEvent(unix_s, f"{state.value}{': ' if where else ''}{where}"))
         followed.state, self._changed = state, True

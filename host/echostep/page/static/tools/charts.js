@@ -16,7 +16,7 @@ const LEFT_PX = 34, TOP_PX = 15;
 export class Charts {
   // `onSeek(t_s)`: the chart was tapped, in a replay
   constructor(canvas, colours, onSeek) {
-    Object.assign(this, { canvas, colours, onSeek, pen: canvas.getContext('2d'), on: false, rows: [], events: [], play: null, reading: false, onEvents: () => {} });
+    Object.assign(this, { canvas, colours, onSeek, pen: canvas.getContext('2d'), on: false, rows: [], events: [], play: null, reading: false, onEvents: () => {}, isWanted: () => false });
     canvas.onclick = ({ offsetX }) => { if (this.play) onSeek(this.time(offsetX)); };
     setInterval(() => this.read(), POLL_MS);
   }
@@ -26,9 +26,9 @@ export class Charts {
     this.onEvents(this.events);
   }
 
-  // Read the rows that are new; a hidden page reads none.
+  // Read the rows that are new, where they are shown: in charts, in a replay's time bar, or in a list (`isWanted`).
   async read() {
-    if (document.hidden || this.reading) return;
+    if (document.hidden || this.reading || !(this.on || this.play || this.isWanted())) return;
     this.reading = true;
     const { run } = this, answer = await fetch(new URL(`over-time/${this.rows.length}`, document.baseURI)).catch(() => null);
     const bytes = answer?.ok ? await answer.arrayBuffer() : null;
@@ -38,7 +38,7 @@ export class Charts {
     if (begin !== this.rows.length) return this.clear();  // another run answers
     const numbers = new Float32Array(bytes, 4 + length, rows * columns);
     for (let k = 0; k < rows; k++) this.rows.push(numbers.subarray(columns * k, columns * (k + 1)));
-    if (events.length !== this.events.length) this.onEvents(this.events = events);
+    if (rows || events.length !== this.events.length) this.onEvents(this.events = events);  // ticks move while a replay grows
     if (rows) this.paint();
   }
 

@@ -34,7 +34,7 @@ export class Tools {
     this.wire();
     this.wireLayers();
     this.setCharts(stored() === 'on');
-    page.charts.onEvents = (events) => this.events(events);
+    Object.assign(page.charts, { onEvents: (events) => this.events(events), isWanted: () => dialog.open });
   }
 
   wire() {
@@ -57,6 +57,7 @@ export class Tools {
   open() {
     $('tool-files').hidden = !this.page.takesFiles();
     this.dialog.showModal();
+    this.page.charts.read();
   }
 
   setCharts(on) {
@@ -65,6 +66,7 @@ export class Tools {
     $('over-time').hidden = !on;
     $('tool-charts').setAttribute('aria-pressed', String(on));
     try { localStorage.setItem('charts', on ? 'on' : 'off'); } catch { /* private browsing */ }
+    charts.read();
     charts.paint();
   }
 
