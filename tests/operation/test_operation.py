@@ -115,7 +115,10 @@ def test_a_history_says_when_a_state_changed_and_is_bounded() -> None:
     assert len(details.history) == MOST_EVENTS
     assert details.history[0].text.startswith("lost: ")
     assert details.history[0].unix_s == team.unix_s
-    assert {"state", "floor", "heading", "safe radius"} <= {fact.name for fact in details.facts}
+    facts = {fact.name: fact.value for fact in details.facts}
+    assert facts["place"] == "not known"
+    assert facts["last known"].startswith("last known 0 s ago, ")
+    assert not {"floor", "heading", "safe radius"} & set(facts)
     assert team.operation.details(number + 1, team.now_s) is None
 
 
