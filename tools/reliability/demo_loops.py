@@ -37,7 +37,7 @@ def once(seed: int) -> None:
 
 def run(minutes: float) -> Floats:
     """Rows of time, s, and memory, MB, after each run; two at least."""
-    began, rows = time.monotonic(), []
+    began, rows = time.monotonic(), list[tuple[float, float]]()
     while len(rows) < 2 or time.monotonic() - began < 60.0 * minutes:
         once(len(rows) + 1)
         rows.append((time.monotonic() - began, resident_mb("self")))
