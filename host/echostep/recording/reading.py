@@ -53,6 +53,7 @@ class Recording:
     goes_on_in: str = ""  # name of the file with the next part of the run
     before: list[str] = field(default_factory=list)  # damage of the recordings of which this one was made
     _log_offset_ns: int = 0  # log time minus arrival time
+    _ended: bool = False  # its end record was read
     _intact: bool | None = None  # whether the checksum is right; None: unknown yet
     _channels: PortChannels = field(default_factory=PortChannels)
     _ports: set[str] = field(default_factory=set)  # with messages
@@ -119,7 +120,7 @@ class Recording:
     def _records(self) -> Iterator[MessageRun | tuple[int, bytes]]:
         """Messages as runs, other records as opcode and body, in order, up to the footer; damaged bytes are skipped and counted."""
         file, self._channels, self._ports = map_file(self.path), PortChannels(), set()
-        self.truncated, self.altered, self.misplaced = True, False, 0
+        self.truncated, self.altered, self.misplaced, self._ended = False, False, 0, False
         self.damaged_bytes = self.damaged_places = self.unreadable_chunks = 0
         ending = Ending() if self.grows else read_ending(file)
         if self._intact is None:
@@ -129,7 +130,7 @@ class Recording:
         else:
             self._channels.add_summary(ending)
         yield from self._from(file, len(MCAP_MAGIC), self._channels)
-        self.truncated = self.truncated and not self._intact and not self.grows
+        self.truncated = not (self._ended or self._intact or self.grows)  # not of a file that is read no further
 
     def _from(self, file: Octets, offset: int, channels: PortChannels) -> Iterator[MessageRun | tuple[int, bytes]]:
         """The records from an offset on."""
@@ -139,12 +140,12 @@ class Recording:
             if isinstance(record, tuple):
                 opcode, body = record
                 if opcode == Opcode.FOOTER and begin + HEAD_SIZE + len(body) + len(MCAP_MAGIC) >= len(file):
-                    self.truncated = False
+                    self._ended = True
                     return
                 if opcode == Opcode.DATA_END and (matches := checksum_matches(file, begin)) is not None:
                     self.altered = self.altered or not matches
                     if matches:  # whatever follows, all before is there
-                        self.truncated = False
+                        self._ended = True
                         return
                 if opcode == Opcode.CHUNK:
                     yield from self._marked(self._records_in_chunk(body, channels), begin + HEAD_SIZE + len(body))
