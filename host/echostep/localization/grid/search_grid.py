@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: MIT
+"""The search of the building: exact Bayes on a grid of cells and headings [Burgard et al. 1998].
+
+In: a start, moves with the pings and the change of height on them. Out: poses drawn from the grid. Owns the weight of each state, and the heights.
+
+The lengths and the rotation of the walk frame drift little, so a state moves rigidly with the path, and what it errs by is spread over its neighbours. A
+layer's sector of the rotation is halved when the way within it errs by a cell: the search is as fine as the path is long. Of the many states of a
+large building the heaviest MOST_STATES are kept.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Floats, Ints
+from echostep.localization.echoes.likelihood import EchoModel
+from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, SECTORS, CoarsePings, log_densities
+from echostep.localization.grid.cells import CLOSED, GridCells
+from echostep.localization.grid.heights import GridHeights
+from echostep.localization.grid.kernels import (
+    GridStates,
+    halved,
+    rotation_of,
+    shift_and_weigh,
+    spread,
+    weigh_levels,
+)
+from echostep.localization.height.levels import HeightChange
+from echostep.localization.particle_arrays import Move, PingBatch
+from echostep.localization.particles.kernels import piece_of, systematic
+from echostep.localization.settings import UNPLANNED_DOOR
+from echostep.path import bend_of
+from echostep.walls.floor import CELL_M
+
+# Assumed, not measured.
+LEAST_SHARE = 1e-6  # of the greatest weight, below which a state is dropped
+MOST_STATES = 300_000  # a millisecond a ping
+SPREAD_M, SPREAD_RAD = 0.05, math.radians(1.0)  # standard deviations on a metre: per axis, and of the rotation
+SPREAD_SHARE = 0.05  # of a state's weight that is due to each neighbour when it is spread
+MOST_BESIDE, MOST_TURNED = 0.2, 0.25  # of it that a neighbour gets at most: what is spread keeps its peak
+NO_PING_BEND = bend_of(math.radians(45.0))  # of a move's chord, above which its pings do not count: an uncertain turn
+
+
+class DrawnPoses(NamedTuple):
+    """Poses (n,) on the sheet: places (m), rotations walk -> map (rad), heights and offsets of the height by pressure (m)."""
+
+    x_m: Floats
+    y_m: Floats
+    turn_rad: Floats
+    z_m: Floats
+    lag_m: Floats
+
+
+class SearchGrid:
+    """The weights of all poses on the grid."""
+
+    def __init__(self, cells: GridCells, heights: GridHeights | None, veer_sd_rad: float = 0.0) -> None:
+        """`heights`: None in a building of one level. `veer_sd_rad`: bias of the path's turn on a metre."""
+        self._cells, self.heights = cells, heights
+        self._turn_variance = SPREAD_RAD**2 + 4.0 * veer_sd_rad**2
+        self._scratch = np.zeros(len(cells.row), np.float32)
+        self._pings = CoarsePings()
+        self._var_m2 = self._var_rad2 = 0.0
+
+    def begin(self, x_m: Floats, y_m: Floats) -> None:
+        """Begin evenly at these places, with any rotation."""
+        place = self._cells.cell_of(x_m, y_m)
+        self._states = GridStates(
+            np.tile(place, SECTORS), np.full(len(place) * SECTORS, 1.0, np.float32),
+            np.arange(SECTORS + 1, dtype=np.int64) * len(place), np.zeros((SECTORS, 2)),
+        )  # fmt: skip
+        self._note_least(1.0)
+
+    def add(self, x_m: Floats, y_m: Floats, turn_rad: Floats, share: float) -> None:
+        """Give this share of the weight to the poses (n,), where the grid began."""
+        s = self._states
+        size = int(s.first[1])
+        rank = np.full(len(self._cells.row), -1, np.int64)
+        rank[s.cell[:size]] = np.arange(size)
+        cell = self._cells.cell_of(x_m, y_m)
+        place = np.where(cell >= 0, rank[cell], -1)
+        layer = np.floor(turn_rad * SECTORS / (2.0 * math.pi)).astype(np.int64) % SECTORS
+        state = (layer * size + place)[place >= 0]
+        if len(state):
+            added = np.bincount(state, minlength=len(s.weight)) * (share / len(state))
+            weight = added + (1.0 - share) / len(s.weight)
+            self._states = s._replace(weight=(weight / weight.max()).astype(np.float32))
+
+    def __len__(self) -> int:
+        return len(self._states.cell)
+
+    @property
+    def path_m(self) -> float:
+        """Length of the path since the search began."""
+        return self._pings.odometer.path_m
+
+    def advance(self, move: Move, pings: PingBatch, change: HeightChange, model: EchoModel) -> None:
+        """Move all states, and weigh them by the pings that `CoarsePings` takes, each where it was triggered, and by the change of height."""
+        length, bend, done = math.hypot(move.dx_m, move.dy_m), math.hypot(move.bend_x_m, move.bend_y_m), 0.0
+        table = np.empty(OUTSIDE_ENTRY + 1)
+        for k in range(len(pings.share)):
+            share = float(pings.share[k])
+            ping = None if bend > NO_PING_BEND * length else self._pings.take(pings, k, share * length)
+            if ping is not None:
+                log_densities(ping, model, table)
+                self._step(move, done, share, table - table.max(), ping.axis_rad)
+                done = share
+        if done < 1.0:
+            self._step(move, done, 1.0, np.zeros(len(table)), 0.0)
+        if self.heights is not None:
+            self._note_least(weigh_levels(self._states, self.heights.update(change), self._cells))
+        self._pings.odometer.add(length)
+        self._var_m2 += SPREAD_M**2 * length + move.sd_m**2 + bend**2
+        self._var_rad2 += self._turn_variance * length + move.turn_sd_rad**2
+        self._refine()
+
+    def _step(self, move: Move, begin: float, end: float, log_factor: Floats, axis_rad: float) -> None:
+        s, piece = self._states, piece_of(move, begin, end)
+        factor = np.exp(log_factor - math.log(self._top)).astype(np.float32)
+        kept, top = shift_and_weigh(
+            s, piece.dx_m, piece.dy_m, factor, axis_rad, self._least, math.exp(UNPLANNED_DOOR), self._cells
+        )
+        self._states = s._replace(cell=s.cell[:kept], weight=s.weight[:kept])
+        self._note_least(top)
+
+    def _note_least(self, top: float) -> None:
+        """Note the greatest weight, and that below which a state is dropped with the next step."""
+        self._top, self._least, count = top, LEAST_SHARE * top, len(self)
+        if count > MOST_STATES:
+            sample = self._states.weight[:: max(count // 20_000, 1)]
+            self._least = max(float(np.quantile(sample, 1.0 - MOST_STATES / count)), self._least)
+
+    def _refine(self) -> None:
+        """Halve the sectors if the way within one errs by a cell, and spread what is due."""
+        layers = len(self._states.offset_m)
+        if self._turned(self._turn_variance, 2 * layers) < MOST_TURNED and self.path_m * math.pi / layers > CELL_M:
+            self._states, layers = halved(self._states), 2 * layers
+        beside, turned = 0.5 * self._var_m2 / CELL_M**2, self._turned(self._var_rad2, layers)
+        if beside > SPREAD_SHARE:
+            self._spread(min(beside, MOST_BESIDE), 0.0)
+            self._var_m2 = 0.0
+        if turned > SPREAD_SHARE:
+            self._spread(0.0, min(turned, MOST_TURNED))
+            self._var_rad2 = 0.0
+
+    @staticmethod
+    def _turned(variance_rad2: float, layers: int) -> float:
+        """Share of a state's weight that each neighbouring layer gets by this variance of the rotation."""
+        return 0.5 * variance_rad2 * (layers / (2.0 * math.pi)) ** 2
+
+    def _spread(self, beside: float, turned: float) -> None:
+        self._states = spread(self._states, beside, turned, self._least, self._scratch, self._cells)
+
+    def draw(self, count: int, rng: np.random.Generator) -> DrawnPoses:
+        """So many poses, evenly within their cells and sectors."""
+        s = self._states
+        chosen = systematic(s.weight, float(rng.random()), count)
+        poses = self._poses(chosen)
+        within = rng.random((3, count)) - 0.5
+        turn = poses.turn_rad + 2.0 * math.pi / len(s.offset_m) * within[2]
+        return poses._replace(x_m=poses.x_m + CELL_M * within[0], y_m=poses.y_m + CELL_M * within[1], turn_rad=turn)
+
+    def _poses(self, chosen: Ints) -> DrawnPoses:
+        """The middles of states (n,)."""
+        s, cells = self._states, self._cells
+        layer = np.searchsorted(s.first, chosen, side="right") - 1
+        line, column = np.divmod(s.cell[chosen], cells.columns)
+        x = cells.x0_m + (column + 0.5) * CELL_M + s.offset_m[layer, 0]
+        y = cells.y0_m + (line + 0.5) * CELL_M + s.offset_m[layer, 1]
+        z, lag = np.zeros(len(chosen)), np.zeros(len(chosen))
+        if self.heights is not None:
+            z, lag = self.heights.of(cells.level[column], cells.connector[s.cell[chosen]])
+        return DrawnPoses(x, y, rotation_of(layer, len(s.offset_m)), z, lag)
