@@ -232,6 +232,6 @@ def right_against(tracked: CloudHypothesis, search: CloudHypothesis, log_odds_be
     log_odds, alike = tracked.plausibility.log_odds, ALIKE_NATS
     if search.evidence_m > EVIDENCE_M:
         return probability_of(log_odds - search.plausibility.log_odds)
-    if search.cloud.is_coarse:  # no rival yet: evidence from before the search cannot stem from likeness
+    if search.cloud.is_searching:  # no rival yet: evidence from before the search cannot stem from likeness
         alike = min(max(log_odds - log_odds_before, 0.0), ALIKE_NATS)
     return min(probability_of(log_odds - alike), UNDECIDED)

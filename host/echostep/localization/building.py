@@ -10,9 +10,10 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.localization.echoes.likelihood import EchoModel
-from echostep.localization.echoes.range_table import CoarseField, coarse_field
+from echostep.localization.echoes.range_table import coarse_field
 from echostep.localization.echoes.unplanned import Background, background
 from echostep.localization.estimate import Elsewhere
+from echostep.localization.grid.cells import GridCells, grid_cells
 from echostep.localization.height.levels import UpperLevels
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import Floor, walkable_floor
@@ -33,7 +34,7 @@ class Building:
             self.upper_levels = UpperLevels(self.floor, sheet)
         self.elsewhere = _elsewhere(self.floor, sheet)
         self._backgrounds: dict[EchoModel, Background] = {}
-        self._fields: dict[EchoModel, CoarseField] = {}
+        self._cells: dict[EchoModel, GridCells] = {}
 
     @property
     def has_walls(self) -> bool:
@@ -51,11 +52,12 @@ class Building:
             self._backgrounds[model] = background(self.walls, self.floor, model)
         return self._backgrounds[model]
 
-    def field(self, model: EchoModel) -> CoarseField:
-        """Table of the ranges to expect, for a coarse cloud."""
-        if model not in self._fields:
-            self._fields[model] = coarse_field(self.walls, self.floor, model)
-        return self._fields[model]
+    def cells(self, model: EchoModel) -> GridCells:
+        """The cells of a search, with the ranges to expect in them."""
+        if model not in self._cells:
+            field = coarse_field(self.walls, self.floor, model)
+            self._cells[model] = grid_cells(self.walls.index, field, self.sheet, self.upper_levels)
+        return self._cells[model]
 
     def log_loss_in_air(self, x_m: Floats, y_m: Floats, path_m: float) -> Floats | None:
         """Loss of log-weight (n,) on this length of path, of particles in the air beside an upper level; None where there is none."""

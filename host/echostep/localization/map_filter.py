@@ -37,6 +37,7 @@ from echostep.localization.building import Building
 from echostep.localization.echoes.likelihood import EchoSettings
 from echostep.localization.echoes.unplanned import UnplannedDensities, UsablePings, evidence_share
 from echostep.localization.estimate import LOST_M, SURE, TRACKING_M, Estimate, Right, estimate, weight_about
+from echostep.localization.grid.start import grid_of, is_unknown
 from echostep.localization.height.height_filter import RelativeHeight, RidingHeight
 from echostep.localization.height.levels import HeightChange
 from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, move_of
@@ -82,7 +83,7 @@ class MapFilter:
         echo = with_plan_error(self._settings)
         self._pings = UsablePings(building.background(self._model), echo)
         cloud = self._new_cloud(start, walk_heading_rad)
-        stated = not cloud.is_coarse
+        stated = not cloud.is_searching
         self._plan = PlanVerdict(self._settings.plan_sd_m)
         prior = (STATED if stated else UNSTATED) if building.has_walls else BY_DEFINITION
         self.tracked = CloudHypothesis(cloud, Plausibility(prior), stated)
@@ -132,7 +133,8 @@ class MapFilter:
             self._search_after(gap, segment)
         if not segment.unobserved:
             self._follow(measured, change)
-        self.beacon_map.update(self.cloud, segment, readings, bool(readings) and self.plan_supports)
+        if not self.cloud.is_searching:
+            self.beacon_map.update(self.cloud, segment, readings, bool(readings) and self.plan_supports)
         right = self._right()
         if self._choose(right.here, segment.heading1_rad):
             right = self._right()
@@ -178,11 +180,16 @@ class MapFilter:
     def turn_walk_frame(self, by_rad: float) -> None:
         """Rotate all particles: the heading in the walk frame has changed while the wearer's heading on the map has not."""
         for each in self._clouds():
-            each.cloud.turn_rad = each.cloud.turn_rad + by_rad
+            each.cloud.turn_walk_frame(by_rad)
 
     def _new_cloud(self, start: Start, walk_heading_rad: float) -> Cloud:
+        """A cloud of a start; a search, where the place is unknown."""
         s, b = self._settings, self._building
-        return Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor)
+        cloud = Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor)
+        if is_unknown(start) and len(b.floor.x_m):
+            cells = b.cells(self._model)
+            cloud.grid = grid_of(start, walk_heading_rad, cells, b.floor, b.sheet, s, self._rng)
+        return cloud
 
     @property
     def plan_supports(self) -> bool:
@@ -200,7 +207,7 @@ class MapFilter:
 
         `air`: calibration of the heights by pressure; None: the level is unknown, so places above and below are searched more densely than the rest.
         """
-        if self.cloud.is_coarse or not len(self._building.floor.x_m):
+        if self.cloud.is_searching or not len(self._building.floor.x_m):
             return
         self._is_elsewhere, self._way = True, RecentWay()
         on_levels = self.cloud.sheet is not None and air is None
@@ -238,6 +245,9 @@ class MapFilter:
         for each in self._clouds():
             self._follow_with(each, move, pings, unplanned, evidence_share(segment.turn_rad))
             each.cloud.change_levels(move, change)
+            if each.cloud.is_searching:
+                self._show_search(each.cloud)
+                continue
             loss = self._building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m) if path_m > 0.0 else None
             if loss is not None:
                 each.cloud.reweight(loss)
@@ -249,12 +259,8 @@ class MapFilter:
     ) -> None:
         """Propagate and reweight one cloud, and update its probability by this share of the evidence of the pings."""
         cloud = each.cloud
-        if cloud.is_coarse:
-            field = self._building.field(self._model)
-            cloud.propagate_and_reweight_coarsely(move, pings, self._model, self._building.walls, field)
-            if not cloud.is_coarse:
-                self._way.pass_again(cloud, self._blurred, self._building.walls)
-                cloud.draw_veer()
+        if cloud.grid is not None:
+            cloud.grid.advance(move, pings, self._model)
         else:
             # The particles of a scattered cloud are sparse: the echo model is blurred by their spacing.
             model = self._blurred if cloud.is_scattered else self._model
@@ -269,6 +275,12 @@ class MapFilter:
                 evidence = evidence._replace(log_path=log_path)
             if self._building.has_walls:
                 self._update_plausibility(each, evidence, pings, unplanned, path_m, share)
+
+    def _show_search(self, cloud: Cloud) -> None:
+        """Draw the particles of a search, which pass the last metres again if it has found the place."""
+        cloud.show_search()
+        if not cloud.is_searching:
+            self._way.pass_again(cloud, self._blurred, self._building.walls)
 
     def _update_plausibility(
         self, each: CloudHypothesis, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float,
@@ -296,7 +308,7 @@ class MapFilter:
     def _right(self) -> Right:
         """Probability that the tracked cloud is right; while the building is searched, no more than the search's weight about it, at its height.
 
-        Where the search has no weight there, or is coarse, both are compared by how well they have predicted the echoes.
+        Where the search has no weight there, or has found no place, both are compared by how well they have predicted the echoes.
         """
         here = self.tracked.plausibility.probability
         if self.search is None:
@@ -305,7 +317,7 @@ class MapFilter:
         place_m = mean.x_m, mean.y_m, float(self.cloud.weight @ self.cloud.z_m)
         near, about = weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, cloud.weight, place_m, (TRACKING_M, LOST_M))
         most = near
-        if cloud.is_coarse or near <= ELSEWHERE:
+        if cloud.is_searching or near <= ELSEWHERE:
             most = max(near, right_against(self.tracked, self.search, self._progress.log_odds_before))
         return Right(min(here, most), about)
 
@@ -351,13 +363,13 @@ class MapFilter:
     def _note_coarse(self) -> None:
         """Count against the plan that a coarse search has no probable place at the end of the path within which one is usually found."""
         cloud = self._clouds()[-1].cloud
-        if cloud.is_coarse and self._progress.note_coarse() and cloud.place_share < DOUBTED:
+        if cloud.is_searching and self._progress.note_coarse() and cloud.place_share < DOUBTED:
             self._plan.fail_search()
 
     def _doubt(self, tracked: CloudHypothesis, walk_heading_rad: float) -> bool:
         """Begin a search if the tracked cloud is improbable; returns whether a search began."""
         least = DOUBTED if tracked.has_contracted or tracked.cloud.rescues else WIDE_DOUBTED
-        if tracked.plausibility.probability >= least or tracked.cloud.is_coarse or not len(self._building.floor.x_m):
+        if tracked.plausibility.probability >= least or tracked.cloud.is_searching or not len(self._building.floor.x_m):
             return False
         if tracked.is_stated:
             self._plan.reject_start(self._pings.odometer.path_m)

@@ -40,13 +40,13 @@ class SearchProgress:
 
     def is_astray(self, cloud: Cloud) -> bool:
         """Whether a cloud is still coarse after twice `found_within_m`."""
-        return cloud.is_coarse and self.length_m > 2.0 * self.found_within_m
+        return cloud.is_searching and self.length_m > 2.0 * self.found_within_m
 
     def has_failed(self, search: CloudHypothesis) -> bool:
         """Whether a search is improbable, crossed a wall as a whole before it contracted, or has had no probable place for too long."""
         if search.plausibility.probability < REJECTED or (search.cloud.rescues and not search.has_contracted):
             return True
-        if search.cloud.is_coarse:
+        if search.cloud.is_searching:
             return self.is_astray(search.cloud)
         # Levels that are alike remain several places, and a new search would not discriminate between them.
         is_probable = search.has_contracted and search.plausibility.probability > FOUND

@@ -113,7 +113,7 @@ class Tracker:
             bad_check_ins=self._bad_check_ins,
             particle_count=0 if self.filter is None else len(self.filter.cloud.x_m),
             right=math.nan if self.filter is None else self.filter.tracked.plausibility.probability,
-            searches=self.filter is not None and (self.filter.search is not None or self.filter.cloud.is_coarse),
+            searches=self.filter is not None and (self.filter.search is not None or self.filter.cloud.is_searching),
             beacon_numbers=tuple(self.gateway.numbers),
             beacon_heard_s=None if self.filter is None else self.filter.beacon_map.heard_s,
             alarm=self.alarm.alarm,
@@ -208,7 +208,7 @@ class Tracker:
         segment = PathSegment(0.0, 1.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0)
         measured = MeasuredSegment(segment, np.array([0.5]), np.array([0]), np.array([1.0]))
         for start in (Start(Pose(0.0, 0.0, 0.0)), Start()):
-            other = self._new_filter(start, 0.0, np.random.default_rng(0), 1000)
+            other = self._new_filter(start, 0.0, np.random.default_rng(0))
             other.update(measured, [BeaconReading(t_s, 0, 0.5, 0.0) for t_s in (0.4, 0.6)])
             other.beacon_map.places(other.cloud, 1.0)
         systematic(np.ones(2), 0.5, 2)
@@ -385,11 +385,10 @@ class Tracker:
         return start
 
     def _new_filter(
-        self, start: Start, walk_heading_rad: float, rng: np.random.Generator, searching: int | None = None
+        self, start: Start, walk_heading_rad: float, rng: np.random.Generator
     ) -> MapFilter:
-        """A filter about a start; `searching`: particles of a search, where not the settings' number."""
+        """A filter about a start."""
         s = self.settings
-        cloud = s.cloud if searching is None else replace(s.cloud, searching=searching)
         echo = echo_of(self._ranger_part, s.echo)
-        settings = FilterSettings(cloud, echo, s.climb, s.beacons, self.plan.uncertainty_m or 0.0)
+        settings = FilterSettings(s.cloud, echo, s.climb, s.beacons, self.plan.uncertainty_m or 0.0)
         return MapFilter(self._building, start, walk_heading_rad, rng, settings)

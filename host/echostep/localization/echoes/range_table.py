@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Int32s
-from echostep.jit import allocating_kernel, inline_kernel, kernel, lean_kernel
+from echostep.jit import allocating_kernel, kernel, lean_kernel
 from echostep.localization.echoes.likelihood import SILENT_SHARE, EchoModel, detection, hidden_density
-from echostep.localization.particle_arrays import ParticleArrays, PingBatch
+from echostep.localization.particle_arrays import PingBatch
 from echostep.path import Odometer
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import CELL_M, Floor
@@ -79,38 +79,6 @@ def coarse_field(walls: Walls, floor: Floor, model: EchoModel) -> CoarseField:
         row = _grown(row)
     expected = _expected(floor.x_m, floor.y_m, walls.near(floor.x_m, floor.y_m), model)
     return CoarseField(x0, y0, row, expected)
-
-
-@lean_kernel
-def reweight_coarsely(
-    particles: ParticleArrays, ping: CoarsePing, field: CoarseField, model: EchoModel, table: Floats
-) -> None:
-    """Add each particle's log-likelihood of a ping, by the table, to the ping's power, and make the greatest log-weight 0.
-
-    `table` (OUTSIDE_ENTRY + 1,): room for the log-density by entry.
-    """
-    x, y, turn, _, log_weight = particles
-    log_densities(ping, model, table)
-    top = -np.inf
-    for i in range(len(x)):
-        log_weight[i] += table[_entry(x[i], y[i], ping.axis_rad + turn[i], field)]
-        top = max(top, log_weight[i])
-    for i in range(len(x)):
-        log_weight[i] -= top
-
-
-@inline_kernel
-def _entry(x: float, y: float, axis_rad: float, field: CoarseField) -> int:
-    """The entry of the table at a place and in a direction; OUTSIDE_ENTRY outside."""
-    rows, columns = field.row.shape
-    c, r = (x - field.x0_m) / CELL_M, (y - field.y0_m) / CELL_M
-    if not (0.0 <= c < columns and 0.0 <= r < rows):
-        return OUTSIDE_ENTRY
-    cell = field.row[int(r), int(c)]
-    if cell < 0:
-        return OUTSIDE_ENTRY
-    turns = axis_rad * (0.5 / math.pi)
-    return int(field.expected[cell, min(int((turns - math.floor(turns)) * SECTORS), SECTORS - 1)])
 
 
 @lean_kernel

@@ -20,66 +20,66 @@ from echostep.localization.height.levels import (
     ClimbSettings,
     HeightChange,
 )
-from echostep.localization.particles.start import Air
+from echostep.localization.particles.start import Start
 from echostep.walls.floor import CELL_M
 from echostep.walls.level_sheet import LIFT, LevelSheet, end_of_connector, nearest_level
 
 
 class GridHeights:
-    """`lag_m` (levels,): offset of the height by pressure; `lag_variance`: of each; `z_m` (connectors, levels)."""
+    """`lag_m` (levels,): offset of the height by pressure; `z_m` (connectors, levels): height in the plan."""
 
-    def __init__(self, sheet: LevelSheet, climbing: ClimbSettings, air: Air | None) -> None:
+    def __init__(self, sheet: LevelSheet, climbing: ClimbSettings, start: Start) -> None:
         self._sheet, self._climbing = sheet, climbing
-        self.z_m: Floats = np.tile(sheet.height_m, (len(sheet.kind), 1))
-        self.lag_m: Floats = np.full(len(sheet.height_m), 0.0 if air is None else air.zero_m)
-        self.lag_variance = UNKNOWN_LAG_M2 if air is None else air.sd_m**2
+        self._z_m: Floats = np.tile(sheet.height_m, (len(sheet.kind), 1))
+        if start.near is not None and start.near_z_m is not None:
+            self._z_m[:, start.near.level] = start.near_z_m
+        self._lag_m: Floats = np.full(len(sheet.height_m), 0.0 if start.air is None else start.air.zero_m)
 
-    def update(self, change: HeightChange) -> LevelFactors:
-        """The factors of a segment."""
+    def update(self, change: HeightChange, lag_variance: float) -> tuple[LevelFactors, float]:
+        """The factors of a segment, and the variance of the offset after it, given that before."""
         sheet, has_pressure = self._sheet, math.isfinite(change.height_sd_m)
-        if has_pressure:
-            self.lag_variance += self._climbing.drift_m**2 * change.span_s
-        variance = self.lag_variance + change.height_sd_m**2
-        connectors, levels = self.z_m.shape
+        variance = lag_variance + change.height_sd_m**2
+        knows_lag = has_pressure and lag_variance < UNKNOWN_LAG_M2
+        connectors, levels = self._z_m.shape
         loss, east = np.zeros((connectors + 1, levels)), np.zeros((connectors + 1, levels), np.int32)
         loss[0] = self._loss_by_foot(change.felt_m, change) + self._loss_by_pressure(
-            change.height_m - sheet.height_m - self.lag_m, variance
+            change.height_m - sheet.height_m - self._lag_m, variance
         )
-        z_m, lag_m, moved = np.tile(sheet.height_m, (connectors, 1)), self.lag_m.copy(), []
+        z_m, lag_m, moved = np.tile(sheet.height_m, (connectors, 1)), self._lag_m.copy(), []
         for c, level in zip(*np.nonzero(sheet.serves), strict=True):
-            z, beyond, height_m = self._climbed(int(c), int(level), change)
+            z, beyond, height_m = self._climbed(int(c), int(level), change, knows_lag=knows_lag)
             to = nearest_level(z, c, sheet)
-            innovation = height_m - z - self.lag_m[level]
+            innovation = height_m - z - self._lag_m[level]
             loss[c + 1, level] = self._loss_by_foot(beyond, change) + self._loss_by_pressure(innovation, variance)
             east[c + 1, level] = round((to - int(level)) * sheet.pitch_m / CELL_M)
             if to == level:
                 z_m[c, level] = z
             else:
-                moved.append((c, to, z, self.lag_m[level]))
+                moved.append((c, to, z, self._lag_m[level]))
         for c, to, z, lag in moved:
             z_m[c, to], lag_m[to] = z, lag
-        self.z_m = z_m
-        gain = self.lag_variance / variance if has_pressure else 0.0
+        self._z_m = z_m
+        gain = lag_variance / variance if has_pressure else 0.0
         innovation = change.height_m - sheet.height_m - lag_m
         if has_pressure and not self._is_climbing(change):
             lag_m += np.where(innovation**2 < LAG_GATE * variance, gain * innovation, 0.0)
-        self.lag_m, self.lag_variance = lag_m, (1.0 - gain) * self.lag_variance
-        return LevelFactors(np.exp(loss.min() - loss).astype(np.float32), east)
+        self._lag_m = lag_m
+        return LevelFactors(np.exp(loss.min() - loss).astype(np.float32), east), (1.0 - gain) * lag_variance
 
     def of(self, level: Ints, connector: Ints) -> tuple[Floats, Floats]:
         """Heights and offsets (n,) on these levels, in these connectors."""
-        z_m = np.vstack([self._sheet.height_m, self.z_m])
-        return z_m[connector.astype(np.int64) + 1, level], self.lag_m[level]
+        z_m = np.vstack([self._sheet.height_m, self._z_m])
+        return z_m[connector.astype(np.int64) + 1, level], self._lag_m[level]
 
-    def _climbed(self, c: int, level: int, change: HeightChange) -> tuple[float, float, float]:
+    def _climbed(self, c: int, level: int, change: HeightChange, *, knows_lag: bool) -> tuple[float, float, float]:
         """Height in a connector, how far it would be beyond its ends, and the height by pressure to compare it with."""
-        z, margin = self.z_m[c, level], self._climbing.landing_sd_m
+        z, margin = self._z_m[c, level], self._climbing.landing_sd_m
         if self._sheet.kind[c] != LIFT and math.isfinite(change.felt_sd_m):
             z += change.felt_m
             end = end_of_connector(z, c, margin, self._sheet)
             return end, z - end, change.height_m
-        if math.isfinite(change.height_sd_m) and self.lag_variance < UNKNOWN_LAG_M2:
-            z = end_of_connector(change.riding_m - self.lag_m[level], c, margin, self._sheet)
+        if knows_lag:
+            z = end_of_connector(change.riding_m - self._lag_m[level], c, margin, self._sheet)
             return z, 0.0, change.riding_m
         return z, 0.0, change.height_m
 

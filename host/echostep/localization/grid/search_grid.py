@@ -18,7 +18,7 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.localization.echoes.likelihood import EchoModel
 from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, SECTORS, CoarsePings, log_densities
-from echostep.localization.grid.cells import CLOSED, GridCells
+from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.heights import GridHeights
 from echostep.localization.grid.kernels import (
     GridStates,
@@ -37,6 +37,7 @@ from echostep.walls.floor import CELL_M
 
 # Assumed, not measured.
 LEAST_SHARE = 1e-6  # of the greatest weight, below which a state is dropped
+WALL_SHARE = math.exp(UNPLANNED_DOOR)  # of the weight that is left behind a wall
 MOST_STATES = 300_000  # a millisecond a ping
 SPREAD_M, SPREAD_RAD = 0.05, math.radians(1.0)  # standard deviations on a metre: per axis, and of the rotation
 SPREAD_SHARE = 0.05  # of a state's weight that is due to each neighbour when it is spread
@@ -54,40 +55,48 @@ class DrawnPoses(NamedTuple):
     lag_m: Floats
 
 
+Places = tuple[Floats, Floats]  # x, y (n,) on the sheet (m)
+
+
 class SearchGrid:
     """The weights of all poses on the grid."""
 
-    def __init__(self, cells: GridCells, heights: GridHeights | None, veer_sd_rad: float = 0.0) -> None:
-        """`heights`: None in a building of one level. `veer_sd_rad`: bias of the path's turn on a metre."""
-        self._cells, self.heights = cells, heights
+    def __init__(
+        self, cells: GridCells, places: Places, heights: GridHeights | None = None, veer_sd_rad: float = 0.0
+    ) -> None:
+        """Evenly at these places, with any rotation. `heights`: None in a building of one level. `veer_sd_rad`: bias of the path's turn on a metre."""
+        self._cells, self._places, self._heights = cells, places, heights
         self._turn_variance = SPREAD_RAD**2 + 4.0 * veer_sd_rad**2
+        self._turned_rad = 0.0  # of the walk frame since the search began
         self._scratch = np.zeros(len(cells.row), np.float32)
         self._pings = CoarsePings()
         self._var_m2 = self._var_rad2 = 0.0
+        self._begin()
 
-    def begin(self, x_m: Floats, y_m: Floats) -> None:
-        """Begin evenly at these places, with any rotation."""
-        place = self._cells.cell_of(x_m, y_m)
+    def _begin(self) -> None:
+        """Every place with every rotation."""
+        cell = self._cells.cell_of(*self._places)
         self._states = GridStates(
-            np.tile(place, SECTORS), np.full(len(place) * SECTORS, 1.0, np.float32),
-            np.arange(SECTORS + 1, dtype=np.int64) * len(place), np.zeros((SECTORS, 2)),
+            np.tile(cell, SECTORS), np.ones(len(cell) * SECTORS, np.float32),
+            np.arange(SECTORS + 1, dtype=np.int64) * len(cell), np.zeros((SECTORS, 2)),
         )  # fmt: skip
         self._note_least(1.0)
 
-    def add(self, x_m: Floats, y_m: Floats, turn_rad: Floats, share: float) -> None:
-        """Give this share of the weight to the poses (n,), where the grid began."""
+    def begin_about(self, x_m: Floats, y_m: Floats, turn_rad: Floats, share: float) -> None:
+        """Begin anew, with this share of the weight at these poses (n,), and the rest evenly."""
+        self._begin()
         s = self._states
         size = int(s.first[1])
         rank = np.full(len(self._cells.row), -1, np.int64)
         rank[s.cell[:size]] = np.arange(size)
         cell = self._cells.cell_of(x_m, y_m)
         place = np.where(cell >= 0, rank[cell], -1)
-        layer = np.floor(turn_rad * SECTORS / (2.0 * math.pi)).astype(np.int64) % SECTORS
+        layer = np.floor((turn_rad - self._turned_rad) * SECTORS / (2.0 * math.pi)).astype(np.int64) % SECTORS
         state = (layer * size + place)[place >= 0]
         if len(state):
-            added = np.bincount(state, minlength=len(s.weight)) * (share / len(state))
-            weight = added + (1.0 - share) / len(s.weight)
+            weight = np.bincount(state, minlength=len(s.weight)) * (share / len(state)) + (1.0 - share) / len(s.weight)
             self._states = s._replace(weight=(weight / weight.max()).astype(np.float32))
+            self._note_least(1.0)
 
     def __len__(self) -> int:
         return len(self._states.cell)
@@ -97,8 +106,12 @@ class SearchGrid:
         """Length of the path since the search began."""
         return self._pings.odometer.path_m
 
-    def advance(self, move: Move, pings: PingBatch, change: HeightChange, model: EchoModel) -> None:
-        """Move all states, and weigh them by the pings that `CoarsePings` takes, each where it was triggered, and by the change of height."""
+    def turn_walk_frame(self, by_rad: float) -> None:
+        """Rotate all states: the heading in the walk frame has changed while that on the map has not."""
+        self._turned_rad += by_rad
+
+    def advance(self, move: Move, pings: PingBatch, model: EchoModel) -> None:
+        """Move all states, and weigh them by the pings that `CoarsePings` takes, each where it was triggered."""
         length, bend, done = math.hypot(move.dx_m, move.dy_m), math.hypot(move.bend_x_m, move.bend_y_m), 0.0
         table = np.empty(OUTSIDE_ENTRY + 1)
         for k in range(len(pings.share)):
@@ -110,8 +123,6 @@ class SearchGrid:
                 done = share
         if done < 1.0:
             self._step(move, done, 1.0, np.zeros(len(table)), 0.0)
-        if self.heights is not None:
-            self._note_least(weigh_levels(self._states, self.heights.update(change), self._cells))
         self._pings.odometer.add(length)
         self._var_m2 += SPREAD_M**2 * length + move.sd_m**2 + bend**2
         self._var_rad2 += self._turn_variance * length + move.turn_sd_rad**2
@@ -119,12 +130,25 @@ class SearchGrid:
 
     def _step(self, move: Move, begin: float, end: float, log_factor: Floats, axis_rad: float) -> None:
         s, piece = self._states, piece_of(move, begin, end)
+        c, d = math.cos(self._turned_rad), math.sin(self._turned_rad)
+        east, north = c * piece.dx_m - d * piece.dy_m, d * piece.dx_m + c * piece.dy_m
         factor = np.exp(log_factor - math.log(self._top)).astype(np.float32)
         kept, top = shift_and_weigh(
-            s, piece.dx_m, piece.dy_m, factor, axis_rad, self._least, math.exp(UNPLANNED_DOOR), self._cells
+            s, east, north, factor, axis_rad + self._turned_rad, self._least, WALL_SHARE, self._cells
         )
         self._states = s._replace(cell=s.cell[:kept], weight=s.weight[:kept])
-        self._note_least(top)
+        if kept:
+            self._note_least(top)
+        else:  # all are beyond the ground that the grid has
+            self._begin()
+
+    def change_levels(self, change: HeightChange, lag_variance: float) -> float:
+        """Weigh by a change of height, and move what has reached another level; returns the variance of the height by pressure's offset."""
+        if self._heights is None:
+            return lag_variance
+        factors, lag_variance = self._heights.update(change, lag_variance)
+        self._note_least(weigh_levels(self._states, factors, self._cells))
+        return lag_variance
 
     def _note_least(self, top: float) -> None:
         """Note the greatest weight, and that below which a state is dropped with the next step."""
@@ -156,12 +180,21 @@ class SearchGrid:
 
     def draw(self, count: int, rng: np.random.Generator) -> DrawnPoses:
         """So many poses, evenly within their cells and sectors."""
-        s = self._states
-        chosen = systematic(s.weight, float(rng.random()), count)
-        poses = self._poses(chosen)
+        poses = self._poses(systematic(self._states.weight, float(rng.random()), count))
         within = rng.random((3, count)) - 0.5
-        turn = poses.turn_rad + 2.0 * math.pi / len(s.offset_m) * within[2]
+        turn = poses.turn_rad + 2.0 * math.pi / len(self._states.offset_m) * within[2]
         return poses._replace(x_m=poses.x_m + CELL_M * within[0], y_m=poses.y_m + CELL_M * within[1], turn_rad=turn)
+
+    def every(self) -> tuple[DrawnPoses, Floats]:
+        """The pose in the middle of each state, and the log-weights."""
+        least = np.finfo(np.float32).tiny
+        log_weight: Floats = np.log(np.maximum(self._states.weight, least).astype(np.float64))
+        return self._poses(np.arange(len(self))), log_weight - log_weight.max()
+
+    def reweight(self, log_weight: Floats) -> None:
+        """Replace the log-weights of all states."""
+        self._states = self._states._replace(weight=np.exp(log_weight - log_weight.max()).astype(np.float32))
+        self._note_least(1.0)
 
     def _poses(self, chosen: Ints) -> DrawnPoses:
         """The middles of states (n,)."""
@@ -171,6 +204,7 @@ class SearchGrid:
         x = cells.x0_m + (column + 0.5) * CELL_M + s.offset_m[layer, 0]
         y = cells.y0_m + (line + 0.5) * CELL_M + s.offset_m[layer, 1]
         z, lag = np.zeros(len(chosen)), np.zeros(len(chosen))
-        if self.heights is not None:
-            z, lag = self.heights.of(cells.level[column], cells.connector[s.cell[chosen]])
-        return DrawnPoses(x, y, rotation_of(layer, len(s.offset_m)), z, lag)
+        if self._heights is not None:
+            z, lag = self._heights.of(cells.level[column], cells.connector[s.cell[chosen]])
+        turn: Floats = rotation_of(layer, len(s.offset_m)) + self._turned_rad
+        return DrawnPoses(x, y, turn, z, lag)

@@ -22,7 +22,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.localization.beacons.beliefs import empty_beliefs
 from echostep.localization.echoes.likelihood import EchoModel
-from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, CoarseField, CoarsePings, reweight_coarsely
+from echostep.localization.grid.search_grid import DrawnPoses, SearchGrid
 from echostep.localization.height.levels import (
     UNKNOWN_LAG_M2,
     ClimbSettings,
@@ -37,35 +37,26 @@ from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.kernels import (
     NOISE_BEND,
     NOISE_TURN,
-    begin_segment,
     effective_size,
-    end_segment,
-    piece_of,
-    propagate,
     systematic,
 )
 from echostep.localization.particles.particles import GATHERED_REST, Particles
 from echostep.localization.particles.reweighting import CloudModel, EchoMemory, MoveProgress, propagate_and_reweight
-from echostep.localization.particles.sampling import heaviest, kld_size, log_mode_weight, spread_evenly
+from echostep.localization.particles.sampling import kld_size, log_mode_weight, spread_evenly
 from echostep.localization.particles.start import ANY_LEVEL, Air, Start, draw_poses, near_count
 from echostep.localization.settings import CloudSettings
-from echostep.path import bend_of
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
-from echostep.walls.level_sheet import LevelSheet
+from echostep.walls.level_sheet import LevelSheet, level_of
 
 SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never so large
 CONTRACTED = 2  # times the least size, up to which a cloud is contracted, assumed
-# Bend of a move, as a share of its chord, above which a coarse cloud uses no ping: an uncertain turn of 45 degrees
-COARSE_BEND = bend_of(math.radians(45.0))
-COARSE_REST = 0.03  # weight outside of few cells, or of one place, below which a cloud is no longer coarse, assumed
+# Weight outside of one place below which a search has found it, on one level, and on several after so many metres of search: only exact likelihoods
+# discriminate between levels that are alike; assumed
+FOUND_REST, LEVELS_REST, LEVELS_M = 0.03, 0.1, 10.0
+SHOWN = 5_000  # particles that show a search
+SCATTERED_SHARE = 0.8  # weight of a search that stays about its places after a move that was not observed, assumed
 START_SIZE = 6_000  # least particles at the start: enough of them in the tails of its distribution (`start`)
-COARSE_SD_M = 3.0  # standard deviation of a start's place above which its cloud is coarse: a room
-# Log-weight that crossing a wall costs a coarse cloud: its particles are a step apart
-COARSE_WALL_COST = 5.0
-# The same on several levels, after so many metres: only exact likelihoods discriminate between levels that are alike
-LEVELS_REST, LEVELS_M = 0.1, 10.0
-COARSE_ROUGH = (0.1, math.radians(4.0))  # roughening (m, rad) of a coarse cloud: half its distances
 LEAST_LEVEL = 0.01  # probability of a level that counts among those on which the trunk may be, assumed
 # Particles of a second pass (about a second for 40 m), and roughening (m, rad) of the places tried again: a coarse place is off by so much
 PASSING, PASSING_ROUGH = 5_000, (0.5, math.radians(2.0))
@@ -84,8 +75,8 @@ class Evidence(NamedTuple):
 class Cloud(Particles):
     """Particles as flat arrays of n; `log_weight` is normalised to a maximum of 0.
 
-    A cloud is coarse, scattered or contracted by its number of particles, gathered or in one place by its spread: see the properties of these names.
-    `is_coarse`: it would need more particles than `CloudSettings.largest`, and echoes are looked up in a table. `is_gathered`: since it last was
+    A cloud is scattered or contracted by its number of particles, gathered or in one place by its spread: see the properties of these names.
+    `grid`: of a search, until it has found the place; the particles only show it, and are drawn from it anew after each move. `is_gathered`: since it last was
     scattered by an unobserved move, less than GATHERED_REST of its weight was once farther than GATHERED_M from its mean on the sheet of levels.
     `rescues`: how often all particles crossed a wall.
     """
@@ -104,38 +95,61 @@ class Cloud(Particles):
         self._lag_variance = UNKNOWN_LAG_M2 if start.air is None else start.air.sd_m**2
         self._settings = settings
         self._rng = rng
-        self._coarse_pings = CoarsePings()
+        self.grid: SearchGrid | None = None
         self.rescues = 0
         self.is_gathered = False
         self.is_on_any_level = (
             self.sheet is not None and start.pose is None and start.level == ANY_LEVEL and start.air is None
         )
-        self.is_coarse = start.pose is None or start.sd_m > COARSE_SD_M
-        self._draw(start, settings.searching if self.is_coarse else settings.largest, walk_heading_rad, floor)
+        x_m, y_m, heading = draw_poses(start, settings.largest, floor, self.sheet, rng)
+        z_m = self.sheet.height_m[level_of(x_m, self.sheet)] if self.sheet else np.zeros(len(x_m))
+        if start.near_z_m is not None:
+            z_m[: near_count(len(x_m))] = start.near_z_m
+        lag_m = np.full(len(x_m), 0.0 if start.air is None else start.air.zero_m)
+        self._put(DrawnPoses(x_m, y_m, heading - walk_heading_rad, z_m, lag_m))
         wanted = max(self._wanted_size(), START_SIZE)
         if wanted < settings.largest:
-            self.is_coarse = False
             self.keep(np.arange(min(wanted, len(self.x_m))))
-        if not self.is_coarse:
-            self.draw_veer()
+        self._draw_veer()
 
-    def _draw(self, start: Start, count: int, walk_heading_rad: float, floor: Floor) -> None:
-        """Draw so many particles from the start."""
-        self.x_m, self.y_m, heading = draw_poses(start, count, floor, self.sheet, self._rng)
-        self.turn_rad: Floats = heading - walk_heading_rad
+    def _put(self, poses: DrawnPoses) -> None:
+        """Replace the particles by others with these poses, of which nothing else is known yet."""
+        self.x_m, self.y_m, self.turn_rad, self.z_m, self.lag_m = poses
+        count = len(self.x_m)
         self.scale: Floats = 1.0 + self._settings.start_scale_sd * self._rng.standard_normal(count)
         self.veer_rad_m: Floats = np.zeros(count)
-        self.lag_m: Floats = np.full(count, 0.0 if start.air is None else start.air.zero_m)
         self.log_weight: Floats = np.zeros(count)
         self.hidden: Floats = np.zeros((2, count))
         self.bend: Floats = np.zeros(count)
         self.beliefs = empty_beliefs(count, 0)
-        self.z_m: Floats = self.sheet.height_m[self.level] if self.sheet else np.zeros(count)
-        if start.near_z_m is not None:
-            self.z_m[: near_count(count)] = start.near_z_m
 
-    def draw_veer(self) -> None:
-        """Draw each particle's veer; not while the cloud is coarse, since its particles are too few to sample one more dimension."""
+    @property
+    def is_searching(self) -> bool:
+        """Whether the place is searched on a grid."""
+        return self.grid is not None
+
+    def show_search(self) -> None:
+        """Draw particles from the grid; if it has found the place, so many as a cloud of its own needs, and the search is over."""
+        grid = self.grid
+        if grid is None:
+            return
+        self._put(grid.draw(SHOWN, self._rng))
+        rest = FOUND_REST if self.sheet is None or grid.path_m < LEVELS_M else LEVELS_REST
+        if self.place_share > 1.0 - rest:
+            self.grid = None
+            self._put(grid.draw(self._settings.largest, self._rng))
+            self._resample(self.log_weight, self.log_weight, min(self._wanted_size(), self._settings.largest))
+            self._draw_veer()
+
+    def show_every_state(self) -> None:
+        """Let the particles of a search be all states of the grid."""
+        if self.grid is not None:
+            poses, log_weight = self.grid.every()
+            self._put(poses)
+            self.log_weight = log_weight
+
+    def _draw_veer(self) -> None:
+        """Draw each particle's veer."""
         sd_rad_m = math.radians(self._settings.start_veer_sd_deg)
         if sd_rad_m > 0.0:  # otherwise nothing is drawn: a walk on foot stays the same to the bit
             self.veer_rad_m = sd_rad_m * self._rng.standard_normal(len(self.x_m))
@@ -182,38 +196,15 @@ class Cloud(Particles):
             self.resample_if_needed()
         return Evidence(log_evidence, log_passed)
 
-    def propagate_and_reweight_coarsely(
-        self, move: Move, pings: PingBatch, model: EchoModel, walls: Walls, field: CoarseField
-    ) -> None:
-        """The same for a coarse cloud: the pings that `CoarsePings` takes, looked up in the table, and none in a turn."""
-        length, table, done = math.hypot(move.dx_m, move.dy_m), np.empty(OUTSIDE_ENTRY + 1), 0.0
-        is_turning = math.hypot(move.bend_x_m, move.bend_y_m) > COARSE_BEND * length
-        noise, used = self._noise(move, 1.0), self._coarse_pings
-        for k, share in enumerate([*pings.share.tolist(), 1.0]):
-            is_end = k == len(pings.share)
-            ping = None if is_end or is_turning else used.take(pings, k, share * length)
-            if ping is None and not is_end:
-                continue
-            if share > done:
-                noise = noise if noise.shape[1] == len(self.x_m) else self._noise(move, 1.0)
-                piece = piece_of(move, done, share)
-                arrays = begin_segment(self.arrays)
-                top, _ = propagate(
-                    self.arrays, arrays, piece, share - done, noise, math.exp(-COARSE_WALL_COST), walls.index
-                )
-                end_segment(self.arrays, arrays, top)
-                done = share
-            if ping is not None:
-                reweight_coarsely(self.arrays, ping, field, model, table)
-            self.resample_if_needed()
-        used.odometer.add(length)
-
     def change_levels(self, move: Move, change: HeightChange) -> None:
         """Update heights and levels after a move, reweight by them, and resample when too few particles carry the weight."""
         if self.sheet is None:
             return
         if math.isfinite(change.height_sd_m):
             self._lag_variance += self._climbing.drift_m**2 * change.span_s
+        if self.grid is not None:
+            self._lag_variance = self.grid.change_levels(change, self._lag_variance)
+            return
         noise = self._rng.standard_normal(len(self.x_m))
         heights = HeightArrays(self.z_m, self.lag_m)
         self._lag_variance = change_levels(
@@ -270,7 +261,10 @@ class Cloud(Particles):
         return Air(mean, math.sqrt(self._lag_variance + float(weight @ (self.lag_m - mean) ** 2)))
 
     def scatter(self, move: Move, change: HeightChange | None = None) -> None:
-        """Spread by an unobserved move without regard to walls, since its path is unknown. The level is that of the height by pressure, if any."""
+        """Spread by an unobserved move without regard to walls, since its path is unknown. The level is that of the height by pressure, if any.
+
+        A search begins anew about where this led to.
+        """
         self.keep(systematic(np.exp(self.log_weight), float(self._rng.random()), self._settings.largest))
         self.is_gathered = False
         noise = self._rng.standard_normal((3, len(self.x_m)))
@@ -280,12 +274,27 @@ class Cloud(Particles):
         self.y_m += s * move.dx_m + c * move.dy_m + move.sd_m * noise[1]
         if self.sheet and change and math.isfinite(change.height_sd_m):
             set_levels_by_pressure(self.x_m, HeightArrays(self.z_m, self.lag_m), change.height_m, self.sheet)
+        if self.grid is not None:
+            self.grid.begin_about(self.x_m, self.y_m, self.turn_rad, SCATTERED_SHARE)
+
+    def turn_walk_frame(self, by_rad: float) -> None:
+        """Rotate all particles: the heading in the walk frame has changed while the wearer's heading on the map has not."""
+        self.turn_rad = self.turn_rad + by_rad
+        if self.grid is not None:
+            self.grid.turn_walk_frame(by_rad)
 
     def reweight(self, log_factor: Floats) -> None:
-        """Multiply the weights by factors, given as logarithms (n,), and resample when too few particles carry the weight."""
+        """Multiply the weights by factors, given as logarithms (n,), and resample when too few particles carry the weight.
+
+        Those of a search are its states (`show_every_state`).
+        """
         self.log_weight = self.log_weight + log_factor
         self.log_weight -= self.log_weight.max()
-        self.resample_if_needed()
+        if self.grid is None:
+            self.resample_if_needed()
+        else:
+            self.grid.reweight(self.log_weight)
+            self.show_search()
 
     def resample_if_needed(self) -> None:
         """Systematic resampling [Kitagawa 1996] when too few particles carry the weight.
@@ -302,21 +311,12 @@ class Cloud(Particles):
         if effective_size(np.exp(wanted_weight)) >= self._settings.resample_below * len(self.x_m):
             return
         self._resample(wanted_weight, weight_after, len(self.x_m))
-        wanted = self._wanted_size()
-        self.is_coarse = self.is_coarse and wanted > self._settings.largest and self.place_share <= 1.0 - self._rest
-        count = self._settings.searching if self.is_coarse else min(wanted, self._settings.largest)
+        count = min(self._wanted_size(), self._settings.largest)
         if count != len(self.x_m):
             self._resample(np.zeros(len(self.x_m)), self.log_weight, count)
         self.is_gathered = self.is_gathered or self.far_weight(self.x_m) < GATHERED_REST
-        if self.is_coarse:
-            self._roughen(*COARSE_ROUGH)
-        elif self.is_scattered:
+        if self.is_scattered:
             self._roughen(self._settings.rough_m, math.radians(self._settings.rough_deg))
-
-    @property
-    def _rest(self) -> float:
-        """Weight outside of one place below which the cloud is no longer coarse."""
-        return COARSE_REST if self.sheet is None or self._coarse_pings.odometer.path_m < LEVELS_M else LEVELS_REST
 
     def _resample(self, log_wanted: Floats, log_weight: Floats, count: int) -> None:
         """Keep `count` particles with these log-probabilities (n,), each with its log-weight (n,)."""
@@ -362,7 +362,5 @@ class Cloud(Particles):
         self.turn_rad += rough_rad * noise[2]
 
     def _wanted_size(self) -> int:
-        """Size for the present spread; the lightest of a coarse cloud, COARSE_REST of its weight, do not count."""
-        counted = heaviest(self.weight, 1.0 - COARSE_REST) if self.is_coarse else slice(None)
-        size = kld_size(self.x_m[counted], self.y_m[counted], self.turn_rad[counted], self._settings)
-        return max(size, self._least_size)
+        """Size for the present spread."""
+        return max(kld_size(self.x_m, self.y_m, self.turn_rad, self._settings), self._least_size)

@@ -33,12 +33,6 @@ def log_mode_weight(x_m: Floats, y_m: Floats, turn_rad: Floats, weight: Floats) 
     return np.log(np.maximum(mass, LEAST_MODE))[cell]
 
 
-def heaviest(weight: Floats, share: float) -> Ints:
-    """The particles that carry this share of the weight."""
-    order = np.argsort(-weight)
-    return order[: int(np.searchsorted(np.cumsum(weight[order]), share)) + 1]
-
-
 def kld_size(x_m: Floats, y_m: Floats, turn_rad: Floats, settings: CloudSettings) -> int:
     """Size for the spread of particles (n,), from the number of cells that hold some [Fox 2003, eq. 7]; 0 where all are in one."""
     cells = np.floor(x_m / settings.cell_m)

@@ -75,7 +75,7 @@ def draw_poses(
 ) -> tuple[Floats, Floats, Floats]:
     """x, y on the sheet (m) and heading (rad), each (count,)."""
     if start.pose is None:
-        x, y, heading = _on_floor(_within(floor, start, sheet), count, rng)
+        x, y, heading = _on_floor(allowed_floor(floor, start, sheet), count, rng)
         return (x, y, heading) if start.near is None else _drawn_near(start.near, x, y, heading, sheet, rng)
     is_wide = rng.random(count) < (WIDE_SHARE if len(floor.x_m) else 0.0)  # without walls nothing would correct it
     sd_m = np.where(is_wide, math.hypot(start.sd_m, WIDE_SD_M), start.sd_m)
@@ -113,7 +113,7 @@ def _levels(level: int, count: int, sheet: LevelSheet) -> Ints:
     return np.arange(count) % len(sheet.height_m) if level == ANY_LEVEL else np.full(count, level)
 
 
-def _within(floor: Floor, start: Start, sheet: LevelSheet | None) -> Floor:
+def allowed_floor(floor: Floor, start: Start, sheet: LevelSheet | None) -> Floor:
     """The cells of the floor that a start without a pose allows; all of them where a room has none."""
     level = np.zeros(len(floor.x_m), np.int64) if sheet is None else level_of(floor.x_m, sheet)
     allowed = np.ones(len(level), np.bool_) if start.level == ANY_LEVEL else level == start.level

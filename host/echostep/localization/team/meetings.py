@@ -168,6 +168,7 @@ def places_at(cloud: Cloud, meeting: Meeting) -> Floats:
 
 def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
     """Reweight a cloud by a meeting on a floor of this area; returns the probability that the meeting is right, given the cloud."""
+    cloud.show_every_state()
     place = places_at(cloud, meeting)
     if cloud.sheet is None:
         on_level, levels = np.full(len(place), meeting.level == 0), 1
@@ -179,7 +180,7 @@ def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
     anywhere = 1.0 / (area_m2 if meeting.range_m is None else math.sqrt(area_m2))
     density = (1.0 - wrong) * float(weight @ np.exp(log_met))
     right = density / (density + wrong * anywhere)
-    factor = log_met if cloud.is_coarse else _intersection(meeting, place, weight, log_met) if right >= FITS else None
+    factor = log_met if cloud.is_searching else _intersection(meeting, place, weight, log_met) if right >= FITS else None
     if factor is not None:  # a cloud that is concentrated elsewhere is not changed
         factor = meeting.share * factor
         factor -= factor.max()

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: MIT
+"""The grid of a start that is not known: evenly over the floor, and about a place where there is one.
+
+In: a `Start`, the cells of the building, its floor. Out: a `SearchGrid`. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from echostep.localization.grid.cells import GridCells
+from echostep.localization.grid.heights import GridHeights
+from echostep.localization.grid.search_grid import SearchGrid
+from echostep.localization.particles.start import NEAR_SHARE, Start, allowed_floor, draw_poses, near_count
+from echostep.localization.settings import FilterSettings
+from echostep.walls.floor import Floor
+from echostep.walls.level_sheet import LevelSheet
+
+ROOM_SD_M = 3.0  # standard deviation of a start's place above which it is searched: a room
+DRAWN = 20_000  # poses that stand for a place with a spread
+
+
+def is_unknown(start: Start) -> bool:
+    """Whether the place is searched, as more than particles about a pose."""
+    return start.pose is None or start.sd_m > ROOM_SD_M
+
+
+def grid_of(
+    start: Start, walk_heading_rad: float, cells: GridCells, floor: Floor, sheet: LevelSheet | None,
+    settings: FilterSettings, rng: np.random.Generator,
+) -> SearchGrid:  # fmt: skip
+    """The grid of an unknown start. `walk_heading_rad`: the trunk's heading in the walk frame at the start."""
+    sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
+    allowed = allowed_floor(floor, start, sheet)
+    heights = None if sheet is None else GridHeights(sheet, settings.climb, start)
+    grid = SearchGrid(cells, (allowed.x_m, allowed.y_m), heights, math.radians(settings.cloud.start_veer_sd_deg))
+    count, share = (DRAWN, 1.0) if start.pose is not None else (near_count(DRAWN), NEAR_SHARE)
+    if start.pose is not None or start.near is not None:
+        x, y, heading = (drawn[:count] for drawn in draw_poses(start, DRAWN, allowed, sheet, rng))
+        grid.begin_about(x, y, heading - walk_heading_rad, share)
+    return grid
