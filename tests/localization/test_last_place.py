@@ -13,7 +13,7 @@ from echostep.localization.building import Building
 from echostep.localization.height.levels import ClimbSettings
 from echostep.localization.map_filter import UNOBSERVED_DOUBT, MapFilter
 from echostep.localization.particles.start import Air, Start
-from echostep.localization.settings import CloudSettings, FilterSettings
+from echostep.localization.settings import FilterSettings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.tracker.last_place import MOVED_M, LastPlace, start_after
 from echostep.walls.level_sheet import lay_out_levels
@@ -22,7 +22,7 @@ from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tower
 ZERO_M = 100.0  # height by pressure on the lowest floor
 AWAY_S = 60.0
 CLIMBING = ClimbSettings()
-SETTINGS = FilterSettings(CloudSettings(searching=5_000))
+SETTINGS = FilterSettings()
 
 
 def filter_of(start: Start) -> MapFilter:

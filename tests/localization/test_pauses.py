@@ -11,7 +11,7 @@ import pytest
 from echostep.localization.building import Building
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.start import Start
-from echostep.localization.settings import CloudSettings, FilterSettings
+from echostep.localization.settings import FilterSettings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
 from echostep.walls.level_sheet import lay_out_levels
@@ -19,7 +19,7 @@ from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tower
 
 PAUSE_S = 20.0  # a ride over two storeys
 FIRST_M = 100.0  # height by pressure on the lowest floor
-SETTINGS = FilterSettings(CloudSettings(searching=5_000))  # the search is not what is judged here
+SETTINGS = FilterSettings()
 
 
 def standing(t0_s: float, height_m: float, barometer_starts: int = 0) -> MeasuredSegment:

@@ -14,7 +14,7 @@ from echostep.localization.building import Building
 from echostep.localization.estimate import SURE, Estimate, TrackStatus
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.start import Start
-from echostep.localization.settings import UNPLANNED_DOOR, CloudSettings, FilterSettings
+from echostep.localization.settings import UNPLANNED_DOOR, FilterSettings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
 from echostep.walls.echo_sources import Walls
@@ -27,9 +27,8 @@ BEFORE = 6.0  # log-odds of a believed cloud
 
 def after_failed_searches(failed: int, confirmed_m: float = 0.0) -> Estimate:
     """The estimate at the end of a step from a known place, after so many failed searches and so much path of a believed cloud."""
-    settings = FilterSettings(cloud=CloudSettings(searching=5_000))
     start = Start(Pose(6.0, 4.0, 0.0), 0.05)
-    map_filter = MapFilter(ROOM, start, 0.0, np.random.default_rng(1), settings)
+    map_filter = MapFilter(ROOM, start, 0.0, np.random.default_rng(1), FilterSettings())
     for _ in range(failed):
         map_filter._plan.fail_search()
     map_filter._plan.confirm(confirmed_m)

@@ -18,7 +18,7 @@ from echostep.localization.motion import height_change, move_of
 from echostep.localization.particle_arrays import Move
 from echostep.localization.particles.cloud import PASSING, Cloud
 from echostep.localization.particles.start import Air, Start
-from echostep.localization.settings import CloudSettings, FilterSettings
+from echostep.localization.settings import CloudSettings
 from echostep.localization.window import MOST_PIECES, PAST_M, RecentWay
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan, Pose
@@ -94,9 +94,8 @@ def level_shares(where: Building, start: Start = ANYWHERE) -> list[float]:
 
 
 def tracked(where: Building) -> list[Estimate]:
-    """Estimates from an unknown start, by a small search."""
-    settings = FilterSettings(cloud=CloudSettings(searching=60_000))
-    filtered = MapFilter(where, Start(), walk().segments[0].segment.heading0_rad, np.random.default_rng(1), settings)
+    """Estimates from an unknown start."""
+    filtered = MapFilter(where, Start(), walk().segments[0].segment.heading0_rad, np.random.default_rng(1))
     return [filtered.update(measured) for measured in segments(WALKED_M)]
 
 

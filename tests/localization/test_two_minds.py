@@ -42,7 +42,7 @@ def hypothetical(at: Pose, log_odds: float) -> CloudHypothesis:
 
 def of_two_minds(log_odds: float, search_log_odds: float, evidence_m: float, at: Pose = THERE) -> MapFilter:
     """A filter that tracks HERE with these log-odds, and whose search says `at` with others."""
-    settings = FilterSettings(cloud=CloudSettings(size=100, largest=1000, searching=2_000))
+    settings = FilterSettings(cloud=CloudSettings(size=100, largest=1000))
     two = MapFilter(ROOM, Start(HERE), 0.0, np.random.default_rng(1), settings)
     two.tracked = hypothetical(HERE, log_odds)
     two.search = hypothetical(at, search_log_odds)

@@ -20,17 +20,17 @@ from echostep.localization.echoes.range_table import (
     SECTORS,
     UNIT_M,
     CoarsePing,
+    coarse_field,
     log_densities,
-    reweight_coarsely,
 )
-from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep.walls.floor import CELL_M
 
 ROOM = Building(
     Walls(np.array([[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0, 8, 0, 0], [3, 0, 3, 5]], float)), None
 )
 MODEL = echo_model(EchoSettings())
-FIELD = ROOM.field(MODEL)
+FIELD = coarse_field(ROOM.walls, ROOM.floor, MODEL)
 EAST, NORTH_EAST = 0.0, math.radians(37.5)
 ROOM_FOR_TABLE = np.empty(CHANCES * RANGES + 1)
 
@@ -46,10 +46,12 @@ def traced(x_m: float, y_m: float, axis_rad: float) -> tuple[float, float]:
 
 def log_density(x_m: float, y_m: float, axis_rad: float, range_m: float, after: int = AFTER_ECHO) -> float:
     """Of one ping (range 0: none) at a place, less that in the middle of the hall, where nothing is in reach."""
-    pair = np.array([x_m, 4.6]), np.array([y_m, 4.1]), np.array([axis_rad, EAST]), np.ones(2), np.zeros(2)
-    particles = ParticleArrays(*pair)
-    reweight_coarsely(particles, CoarsePing(0.0, range_m, 1.0, 0.0, after), FIELD, MODEL, ROOM_FOR_TABLE)
-    return float(particles.log_weight[0] - particles.log_weight[1])
+    log_densities(CoarsePing(0.0, range_m, 1.0, 0.0, after), MODEL, ROOM_FOR_TABLE)
+    here, hall = (
+        ROOM_FOR_TABLE[FIELD.expected[FIELD.row[int((y - FIELD.y0_m) / CELL_M), int((x - FIELD.x0_m) / CELL_M)], sector]]
+        for x, y, sector in ((x_m, y_m, int(axis_rad / (2.0 * math.pi) * SECTORS)), (4.6, 4.1, 0))
+    )
+    return float(here - hall)
 
 
 @pytest.mark.parametrize("seed", range(5))

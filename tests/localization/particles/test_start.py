@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from echostep.localization.building import Building
-from echostep.localization.particles.cloud import Cloud
-from echostep.localization.particles.start import ANY_LEVEL, NEAR_SD_M, NEAR_SHARE, Start, draw_poses, near_count
-from echostep.localization.settings import CloudSettings
+from echostep.localization.particles.start import ANY_LEVEL, NEAR_SD_M, NEAR_SHARE, Start, draw_poses
 from echostep.plan.model import Pose
 from echostep.walls.level_sheet import lay_out_levels, level_of
 from echostep_studies.simulation.tower import LIFT_AT, tower
@@ -27,14 +25,3 @@ def test_near_a_place_of_unknown_level_is_above_and_below_it_too() -> None:
     is_near = np.hypot(x - level * laid_out.sheet.pitch_m - near.x_m, y - near.y_m) < 3.0 * NEAR_SD_M
     assert np.bincount(level[is_near]) == pytest.approx(NEAR_SHARE * COUNT / STOREYS, rel=0.2)
     assert abs(np.exp(1j * heading[is_near]).mean()) < 0.05
-
-
-def test_a_search_beside_a_cloud_on_stairs_begins_between_two_levels() -> None:
-    laid_out = lay_out_levels(tower(STOREYS))
-    building = Building(laid_out.walls, laid_out.sheet)
-    start = Start(near=Pose(*LIFT_AT, 0.0, 1), near_z_m=4.2)
-    rng = np.random.default_rng(1)
-    cloud = Cloud(CloudSettings(searching=COUNT), start, 0.0, rng, laid_out.sheet, None, building.floor)
-    near = near_count(COUNT)
-    assert (cloud.z_m[:near] == start.near_z_m).all()
-    assert (cloud.z_m[near:] == laid_out.sheet.height_m[cloud.level[near:]]).all()

@@ -224,7 +224,7 @@ def test_a_doubted_cloud_moves_to_the_teammate_after_a_tap() -> None:
 
 def test_an_unknown_start_is_found_by_a_meeting() -> None:
     lost = MapFilter(BUILDING, Start(), 0.0, np.random.default_rng(4))
-    assert lost.cloud.is_coarse
+    assert lost.cloud.is_searching
     assert lost.meet(FAR) is MeetingEffect.USED
     near = np.hypot(lost.cloud.map_x_m - 20.0, lost.cloud.y_m - 2.0) < 2.5
     assert float(lost.cloud.weight @ near) > 0.95
