@@ -1,45 +1,28 @@
 # SPDX-License-Identifier: MIT
-"""The cloud of an unknown start: how much a ping tells it, when it turns fine, and when it is begun anew."""
+"""A search of the building: which pings it takes, when it has found a place, and when it is begun anew."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from echostep.localization.belief import DOUBTED, FOUND_WITHIN_M, PLAN_FITS
 from echostep.localization.building import Building
-from echostep.localization.echoes.likelihood import EchoSettings, echo_model
-from echostep.localization.echoes.range_table import AFTER_ECHO, AFTER_SILENCE, INDEPENDENT_M, USED_M, CoarsePings
+from echostep.localization.echoes.range_table import AFTER_ECHO, AFTER_SILENCE, INDEPENDENT_M, USED_M, TablePings
+from echostep.localization.grid.search_grid import SearchGrid
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.particle_arrays import Move, PingBatch
-from echostep.localization.particles.cloud import COARSE_REST, Cloud
+from echostep.localization.particle_arrays import PingBatch
+from echostep.localization.particles.cloud import FOUND_REST, Cloud
 from echostep.localization.particles.start import Start
-from echostep.localization.settings import CloudSettings, FilterSettings
-from echostep.path import MeasuredSegment, PathSegment
+from echostep.localization.settings import CloudSettings
+from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 from echostep.walls.echo_sources import Walls
 
 NONE, NO_RANGERS = np.zeros(0), np.zeros(0, np.int64)
-SILENCE = PingBatch(NONE, NONE, NONE, NONE, NO_RANGERS, NONE, NONE, NONE, NONE)
 ROOM = Building(Walls(np.array([[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0, 8, 0, 0]], float)), None)
-MODEL = echo_model(EchoSettings())
-SETTINGS = CloudSettings(searching=30_000)
 STEP_M = 0.5
-MORE_CELLS = 500  # largest exact cloud, less than what the cells of one place ask for
-
-
-def coarse_cloud(resample_below: float = 0.5, largest: int = SETTINGS.largest) -> Cloud:
-    settings = replace(SETTINGS, resample_below=resample_below, largest=largest)
-    return Cloud(settings, Start(), 0.0, np.random.default_rng(1), floor=ROOM.floor)
-
-
-def gather(cloud: Cloud, share: float) -> None:
-    """Give the particles within half a metre of the middle of the room this share of the weight."""
-    near = np.hypot(cloud.x_m - 6.0, cloud.y_m - 4.0) < 0.5
-    cloud.log_weight = np.where(near, math.log(share / near.sum()), math.log((1.0 - share) / (~near).sum()))
-    cloud.log_weight -= cloud.log_weight.max()
 
 
 def pings(range_m: float, count: int) -> PingBatch:
@@ -48,32 +31,36 @@ def pings(range_m: float, count: int) -> PingBatch:
     return PingBatch(0.0 * one, one, range_m * one, one, np.zeros(count, np.int64), one, 0.0 * one, one, one)
 
 
-def told(way_m: float) -> float:
-    """The range of the log-weights after one ping, this way after one of the same ranger."""
-    ping, cloud = pings(1.2, 1), coarse_cloud(resample_below=0.0)
-    for move, batch in ((Move(0.0, 0.0, 0.0, 0.0), ping), (Move(way_m, 0.0, 0.0, 0.0), SILENCE)):
-        cloud.propagate_and_reweight_coarsely(move, batch, MODEL, ROOM.walls, ROOM.field(MODEL))
-    cloud.log_weight[:] = 0.0
-    cloud.propagate_and_reweight_coarsely(Move(0.0, 0.0, 0.0, 0.0), ping, MODEL, ROOM.walls, ROOM.field(MODEL))
-    return float(np.ptp(cloud.log_weight))
+def gather(grid: SearchGrid, share: float) -> None:
+    """Give this share of the weight to the middle of the room, and the rest to all of it."""
+    there = np.full(50, 6.05), np.full(50, 4.05), np.linspace(0.0, 6.2, 50)
+    grid.begin_about(*there, share)
 
 
-@pytest.mark.long
-def test_a_ping_tells_by_the_way_since_the_one_before() -> None:
-    whole = told(INDEPENDENT_M)
-    assert told(0.5 * INDEPENDENT_M) == pytest.approx(0.5 * whole, rel=0.05)
-    assert told(3.0 * INDEPENDENT_M) == pytest.approx(whole, rel=0.05)
+def searching(map_filter: MapFilter) -> SearchGrid:
+    assert map_filter.cloud.grid is not None
+    return map_filter.cloud.grid
+
+
+def test_a_ping_counts_by_the_way_since_the_one_before() -> None:
+    used, powers = TablePings(), []
+    for way_m in (0.0, 0.5 * INDEPENDENT_M, 3.0 * INDEPENDENT_M):
+        used.odometer.add(way_m)
+        ping = used.take(pings(1.2, 1), 0, 0.0)
+        assert ping is not None
+        powers.append(ping.power)
+    assert powers == pytest.approx([1.0, 0.5, 1.0])
 
 
 def test_pings_from_nearly_one_place_are_used_once() -> None:
-    used, both = CoarsePings(), pings(1.2, 2)
+    used, both = TablePings(), pings(1.2, 2)
     assert used.take(both, 0, 0.0) is not None
     assert used.take(both, 1, 0.9 * USED_M) is None
     assert used.take(both, 1, 1.1 * USED_M) is not None
 
 
 def test_a_ping_knows_whether_that_before_it_was_silent() -> None:
-    used, after = CoarsePings(), []
+    used, after = TablePings(), []
     for range_m in (0.0, 1.2, 0.0, 0.0):
         ping = used.take(pings(range_m, 1), 0, 0.0)
         assert ping is not None
@@ -82,18 +69,73 @@ def test_a_ping_knows_whether_that_before_it_was_silent() -> None:
     assert after == [AFTER_SILENCE, AFTER_SILENCE, AFTER_ECHO, AFTER_SILENCE]
 
 
-@pytest.mark.parametrize(
-    ("share", "rest_away_m", "is_coarse"),
-    [(0.8, 0.0, True), (1.0 - 0.3 * COARSE_REST, 0.0, False), (1.0 - 0.9 * COARSE_REST, 200.0, False)],
-)
-def test_a_cloud_is_fine_when_nearly_all_of_its_weight_is_in_one_place(
-    share: float, rest_away_m: float, is_coarse: bool
-) -> None:
-    cloud = coarse_cloud(largest=MORE_CELLS)
-    gather(cloud, share)
-    cloud.x_m = cloud.x_m + np.where(cloud.log_weight < 0.0, rest_away_m, 0.0)
-    cloud.resample_if_needed()
-    assert cloud.is_coarse == is_coarse
+@pytest.mark.parametrize(("share", "is_searching"), [(0.8, True), (1.0 - 0.3 * FOUND_REST, False)])
+def test_a_search_is_over_when_nearly_all_of_its_weight_is_in_one_place(share: float, is_searching: bool) -> None:
+    map_filter = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
+    gather(searching(map_filter), share)
+    map_filter.cloud.show_search()
+    assert map_filter.cloud.is_searching == is_searching
+    near = np.hypot(map_filter.cloud.x_m - 6.05, map_filter.cloud.y_m - 4.05) < 0.5
+    assert float(map_filter.cloud.weight @ near) == pytest.approx(share, abs=0.02)
+
+
+def test_particles_show_a_search_as_it_is_weighed() -> None:
+    """As a meeting does: by every state of the grid."""
+    cloud = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)).cloud
+    assert cloud.grid is not None
+    cloud.show_every_state()
+    assert len(cloud.x_m) == len(cloud.grid)
+    cloud.reweight(np.where(cloud.x_m < 6.0, -3.0, 0.0))
+    east = float(cloud.weight @ (cloud.x_m > 6.0))
+    assert east == pytest.approx(1.0 / (1.0 + math.exp(-3.0)), abs=0.02)
+
+
+def test_a_search_turns_with_the_walk_frame() -> None:
+    """Straight ahead is where it was on the map, and so is the heading."""
+    map_filter = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
+    grid = searching(map_filter)
+    grid.begin_about(np.full(9, 6.05), np.full(9, 4.05), np.full(9, 0.1), 1.0)
+    map_filter.turn_walk_frame(0.5 * math.pi)
+    map_filter.update(MeasuredSegment(a_step(0.0, -1.0), NONE, NO_RANGERS, NONE))
+    place = map_filter.cloud
+    assert float(place.weight @ place.x_m) == pytest.approx(7.05, abs=0.15)
+    assert float(place.weight @ place.turn_rad) == pytest.approx(0.1 + 0.5 * math.pi, abs=0.1)
+
+
+def a_step(dx_m: float, dy_m: float, k: int = 0) -> PathSegment:
+    return PathSegment(k, k + 1.0, dx_m, dy_m, 0.0, 0.0, sd_m=0.01, turn_sd_rad=0.001, step=k, anchor_sd_m=0.0)
+
+
+def test_a_search_that_has_left_all_ground_begins_anew() -> None:
+    map_filter = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
+    for k in range(60):
+        map_filter.update(MeasuredSegment(a_step(2.0, 0.0, k), NONE, NO_RANGERS, NONE))
+    assert np.isfinite(map_filter.cloud.x_m).all()
+    assert len(searching(map_filter)) > 0
+
+
+def test_a_search_that_moves_unobserved_begins_about_where_it_was() -> None:
+    cloud = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)).cloud
+    assert cloud.grid is not None
+    gather(cloud.grid, 0.9)
+    cloud.show_search()
+    step = PathSegment(0.0, 2.0, 0.0, 0.0, 0.0, 0.0, sd_m=1.1 * UNOBSERVED_SD_M, turn_sd_rad=0.1, step=0)
+    assert step.unobserved
+    after = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
+    after.tracked.cloud = cloud
+    after.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE))
+    cloud.show_search()
+    assert 0.5 < float(cloud.weight @ (np.hypot(cloud.x_m - 6.05, cloud.y_m - 4.05) < 3.0 * step.sd_m)) < 0.95
+
+
+def test_a_search_in_a_room_begins_there() -> None:
+    outline = np.array([[0, 0], [6, 0], [6, 8], [0, 8]], float)
+    grid = searching(MapFilter(ROOM, Start(room_m=outline), 0.0, np.random.default_rng(1)))
+    assert grid.draw(1000, np.random.default_rng(1)).x_m.max() < 6.3
+
+
+def test_a_start_that_is_a_place_is_no_search() -> None:
+    assert not Cloud(CloudSettings(), Start(), 0.0, np.random.default_rng(1)).is_searching
 
 
 @pytest.mark.long
@@ -110,13 +152,10 @@ def test_a_search_goes_on_for_twice_the_path_within_which_one_finds(
     share: float, path_m: float, is_kept: bool, doubts_plan: bool
 ) -> None:
     """To and fro, without pings; the weights are set before the last two steps."""
-    map_filter = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1), FilterSettings(cloud=SETTINGS))
+    map_filter = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
     begun = map_filter.cloud
     for k in range(round(path_m / STEP_M)):
-        gather(map_filter.cloud, DOUBTED * 1.2 if (k + 1) * STEP_M < path_m - 3.0 * STEP_M else share)
-        step = PathSegment(
-            k, k + 1.0, STEP_M * (-1.0) ** k, 0.0, 0.0, 0.0, sd_m=0.01, turn_sd_rad=0.001, step=k, anchor_sd_m=0.0
-        )
-        estimate = map_filter.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE))
+        gather(searching(map_filter), DOUBTED * 1.2 if (k + 1) * STEP_M < path_m - 3.0 * STEP_M else share)
+        estimate = map_filter.update(MeasuredSegment(a_step(STEP_M * (-1.0) ** k, 0.0, k), NONE, NO_RANGERS, NONE))
     assert (map_filter.cloud is begun) == is_kept
     assert (estimate.plan_fits < PLAN_FITS - 0.01) == doubts_plan

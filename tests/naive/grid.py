@@ -7,9 +7,8 @@ import math
 from collections import defaultdict
 from dataclasses import dataclass, field
 
-from naive import walls as naive_walls
-
 from echostep.arrays import Floats
+from naive import walls as naive_walls
 
 State = tuple[int, int, int]  # layer, line, column
 

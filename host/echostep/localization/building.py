@@ -10,7 +10,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.localization.echoes.likelihood import EchoModel
-from echostep.localization.echoes.range_table import coarse_field
+from echostep.localization.echoes.range_table import range_table_of
 from echostep.localization.echoes.unplanned import Background, background
 from echostep.localization.estimate import Elsewhere
 from echostep.localization.grid.cells import GridCells, grid_cells
@@ -55,8 +55,8 @@ class Building:
     def cells(self, model: EchoModel) -> GridCells:
         """The cells of a search, with the ranges to expect in them."""
         if model not in self._cells:
-            field = coarse_field(self.walls, self.floor, model)
-            self._cells[model] = grid_cells(self.walls.index, field, self.sheet, self.upper_levels)
+            table = range_table_of(self.walls, self.floor, model)
+            self._cells[model] = grid_cells(self.walls.index, table, self.sheet, self.upper_levels)
         return self._cells[model]
 
     def log_loss_in_air(self, x_m: Floats, y_m: Floats, path_m: float) -> Floats | None:

@@ -203,7 +203,7 @@ def estimate(
         m = _moments_at(places[0], m, cloud, weight)
     x, y, xx, xy, yy, east, north, near, about = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
-    # A coarse cloud began anywhere: the weight of its likeliest place is the probability of that (search-several-places of the studies' notebook).
+    # A search began anywhere: the weight of its likeliest place is the probability of that (search-several-places of the studies' notebook).
     about *= 1.0 if cloud.is_searching else right.here
     status = _status(right.here * near, max(about, right.about), max(levels))
     xx, yy = xx + sd_m**2, yy + sd_m**2

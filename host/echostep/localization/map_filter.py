@@ -328,7 +328,7 @@ class MapFilter:
         """
         tracked, search = self.tracked, self.search
         self._is_refuted = self._is_refuted or tracked.plausibility.log_odds < REFUTED
-        self._note_coarse()
+        self._note_unfound()
         if self._progress.is_astray(tracked.cloud):
             self._plan.fail_search()
             self.tracked = self._new_search(Start(), walk_heading_rad)
@@ -360,10 +360,10 @@ class MapFilter:
         self.tracked, self.search, self._is_elsewhere = search, None, False
         self._plan.find(self._progress.length_m, away_m(was, self._believed(0.0)))
 
-    def _note_coarse(self) -> None:
-        """Count against the plan that a coarse search has no probable place at the end of the path within which one is usually found."""
+    def _note_unfound(self) -> None:
+        """Count against the plan that a search has no probable place at the end of the path within which one is usually found."""
         cloud = self._clouds()[-1].cloud
-        if cloud.is_searching and self._progress.note_coarse() and cloud.place_share < DOUBTED:
+        if cloud.is_searching and self._progress.note_unfound() and cloud.place_share < DOUBTED:
             self._plan.fail_search()
 
     def _doubt(self, tracked: CloudHypothesis, walk_heading_rad: float) -> bool:

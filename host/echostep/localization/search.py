@@ -2,7 +2,7 @@
 """Progress of the newest search of the building, and whether it has failed.
 
 In: the odometer of the path, the cloud of the search. Out: the conditions of `MapFilter`'s decisions. Owns the marks on the path where a
-search began and was last coarse.
+search began and had last found no place.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ class SearchProgress:
         self.log_odds_before = log_odds
         self._odometer = odometer
         self._began_m = odometer.path_m
-        self._coarse_m = 0.0  # length of the path on which it was coarse
+        self._unfound_m = 0.0  # length of the path on which it had found no place
 
     def begin(self, log_odds: float) -> None:
         """A search begins here on the path."""
-        self._began_m, self._coarse_m = self._odometer.path_m, 0.0
+        self._began_m, self._unfound_m = self._odometer.path_m, 0.0
         self.log_odds_before = log_odds
 
     @property
@@ -33,13 +33,13 @@ class SearchProgress:
         """Length of the path since the search began."""
         return self._odometer.since_m(self._began_m)
 
-    def note_coarse(self) -> bool:
-        """Note that the search is still coarse; returns whether it has just exceeded `found_within_m`."""
-        before_m, self._coarse_m = self._coarse_m, self.length_m
-        return before_m <= self.found_within_m < self._coarse_m
+    def note_unfound(self) -> bool:
+        """Note that the search has found no place yet; returns whether it has just exceeded `found_within_m`."""
+        before_m, self._unfound_m = self._unfound_m, self.length_m
+        return before_m <= self.found_within_m < self._unfound_m
 
     def is_astray(self, cloud: Cloud) -> bool:
-        """Whether a cloud is still coarse after twice `found_within_m`."""
+        """Whether a cloud has found no place after twice `found_within_m`."""
         return cloud.is_searching and self.length_m > 2.0 * self.found_within_m
 
     def has_failed(self, search: CloudHypothesis) -> bool:
@@ -50,4 +50,4 @@ class SearchProgress:
             return self.is_astray(search.cloud)
         # Levels that are alike remain several places, and a new search would not discriminate between them.
         is_probable = search.has_contracted and search.plausibility.probability > FOUND
-        return not is_probable and self.length_m > max(self.found_within_m, self._coarse_m + EARLY_M)
+        return not is_probable and self.length_m > max(self.found_within_m, self._unfound_m + EARLY_M)

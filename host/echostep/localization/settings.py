@@ -24,7 +24,8 @@ class CloudSettings:
     and of the lengths, likewise. `start_scale_sd`, `scale_sd`: of nine walks with surveyed or captured feet. `start_veer_sd_deg`: of a bias
     of the path, degrees that it turns on each metre of a straight way, as by unequal wheels; feet have none. `resample_below`: effective share of the
     cloud at which it is resampled (systematic). The size follows the spread [Fox 2003, KLD-sampling]: enough particles that the distribution over
-    cells of `cell_m`, `cell_m`, `cell_deg` is met within `kld`, at least `size`, at most `largest`. A scattered cloud is roughened by `rough_m` and `rough_deg` until it has contracted.
+    cells of `cell_m`, `cell_m`, `cell_deg` is met within `kld`, at least `size`, at most `largest`. A scattered cloud is roughened by
+    `rough_m` and `rough_deg` until it has contracted.
     `wall_cost`: log-weight that crossing a wall costs. `rescue_sd_m`: widening of a cloud that crossed a wall as a whole.
     """
 

@@ -384,9 +384,7 @@ class Tracker:
             raise EchostepError(f"the start is on level {level}, the plan has {len(self.plan.levels)}, counted from 0")
         return start
 
-    def _new_filter(
-        self, start: Start, walk_heading_rad: float, rng: np.random.Generator
-    ) -> MapFilter:
+    def _new_filter(self, start: Start, walk_heading_rad: float, rng: np.random.Generator) -> MapFilter:
         """A filter about a start."""
         s = self.settings
         echo = echo_of(self._ranger_part, s.echo)

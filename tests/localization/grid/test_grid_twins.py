@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 import pytest
-from naive.grid import NaiveGrid, State
 
 from echostep.localization.building import Building
 from echostep.localization.echoes.likelihood import EchoSettings, echo_model
@@ -16,6 +15,7 @@ from echostep.localization.grid.cells import EAST_WALL, NORTH_WALL
 from echostep.localization.grid.kernels import GridStates, halved, shift_and_weigh, spread
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import CELL_M
+from naive.grid import NaiveGrid, State
 
 WALLS = np.array([[0, 0, 6, 0], [6, 0, 6, 5], [6, 5, 0, 5], [0, 5, 0, 0], [3, 0, 3, 3.3], [4, 3.6, 6, 3.6]], float)
 ROOM = Building(Walls(WALLS), None)
@@ -136,7 +136,9 @@ def test_halved_layers_hold_each_state_twice() -> None:
     finer = halved(states)
     assert len(finer.offset_m) == 2 * LAYERS
     for side in range(2):
-        assert {(layer // 2, *place): w for (layer, *place), w in weights(finer).items() if layer % 2 == side} == weights(states)
+        assert {
+            (layer // 2, *place): w for (layer, *place), w in weights(finer).items() if layer % 2 == side
+        } == weights(states)
 
 
 def test_barriers_are_the_walls_between_middles() -> None:

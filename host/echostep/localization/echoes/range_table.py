@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""A table of the range to expect at every place of the floor and in every direction, for a cloud that is spread over the building.
+"""A table of the range to expect at every place of the floor and in every direction, for a search of the building.
 
-In: walls, their floor. Out: `CoarseField`, and `reweight_coarsely`, which looks a ping up instead of tracing it. Owns nothing.
+In: walls, their floor. Out: `RangeTable`; `log_densities` of a ping by its entries, instead of a trace; the pings that
+a search takes. Owns nothing.
 
 A cell of the floor has one row, a sector of the ranger's axis one column. A ranger's cone is wide, so its range changes little within a sector of 15
-degrees; within a cell of 25 cm it changes by as much as the cell is wide, which is in COARSE_SD_M. An entry is an expected range and the probability
+degrees; within a cell of 25 cm it changes by as much as the cell is wide, which is in TABLE_SD_M. An entry is an expected range and the probability
 of an echo at all, since walls at a grazing angle or far away seldom answer. A look-up takes a tenth of a trace's time.
 """
 
@@ -27,7 +28,7 @@ from echostep.walls.index import WallIndex
 # Assumed, not measured.
 SECTORS = 24  # of 15 degrees
 UNIT_M = 0.025  # of a range in the table, one byte
-COARSE_SD_M = 0.2  # a cell's half diagonal, and the heading's error over a sector
+TABLE_SD_M = 0.2  # a cell's half diagonal, and the heading's error over a sector
 # Of the expected ranges are off by so many times as much: edges, corners, the next wall
 FAR_SHARE, FAR_FACTOR = 0.2, 3.0
 LIKELY = 0.05  # probability of detection that the sources up to the expected range have together
@@ -45,7 +46,7 @@ USED_M = 0.25  # path between two pings of one ranger that are used: a cell of t
 INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one: walls go on
 
 
-class CoarseField(NamedTuple):
+class RangeTable(NamedTuple):
     """`row` (rows, columns): row of `expected` by cell of the grid from (x0_m, y0_m) on, or UNKNOWN.
 
     `expected` (cells, SECTORS): range in UNIT_M (0: none), and RANGES times the step of the probability of an echo, of CHANCES.
@@ -57,7 +58,7 @@ class CoarseField(NamedTuple):
     expected: np.ndarray[tuple[int, int], np.dtype[np.uint16]]
 
 
-class CoarsePing(NamedTuple):
+class TablePing(NamedTuple):
     """One ping: axis in the walk frame, range (0: none), power, odds that a silent one missed its echo (else 0), AFTER_ECHO or AFTER_SILENCE."""
 
     axis_rad: float
@@ -67,10 +68,10 @@ class CoarsePing(NamedTuple):
     after: int
 
 
-def coarse_field(walls: Walls, floor: Floor, model: EchoModel) -> CoarseField:
+def range_table_of(walls: Walls, floor: Floor, model: EchoModel) -> RangeTable:
     """The table of a floor; seconds for a building of thousands of square metres."""
     if not len(floor.x_m):
-        return CoarseField(0.0, 0.0, np.full((1, 1), UNKNOWN, np.int32), np.zeros((1, SECTORS), np.uint16))
+        return RangeTable(0.0, 0.0, np.full((1, 1), UNKNOWN, np.int32), np.zeros((1, SECTORS), np.uint16))
     x0, y0 = float(floor.x_m.min()) - (AROUND + 0.5) * CELL_M, float(floor.y_m.min()) - (AROUND + 0.5) * CELL_M
     column, line = ((floor.x_m - x0) / CELL_M).astype(np.int64), ((floor.y_m - y0) / CELL_M).astype(np.int64)
     row = np.full((int(line.max()) + AROUND + 1, int(column.max()) + AROUND + 1), UNKNOWN, np.int32)
@@ -78,11 +79,11 @@ def coarse_field(walls: Walls, floor: Floor, model: EchoModel) -> CoarseField:
     for _ in range(AROUND):
         row = _grown(row)
     expected = _expected(floor.x_m, floor.y_m, walls.near(floor.x_m, floor.y_m), model)
-    return CoarseField(x0, y0, row, expected)
+    return RangeTable(x0, y0, row, expected)
 
 
 @lean_kernel
-def log_densities(ping: CoarsePing, model: EchoModel, table: Floats) -> None:
+def log_densities(ping: TablePing, model: EchoModel, table: Floats) -> None:
     """Log-density per metre of a range by the entry, to the ping's power; range 0: of no echo.
 
     With the entry's probability the echo is that of the expected range, else as where none is expected; so is the last entry, outside.
@@ -96,11 +97,11 @@ def log_densities(ping: CoarsePing, model: EchoModel, table: Floats) -> None:
         hidden = of_hidden * hidden_density(range_m, k * UNIT_M if k > 0 else model.maximum_m, model)
         likely = missed
         if is_echo:
-            z = (range_m - k * UNIT_M) / COARSE_SD_M
+            z = (range_m - k * UNIT_M) / TABLE_SD_M
             near = math.exp(-0.5 * z * z)
             far = math.exp(-0.5 * z * z / (FAR_FACTOR * FAR_FACTOR)) / FAR_FACTOR
             likely = (1.0 - FAR_SHARE) * near + FAR_SHARE * far
-            likely *= (1.0 - missed) / (COARSE_SD_M * math.sqrt(2.0 * math.pi))
+            likely *= (1.0 - missed) / (TABLE_SD_M * math.sqrt(2.0 * math.pi))
         for c in range(CHANCES):
             chance = (c + 0.5) / CHANCES if k > 0 else 0.0
             planned = chance * likely + (1.0 - chance) * unlikely
@@ -147,15 +148,15 @@ def _grown(row: Int32s) -> Int32s:
     return grown
 
 
-class CoarsePings:
-    """The memory of both rangers since the cloud began."""
+class TablePings:
+    """The memory of both rangers since the search began."""
 
     def __init__(self) -> None:
         self.odometer = Odometer()
         self._used_at_m = [-math.inf, -math.inf]  # mark on the path at the last ping of each ranger
         self._after = [AFTER_SILENCE, AFTER_SILENCE]  # what that was
 
-    def take(self, pings: PingBatch, k: int, way_m: float) -> CoarsePing | None:
+    def take(self, pings: PingBatch, k: int, way_m: float) -> TablePing | None:
         """The k-th ping, `way_m` after the end of the path; None if it comes too soon after the last one of its ranger."""
         ranger, at_m = int(pings.ranger[k]), self.odometer.path_m + way_m
         travel_m, after = at_m - self._used_at_m[ranger], self._after[ranger]
@@ -163,4 +164,4 @@ class CoarsePings:
             return None
         axis_rad, range_m, missed = (float(v[k]) for v in (pings.axis_rad, pings.range_m, pings.missed))
         self._used_at_m[ranger], self._after[ranger] = at_m, AFTER_ECHO if range_m > 0.0 else AFTER_SILENCE
-        return CoarsePing(axis_rad, range_m, min(travel_m / INDEPENDENT_M, 1.0), missed, after)
+        return TablePing(axis_rad, range_m, min(travel_m / INDEPENDENT_M, 1.0), missed, after)

@@ -13,7 +13,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Int32s, Ints
 from echostep.jit import kernel
-from echostep.localization.echoes.range_table import UNKNOWN, CoarseField
+from echostep.localization.echoes.range_table import UNKNOWN, RangeTable
 from echostep.localization.height.levels import UpperLevels
 from echostep.walls.floor import CELL_M
 from echostep.walls.index import WallIndex, crosses_wall
@@ -32,8 +32,8 @@ class GridCells(NamedTuple):
     """Cells of CELL_M in rows of `columns` from (x0_m, y0_m) on; each array is (cells,) if not said otherwise, all rows one after the other.
 
     `barrier`: bits EAST_WALL, NORTH_WALL: a wall stands between the middles of the cell and of its neighbour; CLOSED: nobody can be there (edge of
-    the grid, air beside an upper level). `connector`: number of the connector that holds it. `level` (columns,): that of each column. `row`: its column of `expected`
-    (SECTORS, floor), or UNKNOWN.
+    the grid, air beside an upper level). `connector`: number of the connector that holds it. `level` (columns,): that of each column. `row`: its
+    column of `expected` (SECTORS, floor), or UNKNOWN.
     """
 
     x0_m: float
@@ -53,34 +53,31 @@ class GridCells(NamedTuple):
         return np.where(within, line * self.columns + column, -1.0).astype(np.int32)
 
 
-def grid_cells(walls: WallIndex, field: CoarseField, sheet: LevelSheet | None, upper: UpperLevels | None) -> GridCells:
+def grid_cells(walls: WallIndex, table: RangeTable, sheet: LevelSheet | None, upper: UpperLevels | None) -> GridCells:
     """The cells of a floor and of the ground within OUTSIDE_M of it; `upper`: levels beside which there is air."""
     around = math.ceil(OUTSIDE_M / CELL_M)
-    row = np.pad(field.row, around, constant_values=UNKNOWN)
-    x0, y0 = field.x0_m - around * CELL_M, field.y0_m - around * CELL_M
-    barrier = _barriers(x0, y0, row, walls)
-    level = np.zeros(row.shape[1], np.int64)
-    connector = np.full(row.shape, NO_CONNECTOR, np.int16)
+    row = np.pad(table.row, around, constant_values=UNKNOWN)
+    rows, columns = row.shape
+    x0, y0 = table.x0_m - around * CELL_M, table.y0_m - around * CELL_M
+    x: Floats = x0 + (np.arange(columns, dtype=np.float64) + 0.5) * CELL_M
+    y: Floats = y0 + (np.arange(rows, dtype=np.float64) + 0.5) * CELL_M
+    barrier = _barriers(x0, y0, row, walls).ravel()
+    level, connector = np.zeros(columns, np.int64), np.full(len(barrier), NO_CONNECTOR, np.int16)
     if sheet is not None and len(sheet.height_m) > 1:
-        level = level_of(x0 + (np.arange(row.shape[1]) + 0.5) * CELL_M, sheet)
-        _lay_connectors(x0, y0, connector, sheet)
+        level = level_of(x, sheet)
+        _lay_connectors(x, y, connector, sheet)
     if upper is not None:
-        line, column = np.indices(row.shape)
-        x, y = x0 + (column.ravel() + 0.5) * CELL_M, y0 + (line.ravel() + 0.5) * CELL_M
-        loss = upper.log_loss(x, y, 1.0)
+        loss = upper.log_loss(np.tile(x, rows), np.repeat(y, columns), 1.0)
         if loss is not None:
-            barrier.ravel()[loss < 0.0] |= CLOSED
-    barrier[[0, -1], :] |= CLOSED
-    barrier[:, [0, -1]] |= CLOSED
-    return GridCells(
-        x0, y0, row.shape[1], barrier.ravel(), connector.ravel(), level, row.ravel(), np.ascontiguousarray(field.expected.T)
-    )
+            barrier[loss < 0.0] |= CLOSED
+    edge = np.ones((rows, columns), np.bool_)
+    edge[1:-1, 1:-1] = False
+    barrier[edge.ravel()] |= CLOSED
+    return GridCells(x0, y0, columns, barrier, connector, level, row.ravel(), np.ascontiguousarray(table.expected.T))
 
 
 @kernel
-def _barriers(
-    x0: float, y0: float, row: Int32s, walls: WallIndex
-) -> np.ndarray[tuple[int, int], np.dtype[np.uint8]]:
+def _barriers(x0: float, y0: float, row: Int32s, walls: WallIndex) -> np.ndarray[tuple[int, int], np.dtype[np.uint8]]:
     """The walls to the east and to the north of each cell's middle."""
     rows, columns = row.shape
     barrier = np.zeros((rows, columns), np.uint8)
@@ -95,13 +92,9 @@ def _barriers(
 
 
 @kernel
-def _lay_connectors(
-    x0: float, y0: float, connector: np.ndarray[tuple[int, int], np.dtype[np.int16]], sheet: LevelSheet
-) -> None:
-    """Write the connector that holds the middle of each cell."""
-    rows, columns = connector.shape
-    for c in range(columns):
-        x = x0 + (c + 0.5) * CELL_M
-        level = level_on_sheet(x, sheet)
-        for r in range(rows):
-            connector[r, c] = connector_at(x - level * sheet.pitch_m, y0 + (r + 0.5) * CELL_M, level, sheet)
+def _lay_connectors(x: Floats, y: Floats, connector: Shorts, sheet: LevelSheet) -> None:
+    """Write the connector that holds the middle of each cell; `x` (columns,), `y` (rows,) on the sheet."""
+    for c in range(len(x)):
+        level = level_on_sheet(x[c], sheet)
+        for r in range(len(y)):
+            connector[r * len(x) + c] = connector_at(x[c] - level * sheet.pitch_m, y[r], level, sheet)

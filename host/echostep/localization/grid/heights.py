@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Heights of a search: what rises and heights by pressure say of each level, and of each connector there.
 
-In: `HeightChange`s. Out: `LevelFactors`. Owns, as `height.levels` does for each particle, the height and the offset of the height by pressure, here for
-all that is on one level, and in one connector there: who is on stairs has risen with the path.
+In: `HeightChange`s. Out: `LevelFactors`. Owns heights and offsets of the height by pressure: as in `height.levels`, but common to all states on a
+level, and in a connector there, since what is on the same stairs has risen by the same path.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 
 In: `GridCells`, states, a piece of a move, the likelihoods of a ping by entry of the table. Out: states. Owns nothing.
 
-A state is a cell and a sector of the rotation walk -> map; those of one sector are one layer. All places of a layer are off the middles of their cells
-by the same remainder, so a move shifts a layer by whole cells and smears nothing.
+A state is a cell and a sector of the rotation walk -> map; those of one sector are one layer. All places of a layer are off the middles of their
+cells by the same remainder, so a move shifts a layer by whole cells and smears nothing.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ def shift_and_weigh(
 ) -> tuple[int, float]:  # fmt: skip
     """Move all states by (dx, dy) of the walk frame, and multiply each by the factor of its entry for a ping along `axis_rad`.
 
-    `factor` (OUTSIDE_ENTRY + 1,): by entry. A state that goes through a wall keeps `wall` of its weight; one that had less than `least` is dropped. Returns
-    the number of states, and their greatest weight.
+    `factor` (OUTSIDE_ENTRY + 1,): by entry. A state that goes through a wall keeps `wall` of its weight; one that had less than `least` is dropped.
+    Returns the number of states, and their greatest weight.
     """
     cell, weight, first, offset = states
     layers, kept, top = len(offset), 0, 0.0
@@ -120,13 +120,16 @@ def _moved(cell: int, east: int, north: int, cells: GridCells) -> tuple[int, boo
 
 
 @kernel
-def spread(states: GridStates, beside: float, turned: float, least: float, scratch: Weights, cells: GridCells) -> GridStates:
+def spread(
+    states: GridStates, beside: float, turned: float, least: float, scratch: Weights, cells: GridCells
+) -> GridStates:
     """Diffuse: each of the four neighbours of a state gets the share `beside` where no wall is between, each neighbouring layer `turned`.
 
     `scratch` (cells,): zeros, and zeros afterwards.
     """
     layers, count = len(states.offset_m), 0
-    new_cell, new_weight = np.empty(2 * len(states.cell) + 64, np.int32), np.empty(2 * len(states.cell) + 64, np.float32)
+    room = 2 * len(states.cell) + 64
+    new_cell, new_weight = np.empty(room, np.int32), np.empty(room, np.float32)
     new_first = np.zeros(layers + 1, np.int64)
     touched = np.empty(len(scratch), np.int32)
     for h in range(layers):
@@ -151,8 +154,8 @@ def _spread_into(
         share = turned if away != 0 else 1.0 - 2.0 * turned
         if share == 0.0:
             continue
-        east = int(math.floor((offset[g, 0] - offset[h, 0]) / CELL_M + 0.5))
-        north = int(math.floor((offset[g, 1] - offset[h, 1]) / CELL_M + 0.5))
+        east = math.floor((offset[g, 0] - offset[h, 0]) / CELL_M + 0.5)
+        north = math.floor((offset[g, 1] - offset[h, 1]) / CELL_M + 0.5)
         for k in range(first[g], first[g + 1]):
             at = cell[k]
             if east != 0 or north != 0:

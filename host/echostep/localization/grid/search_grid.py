@@ -3,9 +3,9 @@
 
 In: a start, moves with the pings and the change of height on them. Out: poses drawn from the grid. Owns the weight of each state, and the heights.
 
-The lengths and the rotation of the walk frame drift little, so a state moves rigidly with the path, and what it errs by is spread over its neighbours. A
-layer's sector of the rotation is halved when the way within it errs by a cell: the search is as fine as the path is long. Of the many states of a
-large building the heaviest MOST_STATES are kept.
+The lengths and the rotation of the walk frame drift little, so a state moves rigidly with the path, and what it errs by is spread over its
+neighbours. A layer's sector of the rotation is halved when the way within it errs by a cell: the search is as fine as the path is long. Of the many
+states of a large building the heaviest MOST_STATES are kept.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.localization.echoes.likelihood import EchoModel
-from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, SECTORS, CoarsePings, log_densities
+from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, SECTORS, TablePings, log_densities
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.heights import GridHeights
 from echostep.localization.grid.kernels import (
@@ -64,12 +64,15 @@ class SearchGrid:
     def __init__(
         self, cells: GridCells, places: Places, heights: GridHeights | None = None, veer_sd_rad: float = 0.0
     ) -> None:
-        """Evenly at these places, with any rotation. `heights`: None in a building of one level. `veer_sd_rad`: bias of the path's turn on a metre."""
+        """Evenly at these places, with any rotation.
+
+        `heights`: None in a building of one level. `veer_sd_rad`: standard deviation of a bias of the path, its turn on a metre.
+        """
         self._cells, self._places, self._heights = cells, places, heights
         self._turn_variance = SPREAD_RAD**2 + 4.0 * veer_sd_rad**2
         self._turned_rad = 0.0  # of the walk frame since the search began
         self._scratch = np.zeros(len(cells.row), np.float32)
-        self._pings = CoarsePings()
+        self._pings = TablePings()
         self._var_m2 = self._var_rad2 = 0.0
         self._begin()
 
@@ -111,7 +114,7 @@ class SearchGrid:
         self._turned_rad += by_rad
 
     def advance(self, move: Move, pings: PingBatch, model: EchoModel) -> None:
-        """Move all states, and weigh them by the pings that `CoarsePings` takes, each where it was triggered."""
+        """Move all states, and weigh them by the pings that `TablePings` takes, each where it was triggered."""
         length, bend, done = math.hypot(move.dx_m, move.dy_m), math.hypot(move.bend_x_m, move.bend_y_m), 0.0
         table = np.empty(OUTSIDE_ENTRY + 1)
         for k in range(len(pings.share)):

@@ -76,8 +76,8 @@ class Cloud(Particles):
     """Particles as flat arrays of n; `log_weight` is normalised to a maximum of 0.
 
     A cloud is scattered or contracted by its number of particles, gathered or in one place by its spread: see the properties of these names.
-    `grid`: of a search, until it has found the place; the particles only show it, and are drawn from it anew after each move. `is_gathered`: since it last was
-    scattered by an unobserved move, less than GATHERED_REST of its weight was once farther than GATHERED_M from its mean on the sheet of levels.
+    `grid`: of a search, until it has found the place; the particles only show it, and are drawn from it anew after each move. `is_gathered`: since
+    it last was scattered by an unobserved move, less than GATHERED_REST of its weight was once farther than GATHERED_M from its mean on the sheet.
     `rescues`: how often all particles crossed a wall.
     """
 

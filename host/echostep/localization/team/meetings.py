@@ -180,7 +180,9 @@ def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
     anywhere = 1.0 / (area_m2 if meeting.range_m is None else math.sqrt(area_m2))
     density = (1.0 - wrong) * float(weight @ np.exp(log_met))
     right = density / (density + wrong * anywhere)
-    factor = log_met if cloud.is_searching else _intersection(meeting, place, weight, log_met) if right >= FITS else None
+    factor = log_met if cloud.is_searching else None
+    if right >= FITS and not cloud.is_searching:
+        factor = _intersection(meeting, place, weight, log_met)
     if factor is not None:  # a cloud that is concentrated elsewhere is not changed
         factor = meeting.share * factor
         factor -= factor.max()

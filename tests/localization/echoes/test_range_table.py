@@ -19,9 +19,9 @@ from echostep.localization.echoes.range_table import (
     RANGES,
     SECTORS,
     UNIT_M,
-    CoarsePing,
-    coarse_field,
+    TablePing,
     log_densities,
+    range_table_of,
 )
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import CELL_M
@@ -30,7 +30,7 @@ ROOM = Building(
     Walls(np.array([[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0, 8, 0, 0], [3, 0, 3, 5]], float)), None
 )
 MODEL = echo_model(EchoSettings())
-FIELD = coarse_field(ROOM.walls, ROOM.floor, MODEL)
+FIELD = range_table_of(ROOM.walls, ROOM.floor, MODEL)
 EAST, NORTH_EAST = 0.0, math.radians(37.5)
 ROOM_FOR_TABLE = np.empty(CHANCES * RANGES + 1)
 
@@ -46,9 +46,11 @@ def traced(x_m: float, y_m: float, axis_rad: float) -> tuple[float, float]:
 
 def log_density(x_m: float, y_m: float, axis_rad: float, range_m: float, after: int = AFTER_ECHO) -> float:
     """Of one ping (range 0: none) at a place, less that in the middle of the hall, where nothing is in reach."""
-    log_densities(CoarsePing(0.0, range_m, 1.0, 0.0, after), MODEL, ROOM_FOR_TABLE)
+    log_densities(TablePing(0.0, range_m, 1.0, 0.0, after), MODEL, ROOM_FOR_TABLE)
     here, hall = (
-        ROOM_FOR_TABLE[FIELD.expected[FIELD.row[int((y - FIELD.y0_m) / CELL_M), int((x - FIELD.x0_m) / CELL_M)], sector]]
+        ROOM_FOR_TABLE[
+            FIELD.expected[FIELD.row[int((y - FIELD.y0_m) / CELL_M), int((x - FIELD.x0_m) / CELL_M)], sector]
+        ]
         for x, y, sector in ((x_m, y_m, int(axis_rad / (2.0 * math.pi) * SECTORS)), (4.6, 4.1, 0))
     )
     return float(here - hall)
@@ -92,7 +94,7 @@ def test_silence_that_goes_on_costs_less_before_a_wall_than_silence_after_an_ech
 def test_silence_in_a_hall_is_no_evidence_for_outside() -> None:
     """Otherwise the particles of a hall died within metres, for each silent ping counted."""
     for after in (AFTER_ECHO, AFTER_SILENCE):
-        log_densities(CoarsePing(0.0, 0.0, 1.0, 0.0, after), MODEL, ROOM_FOR_TABLE)
+        log_densities(TablePing(0.0, 0.0, 1.0, 0.0, after), MODEL, ROOM_FOR_TABLE)
         assert ROOM_FOR_TABLE[OUTSIDE_ENTRY] == ROOM_FOR_TABLE[0]
 
 
@@ -103,7 +105,7 @@ def test_the_density_of_each_entry_adds_up_to_one(k: int, after: int) -> None:
     step_m, total, table = 0.01, 0.0, ROOM_FOR_TABLE
     entry = (CHANCES - 1) * RANGES + k
     for range_m in np.arange(MODEL.minimum_m, MODEL.maximum_m, step_m):
-        log_densities(CoarsePing(0.0, float(range_m), 1.0, 0.0, after), MODEL, table)
+        log_densities(TablePing(0.0, float(range_m), 1.0, 0.0, after), MODEL, table)
         total += step_m * math.exp(table[entry])
-    log_densities(CoarsePing(0.0, 0.0, 1.0, 0.0, after), MODEL, table)
+    log_densities(TablePing(0.0, 0.0, 1.0, 0.0, after), MODEL, table)
     assert total + math.exp(table[entry]) == pytest.approx(1.0, abs=0.08)
