@@ -69,7 +69,7 @@ class GridHeights:
     def of(self, level: Ints, connector: Ints) -> tuple[Floats, Floats]:
         """Heights and offsets (n,) on these levels, in these connectors."""
         z_m = np.vstack([self._sheet.height_m, self._z_m])
-        return z_m[connector.astype(np.int64) + 1, level], self._lag_m[level]
+        return z_m[connector + 1, level], self._lag_m[level]
 
     def _climbed(self, c: int, level: int, change: HeightChange, *, knows_lag: bool) -> tuple[float, float, float]:
         """Height in a connector, how far it would be beyond its ends, and the height by pressure to compare it with."""

@@ -23,7 +23,6 @@ from echostep.localization.grid.heights import GridHeights
 from echostep.localization.grid.kernels import (
     GridStates,
     halved,
-    rotation_of,
     shift_and_weigh,
     spread,
     weigh_levels,
@@ -183,7 +182,7 @@ class SearchGrid:
 
     def draw(self, count: int, rng: np.random.Generator) -> DrawnPoses:
         """So many poses, evenly within their cells and sectors."""
-        poses = self._poses(systematic(self._states.weight, float(rng.random()), count))
+        poses = self._poses(systematic(self._states.weight.astype(np.float64), float(rng.random()), count))
         within = rng.random((3, count)) - 0.5
         turn = poses.turn_rad + 2.0 * math.pi / len(self._states.offset_m) * within[2]
         return poses._replace(x_m=poses.x_m + CELL_M * within[0], y_m=poses.y_m + CELL_M * within[1], turn_rad=turn)
@@ -208,6 +207,6 @@ class SearchGrid:
         y = cells.y0_m + (line + 0.5) * CELL_M + s.offset_m[layer, 1]
         z, lag = np.zeros(len(chosen)), np.zeros(len(chosen))
         if self._heights is not None:
-            z, lag = self._heights.of(cells.level[column], cells.connector[s.cell[chosen]])
-        turn: Floats = rotation_of(layer, len(s.offset_m)) + self._turned_rad
+            z, lag = self._heights.of(cells.level[column], cells.connector[s.cell[chosen]].astype(np.int64))
+        turn: Floats = 2.0 * math.pi * (layer + 0.5) / len(s.offset_m) + self._turned_rad
         return DrawnPoses(x, y, turn, z, lag)

@@ -51,8 +51,8 @@ from echostep.walls.level_sheet import LevelSheet, level_of
 
 SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never so large
 CONTRACTED = 2  # times the least size, up to which a cloud is contracted, assumed
-# Weight outside of one place below which a search has found it, on one level, and on several after so many metres of search: only exact likelihoods
-# discriminate between levels that are alike; assumed
+# Weight outside of one place below which a search has found it, on one level, and on several, there after so many metres of search: exact likelihoods
+# discriminate between levels that are alike, and need a way for it; assumed
 FOUND_REST, LEVELS_REST, LEVELS_M = 0.03, 0.1, 10.0
 SHOWN = 5_000  # particles that show a search
 SCATTERED_SHARE = 0.8  # weight of a search that stays about its places after a move that was not observed, assumed
@@ -134,8 +134,8 @@ class Cloud(Particles):
         if grid is None:
             return
         self._put(grid.draw(SHOWN, self._rng))
-        rest = FOUND_REST if self.sheet is None or grid.path_m < LEVELS_M else LEVELS_REST
-        if self.place_share > 1.0 - rest:
+        rest, least_m = (FOUND_REST, 0.0) if self.sheet is None else (LEVELS_REST, LEVELS_M)
+        if grid.path_m >= least_m and self.place_share > 1.0 - rest:
             self.grid = None
             self._put(grid.draw(self._settings.largest, self._rng))
             self._resample(self.log_weight, self.log_weight, min(self._wanted_size(), self._settings.largest))
