@@ -228,7 +228,7 @@ class CloudHypothesis:
 
 
 def right_against(tracked: CloudHypothesis, search: CloudHypothesis, log_odds_before: float) -> float:
-    """Probability that the tracked cloud is right while a search disagrees with it, or has found nothing; `log_odds_before`: when the search began."""
+    """Probability that the tracked cloud is right while a search disagrees with it, or has found none; `log_odds_before`: when the search began."""
     log_odds, alike = tracked.plausibility.log_odds, ALIKE_NATS
     if search.evidence_m > EVIDENCE_M:
         return probability_of(log_odds - search.plausibility.log_odds)

@@ -130,7 +130,9 @@ class MapFilter:
         if segment.unobserved:
             self._scatter(segment, change)
         if gap is not None:
-            self._search_after(gap, segment)
+            if gap is not Gap.UNOBSERVED:  # a rest, a ride in a lift, or a walk
+                self.tracked.plausibility.doubt(UNOBSERVED_DOUBT)
+            self._search_beside(self.cloud.air, segment.heading1_rad)
         if not segment.unobserved:
             self._follow(measured, change)
         if not self.cloud.is_searching:
@@ -187,20 +189,13 @@ class MapFilter:
         s, b = self._settings, self._building
         cloud = Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor)
         if is_unknown(start) and len(b.floor.x_m):
-            cells = b.cells(self._model)
-            cloud.grid = grid_of(start, walk_heading_rad, cells, b.floor, b.sheet, s, self._rng)
+            cloud.grid = grid_of(start, walk_heading_rad, b.cells(self._model), b.floor, b.sheet, s, self._rng)
         return cloud
 
     @property
     def plan_supports(self) -> bool:
         """Whether the last metres of echoes confirm the cloud by the plan."""
         return self._building.has_walls and self._right().here > BELIEVED and self._pings.silent_m < SUPPORTED_M
-
-    def _search_after(self, gap: Gap, segment: PathSegment) -> None:
-        """Doubt the tracked cloud after a gap, and search from where the path goes on; a gap is a rest, a ride in a lift, or a walk."""
-        if gap is not Gap.UNOBSERVED:
-            self.tracked.plausibility.doubt(UNOBSERVED_DOUBT)
-        self._search_beside(self.cloud.air, segment.heading1_rad)
 
     def _search_beside(self, air: Air | None, walk_heading_rad: float) -> None:
         """Search the whole building in addition to the tracked cloud, which covers the near places.
@@ -246,7 +241,8 @@ class MapFilter:
             self._follow_with(each, move, pings, unplanned, evidence_share(segment.turn_rad))
             each.cloud.change_levels(move, change)
             if each.cloud.is_searching:
-                self._show_search(each.cloud)
+                if each.cloud.show_search():
+                    self._way.pass_again(each.cloud, self._blurred, self._building.walls)
                 continue
             loss = self._building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m) if path_m > 0.0 else None
             if loss is not None:
@@ -275,12 +271,6 @@ class MapFilter:
                 evidence = evidence._replace(log_path=log_path)
             if self._building.has_walls:
                 self._update_plausibility(each, evidence, pings, unplanned, path_m, share)
-
-    def _show_search(self, cloud: Cloud) -> None:
-        """Draw the particles of a search, which pass the last metres again if it has found the place."""
-        cloud.show_search()
-        if not cloud.is_searching:
-            self._way.pass_again(cloud, self._blurred, self._building.walls)
 
     def _update_plausibility(
         self, each: CloudHypothesis, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float,

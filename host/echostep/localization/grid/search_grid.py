@@ -180,6 +180,14 @@ class SearchGrid:
     def _spread(self, beside: float, turned: float) -> None:
         self._states = spread(self._states, beside, turned, self._least, self._scratch, self._cells)
 
+    def densest_share(self, size_m2_rad: float) -> float:
+        """Weight of the heaviest states that together have this size."""
+        weight = self._states.weight
+        count = int(size_m2_rad / (CELL_M**2 * 2.0 * math.pi / len(self._states.offset_m)))
+        if count >= len(weight):
+            return 1.0
+        return float(np.partition(weight, len(weight) - count)[len(weight) - count :].sum() / weight.sum())
+
     def draw(self, count: int, rng: np.random.Generator) -> DrawnPoses:
         """So many poses, evenly within their cells and sectors."""
         poses = self._poses(systematic(self._states.weight.astype(np.float64), float(rng.random()), count))

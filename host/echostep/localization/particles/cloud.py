@@ -55,6 +55,7 @@ CONTRACTED = 2  # times the least size, up to which a cloud is contracted, assum
 # discriminate between levels that are alike, and need a way for it; assumed
 FOUND_REST, LEVELS_REST, LEVELS_M = 0.03, 0.1, 10.0
 SHOWN = 5_000  # particles that show a search
+TRACED_M2_RAD = 5.0  # poses that 20,000 particles fill by the sizes of `CloudSettings`: 6,000 cells
 SCATTERED_SHARE = 0.8  # weight of a search that stays about its places after a move that was not observed, assumed
 START_SIZE = 6_000  # least particles at the start: enough of them in the tails of its distribution (`start`)
 LEAST_LEVEL = 0.01  # probability of a level that counts among those on which the trunk may be, assumed
@@ -128,18 +129,21 @@ class Cloud(Particles):
         """Whether the place is searched on a grid."""
         return self.grid is not None
 
-    def show_search(self) -> None:
-        """Draw particles from the grid; if it has found the place, so many as a cloud of its own needs, and the search is over."""
+    def show_search(self) -> bool:
+        """Draw particles from the grid; returns whether the search is over: they are in one place, or in few enough for a cloud to trace."""
         grid = self.grid
         if grid is None:
-            return
+            return False
         self._put(grid.draw(SHOWN, self._rng))
         rest, least_m = (FOUND_REST, 0.0) if self.sheet is None else (LEVELS_REST, LEVELS_M)
-        if grid.path_m >= least_m and self.place_share > 1.0 - rest:
-            self.grid = None
-            self._put(grid.draw(self._settings.largest, self._rng))
-            self._resample(self.log_weight, self.log_weight, min(self._wanted_size(), self._settings.largest))
-            self._draw_veer()
+        is_found = grid.densest_share(TRACED_M2_RAD) > 1.0 - FOUND_REST or self.place_share > 1.0 - rest
+        if grid.path_m < least_m or not is_found:
+            return False
+        self.grid = None
+        self._put(grid.draw(self._settings.largest, self._rng))
+        self._resample(self.log_weight, self.log_weight, min(self._wanted_size(), self._settings.largest))
+        self._draw_veer()
+        return True
 
     def show_every_state(self) -> None:
         """Let the particles of a search be all states of the grid."""
