@@ -243,6 +243,7 @@ class MapFilter:
             if each.cloud.is_searching:
                 if each.cloud.show_search():
                     self._way.pass_again(each.cloud, self._blurred, self._building.walls)
+                    each.cloud.draw_veer()
                 continue
             loss = self._building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m) if path_m > 0.0 else None
             if loss is not None:
@@ -258,8 +259,7 @@ class MapFilter:
         if cloud.grid is not None:
             cloud.grid.advance(move, pings, self._model)
         else:
-            # The particles of a scattered cloud are sparse: the echo model is blurred by their spacing.
-            model = self._blurred if cloud.is_scattered else self._model
+            model = self._blurred if cloud.is_scattered else self._model  # by the spacing of sparse particles
             evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
             # Where there were several places, a light one may have lost its particles on one level by chance.
             if cloud.is_on_any_level and cloud.is_in_one_place:

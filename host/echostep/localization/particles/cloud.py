@@ -111,7 +111,7 @@ class Cloud(Particles):
         wanted = max(self._wanted_size(), START_SIZE)
         if wanted < settings.largest:
             self.keep(np.arange(min(wanted, len(self.x_m))))
-        self._draw_veer()
+        self.draw_veer()
 
     def _put(self, poses: DrawnPoses) -> None:
         """Replace the particles by others with these poses, of which nothing else is known yet."""
@@ -142,7 +142,6 @@ class Cloud(Particles):
         self.grid = None
         self._put(grid.draw(self._settings.largest, self._rng))
         self._resample(self.log_weight, self.log_weight, min(self._wanted_size(), self._settings.largest))
-        self._draw_veer()
         return True
 
     def show_every_state(self) -> None:
@@ -152,8 +151,8 @@ class Cloud(Particles):
             self._put(poses)
             self.log_weight = log_weight
 
-    def _draw_veer(self) -> None:
-        """Draw each particle's veer."""
+    def draw_veer(self) -> None:
+        """Draw each particle's veer; after a search, once its second pass is over: that begins where the path leads back to."""
         sd_rad_m = math.radians(self._settings.start_veer_sd_deg)
         if sd_rad_m > 0.0:  # otherwise nothing is drawn: a walk on foot stays the same to the bit
             self.veer_rad_m = sd_rad_m * self._rng.standard_normal(len(self.x_m))
