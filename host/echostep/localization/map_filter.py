@@ -296,10 +296,7 @@ class MapFilter:
         return [self.tracked] if self.search is None else [self.tracked, self.search]
 
     def _right(self) -> Right:
-        """Probability that the tracked cloud is right; while the building is searched, no more than the search's weight about it, at its height.
-
-        Where the search has no weight there, or has found no place, both are compared by how well they have predicted the echoes.
-        """
+        """Probability that the tracked cloud is right: while the building is searched, no more than the search's weight there, or by predictions."""
         here = self.tracked.plausibility.probability
         if self.search is None:
             return Right(here)
