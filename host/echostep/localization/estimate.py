@@ -173,9 +173,10 @@ def ellipse95(xx_m2: float, xy_m2: float, yy_m2: float) -> Ellipse:
 
 
 class Right(NamedTuple):
-    """Probability that the cloud is right, `here`, and at least `about` that the trunk is within LOST_M of it, by a search of the building."""
+    """Probability that the trunk is in the tracked cloud, `here`, and in another within TRACKING_M and LOST_M of the tracked one's mean."""
 
     here: float
+    near: float = 0.0
     about: float = 0.0
 
 
@@ -203,16 +204,15 @@ def estimate(
         m = _moments_at(places[0], m, cloud, weight)
     x, y, xx, xy, yy, east, north, near, about = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
-    # A search began anywhere: the weight of its likeliest place is the probability of that (search-several-places of the studies' notebook).
-    about *= 1.0 if cloud.is_searching else right.here
-    status = _status(right.here * near, max(about, right.about), max(levels))
+    status = _status(right.here * near + right.near, right.here * about + right.about, max(levels))
     xx, yy = xx + sd_m**2, yy + sd_m**2
-    protection_m = _protection_m(xx, xy, yy, right.here * max(levels))
+    is_right = min(right.here + right.near, 1.0)
+    protection_m = _protection_m(xx, xy, yy, is_right * max(levels))
     if status is not TrackStatus.TRACKING and elsewhere is not None:
-        xx, xy, yy = elsewhere.mixed((x, y), (xx, xy, yy), right.here)
+        xx, xy, yy = elsewhere.mixed((x, y), (xx, xy, yy), is_right)
     return Estimate(
         t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status, levels.index(max(levels)), levels, z, z_sd,
-        protection_m, right.here, places,
+        protection_m, is_right, places,
     )  # fmt: skip
 
 

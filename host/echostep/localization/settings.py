@@ -13,6 +13,7 @@ from echostep.localization.beacons.model import BeaconSettings
 from echostep.localization.echoes.likelihood import EchoModel, EchoSettings, echo_model
 from echostep.localization.height.levels import ClimbSettings
 
+TABLE_SD_M = 0.2  # of a range by the table: a cell's half diagonal, and the heading's error over a sector
 UNPLANNED_DOOR = -6.0  # log-probability (1 in 400) that a way leads through a wall of the plan all the same
 
 
@@ -76,3 +77,8 @@ def echo_models(s: FilterSettings) -> tuple[EchoModel, EchoModel]:
 def with_plan_error(s: FilterSettings) -> EchoSettings:
     """The settings of the echoes, with the error of the plan's walls in that of the ranges."""
     return replace(s.echo, sd_m=math.hypot(s.echo.sd_m, s.plan_sd_m))
+
+
+def inexact(s: FilterSettings) -> EchoSettings:
+    """The settings of the echoes with the error of a table of ranges."""
+    return replace(s.echo, sd_m=math.hypot(s.echo.sd_m, s.plan_sd_m, TABLE_SD_M))

@@ -41,6 +41,19 @@ class RecentWay:
             first, _, _ = self._pieces.popleft()
             self.length_m -= math.hypot(first.dx_m, first.dy_m)
 
+    def clear(self) -> None:
+        """Forget the path: what comes next may begin elsewhere."""
+        self._pieces.clear()
+        self.length_m = 0.0
+
+    def search(self, cloud: Cloud, model: EchoModel) -> float:
+        """Let a search process the way from its beginning; returns the log of its density of the pings over that without a plan."""
+        log_pings = 0.0
+        for move, pings, change in self._pieces:
+            log_pings += cloud.search(move, pings, model)
+            cloud.change_levels(move, change)
+        return log_pings
+
     def pass_again(self, cloud: Cloud, model: EchoModel, walls: Walls) -> None:
         """Let a cloud walk the way once more, from its beginning on each level; not where the level is known: stairs may have led there."""
         if cloud.sheet is not None and not cloud.is_on_any_level:

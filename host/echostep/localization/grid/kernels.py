@@ -51,14 +51,14 @@ def rotation_of(layer: int, layers: int) -> float:
 @lean_kernel
 def shift_and_weigh(
     states: GridStates, dx: float, dy: float, factor: Weights, axis_rad: float, least: float, wall: float, cells: GridCells
-) -> tuple[int, float]:  # fmt: skip
+) -> tuple[int, float, float, float]:  # fmt: skip
     """Move all states by (dx, dy) of the walk frame, and multiply each by the factor of its entry for a ping along `axis_rad`.
 
     `factor` (OUTSIDE_ENTRY + 1,): by entry. A state that goes through a wall keeps `wall` of its weight; one that had less than `least` is dropped.
-    Returns the number of states, and their greatest weight.
+    Returns the number of states, their greatest weight, and the sums of weights before and after the factors.
     """
     cell, weight, first, offset = states
-    layers, kept, top = len(offset), 0, 0.0
+    layers, kept, top, before, after = len(offset), 0, 0.0, 0.0, 0.0
     for h in range(layers):
         turn = rotation_of(h, layers)
         east, north = _shift(turn, dx, dy, offset[h])
@@ -76,12 +76,14 @@ def shift_and_weigh(
                 if crossed:
                     w *= wall
             row = cells.row[at]
+            before += w
             w *= factor[OUTSIDE_ENTRY if row == UNKNOWN else int(heard[row])]
             cell[kept], weight[kept] = at, w
             kept += 1
+            after += w
             top = max(top, w)
     first[layers] = kept
-    return kept, top
+    return kept, top, before, after
 
 
 @inline_kernel

@@ -17,7 +17,8 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.localization.echoes.likelihood import EchoModel
-from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, SECTORS, TablePings, log_densities
+from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, SECTORS, TablePing, TablePings, log_densities
+from echostep.localization.echoes.unplanned import PlacedPings, RangeMemory
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.heights import GridHeights
 from echostep.localization.grid.kernels import (
@@ -29,7 +30,7 @@ from echostep.localization.grid.kernels import (
 )
 from echostep.localization.height.levels import HeightChange
 from echostep.localization.particle_arrays import Move, PingBatch
-from echostep.localization.particles.kernels import piece_of, systematic
+from echostep.localization.particles.kernels import MovePiece, piece_of, systematic
 from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.path import bend_of
 from echostep.walls.floor import CELL_M
@@ -61,17 +62,19 @@ class SearchGrid:
     """The weights of all poses on the grid."""
 
     def __init__(
-        self, cells: GridCells, places: Places, heights: GridHeights | None = None, veer_sd_rad: float = 0.0
-    ) -> None:
+        self, cells: GridCells, places: Places, unplanned: RangeMemory, heights: GridHeights | None = None,
+        veer_sd_rad: float = 0.0,
+    ) -> None:  # fmt: skip
         """Evenly at these places, with any rotation.
 
-        `heights`: None in a building of one level. `veer_sd_rad`: standard deviation of a bias of the path, its turn on a metre.
+        `unplanned`: density without a plan, as inexact as the table. `heights`: None in a building of one level. `veer_sd_rad`: standard deviation of a bias of the path, its turn on a metre.
         """
         self._cells, self._places, self._heights = cells, places, heights
         self._turn_variance = SPREAD_RAD**2 + 4.0 * veer_sd_rad**2
         self._turned_rad = 0.0  # of the walk frame since the search began
         self._scratch = np.zeros(len(cells.row), np.float32)
-        self._pings = TablePings()
+        self._pings, self._unplanned = TablePings(), unplanned
+        self._x_m = self._y_m = 0.0  # end of the path in the walk frame
         self._var_m2 = self._var_rad2 = 0.0
         self._begin()
 
@@ -112,37 +115,53 @@ class SearchGrid:
         """Rotate all states: the heading in the walk frame has changed while that on the map has not."""
         self._turned_rad += by_rad
 
-    def advance(self, move: Move, pings: PingBatch, model: EchoModel) -> None:
-        """Move all states, and weigh them by the pings that `TablePings` takes, each where it was triggered."""
+    def advance(self, move: Move, pings: PingBatch, model: EchoModel) -> float:
+        """Move all states, and weigh them by the pings that `TablePings` takes, each where it was triggered.
+
+        Returns the log of the density of these pings over that without a plan, to the power with which they count here.
+        """
         length, bend, done = math.hypot(move.dx_m, move.dy_m), math.hypot(move.bend_x_m, move.bend_y_m), 0.0
-        table = np.empty(OUTSIDE_ENTRY + 1)
+        table, log_ratio = np.empty(OUTSIDE_ENTRY + 1), 0.0
         for k in range(len(pings.share)):
             share = float(pings.share[k])
             ping = None if bend > NO_PING_BEND * length else self._pings.take(pings, k, share * length)
             if ping is not None:
                 log_densities(ping, model, table)
-                self._step(move, done, share, table - table.max(), ping.axis_rad)
+                log_ratio += self._step(move, done, share, table, ping.axis_rad)
+                log_ratio -= self._log_unplanned(ping, int(pings.ranger[k]), piece_of(move, 0.0, share))
                 done = share
         if done < 1.0:
             self._step(move, done, 1.0, np.zeros(len(table)), 0.0)
         self._pings.odometer.add(length)
+        self._x_m, self._y_m = self._x_m + move.dx_m, self._y_m + move.dy_m
         self._var_m2 += SPREAD_M**2 * length + move.sd_m**2 + bend**2
         self._var_rad2 += self._turn_variance * length + move.turn_sd_rad**2
         self._refine()
+        return log_ratio
 
-    def _step(self, move: Move, begin: float, end: float, log_factor: Floats, axis_rad: float) -> None:
+    def _log_unplanned(self, ping: TablePing, ranger: int, way: MovePiece) -> float:
+        """Log-density of a ping without a plan, to its power; `way`: from the end of the path to where it was triggered."""
+        x_m, y_m = self._x_m + way.dx_m, self._y_m + way.dy_m
+        values = (np.array([v]) for v in (x_m, y_m, ping.axis_rad, ping.range_m, ping.power))
+        return float(self._unplanned.densities(PlacedPings(np.array([ranger]), *values)).either[0])
+
+    def _step(self, move: Move, begin: float, end: float, log_factor: Floats, axis_rad: float) -> float:
+        """Move by a piece, and multiply by factors; returns the log of the mean factor."""
         s, piece = self._states, piece_of(move, begin, end)
         c, d = math.cos(self._turned_rad), math.sin(self._turned_rad)
         east, north = c * piece.dx_m - d * piece.dy_m, d * piece.dx_m + c * piece.dy_m
-        factor = np.exp(log_factor - math.log(self._top)).astype(np.float32)
-        kept, top = shift_and_weigh(
+        log_top = float(log_factor.max())
+        factor = np.exp(log_factor - log_top - math.log(self._top)).astype(np.float32)
+        kept, top, before, after = shift_and_weigh(
             s, east, north, factor, axis_rad + self._turned_rad, self._least, WALL_SHARE, self._cells
         )
+        log_mean = log_top + math.log(self._top * after / before) if after > 0.0 else 0.0
         self._states = s._replace(cell=s.cell[:kept], weight=s.weight[:kept])
         if kept:
             self._note_least(top)
         else:  # all are beyond the ground that the grid has
             self._begin()
+        return log_mean
 
     def change_levels(self, change: HeightChange, lag_variance: float) -> float:
         """Weigh by a change of height, and move what has reached another level; returns the variance of the height by pressure's offset."""

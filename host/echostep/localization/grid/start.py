@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from echostep.localization.echoes.unplanned import RangeMemory
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.heights import GridHeights
 from echostep.localization.grid.search_grid import SearchGrid
@@ -28,14 +29,16 @@ def is_unknown(start: Start) -> bool:
 
 
 def grid_of(
-    start: Start, walk_heading_rad: float, cells: GridCells, floor: Floor, sheet: LevelSheet | None,
+    start: Start, walk_heading_rad: float, cells: GridCells, unplanned: RangeMemory, floor: Floor, sheet: LevelSheet | None,
     settings: FilterSettings, rng: np.random.Generator,
 ) -> SearchGrid:  # fmt: skip
     """The grid of an unknown start. `walk_heading_rad`: the trunk's heading in the walk frame at the start."""
     sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
     allowed = allowed_floor(floor, start, sheet)
     heights = None if sheet is None else GridHeights(sheet, settings.climb, start)
-    grid = SearchGrid(cells, (allowed.x_m, allowed.y_m), heights, math.radians(settings.cloud.start_veer_sd_deg))
+    grid = SearchGrid(
+        cells, (allowed.x_m, allowed.y_m), unplanned, heights, math.radians(settings.cloud.start_veer_sd_deg)
+    )
     count, share = (DRAWN, 1.0) if start.pose is not None else (near_count(DRAWN), NEAR_SHARE)
     if start.pose is not None or start.near is not None:
         x, y, heading = (drawn[:count] for drawn in draw_poses(start, DRAWN, allowed, sheet, rng))

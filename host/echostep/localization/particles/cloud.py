@@ -129,6 +129,10 @@ class Cloud(Particles):
         """Whether the place is searched on a grid."""
         return self.grid is not None
 
+    def search(self, move: Move, pings: PingBatch, model: EchoModel) -> float:
+        """Move and weigh all states of a search; returns the log of its density of the pings over that without a plan."""
+        return 0.0 if self.grid is None else self.grid.advance(move, pings, model)
+
     def show_search(self) -> bool:
         """Draw particles from the grid; returns whether the search is over: they are in one place, or in few enough for a cloud to trace."""
         grid = self.grid

@@ -338,11 +338,11 @@ def weigh_range(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> floa
     A range that the cloud explains worse than chance casts doubt on it; one that it explains takes such doubt back, and gives nothing else.
     """
     right = weigh(each.cloud, meeting, area_m2)
-    if each.has_contracted or each.is_stated:
+    if not each.cloud.is_searching:
         before = each.doubts.get(meeting.name, 0.0)
         after = before + meeting.share * math.log(WRONG[meeting.status] / max(1.0 - right, LEAST_WRONG))
         each.doubts[meeting.name] = min(max(after, MOST_DOUBT), 0.0)
-        each.plausibility.add(each.doubts[meeting.name] - before)
+        each.log_weight += each.doubts[meeting.name] - before
     return right
 
 

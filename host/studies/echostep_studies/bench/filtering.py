@@ -71,7 +71,7 @@ def track(
         estimate = map_filter.update(segment)
         cpu_s += time.process_time() - begin_s
         claims.append(_claim(estimate))
-        searching = 0 if map_filter.search is None else len(map_filter.search.cloud.x_m)
+        searching = 0 if map_filter.belief.search is None else len(map_filter.belief.search.cloud.x_m)
         most = max(most, len(map_filter.cloud.x_m) + searching)
     return FilterRun(tuple(claims), most, cpu_s)
 
