@@ -32,6 +32,7 @@ BY_CHANCE = (
     0.3  # of a search's mass that stays elsewhere when it has found a place: the range table is no exact likelihood
 )
 LEAST = 1e-4  # probability of a cloud below which it ends
+LEAST_LOG_ODDS = -700.0  # whose exponential is a number
 
 
 @dataclass(slots=True)
@@ -48,54 +49,61 @@ class CloudHypothesis:
 
 
 class Belief:
-    """The clouds' hypotheses, and the log-weights of `elsewhere` and `another`; normalised after each method."""
+    """Log-weights of the clouds' hypotheses and of `elsewhere`, which sum to 1, and the log-odds of their building against another."""
 
-    def __init__(self, cloud: Cloud, prior: float, another: float) -> None:
-        """`prior`: that the trunk is in the first cloud, if it is in this building; `another`: that it is in another."""
-        self.tracked = CloudHypothesis(cloud, _log(prior) + _log(1.0 - another))
+    def __init__(self, cloud: Cloud, prior: float, plan_fits: float) -> None:
+        """Prior probabilities: that the trunk is in the first cloud, if it is in this building; that the plan is the building's."""
+        self.tracked = CloudHypothesis(cloud, _log(prior))
         self.search: CloudHypothesis | None = None
-        self.log_elsewhere = _log(1.0 - prior) + _log(1.0 - another)
-        self.log_another = _log(another)
+        self.log_elsewhere = _log(1.0 - prior)
+        self._log_odds = _log(plan_fits) - _log(1.0 - plan_fits)
 
     @property
     def clouds(self) -> list[CloudHypothesis]:
         """The hypotheses that have a cloud."""
         return [self.tracked] if self.search is None else [self.tracked, self.search]
 
-    def probability(self, each: CloudHypothesis | None) -> float:
-        """Of a cloud; 0 of none."""
-        return 0.0 if each is None else math.exp(each.log_weight)
-
     @property
     def plan_fits(self) -> float:
         """Probability that the plan is the building's."""
-        return 1.0 - math.exp(self.log_another)
+        return 1.0 / (1.0 + math.exp(-max(self._log_odds, LEAST_LOG_ODDS)))
+
+    def probability(self, each: CloudHypothesis | None) -> float:
+        """That the trunk is in this cloud; 0 of none."""
+        return 0.0 if each is None else math.exp(each.log_weight) * self.plan_fits
 
     @property
     def is_doubted(self) -> bool:
         """Whether it is probable that the trunk is where no cloud is, if the plan fits."""
-        return math.exp(self.log_elsewhere) > DOUBTED * self.plan_fits
+        return math.exp(self.log_elsewhere) > DOUBTED
 
     def normalise(self) -> None:
-        """Let the probabilities have the sum 1."""
-        every = [self.log_elsewhere, self.log_another, *(each.log_weight for each in self.clouds)]
-        total = float(np.logaddexp.reduce(every))
+        """Let the weights have the sum 1; what they had is evidence for the plan."""
+        total = float(np.logaddexp.reduce([self.log_elsewhere, *(each.log_weight for each in self.clouds)]))
         for each in self.clouds:
             each.log_weight -= total
         self.log_elsewhere -= total
-        self.log_another -= total
+        self._log_odds += total
 
     def leave(self, share: float) -> None:
-        """Move this share of each cloud's probability to `elsewhere`."""
+        """Move this share of each cloud's weight to `elsewhere`."""
         for each in self.clouds:
             self._move(each, share)
-        self.normalise()
 
     def begin_search(self, cloud: Cloud, log_pings: float) -> None:
-        """Let a cloud search for what is elsewhere; `log_pings`: log of its density of the path that it has searched over that without a plan."""
+        """Let a cloud search for what is elsewhere; `log_pings`: log of its density of the path that it has searched over that without a plan.
+
+        It takes the place of an earlier search that has found nothing.
+        """
         if self.search is not None:
             self._move(self.search, 1.0)
-        self.search = CloudHypothesis(cloud, self.log_elsewhere + TEMPER * log_pings)
+        if self.tracked.cloud.is_searching:
+            self._move(self.tracked, 1.0)
+        begun = CloudHypothesis(cloud, self.log_elsewhere + TEMPER * log_pings)
+        if self.tracked.cloud.is_searching:
+            self.tracked, self.search = begun, None
+        else:
+            self.search = begun
         self.log_elsewhere = -math.inf
         self.normalise()
 
@@ -109,24 +117,25 @@ class Belief:
             self.tracked.log_weight = float(np.logaddexp(self.tracked.log_weight, self.search.log_weight))
             self.search = None
 
-    def prune(self) -> bool:
-        """Track a search that has found a likelier place, and end improbable clouds; returns whether another cloud is tracked."""
-        search, was = self.search, self.tracked
-        if search is not None:
-            is_likelier = search.log_weight > self.tracked.log_weight
-            if is_likelier and (not search.cloud.is_searching or self.tracked.log_weight < math.log(LEAST)):
-                self.tracked, self.search = search, was
-            if self.search is not None and self.search.log_weight < math.log(LEAST):
-                self._move(self.search, 1.0)
-                self.search = None
-        return self.tracked is not was
+    def prune(self) -> None:
+        """Track a likelier place that a search has found, and end an improbable cloud."""
+        if self.search is None:
+            return
+        lead = self.search.log_weight - self.tracked.log_weight
+        if lead > 0.0 and (not self.search.cloud.is_searching or self.tracked.log_weight < math.log(LEAST)):
+            self.tracked, self.search = self.search, self.tracked
+        if self.search.log_weight < math.log(LEAST):
+            self._move(self.search, 1.0)
+            self.search = None
 
     def raise_to(self, each: CloudHypothesis, least: float) -> None:
-        """Let the probability of a cloud be at least `least`."""
-        others = 1.0 - self.probability(each)
-        if self.probability(each) < least:
-            each.log_weight = _log(least) - _log(1.0 - least) + _log(others)
+        """Let the probability of a cloud, if the plan fits, be at least `least`."""
+        was = math.exp(each.log_weight)
+        if was < least:
+            each.log_weight = _log(least) - _log(1.0 - least) + _log(1.0 - was)
+            fits = self._log_odds
             self.normalise()
+            self._log_odds = fits
 
     def _move(self, each: CloudHypothesis, share: float) -> None:
         self.log_elsewhere = float(np.logaddexp(self.log_elsewhere, each.log_weight + _log(share)))

@@ -20,7 +20,7 @@ from echostep.arrays import Floats
 from echostep.jit import lean_kernel
 from echostep.localization.height.levels import SAME_LEVEL_M
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.particles.places import LikelyPlace
+from echostep.localization.particles.places import LikelyPlace, hypotheses
 
 CHI2_95 = 5.991464547107979  # 95 % quantile of chi-square, two degrees of freedom
 TRACKING_M, LOST_M = 1.0, 5.0  # errors that matter: a door, a room
@@ -173,11 +173,10 @@ def ellipse95(xx_m2: float, xy_m2: float, yy_m2: float) -> Ellipse:
 
 
 class Right(NamedTuple):
-    """Probability that the trunk is in the tracked cloud, `here`, and in another within TRACKING_M and LOST_M of the tracked one's mean."""
+    """Probability that the trunk is in the tracked cloud, `here`, and in that of a search."""
 
     here: float
-    near: float = 0.0
-    about: float = 0.0
+    search: float = 0.0
 
 
 SURELY = Right(1.0)
@@ -199,14 +198,21 @@ def estimate(
     m = moments(cloud.map_x_m, cloud.y_m, cloud.turn_rad + walk_heading_rad, weight, TRACKING_M, LOST_M)
     places: tuple[LikelyPlace, ...] = ()
     if search is not None or m.xx_m2 + m.yy_m2 > SPREAD_M**2 or max(levels) < SURE_OF_LEVEL:
-        places = (search or cloud).places(walk_heading_rad)
+        places = (
+            cloud.places(walk_heading_rad) if search is None else places_of_both(cloud, search, right, walk_heading_rad)
+        )
     if search is None and places and places[0].probability > UNSURE:
         m = _moments_at(places[0], m, cloud, weight)
     x, y, xx, xy, yy, east, north, near, about = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
-    status = _status(right.here * near + right.near, right.here * about + right.about, max(levels))
+    near, about = right.here * near, right.here * about
+    is_right = right.here
+    if search is not None:
+        beside = weight_about(search.map_x_m, search.y_m, search.z_m, search.weight, (x, y, z), (TRACKING_M, LOST_M))
+        near, about = near + right.search * beside[0], about + right.search * beside[1]
+        is_right = min(right.here + right.search * beside[0], 1.0)
+    status = _status(near, about, max(levels))
     xx, yy = xx + sd_m**2, yy + sd_m**2
-    is_right = min(right.here + right.near, 1.0)
     protection_m = _protection_m(xx, xy, yy, is_right * max(levels))
     if status is not TrackStatus.TRACKING and elsewhere is not None:
         xx, xy, yy = elsewhere.mixed((x, y), (xx, xy, yy), is_right)
@@ -214,6 +220,15 @@ def estimate(
         t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status, levels.index(max(levels)), levels, z, z_sd,
         protection_m, is_right, places,
     )  # fmt: skip
+
+
+def places_of_both(cloud: Cloud, search: Cloud, right: Right, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:
+    """The likely places of the tracked cloud and of a search, if the trunk is in one of them."""
+    both = (cloud, search)
+    weight = np.concatenate([cloud.weight * right.here, search.weight * right.search])
+    x, y, turn = (np.concatenate([getattr(each, name) for each in both]) for name in ("map_x_m", "y_m", "turn_rad"))
+    level = np.concatenate([each.level for each in both])
+    return hypotheses(x, y, level, turn + walk_heading_rad, weight / weight.sum())
 
 
 def _moments_at(place: LikelyPlace, mean: Moments, cloud: Cloud, weight: Floats) -> Moments:

@@ -68,7 +68,7 @@ class MapFilter:
         self._pings = UsablePings(building.background(self._model), echo)
         cloud = self._new_cloud(start, walk_heading_rad)
         prior = (1.0 if cloud.is_searching else STATED) if building.has_walls else BY_DEFINITION
-        self.belief = Belief(cloud, prior, 1.0 - PLAN_FITS if building.has_walls else 0.0)
+        self.belief = Belief(cloud, prior, PLAN_FITS if building.has_walls else 1.0)
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
         self._way = RecentWay()  # since the last gap
@@ -246,7 +246,8 @@ class MapFilter:
             loss = self._building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m) if path_m > 0.0 else None
             if loss is not None:
                 each.cloud.reweight(loss)
-        self._compare(path_m)
+        if self._building.has_walls:
+            self._compare(path_m)
 
     def _follow_with(self, each: CloudHypothesis, move: Move, pings: PingBatch, unplanned: UnplannedDensities) -> None:
         """Propagate and reweight one cloud, and its hypothesis."""
@@ -266,18 +267,20 @@ class MapFilter:
     def _compare(self, path_m: float) -> None:
         """Update the belief after a move: end what is improbable, and merge what is in one place."""
         belief = self.belief
+        belief.normalise()
         belief.leave(WRONG_PER_M * path_m)
         belief.prune()
-        if belief.search is not None and not belief.search.cloud.is_searching and self._share_about()[0] > MERGED:
+        if self._is_found_here():
             belief.merge()
 
-    def _share_about(self) -> tuple[float, float]:
-        """Weight of the search's cloud within TRACKING_M and LOST_M of the tracked cloud's mean."""
-        if self.belief.search is None:
-            return 0.0, 0.0
+    def _is_found_here(self) -> bool:
+        """Whether a search has found the place of the tracked cloud."""
+        if self.belief.search is None or self.belief.search.cloud.is_searching:
+            return False
         cloud, mean = self.belief.search.cloud, self._believed(0.0)
         place_m = mean.x_m, mean.y_m, float(self.cloud.weight @ self.cloud.z_m)
-        return weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, cloud.weight, place_m, (TRACKING_M, LOST_M))
+        near, _ = weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, cloud.weight, place_m, (TRACKING_M, LOST_M))
+        return near > MERGED
 
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""
@@ -292,8 +295,7 @@ class MapFilter:
         belief = self.belief
         hidden_sd_m = HIDDEN_SD_M * self.cloud.hidden_share
         sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M)
-        near, about = (belief.probability(belief.search) * share for share in self._share_about())
-        right = Right(belief.probability(belief.tracked), near, about)
+        right = Right(belief.probability(belief.tracked), belief.probability(belief.search))
         search = belief.search.cloud if belief.search else None
         new = estimate(
             self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, self._building.elsewhere, search

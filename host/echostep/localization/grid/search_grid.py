@@ -67,7 +67,8 @@ class SearchGrid:
     ) -> None:  # fmt: skip
         """Evenly at these places, with any rotation.
 
-        `unplanned`: density without a plan, as inexact as the table. `heights`: None in a building of one level. `veer_sd_rad`: standard deviation of a bias of the path, its turn on a metre.
+        `unplanned`: density without a plan, as inexact as the table. `heights`: None in a building of one level.
+        `veer_sd_rad`: standard deviation of a bias of the path, its turn on a metre.
         """
         self._cells, self._places, self._heights = cells, places, heights
         self._turn_variance = SPREAD_RAD**2 + 4.0 * veer_sd_rad**2
