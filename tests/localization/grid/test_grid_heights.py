@@ -12,10 +12,9 @@ from echostep.localization.grid.heights import GridHeights
 from echostep.localization.grid.kernels import LevelFactors
 from echostep.localization.height.levels import UNKNOWN_LAG_M2, ClimbSettings, HeightChange
 from echostep.localization.particles.start import Air, Start
-from echostep.plan.model import Pose
 from echostep.walls.floor import CELL_M
 from echostep.walls.level_sheet import LIFT, STAIRS, lay_out_levels
-from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tower
+from echostep_studies.simulation.tower import STOREY_M, tower
 
 SHEET = lay_out_levels(tower(3)).sheet
 STAIR, RIDE = (int(np.flatnonzero(SHEET.kind == kind)[0]) + 1 for kind in (STAIRS, LIFT))
@@ -74,9 +73,3 @@ def test_a_known_barometer_tells_the_level() -> None:
     (factors,), _ = climbed(heights, [by_pressure(100.0 + STOREY_M)], 0.04)
     assert factors.weight[0, 1] == factors.weight[0].max()
     assert factors.weight[0, 0] < 0.01
-
-
-def test_a_search_beside_a_cloud_on_stairs_begins_between_two_levels() -> None:
-    start = Start(near=Pose(*LIFT_AT, 0.0, 1), near_z_m=4.2)
-    z, _ = GridHeights(SHEET, CLIMB, start).of(np.array([1, 1, 0]), np.array([STAIR - 1, -1, STAIR - 1]))
-    assert z == pytest.approx([4.2, SHEET.height_m[1], SHEET.height_m[0]])

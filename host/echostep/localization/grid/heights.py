@@ -31,8 +31,6 @@ class GridHeights:
     def __init__(self, sheet: LevelSheet, climbing: ClimbSettings, start: Start) -> None:
         self._sheet, self._climbing = sheet, climbing
         self._z_m: Floats = np.tile(sheet.height_m, (len(sheet.kind), 1))
-        if start.near is not None and start.near_z_m is not None:
-            self._z_m[:, start.near.level] = start.near_z_m
         self._lag_m: Floats = np.full(len(sheet.height_m), 0.0 if start.air is None else start.air.zero_m)
 
     def update(self, change: HeightChange, lag_variance: float) -> tuple[LevelFactors, float]:

@@ -43,14 +43,13 @@ from echostep.localization.particles.kernels import (
 from echostep.localization.particles.particles import GATHERED_REST, Particles
 from echostep.localization.particles.reweighting import CloudModel, EchoMemory, MoveProgress, propagate_and_reweight
 from echostep.localization.particles.sampling import kld_size, log_mode_weight, spread_evenly
-from echostep.localization.particles.start import ANY_LEVEL, Air, Start, draw_poses, near_count
+from echostep.localization.particles.start import ANY_LEVEL, Air, Start, draw_poses
 from echostep.localization.settings import CloudSettings
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never so large
-CONTRACTED = 2  # times the least size, up to which a cloud is contracted, assumed
 # Weight outside of one place below which a search has found it, on one level, and on several, there after so many metres of search: exact likelihoods
 # discriminate between levels that are alike, and need a way for it; assumed
 FOUND_REST, LEVELS_REST, LEVELS_M = 0.03, 0.1, 10.0
@@ -79,7 +78,6 @@ class Cloud(Particles):
     A cloud is scattered or contracted by its number of particles, gathered or in one place by its spread: see the properties of these names.
     `grid`: of a search, until it has found the place; the particles only show it, and are drawn from it anew after each move. `is_gathered`: since
     it last was scattered by an unobserved move, less than GATHERED_REST of its weight was once farther than GATHERED_M from its mean on the sheet.
-    `rescues`: how often all particles crossed a wall.
     """
 
     def __init__(
@@ -97,15 +95,12 @@ class Cloud(Particles):
         self._settings = settings
         self._rng = rng
         self.grid: SearchGrid | None = None
-        self.rescues = 0
         self.is_gathered = False
         self.is_on_any_level = (
             self.sheet is not None and start.pose is None and start.level == ANY_LEVEL and start.air is None
         )
         x_m, y_m, heading = draw_poses(start, settings.largest, floor, self.sheet, rng)
         z_m = self.sheet.height_m[level_of(x_m, self.sheet)] if self.sheet else np.zeros(len(x_m))
-        if start.near_z_m is not None:
-            z_m[: near_count(len(x_m))] = start.near_z_m
         lag_m = np.full(len(x_m), 0.0 if start.air is None else start.air.zero_m)
         self._put(DrawnPoses(x_m, y_m, heading - walk_heading_rad, z_m, lag_m))
         wanted = max(self._wanted_size(), START_SIZE)
@@ -165,11 +160,6 @@ class Cloud(Particles):
     def is_scattered(self) -> bool:
         """Whether the cloud has more than SCATTERED times its least number of particles; such a cloud is roughened."""
         return len(self.x_m) > SCATTERED * self._least_size
-
-    @property
-    def is_contracted(self) -> bool:
-        """Whether the cloud has at most CONTRACTED times its least number of particles."""
-        return len(self.x_m) <= CONTRACTED * self._least_size
 
     @property
     def _least_size(self) -> int:
@@ -357,7 +347,6 @@ class Cloud(Particles):
 
     def _widen(self) -> None:
         """Widen the places after every particle has crossed a wall."""
-        self.rescues += 1
         self.x_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
         self.y_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
 

@@ -39,7 +39,7 @@ class Start:
 
     `pose`: its mean, with a standard deviation `sd_m` per axis and `heading_sd_rad`; a pose with level ANY_LEVEL may be on any. Without a pose:
     evenly over the walkable floor, on any level and with any heading, within the outline `room_m` (k, 2) on `level` if there is one; a share of them
-    `near` a pose, if there is one, at the height `near_z_m` (on stairs it is between two levels): with level ANY_LEVEL, above and below it too, with
+    `near` a pose, if there is one: with level ANY_LEVEL, above and below it too, with
     any heading. `air`: what is known of the heights by pressure.
     `after_pause`: at the pose an earlier run ended, and the wearer may have gone on since, so the whole building is searched beside it.
 
@@ -59,7 +59,6 @@ class Start:
     room_m: Floats | None = None
     level: int = ANY_LEVEL
     near: Pose | None = None
-    near_z_m: float | None = None
     air: Air | None = None
     after_pause: bool = False
 
