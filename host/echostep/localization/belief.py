@@ -16,36 +16,78 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from echostep.arrays import Floats
+from echostep.localization.grid.search_grid import SearchGrid
+from echostep.localization.height.levels import HeightChange
+from echostep.localization.particle_arrays import Move
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.settings import UNPLANNED_DOOR
+from echostep.plan.model import Pose
 
 # Assumed, not measured.
 PLAN_FITS = 0.99  # prior probability that the plan is the building's
 STATED = 0.99  # prior probability of a stated start, if the plan fits
 WRONG_PER_M = 2e-5  # probability that the trunk leaves all clouds on a metre of the path (carried, a door that is no door): once in 50 km
 # Power of the echoes' densities: their errors are alike on a longer path than that on which they count as one (plan, sway, speed of sound)
-TEMPER = 0.5
+TEMPER = 0.3
 DOUBTED = 0.5  # probability of `elsewhere`, if the plan fits, above which the building is searched
 BELIEVED = 0.99  # of the tracked cloud, above which the plan supports it
 BY_CHANCE = (
     0.3  # of a search's mass that stays elsewhere when it has found a place: the range table is no exact likelihood
 )
+CROSSED_M = (
+    4.0  # from one way through a wall, within which another is through the same one; path on which a cloud goes through
+)
+THROUGH = math.log(
+    1 / 100
+)  # of the share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more
 LEAST = 1e-4  # probability of a cloud below which it ends
 LEAST_LOG_ODDS = -700.0  # whose exponential is a number
 
 
 @dataclass(slots=True)
 class CloudHypothesis:
-    """The trunk is in this cloud. `log_weight`: of its probability. `doubts`: log-odds that ranges to beacons of each teammate have taken from it."""
+    """The trunk is in this cloud. `log_weight`: of its probability.
+
+    `table`: the same cloud on a grid, while a search on one is compared with it: by the range table, too. `doubts`: log-odds that
+    ranges to beacons of each teammate have taken from it.
+    """
 
     cloud: Cloud
     log_weight: float
+    table: SearchGrid | None = None
     doubts: dict[str, float] = field(default_factory=dict)
 
-    def weigh(self, log_pings: Floats, log_passed: float) -> None:
-        """Multiply by the density of pings (k,) over that without a plan, given as logarithms, and by the share that crossed no wall."""
-        self.log_weight += TEMPER * float(log_pings.sum()) + max(log_passed, UNPLANNED_DOOR)
+    def weigh(self, log_pings: float, log_passed: float) -> None:
+        """Multiply by the density of pings over that without a plan, given as logarithms, and by the share that crossed no wall."""
+        self.log_weight += TEMPER * log_pings + max(log_passed, UNPLANNED_DOOR)
+
+    def change_levels(self, move: Move, change: HeightChange) -> None:
+        """Update heights and levels after a move."""
+        before = self.cloud.lag_variance
+        self.cloud.change_levels(move, change)
+        if self.table is not None:
+            self.table.change_levels(change, before)
+
+
+class CrossedWalls:
+    """Walls of the plan that a believed cloud has gone through: each costs its price once."""
+
+    def __init__(self) -> None:
+        self._crossed: list[Pose] = []
+        self._log_passed = 0.0  # of the last CROSSED_M
+
+    def charge(self, at: Pose, path_m: float, log_passed: float) -> float:
+        """What of `log_passed` counts for a cloud that has moved so far to `at`; the log of the share that crossed no wall."""
+        if any(
+            was.level == at.level and math.hypot(was.x_m - at.x_m, was.y_m - at.y_m) < CROSSED_M
+            for was in self._crossed
+        ):
+            self._log_passed = 0.0
+            return 0.0
+        self._log_passed = self._log_passed * math.exp(-path_m / CROSSED_M) + log_passed
+        if self._log_passed < THROUGH:
+            self._crossed.append(at)
+        return log_passed
 
 
 class Belief:
@@ -126,7 +168,7 @@ class Belief:
             self.tracked, self.search = self.search, self.tracked
         if self.search.log_weight < math.log(LEAST):
             self._move(self.search, 1.0)
-            self.search = None
+            self.search, self.tracked.table = None, None
 
     def raise_to(self, each: CloudHypothesis, least: float) -> None:
         """Let the probability of a cloud, if the plan fits, be at least `least`."""

@@ -16,12 +16,13 @@ import numpy as np
 from echostep.angles import mean_angle
 from echostep.board.gateway import BeaconReading
 from echostep.localization.beacon_map import BeaconMap
-from echostep.localization.belief import BELIEVED, PLAN_FITS, STATED, WRONG_PER_M, Belief, CloudHypothesis
+from echostep.localization.belief import BELIEVED, PLAN_FITS, STATED, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
 from echostep.localization.building import Building
 from echostep.localization.echoes.likelihood import EchoSettings
 from echostep.localization.echoes.unplanned import RangeMemory, UnplannedDensities, UsablePings
 from echostep.localization.estimate import LOST_M, TRACKING_M, Estimate, Right, estimate, weight_about
-from echostep.localization.grid.start import grid_of, is_unknown
+from echostep.localization.grid.cells import GridCells
+from echostep.localization.grid.start import grid_about, grid_of, is_unknown
 from echostep.localization.height.height_filter import RelativeHeight, RidingHeight
 from echostep.localization.height.levels import HeightChange
 from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, move_of
@@ -69,6 +70,7 @@ class MapFilter:
         cloud = self._new_cloud(start, walk_heading_rad)
         prior = (1.0 if cloud.is_searching else STATED) if building.has_walls else BY_DEFINITION
         self.belief = Belief(cloud, prior, PLAN_FITS if building.has_walls else 1.0)
+        self._crossed = CrossedWalls()
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
         self._way = RecentWay()  # since the last gap
@@ -167,11 +169,13 @@ class MapFilter:
         s, b = self._settings, self._building
         cloud = Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor)
         if is_unknown(start) and len(b.floor.x_m):
-            unplanned = RangeMemory(b.background(self._model), inexact(self._settings))
-            cloud.grid = grid_of(
-                start, walk_heading_rad, b.cells(self._model), unplanned, b.floor, b.sheet, s, self._rng
-            )
+            cloud.grid = grid_of(start, walk_heading_rad, *self._table(), b.floor, b.sheet, s, self._rng)
         return cloud
+
+    def _table(self) -> tuple[GridCells, RangeMemory]:
+        """The cells of a grid, and the density of pings without a plan that is as inexact as they are."""
+        unplanned = RangeMemory(self._building.background(self._model), inexact(self._settings))
+        return self._building.cells(self._model), unplanned
 
     @property
     def plan_supports(self) -> bool:
@@ -199,6 +203,10 @@ class MapFilter:
         cloud = self._new_cloud(start, walk_heading_rad)
         self._met.forget_beacons()
         self.belief.begin_search(cloud, self._way.search(cloud, self._model))
+        if self.belief.search is not None:
+            self.belief.tracked.table = grid_about(
+                self.cloud, *self._table(), self._building.floor, self._settings, self._rng
+            )
 
     def _search_if_doubted(self, walk_heading_rad: float) -> None:
         """Search the building where the trunk is probably in no cloud."""
@@ -236,12 +244,13 @@ class MapFilter:
         self._way.add(move, pings, change)
         for each in self.belief.clouds:
             self._follow_with(each, move, pings, unplanned)
-            each.cloud.change_levels(move, change)
+            each.change_levels(move, change)
             if each.cloud.is_searching:
                 if each.cloud.show_search():
                     self._way.pass_again(each.cloud, self._blurred, self._building.walls)
                     each.cloud.draw_veer()
                     self.belief.find(each)
+                    self.belief.tracked.table = None
                 continue
             loss = self._building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m) if path_m > 0.0 else None
             if loss is not None:
@@ -253,7 +262,7 @@ class MapFilter:
         """Propagate and reweight one cloud, and its hypothesis."""
         cloud = each.cloud
         if cloud.is_searching:
-            each.weigh(np.array([cloud.search(move, pings, self._model)]), 0.0)
+            each.weigh(cloud.search(move, pings, self._model), 0.0)
             return
         model = self._blurred if cloud.is_scattered else self._model  # by the spacing of sparse particles
         evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
@@ -261,8 +270,18 @@ class MapFilter:
         if cloud.is_on_any_level and cloud.is_in_one_place:
             self._way.pass_again(cloud, self._blurred, self._building.walls)
             cloud.is_on_any_level = False
-        if self._building.has_walls:
-            each.weigh(evidence.log_pings - unplanned.either, evidence.log_path)
+        if each.table is not None:
+            each.weigh(each.table.advance(move, pings, self._model), evidence.log_path)
+        elif self._building.has_walls:
+            each.weigh(
+                float((evidence.log_pings - unplanned.either).sum()), self._passed(each, move, evidence.log_path)
+            )
+
+    def _passed(self, each: CloudHypothesis, move: Move, log_passed: float) -> float:
+        """What counts of the log of the share of a cloud that crossed no wall."""
+        if self.belief.search is not None or self.belief.probability(each) < BELIEVED:
+            return log_passed
+        return self._crossed.charge(self._believed(0.0), math.hypot(move.dx_m, move.dy_m), log_passed)
 
     def _compare(self, path_m: float) -> None:
         """Update the belief after a move: end what is improbable, and merge what is in one place."""

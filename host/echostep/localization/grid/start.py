@@ -14,6 +14,8 @@ from echostep.localization.echoes.unplanned import RangeMemory
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.heights import GridHeights
 from echostep.localization.grid.search_grid import SearchGrid
+from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.kernels import systematic
 from echostep.localization.particles.start import NEAR_SHARE, Start, allowed_floor, draw_poses, near_count
 from echostep.localization.settings import FilterSettings
 from echostep.walls.floor import Floor
@@ -26,6 +28,17 @@ DRAWN = 20_000  # poses that stand for a place with a spread
 def is_unknown(start: Start) -> bool:
     """Whether the place is searched, as more than particles about a pose."""
     return start.pose is None or start.sd_m > ROOM_SD_M
+
+
+def grid_about(
+    cloud: Cloud, cells: GridCells, unplanned: RangeMemory, floor: Floor, settings: FilterSettings, rng: np.random.Generator
+) -> SearchGrid:  # fmt: skip
+    """The grid of the poses of a cloud: by it, the cloud is compared with a search as long as that is on a grid."""
+    heights = None if cloud.sheet is None else GridHeights(cloud.sheet, settings.climb, Start(air=cloud.air))
+    grid = SearchGrid(cells, (floor.x_m, floor.y_m), unplanned, heights, math.radians(settings.cloud.start_veer_sd_deg))
+    chosen = systematic(cloud.weight, float(rng.random()), len(cloud.x_m))
+    grid.begin_about(cloud.x_m[chosen], cloud.y_m[chosen], cloud.turn_rad[chosen], 1.0)
+    return grid
 
 
 def grid_of(

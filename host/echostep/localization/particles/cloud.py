@@ -91,7 +91,7 @@ class Cloud(Particles):
         self.sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
         self._climbing = climbing or ClimbSettings()
         self._level_changes = level_change_model(self._climbing)
-        self._lag_variance = UNKNOWN_LAG_M2 if start.air is None else start.air.sd_m**2
+        self.lag_variance = UNKNOWN_LAG_M2 if start.air is None else start.air.sd_m**2
         self._settings = settings
         self._rng = rng
         self.grid: SearchGrid | None = None
@@ -198,14 +198,14 @@ class Cloud(Particles):
         if self.sheet is None:
             return
         if math.isfinite(change.height_sd_m):
-            self._lag_variance += self._climbing.drift_m**2 * change.span_s
+            self.lag_variance += self._climbing.drift_m**2 * change.span_s
         if self.grid is not None:
-            self._lag_variance = self.grid.change_levels(change, self._lag_variance)
+            self.lag_variance = self.grid.change_levels(change, self.lag_variance)
             return
         noise = self._rng.standard_normal(len(self.x_m))
         heights = HeightArrays(self.z_m, self.lag_m)
-        self._lag_variance = change_levels(
-            self.arrays, heights, move, noise, change, self._lag_variance, self._level_changes, self.sheet
+        self.lag_variance = change_levels(
+            self.arrays, heights, move, noise, change, self.lag_variance, self._level_changes, self.sheet
         )
         self.resample_if_needed()
 
@@ -241,21 +241,21 @@ class Cloud(Particles):
 
     def forget_lag(self) -> None:
         """Make the lag unknown: the barometer may have restarted."""
-        self._lag_variance = UNKNOWN_LAG_M2
+        self.lag_variance = UNKNOWN_LAG_M2
 
     def let_lag_drift(self, pause_s: float) -> None:
         """Let the variance of the lag grow over a pause without measurements."""
-        drifted_m2 = self._lag_variance + drift_m(self._climbing, pause_s) ** 2
-        self._lag_variance = min(drifted_m2, UNKNOWN_LAG_M2)
+        drifted_m2 = self.lag_variance + drift_m(self._climbing, pause_s) ** 2
+        self.lag_variance = min(drifted_m2, UNKNOWN_LAG_M2)
 
     @property
     def air(self) -> Air | None:
         """Mean and standard deviation of the lag of the height by pressure; None where nothing is known of it."""
-        if self.sheet is None or self._lag_variance >= UNKNOWN_LAG_M2:
+        if self.sheet is None or self.lag_variance >= UNKNOWN_LAG_M2:
             return None
         weight = self.weight
         mean = float(weight @ self.lag_m)
-        return Air(mean, math.sqrt(self._lag_variance + float(weight @ (self.lag_m - mean) ** 2)))
+        return Air(mean, math.sqrt(self.lag_variance + float(weight @ (self.lag_m - mean) ** 2)))
 
     def scatter(self, move: Move, change: HeightChange | None = None) -> None:
         """Spread by an unobserved move without regard to walls, since its path is unknown. The level is that of the height by pressure, if any.
