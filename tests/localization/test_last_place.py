@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization.belief import STATED
+from echostep.localization.belief import PLAN_FITS, STATED
 from echostep.localization.building import Building
 from echostep.localization.height.levels import ClimbSettings
 from echostep.localization.map_filter import UNOBSERVED_DOUBT, MapFilter
@@ -75,8 +75,9 @@ def test_after_a_change_of_the_storey_meanwhile_the_last_one_is_not_claimed(stor
     resumed = filter_of(start_after(LastPlace(LIFT_AT[0] + 4.0, LIFT_AT[1], 0.1, 0, Air(ZERO_M, 0.1)), 20.0, CLIMBING))
     for k in range(6):
         right = resumed.update(standing(k, ZERO_M + storey * STOREY_M)).right
-    assert resumed.search is not None
-    search = resumed.search.cloud
+    assert resumed.belief.search is not None
+    search = resumed.belief.search.cloud
     assert np.bincount(search.level, search.weight, 3)[storey] > 0.99
     assert right < 0.5
-    assert resumed.tracked.plausibility.probability == pytest.approx(STATED * (1.0 - UNOBSERVED_DOUBT), abs=1e-3)
+    stayed = PLAN_FITS * STATED * (1.0 - UNOBSERVED_DOUBT)
+    assert resumed.belief.probability(resumed.belief.tracked) == pytest.approx(stayed, abs=1e-3)

@@ -60,8 +60,8 @@ def test_weather_makes_a_long_pause_worthless() -> None:
         Building(laid_out.walls, laid_out.sheet), Start(Pose(*LIFT_AT, 0.0, 0), 0.05), 0.0,
         np.random.default_rng(1), SETTINGS,
     ).cloud  # fmt: skip
-    cloud._lag_variance = 0.01
+    cloud.lag_variance = 0.01
     for hours, least_m, most_m in ((0.01, 0.1, 0.2), (1.0, 3.0, 5.0), (8.0, 20.0, 40.0)):
-        before = cloud._lag_variance
+        before = cloud.lag_variance
         cloud.let_lag_drift(3600.0 * hours)
-        assert least_m < math.sqrt(cloud._lag_variance - before + 0.01) < most_m
+        assert least_m < math.sqrt(cloud.lag_variance - before + 0.01) < most_m

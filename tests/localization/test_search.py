@@ -8,7 +8,6 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization.belief import DOUBTED, FOUND_WITHIN_M, PLAN_FITS
 from echostep.localization.building import Building
 from echostep.localization.echoes.range_table import AFTER_ECHO, AFTER_SILENCE, INDEPENDENT_M, USED_M, TablePings
 from echostep.localization.grid.search_grid import SearchGrid
@@ -122,7 +121,7 @@ def test_a_search_that_moves_unobserved_begins_about_where_it_was() -> None:
     step = PathSegment(0.0, 2.0, 0.0, 0.0, 0.0, 0.0, sd_m=1.1 * UNOBSERVED_SD_M, turn_sd_rad=0.1, step=0)
     assert step.unobserved
     after = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
-    after.tracked.cloud = cloud
+    after.belief.tracked.cloud = cloud
     after.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE))
     cloud.show_search()
     assert 0.5 < float(cloud.weight @ (np.hypot(cloud.x_m - 6.05, cloud.y_m - 4.05) < 3.0 * step.sd_m)) < 0.95
@@ -136,26 +135,3 @@ def test_a_search_in_a_room_begins_there() -> None:
 
 def test_a_start_that_is_a_place_is_no_search() -> None:
     assert not Cloud(CloudSettings(), Start(), 0.0, np.random.default_rng(1)).is_searching
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("share", "path_m", "is_kept", "doubts_plan"),
-    [
-        (0.4 * DOUBTED, FOUND_WITHIN_M - 1.0, True, False),
-        (0.4 * DOUBTED, FOUND_WITHIN_M + 2.0, True, True),
-        (1.2 * DOUBTED, FOUND_WITHIN_M + 2.0, True, False),
-        (1.2 * DOUBTED, 2.0 * FOUND_WITHIN_M + 1.0, False, True),
-    ],
-)
-def test_a_search_goes_on_for_twice_the_path_within_which_one_finds(
-    share: float, path_m: float, is_kept: bool, doubts_plan: bool
-) -> None:
-    """To and fro, without pings; the weights are set before the last two steps."""
-    map_filter = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
-    begun = map_filter.cloud
-    for k in range(round(path_m / STEP_M)):
-        gather(searching(map_filter), DOUBTED * 1.2 if (k + 1) * STEP_M < path_m - 3.0 * STEP_M else share)
-        estimate = map_filter.update(MeasuredSegment(a_step(STEP_M * (-1.0) ** k, 0.0, k), NONE, NO_RANGERS, NONE))
-    assert (map_filter.cloud is begun) == is_kept
-    assert (estimate.plan_fits < PLAN_FITS - 0.01) == doubts_plan

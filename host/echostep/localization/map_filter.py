@@ -131,7 +131,11 @@ class MapFilter:
         refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._met.refusal(meeting)
         if refusal is not None:
             return refusal
+        searching = [each for each in self.belief.clouds if each.cloud.is_searching]
         fits = [weigh_by(each, meeting, area_m2) for each in self.belief.clouds]
+        for each in searching:
+            if not each.cloud.is_searching:
+                self.belief.find(each)
         if meeting.beacon is not None:
             self.belief.normalise()
             return MeetingEffect.USED if fits[0] >= FITS else MeetingEffect.CONTRADICTS

@@ -19,7 +19,7 @@ from echostep.angles import mean_angle
 from echostep.errors import EchostepError
 from echostep.guidance.guided_run import GuidedRun, destination
 from echostep.localization.beacons.beliefs import BeaconBeliefs, moments
-from echostep.localization.belief import CloudHypothesis, Plausibility
+from echostep.localization.belief import CloudHypothesis
 from echostep.localization.estimate import digest
 from echostep.localization.particles.start import Start
 from echostep.plan.model import Plan, Pose, load_plan
@@ -93,9 +93,7 @@ def test_another_cloud_that_is_tracked_from_now_on_locates_the_beacons_anew(walk
     assert tracker.beacon_places(at.t_s)
     near = Start(Pose(at.x_m, at.y_m, at.heading_rad, at.level), 0.2)
     walk_rad = mean_angle(before.cloud.turn_rad, before.cloud.weight)
-    before.tracked = CloudHypothesis(
-        before._new_cloud(near, at.heading_rad - walk_rad), Plausibility(0.99), is_stated=True
-    )
+    before.belief.tracked = CloudHypothesis(before._new_cloud(near, at.heading_rad - walk_rad), 0.0)
     assert tracker.beacon_places(at.t_s) == []
     assert not tracker.own_beacons()
     last = tracker.take(portion_of(walk.chunks[half:]))[-1]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.localization.belief import beyond_errors_that_stay
+from echostep.localization.belief import TEMPER
 from echostep.localization.echoes.likelihood import EchoSettings
 from echostep.localization.echoes.unplanned import (
     BIN_M,
@@ -19,7 +19,7 @@ from echostep.localization.echoes.unplanned import (
     RangeMemory,
     UnplannedDensities,
 )
-from echostep.localization.settings import FilterSettings, with_plan_error
+from echostep.localization.settings import UNPLANNED_DOOR, FilterSettings, with_plan_error
 
 SD_M = 0.036
 SPACING_M = 0.25
@@ -70,13 +70,13 @@ def test_an_error_that_stays_along_a_wall_casts_less_doubt(off_m: float) -> None
     range_m = 1.2 + 0.5 * SD_M * np.random.default_rng(2).standard_normal(400)
     log_ratio = log_planned(range_m, 1.2 + off_m)[20:] - densities(range_m).either[20:]
     assert log_ratio.sum() < -35.0
-    assert beyond_errors_that_stay(log_ratio, np.ones(380)).sum() > 0.65 * log_ratio.sum()
+    assert TEMPER * log_ratio.sum() > 3.0 * UNPLANNED_DOOR  # no more than three walls that were never built
 
 
 def test_a_wall_where_a_door_was_foretold_does() -> None:
     range_m = np.full(24, 1.2)
     log_ratio = log_planned(range_m, 2.5)[20:] - densities(range_m).either[20:]
-    assert beyond_errors_that_stay(log_ratio, np.ones(4)).sum() < -8.0
+    assert log_ratio.sum() < -8.0
 
 
 def test_a_rival_knows_a_wall_no_better_than_the_plan_does() -> None:

@@ -60,8 +60,10 @@ def test_moves_are_those_of_the_dictionary(seed: int) -> None:
     states, rng = some_states(seed), np.random.default_rng([seed, 1])
     twin = twin_of(states)
     for dx, dy in rng.uniform(-0.6, 0.6, (4, 2)).tolist():
-        kept, top = shift_and_weigh(states, dx, dy, EVEN, 0.0, 0.0, THROUGH, CELLS)
+        kept, top, before, after = shift_and_weigh(states, dx, dy, EVEN, 0.0, 0.0, THROUGH, CELLS)
         twin.move(dx, dy, THROUGH)
+        assert before == pytest.approx(sum(twin.weight.values()))
+        assert after == pytest.approx(before)
         assert kept == len(states.cell)
         assert top == pytest.approx(max(twin.weight.values()))
         assert weights(states) == pytest.approx(twin.weight)
@@ -89,14 +91,16 @@ def test_a_ping_weighs_each_state_by_the_entry_of_its_cell_and_axis(axis_deg: fl
         row = CELLS.row[line * CELLS.columns + column]
         assert row != UNKNOWN
         expected[layer, line, column] = weight * factor[CELLS.expected[sector, row]]
-    shift_and_weigh(states, 0.0, 0.0, factor, math.radians(axis_deg), 0.0, THROUGH, CELLS)
+    before_all = sum(weights(states).values())
+    _, _, before, after = shift_and_weigh(states, 0.0, 0.0, factor, math.radians(axis_deg), 0.0, THROUGH, CELLS)
     assert weights(states) == pytest.approx(expected, rel=1e-5)
+    assert [before, after] == pytest.approx([before_all, sum(expected.values())], rel=1e-5)
 
 
 def test_what_is_improbable_is_dropped() -> None:
     states = some_states(5)
     heavy = {state: weight for state, weight in weights(states).items() if weight >= 0.5}
-    kept, _ = shift_and_weigh(states, 0.0, 0.0, EVEN, 0.0, 0.5, THROUGH, CELLS)
+    kept, *_ = shift_and_weigh(states, 0.0, 0.0, EVEN, 0.0, 0.5, THROUGH, CELLS)
     assert weights(states._replace(cell=states.cell[:kept], weight=states.weight[:kept])) == pytest.approx(heavy)
 
 

@@ -42,7 +42,7 @@ def headings_deg(veer_sd_deg: float) -> Floats:
     settings = FilterSettings(cloud=CloudSettings(start_veer_sd_deg=veer_sd_deg))
     tracked = MapFilter(CORRIDOR, Start(START), 0.0, np.random.default_rng(1), settings)
     every = [tracked.update(measured) for measured in segments()]
-    veer = tracked.tracked.cloud.veer_rad_m
+    veer = tracked.belief.tracked.cloud.veer_rad_m
     assert np.degrees(veer.mean()) == pytest.approx(-VEER_DEG if veer_sd_deg else 0.0, abs=0.5)
     return np.degrees([e.heading_rad for e in every[3 * len(every) // 4 :]])
 

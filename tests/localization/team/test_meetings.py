@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from board_runs import ROOT
 from echostep.arrays import Floats
-from echostep.localization.belief import STATED, Plausibility
+from echostep.localization.belief import STATED, Belief
 from echostep.localization.building import Building
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.cloud import Cloud
@@ -77,7 +77,7 @@ BUILDING = building()
 
 def filter_at(x_m: float, y_m: float, right: float) -> MapFilter:
     made = MapFilter(BUILDING, Start(Pose(x_m, y_m, 0.0)), 0.0, np.random.default_rng(3))
-    made.tracked.plausibility = Plausibility(right)
+    made.belief = Belief(made.cloud, right, 1.0)
     return made
 
 
@@ -180,7 +180,7 @@ def test_a_teammate_elsewhere_does_not_pull_a_sure_cloud() -> None:
     for name in ("eve", "mallory"):
         assert sure.meet(elsewhere(name)) is MeetingEffect.CONTRADICTS
     assert np.array_equal(sure.cloud.x_m, before)
-    assert sure.tracked.plausibility.probability == pytest.approx(0.9999)
+    assert sure.belief.probability(sure.belief.tracked) == pytest.approx(0.9999)
     assert sure._rng.bit_generator.state == drawn
 
 
@@ -218,8 +218,8 @@ def test_a_doubted_cloud_moves_to_the_teammate_after_a_tap() -> None:
     assert doubted.meet(FAR) is MeetingEffect.MOVED
     mean = doubted.cloud.weight @ np.column_stack([doubted.cloud.map_x_m, doubted.cloud.y_m])
     assert mean == pytest.approx([20.0, 2.0], abs=0.1)
-    assert 0.5 < doubted.tracked.plausibility.probability < 1.0 - WRONG["tracking"]
-    assert doubted.search is None
+    assert 0.5 < doubted.belief.probability(doubted.belief.tracked) < 1.0 - WRONG["tracking"]
+    assert doubted.belief.search is None
 
 
 def test_an_unknown_start_is_found_by_a_meeting() -> None:
@@ -228,7 +228,7 @@ def test_an_unknown_start_is_found_by_a_meeting() -> None:
     assert lost.meet(FAR) is MeetingEffect.USED
     near = np.hypot(lost.cloud.map_x_m - 20.0, lost.cloud.y_m - 2.0) < 2.5
     assert float(lost.cloud.weight @ near) > 0.95
-    assert lost.tracked.plausibility.probability <= 1.0 - WRONG["tracking"]
+    assert lost.belief.probability(lost.belief.tracked) <= 1.0 - WRONG["tracking"]
 
 
 @pytest.mark.parametrize("met", [

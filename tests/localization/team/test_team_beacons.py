@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from board_runs import ROOT
 from echostep.board.gateway import BeaconReading
-from echostep.localization.belief import Plausibility
+from echostep.localization.belief import Belief
 from echostep.localization.building import Building
 from echostep.localization.estimate import Estimate, digest
 from echostep.localization.map_filter import MapFilter
@@ -52,7 +52,7 @@ def a_range(range_m: float, number: int = 7, name: str = "kim") -> Meeting:
 
 def filter_at(x_m: float, y_m: float, sd_m: float, right: float = 0.99) -> MapFilter:
     made = MapFilter(BUILDING, Start(Pose(x_m, y_m, 0.0), sd_m), 0.0, np.random.default_rng(3))
-    made.tracked.plausibility = Plausibility(right)
+    made.belief = Belief(made.cloud, right, 1.0)
     return made
 
 
@@ -75,7 +75,7 @@ def test_a_sure_cloud_is_not_changed_by_a_bit_and_not_made_surer() -> None:
     assert sure.meet(a_range(3.0)) is MeetingEffect.USED
     assert np.array_equal(sure.cloud.log_weight, before)
     assert sure._rng.bit_generator.state == drawn
-    assert sure.tracked.plausibility.probability == pytest.approx(0.6)
+    assert sure.belief.probability(sure.belief.tracked) == pytest.approx(0.6)
 
 
 def test_beacons_of_one_teammate_do_not_make_a_stated_start_improbable_but_those_of_two_do() -> None:
@@ -84,21 +84,21 @@ def test_beacons_of_one_teammate_do_not_make_a_stated_start_improbable_but_those
     before = stated.cloud.x_m.copy()
     for number in range(20):
         assert stated.meet(a_range(1.0, number)) is MeetingEffect.CONTRADICTS
-    assert 0.6 < stated.tracked.plausibility.probability < 0.7
+    assert 0.6 < stated.belief.probability(stated.belief.tracked) < 0.7
     elsewhere = Meeting("anna", "tracking", 4.0, 7.5, 0, 0.0025, 0.0, 0.0025)
     assert stated.meet(elsewhere) is MeetingEffect.CONTRADICTS
     stated.meet(a_range(1.0, name="bo"))
-    assert stated.tracked.plausibility.probability < 0.5
+    assert stated.belief.probability(stated.belief.tracked) < 0.5
     assert np.array_equal(stated.cloud.x_m, before)
 
 
 def test_ranges_that_fit_take_back_doubt_and_give_nothing_more() -> None:
     stated = filter_at(7.0, 7.5, 0.15)
     assert stated.meet(a_range(9.0)) is MeetingEffect.CONTRADICTS  # an outlier
-    assert stated.tracked.plausibility.probability < 0.96
+    assert stated.belief.probability(stated.belief.tracked) < 0.96
     for number in range(8, 12):
         assert stated.meet(a_range(3.0, number)) is MeetingEffect.USED
-    assert stated.tracked.plausibility.probability == pytest.approx(0.99)
+    assert stated.belief.probability(stated.belief.tracked) == pytest.approx(0.99)
 
 
 def test_a_search_is_narrowed_by_ranges_of_two_beacons_that_it_fits_badly_at_first() -> None:
