@@ -78,7 +78,9 @@ def test_probabilities_are_those_without_logarithms(
             belief.begin_search(no_cloud(is_searching=True), one / TEMPER)
             naive.begin_search(math.exp(one))
     p = naive.probability
-    assert belief.probability(belief.tracked) == pytest.approx(p["tracked"], rel=1e-6)
+    given = belief.plan_fits if belief.plan_fits < SURELY else 1.0
+    assert math.exp(belief.tracked.log_weight) == pytest.approx(p["tracked"] / (1.0 - p[ANOTHER]), rel=1e-6)
+    assert belief.probability(belief.tracked) == pytest.approx(given * math.exp(belief.tracked.log_weight))
     assert belief.probability(belief.search) == pytest.approx(p.get("search", 0.0), rel=1e-6)
     assert belief.plan_fits == pytest.approx(1.0 - p[ANOTHER], rel=1e-6)
     assert belief.is_doubted == (p[ELSEWHERE] > 0.5 * (1.0 - p[ANOTHER]))

@@ -25,7 +25,12 @@ from echostep.plan.model import Pose
 
 # Assumed, not measured.
 PLAN_FITS = 0.99  # prior probability that the plan is the building's
+SURELY = 0.95  # probability that the plan fits, above which what is stated is conditional on it
 STATED = 0.99  # prior probability of a stated start, if the plan fits
+ALIKE, ALIKE_M = (
+    0.5,
+    30.0,
+)  # share of two buildings that is alike (wings, levels), and length of the path on which it goes on
 WRONG_PER_M = 2e-5  # probability that the trunk leaves all clouds on a metre of the path (carried, a door that is no door): once in 50 km
 # Power of the echoes' densities: their errors are alike on a longer path than that on which they count as one (plan, sway, speed of sound)
 TEMPER = 0.3
@@ -99,6 +104,7 @@ class Belief:
         self.search: CloudHypothesis | None = None
         self.log_elsewhere = _log(1.0 - prior)
         self._log_odds = _log(plan_fits) - _log(1.0 - plan_fits)
+        self._alike = ALIKE  # probability that another building is as this one, here
 
     @property
     def clouds(self) -> list[CloudHypothesis]:
@@ -111,21 +117,29 @@ class Belief:
         return 1.0 / (1.0 + math.exp(-max(self._log_odds, LEAST_LOG_ODDS)))
 
     def probability(self, each: CloudHypothesis | None) -> float:
-        """That the trunk is in this cloud; 0 of none."""
-        return 0.0 if each is None else math.exp(each.log_weight) * self.plan_fits
+        """That the trunk is in this cloud, 0 of none; of a plan that is SURELY the building's, conditional on that."""
+        fits = self.plan_fits
+        return 0.0 if each is None else math.exp(each.log_weight) * (1.0 if fits >= SURELY else fits)
 
     @property
     def is_doubted(self) -> bool:
         """Whether it is probable that the trunk is where no cloud is, if the plan fits."""
         return math.exp(self.log_elsewhere) > DOUBTED
 
-    def normalise(self) -> None:
-        """Let the weights have the sum 1; what they had is evidence for the plan."""
+    def normalise(self, path_m: float = 0.0) -> None:
+        """Let the weights have the sum 1; what they had is evidence for the plan.
+
+        `path_m`: length of the path on which they were changed. Another building is alike for ALIKE_M, and then its density is the same.
+        """
         total = float(np.logaddexp.reduce([self.log_elsewhere, *(each.log_weight for each in self.clouds)]))
         for each in self.clouds:
             each.log_weight -= total
         self.log_elsewhere -= total
-        self._log_odds += total
+        stays = math.exp(-path_m / ALIKE_M)
+        alike = stays * self._alike + (1.0 - stays) * ALIKE
+        log_another = float(np.logaddexp(total + _log(alike), _log(1.0 - alike)))
+        self._alike = math.exp(total + _log(alike) - log_another)
+        self._log_odds += total - log_another
 
     def leave(self, share: float) -> None:
         """Move this share of each cloud's weight to `elsewhere`."""
@@ -141,7 +155,7 @@ class Belief:
             self._move(self.search, 1.0)
         if self.tracked.cloud.is_searching:
             self._move(self.tracked, 1.0)
-        begun = CloudHypothesis(cloud, self.log_elsewhere + TEMPER * log_pings)
+        begun = CloudHypothesis(cloud, self.log_elsewhere + min(TEMPER * log_pings, 0.0))
         if self.tracked.cloud.is_searching:
             self.tracked, self.search = begun, None
         else:

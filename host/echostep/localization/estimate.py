@@ -210,6 +210,7 @@ def estimate(
     if search is not None:
         beside = weight_about(search.map_x_m, search.y_m, search.z_m, search.weight, (x, y, z), (TRACKING_M, LOST_M))
         near, about = near + right.search * beside[0], about + right.search * beside[1]
+        levels = _levels_of_both(levels, _heights(search, search.weight)[0], right)
         is_right = min(right.here + right.search * beside[0], 1.0)
     status = _status(near, about, max(levels))
     xx, yy = xx + sd_m**2, yy + sd_m**2
@@ -279,6 +280,12 @@ class Elsewhere(NamedTuple):
         away = (self.xx_m2 + dx * dx, self.xy_m2 + dx * dy, self.yy_m2 + dy * dy)
         xx, xy, yy = (right * c + (1.0 - right) * a for c, a in zip(covariance_m2, away, strict=True))
         return xx, xy, yy
+
+
+def _levels_of_both(one: tuple[float, ...], other: tuple[float, ...], right: Right) -> tuple[float, ...]:
+    """Probability of each level, if the trunk is in one of both clouds."""
+    both = [right.here * a + right.search * b for a, b in zip(one, other, strict=True)]
+    return tuple(p / sum(both) for p in both)
 
 
 def _heights(cloud: Cloud, weight: Floats) -> tuple[tuple[float, ...], float, float]:

@@ -290,7 +290,7 @@ class MapFilter:
     def _compare(self, path_m: float) -> None:
         """Update the belief after a move: end what is improbable, and merge what is in one place."""
         belief = self.belief
-        belief.normalise()
+        belief.normalise(path_m)
         belief.leave(WRONG_PER_M * path_m)
         belief.prune()
         if self._is_found_here():
