@@ -21,6 +21,7 @@ from echostep.localization.belief import (
     STATED,
     SURELY,
     TEMPER,
+    UNLIKE_M,
     Belief,
     CloudHypothesis,
     CrossedWalls,
@@ -77,7 +78,7 @@ def test_probabilities_are_those_without_logarithms(
             naive.weigh({"tracked": math.exp(one), "search": math.exp(other)})
         elif name == "move":
             belief.normalise(one)
-            naive.move(math.exp(-one / ALIKE_M), ALIKE)
+            naive.move(math.exp(-one / ALIKE_M - one / UNLIKE_M), ALIKE)
         elif name == "leave":
             belief.leave(one)
             naive.leave(one)

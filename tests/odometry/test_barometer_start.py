@@ -13,7 +13,7 @@ from echostep.localization.height.height_filter import RelativeHeight
 from echostep.localization.height.levels import HeightChange
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.start import Start
-from echostep.localization.settings import CloudSettings, FilterSettings
+from echostep.localization.settings import FilterSettings
 from echostep.odometry.barometer_start import BarometerStart
 from echostep.odometry.synchronizer import BAROMETER, MEASUREMENT, _measured
 from echostep.path import MeasuredSegment, PathSegment
@@ -26,7 +26,7 @@ from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tower
 from walks import DEMO
 
 RESET_M = 3_150.0  # the height of 68500 Pa
-SETTINGS = FilterSettings(CloudSettings(searching=5_000))  # the search is not what is judged here
+SETTINGS = FilterSettings()
 
 
 def starts(heights_m: list[float], restarts: list[int] | None = None) -> list[int]:

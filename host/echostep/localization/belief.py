@@ -129,13 +129,13 @@ class Belief:
     def normalise(self, path_m: float = 0.0) -> None:
         """Let the weights have the sum 1; what they had is evidence for the plan.
 
-        `path_m`: length of the path on which they were changed. Another building is alike for ALIKE_M, and then its density is the same.
+        `path_m`: length of the path on which they were changed. Where another building is alike its density is the same.
         """
         total = float(np.logaddexp.reduce([self.log_elsewhere, *(each.log_weight for each in self.clouds)]))
         for each in self.clouds:
             each.log_weight -= total
         self.log_elsewhere -= total
-        stays = math.exp(-path_m / ALIKE_M)
+        stays = math.exp(-path_m * (1.0 / ALIKE_M + 1.0 / UNLIKE_M))
         alike = stays * self._alike + (1.0 - stays) * ALIKE
         log_another = float(np.logaddexp(total + _log(alike), _log(1.0 - alike)))
         self._alike = math.exp(total + _log(alike) - log_another)

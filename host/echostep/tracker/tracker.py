@@ -112,8 +112,9 @@ class Tracker:
             undone=self._undone,
             bad_check_ins=self._bad_check_ins,
             particle_count=0 if self.filter is None else len(self.filter.cloud.x_m),
-            right=math.nan if self.filter is None else self.filter.tracked.plausibility.probability,
-            searches=self.filter is not None and (self.filter.search is not None or self.filter.cloud.is_searching),
+            right=math.nan if self.filter is None else self.filter.belief.probability(self.filter.belief.tracked),
+            searches=self.filter is not None
+            and (self.filter.belief.search is not None or self.filter.cloud.is_searching),
             beacon_numbers=tuple(self.gateway.numbers),
             beacon_heard_s=None if self.filter is None else self.filter.beacon_map.heard_s,
             alarm=self.alarm.alarm,
