@@ -27,10 +27,8 @@ from echostep.plan.model import Pose
 PLAN_FITS = 0.99  # prior probability that the plan is the building's
 SURELY = 0.95  # probability that the plan fits, above which what is stated is conditional on it
 STATED = 0.99  # prior probability of a stated start, if the plan fits
-ALIKE, ALIKE_M = (
-    0.5,
-    30.0,
-)  # share of two buildings that is alike (wings, levels), and length of the path on which it goes on
+ALIKE_M, UNLIKE_M = 30.0, 10.0  # mean lengths of the path on which two buildings are alike (wings, levels), and are not
+ALIKE = ALIKE_M / (ALIKE_M + UNLIKE_M)
 WRONG_PER_M = 2e-5  # probability that the trunk leaves all clouds on a metre of the path (carried, a door that is no door): once in 50 km
 # Power of the echoes' densities: their errors are alike on a longer path than that on which they count as one (plan, sway, speed of sound)
 TEMPER = 0.3
