@@ -34,15 +34,10 @@ WRONG_PER_M = 2e-5  # probability that the trunk leaves all clouds on a metre of
 TEMPER = 0.3
 DOUBTED = 0.5  # probability of `elsewhere`, if the plan fits, above which the building is searched
 BELIEVED = 0.99  # of the tracked cloud, above which the plan supports it
-BY_CHANCE = (
-    0.3  # of a search's mass that stays elsewhere when it has found a place: the range table is no exact likelihood
-)
-CROSSED_M = (
-    4.0  # from one way through a wall, within which another is through the same one; path on which a cloud goes through
-)
-THROUGH = math.log(
-    1 / 100
-)  # of the share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more
+BY_CHANCE = 0.3  # of a search's mass, that stays elsewhere when it has found a place: a table is no exact likelihood
+CROSSED_M = 4.0  # from one way through a wall, within which another is through the same one; path of a cloud through it
+# Log of the share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more
+THROUGH = math.log(1 / 100)
 LEAST = 1e-4  # probability of a cloud below which it ends
 LEAST_LOG_ODDS = -700.0  # whose exponential is a number
 
