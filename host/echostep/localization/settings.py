@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 
 from echostep.localization.beacons.model import BeaconSettings
 from echostep.localization.echoes.likelihood import EchoModel, EchoSettings, echo_model
+from echostep.localization.echoes.range_table import TABLE_SD_M
 from echostep.localization.height.levels import ClimbSettings
 
-TABLE_SD_M = 0.2  # of a range by the table: a cell's half diagonal, and the heading's error over a sector
 UNPLANNED_DOOR = -6.0  # log-probability (1 in 400) that a way leads through a wall of the plan all the same
 
 

@@ -20,7 +20,6 @@ from echostep.arrays import Floats, Int32s
 from echostep.jit import allocating_kernel, kernel, lean_kernel
 from echostep.localization.echoes.likelihood import SILENT_SHARE, EchoModel, detection, hidden_density
 from echostep.localization.particle_arrays import PingBatch
-from echostep.localization.settings import TABLE_SD_M
 from echostep.path import Odometer
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import CELL_M, Floor
@@ -29,6 +28,7 @@ from echostep.walls.index import WallIndex
 # Assumed, not measured.
 SECTORS = 24  # of 15 degrees
 UNIT_M = 0.025  # of a range in the table, one byte
+TABLE_SD_M = 0.2  # a cell's half diagonal, and the heading's error over a sector
 # Of the expected ranges are off by so many times as much: edges, corners, the next wall
 FAR_SHARE, FAR_FACTOR = 0.2, 3.0
 LIKELY = 0.05  # probability of detection that the sources up to the expected range have together
