@@ -19,7 +19,7 @@ from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.belief import BELIEVED, PLAN_FITS, STATED, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
 from echostep.localization.building import Building
 from echostep.localization.echoes.likelihood import EchoSettings
-from echostep.localization.echoes.unplanned import RangeMemory, UnplannedDensities, UsablePings
+from echostep.localization.echoes.unplanned import RangeMemory, UnplannedDensities, UsablePings, evidence_share
 from echostep.localization.estimate import LOST_M, TRACKING_M, Estimate, Right, estimate, weight_about
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.start import grid_about, grid_of, is_unknown
@@ -247,7 +247,7 @@ class MapFilter:
         move, path_m = move_of(segment), math.hypot(segment.dx_m, segment.dy_m)
         self._way.add(move, pings, change)
         for each in self.belief.clouds:
-            self._follow_with(each, move, pings, unplanned)
+            self._follow_with(each, move, pings, unplanned, evidence_share(segment.turn_rad))
             each.change_levels(move, change)
             if each.cloud.is_searching:
                 if each.cloud.show_search():
@@ -262,11 +262,13 @@ class MapFilter:
         if self._building.has_walls:
             self._compare(path_m)
 
-    def _follow_with(self, each: CloudHypothesis, move: Move, pings: PingBatch, unplanned: UnplannedDensities) -> None:
-        """Propagate and reweight one cloud, and its hypothesis."""
+    def _follow_with(
+        self, each: CloudHypothesis, move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float
+    ) -> None:
+        """Propagate and reweight one cloud, and its hypothesis by this share of the evidence of the pings."""
         cloud = each.cloud
         if cloud.is_searching:
-            each.weigh(cloud.search(move, pings, self._model), 0.0)
+            each.weigh(share * cloud.search(move, pings, self._model), 0.0)
             return
         model = self._blurred if cloud.is_scattered else self._model  # by the spacing of sparse particles
         evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
@@ -275,11 +277,10 @@ class MapFilter:
             self._way.pass_again(cloud, self._blurred, self._building.walls)
             cloud.is_on_any_level = False
         if each.table is not None:
-            each.weigh(each.table.advance(move, pings, self._model), evidence.log_path)
+            each.weigh(share * each.table.advance(move, pings, self._model), evidence.log_path)
         elif self._building.has_walls:
-            each.weigh(
-                float((evidence.log_pings - unplanned.either).sum()), self._passed(each, move, evidence.log_path)
-            )
+            log_ratio = float((evidence.log_pings - unplanned.either).sum())
+            each.weigh(share * log_ratio, self._passed(each, move, evidence.log_path))
 
     def _passed(self, each: CloudHypothesis, move: Move, log_passed: float) -> float:
         """What counts of the log of the share of a cloud that crossed no wall."""

@@ -38,7 +38,8 @@ POSES = 400  # drawn on the floor: their mean is then good to 5 %
 BIN_M = 0.05  # width of a bin of ranges
 LEAST_POWER = 0.01  # share of independent information below which a ping is left out: it changes nothing
 # Turns on a segment at which its pings count half: headings between its ends are interpolated
-TURNING_RAD = math.radians(45.0)
+TURNING_RAD = math.radians(45.0)  # as weights of particles
+EVIDENCE_RAD = math.radians(15.0)  # as evidence for the cloud: they select the path of a turn, and are predicted badly
 
 
 class LastWall:
@@ -201,6 +202,16 @@ def _mean_density(x: Floats, y: Floats, axis: Floats, walls: WallIndex, model: E
     return mean / len(x)
 
 
+def evidence_share(turn_rad: float) -> float:
+    """Share of the information of a turning segment's pings that is evidence for or against the cloud."""
+    return _loss(turn_rad, TURNING_RAD) / _loss(turn_rad, EVIDENCE_RAD)
+
+
+def _loss(turn_rad: float, half_rad: float) -> float:
+    """By what the information of a ping is divided on a segment that turns; 2 where it turns by `half_rad`."""
+    return 1.0 + (turn_rad / half_rad) ** 2
+
+
 class UsablePings:
     """Pings from nearly one place repeat each other's errors: each counts by the path since the one before, up to `own` after `correlation_m`."""
 
@@ -231,7 +242,7 @@ class UsablePings:
         range_m = np.where(np.isnan(measured.range_m), 0.0, measured.range_m)
         travel_m = self._travels(measured.ranger, self.odometer.path_m + share * length)
         power = (
-            self._own * np.minimum(travel_m / self._correlation_m, 1.0) / (1.0 + (segment.turn_rad / TURNING_RAD) ** 2)
+            self._own * np.minimum(travel_m / self._correlation_m, 1.0) / _loss(segment.turn_rad, TURNING_RAD)
         )
         self.odometer.add(length)
         used = power > LEAST_POWER
