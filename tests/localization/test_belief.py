@@ -13,15 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from echostep.localization.belief import (
-    ALIKE,
-    ALIKE_M,
+    ANOTHER_M,
     BY_CHANCE,
+    HERE_M,
     LEAST,
     PLAN_FITS,
     STATED,
     SURELY,
     TEMPER,
-    UNLIKE_M,
     Belief,
     CloudHypothesis,
     CrossedWalls,
@@ -35,7 +34,7 @@ from echostep.localization.settings import UNPLANNED_DOOR, CloudSettings, Filter
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
 from echostep.walls.echo_sources import Walls
-from naive.belief import ELSEWHERE, NaiveBelief
+from naive.belief import ANOTHER, ELSEWHERE, THIS, NaiveBelief
 
 ROOM = Building(Walls(np.array([[0, 0, 30, 0], [30, 0, 30, 8], [30, 8, 0, 8], [0, 8, 0, 0]], float)), None)
 HERE, THERE = Pose(3.0, 4.0, 0.0), Pose(25.0, 4.0, 0.0)
@@ -69,7 +68,10 @@ steps = st.lists(
 def test_probabilities_are_those_without_logarithms(
     prior: float, fits: float, taken: list[tuple[str, float, float]]
 ) -> None:
-    belief, naive = Belief(no_cloud(is_searching=False), prior, fits), NaiveBelief(prior, fits, ALIKE)
+    belief, naive = (
+        Belief(no_cloud(is_searching=False), prior, fits),
+        NaiveBelief(prior, fits, {THIS: HERE_M, ANOTHER: ANOTHER_M}),
+    )
     for name, one, other in taken:
         if name == "weigh":
             for each, log_ratio in zip(belief.clouds, (one, other), strict=False):
@@ -78,19 +80,19 @@ def test_probabilities_are_those_without_logarithms(
             naive.weigh({"tracked": math.exp(one), "search": math.exp(other)})
         elif name == "move":
             belief.normalise(one)
-            naive.move(math.exp(-one / ALIKE_M - one / UNLIKE_M), ALIKE)
+            naive.weigh({}, one)
         elif name == "leave":
             belief.leave(one)
             naive.leave(one)
         else:
             belief.begin_search(no_cloud(is_searching=True), one / TEMPER)
             naive.begin_search(math.exp(one))
-    p = naive.probability
+    p = naive.place
     given = belief.plan_fits if belief.plan_fits < SURELY else 1.0
-    assert math.exp(belief.tracked.log_weight) == pytest.approx(p["tracked"] / (1.0 - naive.another), rel=1e-6)
+    assert math.exp(belief.tracked.log_weight) == pytest.approx(p["tracked"], rel=1e-6)
     assert belief.probability(belief.tracked) == pytest.approx(given * math.exp(belief.tracked.log_weight))
-    assert belief.plan_fits == pytest.approx(1.0 - naive.another, rel=1e-6)
-    assert math.exp(belief.log_elsewhere) == pytest.approx(p[ELSEWHERE] / (1.0 - naive.another), rel=1e-6, abs=1e-300)
+    assert belief.plan_fits == pytest.approx(naive.plan_fits, rel=1e-6)
+    assert math.exp(belief.log_elsewhere) == pytest.approx(p[ELSEWHERE], rel=1e-6, abs=1e-300)
 
 
 @pytest.mark.parametrize(("log_ratio", "is_tracked"), [(-3.0, False), (3.0, True)])
@@ -152,7 +154,7 @@ def test_a_plan_on_which_nothing_is_explained_is_another_buildings() -> None:
     belief = Belief(no_cloud(is_searching=False), STATED, PLAN_FITS)
     for _ in range(100):
         belief.tracked.weigh(-50.0, -6.0)
-        belief.normalise()
+        belief.normalise(5.0)
         belief.begin_search(no_cloud(is_searching=True), -50.0)
     assert belief.plan_fits < 1e-6
     assert total(belief) == pytest.approx(1.0)
@@ -244,4 +246,5 @@ def test_a_wall_that_is_not_there_costs_a_believed_cloud_its_price_once() -> Non
         step = PathSegment(k, k + 1.0, dx_m, 0.0, 0.0, 0.0, sd_m=0.01, turn_sd_rad=0.001, step=k, anchor_sd_m=0.0)
         fits = through.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE)).plan_fits
         costs.append(math.log(fits / (1.0 - fits)) - math.log(0.999 / 0.001))
-    assert costs == pytest.approx([UNPLANNED_DOOR - math.log(1.0 - ALIKE), 0.0], abs=0.1)
+    assert costs[0] < -4.0
+    assert costs[1] == pytest.approx(0.0, abs=0.1)

@@ -241,9 +241,7 @@ class UsablePings:
         axis = segment.heading0_rad + share * segment.turn_rad + measured.off_heading_rad
         range_m = np.where(np.isnan(measured.range_m), 0.0, measured.range_m)
         travel_m = self._travels(measured.ranger, self.odometer.path_m + share * length)
-        power = (
-            self._own * np.minimum(travel_m / self._correlation_m, 1.0) / _loss(segment.turn_rad, TURNING_RAD)
-        )
+        power = self._own * np.minimum(travel_m / self._correlation_m, 1.0) / _loss(segment.turn_rad, TURNING_RAD)
         self.odometer.add(length)
         used = power > LEAST_POWER
         way_x_m, way_y_m = segment.way_m(share)
