@@ -187,7 +187,7 @@ def test_heights_are_those_of_the_obvious_way(felt_m: float, height_sd_m: float)
     wanted = [naive_climb(row, move, rise, 0.3, s, plan, storeys) for row in particles]
     weights = log_weight + [row[3] for row in wanted]
     cloud, heights = ParticleArrays(x, y, turn, scale, log_weight), HeightArrays(z, lag)
-    variance = change_levels(cloud, heights, move, np.zeros(n), rise, 0.3, level_change_model(s), storeys)
+    variance, _ = change_levels(cloud, heights, move, np.zeros(n), rise, 0.3, level_change_model(s), storeys)
     np.testing.assert_allclose(np.column_stack([x, z, lag]), np.array(wanted)[:, :3], rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(log_weight, weights - weights.max(), rtol=0.0, atol=1e-9)
     assert variance == pytest.approx(0.3 * 0.04 / 0.34 if math.isfinite(height_sd_m) else 0.3)

@@ -60,12 +60,12 @@ class CloudHypothesis:
         """Multiply by the density of pings over that without a plan, given as logarithms, and by the share that crossed no wall."""
         self.log_weight += TEMPER * log_pings + max(log_passed, UNPLANNED_DOOR)
 
-    def change_levels(self, move: Move, change: HeightChange) -> None:
-        """Update heights and levels after a move."""
+    def change_levels(self, move: Move, change: HeightChange) -> float:
+        """Update heights and levels after a move; returns the log of the mean factor of the weights."""
         before = self.cloud.lag_variance
-        self.cloud.change_levels(move, change)
         if self.table is not None:
             self.table.change_levels(change, before)
+        return self.cloud.change_levels(move, change)
 
 
 class CrossedWalls:
@@ -137,6 +137,11 @@ class Belief:
         there, log_there = _predicted(self._well[1], ANOTHER_M, path_m, total)
         self._well = here, there
         self._log_odds += log_here - log_there
+
+    def compare(self, log_means: list[float]) -> None:
+        """Multiply the clouds by the mean factors of their heights, given as logarithms, relative to the greatest: they say nothing of the plan."""
+        for each, log_mean in zip(self.clouds, log_means, strict=True):
+            each.log_weight += log_mean - max(log_means)
 
     def leave(self, share: float) -> None:
         """Move this share of each cloud's weight to `elsewhere`."""

@@ -246,9 +246,11 @@ class MapFilter:
         pings, unplanned = self._pings.take(measured if self._building.has_walls else measured.without_pings)
         move, path_m = move_of(segment), math.hypot(segment.dx_m, segment.dy_m)
         self._way.add(move, pings, change)
-        for each in self.belief.clouds:
+        clouds = self.belief.clouds
+        for each in clouds:
             self._follow_with(each, move, pings, unplanned, evidence_share(segment.turn_rad))
-            each.change_levels(move, change)
+        self.belief.compare([each.change_levels(move, change) for each in clouds])
+        for each in clouds:
             if each.cloud.is_searching:
                 if each.cloud.show_search():
                     self._way.pass_again(each.cloud, self._blurred, self._building.walls)

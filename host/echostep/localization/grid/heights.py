@@ -62,7 +62,9 @@ class GridHeights:
         if has_pressure and not self._is_climbing(change):
             lag_m += np.where(innovation**2 < LAG_GATE * variance, gain * innovation, 0.0)
         self._lag_m = lag_m
-        return LevelFactors(np.exp(loss.min() - loss).astype(np.float32), east), (1.0 - gain) * lag_variance
+        return LevelFactors(np.exp(loss.min() - loss).astype(np.float32), east, -float(loss.min())), (
+            1.0 - gain
+        ) * lag_variance
 
     def of(self, level: Ints, connector: Ints) -> tuple[Floats, Floats]:
         """Heights and offsets (n,) on these levels, in these connectors."""

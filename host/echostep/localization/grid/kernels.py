@@ -36,10 +36,14 @@ class GridStates(NamedTuple):
 
 
 class LevelFactors(NamedTuple):
-    """Of a change of height, by connector + 1 (row 0: outside of all) and level: factor of the weight, and cells to the east on the sheet."""
+    """Of a change of height, by connector + 1 (row 0: outside of all) and level: factor of the weight, and cells to the east on the sheet.
+
+    The greatest factor is 1, and was `log_top` as a logarithm.
+    """
 
     weight: np.ndarray[tuple[int, int], np.dtype[np.float32]]
     east: np.ndarray[tuple[int, int], np.dtype[np.int32]]
+    log_top: float
 
 
 @inline_kernel
@@ -206,17 +210,22 @@ def _add(at: int, w: float, scratch: Weights, touched: Int32s, found: int) -> in
 
 
 @lean_kernel
-def weigh_levels(states: GridStates, factor: LevelFactors, cells: GridCells) -> float:
-    """Multiply each state by the factor of its level and connector, and move it to the level it has reached; returns the greatest weight."""
+def weigh_levels(states: GridStates, factor: LevelFactors, cells: GridCells) -> tuple[float, float]:
+    """Multiply each state by the factor of its level and connector, and move it to the level it has reached.
+
+    Returns the greatest weight, and the mean factor of the weights.
+    """
     cell, weight = states.cell, states.weight
-    top = 0.0
+    top, before, after = 0.0, 0.0, 0.0
     for k in range(len(cell)):
         at = cell[k]
+        before += weight[k]
         level, connector = cells.level[at % cells.columns], cells.connector[at]
         weight[k] *= factor.weight[connector + 1, level]
         cell[k] = at + factor.east[connector + 1, level]
+        after += weight[k]
         top = max(top, weight[k])
-    return top
+    return top, after / before
 
 
 @kernel

@@ -164,13 +164,17 @@ class SearchGrid:
             self._begin()
         return log_mean
 
-    def change_levels(self, change: HeightChange, lag_variance: float) -> float:
-        """Weigh by a change of height, and move what has reached another level; returns the variance of the height by pressure's offset."""
+    def change_levels(self, change: HeightChange, lag_variance: float) -> tuple[float, float]:
+        """Weigh by a change of height, and move what has reached another level.
+
+        Returns the variance of the height by pressure's offset, and the log of the mean factor of the weights.
+        """
         if self._heights is None:
-            return lag_variance
+            return lag_variance, 0.0
         factors, lag_variance = self._heights.update(change, lag_variance)
-        self._note_least(weigh_levels(self._states, factors, self._cells))
-        return lag_variance
+        top, mean = weigh_levels(self._states, factors, self._cells)
+        self._note_least(top)
+        return lag_variance, factors.log_top + math.log(max(mean, LEAST_SHARE))
 
     def _note_least(self, top: float) -> None:
         """Note the greatest weight, and that below which a state is dropped with the next step."""

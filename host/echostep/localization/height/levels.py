@@ -102,10 +102,10 @@ class HeightArrays(NamedTuple):
 def change_levels(
     particles: ParticleArrays, heights: HeightArrays, move: Move, noise: Floats, change: HeightChange,
     lag_variance: float, model: LevelChangeModel, sheet: LevelSheet,
-) -> float:  # fmt: skip
+) -> tuple[float, float]:  # fmt: skip
     """Update heights, levels and log-weights after a move that led to the particles' present places; `noise` (n,) is standard normal.
 
-    Returns the variance of `lag` afterwards; the greatest log-weight is 0 again.
+    Returns the variance of `lag` afterwards, and the log of the mean factor of the weights; the greatest log-weight is 0 again.
     """
     x, y, turn, scale, log_weight = particles
     z, lag = heights
@@ -113,8 +113,9 @@ def change_levels(
     variance = lag_variance + change.height_sd_m**2 if has_pressure else np.inf
     gain = lag_variance / variance if has_pressure else 0.0
     knows_lag = has_pressure and lag_variance < UNKNOWN_LAG_M2
-    flat_sd, top = math.hypot(model.flat_sd_m, change.felt_sd_m), -np.inf
+    flat_sd, top, before, after = math.hypot(model.flat_sd_m, change.felt_sd_m), -np.inf, 0.0, 0.0
     for i in range(len(x)):
+        before += math.exp(log_weight[i])
         level = level_on_sheet(x[i], sheet)
         inside = connector_at(x[i] - level * sheet.pitch_m, y[i], level, sheet)
         connector, height = inside, change.height_m
@@ -147,7 +148,8 @@ def change_levels(
         top = max(top, log_weight[i])
     for i in range(len(x)):
         log_weight[i] -= top
-    return (1.0 - gain) * lag_variance
+        after += math.exp(log_weight[i])
+    return (1.0 - gain) * lag_variance, top + math.log(after / before)
 
 
 @kernel

@@ -193,21 +193,25 @@ class Cloud(Particles):
             self.resample_if_needed()
         return Evidence(log_evidence, log_passed)
 
-    def change_levels(self, move: Move, change: HeightChange) -> None:
-        """Update heights and levels after a move, reweight by them, and resample when too few particles carry the weight."""
+    def change_levels(self, move: Move, change: HeightChange) -> float:
+        """Update heights and levels after a move, reweight by them, and resample when too few particles carry the weight.
+
+        Returns the log of the mean factor of the weights.
+        """
         if self.sheet is None:
-            return
+            return 0.0
         if math.isfinite(change.height_sd_m):
             self.lag_variance += self._climbing.drift_m**2 * change.span_s
         if self.grid is not None:
-            self.lag_variance = self.grid.change_levels(change, self.lag_variance)
-            return
+            self.lag_variance, log_mean = self.grid.change_levels(change, self.lag_variance)
+            return log_mean
         noise = self._rng.standard_normal(len(self.x_m))
         heights = HeightArrays(self.z_m, self.lag_m)
-        self.lag_variance = change_levels(
+        self.lag_variance, log_mean = change_levels(
             self.arrays, heights, move, noise, change, self.lag_variance, self._level_changes, self.sheet
         )
         self.resample_if_needed()
+        return log_mean
 
     @contextmanager
     def passing_again(self, dx_m: float, dy_m: float) -> Iterator[None]:

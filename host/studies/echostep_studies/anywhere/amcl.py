@@ -155,7 +155,7 @@ class AugmentedMcl:
         span_s = s.t1_s - s.t0_s
         height_m, sd_m = (median(last), HEIGHT_SD_M) if last else (0.0, math.inf)
         self._lag_variance += ClimbSettings().drift_m ** 2 * span_s if last else 0.0
-        self._lag_variance = change_levels(
+        self._lag_variance, _ = change_levels(
             self._particles, self._heights, Move(s.dx_m, s.dy_m, s.sd_m, s.turn_sd_rad), self._rng.standard_normal(SIZE),
             HeightChange(s.rise_m, s.rise_sd_m, height_m, sd_m, height_m, span_s), self._lag_variance, level_change_model(ClimbSettings()),
             self._sheet,
