@@ -76,10 +76,10 @@ def test_probabilities_are_those_without_logarithms(
         if name == "weigh":
             for each, log_ratio in zip(belief.clouds, (one, other), strict=False):
                 each.weigh(log_ratio / TEMPER, 0.0)
-            belief.normalise()
+            belief.judge_plan()
             naive.weigh({"tracked": math.exp(one), "search": math.exp(other)})
         elif name == "move":
-            belief.normalise(one)
+            belief.judge_plan(one)
             naive.weigh({}, one)
         elif name == "leave":
             belief.leave(one)
@@ -102,7 +102,7 @@ def test_a_place_that_is_found_is_tracked_if_it_is_likelier(log_ratio: float, is
     belief.begin_search(search, 0.0)
     assert belief.search is not None
     belief.search.weigh(log_ratio / TEMPER, 0.0)
-    belief.normalise()
+    belief.judge_plan()
     belief.prune()
     assert belief.tracked.cloud is cloud  # a search that has found nothing yet is no place
     search.is_searching = False  # type: ignore[misc]
@@ -122,7 +122,7 @@ def test_a_search_that_is_improbable_ends_and_a_cloud_that_is_lets_the_search_be
         belief = Belief(clouds[0], 0.5, PLAN_FITS)
         belief.begin_search(clouds[1], 0.0)
         belief.clouds[1].weigh(log_ratio / TEMPER, 0.0)
-        belief.normalise()
+        belief.judge_plan()
         belief.prune()
         assert belief.tracked.cloud is clouds[survivor]
         assert belief.search is None
@@ -154,7 +154,7 @@ def test_a_plan_on_which_nothing_is_explained_is_another_buildings() -> None:
     belief = Belief(no_cloud(is_searching=False), STATED, PLAN_FITS)
     for _ in range(100):
         belief.tracked.weigh(-50.0, -6.0)
-        belief.normalise(5.0)
+        belief.judge_plan(5.0)
         belief.begin_search(no_cloud(is_searching=True), -50.0)
     assert belief.plan_fits < 1e-6
     assert total(belief) == pytest.approx(1.0)

@@ -4,9 +4,8 @@
 In: of each cloud the log of its density of the last echoes over that without a plan (`echoes.unplanned`), and of the share that crossed no wall.
 Out: probabilities. Owns their logarithms.
 
-Hypotheses: the trunk is in a cloud, tracked or searching; `elsewhere` in this building; in `another` building than the plan's. Bayes' rule compares
-them by predictive density [Bar-Shalom et al. 2001, ch. 11]. The last two have the density without a plan. A search of the building takes the mass
-of `elsewhere`, and its density since the beginning of the path that it searches, so all are compared on the same echoes.
+Hypotheses: the trunk is in a cloud, tracked or searching; `elsewhere` in this building, with the density without a plan; in another building than
+the plan's. Bayes' rule compares them by predictive density [Bar-Shalom et al. 2001, ch. 11]. A search of the building takes the mass of `elsewhere`.
 """
 
 from __future__ import annotations
@@ -98,10 +97,8 @@ class Belief:
         self.search: CloudHypothesis | None = None
         self.log_elsewhere = _log(1.0 - prior)
         self._log_odds = _log(plan_fits) - _log(1.0 - plan_fits)
-        self._well = (
-            prior,
-            _mean_share(ANOTHER_M),
-        )  # probability that a cloud predicts the echoes, in this building and in another
+        # Probability that a cloud predicts the echoes, in this building and in another
+        self._well = prior, _mean_share(ANOTHER_M)
 
     @property
     def clouds(self) -> list[CloudHypothesis]:
@@ -123,22 +120,27 @@ class Belief:
         """Whether it is probable that the trunk is where no cloud is, if the plan fits."""
         return math.exp(self.log_elsewhere) > DOUBTED
 
-    def normalise(self, path_m: float = 0.0) -> None:
-        """Let the weights have the sum 1; what they had is evidence for the plan.
-
-        `path_m`: length of the path on which they were changed. A plan that fits has clouds that predict the echoes nearly always, and soon again;
-        another building's has them where it is alike. So the plan is judged by a hidden Markov model of two states for each [Rabiner 1989].
-        """
+    def normalise(self) -> float:
+        """Let the weights have the sum 1; returns the logarithm of what they had."""
         total = float(np.logaddexp.reduce([self.log_elsewhere, *(each.log_weight for each in self.clouds)]))
         for each in self.clouds:
             each.log_weight -= total
         self.log_elsewhere -= total
+        return total
+
+    def judge_plan(self, path_m: float = 0.0) -> None:
+        """Normalise; what the weights had is evidence for the plan.
+
+        `path_m`: length of the path on which they were changed. A plan that fits has clouds that predict the echoes nearly always, and soon again;
+        another building's has them where it is alike. So the plan is judged by a hidden Markov model of two states for each [Rabiner 1989].
+        """
+        total = self.normalise()
         here, log_here = _predicted(self._well[0], HERE_M, path_m, total)
         there, log_there = _predicted(self._well[1], ANOTHER_M, path_m, total)
         self._well = here, there
         self._log_odds += log_here - log_there
 
-    def compare(self, log_means: list[float]) -> None:
+    def weigh_heights(self, log_means: list[float]) -> None:
         """Multiply the clouds by the mean factors of their heights, given as logarithms, relative to the greatest: they say nothing of the plan."""
         for each, log_mean in zip(self.clouds, log_means, strict=True):
             each.log_weight += log_mean - max(log_means)
@@ -163,7 +165,7 @@ class Belief:
         else:
             self.search = begun
         self.log_elsewhere = -math.inf
-        self.normalise()
+        self.judge_plan()
 
     def find(self, each: CloudHypothesis) -> None:
         """A search has found a place."""
@@ -191,9 +193,7 @@ class Belief:
         was = math.exp(each.log_weight)
         if was < least:
             each.log_weight = _log(least) - _log(1.0 - least) + _log(1.0 - was)
-            fits = self._log_odds
             self.normalise()
-            self._log_odds = fits
 
     def _move(self, each: CloudHypothesis, share: float) -> None:
         self.log_elsewhere = float(np.logaddexp(self.log_elsewhere, each.log_weight + _log(share)))

@@ -156,6 +156,7 @@ class MapFilter:
         belief = self.belief
         if belief.search is not None and search_fits:
             belief.tracked, belief.search = belief.search, belief.tracked
+            belief.search.table = None
         else:
             at = start_at(meeting)
             start = Start(Pose(at.x_m, at.y_m, 0.0, at.level), at.sd_m, math.pi)
@@ -249,7 +250,7 @@ class MapFilter:
         clouds = self.belief.clouds
         for each in clouds:
             self._follow_with(each, move, pings, unplanned, evidence_share(segment.turn_rad))
-        self.belief.compare([each.change_levels(move, change) for each in clouds])
+        self.belief.weigh_heights([each.change_levels(move, change) for each in clouds])
         for each in clouds:
             if each.cloud.is_searching:
                 if each.cloud.show_search():
@@ -293,7 +294,7 @@ class MapFilter:
     def _compare(self, path_m: float) -> None:
         """Update the belief after a move: end what is improbable, and merge what is in one place."""
         belief = self.belief
-        belief.normalise(path_m)
+        belief.judge_plan(path_m)
         belief.leave(WRONG_PER_M * path_m)
         belief.prune()
         if self._is_found_here():
