@@ -117,7 +117,7 @@ def test_a_short_team(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run_study(short, StudyRequest(1, 3, tmp_path / "rows.json", tmp_path))
     (row,) = json.loads((tmp_path / "rows.json").read_text())["rows"]
     assert set(study.COLUMNS) <= set(row)
-    assert row["first_alone_m"] > 3.0
+    assert row["first_alone_m"] > 2.0  # its start is wrong, and the walk is short
     assert row["first_together_m"] < row["first_alone_m"]
     assert row["worst"] == pytest.approx(1.0, abs=0.05)
 
