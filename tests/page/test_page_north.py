@@ -52,7 +52,8 @@ def check(page: Any, plan: Plan, shot: Path) -> None:
     for act in (turn_north, press_n):
         page.focus("#map")
         page.keyboard.press("[")
-        wait_for(page, f"Math.abs(({POINTS})({north})[0]) > 10")
+        wait_for(page, f"({POINTS})({north}).every((angle) => Math.abs(angle) > 10)")
+        page.evaluate("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
         needle, heading = angles()
         assert math.remainder(needle - heading, 360.0) == pytest.approx(0.0, abs=0.1)
         act()
