@@ -42,7 +42,7 @@ def moment(t_s: float) -> PageScene:
         estimate=estimate,
         echo_lines=lines,
         streams=RATES,
-        status_text="tracking, 0.2 m",
+        status_text="lost" if status is TrackStatus.LOST else "tracking, 0.2 m",
         trail_count=int(t_s),
     )
 
