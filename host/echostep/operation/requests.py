@@ -15,8 +15,9 @@ from echostep.page.requests import MOST_REQUEST, FrameDrawn, SetPlaying, SetSpee
 from echostep.plan.plan_file import Metres
 from echostep.ports.people.payloads import Level, decoded
 from echostep.team.messages.crews import AirMinutes, Does, Members
-from echostep.team.messages.marks import Identity, MarkKind, Person
+from echostep.team.messages.marks import MarkKind
 from echostep.team.messages.report import is_printable
+from echostep.team.messages.shared import Identity, Person
 
 Number = Annotated[int, Meta(ge=0, lt=1 << 53)]
 

@@ -13,19 +13,16 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from echostep.team.messages.report import BadReportError, decode_as, is_printable
+from echostep.team.messages.report import BadReportError
+from echostep.team.messages.shared import Identity, Person, UnixTime, check_printable, check_room, decoded
 
 TOPIC = "echostep-table/crew"
 MOST_CREWS, MOST_MEMBERS = 64, 8  # further crews are refused
 MOST_AIR_MIN = 600.0  # a rebreather lasts 4 h [EN 145]
-CHECK_SHARE = (
-    1.0 / 3.0
-)  # of the planned air until a check is due: pressure is asked for after one and two thirds [FwDV 7, 7.4]
-Identity = Annotated[str, Meta(pattern="^[0-9a-f]{8}$")]
-Person = Annotated[str, Meta(min_length=1, max_length=32)]
+# Of the planned air until a check is due: pressure is asked for after one and two thirds [FwDV 7, 7.4; from memory]
+CHECK_SHARE = 1.0 / 3.0
 Members = Annotated[tuple[Person, ...], Meta(max_length=MOST_MEMBERS)]
 AirMinutes = Annotated[float, Meta(ge=1.0, le=MOST_AIR_MIN)]
-UnixTime = Annotated[float, Meta(ge=0.0, le=1e11)]
 Does = Literal["enter", "check", "leave"]
 
 
@@ -93,17 +90,12 @@ class Crews:
         if not payload:
             self.known.pop(identity, None)
             return
-        try:
-            crew = decode_as(payload, _DECODER)
-        except BadReportError as error:
-            raise BadReportError(f"not a valid crew: {error}") from error
+        crew = decoded(payload, _DECODER, "crew")
         if crew.id != identity:
             raise BadReportError("crew and topic contradict each other")
-        if not all(map(is_printable, (crew.name, crew.by, *crew.members))):
-            raise BadReportError("unprintable text")
+        check_printable(crew.name, crew.by, *crew.members)
+        check_room(self.known, identity, MOST_CREWS, "crews")
         known = self.known.get(identity)
-        if known is None and len(self.known) >= MOST_CREWS:
-            raise BadReportError(f"more than {MOST_CREWS} crews")
         if known is not None and (known.unix_s, known.by) > (crew.unix_s, crew.by):
             answers.append(known.message)
         else:

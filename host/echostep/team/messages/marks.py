@@ -13,15 +13,16 @@ of the errands of one run the latest. So what each commander knows can be sent a
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Literal, TypeVar
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
 from echostep.ports.people.payloads import Level
 from echostep.team.messages.crews import Crews
-from echostep.team.messages.report import BadReportError, Metres, check_name, decode_as, is_printable
+from echostep.team.messages.report import BadReportError, Metres, check_name
+from echostep.team.messages.shared import Identity, Person, UnixTime, check_printable, check_room, decoded
 
 ROOT = "echostep-table"
 MARKS, ALL = f"{ROOT}/mark/#", f"{ROOT}/#"
@@ -29,8 +30,6 @@ MOST_MARKS, MOST_ACKS, MOST_ERRANDS = 256, 1024, 256  # further ones are refused
 MOST_ANSWERS = 64  # that wait; further ones replace the oldest
 MOST_REMOVED = 1024  # removed marks that are remembered, the newest ones
 MarkKind = Literal["cleared", "hazard", "meeting"]
-Identity = Annotated[str, Meta(pattern="^[0-9a-f]{8}$")]
-Person = Annotated[str, Meta(min_length=1, max_length=32)]
 
 
 class Mark(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -46,7 +45,7 @@ class Mark(msgspec.Struct, frozen=True, omit_defaults=True):
     y_m: Metres
     level: Level
     by: Person
-    unix_s: Annotated[float, Meta(ge=0.0, le=1e11)]
+    unix_s: UnixTime
     plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
     removed: bool = False
 
@@ -61,7 +60,7 @@ class Ack(msgspec.Struct, frozen=True):
 
     echostep_ack: Literal[1]
     by: Person
-    unix_s: Annotated[float, Meta(ge=0.0, le=1e11)]
+    unix_s: UnixTime
 
 
 class Errand(msgspec.Struct, frozen=True):
@@ -74,7 +73,7 @@ class Errand(msgspec.Struct, frozen=True):
     y_m: Metres
     level: Level
     by: Person
-    unix_s: Annotated[float, Meta(ge=0.0, le=1e11)]
+    unix_s: UnixTime
     plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 
     @property
@@ -85,8 +84,6 @@ class Errand(msgspec.Struct, frozen=True):
 
 AlarmKey = tuple[str, str, str]  # team, wearer, "<run>-<number>"
 RunKey = tuple[str, str, str]  # team, wearer, run
-T = TypeVar("T")
-K = TypeVar("K")
 _MARK, _ACK, _ERRAND = msgspec.json.Decoder(Mark), msgspec.json.Decoder(Ack), msgspec.json.Decoder(Errand)
 
 
@@ -168,10 +165,10 @@ class MarkBoard:
             self.marks.pop(identity, None)
             self.removed.pop(identity, None)
             return
-        mark = _decoded(payload, _MARK, "mark")
+        mark = decoded(payload, _MARK, "mark")
         if mark.id != identity:
             raise BadReportError("mark and topic contradict each other")
-        _check_printable(mark.by)
+        check_printable(mark.by)
         if identity in self.removed:
             if not mark.removed:  # sent by a commander who had not heard that it was removed
                 self.answers.append(self.removed[identity].message)
@@ -182,7 +179,7 @@ class MarkBoard:
                 self.removed.pop(next(iter(self.removed)))
             self.removed[identity] = mark
             return
-        _check_room(self.marks, identity, MOST_MARKS, "marks")
+        check_room(self.marks, identity, MOST_MARKS, "marks")
         self.marks[identity] = mark
 
     def _receive_ack(self, key: AlarmKey, payload: bytes) -> None:
@@ -190,9 +187,9 @@ class MarkBoard:
         if not payload:
             self.acks.pop(key, None)
             return
-        ack = _decoded(payload, _ACK, "acknowledgement")
-        _check_printable(ack.by)
-        _check_room(self.acks, key, MOST_ACKS, "acknowledgements")
+        ack = decoded(payload, _ACK, "acknowledgement")
+        check_printable(ack.by)
+        check_room(self.acks, key, MOST_ACKS, "acknowledgements")
         known = self.acks.get(key)
         if known is not None and (known.unix_s, known.by) < (ack.unix_s, ack.by):
             self.answers.append(ack_message(key, known.by, known.unix_s))
@@ -204,26 +201,14 @@ class MarkBoard:
         if not payload:
             self.errands.pop(key, None)
             return
-        errand = _decoded(payload, _ERRAND, "errand")
-        _check_printable(errand.by, errand.to, errand.where)
-        _check_room(self.errands, key, MOST_ERRANDS, "errands")
+        errand = decoded(payload, _ERRAND, "errand")
+        check_printable(errand.by, errand.to, errand.where)
+        check_room(self.errands, key, MOST_ERRANDS, "errands")
         known = self.errands.get(key)
         if known is not None and (known.unix_s, known.by) > (errand.unix_s, errand.by):
             self.answers.append(errand_message(key, known))
         else:
             self.errands[key] = errand
-
-
-def _check_printable(*texts: str) -> None:
-    """Raises BadReportError for a text with letters that are not printed."""
-    if not all(map(is_printable, texts)):
-        raise BadReportError("unprintable text")
-
-
-def _check_room(known: Mapping[K, object], key: K, most: int, what: str) -> None:
-    """Raises BadReportError for a new key where `most` are known."""
-    if key not in known and len(known) >= most:
-        raise BadReportError(f"more than {most} {what}")
 
 
 def _check_key(key: tuple[str, str, str]) -> None:
@@ -232,10 +217,3 @@ def _check_key(key: tuple[str, str, str]) -> None:
         check_name(name)
     if len(key[2]) > 32:
         raise BadReportError("unknown topic")
-
-
-def _decoded(payload: bytes, decoder: msgspec.json.Decoder[T], what: str) -> T:
-    try:
-        return decode_as(payload, decoder)
-    except BadReportError as error:
-        raise BadReportError(f"not a valid {what}: {error}") from error
