@@ -168,8 +168,9 @@ class Belief:
         self.judge_plan()
 
     def find(self, each: CloudHypothesis) -> None:
-        """A search has found a place."""
+        """A search has found a place; from then on it and the tracked cloud are compared by traced echoes."""
         self._move(each, BY_CHANCE)
+        self.tracked.table = None
 
     def merge(self) -> None:
         """The search is where the tracked cloud is."""

@@ -247,9 +247,9 @@ class MapFilter:
         pings, unplanned = self._pings.take(measured if self._building.has_walls else measured.without_pings)
         move, path_m = move_of(segment), math.hypot(segment.dx_m, segment.dy_m)
         self._way.add(move, pings, change)
-        clouds = self.belief.clouds
+        clouds, share = self.belief.clouds, evidence_share(segment.turn_rad)
         for each in clouds:
-            self._follow_with(each, move, pings, unplanned, evidence_share(segment.turn_rad))
+            self._follow_with(each, move, pings, unplanned, share)
         self.belief.weigh_heights([each.change_levels(move, change) for each in clouds])
         for each in clouds:
             if each.cloud.is_searching:
@@ -257,7 +257,6 @@ class MapFilter:
                     self._way.pass_again(each.cloud, self._blurred, self._building.walls)
                     each.cloud.draw_veer()
                     self.belief.find(each)
-                    self.belief.tracked.table = None
                 continue
             loss = self._building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m) if path_m > 0.0 else None
             if loss is not None:

@@ -69,6 +69,16 @@ def run_metadata(
     }
 
 
+def is_simulated(metadata: Mapping[str, str]) -> bool:
+    """Whether a recording is of a simulation."""
+    return metadata.get("source") == SIMULATED
+
+
+def shown_name(path: Path, metadata: Mapping[str, str]) -> str:
+    """The name of a recording, which says so where it is simulated."""
+    return f"{path.name}{' (simulated)' if is_simulated(metadata) else ''}"
+
+
 def _start_fields(start: Pose | Start) -> dict[str, str]:
     """Fields of a start: its mean pose, its standard deviations, or the outline of the room; neither: anywhere."""
     if isinstance(start, Pose):

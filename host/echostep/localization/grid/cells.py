@@ -31,7 +31,7 @@ Entries = np.ndarray[tuple[int, int], np.dtype[np.uint16]]
 class GridCells(NamedTuple):
     """Cells of CELL_M in rows of `columns` from (x0_m, y0_m) on; each array is (cells,) if not said otherwise, all rows one after the other.
 
-    `barrier`: bits EAST_WALL, NORTH_WALL: a wall stands between the middles of the cell and of its neighbour; CLOSED: nobody can be there (edge of
+    `barrier`: bits EAST_WALL, NORTH_WALL: a wall stands between the middles of the cell and of its neighbour; CLOSED: no trunk can be there (edge of
     the grid, air beside an upper level). `connector`: number of the connector that holds it. `level` (columns,): that of each column. `row`: its
     column of `expected` (SECTORS, floor), or UNKNOWN.
     """

@@ -108,7 +108,7 @@ def _shift(turn: float, dx: float, dy: float, offset: Floats) -> tuple[int, int]
 
 @lean_kernel
 def _moved(cell: int, east: int, north: int, cells: GridCells) -> tuple[int, bool]:
-    """The cell so far off, -1 where nobody can be, and whether a wall stands on the way: by turns to the east and to the north."""
+    """The cell so far off, -1 where no trunk can be, and whether a wall stands on the way: by turns to the east and to the north."""
     crossed = False
     while east != 0 or north != 0:
         if abs(east) >= abs(north):

@@ -27,7 +27,7 @@ from echostep.recording.mcap_records import MCAP_MAGIC
 from echostep.recording.parts.joining import open_parts
 from echostep.session.browser import open_browser
 from echostep.session.console import console, print_notices
-from echostep.session.metadata import SIMULATED
+from echostep.session.metadata import shown_name
 from echostep.session.options import TrackingOptions
 from echostep.session.results import summary_words
 from echostep.session.runs.replay import tracker_of
@@ -91,8 +91,7 @@ class DroppedFiles:
         assert self._recording
         recording = open_parts([self._recording])
         tracker = tracker_of(recording, plan, TrackingOptions(None))
-        title = f"{self._recording.name}{' (simulated)' if recording.metadata.get('source') == SIMULATED else ''}"
-        self.drops.put(Drop(self._recording, tracker, title))
+        self.drops.put(Drop(self._recording, tracker, shown_name(self._recording, recording.metadata)))
         other = plan.is_drawn and recording.metadata.get("plan_sha256", plan.digest) != plan.digest
         return f"Note: {plan.name} is not the plan that this was tracked on." if other else ""
 

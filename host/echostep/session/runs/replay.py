@@ -19,7 +19,15 @@ from echostep.scorecard.truth import load_truth
 from echostep.session.chunk_streams import paced, portions_of
 from echostep.session.console import console
 from echostep.session.losses import skipped
-from echostep.session.metadata import CHECK_IN_START, SIMULATED, plan_of, recorded_seed, recorded_start, start_given
+from echostep.session.metadata import (
+    CHECK_IN_START,
+    is_simulated,
+    plan_of,
+    recorded_seed,
+    recorded_start,
+    shown_name,
+    start_given,
+)
 from echostep.session.options import OutputOptions, TrackingOptions
 from echostep.session.progress import with_bar
 from echostep.session.results import output_folder
@@ -43,10 +51,14 @@ def replay(paths: Sequence[Path], tracking: TrackingOptions, truth_path: Path | 
     output_folder(output.folder)
     if note := recording.metadata.get("note"):
         console.print(f"Recording: {note}")
-    simulated = recording.metadata.get("source") == SIMULATED
-    title = f"echostep replay {path.name}{' (simulated)' if simulated else ''}"
+    title = f"echostep replay {shown_name(path, recording.metadata)}"
     with Session(
-        tracker, title, "simulated" if simulated else "replay", output, tracking.guide_to, recording
+        tracker,
+        title,
+        "simulated" if is_simulated(recording.metadata) else "replay",
+        output,
+        tracking.guide_to,
+        recording,
     ) as session:
         session.prepare()
         start_s = time.perf_counter()
