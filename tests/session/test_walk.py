@@ -17,8 +17,8 @@ from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.foot.steps import FootCounts, Step, Track
 from echostep.output.track_plot import write_track
-from echostep.picture_files import ENDINGS
 from echostep.plan.model import NO_PLAN, Pose, load_plan
+from echostep.printing.picture_files import ENDINGS
 from walks import DEMO
 
 pytestmark = pytest.mark.long

@@ -25,7 +25,7 @@ FEWEST = 10  # runs that say anything of that
 
 
 def once(seed: int) -> None:
-    """A demo of this seed with a page that nobody opens, its results thrown away; raises SystemExit when it fails."""
+    """A demo of this seed with a page that no browser opens, its results thrown away; raises SystemExit when it fails."""
     with TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
         sys.argv = ["echostep", "demo", "--port", "0", "--seed", str(seed), "--out", folder, "--no-open"]
         try:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from echostep.extras import PAGE, lacks, require
-from echostep.picture_files import check_picture
 from echostep.printing.lines import complain
+from echostep.printing.picture_files import check_picture
 
 if TYPE_CHECKING:
     from echostep.page.server import Address

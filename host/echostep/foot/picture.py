@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from echostep.picture_files import save_picture
+from echostep.printing.picture_files import save_picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

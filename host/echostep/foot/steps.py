@@ -32,7 +32,7 @@ from echostep.foot.zupt_state import (
     START_S,
     TOE,
 )
-from echostep.picture_files import svg_text
+from echostep.printing.picture_files import svg_text
 
 NO_MAG: Floats = np.empty((0, 3))  # in the place of magnetometer samples
 

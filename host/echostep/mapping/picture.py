@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.picture_files import check_picture, save_picture
 from echostep.plan.model import Level, Plan
 from echostep.plan.pictures.drawing import DOOR, OBSTACLE, WALL
+from echostep.printing.picture_files import check_picture, save_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from pathlib import Path
 from echostep.arrays import Floats
 from echostep.legs.stride import Flag, Stride
 from echostep.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
-from echostep.picture_files import save_picture
+from echostep.printing.picture_files import save_picture
 
 PARTIAL_COLOUR = "#999999"
 

@@ -17,10 +17,10 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.localization.beacon_map import BeaconPlace, BeaconState
 from echostep.localization.estimate import Estimate
-from echostep.picture_files import save_picture
 from echostep.plan.model import Level, Plan
 from echostep.plan.routing import Route
 from echostep.printing.file_mode import claim
+from echostep.printing.picture_files import save_picture
 from echostep.scorecard.truth import Truth
 
 if TYPE_CHECKING:

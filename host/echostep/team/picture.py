@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from echostep.localization.estimate import ellipse95
-from echostep.picture_files import save_picture
 from echostep.plan.model import Plan
+from echostep.printing.picture_files import save_picture
 from echostep.team.messages.report import Position
 from echostep.team.roster import Member, MemberState
 

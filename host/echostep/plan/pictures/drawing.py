@@ -14,12 +14,12 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from echostep.picture_files import check_picture, save_picture, svg_text
 from echostep.plan.cropping import Bounds, extent, within
 from echostep.plan.model import Connector, Level, Plan, Pose, Room
 from echostep.plan.pictures.labels import Label, draw_labels, fonts_for
 from echostep.plan.places.faces import find_faces
 from echostep.plan.places.spaces import MOST_WALLS
+from echostep.printing.picture_files import check_picture, save_picture, svg_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -20,11 +20,11 @@ from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.particles.start import Start
 from echostep.output.track_files import columns_of, refuse_none
 from echostep.output.track_plot import COLUMNS, track_figure
-from echostep.picture_files import save_picture, svg_text
 from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import NO_PLAN, Plan, Pose
+from echostep.printing.picture_files import save_picture, svg_text
 from echostep.recording.parts.joining import open_parts
-from echostep.session.metadata import SIMULATED
+from echostep.session.metadata import shown_name
 from echostep.session.options import TrackingOptions
 from echostep.session.runs.replay import tracker_of
 from echostep.settings import Settings
@@ -120,5 +120,4 @@ def replay(
     tracker = tracker_of(opened, on, options, start, given)
     estimates = [e for portion in opened.portions() for e in tracker.take(portion)]
     refuse_none(estimates, opened.path)
-    simulated = " (simulated)" if opened.metadata.get("source") == SIMULATED else ""
-    return Walk(opened.path.name + simulated, on, tuple(estimates))
+    return Walk(shown_name(opened.path, opened.metadata), on, tuple(estimates))

@@ -15,7 +15,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.output.table import console
-from echostep.picture_files import save_picture
+from echostep.printing.picture_files import save_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
