@@ -7,6 +7,7 @@ Each test has its layer, by which `make quick` chooses. One Chromium for all tes
 import contextlib
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Generator, Iterator
@@ -17,6 +18,7 @@ import pytest
 from hypothesis import settings
 
 import layers
+from echostep.interruption import ENDS
 
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
@@ -51,6 +53,15 @@ def pytest_configure(config: pytest.Config) -> None:
 def _computer_of_one_user(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever accounts this computer has: they would put a token into the addresses of pages."""
     monkeypatch.setattr("echostep.page.web.users.has_other_users", lambda: False)
+
+
+@pytest.fixture(autouse=True)
+def _signals_as_they_were() -> Iterator[None]:
+    """A command that ran in this process leaves its handlers, or ignores a signal: the next test's processes would ignore it too."""
+    handlers = [(number, signal.getsignal(number)) for number in (signal.SIGINT, *ENDS)]
+    yield
+    for number, handler in handlers:
+        signal.signal(number, handler)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

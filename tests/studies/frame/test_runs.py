@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import multiprocessing
 import os
+import signal
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -105,11 +106,15 @@ def held(folder: str, seed: int) -> list[Counted]:
     return [Counted(name="held", value=0.0)]
 
 
-def test_an_interrupted_study_waits_for_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("sigterm", [signal.SIG_DFL, signal.SIG_IGN])
+def test_an_interrupted_study_waits_for_no_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sigterm: signal.Handlers
+) -> None:
     def interrupt(_journal: Journal[Counted], _seed: int, _rows: list[Counted]) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Journal, "add", interrupt)
+    signal.signal(signal.SIGTERM, sigterm)
     with pytest.raises(KeyboardInterrupt):
         SeededRuns("s", 2, 1, partial(held, str(tmp_path)), tmp_path, KINDS).rows()
     assert not multiprocessing.active_children()

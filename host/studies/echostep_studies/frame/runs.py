@@ -136,7 +136,7 @@ def _on_cores(
             yield seed_of[done], done.result()
     except BaseException:  # a SIGTERM reaches this process alone: its workers would finish runs of minutes first
         for worker in multiprocessing.active_children():
-            worker.terminate()
+            worker.kill()  # SIGTERM may be ignored, inherited from whatever started this process; the journal is this one's
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
