@@ -19,14 +19,14 @@ from echostep.localization.belief import (
     LEAST,
     PLAN_FITS,
     STATED,
-    SURELY,
     TEMPER,
     Belief,
     CloudHypothesis,
     CrossedWalls,
 )
 from echostep.localization.building import Building
-from echostep.localization.estimate import SURE, Estimate, TrackStatus
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization.limits import SURE
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.start import Start
@@ -88,7 +88,7 @@ def test_probabilities_are_those_without_logarithms(
             belief.begin_search(no_cloud(is_searching=True), one / TEMPER)
             naive.begin_search(math.exp(one))
     p = naive.place
-    given = belief.plan_fits if belief.plan_fits < SURELY else 1.0
+    given = belief.plan_fits if belief.plan_fits < SURE else 1.0
     assert math.exp(belief.tracked.log_weight) == pytest.approx(p["tracked"], rel=1e-6)
     assert belief.probability(belief.tracked) == pytest.approx(given * math.exp(belief.tracked.log_weight))
     assert belief.plan_fits == pytest.approx(naive.plan_fits, rel=1e-6)
@@ -221,7 +221,7 @@ def test_a_place_is_as_sure_as_the_plan_that_it_is_on(fits: float, status: Track
     on_it.belief = Belief(on_it.cloud, 0.999, fits)
     estimate = after_a_step(on_it)
     assert estimate.plan_fits == pytest.approx(fits, abs=0.01)
-    assert estimate.right == pytest.approx(0.999 * (fits if fits < SURELY else 1.0), abs=0.01)
+    assert estimate.right == pytest.approx(0.999 * (fits if fits < SURE else 1.0), abs=0.01)
     assert estimate.status is status
 
 

@@ -12,7 +12,8 @@ import pytest
 from echostep.localization.building import Building
 from echostep.localization.echoes.likelihood import EchoSettings, echo_model
 from echostep.localization.echoes.unplanned import UsablePings
-from echostep.localization.estimate import SURE_OF_LEVEL, Estimate, TrackStatus
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization.limits import BELIEVED
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.motion import height_change, move_of
 from echostep.localization.particle_arrays import Move
@@ -104,7 +105,7 @@ def test_levels_that_are_alike_are_about_as_probable_after_the_second_pass() -> 
 
 
 def test_doors_tell_the_true_level_by_the_second_pass() -> None:
-    assert level_shares(different())[TRUE] > SURE_OF_LEVEL
+    assert level_shares(different())[TRUE] > BELIEVED
 
 
 @pytest.mark.parametrize("start", [Start(level=WRONG), Start(air=Air(0.0, 1.0))])

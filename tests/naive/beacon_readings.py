@@ -21,7 +21,6 @@ from echostep.localization.beacons.initialisation import (
     FITTING,
     GRID_M,
     MARGIN,
-    OUTLIER_COST,
     PATH_M,
     READING_SD_M,
 )
@@ -34,17 +33,18 @@ from echostep.localization.beacons.slam import (
     RECOVERED_FIT,
 )
 from echostep.localization.beacons.step import FIRST, LOCATE_EVERY, LOCATED_SD_M, MOST_READINGS
+from echostep.localization.limits import THREE_SD2
 from naive.beacons import Belief, Particle, recover, reweight
 
 
 def cost(readings: Floats, place: Floats) -> float:
-    """Squared normalised residuals of ranges and bearings, none above OUTLIER_COST; the beacon's axis is the mean of what the bearings say."""
+    """Squared normalised residuals of ranges and bearings, none above THREE_SD2; the beacon's axis is the mean of what the bearings say."""
     away = readings[:, :2] - place
     off = (np.hypot(away[:, 0], away[:, 1]) - readings[:, 2]) / READING_SD_M
     axes = np.angle((away[:, 0] + 1j * away[:, 1]) * np.exp(-1j * readings[:, 3]))
     axes = axes[~np.isnan(axes)]
     turned = np.angle(np.exp(1j * (axes - np.angle(np.exp(1j * axes).sum())))) / BEARING_SD_RAD
-    return float(np.minimum(off**2, OUTLIER_COST).sum() + np.minimum(turned**2, OUTLIER_COST).sum())
+    return float(np.minimum(off**2, THREE_SD2).sum() + np.minimum(turned**2, THREE_SD2).sum())
 
 
 def grid(readings: Floats, about: Floats, cells: int, step_m: float) -> tuple[Floats, Floats]:
@@ -124,7 +124,7 @@ class Beacons:
         known.in_place += FIT_SHARE * (fit - known.in_place)
         if known.suspect:
             known.suspect = known.in_place <= ACQUITTED_FIT
-        elif known.in_place < MISFIT and self.cloud_fit > LOST_FIT:
+        elif known.in_place < MISFIT:
             known.suspect, known.times_moved = True, known.times_moved + 1
 
     def _drop(self, slot: int, model: BeaconModel) -> None:

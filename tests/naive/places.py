@@ -7,7 +7,8 @@ import numpy as np
 
 from echostep.angles import mean_angle
 from echostep.arrays import Floats, Ints
-from echostep.localization.particles.places import LEAST_PROBABILITY, MOST_PLACES, REACH_M
+from echostep.localization.limits import ROOM_M
+from echostep.localization.particles.places import LEAST_PROBABILITY, MOST_PLACES
 
 Place = tuple[float, float, float, int, float, float]  # probability, x, y, level, standard deviation, heading
 
@@ -23,7 +24,7 @@ def places(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weight: F
         if not inside.any():
             break
         at_x, at_y = np.average(x_m[inside], weights=left[inside]), np.average(y_m[inside], weights=left[inside])
-        near = (np.hypot(x_m - at_x, y_m - at_y) < REACH_M) & (level == level[inside][0]) & (left > 0.0)
+        near = (np.hypot(x_m - at_x, y_m - at_y) < ROOM_M) & (level == level[inside][0]) & (left > 0.0)
         total = float(left[near].sum())
         if total < LEAST_PROBABILITY:
             break

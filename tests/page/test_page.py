@@ -14,8 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.localization.belief import BELIEVED, DOUBTED
 from echostep.localization.estimate import Estimate, digest
+from echostep.localization.limits import BELIEVED, PROBABLE
 from echostep.page import requests
 from echostep.page.live import LivePage
 from echostep.plan.model import Pose
@@ -252,7 +252,7 @@ def test_echoes_speak_for_a_right_tap_and_against_a_wrong_one(
     tracker.feed(Chunk(PERSON, 0, CheckIn(x_m + at[0], y_m + at[1], None, 0.2).encode()))
     for k in range(begin, len(chunks), 100):
         tracker.take(portion_of(chunks[k : k + 100]))
-        if not DOUBTED <= tracker.state.right <= BELIEVED:
+        if not PROBABLE <= tracker.state.right <= BELIEVED:
             break
     assert (tracker.state.right > BELIEVED) == fits
-    assert (tracker.state.right < DOUBTED) == (not fits)
+    assert (tracker.state.right < PROBABLE) == (not fits)

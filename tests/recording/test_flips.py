@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from echostep.localization.estimate import TRACKING_M, Estimate
+from echostep.localization.estimate import Estimate
+from echostep.localization.limits import TRACKING_M
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.recording.mcap_records import HEAD_SIZE

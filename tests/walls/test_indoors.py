@@ -10,7 +10,7 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.localization.building import Building
-from echostep.localization.estimate import OUTSIDE
+from echostep.localization.limits import PROBABLE
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.start import Start
 from echostep.path import MeasuredSegment, PathSegment
@@ -61,4 +61,4 @@ def test_an_estimate_says_that_it_is_outside() -> None:
     empty = np.empty(0), np.empty(0, np.int64), np.empty(0)
     moves = [PathSegment(float(k), k + 1.0, 1.0, 0.0, 0.0, 0.0, 0.02, 0.0, k) for k in range(10)]
     said = [tracked.update(MeasuredSegment(move, *empty)).outside for move in moves]
-    assert max(said[:2]) < OUTSIDE < min(said[5:])
+    assert max(said[:2]) < PROBABLE < min(said[5:])

@@ -17,7 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from echostep.localization.estimate import TRACKING_M, Estimate, TrackStatus
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization.limits import TRACKING_M
 from echostep.plan.model import Plan, load_plan
 from echostep.recording.mcap_records import HEAD_SIZE
 from places import PLAN

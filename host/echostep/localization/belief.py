@@ -17,6 +17,7 @@ import numpy as np
 
 from echostep.localization.grid.search_grid import SearchGrid
 from echostep.localization.height.levels import HeightChange
+from echostep.localization.limits import PROBABLE, SURE
 from echostep.localization.particle_arrays import Move
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.settings import UNPLANNED_DOOR
@@ -24,7 +25,6 @@ from echostep.plan.model import Pose
 
 # Assumed, not measured.
 PLAN_FITS = 0.99  # prior probability that the plan is the building's
-SURELY = 0.95  # probability that the plan fits, above which what is stated is conditional on it
 STATED = 0.99  # prior probability of a stated start, if the plan fits
 # Mean lengths of the path on which a cloud predicts the echoes, and on which none does. In this building until one goes wrong (a turn that is
 # measured badly: once in 1.8 km of simulated soak), and until a search has found (95 % within 40 m); in another while parts are alike (wings, levels)
@@ -32,8 +32,6 @@ HERE_M, ANOTHER_M = (2000.0, 13.0), (30.0, 60.0)
 WRONG_PER_M = 2e-5  # probability that the trunk leaves all clouds on a metre of the path (carried, a door that is no door): once in 50 km
 # Power of the echoes' densities: their errors are alike on a longer path than that on which they count as one (plan, sway, speed of sound)
 TEMPER = 0.3
-DOUBTED = 0.5  # probability of `elsewhere`, if the plan fits, above which the building is searched
-BELIEVED = 0.99  # of the tracked cloud, above which the plan supports it
 BY_CHANCE = 0.3  # of a search's mass, that stays elsewhere when it has found a place: a table is no exact likelihood
 CROSSED_M = 4.0  # from one way through a wall, within which another is through the same one; path of a cloud through it
 # Log of the share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more
@@ -111,14 +109,14 @@ class Belief:
         return 1.0 / (1.0 + math.exp(-max(self._log_odds, LEAST_LOG_ODDS)))
 
     def probability(self, each: CloudHypothesis | None) -> float:
-        """That the trunk is in this cloud, 0 of none; of a plan that is SURELY the building's, conditional on that."""
+        """That the trunk is in this cloud, 0 of none; of a plan that is SURE to be the building's, conditional on that."""
         fits = self.plan_fits
-        return 0.0 if each is None else math.exp(each.log_weight) * (1.0 if fits >= SURELY else fits)
+        return 0.0 if each is None else math.exp(each.log_weight) * (1.0 if fits >= SURE else fits)
 
     @property
     def is_doubted(self) -> bool:
         """Whether it is probable that the trunk is where no cloud is, if the plan fits."""
-        return math.exp(self.log_elsewhere) > DOUBTED
+        return math.exp(self.log_elsewhere) > PROBABLE
 
     def normalise(self) -> float:
         """Let the weights have the sum 1; returns the logarithm of what they had."""

@@ -18,23 +18,17 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.jit import lean_kernel
-from echostep.localization.height.levels import SAME_LEVEL_M
+from echostep.localization.limits import BELIEVED, HALF_STOREY_M, LOST_M, PROBABLE, SURE, TRACKING_M
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.places import LikelyPlace, hypotheses
 
 CHI2_95 = 5.991464547107979  # 95 % quantile of chi-square, two degrees of freedom
-TRACKING_M, LOST_M = 1.0, 5.0  # errors that matter: a door, a room
-SURE = 0.95  # probability of an error below TRACKING_M while tracking, assumed
 # Times the weight near the mean of a cloud of several places, with which the likeliest of them is its position, assumed
 MUCH_LIKELIER = 2.0
-UNSURE = 0.5  # probability of an error below LOST_M, less than which is lost, assumed
 RISK = 1e-3  # probability of an error beyond the protection radius
 # Of the protection radius of a normal distribution: errors of echoes and steps have heavier tails.
 TAIL = 1.5
 SPREAD_M = 0.75  # standard deviation of a cloud above which its hypotheses are listed, assumed
-UNFIT = 0.5  # probability of the plan below which it is reported not to fit, assumed
-OUTSIDE = 0.5  # probability of being outside of the building above which that is reported, assumed
-SURE_OF_LEVEL = 0.99  # least probability of the likeliest level while tracking, assumed
 WALKER_M_S = 1.5  # speed at which an unobserved position spreads per axis: a brisk walk
 
 
@@ -78,10 +72,10 @@ def moments(x_m: Floats, y_m: Floats, heading_rad: Floats, weight: Floats, near_
 def weight_about(
     x_m: Floats, y_m: Floats, z_m: Floats, weight: Floats, place_m: tuple[float, float, float], limit_m: tuple[float, float]
 ) -> tuple[float, float]:  # fmt: skip
-    """Weight of the particles (n,) within each of two distances of a place in the map, and within SAME_LEVEL_M of its height."""
+    """Weight of the particles (n,) within each of two distances of a place in the map, and within HALF_STOREY_M of its height."""
     near, about = 0.0, 0.0
     for i in range(len(weight)):
-        if abs(z_m[i] - place_m[2]) < SAME_LEVEL_M:
+        if abs(z_m[i] - place_m[2]) < HALF_STOREY_M:
             distance = math.hypot(x_m[i] - place_m[0], y_m[i] - place_m[1])
             near += weight[i] if distance < limit_m[0] else 0.0
             about += weight[i] if distance < limit_m[1] else 0.0
@@ -197,11 +191,11 @@ def estimate(
     levels, z, z_sd = _heights(cloud, weight)
     m = moments(cloud.map_x_m, cloud.y_m, cloud.turn_rad + walk_heading_rad, weight, TRACKING_M, LOST_M)
     places: tuple[LikelyPlace, ...] = ()
-    if search is not None or m.xx_m2 + m.yy_m2 > SPREAD_M**2 or max(levels) < SURE_OF_LEVEL:
+    if search is not None or m.xx_m2 + m.yy_m2 > SPREAD_M**2 or max(levels) < BELIEVED:
         places = (
             cloud.places(walk_heading_rad) if search is None else places_of_both(cloud, search, right, walk_heading_rad)
         )
-    if search is None and places and places[0].probability > UNSURE:
+    if search is None and places and places[0].probability > PROBABLE:
         m = _moments_at(places[0], m, cloud, weight)
     x, y, xx, xy, yy, east, north, near, about = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
@@ -247,9 +241,9 @@ def _moments_at(place: LikelyPlace, mean: Moments, cloud: Cloud, weight: Floats)
 
 def _status(near: float, about: float, level: float) -> TrackStatus:
     """Status from the probabilities of errors below TRACKING_M and below LOST_M, and that of the likeliest level."""
-    if near >= SURE and level >= SURE_OF_LEVEL:
+    if near >= SURE and level >= BELIEVED:
         return TrackStatus.TRACKING
-    return TrackStatus.UNCERTAIN if about >= UNSURE else TrackStatus.LOST
+    return TrackStatus.UNCERTAIN if about >= PROBABLE else TrackStatus.LOST
 
 
 def _protection_m(xx_m2: float, xy_m2: float, yy_m2: float, right: float) -> float:

@@ -16,22 +16,22 @@ import numpy as np
 from echostep.angles import mean_angle
 from echostep.board.gateway import BeaconReading
 from echostep.localization.beacon_map import BeaconMap
-from echostep.localization.belief import BELIEVED, PLAN_FITS, STATED, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
+from echostep.localization.belief import PLAN_FITS, STATED, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
 from echostep.localization.building import Building
 from echostep.localization.echoes.likelihood import EchoSettings
 from echostep.localization.echoes.unplanned import RangeMemory, UnplannedDensities, UsablePings, evidence_share
-from echostep.localization.estimate import LOST_M, TRACKING_M, Estimate, Right, estimate, weight_about
+from echostep.localization.estimate import Estimate, Right, estimate, weight_about
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.start import grid_about, grid_of, is_unknown
 from echostep.localization.height.height_filter import RelativeHeight, RidingHeight
 from echostep.localization.height.levels import HeightChange
+from echostep.localization.limits import BELIEVED, LOST_M, PROBABLE, TRACKING_M
 from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, move_of
 from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.start import ANY_LEVEL, Air, Start
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
 from echostep.localization.team.meetings import (
-    FITS,
     WRONG,
     Meeting,
     MeetingEffect,
@@ -49,7 +49,6 @@ EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate: no plan 
 # Standard deviation per axis when all views are hidden: a plan that explains few echoes may be so far off
 HIDDEN_SD_M = 0.15
 BY_DEFINITION = 1.0 - 1e-6  # without a plan: the map begins where the walk began, and no echo can contradict that
-MERGED = 0.5  # weight of a found cloud near the tracked one, above which both are one
 UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, assumed
 
 
@@ -138,9 +137,9 @@ class MapFilter:
                 self.belief.find(each)
         if meeting.beacon is not None:
             self.belief.normalise()
-            return MeetingEffect.USED if fits[0] >= FITS else MeetingEffect.CONTRADICTS
+            return MeetingEffect.USED if fits[0] >= PROBABLE else MeetingEffect.CONTRADICTS
         tracked, wrong = self.belief.tracked, WRONG[meeting.status]
-        if fits[0] >= FITS:
+        if fits[0] >= PROBABLE:
             self.belief.raise_to(tracked, min(fits[0], 1.0 - wrong))
             self._met.agree()
             return MeetingEffect.USED
@@ -148,7 +147,7 @@ class MapFilter:
         if moved is None:
             return MeetingEffect.CONTRADICTS
         self._met.agree()
-        self._track_from(meeting, moved, search_fits=fits[-1] >= FITS)
+        self._track_from(meeting, moved, search_fits=fits[-1] >= PROBABLE)
         return MeetingEffect.MOVED
 
     def _track_from(self, meeting: Meeting, right: float, *, search_fits: bool) -> None:
@@ -306,7 +305,7 @@ class MapFilter:
         cloud, mean = self.belief.search.cloud, self._believed(0.0)
         place_m = mean.x_m, mean.y_m, float(self.cloud.weight @ self.cloud.z_m)
         near, _ = weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, cloud.weight, place_m, (TRACKING_M, LOST_M))
-        return near > MERGED
+        return near > PROBABLE
 
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""

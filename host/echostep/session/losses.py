@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections import Counter
 
-from echostep.localization.belief import DOUBTED
 from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization.limits import PROBABLE
 from echostep.path import MeasuredSegment
 from echostep.recording.reading import Recording
 from echostep.tracker import Tracker
@@ -59,7 +59,7 @@ class Losses:
             return SILENT
         if not self._tracker.plan.is_drawn:
             return DRIFTED
-        if state.right < DOUBTED:
+        if state.right < PROBABLE:
             since = [t_s for t_s in self._check_ins.values() if t_s < e.t_s]
             return f"{UNFITTING} after the position was set by hand at {since[-1]:.0f} s" if since else UNFITTING
         return ECHOLESS if e.t_s - self._ping_s > ECHOLESS_S else SPREAD

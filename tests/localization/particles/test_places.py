@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from echostep.angles import mean_angle
 from echostep.localization.estimate import moments, weight_about
-from echostep.localization.height.levels import SAME_LEVEL_M
+from echostep.localization.limits import HALF_STOREY_M
 from echostep.localization.particles import places as module
 from echostep.localization.particles.places import hypotheses
 from naive.places import places
@@ -57,7 +57,7 @@ def test_moments_are_those_of_numpy(seed: int, count: int) -> None:
 def test_weight_about_a_place_is_of_its_level() -> None:
     x, z, weight = (
         np.array([0.0, 2.0, 0.0, 9.0]),
-        np.array([0.0, 0.0, SAME_LEVEL_M, 0.0]),
+        np.array([0.0, 0.0, HALF_STOREY_M, 0.0]),
         np.array([0.1, 0.2, 0.3, 0.4]),
     )
     assert weight_about(x, np.zeros(4), z, weight, (0.0, 0.0, 0.0), (1.0, 5.0)) == pytest.approx((0.1, 0.3))

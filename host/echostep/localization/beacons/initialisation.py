@@ -15,6 +15,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.jit import kernel
 from echostep.localization.beacons.beliefs import wrap_angle
+from echostep.localization.limits import THREE_SD2
 
 # Columns of readings (n, 4): place of the boot (m), range (m), bearing (rad, NaN: not measured)
 X, Y, RANGE, BEARING = 0, 1, 2, 3
@@ -26,7 +27,6 @@ GRID_M = 0.25
 FINER = 5.0  # the second grid
 READING_SD_M = 0.3
 BEARING_SD_RAD = math.radians(30.0)
-OUTLIER_COST = 9.0  # greatest cost of one reading: three standard deviations, squared
 APART_M = 1.5  # places further apart are two hypotheses
 MARGIN = 12.0  # by which the cost of any other hypothesis must be higher
 FITTING = 0.6  # share of ranges that must fit within three standard deviations
@@ -95,7 +95,7 @@ def _cost(readings: Floats, x: float, y: float, axes: Floats) -> float:
     for k in range(len(readings)):
         dx, dy = readings[k, X] - x, readings[k, Y] - y
         residual = (math.sqrt(dx * dx + dy * dy) - readings[k, RANGE]) / READING_SD_M
-        cost += min(residual * residual, OUTLIER_COST)
+        cost += min(residual * residual, THREE_SD2)
         axes[k] = math.atan2(dy, dx) - readings[k, BEARING]  # the beacon's axis by this reading
         if not math.isnan(axes[k]):
             sine += math.sin(axes[k])
@@ -104,5 +104,5 @@ def _cost(readings: Floats, x: float, y: float, axes: Floats) -> float:
     for k in range(len(readings)):
         if not math.isnan(axes[k]):
             residual = wrap_angle(axes[k] - axis) / BEARING_SD_RAD
-            cost += min(residual * residual, OUTLIER_COST)
+            cost += min(residual * residual, THREE_SD2)
     return cost

@@ -31,6 +31,7 @@ from echostep.localization.beacons.beliefs import (
     wrap_angle,
 )
 from echostep.localization.beacons.model import BeaconModel
+from echostep.localization.limits import THREE_SD2
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.index import WallIndex, crosses_wall
 
@@ -40,7 +41,6 @@ LEAST_DOUBT = 1.0 / GREATEST_ODDS  # of a particle, in terms of a beacon that ha
 CLOSE_BEARING_M2 = 0.25  # squared distance below which a bearing carries no information: half a metre
 UNKNOWN_AXIS_RAD2 = 3.0  # variance above which an axis is unknown: that of a uniform one is pi^2 / 3
 KNOWN_AXIS_RAD2 = 1.0  # variance below which an axis determines on which side of the beacon the boot is
-GATE = 9.0  # squared normalised innovation above which a bearing is an outlier: three standard deviations
 FIT_SHARE = 0.12  # of the newest measurement in a running mean
 MISFIT = 0.25  # running probability below which a beacon was moved
 LOST_FIT = 0.4  # the same of all beacons together: below it the cloud is wrong
@@ -88,7 +88,7 @@ def update_by_measurement(
     if each[SUSPECT]:
         if each[IN_PLACE] > ACQUITTED_FIT:
             each[SUSPECT] = 0.0
-    elif each[IN_PLACE] < MISFIT and together[CLOUD_FIT] > LOST_FIT:
+    elif each[IN_PLACE] < MISFIT:
         each[TIMES_MOVED] += 1.0
         each[SUSPECT] = 1.0
     together[CLOUD_FIT] += 0.5 * FIT_SHARE * (fit - together[CLOUD_FIT])
@@ -167,7 +167,8 @@ def _range_density(
     density = inlier + outliers / model.span_m
     if in_place * inlier > 0.5 * density:
         noise_var = model.range_sd_m**2 + longer_var * inverse
-        correct(mean, cov, -ux, -uy, 0.0, innovation, noise_var)
+        slope = math.sqrt(square) / expected  # of the expected range, by the distance of the means
+        correct(mean, cov, -slope * ux, -slope * uy, 0.0, innovation, noise_var)
     return density
 
 
@@ -197,7 +198,7 @@ def _bearing_density(
     variance = variance - 2.0 * (hx * cov[X_AXIS] + hy * cov[Y_AXIS]) + cov[AXIS_AXIS]
     variance += model.bearing_sd_rad**2
     near = math.exp(-0.5 * innovation * innovation / variance) / math.sqrt(TWO_PI * variance)
-    if learn and innovation * innovation <= GATE * variance:
+    if learn and innovation * innovation <= THREE_SD2 * variance:
         correct(mean, cov, hx, hy, -1.0, innovation, model.bearing_sd_rad**2)
     return (1.0 - model.bearing_outliers) * near + model.bearing_outliers / TWO_PI
 

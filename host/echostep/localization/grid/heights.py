@@ -13,13 +13,8 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.localization.grid.kernels import LevelFactors
-from echostep.localization.height.levels import (
-    LAG_GATE,
-    PRESSURE_TAIL,
-    UNKNOWN_LAG_M2,
-    ClimbSettings,
-    HeightChange,
-)
+from echostep.localization.height.levels import PRESSURE_TAIL, UNKNOWN_LAG_M2, ClimbSettings, HeightChange
+from echostep.localization.limits import THREE_SD2
 from echostep.localization.particles.start import Start
 from echostep.walls.floor import CELL_M
 from echostep.walls.level_sheet import LIFT, LevelSheet, end_of_connector, nearest_level
@@ -60,7 +55,7 @@ class GridHeights:
         gain = lag_variance / variance if has_pressure else 0.0
         innovation = change.height_m - sheet.height_m - lag_m
         if has_pressure and not self._is_climbing(change):
-            lag_m += np.where(innovation**2 < LAG_GATE * variance, gain * innovation, 0.0)
+            lag_m += np.where(innovation**2 < THREE_SD2 * variance, gain * innovation, 0.0)
         self._lag_m = lag_m
         return LevelFactors(np.exp(loss.min() - loss).astype(np.float32), east, -float(loss.min())), (
             1.0 - gain

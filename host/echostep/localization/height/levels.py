@@ -20,6 +20,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.jit import kernel, lean_kernel
+from echostep.localization.limits import HALF_STOREY_M, THREE_SD2
 from echostep.localization.particle_arrays import Move, ParticleArrays
 from echostep.walls.floor import Floor
 from echostep.walls.indoors import inside_grid
@@ -35,11 +36,8 @@ from echostep.walls.level_sheet import (
 
 PRESSURE_TAIL = 3.0  # degrees of freedom of the Student t density of the height by pressure: doors slam
 UNKNOWN_LAG_M2 = 1e6  # variance of `lag` before the first height by pressure: no information
-SAME_LEVEL_M = 1.5  # difference of height within one level: half of one; on stairs and in lifts two clouds change levels one after the other
 # Standard deviation of the height by pressure's speed: a front changes the pressure by 0.4 hPa in an hour
 WEATHER_M_S = 1e-3
-LAG_GATE = 9.0  # squared normalised innovation above which the height by pressure does not correct `lag`: three standard deviations
-ABOVE_M = 1.5  # height above the ground, which is at 0 or the lowest level: an entrance over a few steps is not on an upper level
 FALL_PER_M = 1.0  # log-weight lost on a metre of path, assumed: a corner that the plan lacks is passed
 
 
@@ -143,7 +141,7 @@ def change_levels(
         if has_pressure:
             innovation = height - z[i] - lag[i]
             log_weight[i] -= min(2.0 * math.log1p(innovation * innovation / (PRESSURE_TAIL * variance)), model.unlikely)
-            if innovation * innovation < LAG_GATE * variance:
+            if innovation * innovation < THREE_SD2 * variance:
                 lag[i] += gain * innovation
         top = max(top, log_weight[i])
     for i in range(len(x)):
@@ -177,7 +175,7 @@ class UpperLevels:
     def __init__(self, floor: Floor, sheet: LevelSheet) -> None:
         self._sheet = sheet
         self._grid = inside_grid(floor.x_m, floor.y_m)
-        self._is_above = sheet.height_m > max(0.0, float(sheet.height_m.min())) + ABOVE_M
+        self._is_above = sheet.height_m > max(0.0, float(sheet.height_m.min())) + HALF_STOREY_M
 
     def log_loss(self, x_m: Floats, y_m: Floats, path_m: float) -> Floats | None:
         """Loss of log-weight (n,) of places on the sheet on this length of path; None if none is in the air."""

@@ -77,7 +77,7 @@ class Cloud(Particles):
 
     A cloud is scattered or contracted by its number of particles, gathered or in one place by its spread: see the properties of these names.
     `grid`: of a search, until it has found the place; the particles only show it, and are drawn from it anew after each move. `is_gathered`: since
-    it last was scattered by an unobserved move, less than GATHERED_REST of its weight was once farther than GATHERED_M from its mean on the sheet.
+    it last was scattered by an unobserved move, less than GATHERED_REST of its weight was once farther than ROOM_M from its mean on the sheet.
     """
 
     def __init__(

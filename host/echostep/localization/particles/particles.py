@@ -10,12 +10,13 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.localization.beacons.beliefs import BeaconBeliefs
+from echostep.localization.limits import ROOM_M
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.localization.particles.places import LikelyPlace, hypotheses
 from echostep.walls.level_sheet import LevelSheet, level_of
 
-# A cloud is gathered when less than this weight is farther than this from its mean; assumed, the distance as of a room
-GATHERED_M, GATHERED_REST = 2.5, 1e-4
+# A cloud is gathered when less than this weight is farther than ROOM_M from its mean, assumed
+GATHERED_REST = 1e-4
 
 
 class Particles:
@@ -97,9 +98,9 @@ class Particles:
         return int(level_of(np.array([x_m]), self.sheet)[0]) if self.sheet else 0
 
     def far_weight(self, x_m: Floats) -> float:
-        """Weight further than GATHERED_M from the mean, by x (n,) on the sheet or in the map."""
+        """Weight further than ROOM_M from the mean, by x (n,) on the sheet or in the map."""
         weight = self.weight
-        far = np.hypot(x_m - weight @ x_m, self.y_m - weight @ self.y_m) > GATHERED_M
+        far = np.hypot(x_m - weight @ x_m, self.y_m - weight @ self.y_m) > ROOM_M
         return float(weight @ far)
 
     def keep(self, chosen: Ints) -> None:

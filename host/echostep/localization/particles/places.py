@@ -14,9 +14,9 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel
+from echostep.localization.limits import ROOM_M
 
 # Assumed, not measured.
-REACH_M = 2.5  # particles so near to the heaviest square are one hypothesis: a room
 MOST_PLACES = 5  # likely places that are listed
 LEAST_PROBABILITY = 0.02  # probability of one that is listed
 SQUARE_M = 1.0  # side of a square, doubled until there are at most MOST_SQUARES
@@ -86,7 +86,7 @@ def _hypothesis(
 def _take(
     heaviest: int, particles: _Particles, left: Floats, mass: Floats
 ) -> tuple[float, float, float, float, float, float, float]:
-    """Take particles within REACH_M of the middle of a square out of `left` (n,) and `mass` (squares,), if they have LEAST_PROBABILITY in all.
+    """Take particles within ROOM_M of the middle of a square out of `left` (n,) and `mass` (squares,), if they have LEAST_PROBABILITY in all.
 
     Returns their weight, mean x and y, level, mean square of the distance from there, and the mean of their unit vectors.
     """
@@ -127,4 +127,4 @@ def _middle(heaviest: int, particles: _Particles, left: Floats) -> tuple[float, 
 
 @kernel
 def _is_near(dx_m: float, dy_m: float) -> bool:
-    return dx_m * dx_m + dy_m * dy_m < REACH_M * REACH_M
+    return dx_m * dx_m + dy_m * dy_m < ROOM_M * ROOM_M

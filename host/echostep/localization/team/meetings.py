@@ -31,9 +31,9 @@ import numpy as np
 from msgspec import structs
 
 from echostep.arrays import Bools, Floats
-from echostep.localization.belief import DOUBTED, CloudHypothesis
-from echostep.localization.estimate import LOST_M, TAIL, ellipse95
-from echostep.localization.height.levels import SAME_LEVEL_M
+from echostep.localization.belief import CloudHypothesis
+from echostep.localization.estimate import TAIL, ellipse95
+from echostep.localization.limits import HALF_STOREY_M, LOST_M, PROBABLE
 from echostep.localization.particles.cloud import Cloud
 from echostep.path import Odometer, PathSegment
 from echostep.ports.people.check_in import MOST_SD_M, CheckIn
@@ -49,7 +49,6 @@ MOST_DOUBT = math.log(WRONG["tracking"])  # of all ranges of one teammate: then 
 LEAST_WRONG = 1e-6  # probability that a range is wrong, at least, in a ratio
 LEAST_SD_OF_CLOUD_M = 0.02  # of a cloud without spread
 FARTHEST = -4.6  # log of the prior, relative to its peak, at which 99 % of a normal distribution lie inside: a far mode is no tail of it
-FITS = 0.5  # probability that the meeting is right, given the cloud, below which they contradict each other
 LEAST_FACTOR = -200.0  # log of the least weight that a meeting leaves
 # Path on which a wearer's own echoes, or drift, renew the filter's information
 RENEWED_M = 10.0
@@ -174,14 +173,14 @@ def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
         on_level, levels = np.full(len(place), meeting.level == 0), 1
     else:
         heights = cloud.sheet.height_m
-        on_level, levels = np.abs(cloud.z_m - heights[meeting.level]) < SAME_LEVEL_M, len(heights)
+        on_level, levels = np.abs(cloud.z_m - heights[meeting.level]) < HALF_STOREY_M, len(heights)
     log_met, weight = log_density(meeting, place, on_level, levels), cloud.weight
     wrong = WRONG[meeting.status]
     anywhere = 1.0 / (area_m2 if meeting.range_m is None else math.sqrt(area_m2))
     density = (1.0 - wrong) * float(weight @ np.exp(log_met))
     right = density / (density + wrong * anywhere)
     factor = log_met if cloud.is_searching else None
-    if right >= FITS and not cloud.is_searching:
+    if right >= PROBABLE and not cloud.is_searching:
         factor = _intersection(meeting, place, weight, log_met)
     if factor is not None:  # a cloud that is concentrated elsewhere is not changed
         factor = meeting.share * factor
@@ -293,8 +292,8 @@ def moved_probability(here: float, meeting: Meeting, count: int) -> float:
 def moved_by(meeting: Meeting, here: float, count: int) -> float | None:
     """Probability of the teammate's place where `count` contradictions move the cloud there; None where they do not. `here`: that it is right."""
     moved = moved_probability(here, meeting, count)
-    is_alone = count < CONTRADICTIONS and here >= DOUBTED
-    return None if (meeting.range_m or 0.0) > PLACE_M or is_alone or moved < FITS else moved
+    is_alone = count < CONTRADICTIONS and here >= PROBABLE
+    return None if (meeting.range_m or 0.0) > PLACE_M or is_alone or moved < PROBABLE else moved
 
 
 class MeetingQueue:

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Octets
-from echostep.localization.estimate import OUTSIDE, UNFIT, Estimate, TrackStatus, claims_place
+from echostep.localization.estimate import Estimate, TrackStatus, claims_place
+from echostep.localization.limits import PROBABLE
 from echostep.page.elements.alarm import ShownAlarm
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
@@ -94,13 +95,13 @@ def status_text(
     tap = " or tap where you are" if accepts_taps else ""
     if estimate is None:
         return "tap where you stand to start" if needs_start else "waiting for the foot to stand still"
-    if estimate.plan_fits < UNFIT:
+    if estimate.plan_fits < PROBABLE:
         return "this plan does not fit: is it another building or floor, or mirrored?"
     if estimate.status != TrackStatus.TRACKING and len(estimate.hypotheses) > 1:
         return f"{estimate.status.value}: {len(estimate.hypotheses)} places fit; walk on, turn into a room{tap}"
     if estimate.status == TrackStatus.LOST and not no_plan:
         return "lost: walk along a wall or tap where you are" if accepts_taps else "lost"
-    where = ", outside the building" if estimate.outside > OUTSIDE else _height_words(estimate.z_m) if no_plan else ""
+    where = ", outside the building" if estimate.outside > PROBABLE else _height_words(estimate.z_m) if no_plan else ""
     return f"{estimate.status.value}{where}, {format_metres(estimate.ellipse95.major_m)}"
 
 

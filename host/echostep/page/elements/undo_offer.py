@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from echostep.localization.belief import BELIEVED, DOUBTED
+from echostep.localization.limits import BELIEVED, PROBABLE
 from echostep.tracker.state import TrackerState
 
 UNDO_NS = 10_000_000_000  # for so long the page offers to undo a check-in, and again once echoes contradict it
@@ -43,7 +43,7 @@ class UndoClock:
             self._number, self._until_ns, self._contradicted = state.undoable, now_ns + UNDO_NS, False
         if self._number is None:
             return None
-        contradicted = state.right < DOUBTED
+        contradicted = state.right < PROBABLE
         if contradicted and not self._contradicted:
             self._until_ns, self._contradicted = now_ns + UNDO_NS, True
         left_s = (self._until_ns - now_ns) * 1e-9
