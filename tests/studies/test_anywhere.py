@@ -20,6 +20,7 @@ from echostep.localization.particles.start import Start
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Connector, ConnectorKind, Level, Plan, Pose
 from echostep_studies.anywhere import amcl, kidnaps, plan_changes
+from echostep_studies.anywhere.study import PEER, anywhere_study
 from echostep_studies.bench import echo_changes, sites, walks
 from echostep_studies.bench.columns import JudgedRow, JudgedSummary, run_row, summaries
 from echostep_studies.bench.filtering import Claim, FilterRun
@@ -297,6 +298,13 @@ def test_the_command_writes_its_table_and_the_diagrams(tmp_path: Path) -> None:
     assert (row["name"], row["runs"], row["found"]) == ("hall", 1, 1.0)
     assert row["mean_m"] < 0.3
     assert (tmp_path / "out" / "stanford.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(("rows", "peers"), [("*", 0), ("kidnap/*", 0), ("*/amcl", 7), ("kidnap/lift/amcl", 1)])
+def test_the_peer_is_run_where_it_is_named(rows: str, peers: int) -> None:
+    names = anywhere_study(None, rows).run.args[0]  # type: ignore[attr-defined]
+    assert sum(name.endswith(PEER) for name in names) == peers
+    assert peers in (0, len(names))
 
 
 def test_an_unknown_row_is_answered_by_those_that_there_are(tmp_path: Path) -> None:

@@ -58,8 +58,8 @@ def _data(words: str, default: Any = None) -> Parameter:
     return _option("data", Path | None if default is None else Path, default, words, "DIR")
 
 
-def _rows(example: str) -> Parameter:
-    return _option("rows", str, "*", f"Only rows of such a name: '{example}'.", "PATTERN")
+def _rows(example: str, more: str = "") -> Parameter:
+    return _option("rows", str, "*", f"Only rows of such a name: '{example}'.{more}", "PATTERN")
 
 
 def _out(name: str) -> Parameter:
@@ -197,7 +197,7 @@ STUDIES = (
         "anywhere",
         OURS,
         "Wrong and unknown starts, kidnappings, wrong plans, poor echoes: found or not, and what is claimed (simulated).",
-        _usual("anywhere", 200, "Walks of each row.", WESTPORT, _rows("kidnap/*")),
+        _usual("anywhere", 200, "Walks of each row.", WESTPORT, _rows("kidnap/*", " Those of the peer: '*/amcl'.")),
         lambda _request, given: _of("anywhere.study").anywhere_study(given["data"], given["rows"]),
     ),
     StudyCommand(
