@@ -27,7 +27,7 @@ STEP_M = 0.5
 def pings(range_m: float, count: int) -> PingBatch:
     """So many of ranger 0 at the beginning, all with this range (0: silent)."""
     one = np.ones(count)
-    return PingBatch(0.0 * one, one, range_m * one, one, np.zeros(count, np.int64), one, 0.0 * one, one, one)
+    return PingBatch(0.0 * one, one, range_m * one, one, np.zeros(count, np.int64), one, one, 0.0 * one, one, one)
 
 
 def gather(grid: SearchGrid, share: float) -> None:

@@ -93,6 +93,13 @@ def test_a_door_is_news() -> None:
     assert gain[1:].max() < 2.0
 
 
+def test_silence_goes_on_in_a_hall_as_a_wall_does_in_a_corridor() -> None:
+    """Where walls are out of reach the plan predicts silence nearly as well as the rival, which knows no better."""
+    of = densities(np.zeros(40))
+    silent = np.log((1.0 - ECHO.hidden) * (1.0 - of.stray) + ECHO.hidden * np.exp(of.either))
+    assert (silent - of.either)[20:].mean() > -0.1
+
+
 def test_an_echo_behind_a_silent_ping_is_news() -> None:
     of = densities(np.array([1.2, 1.2, 0.0, 0.0, 1.2]))
     assert of.alike[4] < 0.1 * of.alike[1]

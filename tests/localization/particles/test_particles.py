@@ -32,7 +32,7 @@ TRAVEL_M, ALIKE, UNPLANNED = 0.05, 0.2, 0.6  # path between two pings; density l
 MODEL = echo_model(EchoSettings())
 BOX = Walls(np.array([[0.0, 0.0, 6.0, 0.0], [6.0, 0.0, 6.0, 2.0], [6.0, 2.0, 0.0, 2.0], [0.0, 2.0, 0.0, 0.0]]))
 NONE = np.zeros(0)
-NOTHING = PingBatch(NONE, NONE, NONE, NONE, np.zeros(0, np.int64), NONE, NONE, NONE, NONE)
+NOTHING = PingBatch(NONE, NONE, NONE, NONE, np.zeros(0, np.int64), NONE, NONE, NONE, NONE, NONE)
 Source = tuple[float, float, float]  # distance, degrees off the axis, kind
 
 
@@ -44,7 +44,10 @@ def heard(axis_rad: float, range_m: float, count: int = 1, power: float = 0.3) -
     share, axis, ranges, powers, travel, alike, unplanned = np.tile(
         [[0.5], [axis_rad], [range_m], [power], [TRAVEL_M], [ALIKE], [UNPLANNED]], count
     )
-    return PingBatch(share, axis, ranges, powers, np.zeros(count, np.int64), travel, np.zeros(count), alike, unplanned)
+    stray = np.full(count, MODEL.stray)
+    return PingBatch(
+        share, axis, ranges, powers, np.zeros(count, np.int64), travel, stray, np.zeros(count), alike, unplanned
+    )
 
 
 def log_p(range_m: float, sources: list[Source]) -> float:
@@ -159,6 +162,7 @@ def test_pings_count_where_they_were_triggered() -> None:
             np.ones(10),
             np.zeros(10, np.int64),
             np.full(10, 0.15),
+            np.full(10, MODEL.stray),
             np.zeros(10),
             np.full(10, ALIKE),
             np.full(10, UNPLANNED),

@@ -46,9 +46,9 @@ def written_out(distance_m: float, hidden: float, ping: WeightedPing) -> tuple[f
     if ping.range_m > 0.0:
         even, off = 0.8 / SPAN_M, abs(ping.range_m - distance_m) / 0.036
         normal = math.exp(-0.5 * off**2) / (0.036 * math.sqrt(2.0 * math.pi)) if off < GATE_SD else 0.0
-        planned = heard * normal + (1.0 - heard) * 0.3 * 0.5 * (ping.alike + 1.0 / SPAN_M)
+        planned = heard * normal + (1.0 - heard) * ping.stray * 0.5 * (ping.alike + 1.0 / SPAN_M)
     else:
-        even, planned = 0.2, 0.7 * (1.0 - heard)
+        even, planned = 0.2, (1.0 - ping.stray) * (1.0 - heard)
     before = 0.15 + math.exp(-ping.travel_m / 0.6) * (hidden - 0.15)
     of_plan = 0.95 * (planned + ping.missed) ** ping.power + 0.05 * (even + ping.missed) ** ping.power
     likelihood = before * ping.unplanned + (1.0 - before) * of_plan
@@ -58,14 +58,20 @@ def written_out(distance_m: float, hidden: float, ping: WeightedPing) -> tuple[f
 @given(
     st.lists(st.tuples(st.floats(-3.0, 1.5), st.floats(0.0, 1.0)), min_size=1, max_size=6),
     st.floats(0.2, 5.9) | st.just(0.0), st.floats(0.05, 1.0), st.floats(0.01, 3.0),
-    st.floats(0.0, 8.0), st.floats(0.05, 3.0),
+    st.floats(0.0, 8.0), st.floats(0.05, 3.0), st.floats(0.05, 0.5),
 )  # fmt: skip
 @settings(max_examples=60)
 def test_the_kernel_is_the_formula(
-    places: list[tuple[float, float]], range_m: float, power: float, travel_m: float, alike: float, unplanned: float
+    places: list[tuple[float, float]],
+    range_m: float,
+    power: float,
+    travel_m: float,
+    alike: float,
+    unplanned: float,
+    stray: float,
 ) -> None:
     missed = 0.02 if range_m == 0.0 else 0.0
-    ping = WeightedPing(0.5 * math.pi, range_m, power, travel_m, missed, alike, unplanned)
+    ping = WeightedPing(0.5 * math.pi, range_m, power, travel_m, stray, missed, alike, unplanned)
     y_m, hidden = (np.array(column) for column in zip(*places, strict=True))
     zeros = np.zeros(len(y_m))
     particles = ParticleArrays(zeros.copy(), y_m.copy(), zeros.copy(), np.ones(len(y_m)), zeros.copy())
@@ -102,7 +108,7 @@ def test_a_segment_is_its_moves_and_pings_one_by_one(seed: int, turn_sd_deg: flo
     noise *= np.array([[0.02], [0.02], [math.radians(turn_sd_deg)], [0.001], [1.0]])
     pings = PingBatch(
         np.sort(rng.uniform(0.0, 1.0, k)), rng.uniform(-3.0, 3.0, k), rng.uniform(0.3, 5.0, k), rng.uniform(0.8, 1.0, k),
-        rng.integers(0, 2, k), rng.uniform(0.02, 0.3, k), np.zeros(k), rng.uniform(0.1, 2.0, k), rng.uniform(0.1, 2.0, k),
+        rng.integers(0, 2, k), rng.uniform(0.02, 0.3, k), rng.uniform(0.05, 0.5, k), np.zeros(k), rng.uniform(0.1, 2.0, k), rng.uniform(0.1, 2.0, k),
     )  # fmt: skip
     (dx_m, dy_m), (bend_x_m, bend_y_m) = rng.uniform(-0.8, 0.8, 2), rng.uniform(-0.2, 0.2, 2)
     move = Move(dx_m, dy_m, 0.02, 0.02, 0.0, bend_x_m, bend_y_m)
@@ -136,6 +142,6 @@ def test_sources_that_are_left_out_change_no_density(seed: int) -> None:
     assert fewer <= count
     for range_m in (0.0, *rng.uniform(0.2, 6.0, 5), *every.distance_m[:count]):
         densities = [
-            planned_density(range_m, n, *sources, 0.2, MODEL) for n, sources in ((count, every), (fewer, first))
+            planned_density(range_m, n, *sources, 0.3, 0.2, MODEL) for n, sources in ((count, every), (fewer, first))
         ]
         assert densities[0] == pytest.approx(densities[1], abs=1e-12)

@@ -32,6 +32,9 @@ DB = 20.0 / math.log(10.0)  # decibels per unit of the natural logarithm of a di
 NEGLIGIBLE_REST = 1e-4
 SILENT_SHARE = 0.2  # share of outliers and of hidden views that are "no echo", assumed
 HIDDEN_NEARER = 0.6  # share of echoes from hidden views that are nearer than the plan's first source: more is added to a room than removed
+# Of `stray`, when the ping before was silent too: among real clutter, of which `hidden` is a part, 0.70 to 0.86 are then silent where nothing is
+# expected (search-silence of the studies' notebook); with this share 0.79
+STRAY_ON = 0.25
 LEAST_LOGIT = -8.0  # below it a source is not detected: probability 3e-4
 SURE_RAD = math.radians(20.0)  # angle off the axis within which a near wall surely answers: half of the cone
 SURE_COS = math.cos(SURE_RAD)
@@ -77,7 +80,7 @@ class EchoSettings:
     and back and a beam that is `rim_db` down at 27.5 degrees each way [Girard 2011, 2.6.2, 2.6.3]; `soft_db`: decibels per unit of logit.
     The inside of a corner answers `corner_db` more weakly, any other wall end `edge_db`, and more so with distance.
     `hidden`: share of views in which the plan is not what stands there, `hidden_m`: length of the path over which a view stays hidden (a cupboard).
-    `stray`: a second reflection when no source was detected; `outlier`: anything else, from ping to ping.
+    `stray`: a second reflection when no source was detected, a quarter of it after a silent ping; `outlier`: anything else, from ping to ping.
     `correlation_m`: length of the path over which errors of successive echoes become independent: those of the plan, of a ranger's bias, and of the
     trunk's sway, which lasts half a stride. `own`: share of an echo's information that none before it has brought, however far back: a plan that is
     not what stands there errs alike for metres (by the filter's errors among real clutter: echo-own of the studies' notebook).
@@ -161,11 +164,18 @@ def _distance_m(level: float, per_db: float, spreading: float) -> float:
 
 @lean_kernel
 def planned_density(
-    range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, stray: float, m: EchoModel
+    range_m: float,
+    count: int,
+    distance_m: Floats,
+    off_axis_rad: Floats,
+    kind: Floats,
+    stray: float,
+    strays: float,
+    m: EchoModel,
 ) -> float:
     """Density per metre of a range given `count` sources, nearest first, if the view is as planned; range 0: the probability of no echo.
 
-    `stray`: density of this range if it is a second reflection.
+    `stray`: probability of a second reflection where no source is detected; `strays`: its density at this range.
     """
     unheard, hit = 1.0, 0.0
     for k in range(count):
@@ -177,8 +187,8 @@ def planned_density(
         if unheard < NEGLIGIBLE_REST:
             break
     if range_m <= 0.0:
-        return (1.0 - m.stray) * unheard
-    return hit + unheard * m.stray * stray
+        return (1.0 - stray) * unheard
+    return hit + unheard * stray * strays
 
 
 @inline_kernel
@@ -203,8 +213,8 @@ def echo_density(
 ) -> float:
     """Density per metre of a range whose view has no history: hidden with probability `hidden`; range 0: the probability of no echo."""
     outlier = outlier_density(range_m, m)
-    stray = 1.0 / (m.maximum_m - m.minimum_m)
-    planned = planned_density(range_m, count, distance_m, off_axis_rad, kind, stray, m)
+    strays = 1.0 / (m.maximum_m - m.minimum_m)
+    planned = planned_density(range_m, count, distance_m, off_axis_rad, kind, m.stray, strays, m)
     hidden = hidden_density(range_m, distance_m[0] if count else m.maximum_m, m)
     return (1.0 - m.outlier) * ((1.0 - m.hidden) * planned + m.hidden * hidden) + m.outlier * outlier
 

@@ -21,7 +21,14 @@ import numpy as np
 from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel
-from echostep.localization.echoes.likelihood import EchoModel, EchoSettings, MissedEchoes, echo_density, normal
+from echostep.localization.echoes.likelihood import (
+    STRAY_ON,
+    EchoModel,
+    EchoSettings,
+    MissedEchoes,
+    echo_density,
+    normal,
+)
 from echostep.localization.particle_arrays import PingBatch
 from echostep.path import MeasuredSegment, Odometer
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
@@ -90,6 +97,11 @@ class UnplannedView:
         self._wall: LastWall | None = None  # None: no echo yet
         self._x_m, self._y_m = math.nan, math.nan
 
+    @property
+    def is_silent(self) -> bool:
+        """Whether the last ping had no echo, or there was none."""
+        return self._wall is None
+
     def move(self, x_m: float, y_m: float) -> float:
         """Go on to the place of the next ping; returns the length of the way (m), infinite to the first one."""
         dx_m, dy_m = x_m - self._x_m, y_m - self._y_m
@@ -152,11 +164,13 @@ class PlacedPings(NamedTuple):
 
 
 class UnplannedDensities(NamedTuple):
-    """Of pings (k,): `missed`, odds that a silent one missed its echo, 0 for an echo; `alike`, the density if like the one before, without those.
+    """Of pings (k,): `stray`, probability of a second reflection where nothing answers, by the one before; `missed`, odds that a silent one missed
+    its echo, 0 for an echo; `alike`, the density if like the one before, without those.
 
     Logs of densities to the pings' power, with them: `anywhere` in the building, `either` that or like the one before.
     """
 
+    stray: Floats
     missed: Floats
     alike: Floats
     anywhere: Floats
@@ -175,9 +189,10 @@ class RangeMemory:
         """For pings (k,) in order of time."""
         log_anywhere = self._background.of(pings.range_m)
         anywhere = np.exp(log_anywhere)
-        missed, alike, changed = (np.zeros(len(anywhere)) for _ in range(3))
+        stray, missed, alike, changed = (np.zeros(len(anywhere)) for _ in range(4))
         for k, which in enumerate(pings.ranger.tolist()):
             view, range_m = self._views[which], float(pings.range_m[k])
+            stray[k] = self._echo.stray * (STRAY_ON if view.is_silent else 1.0)
             missed[k] = self._missed.odds(which) if range_m <= 0.0 else 0.0
             self._missed.update(which, range_m)
             travel_m = view.move(float(pings.x_m[k]), float(pings.y_m[k]))
@@ -186,7 +201,7 @@ class RangeMemory:
             goes_on = (1.0 - changed[k]) * (alike[k] + missed[k]) > changed[k] * anywhere[k]
             view.update(range_m, float(pings.axis_rad[k]), float(pings.power[k]), goes_on)
         either = changed * (anywhere + missed) ** pings.power + (1.0 - changed) * (alike + missed) ** pings.power
-        return UnplannedDensities(missed, alike, pings.power * np.log(anywhere + missed), np.log(either))
+        return UnplannedDensities(stray, missed, alike, pings.power * np.log(anywhere + missed), np.log(either))
 
 
 @kernel
@@ -251,7 +266,7 @@ class UsablePings:
         unplanned = self._ranges.densities(pings)
         return PingBatch(
             share[used], pings.axis_rad, pings.range_m, pings.power, pings.ranger, travel_m[used],
-            unplanned.missed, unplanned.alike, np.exp(unplanned.either),
+            unplanned.stray, unplanned.missed, unplanned.alike, np.exp(unplanned.either),
         ), unplanned  # fmt: skip
 
     def _travels(self, ranger: Ints, path_m: Floats) -> Floats:

@@ -41,6 +41,7 @@ class WeightedPing(NamedTuple):
     range_m: float
     power: float
     travel_m: float
+    stray: float
     missed: float
     alike: float
     unplanned: float
@@ -114,6 +115,7 @@ def ping_of(pings: PingBatch, k: int) -> WeightedPing:
         pings.range_m[k],
         pings.power[k],
         pings.travel_m[k],
+        pings.stray[k],
         pings.missed[k],
         pings.alike[k],
         pings.unplanned[k],
@@ -138,7 +140,7 @@ def reweight_by_ping(
     ax, ay = math.cos(ping.axis_rad), math.sin(ping.axis_rad)
     persists = math.exp(-ping.travel_m / model.hidden_m)
     outlier = model.outlier * (outlier_density(ping.range_m, model) + ping.missed) ** ping.power
-    stray = 0.5 * (ping.alike + 1.0 / (model.maximum_m - model.minimum_m))
+    strays = 0.5 * (ping.alike + 1.0 / (model.maximum_m - model.minimum_m))
     limits = Limits(model.sure_m, SURE_COS, model.edge_m)
     least, best = NEGLIGIBLE_WEIGHT * top, 0.0
     total_before, total, squares = 0.0, 0.0, 0.0
@@ -148,7 +150,8 @@ def reweight_by_ping(
             continue
         receiver = Receiver(x[i], y[i], ax * cos[i] - ay * sin[i], ax * sin[i] + ay * cos[i])
         count = first_sources(receiver, ping.axis_rad + turn[i], walls, limits, sources)
-        density = planned_density(ping.range_m, count, distance_m, off_axis_rad, kind, stray, model) + ping.missed
+        density = planned_density(ping.range_m, count, distance_m, off_axis_rad, kind, ping.stray, strays, model)
+        density += ping.missed
         planned = (1.0 - model.outlier) * math.exp(ping.power * math.log(max(density, LEAST_DENSITY))) + outlier
         before = model.hidden + persists * (hidden[i] - model.hidden)
         by_hidden = before * ping.unplanned
