@@ -17,6 +17,7 @@ from echostep.operation import requests
 from echostep.operation.crews import HEAD, CrewLog
 from echostep.team.messages.crews import MOST_CREWS, Crew, Crews
 from echostep.team.messages.report import BadReportError
+from echostep.team.messages.shared import keep_latest
 from operation.teams import TOWER, ServedTeam, Team, place, whole_team
 from operation.test_table_page import LOOKS, shot, table
 from page.browser import loaded_page, overflow, wait_for
@@ -88,6 +89,15 @@ def test_commanders_come_to_one_state_in_any_order() -> None:
         assert len(answers) == sum(crew.unix_s < max(c.unix_s for c in order[: k + 1]) for k, crew in enumerate(order))
     crews.receive(CREW.id, b"", answers)
     assert not crews.known
+
+
+def test_of_two_changes_at_one_time_all_commanders_keep_the_same() -> None:
+    anns, bens = (msgspec.structs.replace(CREW, by=by, air_min=air) for by, air in (("Ann", 30.0), ("Ben", 20.0)))
+    for order in ((anns, bens), (bens, anns)):
+        known = dict[str, Crew]()
+        newer = [keep_latest(known, CREW.id, crew) for crew in order]
+        assert known == {CREW.id: bens}
+        assert newer == [None, None if order[1] is bens else bens]
 
 
 def hostile() -> list[bytes]:

@@ -106,7 +106,7 @@ def test_a_recording_of_another_building_waits_for_its_plan(
         wait_for(page, f"{SAID} === 'walk.mcap: now drop its plan (Other building).'")
         page.screenshot(path=tmp_path / "drop.png")
         page.set_input_files("#drop-file", plan)  # by the button
-        wait_for(page, f"{HINT} === 'Note: Other building is not the plan that this was tracked on.'")
+        wait_for(page, f"{HINT} === 'Note: Other building is not the plan that walk.mcap was tracked on.'")
         wait_for(page, PLAYS.format("walk.mcap (simulated): Other building"))
         assert not page.wrong
         page.reload()

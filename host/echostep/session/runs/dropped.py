@@ -30,7 +30,7 @@ from echostep.session.console import console, print_notices
 from echostep.session.metadata import shown_name
 from echostep.session.options import TrackingOptions
 from echostep.session.results import summary_words
-from echostep.session.runs.replay import tracker_of
+from echostep.session.runs.replay import plan_note, tracker_of
 from echostep.tracker import Tracker
 
 DEMO_PLAN = Path(__file__).parents[2] / "plans" / "demo.json"
@@ -92,8 +92,7 @@ class DroppedFiles:
         recording = open_parts([self._recording])
         tracker = tracker_of(recording, plan, TrackingOptions(None))
         self.drops.put(Drop(self._recording, tracker, shown_name(self._recording, recording.metadata)))
-        other = plan.is_drawn and recording.metadata.get("plan_sha256", plan.digest) != plan.digest
-        return f"Note: {plan.name} is not the plan that this was tracked on." if other else ""
+        return plan_note(plan, recording)
 
 
 def serve_drops(address: Address, *, browser: bool) -> None:

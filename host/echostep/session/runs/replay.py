@@ -43,8 +43,8 @@ def replay(paths: Sequence[Path], tracking: TrackingOptions, truth_path: Path | 
     """Track a recording, in one file or in parts; start, settings and seed are the recorded ones unless `tracking` gives others."""
     recording, plan = open_parts(paths), plan_of(tracking)
     path = recording.path
-    if plan.is_drawn and recording.metadata.get("plan_sha256", plan.digest) != plan.digest:
-        console.print(f"Note: {tracking.plan_path} is not the plan that {path} was tracked on.")
+    if other := plan_note(plan, recording):
+        console.print(other, markup=False)
     truth = load_truth(truth_path) if truth_path else None
     tracker = tracker_of(recording, plan, tracking)
     check_start(plan, tracker.start, given=tracking.start is not None, recorded="start_x_y_rad" in recording.metadata)
@@ -73,6 +73,13 @@ def replay(paths: Sequence[Path], tracking: TrackingOptions, truth_path: Path | 
             console.print(line, markup=False, highlight=False)
         session.finish(path.name, truth, elapsed_s)
         session.keep_page_open()
+
+
+def plan_note(plan: Plan, recording: Recording) -> str:
+    """A note where a recording was tracked on another plan; empty on the same one, and without a plan."""
+    if not plan.is_drawn or recording.metadata.get("plan_sha256", plan.digest) == plan.digest:
+        return ""
+    return f"Note: {plan.name} is not the plan that {recording.path.name} was tracked on."
 
 
 def tracker_of(

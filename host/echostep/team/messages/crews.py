@@ -2,7 +2,7 @@
 """Crews inside: who is in a crew, since when, for how much air, and when it last answered (accountability check, PAR).
 
 In: retained messages from untrusted senders, on `echostep-table/crew/<id>`; an empty one removes. Out: `Crew`s, and the messages for new ones. Owns
-those that are known; their number is bounded. Of several messages about one crew the latest counts, as with errands (`messages/marks.py`).
+those that are known; their number is bounded. Of several messages about one crew the latest counts, as of errands (`shared.keep_latest`).
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import msgspec
 from msgspec import Meta
 
 from echostep.team.messages.report import BadReportError
-from echostep.team.messages.shared import Identity, Person, UnixTime, check_printable, check_room, decoded
+from echostep.team.messages.shared import Identity, Person, UnixTime, check_printable, check_room, decoded, keep_latest
 
 TOPIC = "echostep-table/crew"
 MOST_CREWS, MOST_MEMBERS = 64, 8  # further crews are refused
 MOST_AIR_MIN = 600.0  # a rebreather lasts 4 h [EN 145]
-# Of the planned air until a check is due: pressure is asked for after one and two thirds [FwDV 7, 7.4; from memory]
+# Of the planned time until a check is due: the crew is reminded of its pressures after one and after two thirds [FwDV 7 (2002, changed 2005), 7.4]
 CHECK_SHARE = 1.0 / 3.0
 Members = Annotated[tuple[Person, ...], Meta(max_length=MOST_MEMBERS)]
 AirMinutes = Annotated[float, Meta(ge=1.0, le=MOST_AIR_MIN)]
@@ -95,8 +95,5 @@ class Crews:
             raise BadReportError("crew and topic contradict each other")
         check_printable(crew.name, crew.by, *crew.members)
         check_room(self.known, identity, MOST_CREWS, "crews")
-        known = self.known.get(identity)
-        if known is not None and (known.unix_s, known.by) > (crew.unix_s, crew.by):
-            answers.append(known.message)
-        else:
-            self.known[identity] = crew
+        if newer := keep_latest(self.known, identity, crew):
+            answers.append(newer.message)

@@ -22,7 +22,16 @@ from msgspec import Meta
 from echostep.ports.people.payloads import Level
 from echostep.team.messages.crews import Crews
 from echostep.team.messages.report import BadReportError, Metres, check_name
-from echostep.team.messages.shared import Identity, Person, UnixTime, check_printable, check_room, decoded
+from echostep.team.messages.shared import (
+    Identity,
+    Person,
+    UnixTime,
+    check_printable,
+    check_room,
+    decoded,
+    is_older,
+    keep_latest,
+)
 
 ROOT = "echostep-table"
 MARKS, ALL = f"{ROOT}/mark/#", f"{ROOT}/#"
@@ -191,7 +200,7 @@ class MarkBoard:
         check_printable(ack.by)
         check_room(self.acks, key, MOST_ACKS, "acknowledgements")
         known = self.acks.get(key)
-        if known is not None and (known.unix_s, known.by) < (ack.unix_s, ack.by):
+        if known is not None and is_older(known, ack):
             self.answers.append(ack_message(key, known.by, known.unix_s))
         else:
             self.acks[key] = ack
@@ -204,11 +213,8 @@ class MarkBoard:
         errand = decoded(payload, _ERRAND, "errand")
         check_printable(errand.by, errand.to, errand.where)
         check_room(self.errands, key, MOST_ERRANDS, "errands")
-        known = self.errands.get(key)
-        if known is not None and (known.unix_s, known.by) > (errand.unix_s, errand.by):
-            self.answers.append(errand_message(key, known))
-        else:
-            self.errands[key] = errand
+        if newer := keep_latest(self.errands, key, errand):
+            self.answers.append(errand_message(key, newer))
 
 
 def _check_key(key: tuple[str, str, str]) -> None:
