@@ -87,11 +87,48 @@ def test_an_export_of_mt_manager_counts_samples_and_the_counter_wraps(
         load_imu(path)
 
 
+DOT_ABOVE = (
+    "sep=,\nDeviceTag:,bei\nFirmwareVersion:,1.6.0\nAppVersion:,2021.0\nStartTime: ,2021-08-30_17:05:05_000 GMT+8\n"
+    "© Xsens Technologies B. V. 2005-2021\n\n"
+)
+DOT_LIVE = (
+    "SyncStatus:,Synced,,,\nOutputRate:,60Hz,,,\nFilterProfile:,General,,,\nMeasurement Mode:,Rate quantities,,,\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("above", "more", "end"),
+    [(DOT_ABOVE, "Euler_X,Euler_Y,Euler_Z,", ""), (DOT_ABOVE.replace("StartTime", DOT_LIVE + "StartTime"), "", ",")],
+)
+def test_an_export_of_movella_dot_counts_microseconds_and_turns_in_degrees(
+    above: str, more: str, end: str, table: np.ndarray, tmp_path: Path
+) -> None:
+    """The clock wraps after 71 minutes; a recording's lines end with a comma."""
+    clock = ((1 << 32) - 500_000 + np.round(table[:, 0] * 1e6)) % (1 << 32)
+    header = f"PacketCounter,SampleTimeFine,{more}{','.join(titles('Acc_{}', 'Gyr_{}', 'XYZ'))}{end}"
+    fused = np.zeros((len(table), more.count(",")))
+    rows = np.column_stack([np.arange(len(table)), clock, fused, table[:, 1:4], np.degrees(table[:, 4:7])])
+    path = tmp_path / "bei.csv"
+    lines = [", ".join(f"{value:.12g}" for value in row) + end for row in rows]
+    path.write_text(above + "\n".join([header, *lines]), encoding="utf-8")
+    assert same(path, table) == ("read as an export of Movella DOT",)
+
+
+def test_an_export_of_movella_dot_without_gravity_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "free.csv"
+    path.write_text(DOT_ABOVE + "PacketCounter,SampleTimeFine,Euler_X,FreeAcc_X\n1,2,3,4\n", encoding="utf-8")
+    with pytest.raises(EchostepError, match=r"free\.csv: an export of Movella DOT without .*Acc_X.* custom mode 5"):
+        load_imu(path)
+
+
 def test_no_logger_is_taken_for_another_one() -> None:
-    for name, has, may_have, _ in LOGGERS:
-        header = read_header(iter(["// Update Rate: 100.0Hz", ",".join([*has.values(), *may_have.values()])]))
-        assert header.notes == (f"read as an export of {name}",)
-        assert set(has) | set(may_have) <= set(header.names)
+    for logger in LOGGERS:
+        theirs = [*logger.has.values(), *logger.may_have.values()]
+        more = [] if "SampleTimeFine" in theirs else ["SampleTimeFine"]  # as MT Manager has it, too
+        above = [f"{logger.above},"] if logger.above else []
+        header = read_header(iter(["// Update Rate: 100.0Hz", *above, ",".join(theirs + more)]))
+        assert header.notes == (f"read as an export of {logger.name}",)
+        assert set(logger.has) | set(logger.may_have) <= set(header.names)
 
 
 def test_names_and_units_of_any_file_are_given(table: np.ndarray, tmp_path: Path) -> None:

@@ -6,7 +6,9 @@ for names and units that are not known. Owns the table of the loggers that are r
 
 Sources of the table: NGIMU: short_walk.csv of github.com/xioTechnologies/Gait-Tracking. x-IMU3: Inertial.csv in the examples of
 github.com/xioTechnologies/x-IMU3-CSV. phyphox: titles of the columns in public scripts that read its exports. Sensor Logger: UNITS.md of
-github.com/tszheichoi/awesome-sensor-logger. MT Manager: text exports in a test of opensim-core's reader, and in [Voisard 2025].
+github.com/tszheichoi/awesome-sensor-logger. MT Manager: text exports in a test of opensim-core's reader, and in [Voisard 2025]. Movella DOT: export
+bei_D4CA6EF17860_20210830_170505.csv of a recording, in github.com/Allwillcome/XsensDot2Mtw4OpenSense: its times step by 8333 at 120 Hz, its sensor
+at rest reads 9.65 and 0.2, which as rad/s would be a bias of 11 deg/s; the titles of the other modes: logger of the SDK for Android.
 """
 
 from __future__ import annotations
@@ -34,7 +36,10 @@ QUANTITIES = {"t_s": "time", "pressure_pa": "pressure", "compass_rad": "angle"} 
 }
 RATE = re.compile(r"g[xyz]|(thigh|shank)_[xyz]|\w+_rad_s")
 COUNTER, COUNTER_PERIOD = "PacketCounter", 1 << 16  # of the samples, in exports of MT Manager
-PREAMBLE = re.compile(r"//|Acquisition frequency:")  # lines above the names of the columns
+DOT_CLOCK, DOT_CLOCK_HZ, DOT_CLOCK_PERIOD = "SampleTimeFine", 1e6, 1 << 32  # microseconds, in exports of Movella DOT
+DOT = "DeviceTag:"  # begins a line above the names of the columns
+DOT_PREAMBLE = r"sep=|\w[\w ]*: *,|.*Technologies B\. ?V\.|\s*\n"  # further ones, until an empty line
+PREAMBLE = re.compile(rf"//|Acquisition frequency:|{DOT_PREAMBLE}")  # lines above the names of the columns
 COUNTS_HZ = re.compile(r"(?:Update Rate|Acquisition frequency): *([0-9.]+) *Hz")
 ADVICE = "; other names: --columns OURS=THEIRS,...; other units: --units deg/s,g"  # for a file without the names
 MOST_PREAMBLE = 50  # lines; assumed
@@ -49,14 +54,28 @@ XIO = _axes("a", "Accelerometer {} (g)") | _axes("g", "Gyroscope {} (deg/s)")
 XIO_MAG = _axes("m", "Magnetometer {} (uT)")
 PHYPHOX = _axes("a", "Acceleration {} (m/s^2)", "xyz") | _axes("g", "Gyroscope {} (rad/s)", "xyz")
 XSENS = _axes("a", "Acc_{}") | _axes("g", "Gyr_{}")
-LOGGERS: tuple[tuple[str, dict[str, str], dict[str, str], dict[str, str]], ...] = (
-    # Name, columns that it has, columns that it may have (both ours to theirs), units that the names do not hold.
-    ("NGIMU", {"t_s": "Time (s)"} | XIO, XIO_MAG, {}),
-    ("x-IMU3", {"t_s": "Timestamp (us)"} | XIO, XIO_MAG, {}),
-    ("phyphox", {"t_s": "Time (s)"} | PHYPHOX, {}, {}),
-    ("phyphox", {"t_s": "Time (s)", "pressure_pa": "Pressure (hPa)"}, {}, {}),
-    ("Sensor Logger", {"t_s": "seconds_elapsed", "pressure_pa": "pressure"}, {}, {"pressure": "hPa"}),
-    ("MT Manager", {"t_s": COUNTER} | XSENS, _axes("m", "Mag_{}"), {}),
+XSENS_MAG = _axes("m", "Mag_{}")
+
+
+@dataclass(frozen=True, slots=True)
+class Logger:
+    """Columns that its files have and may have (ours to theirs), units that the names do not hold, how a line `above` the names begins."""
+
+    name: str
+    has: dict[str, str]
+    may_have: dict[str, str] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    above: str = ""
+
+
+LOGGERS = (
+    Logger("NGIMU", {"t_s": "Time (s)"} | XIO, XIO_MAG),
+    Logger("x-IMU3", {"t_s": "Timestamp (us)"} | XIO, XIO_MAG),
+    Logger("phyphox", {"t_s": "Time (s)"} | PHYPHOX),
+    Logger("phyphox", {"t_s": "Time (s)", "pressure_pa": "Pressure (hPa)"}),
+    Logger("Sensor Logger", {"t_s": "seconds_elapsed", "pressure_pa": "pressure"}, units={"pressure": "hPa"}),
+    Logger("Movella DOT", {"t_s": DOT_CLOCK} | XSENS, XSENS_MAG, {"rate": "deg/s"}, DOT),
+    Logger("MT Manager", {"t_s": COUNTER} | XSENS, XSENS_MAG),
 )
 
 
@@ -75,7 +94,7 @@ OWN = Naming()
 class Header:
     """`names` of the columns, this project's where they are known; `line`: their line in the file; `factors` to SI by name.
 
-    `counts_hz`: samples a second, where `t_s` is a counter of them. `notes`: which logger was recognised.
+    `counts_hz`: counts a second, where `t_s` is a counter, which wraps after `counts_period`. `notes`: which logger was recognised.
     """
 
     names: list[str]
@@ -83,13 +102,15 @@ class Header:
     line: int
     factors: Mapping[str, float]
     counts_hz: float | None = None
+    counts_period: int = COUNTER_PERIOD
     notes: tuple[str, ...] = ()
 
     def in_si(self, values: Floats, names: Sequence[str]) -> Floats:
         """Columns (n, k) of these names in SI units."""
         scaled: Floats = values * [self.factors.get(name, 1.0) for name in names]
         if self.counts_hz is not None:
-            scaled[:, list(names).index("t_s")] = _since_first(values[:, list(names).index("t_s")]) / self.counts_hz
+            time = list(names).index("t_s")
+            scaled[:, time] = _since_first(values[:, time], self.counts_period) / self.counts_hz
         return scaled
 
 
@@ -111,33 +132,58 @@ def parse_naming(columns: str | None, units: str | None) -> Naming:
 
 def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
     """The names of the columns, taken from the lines with what stands above them; raises ValueError for names that are not there."""
-    line, text, counts_hz = 1, next(lines, ""), None
-    while PREAMBLE.match(text) and line < MOST_PREAMBLE:
-        found = COUNTS_HZ.search(text)
-        counts_hz = float(found[1]) if found else counts_hz
-        line, text = line + 1, next(lines, "")
+    above, text = _preamble(lines)
     theirs, separator = header_of(text)
     columns, units = dict(naming.columns), dict(naming.units)
     notes: tuple[str, ...] = ()
     if not columns and "t_s" not in theirs:
-        columns, more, notes = _recognised(theirs)
+        columns, more, notes = _recognised(theirs, above)
         units = more | units
-    is_counter = columns.get("t_s") == COUNTER
-    if is_counter and not counts_hz:
+    counts_hz, period = _counter(columns.get("t_s"), above)
+    names = _renamed(theirs, columns)
+    factors = _factors(names, theirs, units)
+    return Header(names, separator, len(above) + 1, factors, counts_hz, period, notes)
+
+
+def _preamble(lines: Iterator[str]) -> tuple[list[str], str]:
+    """The lines above the names of the columns, and the line of the names."""
+    above, text = list[str](), next(lines, "")
+    while PREAMBLE.match(text) and len(above) < MOST_PREAMBLE:
+        above.append(text)
+        text = next(lines, "")
+    return above, text
+
+
+def _counter(name: str | None, above: list[str]) -> tuple[float | None, int]:
+    """Counts a second and period of a column that counts samples or ticks; (None, ...) for one of times."""
+    if name == DOT_CLOCK and _has(above, DOT):
+        return DOT_CLOCK_HZ, DOT_CLOCK_PERIOD
+    if name != COUNTER:
+        return None, COUNTER_PERIOD
+    rates = [float(found[1]) for line in above if (found := COUNTS_HZ.search(line))]
+    if not rates or not rates[-1]:
         raise ValueError(
             f"{COUNTER} counts samples, and no line '// Update Rate: 100.0Hz' says how many there are a second"
         )
-    names = _renamed(theirs, columns)
-    factors = _factors(names, theirs, units)
-    return Header(names, separator, line, factors, counts_hz if is_counter else None, notes)
+    return rates[-1], COUNTER_PERIOD
 
 
-def _recognised(theirs: list[str]) -> tuple[dict[str, str], dict[str, str], tuple[str, ...]]:
+def _has(above: list[str], begin: str) -> bool:
+    """Whether one of the lines begins so."""
+    return any(line.startswith(begin) for line in above)
+
+
+def _recognised(theirs: list[str], above: list[str]) -> tuple[dict[str, str], dict[str, str], tuple[str, ...]]:
     """Columns, units and a note of the logger that names its columns so; empty for an unknown one."""
-    for logger, has, may_have, units in LOGGERS:
-        if set(has.values()) <= set(theirs):
-            there = {ours: name for ours, name in may_have.items() if name in theirs}
-            return has | there, units, (f"read as an export of {logger}",)
+    for logger in LOGGERS:
+        if set(logger.has.values()) <= set(theirs) and (not logger.above or _has(above, logger.above)):
+            there = {ours: name for ours, name in logger.may_have.items() if name in theirs}
+            return logger.has | there, logger.units, (f"read as an export of {logger.name}",)
+    if _has(above, DOT):
+        raise ValueError(
+            f"an export of Movella DOT without {DOT_CLOCK}, {', '.join(XSENS.values())}: record in a mode that has them, as "
+            "rate quantities or custom mode 5 (FreeAcc is without gravity, which a track needs)"
+        )
     return {}, {}, ()
 
 
@@ -170,11 +216,11 @@ def quantity_of(name: str) -> str:
     return QUANTITIES.get(name) or ("rate" if RATE.fullmatch(name) else "")
 
 
-def _since_first(counter: Floats) -> Floats:
-    """Samples since the first one, of a counter (n,) that wraps; NaN where there is no number."""
+def _since_first(counter: Floats, period: int) -> Floats:
+    """Counts since the first one, of a counter (n,) that wraps after `period`; NaN where there is no number."""
     counts = np.full(len(counter), np.nan)
     whole = np.isfinite(counter)
     if whole.any():
-        unwrapped = np.unwrap(counter[whole], period=COUNTER_PERIOD)
+        unwrapped = np.unwrap(counter[whole], period=period)
         counts[whole] = unwrapped - unwrapped[0]
     return counts
