@@ -82,11 +82,11 @@ page-speed: $(READY) ## latency and frame rate of the live page and of the comma
 	@tools/apt.sh chromium || echo "Chromium is not installed."
 	$(BIN)/python -m pytest -q -s -m speed tests/page/web/test_page_speed.py tests/operation/test_table_speed.py
 
-operation: $(READY) ## 20 wearers on one broker, two with the real firmware, one lost, one fallen, one rescuer, one commander
+operation: $(READY) ## 20 wearers, crews and a commander, whose page is at http://127.0.0.1:8420/ meanwhile (simulated); PORT=9000: there
 	@tools/apt.sh $(APT_PACKAGES) mosquitto
 	$(MAKE) --quiet -C firmware
 	$(MAKE) --quiet -C tools/twin
-	$(TOOL) reliability.team_operation
+	$(TOOL) reliability.team_operation $(if $(PORT),--port $(PORT))
 
 $(VENV)/peers: host/studies/pyproject.toml $(READY)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host/studies[bench]' || echo "Not all peers could be installed: the table says which are missing."

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """An operation: a team on one broker with a commander; one wearer is lost, one has fallen, and a rescuer is guided to the fallen one.
 
-In: number of wearers, speed; the twin for those with the real firmware. Out: figures on the terminal. Owns the broker and all processes. The fallen
-wearer and the rescuer are simulated walks through the whole tracker, each in a process of its own, the others simulated reports; the rescuer starts
-after the mayday. Exit status 1 when one of these events is missing.
+In: number of wearers, speed; the twin for those with the real firmware. Out: the commander's page at a fixed address, its recording and table of
+crews, figures on the terminal. Owns the broker and all processes. The fallen wearer and the rescuer are simulated walks through the whole tracker,
+each in a process of its own, the others simulated reports; the rescuer starts after the mayday. Exit status 1 when one of these events is missing.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from __future__ import annotations
 import json
 import os
 import resource
+import shlex
 import signal
-import subprocess
 import sys
 import tempfile
 import threading
@@ -42,6 +42,8 @@ from echostep.tracker import Tracker
 from places import PLAN, TWIN
 from reliability.broker import broker
 from reliability.campaign import options
+from reliability.operation_crews import INSIDE, RESCUE, SimulatedCrews, crews_written
+from reliability.processes import start_python, wait_for
 from reliability.team_load import report_at
 
 FALLEN_WAY: tuple[Waypoint, ...] = (
@@ -52,6 +54,7 @@ FALLEN_WAY: tuple[Waypoint, ...] = (
 RESCUE_WAY: tuple[Waypoint, ...] = ((24.0, 2.0), (24.0, 7.5), (9.5, 7.5), (9.5, 10.8))
 RATE_HZ = 10.0  # of the simulated reports
 LONGEST_S = 300.0  # of the whole operation
+PORT = 8420  # of the commander's page, as that of any page
 
 
 def walk(role: str, url: str, plan: Plan, speed: float) -> None:
@@ -121,49 +124,62 @@ class Listening:
         return alarm.age_s if m and alarm and m.state(time.monotonic()) is MemberState.MAYDAY else None
 
 
-def operate(url: str, plan_path: Path, wearers: int, firmware: int, speed: float, folder: Path) -> bool:
-    """Run the operation and print its figures; whether all of it happened."""
-    plan, began = load_plan(plan_path), time.monotonic()
+class Commander:
+    """`echostep command` in a process: its page is at `address`, `recording` is what it writes."""
+
+    def __init__(self, opened: ExitStack, url: str, plan_path: Path, port: int, out: Path, log: Path) -> None:
+        self._log = log
+        words = ["command", url, "--plan", str(plan_path), "--json", "--port", str(port), "--out", str(out)]
+        self._running = start_python(opened, ["-m", "echostep", *words], log)
+        recording = wait_for(lambda: self._line("Recording: "), LONGEST_S)
+        if not recording:
+            sys.exit(f"the commander has not started: {log.read_text().strip()}")
+        self.recording, self.address = Path(recording), self._line("The page: ") or ""
+
+    def _line(self, begin: str) -> str | None:
+        """The rest of a line of its messages; empty when it has ended."""
+        lines = self._log.read_text().splitlines()
+        found = [line.removeprefix(begin) for line in lines if line.startswith(begin)]
+        return found[0] if found else "" if self._running.poll() is not None else None
+
+    def finish(self) -> tuple[dict[str, list[dict[str, object]]], dict[str, list[str]]]:
+        """End it; the roster, and the events of each crew."""
+        self._running.send_signal(signal.SIGINT)
+        roster = json.loads(self._running.communicate(timeout=30)[0])
+        return roster, crews_written(self.recording.with_name(f"{self.recording.stem}-crews.csv"))
+
+
+def operate(url: str, wearers: int, firmware: int, speed: float, port: int, folders: tuple[Path, Path]) -> bool:
+    """Run the operation and print its figures; whether all of it happened. `folders`: for the commander's files, and for what is not kept."""
+    plan, began, (kept, folder) = load_plan(PLAN), time.monotonic(), folders
     with ExitStack() as opened:
         ear = Listening(url)
         opened.callback(ear.receiver.close)
-        commander = _start(
-            opened,
-            [
-                "-m",
-                "echostep",
-                "command",
-                url,
-                "--plan",
-                str(plan_path),
-                "--json",
-                "--port",
-                "0",
-                "--out",
-                str(folder / "operation.mcap"),
-            ],
-        )
+        commander = Commander(opened, url, PLAN, port, kept / "operation.mcap", folder / "commander.txt")
+        print(f"The commander's page (simulated wearers), for about two minutes: {commander.address}", flush=True)
+        crews = SimulatedCrews(ear.receiver.send)
+        crews.begin()
         for k in range(firmware):
             out, name = str(folder / f"firmware-{k}"), f"firmware {k}"
-            _start(opened, ["-m", "echostep", "demo", "--headless", "--speed", "1", "--board-command", " ".join(TWIN), "--publish", url,
+            start_python(opened, ["-m", "echostep", "demo", "--headless", "--speed", "1", "--board-command", " ".join(TWIN), "--publish", url,
                             "--name", name, "--team", "load", "--seed", str(k + 1), "--out", out])  # fmt: skip
         crowd = Crowd(url, plan, wearers - firmware - 2)
-        _start(opened, ["-m", "reliability.team_operation", "--role", "fallen", "--url", url, "--speed", str(speed)])
-        told_s = _wait(ear.mayday_s)
-        rescuer = _start(
-            opened, ["-m", "reliability.team_operation", "--role", "rescuer", "--url", url, "--speed", str(speed)]
-        )
+        walks = ["-m", "reliability.team_operation", "--url", url, "--speed", str(speed), "--role"]
+        start_python(opened, [*walks, "fallen"])
+        told_s = wait_for(ear.mayday_s, LONGEST_S)
+        rescuer = start_python(opened, [*walks, "rescuer"])
+        crews.rescue()
         out, _ = rescuer.communicate(timeout=LONGEST_S)
         arrived = json.loads(out.splitlines()[-1])
-        commander.send_signal(signal.SIGINT)  # before the wearers end
-        state = json.loads(commander.communicate(timeout=30)[0])
+        state, events = commander.finish()  # before the wearers end
         summaries = crowd.close()
-    return judge(state, summaries, told_s, arrived, wearers, time.monotonic() - began)
+    print(f"To see it again: echostep command {shlex.quote(str(commander.recording))} --plan {PLAN}")
+    return judge(state, summaries, told_s, arrived, events, wearers, time.monotonic() - began)
 
 
 def judge(
     state: dict[str, list[dict[str, object]]], summaries: Sequence[str], told_s: float | None,
-    arrived: dict[str, str], wearers: int, span_s: float,
+    arrived: dict[str, str], crews: dict[str, list[str]], wearers: int, span_s: float,
 ) -> bool:  # fmt: skip
     """Print what happened; whether all of it did."""
     members = {str(m["name"]): m for m in state["members"]}
@@ -177,6 +193,9 @@ def judge(
         f"mayday after {told_s or 0.0:.1f} s without motion": told_s is not None and 30.0 <= told_s <= 35.0,
         f"rescuer: {arrived['cue']}": arrived["kind"] == CueKind.ARRIVED.value,
         f"{all_sent} of {len(summaries)} simulated wearers sent all": all_sent == len(summaries),
+        f"crews in the commander's table: {', '.join(crews)}; {RESCUE}: {', '.join(crews.get(RESCUE, ()))}": (
+            crews.keys() == {RESCUE, *(name for name, *_ in INSIDE)} and crews[RESCUE] == ["entered", "checked"]
+        ),
     }
     for words, holds in checks.items():
         print(f"{'ok ' if holds else 'NOT'} {words}")
@@ -188,36 +207,6 @@ def judge(
     return all(checks.values())
 
 
-def _start(opened: ExitStack, arguments: Sequence[str]) -> subprocess.Popen[str]:
-    """A process of Python that is ended with the operation."""
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-    running = subprocess.Popen(
-        [sys.executable, *arguments], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=environment
-    )
-    opened.callback(_end, running)
-    return running
-
-
-def _end(running: subprocess.Popen[str]) -> None:
-    if running.poll() is None:
-        running.send_signal(signal.SIGINT)
-    try:
-        running.communicate(timeout=20)
-    except subprocess.TimeoutExpired:
-        running.kill()
-        running.communicate()
-
-
-def _wait(condition: object) -> float | None:
-    """The first value that is not None, within LONGEST_S."""
-    end_s = time.monotonic() + LONGEST_S
-    while time.monotonic() < end_s:
-        if (value := condition()) is not None:  # type: ignore[operator]
-            return float(value)
-        time.sleep(0.1)
-    return None
-
-
 def main() -> None:
     """Run the broker, operate."""
     asked = options(
@@ -225,6 +214,8 @@ def main() -> None:
         wearers=(20, "of the team"),
         firmware=(2, "wearers with the real firmware in the twin"),
         speed=(1.0, "times real time, of the fallen wearer and of the rescuer"),
+        port=(PORT, "of the commander's page"),
+        out=("out/operation", "folder of the commander's recording and table of crews"),
         role=("", "internal: one wearer"),
         url=("", "internal: the broker"),
     )
@@ -238,7 +229,7 @@ def main() -> None:
         )
         Tracker(load_plan(PLAN)).warm_up()
         folder = Path(opened.enter_context(tempfile.TemporaryDirectory()))
-        happened = operate(url, PLAN, asked.wearers, asked.firmware, asked.speed, folder)
+        happened = operate(url, asked.wearers, asked.firmware, asked.speed, asked.port, (Path(asked.out), folder))
     sys.exit(0 if happened else 1)
 
 
