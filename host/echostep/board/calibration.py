@@ -33,7 +33,9 @@ OFFSET_MAX_M_S2 = 1.5
 SCALE_ERROR_MAX = 0.05  # 1.5 % when new [table 2], three times; assumed
 BIAS_MAX_RAD_S = math.radians(30.0)  # of a gyro; assumed
 AXES = ("x", "y", "z")
+MOST_BIAS_M = 0.3  # of a ranger: six times what real ones have [real sweeps of 40 kHz rangers: -0.3 to 5 cm]; assumed
 MOST_AHEAD_DEG = 60.0  # that rangers look off abeam: then they look along the way
+LEAST_RANGE_M = 0.01  # what a bias leaves of a longer range: 0 would be no echo
 
 
 class Echo(NamedTuple):
@@ -47,15 +49,20 @@ class Echo(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class RangerSettings:
     """`speed_of_sound_m_s`; `delay_s` from the time stamp of the trigger to the ultrasonic burst; `ahead_deg`: how far both rangers look ahead of
-    abeam, as the belt carries them.
+    abeam, as the belt carries them; `left_bias_m`, `right_bias_m`: what each measures too much (`echostep calibrate rangers`).
     """
 
     speed_of_sound_m_s: float = SPEED_OF_SOUND_M_S
     delay_s: float = 0.0
     ahead_deg: float = 0.0
+    left_bias_m: float = 0.0
+    right_bias_m: float = 0.0
 
     def __post_init__(self) -> None:
-        """Raise ValueError for rangers that do not look aside."""
+        """Raise ValueError for rangers that do not look aside, or measure what no ranger does."""
+        for name in ("left_bias_m", "right_bias_m"):
+            if abs(getattr(self, name)) > MOST_BIAS_M:
+                raise ValueError(f"{name}: a ranger errs by at most {MOST_BIAS_M:g} m")
         if abs(self.ahead_deg) > MOST_AHEAD_DEG:
             raise ValueError(f"ahead_deg: rangers look aside, at most {MOST_AHEAD_DEG:.0f} degrees off it")
 
@@ -133,8 +140,10 @@ class Imus(NamedTuple):
 
 
 def ranges(pings: NDArray[np.void], settings: RangerSettings) -> Floats:
-    """Ranges (n,) in m of pings (n,): half the path of the sound; NaN without an echo."""
-    range_m = 0.5e-6 * pings["time_of_flight_us"] * settings.speed_of_sound_m_s
+    """Ranges (n,) in m of pings (n,): half the path of the sound, less the ranger's bias; NaN without an echo."""
+    bias_m = np.where(pings["ranger"] == 0, settings.left_bias_m, settings.right_bias_m)
+    measured_m = 0.5e-6 * pings["time_of_flight_us"] * settings.speed_of_sound_m_s
+    range_m = np.maximum(measured_m - bias_m, np.minimum(measured_m, LEAST_RANGE_M))
     unmeasured = pings["time_of_flight_us"] == PING_TIME_OF_FLIGHT_US_INVALID
     range_m[(pings["outcome"] != Outcome.ECHO) | unmeasured] = np.nan
     return range_m

@@ -71,7 +71,8 @@ def calibrate(
     parts: Annotated[
         list[str] | None,
         typer.Argument(
-            help="gyros, mounting, compass, legs; without any, these four. accelerometers: of the parts on six sides."
+            help="gyros, mounting, compass, legs; without any, these four. accelerometers: of the parts on six sides. "
+            "rangers RECORDING: from a recorded walk on --plan."
         ),
     ] = None,
     board: Annotated[
@@ -91,8 +92,17 @@ def calibrate(
     walked: Annotated[
         float, typer.Option("--walked", metavar="M", help="Length of the walk that calibrates the legs, metres.")
     ] = 10.0,
+    plan: Annotated[
+        Path | None, typer.Option("--plan", metavar="PLAN", help="Plan of the walk that calibrates the rangers.")
+    ] = None,
 ) -> None:
-    """Calibrate gyros, mounting, compass and legs, or the accelerometers. Writes the results as settings."""
+    """Calibrate gyros, mounting, compass and legs, the accelerometers, or the rangers. Writes the results as settings."""
+    if parts and parts[0] == "rangers":
+        from echostep.commands.actions.rangers import calibrate_rangers
+        from echostep.printing.console import console_for_people
+
+        calibrate_rangers([Path(p) for p in parts[1:]], plan, out, console_for_people(highlight=False))
+        return
     from echostep.commissioning import calibrate as calibration
     from echostep.printing.console import console_for_people
 

@@ -96,7 +96,7 @@ def calibrate(ports: Ports, names: list[str], wearer: Wearer, out: Path, console
         raise EchostepError("no board is plugged in: plug it in, or name its port with --board; see echostep doctor")
     for finding in [f for port in ports if port is not None for f in access_findings("board", port)]:
         raise EchostepError(str(finding))
-    sections = _sections(out)
+    sections = read_sections(out)
     if ACCELEROMETERS in names:
         _calibrate_accelerometers([port for port in ports if port is not None], out, sections, console)
     for request, group in groupby(parts, key=lambda part: part.request):
@@ -111,7 +111,7 @@ def calibrate(ports: Ports, names: list[str], wearer: Wearer, out: Path, console
             _check_usual(values_of_section, console)
             for section, values in values_of_section.items():
                 sections.setdefault(section, {}).update(values)
-            _write(out, sections)
+            write_sections(out, sections)
     console.print(f"{out}: use it with --settings {out}")
 
 
@@ -125,7 +125,7 @@ def _calibrate_accelerometers(ports: list[str], out: Path, sections: Sections, c
     for place, errors in measure_poses(listen, console).items():
         console.print(described(place, errors))
         sections[f"{place}_imu"] = asdict(errors)
-    _write(out, sections)
+    write_sections(out, sections)
 
 
 def _chosen_parts(names: list[str]) -> list[Calibration]:
@@ -179,7 +179,7 @@ def _check_gyros(probed: ProbeResult) -> None:
         raise EchostepError(str(faults[0]))
 
 
-def _sections(out: Path) -> Sections:
+def read_sections(out: Path) -> Sections:
     """Sections of an existing settings file; empty without a file."""
     if not out.exists():
         return {}
@@ -199,7 +199,8 @@ def _text(sections: Sections) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _write(out: Path, sections: Sections) -> None:
+def write_sections(out: Path, sections: Sections) -> None:
+    """Write a settings file; raises EchostepError for values that no settings can have, and for a file that cannot be written."""
     text = _text(sections)
     parse_settings(text, str(out))
     try:

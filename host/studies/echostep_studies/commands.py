@@ -118,8 +118,11 @@ STUDIES = (
         "echoes",
         OURS,
         "Echoes of simulated rangers, and how well the tracker's likelihood predicts them.",
-        (SEED, JSON, _out("echoes"), _option("fit", bool, False, "Fit the likelihood's settings to simulated pings (minutes).")),
-        lambda _request, given: _of("echoes.study").echoes_study(fit=given["fit"]),
+        (
+            SEED, JSON, _out("echoes"), _option("fit", bool, False, "Fit the likelihood's settings to simulated pings (minutes)."),
+            _option("sweeps", Path | None, None, "Measured sweeps instead: walls.csv, and CSV files of pings by pose and bearing.", "DIR"),
+        ),
+        lambda _request, given: _of("echoes.study").echoes_study(fit=given["fit"], sweeps=given["sweeps"]),
     ),
     StudyCommand(
         "incapacity",

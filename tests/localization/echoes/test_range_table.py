@@ -98,6 +98,15 @@ def test_silence_in_a_hall_is_no_evidence_for_outside() -> None:
         assert ROOM_FOR_TABLE[OUTSIDE_ENTRY] == ROOM_FOR_TABLE[0]
 
 
+def test_a_ranger_of_many_second_reflections_is_seldom_silent_in_a_hall() -> None:
+    usual, often, table = MODEL, echo_model(EchoSettings(stray=0.65)), ROOM_FOR_TABLE
+    silent = []
+    for model in (usual, often):
+        log_densities(TablePing(0.0, 0.0, 1.0, 0.0, AFTER_SILENCE), model, table)
+        silent.append(math.exp(table[0]) - 0.2 * 0.6)  # less those of hidden views
+    assert silent[1] == pytest.approx(0.5 * silent[0])
+
+
 @pytest.mark.parametrize("after", [AFTER_ECHO, AFTER_SILENCE])
 @pytest.mark.parametrize("k", [0, 20, 90, 200])
 def test_the_density_of_each_entry_adds_up_to_one(k: int, after: int) -> None:

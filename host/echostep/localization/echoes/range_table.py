@@ -18,7 +18,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Int32s
 from echostep.jit import allocating_kernel, kernel, lean_kernel
-from echostep.localization.echoes.likelihood import SILENT_SHARE, EchoModel, detection, hidden_density
+from echostep.localization.echoes.likelihood import SILENT_SHARE, EchoModel, EchoSettings, detection, hidden_density
 from echostep.localization.particle_arrays import PingBatch
 from echostep.path import Odometer
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
@@ -40,6 +40,10 @@ AFTER_ECHO, AFTER_SILENCE = 0, 1
 # Shares after an echo, and after silence: of echoes heard by the entry that are none all the same; of "no echo" where none is heard (the others are
 # second reflections and things that no plan shows); of views that are hidden; of "no echo" in these
 MISSED, QUIET, HIDDEN, HIDDEN_QUIET = (0.02, 0.1), (0.3, 0.8), (0.1, 0.2), (0.1, 0.6)
+USUAL_SILENT = (
+    1.0 - EchoSettings().stray
+)  # share of silence, by second reflections, for which QUIET stands: it goes with a ranger's own
+MOST_QUIET = 0.95
 AROUND = 2  # cells about the floor, at its walls, that share the nearest row
 UNKNOWN = -1  # no row: outside the building
 USED_M = 0.25  # path between two pings of one ranger that are used: a cell of the table
@@ -88,7 +92,8 @@ def log_densities(ping: TablePing, model: EchoModel, table: Floats) -> None:
 
     With the entry's probability the echo is that of the expected range, else as where none is expected; so is the last entry, outside.
     """
-    range_m, missed, quiet = ping.range_m, MISSED[ping.after], QUIET[ping.after]
+    range_m, missed = ping.range_m, MISSED[ping.after]
+    quiet = min(QUIET[ping.after] * ((1.0 - model.stray) / USUAL_SILENT), MOST_QUIET)
     hidden_share, hidden_quiet = HIDDEN[ping.after], HIDDEN_QUIET[ping.after]
     is_echo = range_m > 0.0
     unlikely = (1.0 - quiet) / (model.maximum_m - model.minimum_m) if is_echo else quiet

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Echoes of simulated rangers, effect by effect [Girard 2011, 2.6, Figures 1-5], and how well the tracker's likelihood predicts them.
 
-In: a seed. Out: rows, a picture of each effect, and on demand the settings that explain simulated pings best. The simulation and the likelihood share
+In: a seed, or a folder of sweeps. Out: rows, a picture of each effect, shares and places of sweeps, and on demand the settings that explain simulated
+pings best. The simulation and the likelihood share
 nothing but the plan: one computes levels of sound from mirror images, the other has a handful of numbers.
 """
 
@@ -23,6 +24,8 @@ from echostep_studies.echoes.effects import Effect, pipe_range_m, simulated_effe
 from echostep_studies.echoes.findings import FINDINGS
 from echostep_studies.echoes.likelihood import SettingRow, fitted, log_p
 from echostep_studies.echoes.pictures import draw_effects
+from echostep_studies.echoes.sweep_rows import ShareRow, SweepRow, share_rows, sweep_rows
+from echostep_studies.echoes.sweeps import SweepSet, read_sweeps, simulated_sweeps
 from echostep_studies.frame.report import as_dicts
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.marker_walk import lay_markers, walk_markers
@@ -31,6 +34,12 @@ from echostep_studies.simulation.sites import otb
 UNIFORM = -math.log(6.0)  # log-density of a range of which nothing is known
 COLUMNS = {
     "name": "effect", "pings": "pings", "heard": "heard", "log_p": "mean log p", "uniform": "of a uniform", "finding": "finding",
+}  # fmt: skip
+SHARE_COLUMNS = {
+    "name": "off the wall's normal", "pings": "pings", "right": "right, %", "none": "none, %", "long": "too long, %", "real": "real sweeps"
+}  # fmt: skip
+SWEEP_COLUMNS = {
+    "name": "model", "pings": "pings", "log_p": "mean log p", "all": "found, %", "few": "by 12 pings, %", "known": "heading within 20 deg, %"
 }  # fmt: skip
 SETTINGS_COLUMNS = {"name": "setting", "set": "as set", "fitted": "fitted"}
 
@@ -47,18 +56,22 @@ class EchoRow:
     finding: str
 
 
-EchoesRow = EchoRow | SettingRow
+EchoesRow = EchoRow | ShareRow | SweepRow | SettingRow
 
 
-def echoes_study(*, fit: bool) -> Study[EchoesRow, EchoesRow]:
-    """The study, which has one run; `fit`: also fit the likelihood's settings to simulated pings, which takes minutes."""
+def echoes_study(*, fit: bool, sweeps: Path | None = None) -> Study[EchoesRow, EchoesRow]:
+    """The study, which has one run; `fit`: also fit the likelihood's settings to simulated pings, which takes minutes.
+
+    `sweeps`: a folder of measured sweeps, which alone are judged.
+    """
+    measured = None if sweeps is None else read_sweeps(sweeps)
     return Study(
         "echoes",
-        (EchoRow, SettingRow),
-        partial(one_run, fit=fit),
+        (EchoRow, ShareRow, SweepRow, SettingRow),
+        partial(one_run, fit=fit) if measured is None else partial(measured_run, measured),
         lambda rows: rows,
-        _tables,
-        draw_figures,
+        partial(_tables, is_real=measured is not None),
+        draw_figures if measured is None else None,
         journal=False,
         parquet=None,
     )
@@ -67,7 +80,15 @@ def echoes_study(*, fit: bool) -> Study[EchoesRow, EchoesRow]:
 def one_run(seed: int, *, fit: bool) -> list[EchoesRow]:
     """Rows of the effects, of the angular response, of the schedules, and of the fitted settings."""
     rows = [*(_row(effect) for effect in simulated_effects(seed)), _cone(), *_schedules(seed)]
-    return [*rows, *fitted(seed)] if fit else [*rows]
+    sweeps = simulated_sweeps(seed)
+    rows_of_sweeps: list[EchoesRow] = [*share_rows(sweeps), *sweep_rows(sweeps)]
+    settings: list[EchoesRow] = [*fitted(seed)] if fit else []
+    return [*rows, *rows_of_sweeps, *settings]
+
+
+def measured_run(sweeps: SweepSet, _seed: int) -> list[EchoesRow]:
+    """Rows of measured sweeps."""
+    return [*share_rows(sweeps), *sweep_rows(sweeps)]
 
 
 def draw_figures(folder: Path, seed: int, _rows: list[EchoesRow]) -> None:
@@ -75,11 +96,22 @@ def draw_figures(folder: Path, seed: int, _rows: list[EchoesRow]) -> None:
     draw_effects(folder / "figures1-5.png", simulated_effects(seed))
 
 
-def _tables(rows: list[EchoesRow], _request: StudyRequest) -> list[Table]:
-    effects = as_dicts(row for row in rows if isinstance(row, EchoRow))
-    settings = as_dicts(row for row in rows if isinstance(row, SettingRow))
-    tables = [Table("Simulated pings, and how the likelihood expects them", effects, COLUMNS)]
-    return [*tables, Table("Echo settings", settings, SETTINGS_COLUMNS)] if settings else tables
+def _tables(rows: list[EchoesRow], _request: StudyRequest, *, is_real: bool) -> list[Table]:
+    origin = "Measured" if is_real else "Simulated"
+    kinds: tuple[tuple[type[EchoesRow], str, dict[str, str]], ...] = (
+        (EchoRow, "Simulated pings, and how the likelihood expects them", COLUMNS),
+        (
+            ShareRow,
+            f"{origin} sweeps: pings by the angle off the nearest wall, beside right/none/too long of real ones",
+            SHARE_COLUMNS,
+        ),
+        (SweepRow, f"{origin} sweeps: the density, and places found within 10 cm from one sweep", SWEEP_COLUMNS),
+        (SettingRow, "Echo settings", SETTINGS_COLUMNS),
+    )
+    chosen = [
+        (title, as_dicts(row for row in rows if isinstance(row, kind)), columns) for kind, title, columns in kinds
+    ]
+    return [Table(title, found, columns) for title, found, columns in chosen if found]
 
 
 def _row(effect: Effect) -> EchoRow:

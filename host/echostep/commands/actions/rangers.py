@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT
+"""`echostep calibrate rangers`: the wearer's own two rangers from a recorded walk on a plan.
+
+In: a recording, a plan, a settings file. Out: findings and figures, settings. Owns the order: track, judge, write.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+
+from echostep.commissioning.calibrate import read_sections, write_sections
+from echostep.commissioning.rangers.faults import SWAPPED
+from echostep.commissioning.rangers.poses import PosedPings, SwappedTracker, posed_pings
+from echostep.commissioning.rangers.report import report
+from echostep.errors import EchostepError
+from echostep.localization.echoes.rangers import echo_of
+from echostep.recording.parts.joining import open_parts
+from echostep.session.metadata import plan_of
+from echostep.session.options import TrackingOptions
+from echostep.session.runs.replay import tracker_of
+from echostep.tracker import Tracker
+
+SURELY = 0.9  # share of the pings sent while `tracking`: of rangers that are swapped a search may find a place that looks alike; assumed
+NOTHING = "Nothing was written: mend it, and walk again."
+WALK = "walk for a minute along walls, round corners and past doors, from a start that is marked on the plan"
+RECORD = "echostep live --plan PLAN --record"
+
+
+def calibrate_rangers(paths: list[Path], plan_path: Path | None, out: Path, console: Console) -> None:
+    """Judge and fit the rangers of a walk; raises EchostepError where the walk cannot be used, or a ranger has a fault."""
+    if not paths or plan_path is None:
+        raise EchostepError(f"calibrate rangers: a recording and --plan are needed: {WALK}, with {RECORD} WALK.mcap")
+    tracking = TrackingOptions(plan_path)
+    recording = open_parts(paths)
+    tracker = tracker_of(recording, plan_of(tracking), tracking)
+    pings = posed_pings(tracker, recording.portions())
+    if pings.believed < SURELY <= _swapped(paths, tracker).believed:
+        raise EchostepError(f"{SWAPPED} {NOTHING}")
+    usual = echo_of(pings.part, tracker.settings.echo)
+    found = report(pings, tracker.laid_out.walls, usual, tracker.settings.ranger)
+    for line in found.lines:
+        console.print(line)
+    if found.faults:
+        raise EchostepError("\n".join([*found.faults, NOTHING]))
+    if not found.values:
+        return
+    sections = read_sections(out)
+    for section, values in found.values.items():
+        sections.setdefault(section, {}).update(values)
+    write_sections(out, sections)
+    console.print(f"{out}: use it with --settings {out}")
+
+
+def _swapped(paths: list[Path], tracker: Tracker) -> PosedPings:
+    """The same pings if each ranger's are the other one's."""
+    other = SwappedTracker(tracker.plan, tracker.start, tracker.settings)
+    return posed_pings(other, open_parts(paths).portions())

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""Pings at known poses, with the plan's echo sources before each: what the ranger models are fitted to.
+
+In: walls, poses, ranges. Out: `KnownPings`; the log-density of each by an echo model. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Floats, Ints
+from echostep.jit import kernel
+from echostep.localization.echoes.likelihood import EchoModel, echo_density, outlier_density, planned_density
+from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep.walls.index import EAR_REACH_M, WallIndex
+
+
+class KnownPings(NamedTuple):
+    """`range_m` (n,), 0: no echo. `listed` (n,) sources, nearest first: `distance_m`, `off_axis_rad`, `kind` (n, MOST_SOURCES)."""
+
+    range_m: Floats
+    listed: Ints
+    distance_m: Floats
+    off_axis_rad: Floats
+    kind: Floats
+
+    def rows(self, which: np.ndarray) -> KnownPings:
+        """These pings alone: by a mask, or by their numbers."""
+        return KnownPings(*(column[which] for column in self))
+
+
+def known_pings(walls: Walls, x_m: Floats, y_m: Floats, axis_rad: Floats, range_m: Floats) -> KnownPings:
+    """Pings (n,) from these places along these axes; a range that is NaN or not positive is no echo."""
+    heard = np.where(range_m > 0.0, range_m, 0.0)
+    x, y, axis = (np.ascontiguousarray(column, np.float64) for column in (x_m, y_m, axis_rad))
+    return KnownPings(heard, *_sources(x, y, axis, walls.near(x, y)))
+
+
+@kernel
+def _sources(x: Floats, y: Floats, axis: Floats, index: WallIndex) -> tuple[Ints, Floats, Floats, Floats]:
+    """Sources before each pose."""
+    n = len(x)
+    count, distance_m = np.zeros(n, np.int64), np.zeros((n, MOST_SOURCES))
+    off_axis_rad, kind = np.zeros((n, MOST_SOURCES)), np.zeros((n, MOST_SOURCES))
+    for i in range(n):
+        count[i] = echo_sources(x[i], y[i], axis[i], index, distance_m[i], off_axis_rad[i], kind[i])
+    return count, distance_m, off_axis_rad, kind
+
+
+@kernel
+def log_densities(pings: KnownPings, bias_m: float, missed: float, m: EchoModel) -> Floats:
+    """Log-density (n,) of the pings of a ranger that measures `bias_m` too much and misses a share of all echoes.
+
+    A range beyond the ranger's limits is an echo of a source, or an outlier even over all that any ranger reaches: otherwise narrow limits would
+    cost nothing.
+    """
+    found = np.empty(len(pings.range_m))
+    for i in range(len(found)):
+        range_m = pings.range_m[i]
+        if range_m > 0.0:
+            range_m = max(range_m - bias_m, 1e-3)
+        if range_m > m.maximum_m or 0.0 < range_m < m.minimum_m:
+            density = planned_density(
+                range_m, pings.listed[i], pings.distance_m[i], pings.off_axis_rad[i], pings.kind[i], 0.0, m
+            )
+            density = (1.0 - m.outlier) * (1.0 - m.hidden) * density
+            density += m.outlier * (1.0 - outlier_density(0.0, m)) / EAR_REACH_M
+        else:
+            density = echo_density(
+                range_m, pings.listed[i], pings.distance_m[i], pings.off_axis_rad[i], pings.kind[i], m
+            )
+        found[i] = math.log((1.0 - missed) * density + (missed if range_m <= 0.0 else 0.0))
+    return found
