@@ -64,7 +64,7 @@ def log_densities(pings: KnownPings, bias_m: float, missed: float, m: EchoModel)
             range_m = max(range_m - bias_m, 1e-3)
         if range_m > m.maximum_m or 0.0 < range_m < m.minimum_m:
             density = planned_density(
-                range_m, pings.listed[i], pings.distance_m[i], pings.off_axis_rad[i], pings.kind[i], 0.0, m
+                range_m, pings.listed[i], pings.distance_m[i], pings.off_axis_rad[i], pings.kind[i], m.stray, 0.0, m
             )
             density = (1.0 - m.outlier) * (1.0 - m.hidden) * density
             density += m.outlier * (1.0 - outlier_density(0.0, m)) / EAR_REACH_M
