@@ -141,7 +141,7 @@ def test_a_file_cut_off_anywhere_shows_what_came_before(tmp_path: Path) -> None:
         path.write_bytes(whole[: rng.randrange(len(whole) // 3, len(whole))])
         player, _ = played(path)
         assert 0 < len(player.scene().rows) <= 8
-        assert player.file.truncated
+        assert player.file.own_damage.truncated
 
 
 @pytest.mark.long

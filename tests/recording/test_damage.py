@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import random
 import struct
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,12 +15,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
 
 from command_line import echostep
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import Chunk
 from echostep.recording.damage.placing import Placement
-from echostep.recording.mcap_records import HEAD_SIZE
+from echostep.recording.mcap_records import HEAD_SIZE, RAW_ENCODING
 from echostep.recording.reading import Recording, open_recording
 from echostep.recording.recorder import Recorder
 from echostep.recording.repair.contents import info
@@ -139,6 +141,45 @@ def test_a_port_without_a_readable_channel_is_named(tmp_path: Path) -> None:
         assert not info(made_of)[-1].endswith("whole")
 
 
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda whole: whole[:-3000],
+        lambda whole: channel_flip(whole)[:-2000],
+        lambda whole: whole[:9000] + bytes(700) + whole[9700:],
+        lambda whole: whole[:9000] + bytes(10) + whole[9010:20_000] + bytes(10) + whole[20_010:],
+        lambda whole: flipped(whole, arrival_offsets(whole)[100] + 20, 3),
+        lambda whole: whole[:30720] + whole[30720:38912] + whole[30720:],
+    ],
+    ids=["cut", "channel", "zeros", "two places", "flip", "twice"],
+)
+def test_every_command_says_the_same_of_a_damage(tmp_path: Path, damage: Callable[[bytes], bytes]) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(damage(content()))
+    told = read(path)[0].damage()
+    assert told
+    assert info(path)[-1 - len(told) : -1] == [f"  {line}" for line in told]
+    assert repair(path, tmp_path / "b.mcap")[-len(told) :] == [f"  {line}" for line in told]
+
+
+def test_a_compressed_chunk_that_holds_no_records_is_told_by_every_command(tmp_path: Path) -> None:
+    """Its own checksum is right: the program that packed it wrote what is no record."""
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=1 << 20, compression=CompressionType.ZSTD)
+        writer.start()
+        channel = writer.register_channel("/board/bytes", RAW_ENCODING, 0)
+        for chunk in CHUNKS:
+            writer.add_message(channel, chunk.t_arrival_ns, chunk.data, 0)
+        builder = writer._Writer__chunk_builder  # type: ignore[attr-defined]
+        builder.record_writer.write(bytes(40))
+        writer.finish()  # type: ignore[no-untyped-call]
+    recording, found = read(path)
+    assert len(found) == len(CHUNKS)
+    assert "1 compressed chunks cannot be opened, or not be read to their end" in "\n".join(recording.damage())
+    assert info(path)[-1].endswith("makes a whole file of what is readable")
+
+
 def test_the_damage_goes_into_a_piece_too(tmp_path: Path) -> None:
     path, piece = tmp_path / "a.mcap", tmp_path / "b.mcap"
     path.write_bytes(flipped(content(), arrival_offsets(content())[100] + 20, 3))
@@ -176,7 +217,7 @@ def test_a_block_that_stands_twice_is_used_once(tmp_path: Path) -> None:
     recording, found = read(tmp_path / "a.mcap")
     assert len(found) == len(set(found)) >= len(CHUNKS) - 2
     assert [c.t_arrival_ns for c in found] == sorted(c.t_arrival_ns for c in found)
-    assert recording.misplaced > 50
+    assert recording.own_damage.misplaced > 50
     assert "stand twice in the file, or not where they were written" in replay_says(recording)
     repair(tmp_path / "a.mcap", tmp_path / "b.mcap")
     assert read(tmp_path / "b.mcap")[1] == found

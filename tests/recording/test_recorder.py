@@ -39,7 +39,7 @@ def test_round_trip(tmp_path: Path) -> None:
     recording = open_recording(tmp_path / "a.mcap")
     assert recording.metadata == {"seed": "4", "note": "a test"}
     assert list(recording.chunks()) == CHUNKS
-    assert not recording.truncated
+    assert not recording.own_damage.truncated
 
 
 @given(st.data())
@@ -147,7 +147,7 @@ def test_a_recording_that_another_tool_has_packed_into_chunks_is_the_same(
     recording = open_recording(tmp_path / "b.mcap")
     assert recording.metadata == {"seed": "4", "note": "a test"}
     assert list(recording.chunks()) == CHUNKS
-    assert not recording.truncated
+    assert not recording.own_damage.truncated
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "", "unheard"])

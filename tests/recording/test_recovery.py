@@ -129,7 +129,7 @@ def test_when_there_is_room_again_nothing_is_missing(tmp_path: Path) -> None:
     assert list(open_recording(tmp_path / "a.mcap").chunks()) == [
         Chunk("mtx", n * 1_000_000, bytes(100)) for n in range(1000)
     ]
-    assert not open_recording(tmp_path / "a.mcap").truncated
+    assert not open_recording(tmp_path / "a.mcap").own_damage.truncated
 
 
 def test_a_disk_that_stays_full_costs_no_more_memory_than_the_limit(

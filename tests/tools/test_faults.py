@@ -93,9 +93,9 @@ def test_a_killed_run_is_started_again_while_the_mtx_is_unplugged(tmp_path: Path
         outcome = walk.play()
         first, second = (open_recording(run / "walk.mcap") for run in walk.runs)
     assert sum(len(chunk.data) for chunk in first.chunks()) > 10_000
-    assert first.truncated
+    assert first.own_damage.truncated
     assert {chunk.port for chunk in second.chunks()} == {BOARD, MTX}
-    assert not second.truncated
+    assert not second.own_damage.truncated
     assert set(outcome.silent_s) == set(NORMAL_S)
     assert outcome.wrongly_sure == 0
 

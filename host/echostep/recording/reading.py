@@ -22,7 +22,7 @@ from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk, Portion
 from echostep.recording.clock import log_offset_ns
 from echostep.recording.damage.ending import Ending, begins_as_mcap, checksum_matches, read_ending
-from echostep.recording.damage.notes import MISPLACED, made_of, missing_ports
+from echostep.recording.damage.notes import FileDamage, made_of
 from echostep.recording.damage.placing import Placement
 from echostep.recording.damage.scan import map_file, next_valid_run, record_end
 from echostep.recording.mcap_records import HEAD_SIZE, MCAP_MAGIC, MESSAGE, decompress_chunk, parse_record
@@ -33,20 +33,12 @@ from echostep.recording.recorder import DAMAGE_NAME, LIBRARY, METADATA_NAME, NEX
 
 @dataclass
 class Recording:
-    """A recording on disk. What is wrong with it is known once its portions were iterated.
-
-    `truncated`: it ends without a footer, in the middle of a walk. `altered`: its bytes do not match the checksum written with them.
-    """
+    """A recording on disk. What is wrong with it is known once its portions were iterated."""
 
     path: Path
     metadata: dict[str, str] = field(default_factory=dict)
-    truncated: bool = False
-    altered: bool = False
+    own_damage: FileDamage = field(default_factory=FileDamage)  # of this very file
     fraction: float = 0.0  # of the file, read so far
-    damaged_bytes: int = 0  # in no valid record
-    damaged_places: int = 0
-    unreadable_chunks: int = 0  # chunk records of the file that could not be decompressed
-    misplaced: int = 0  # messages that stand twice in the file, or not where they were written
     grows: bool = False  # it is being written: reading ends before an unfinished record
     resume: int = -1  # offset from which `portions_from` goes on behind the last portion; -1 inside a compressed chunk
     library: str = ""  # by which the file was written
@@ -77,7 +69,7 @@ class Recording:
             return
         file, channels = map_file(self.path), PortChannels()
         channels.add_summary(read_ending(file))
-        for _, record in self._scan(file, len(MCAP_MAGIC), channels):
+        for _, record in self._scan(file, len(MCAP_MAGIC), channels, FileDamage()):
             if isinstance(record, tuple) and record[0] == Opcode.CHUNK:
                 deque(self._records_in_chunk(record[1], channels), maxlen=0)
             if isinstance(record, MessageRun) or record[0] == Opcode.CHUNK:
@@ -87,41 +79,25 @@ class Recording:
             if isinstance(record, MessageRun):
                 yield record.portion
 
-    @property
-    def damaged(self) -> bool:
-        """Whether something is wrong with this very file, which `repair` makes whole."""
-        return bool(self.altered or self.damaged_bytes or self.unreadable_chunks or self.misplaced or self.truncated)
-
     def to_repair(self) -> list[Path]:
         """The files that `echostep repair` makes whole."""
-        return [self.path] if self.damaged else []
+        return [self.path] if self.own_damage else []
 
     def damage(self) -> list[str]:
         """What is wrong with the file, as sentences, once it was read; and what was wrong with those of which it was made."""
-        return [*self._own_damage(), *self.before]
+        return [*self._own_sentences(), *self.before]
 
     def damage_notes(self) -> list[str]:
         """The same, to be noted in a recording that is made of this one."""
-        return [*made_of(self.path, self._own_damage()), *self.before]
+        return [*made_of(self.path, self._own_sentences()), *self.before]
 
-    def _own_damage(self) -> list[str]:
-        places = f"{self.damaged_bytes} damaged bytes in {self.damaged_places} places were skipped"
-        facts = [
-            (self.altered, "its checksum is wrong: bytes have changed since it was recorded"),
-            (self.damaged_bytes, places),
-            (self.unreadable_chunks, f"{self.unreadable_chunks} compressed chunks cannot be opened"),
-            (self.misplaced, MISPLACED.format(self.misplaced)),
-            (self.truncated, "the recording ends without an end record: it was not closed; all before was used"),
-        ]
-        lines = [text for applies, text in facts if applies]
-        lost = missing_ports(self._ports, self._channels.misnamed) if self.damaged else []
-        return [*lines, *lost]
+    def _own_sentences(self) -> list[str]:
+        return self.own_damage.sentences(self._ports, self._channels.misnamed)
 
     def _records(self) -> Iterator[MessageRun | tuple[int, bytes]]:
         """Messages as runs, other records as opcode and body, in order, up to the footer; damaged bytes are skipped and counted."""
         file, self._channels, self._ports = map_file(self.path), PortChannels(), set()
-        self.truncated, self.altered, self.misplaced, self._ended = False, False, 0, False
-        self.damaged_bytes = self.damaged_places = self.unreadable_chunks = 0
+        self.own_damage, self._ended = FileDamage(), False
         ending = Ending() if self.grows else read_ending(file)
         if self._intact is None:
             self._intact = bool(ending.data_end >= 0 and checksum_matches(file, ending.data_end))
@@ -130,11 +106,13 @@ class Recording:
         else:
             self._channels.add_summary(ending)
         yield from self._from(file, len(MCAP_MAGIC), self._channels)
-        self.truncated = not (self._ended or self._intact or self.grows)  # not of a file that is read no further
+        self.own_damage.truncated = not (
+            self._ended or self._intact or self.grows
+        )  # not of a file that is read no further
 
     def _from(self, file: Octets, offset: int, channels: PortChannels) -> Iterator[MessageRun | tuple[int, bytes]]:
         """The records from an offset on."""
-        for begin, record in self._scan(file, offset, channels):
+        for begin, record in self._scan(file, offset, channels, self.own_damage):
             self.fraction = begin / len(file)
             self.resume = begin
             if isinstance(record, tuple):
@@ -143,7 +121,7 @@ class Recording:
                     self._ended = True
                     return
                 if opcode == Opcode.DATA_END and (matches := checksum_matches(file, begin)) is not None:
-                    self.altered = self.altered or not matches
+                    self.own_damage.altered |= not matches
                     if matches:  # whatever follows, all before is there
                         self._ended = True
                         return
@@ -174,7 +152,7 @@ class Recording:
             place = self.resume, self.fraction
             following = next(runs, None)
             kept = placement.keep(this.sequence, following.sequence if following else this.sequence[:0])
-            self.misplaced = placement.misplaced
+            self.own_damage.misplaced = placement.misplaced
             ahead, (self.resume, self.fraction) = (self.resume, self.fraction), place
             yield this.portion if kept.all() else this.portion.where(kept)
             (self.resume, self.fraction), this = ahead, following
@@ -195,15 +173,17 @@ class Recording:
     def _records_in_chunk(self, body: bytes, channels: PortChannels) -> Iterator[MessageRun | tuple[int, bytes]]:
         records = decompress_chunk(body)
         if records is None:
-            self.unreadable_chunks += 1
+            self.own_damage.unreadable_chunks += 1
             return
-        for _, record in self._scan(np.frombuffer(records, np.uint8), 0, channels):
+        inside = FileDamage()
+        for _, record in self._scan(np.frombuffer(records, np.uint8), 0, channels, inside):
             yield record
+        self.own_damage.unreadable_chunks += bool(inside)
 
     def _scan(
-        self, file: Octets, offset: int, channels: PortChannels
+        self, file: Octets, offset: int, channels: PortChannels, damage: FileDamage
     ) -> Iterator[tuple[int, MessageRun | tuple[int, bytes]]]:
-        """Offset and content of portions and other valid records, from `offset` on."""
+        """Offset and content of portions and other valid records, from `offset` on; ranges without one are counted as damage."""
         while offset < len(file):
             run, offset = read_messages(file, offset, channels)
             if run:
@@ -213,8 +193,7 @@ class Recording:
                 return
             if end < 0 and offset < len(file):
                 end = next_valid_run(file, offset + 1, channels.known)
-                self.damaged_places += 1
-                self.damaged_bytes += end - offset
+                damage.skip(offset, end, len(file))
             elif end >= 0 and file[offset] != MESSAGE:
                 opcode, body = int(file[offset]), file[offset + HEAD_SIZE : end].tobytes()
                 if opcode == Opcode.CHANNEL:

@@ -130,7 +130,7 @@ def _files(out: Path) -> tuple[dict[str, str], bool]:
                 recording = open_recording(path)
                 for chunk in recording.chunks():
                     digest.update(chunk.data)
-                truncated = truncated or recording.truncated
+                truncated = truncated or recording.own_damage.truncated
             except EchostepError:
                 truncated = True
         elif path.is_file():

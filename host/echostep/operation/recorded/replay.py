@@ -74,7 +74,7 @@ def _serve(player: Player, page: TablePage, seconds: float) -> None:
 def _say(player: Player, console: Console) -> None:
     """What is wrong with the file."""
     file = player.file
-    if file.truncated:
+    if file.own_damage.truncated:
         console.print(f"{file.path}: it was not closed: it is shown up to its last whole record", markup=False)
-    if file.altered or file.damaged_bytes or file.unreadable_chunks or player.unknown:
+    if file.own_damage.altered or file.own_damage.places or file.own_damage.unreadable_chunks or player.unknown:
         console.print(f"{file.path}: damaged; echostep info {file.path} says where", markup=False)

@@ -19,7 +19,7 @@ from echostep.printing.console import console_for_people
 from echostep.recording.capture import Decoder
 from echostep.recording.capture_summary import refusals
 from echostep.recording.clock import log_offset_ns, utc_offset_ns
-from echostep.recording.damage.notes import MISPLACED, made_of, missing_ports
+from echostep.recording.damage.notes import made_of
 from echostep.recording.mcap_records import port_of
 from echostep.recording.repair.arrival_order import ArrivalOrder
 from echostep.recording.repair.recovery import RecordedMessage, Recovery
@@ -201,24 +201,9 @@ def _port_lines(contents: Contents) -> list[str]:
 
 def damage_of(recovery: Recovery, contents: Contents) -> list[str]:
     """What is wrong with a file that was read to its end, as sentences; empty for a whole one, and for one that is being written."""
-    inside = [(begin, end) for begin, end in recovery.damaged if end < recovery.size]
-    lost = sum(end - begin for begin, end in inside)
-    places = f"{lost} bytes in {len(inside)} places are not valid, the first at byte {inside[0][0] if inside else 0}"
-    middle = ", in the middle of a record" if len(inside) < len(recovery.damaged) else ""
     corrected = f"{contents.order.corrected} arrival times contradict their neighbours; repair corrects them"
-    facts = [
-        (bool(inside), f"damaged: {places}"),
-        (recovery.unreadable_chunks, f"damaged: {recovery.unreadable_chunks} compressed chunks cannot be opened"),
-        (contents.order.corrected, corrected),
-        (recovery.altered, "its checksum is wrong: bytes have changed since it was written"),
-        (recovery.misplaced, MISPLACED.format(recovery.misplaced)),
-        (
-            not (recovery.has_footer or recovery.grows or recovery.intact),
-            f"the file ends too early{middle}: the recorder was stopped before it could close it",
-        ),
-    ]
-    lines = [text for applies, text in facts if applies]
-    return [*lines, *(missing_ports(contents.ports, recovery.misnamed) if lines else ())]
+    lines = recovery.own_damage.sentences(contents.ports, recovery.misnamed)
+    return [*lines, *([corrected] if contents.order.corrected else [])]
 
 
 def damage_notes(recovery: Recovery, contents: Contents) -> list[str]:
@@ -239,8 +224,7 @@ def problems_of(recovery: Recovery, contents: Contents) -> list[str]:
 def is_mended_by_repair(recovery: Recovery, contents: Contents) -> bool:
     """Whether a repaired copy lacks a fault of this file; what the decoder could not read, and the order between ports, stay as they are."""
     unfinished = not recovery.has_footer and not recovery.grows
-    damaged = recovery.damaged or recovery.unreadable_chunks or recovery.altered or unfinished
-    return bool(damaged or recovery.misplaced or contents.order.corrected)
+    return bool(recovery.own_damage or unfinished or contents.order.corrected)
 
 
 def with_progress(recovery: Recovery, contents: Contents, title: str) -> Iterator[RecordedMessage]:

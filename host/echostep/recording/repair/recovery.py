@@ -23,6 +23,7 @@ from mcap.records import Channel, Header, Metadata, Schema
 from echostep.arrays import Bools, Octets
 from echostep.errors import EchostepError
 from echostep.recording.damage.ending import begins_as_mcap, checksum_matches, read_ending
+from echostep.recording.damage.notes import FileDamage
 from echostep.recording.damage.placing import Placement
 from echostep.recording.damage.scan import CHUNK, map_file, next_valid_run, record_end
 from echostep.recording.mcap_records import (
@@ -60,13 +61,10 @@ class Recovery:
     metadata: dict[str, str] = field(default_factory=dict)  # as given to the recorder
     channels: dict[int, Channel] = field(default_factory=dict)
     schemas: dict[int, Schema] = field(default_factory=dict)
-    damaged: list[tuple[int, int]] = field(default_factory=list)  # byte ranges (begin, end) without valid records
-    unreadable_chunks: int = 0  # chunk records that cannot be decompressed
+    own_damage: FileDamage = field(default_factory=FileDamage)  # of this very file
     has_footer: bool = False  # the recorder was closed
-    altered: bool = False  # the file's checksum says that bytes have changed since they were written
     grows: bool = False  # a process is writing it
-    intact: bool = False  # it says that none have
-    misplaced: int = 0  # messages that stand twice in the file, or not where they were written
+    intact: bool = False  # the file's checksum says that no byte has changed since it was written
     misnamed: set[str] = field(default_factory=set)  # topics of channels of which either name or encoding is damaged
     library: str = ""  # by which the file was written
     before: list[str] = field(default_factory=list)  # damage of the recordings of which this one was made
@@ -96,13 +94,14 @@ class Recovery:
         self._settled = bool(self.channels) and ending.trusted
         yield from self._placed(self._contents(file[: ending.data_end] if self.intact else file))
         self.byte_offset = self.size
+        self.own_damage.truncated = not (self.has_footer or self.grows or self.intact)
 
     def _contents(self, file: Octets) -> Iterator[RecordedMessage]:
         """All readable messages in the order of the file."""
         for begin, end, content in self._scan(file, len(MCAP_MAGIC)):
             self.byte_offset = begin
             if content is None:
-                self.damaged.append((begin, end))
+                self.own_damage.skip(begin, end, self.size)
             elif isinstance(content, RecordedMessage):
                 yield content
             else:
@@ -115,7 +114,7 @@ class Recovery:
             following = list(islice(messages, PLACED_AT_ONCE))
             numbers, ahead = (np.array([m.sequence for m in part], np.int64) for part in (this, following))
             yield from compress(this, placement.keep(numbers, ahead).tolist())
-            self.misplaced, this = placement.misplaced, following
+            self.own_damage.misplaced, this = placement.misplaced, following
         yield from chain(this, messages)
 
     def _scan(self, file: Octets, begin: int) -> Iterator[tuple[int, int, RecordedMessage | bytes | None]]:
@@ -141,7 +140,7 @@ class Recovery:
                 return
             elif opcode == Opcode.DATA_END:
                 matches = checksum_matches(file, begin)
-                self.altered = self.altered or matches is False
+                self.own_damage.altered |= matches is False
                 if matches:  # whatever follows, all before is there
                     self.intact = True
                     self.has_footer = bytes(view[size - len(MCAP_MAGIC) : size]) == MCAP_MAGIC
@@ -157,11 +156,14 @@ class Recovery:
     def _messages_in_chunk(self, body: bytes) -> Iterator[RecordedMessage]:
         records = decompress_chunk(body)
         if records is None:
-            self.unreadable_chunks += 1
+            self.own_damage.unreadable_chunks += 1
             return
+        whole = True
         for _, _, content in self._scan(np.frombuffer(records, np.uint8), 0):
+            whole &= content is not None
             if isinstance(content, RecordedMessage):
                 yield content
+        self.own_damage.unreadable_chunks += not whole
 
     def _register(self, opcode: int, body: bytes) -> None:
         """Keep a channel, a schema, the recorder's name and its metadata; ignore other records."""
