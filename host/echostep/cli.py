@@ -18,11 +18,13 @@ from echostep.commands import beacons, commander, files, hardware, plan, recordi
 from echostep.commands.studies import add_studies
 from echostep.errors import EchostepError, IncompleteError, words_of
 from echostep.extras import EXTRAS, lacks
-from echostep.interruption import end_by_signals
+from echostep.interruption import end_by_signals, is_asked
 from echostep.printing.compiling import tell_of_compiling
 from echostep.printing.file_mode import share_files
 from echostep.printing.lines import complain, say
 from echostep.printing.people import lost_result, to_people
+
+LOST_KERNEL = "no compiled object"  # numba's words where a signal's exception was dropped in a callback of LLVM, while a kernel was compiled
 
 app = typer.Typer(
     add_completion=False,
@@ -92,6 +94,8 @@ def _status() -> int:
     except OSError as error:
         complain(f"echostep: {words_of(error)}")
         return 2
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and not (is_asked() and LOST_KERNEL in str(error)):
+            raise
         return 130
     return 0

@@ -17,10 +17,12 @@ import re
 import stat
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+
+from echostep.errors import EchostepError
 
 PACKAGE = str(Path(__file__).parent)
 IMPORT = re.compile(rb"^ *(?:from ([\w.]+) import (\([^)]*\)|.*)|import ([\w.]+))", re.MULTILINE)
@@ -39,7 +41,7 @@ def cache_folder(source: str) -> Path | None:
         return None
     _roots.setdefault(root.name, str(root))
     module = path.stem
-    folder = _base(path.parent, root) / f"{module}-{_digest(source)}"
+    folder = _folder(path.parent, root, f"{module}-{_digest(source)}")
     if not folder.is_dir():
         for old in folder.parent.glob(f"{module}-*/*/*.nb[ic]"):
             old.unlink(missing_ok=True)  # their folders stay: another process may be about to write there
@@ -54,14 +56,38 @@ def _root_of(folder: Path) -> Path | None:
     return _root_of(folder.parent) or folder
 
 
-def _base(package: Path, root: Path) -> Path:
-    """NUMBA_CACHE_DIR, or `__pycache__` beside the sources, or where that is not writable a folder of the user's, or a temporary one."""
+def _folder(package: Path, root: Path, name: str) -> Path:
+    """In NUMBA_CACHE_DIR, `__pycache__` beside the sources, or a folder at home: the first that this user can write; else in a temporary one."""
     inside = package.relative_to(root.parent)
+    folder = next((base / name for base in _bases(package, inside) if _can_be_written(base / name)), None)
+    folder = folder or _temporary_folder() / inside / name
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    if chosen and not folder.is_relative_to(chosen):
+        _tell_of_other_folder(chosen, root if folder.is_relative_to(root) else folder.parents[len(inside.parts)])
+    return folder
+
+
+def _bases(package: Path, inside: Path) -> Iterator[Path]:
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
-        return Path(chosen) / inside
-    if os.access(package, os.W_OK):
-        return package / "__pycache__"
-    return (_users_folder() or _temporary_folder()) / inside
+        yield Path(chosen) / inside
+    yield package / "__pycache__"
+    if users := _users_folder():
+        yield users / inside
+
+
+def _can_be_written(folder: Path) -> bool:
+    """Whether the user can make files in a folder, which need not exist yet."""
+    while not os.path.exists(folder):  # noqa: PTH110 (Path.exists raises in a folder that may not be searched)
+        folder = folder.parent
+    return folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)
+
+
+@cache
+def _tell_of_other_folder(chosen: str, used: Path) -> None:
+    """Once a run."""
+    print(
+        f"echostep: NUMBA_CACHE_DIR: {chosen} cannot be written: compiled kernels are kept in {used}", file=sys.stderr
+    )
 
 
 @cache
@@ -82,10 +108,16 @@ def _temporary_folder() -> Path:
     numba runs what it finds in its cache, so a folder that another user may write is not used.
     """
     owner = os.getuid() if hasattr(os, "getuid") else "user"
-    folder = Path(tempfile.gettempdir()) / f"echostep-kernels-{owner}"
+    try:
+        folder = Path(tempfile.gettempdir()) / f"echostep-kernels-{owner}"
+    except FileNotFoundError as error:
+        raise EchostepError("no folder for compiled kernels can be written: give one in NUMBA_CACHE_DIR") from error
     with suppress(FileExistsError):
         folder.mkdir(mode=0o700)
-        print(f"echostep: no home that can be written: compiled kernels are kept in {folder}", file=sys.stderr)
+        print(
+            f"echostep: the user has no cache folder that can be written: compiled kernels are kept in {folder}",
+            file=sys.stderr,
+        )
     state = folder.lstat()
     if not hasattr(os, "getuid"):  # Windows: the temporary folder is the user's own
         return folder

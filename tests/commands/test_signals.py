@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import os
 import pty
 import select
@@ -14,11 +15,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from numba.core.registry import cpu_target
 
 from board_runs import ROOT
 from command_line import PROGRAM, echostep
 from echostep.interruption import end_by_signals, holding_signals, is_asked, sleep
 from echostep.ports.chunks import Chunk
+from echostep.recording.mcap_records import MCAP_MAGIC
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import Recorder
 from players import python_board
@@ -175,3 +178,27 @@ def _cpu_s(pid: int) -> float:
     """Processor time of a process, all its threads: utime and stime [proc(5)]."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_ctrl_c_while_a_kernel_is_compiled_ends_without_a_traceback(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its exception is dropped in a callback of LLVM; numba then misses what was compiled."""
+    (tmp_path / "some_kernel.py").write_text("import numba\n\n@numba.njit(cache=True)\ndef same(x):\n    return x\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    engine = cpu_target.target_context.codegen()._engine._ee
+
+    def interrupted(*_: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    def compiling(_: Path) -> list[str]:
+        monkeypatch.setattr(engine, "_object_cache_notify", interrupted)
+        importlib.import_module("some_kernel").same(1)
+        return []
+
+    monkeypatch.setattr("echostep.recording.repair.contents.info", compiling)
+    (tmp_path / "walk.mcap").write_bytes(MCAP_MAGIC)
+    done = echostep("info", tmp_path / "walk.mcap")
+    assert done.returncode == 130
+    assert not done.stdout

@@ -8,14 +8,17 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 import echostep
 from echostep import kernel_cache
+from echostep.errors import EchostepError
 from echostep.jit import kernel
 from echostep.kernel_cache import PACKAGE, cache_folder
+from users import ANOTHER_USER, AS_ANOTHER_USER, needs_another_user
 from waiting import PATIENCE_S
 
 SHAPES = """
@@ -37,6 +40,13 @@ def twice(shape):
 print(twice(shapes.{name}(3.0)))
 """
 
+PROBE = """
+from numpy import uint8, zeros
+from echostep.recording.mcap_records import read_uint
+assert not read_uint(zeros(8, uint8), 0, 8)
+print(read_uint._cache.cache_path)
+"""
+
 
 def run(package: Path, name: str, unit: float) -> str:
     """What the small package prints with this class and constant in one of its files."""
@@ -54,7 +64,7 @@ def run(package: Path, name: str, unit: float) -> str:
 def test_an_update_in_place_is_compiled_anew_and_the_old_kernels_go(tmp_path: Path) -> None:
     package = tmp_path / "echostep"
     package.mkdir()
-    for name in ("jit", "kernel_cache"):
+    for name in ("errors", "jit", "kernel_cache"):
         shutil.copy(f"{PACKAGE}/{name}.py", package)
     (package / "__init__.py").touch()
     (package / "main.py").write_text(MAIN.format(name="Square"))
@@ -90,6 +100,7 @@ def folder_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: Path | None
     for name in ("_users_folder", "_temporary_folder"):
         getattr(kernel_cache, name).cache_clear()
     package = tmp_path / "p"
+    package.mkdir(exist_ok=True)
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path))
@@ -103,16 +114,16 @@ def folder_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: Path | None
         return home
 
     monkeypatch.setattr(Path, "home", classmethod(at_home))
-    return kernel_cache._base(package, package)
+    return kernel_cache._folder(package, package, "k")
 
 
 def test_without_a_home_kernels_go_to_a_temporary_folder_that_is_told_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert folder_of(tmp_path, monkeypatch, tmp_path / "home") == tmp_path / "home/.cache/p"
+    assert folder_of(tmp_path, monkeypatch, tmp_path / "home") == tmp_path / "home/.cache/p/k"
     for home in (None, Path("/proc/nowhere")):
-        assert folder_of(tmp_path, monkeypatch, home) == tmp_path / f"echostep-kernels-{os.getuid()}/p"
-    assert capsys.readouterr().err.count("no home that can be written") == 1
+        assert folder_of(tmp_path, monkeypatch, home) == tmp_path / f"echostep-kernels-{os.getuid()}/p/k"
+    assert capsys.readouterr().err.count("no cache folder that can be written") == 1
 
 
 def test_a_temporary_folder_that_another_user_may_write_is_not_used(
@@ -121,5 +132,50 @@ def test_a_temporary_folder_that_another_user_may_write_is_not_used(
     (tmp_path / f"echostep-kernels-{os.getuid()}").mkdir()
     (tmp_path / f"echostep-kernels-{os.getuid()}").chmod(0o777)
     used = folder_of(tmp_path, monkeypatch, None)
-    assert used.parent.name not in ("", f"echostep-kernels-{os.getuid()}")
+    assert used.parents[1].name not in ("", f"echostep-kernels-{os.getuid()}")
     assert "give a folder in NUMBA_CACHE_DIR" in capsys.readouterr().err
+
+
+@pytest.fixture
+def open_path() -> Iterator[Path]:
+    """A folder that every user can search, unlike pytest's."""
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o755)
+        yield Path(folder)
+
+
+@needs_another_user
+@pytest.mark.process
+@pytest.mark.parametrize("given", ["", "/chosen", "/home"])
+def test_a_user_who_cannot_write_the_folder_for_kernels_has_them_elsewhere(open_path: Path, given: str) -> None:
+    """Neither the installation, nor NUMBA_CACHE_DIR, nor a cache at home that `sudo` has made: in a folder of the user's, and that is said once."""
+    (open_path / "temporary").mkdir()
+    (open_path / "temporary").chmod(0o1777)
+    (open_path / "chosen").mkdir()
+    (open_path / "home/.cache/echostep").mkdir(parents=True)
+    os.chown(open_path / "home/.cache", ANOTHER_USER, ANOTHER_USER)
+    environment = {
+        "HOME": f"{open_path}/home" if given == "/home" else "/nonexistent",
+        "TMPDIR": f"{open_path}/temporary",
+    }
+    environment |= {"NUMBA_CACHE_DIR": f"{open_path}/chosen"} if given == "/chosen" else {}
+    for run_number in range(2):
+        done = subprocess.run(
+            [*AS_ANOTHER_USER, sys.executable, "-c", PROBE], capture_output=True, text=True, timeout=5.0 * PATIENCE_S,
+            check=False, cwd="/", env={"PATH": os.environ["PATH"], "PYTHONPATH": os.pathsep.join(sys.path), **environment},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        kept = open_path / f"temporary/echostep-kernels-{ANOTHER_USER}"
+        assert done.stdout.startswith(str(kept / "echostep/recording"))
+        assert done.stderr.count("kernels are kept in") == (not run_number) + (given == "/chosen")
+        assert done.stderr.count(f"NUMBA_CACHE_DIR: {open_path}/chosen cannot be written") == (given == "/chosen")
+
+
+def test_where_nothing_can_be_written_the_error_names_what_to_give(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nowhere() -> str:
+        raise FileNotFoundError(2, "No usable temporary directory found in ['/tmp']")
+
+    monkeypatch.setattr(tempfile, "gettempdir", nowhere)
+    kernel_cache._temporary_folder.cache_clear()
+    with pytest.raises(EchostepError, match="give one in NUMBA_CACHE_DIR"):
+        kernel_cache._temporary_folder()
