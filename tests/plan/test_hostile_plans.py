@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import signal
 import zipfile
 from pathlib import Path
@@ -15,8 +16,9 @@ from echostep.errors import EchostepError
 from echostep.plan.check import check_plan
 from echostep.plan.importers import limited
 from echostep.plan.importers.formats import import_plan
-from echostep.plan.importers.imdf.archive import FREE_BYTES, MOST_RATIO, Archive
+from echostep.plan.importers.imdf.archive import FREE_BYTES, MOST_FILES, MOST_RATIO, Archive
 from echostep.plan.importers.limited import import_limited, open_limited
+from echostep.plan.importers.parsing import LARGEST_BYTES
 from echostep.plan.importers.report import ImportReport
 from echostep.plan.model import load_plan
 from echostep.plan.plan_file import MOST_CORNERS
@@ -60,6 +62,37 @@ def test_a_zip_that_unpacks_a_hundredfold_is_refused(tmp_path: Path) -> None:
         assert archive.text("unit.geojson") == "{}"
         with pytest.raises(EchostepError, match=r"level\.geojson: unpacks to more than"):
             archive.text("level.geojson")
+
+
+def test_a_zip_of_too_many_files_is_refused(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as packed:
+        for k in range(MOST_FILES + 1):
+            packed.writestr(f"{k}.geojson", b"")
+    with pytest.raises(EchostepError, match=r"a\.zip: the zip file has 1001 files; expected 1000 at most"):
+        import_plan(tmp_path / "a.zip")
+
+
+@pytest.mark.parametrize("suffix", ["dxf", "osm", "geojson"])
+def test_a_file_too_large_to_be_one_building_is_not_read(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a.{suffix}"
+    path.touch()
+    os.truncate(path, LARGEST_BYTES + 1)
+    with pytest.raises(EchostepError, match=rf"a\.{suffix}: larger than 512 MiB"):
+        import_plan(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (json.dumps({"echostep_plan": 1, "levels": [{"walls": [[0, 0, 100_001, 0]]}]}), "within 100000 m"),
+        ('{"echostep_plan": 1, "levels": ' + "[" * 2000 + "]" * 2000 + "}", r"a\.json"),
+    ],
+    ids=["far", "deep"],
+)
+def test_a_plan_that_is_too_wide_or_too_deep_is_one_error(tmp_path: Path, text: str, named: str) -> None:
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(EchostepError, match=named):
+        load_plan(tmp_path / "a.json")
 
 
 def plan_file(path: Path, obstacle: list[list[float]]) -> Path:

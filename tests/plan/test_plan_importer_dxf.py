@@ -208,6 +208,18 @@ def test_no_drawing(tmp_path: Path, raw: bytes) -> None:
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(("deep", "walls"), [(16, 5), (17, 4)])
+def test_blocks_in_blocks_are_read_to_a_depth(tmp_path: Path, deep: int, walls: int) -> None:
+    doc, space = drawing()
+    for a, b in (((0, 0), (4, 0)), ((4, 0), (4, 4)), ((4, 4), (0, 4)), ((0, 4), (0, 0))):
+        space.add_line(a, b, {"layer": "A-WALL"})
+    doc.blocks.new("B1").add_line((2, 0), (2, 3), {"layer": "A-WALL"})
+    for k in range(2, deep + 1):
+        doc.blocks.new(f"B{k}").add_blockref(f"B{k - 1}", (0, 0), {"layer": "A-WALL"})
+    space.add_blockref(f"B{deep}", (0, 0), {"layer": "A-WALL"})
+    assert len(walls_of(imported(doc, tmp_path))) == walls
+
+
 def test_room_numbers_of_blocks(tmp_path: Path) -> None:
     """Room tags are often attributes of a block."""
     doc, space = with_gap()

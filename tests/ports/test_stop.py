@@ -56,9 +56,12 @@ def test_a_port_whose_close_fails_is_closed_once() -> None:
         close()
 
 
-@pytest.mark.parametrize("command", ["record", "live"])
+@pytest.mark.parametrize(
+    ("command", "end"),
+    [("record", "SIGTERM"), ("live", "SIGTERM"), ("live", "SIGINT"), ("live", "SIGQUIT"), ("live", "SIGHUP")],
+)
 def test_a_signal_ends_a_run_that_is_behind_with_all_that_had_arrived(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str, end: str
 ) -> None:
     """The disk, or a kernel that is compiled, holds the run up while its port goes on."""
     write, put, sent, queued = Recorder.write, ChunkQueue.put, [b"begin"], list[bytes]()
@@ -71,7 +74,7 @@ def test_a_signal_ends_a_run_that_is_behind_with_all_that_had_arrived(
                     os.write(ours, sent[-1])
                 # A pseudo terminal hands over later what is written: a busy computer takes its time.
                 assert until(lambda: b"".join(queued) == b"".join(sent))
-                signal.raise_signal(signal.SIGTERM)
+                signal.raise_signal(getattr(signal, end))
             write(recorder, chunk)
 
         def counted(queue: ChunkQueue, chunk: Chunk) -> None:

@@ -166,6 +166,14 @@ def test_a_chunk_that_would_fill_the_memory_is_left_closed() -> None:
     assert decompress_chunk(head + squeezed) is None
 
 
+@pytest.mark.parametrize(("exponent", "opened"), [(27, True), (28, False)])
+def test_a_chunk_with_a_window_above_128_mib_is_left_closed(exponent: int, opened: bool) -> None:
+    """A frame of one raw block [RFC 8878, 3.1.1]: window descriptor without mantissa, block header with size and the mark of the last."""
+    frame = struct.pack("<IBB", 0xFD2FB528, 0, exponent - 10 << 3) + (10 << 3 | 1).to_bytes(3, "little") + bytes(10)
+    head = struct.pack("<QQQII", 0, 0, 10, 0, 4) + b"zstd" + struct.pack("<Q", len(frame))
+    assert decompress_chunk(head + frame) == (bytes(10) if opened else None)
+
+
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x89MCAP0\r\n"])
 def test_what_is_no_recording_is_named(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "x.mcap").write_bytes(content)
