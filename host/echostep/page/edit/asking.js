@@ -2,6 +2,7 @@
 // The panel of questions: shows one after the other, and gives the answers to the sheet. In: sheet, view, tools, desk. Owns the question that is shown.
 
 import { accept, put, reject } from './questions.js';
+import { WORDS } from './words.js';
 
 const byId = (id) => document.getElementById(id);
 const NEAR = 30; // pixels a metre at least, when a question is shown
@@ -40,27 +41,27 @@ export class Asking {
   answer(level, words) {
     const { open, index } = this, following = open[index + 1]?.[1];
     this.tools.choose('select');
-    this.sheet.setLevel(level);
-    this.desk.say(`${words}${open.length > 1 ? '' : '. No question is left: Save'}`);
+    this.sheet.setLevel(level, words);
+    if (open.length === 1) this.desk.say(WORDS.lastAnswer(words));
     this.show(following, open.length > 1);
   }
 
-  accept() { if (this.here()) this.answer(accept(this.sheet.level, this.shown), this.shown.proposed ? 'Added' : 'Kept'); }
+  accept() { if (this.here()) this.answer(accept(this.sheet.level, this.shown), WORDS.answered[this.shown.proposed ? 'added' : 'kept']); }
 
-  reject() { if (this.here()) this.answer(reject(this.sheet.level, this.shown), this.shown.proposed ? 'Dropped' : 'Deleted'); }
+  reject() { if (this.here()) this.answer(reject(this.sheet.level, this.shown), WORDS.answered[this.shown.proposed ? 'dropped' : 'deleted']); }
 
   // The next click on the sheet says where the element belongs.
   place() {
     if (!this.here() || this.shown.about === 'wall') return;
     this.tools.choose('place');
-    this.desk.say(this.shown.about === 'door' ? 'Click on the wall where the door belongs' : 'Click where the room is');
+    this.desk.say(this.shown.about === 'door' ? WORDS.doorHere : WORDS.roomHere);
     this.desk.changed();
   }
 
   placed(p) {
     const level = this.here() && put(this.sheet.level, this.shown, p);
-    if (level) this.answer(level, 'Moved');
-    else this.desk.say('No wall here that is long enough: click on a wall');
+    if (level) this.answer(level, WORDS.answered.moved);
+    else this.desk.say(WORDS.noRoomForDoor);
   }
 
   // Whether there is a question; goes to its level.
@@ -75,9 +76,9 @@ export class Asking {
   paint() {
     const { open, current } = this;
     byId('questions').hidden = !open.length;
-    byId('asked').textContent = current ? `${open.findIndex(([, question]) => question === current) + 1} of ${open.length}: ${current.text}` : '';
+    byId('asked').textContent = current ? WORDS.question(open.findIndex(([, question]) => question === current) + 1, open.length, current.text) : '';
     byId('answer-move').disabled = current?.about === 'wall';
-    byId('answer-yes').textContent = current?.proposed ? 'Add' : 'Keep';
-    byId('answer-no').textContent = current?.proposed ? 'Drop' : 'Delete';
+    byId('answer-yes').textContent = current?.proposed ? WORDS.add : WORDS.keep;
+    byId('answer-no').textContent = current?.proposed ? WORDS.drop : WORDS.remove;
   }
 }

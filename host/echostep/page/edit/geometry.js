@@ -73,14 +73,14 @@ export function crossing([px, py], [ux, uy], [x0, y0, x1, y1]) {
   return t < 0 || t > 1 ? null : [x0 + t * vx, y0 + t * vy];
 }
 
-// Cut a door of a width into wall k at the point nearest to p; null where the wall is too short. Remaining pieces shorter than a joint are dropped.
+// Cut a door of a width into wall k at the point nearest to p, in steps along the wall; null where the wall is too short. Remaining pieces shorter than a joint are dropped.
 // Of a wall that is drawn as two faces the other one is cut too, and the gap's ends join both.
-export function cutDoor(level, k, p, width, kept = { state: 'unknown' }) {
+export function cutDoor(level, k, p, width, kept = { state: 'unknown' }, step = GRID_M) {
   const wall = level.walls[k], [a, b] = ends(wall), long = length(wall);
   if (!(width > JOINT_M) || long < width - JOINT_M) return null;
   const u = unit(a, b), w = Math.min(width, long);
   let s = Math.min(Math.max(foot(p, wall).t * long - w / 2, 0), long - w);
-  s = Math.min(Math.round(s / GRID_M) * GRID_M, long - w);
+  s = Math.min(Math.round(s / step) * step, long - w);
   const at = (d) => (d <= JOINT_M ? a : d >= long - JOINT_M ? b : spot([a[0] + d * u[0], a[1] + d * u[1]]));
   const jambs = [at(s), at(s + w)], other = otherFace(level.walls, k, jambs), walls = level.walls.toSpliced(k, 1, ...beside(wall, jambs));
   if (other >= 0) {
@@ -151,11 +151,11 @@ export function fillDoor(level, k) {
   return { level: { ...level, walls, doors }, wall: walls === level.walls ? -1 : walls.length - 1 };
 }
 
-// Move the centre of door k to p: along its wall, or freely where it has none. Null where it does not fit.
-export function moveDoor(level, k, p) {
+// Move the centre of door k to p: along its wall, or freely where it has none; in steps of the grid unless `exact`. Null where it does not fit.
+export function moveDoor(level, k, p, exact = false) {
   const { line, ...kept } = level.doors[k], filled = fillDoor(level, k);
-  if (filled.wall >= 0) return cutDoor(filled.level, filled.wall, p, length(line), kept);
-  const [mx, my] = [(line[0] + line[2]) / 2, (line[1] + line[3]) / 2], dx = onGrid(p[0] - mx), dy = onGrid(p[1] - my);
+  if (filled.wall >= 0) return cutDoor(filled.level, filled.wall, p, length(line), kept, exact ? 1e-4 : GRID_M);
+  const [mx, my] = [(line[0] + line[2]) / 2, (line[1] + line[3]) / 2], [dx, dy] = [p[0] - mx, p[1] - my].map(exact ? round : onGrid);
   return { ...filled.level, doors: [...filled.level.doors, { ...kept, line: [line[0] + dx, line[1] + dy, line[2] + dx, line[3] + dy].map(round) }] };
 }
 
@@ -193,8 +193,9 @@ export function scaled(picture, a, b, metres) {
   return { x: a[0] + (picture.x - a[0]) * factor, y: a[1] + (picture.y - a[1]) * factor, perPx: picture.perPx * factor };
 }
 
-export function box(level, picture) {
-  const xs = [], ys = [];
+// The bounds of a level, of a picture and of other points.
+export function box(level, picture, points = []) {
+  const xs = points.map(([x]) => x), ys = points.map(([, y]) => y);
   for (const row of [...level.walls, ...(level.windows ?? []), ...(level.doors ?? []).map((d) => d.line)]) { xs.push(row[0], row[2]); ys.push(row[1], row[3]); }
   if (picture) { xs.push(picture.x, picture.x + picture.width * picture.perPx); ys.push(picture.y, picture.y + picture.height * picture.perPx); }
   const least = (v) => v.reduce((a, b) => Math.min(a, b)), most = (v) => v.reduce((a, b) => Math.max(a, b));

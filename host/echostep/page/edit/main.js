@@ -2,35 +2,25 @@
 // The plan editor: loads the plan and the picture, connects sheet, tools, view and buttons, saves. A *level* is an index into the plan's levels.
 
 import { Asking } from './asking.js';
+import { ask, askConnector, isOpen } from './dialogs.js';
 import { box } from './geometry.js';
 import { paint } from './paint.js';
 import { Pointer } from './pointer.js';
+import { outlined } from './shapes.js';
 import { Sheet } from './sheet.js';
 import { startTheme } from './theme.js';
 import { Tools } from './tools.js';
 import { View } from './view.js';
+import { HINTS, WORDS } from './words.js';
 
 const byId = (id) => document.getElementById(id);
-const KEYS = { v: 'select', w: 'wall', d: 'door', x: 'erase', n: 'room', s: 'scale', o: 'origin' };
+const KEYS = { v: 'select', w: 'wall', d: 'door', x: 'erase', n: 'room', s: 'scale', o: 'origin', b: 'obstacle', t: 'stairs', l: 'lift', p: 'ramp', g: 'start' };
 const FIRST_WIDTH_M = 20; // of a picture without a scale
 const view = new View(), map = byId('map');
 let sheet, tools, asking, stamp, waiting = false;
 
 const say = (text) => { byId('status').textContent = text; };
 const wrong = (text) => { byId('wrong').textContent = text; };
-
-function ask(question, answer) {
-  byId('question').textContent = question;
-  byId('answer').value = answer;
-  byId('ask').showModal();
-  byId('answer').select();
-  return new Promise((resolve) => {
-    const end = (value) => { byId('ask').onclose = null; byId('ask').close(); map.focus(); resolve(value); };
-    byId('ask').querySelector('form').onsubmit = (e) => { e.preventDefault(); end(byId('answer').value); };
-    byId('no').onclick = () => end(null);
-    byId('ask').onclose = () => end(null);
-  });
-}
 
 function doorWidth() {
   const width = byId('width').valueAsNumber;
@@ -46,12 +36,12 @@ function changed() {
 function draw() {
   waiting = false;
   asking.paint();
-  paint({ shown: asking.current, level: tools.level, picture: tools.picture, view, chosen: tools.chosen, draft: tools.draft, measure: Boolean(tools.live), cross: tools.cross, points: tools.points });
+  paint(tools, view, asking.current);
   for (const button of document.querySelectorAll('[data-tool]')) button.setAttribute('aria-pressed', String(button.dataset.tool === tools.name));
   byId('step-back').disabled = !sheet.past.length;
   byId('step-forth').disabled = !sheet.future.length;
   byId('save').toggleAttribute('data-unsaved', sheet.unsaved);
-  byId('title').textContent = `${sheet.tree.name}${sheet.unsaved ? ' (not saved)' : ''}`;
+  byId('title').textContent = sheet.unsaved ? WORDS.unsaved(sheet.tree.name) : sheet.tree.name;
   const names = sheet.tree.levels.map((level) => level.name), options = byId('level');
   if (names.join('\n') !== [...options.options].map((o) => o.text).join('\n')) options.replaceChildren(...names.map((name, k) => new Option(name, k)));
   options.value = sheet.k;
@@ -59,7 +49,7 @@ function draw() {
 }
 
 function show() {
-  view.fit(box(sheet.level, sheet.picture));
+  view.fit(box(sheet.level, sheet.picture, outlined(sheet.tree, sheet.k).flatMap(({ outline }) => outline)));
   changed();
 }
 
@@ -67,18 +57,20 @@ function goLevel(level) {
   if (level < 0 || level >= sheet.tree.levels.length) return;
   tools.choose(tools.name);
   sheet.k = level;
-  say(`Level ${sheet.level.name}, ${sheet.level.height_m} m`);
+  say(WORDS.level(sheet.level.name, sheet.level.height_m));
   changed();
 }
 
 async function addLevel() {
-  const { levels } = sheet.tree, name = (await ask('Name of the new level', ''))?.trim();
+  const { levels } = sheet.tree, name = (await ask(WORDS.levelName, ''))?.trim();
   if (!name) return;
-  if (levels.some((level) => level.name === name)) { say(`There is a level ${name}`); return; }
-  const height = Number((await ask('Its height in metres above the ground', String(levels.at(-1).height_m + 3.5)))?.replace(',', '.') ?? NaN);
-  if (!(Math.abs(height) < 1e5)) { say('No level: its height is a number of metres'); return; }
-  sheet.change({ ...sheet.tree, levels: [...levels, { name, height_m: height, walls: [], rooms: [] }] });
-  goLevel(levels.length);
+  if (levels.some((level) => level.name === name)) { say(WORDS.levelExists(name)); return; }
+  const height = Number((await ask(WORDS.levelHeight, String(levels.at(-1).height_m + 3.5)))?.replace(',', '.') ?? NaN);
+  if (!(Math.abs(height) < 1e5)) { say(WORDS.noHeight); return; }
+  sheet.change({ ...sheet.tree, levels: [...levels, { name, height_m: height, walls: [], rooms: [] }] }, WORDS.levelAdded(name, height));
+  sheet.k = levels.length;
+  tools.choose(tools.name);
+  changed();
 }
 
 async function save(over = false) {
@@ -87,13 +79,13 @@ async function save(over = false) {
     const headers = { 'content-type': 'application/json', ...(over ? {} : { 'if-match': stamp }) };
     const answer = await fetch('plan', { method: 'POST', headers, body: JSON.stringify(tree), signal: AbortSignal.timeout(30000) });
     const reply = await answer.json().catch(() => ({}));
-    if (answer.status === 409 && confirm(`${reply.error}. Write over it? It stays as .bak.`)) { await save(true); return; }
-    if (!answer.ok) { wrong(`Not saved: ${reply.error ?? answer.status}`); return; }
+    if (answer.status === 409 && confirm(WORDS.writeOver(reply.error))) { await save(true); return; }
+    if (!answer.ok) { wrong(WORDS.notSaved(reply.error ?? answer.status)); return; }
     stamp = answer.headers.get('etag');
     sheet.saved = tree;
     wrong('');
-    say(`Saved ${reply.saved}`);
-  } catch { wrong('Not saved: echostep does not answer. Is it still running?'); }
+    say(WORDS.saved(reply.saved));
+  } catch { wrong(WORDS.noAnswer); }
   changed();
 }
 
@@ -107,24 +99,24 @@ function step(e, [dx, dy]) {
   const wide = [0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 25].find((m) => m * view.scale >= 8) ?? 50, by = e.shiftKey ? 0.05 : wide, [x, y] = tools.cross;
   tools.move([Math.round((x + dx * by) / 0.05) * 0.05, Math.round((y + dy * by) / 0.05) * 0.05]);
   view.keep(...tools.cross);
-  if (!tools.draft && !tools.live) say(`x ${tools.cross[0].toFixed(2)}, y ${tools.cross[1].toFixed(2)} m`);
+  if (!tools.draft && !tools.live) say(WORDS.cross(tools.cross));
 }
 
 function enter() {
   if (!tools.drags) tools.up(tools.cross, true);
   else if (tools.held) tools.up(tools.cross, false);
-  else say(tools.down(tools.cross) ? 'Picked up: arrows carry it, Enter puts it down' : 'Nothing here');
+  else say(tools.down(tools.cross) ? WORDS.pickedUp : WORDS.nothing);
 }
 
 function key(e) {
   const ctrl = e.ctrlKey || e.metaKey, name = e.key.length === 1 ? e.key.toLowerCase() : e.key;
-  if (byId('ask').open) return;
+  if (isOpen()) return;
   const always = ctrl && { s: save, z: () => turn(e.shiftKey ? 'redo' : 'undo'), y: () => turn('redo') }[name];
   if (always) { e.preventDefault(); always(); return; }
   if (ctrl || e.altKey || document.activeElement !== map) return;
   const done = {
     ArrowLeft: () => step(e, [-1, 0]), ArrowRight: () => step(e, [1, 0]), ArrowUp: () => step(e, [0, 1]), ArrowDown: () => step(e, [0, -1]),
-    Enter: enter, ' ': enter, Escape: () => { tools.stop(); say('Ended'); }, Delete: () => tools.chosen && tools.remove(tools.chosen), Backspace: () => tools.chosen && tools.remove(tools.chosen),
+    Enter: enter, ' ': enter, Escape: () => tools.end(), Delete: () => tools.chosen && tools.remove(tools.chosen), Backspace: () => tools.chosen && tools.remove(tools.chosen),
     '+': () => view.zoom(1.25), '=': () => view.zoom(1.25), '-': () => view.zoom(0.8), 0: show, a: () => asking.accept(), m: () => asking.place(), r: () => asking.reject(), q: () => asking.next(), PageUp: () => goLevel(sheet.k + 1), PageDown: () => goLevel(sheet.k - 1),
   }[name] ?? (KEYS[name] && (() => pick(KEYS[name])));
   if (!done) return;
@@ -132,11 +124,6 @@ function key(e) {
   done();
   changed();
 }
-
-const HINTS = {
-  select: 'Drag walls, ends of walls, doors and names', wall: 'Click from corner to corner, or drag; Escape or End ends a wall. Two fingers or the right button move the sheet', door: 'Click on a wall', erase: 'Click on an element to delete it',
-  room: 'Click into a room', scale: 'Click two points whose distance you know', origin: 'Drag the picture',
-};
 
 function pick(name) {
   tools.choose(name);
@@ -149,7 +136,7 @@ async function loadPicture(name) {
   if (answer.status !== 200) return;
   const image = new Image();
   image.src = URL.createObjectURL(await answer.blob());
-  try { await image.decode(); } catch { wrong('The browser cannot show this picture'); return; }
+  try { await image.decode(); } catch { wrong(WORDS.noShow); return; }
   const [width, height] = [image.naturalWidth || 1000, image.naturalHeight || 1000];
   byId('image').setAttribute('href', image.src);
   byId('image').setAttribute('width', width);
@@ -164,9 +151,9 @@ async function start() {
   const answer = await fetch('plan'), tree = await answer.json();
   if (!answer.ok) { wrong(tree.error); return; }
   stamp = answer.headers.get('etag');
-  sheet = new Sheet(tree);
+  sheet = new Sheet(tree, say);
   await loadPicture(tree.name);
-  tools = new Tools(sheet, view, { ask, say, changed, doorWidth, asked: (question) => asking.show(question, false), placed: (p) => asking.placed(p) });
+  tools = new Tools(sheet, view, { ask, askConnector: (kind, fields) => askConnector(kind, sheet.tree.levels.map((level) => level.name), fields), say, changed, doorWidth, asked: (question) => asking.show(question, false), placed: (p) => asking.placed(p) });
   asking = new Asking(sheet, view, tools, { say, changed });
   new Pointer(map, view, { down: (p) => tools.down(p), move: (p) => tools.move(p), up: (p, click) => tools.up(p, click), cancel: () => { tools.cancel(); changed(); }, moved: changed });
   new ResizeObserver(() => { view.resize(map.clientWidth, map.clientHeight); changed(); }).observe(map);
@@ -176,16 +163,16 @@ async function start() {
   document.addEventListener('keydown', key);
   for (const button of document.querySelectorAll('[data-tool]')) button.onclick = () => pick(button.dataset.tool);
   const clicks = {
-    end: () => { tools.stop(); changed(); }, add: addLevel, 'step-back': () => turn('undo'), 'step-forth': () => turn('redo'), whole: show, save: () => save(),
+    end: () => tools.end(), add: addLevel, 'step-back': () => turn('undo'), 'step-forth': () => turn('redo'), whole: show, save: () => save(),
     closer: () => { view.zoom(1.25); changed(); }, farther: () => { view.zoom(0.8); changed(); },
   };
   for (const [id, done] of Object.entries(clicks)) byId(id).onclick = done;
   byId('level').onchange = () => goLevel(Number(byId('level').value));
   startTheme(byId('look'), changed);
   addEventListener('beforeunload', (e) => { if (sheet.unsaved) e.preventDefault(); });
-  const asked = asking.open.length && `${asking.open.length} questions of the import are marked: answer them one by one, or Move, Door and Delete as you like`;
-  say(sheet.picture && !sheet.picture.set ? 'Set the scale first: Scale, then two points whose distance you know' : asked || HINTS.select);
+  const asked = asking.open.length && WORDS.questions(asking.open.length);
+  say(sheet.picture && !sheet.picture.set ? WORDS.scaleFirst : asked || HINTS.select);
   window.echostep = { view, sheet, tools, asking };
 }
 
-start().catch((error) => wrong(`Cannot start: ${error.message}`));
+start().catch((error) => wrong(WORDS.noStart(error.message)));

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The sheet in SVG. In: a level, the picture's position, the view, the selected element and the draft. Owns the SVG elements.
+// The sheet in SVG. In: the tools (plan, picture, selected element, draft), the view and the question that is shown. Owns the SVG elements.
 
 import { ends, length } from './geometry.js';
+import { middle, outlined, outlineOf, sides, size, startOn } from './shapes.js';
+import { KINDS, WORDS } from './words.js';
 
 const SVG = 'http://www.w3.org/2000/svg';
 const byId = (id) => document.getElementById(id);
@@ -29,28 +31,58 @@ function paintQuestions(questions, shown, view) {
   });
 }
 
-export function paint({ level, picture, view, chosen, shown, draft, measure, cross, points }) {
+// Symbol of the start: a disc with an arrow, 30 pixels long, where the wearer looks.
+function startMark({ x, y, heading_deg }, view, chosen) {
+  const made = document.createElementNS(SVG, 'path'), [sx, sy] = view.toScreen(x, y);
+  made.id = 'start';
+  made.setAttribute('d', 'M-6 0A6 6 0 1 0 6 0A6 6 0 1 0-6 0M6 0H30M22-6L30 0L22 6');
+  made.setAttribute('transform', `translate(${sx} ${sy}) rotate(${-heading_deg})`);
+  made.toggleAttribute('data-chosen', chosen);
+  return made;
+}
+
+// The elements that are outlines; names of stairs, lifts and ramps in their middle. Returns the names and the start.
+function paintShapes({ tree, sheet: { k }, chosen }, view) {
+  const rows = outlined(tree, k), closed = (kind) => rows.filter((row) => row.kind === kind).map(({ outline }) => `M${outline.map((p) => p.join(' ')).join('L')}Z`).join('');
+  byId('obstacles').setAttribute('d', closed('obstacle'));
+  byId('connectors').setAttribute('d', closed('connector'));
+  const names = rows.filter(({ way }) => way).map(({ outline, way, name }) => mark('text', view.toScreen(...middle(outline)), name || KINDS[way]));
+  return startOn(tree, k) ? [...names, startMark(tree.start, view, chosen?.kind === 'start')] : names;
+}
+
+// The segments of the selected element.
+function chosenRows({ tree, level, sheet: { k }, chosen }) {
+  if (!chosen) return [];
+  const { kind, of } = chosen;
+  if (kind === 'obstacle' || kind === 'connector' || of) return sides(outlineOf(tree, k, of ?? chosen));
+  return [{ wall: level.walls[chosen.k], end: level.walls[chosen.k], door: level.doors?.[chosen.k]?.line }[kind]].filter(Boolean);
+}
+
+// The length of what is drawn or moved, or the size of a rectangle: [text, position].
+function measured({ draft, box, live }, rows) {
+  if (box) return [WORDS.size(...size(box)), middle(box)];
+  const row = draft ?? (live && rows.length === 1 ? rows[0] : null);
+  return row && length(row) > 0 ? [WORDS.length(...ends(row)), middle(ends(row))] : ['', [0, 0]];
+}
+
+export function paint(tools, view, shown) {
+  const { level, picture, chosen, draft, box, chain, cross, points } = tools, doors = level.doors ?? [];
   byId('world').setAttribute('transform', `matrix(${view.matrix().join(' ')})`);
   const image = byId('image');
   image.toggleAttribute('hidden', !picture);
   if (picture) image.setAttribute('transform', `matrix(${picture.perPx} 0 0 ${-picture.perPx} ${picture.x} ${picture.y + picture.height * picture.perPx})`);
-  const doors = level.doors ?? [];
   byId('walls').setAttribute('d', path(level.walls));
   byId('windows').setAttribute('d', path(level.windows ?? []));
-  byId('obstacles').setAttribute('d', (level.obstacles ?? []).map((o) => `M${o.map((p) => p.join(' ')).join('L')}Z`).join(''));
   byId('doors').setAttribute('d', path(doors.map((door) => door.line)));
-  const row = chosen && { wall: level.walls[chosen.k], end: level.walls[chosen.k], door: doors[chosen.k]?.line }[chosen.kind];
-  byId('chosen').setAttribute('d', row ? path([row]) : '');
-  byId('draft').setAttribute('d', draft ? path([draft]) : '');
+  const rows = chosenRows(tools), drawn = chain?.corners ? sides(chain.corners).slice(0, -1) : [];
+  byId('chosen').setAttribute('d', path(rows));
+  byId('draft').setAttribute('d', path([...drawn, ...(box ? sides(box) : draft ? [draft] : [])]));
   const marks = (level.rooms ?? []).map((room, k) => mark('text', view.toScreen(...room.at), room.name, chosen?.kind === 'room' && chosen.k === k));
-  for (const p of [...(row ? ends(row) : []), ...points]) marks.push(mark('circle', view.toScreen(...p)));
-  byId('marks').replaceChildren(...marks, ...paintQuestions(level.questions ?? [], shown, view));
+  for (const p of [...rows.flatMap(ends), ...points]) marks.push(mark('circle', view.toScreen(...p)));
+  byId('marks').replaceChildren(...marks, ...paintShapes(tools, view), ...paintQuestions(level.questions ?? [], shown, view));
   byId('cross').setAttribute('transform', `translate(${view.toScreen(...cross).join(' ')})`);
-  const measured = draft ?? (measure ? row : null), text = byId('measure');
-  text.textContent = measured && length(measured) > 0 ? `${length(measured).toFixed(2)} m` : '';
-  if (measured) {
-    const [x, y] = view.toScreen((measured[0] + measured[2]) / 2, (measured[1] + measured[3]) / 2);
-    text.setAttribute('x', x);
-    text.setAttribute('y', y - 12);
-  }
+  const [text, at] = measured(tools, rows), [x, y] = view.toScreen(...at), label = byId('measure');
+  label.textContent = text;
+  label.setAttribute('x', x);
+  label.setAttribute('y', y - 12);
 }

@@ -1,31 +1,34 @@
 // SPDX-License-Identifier: MIT
-// The sheet: the plan and the picture's position, with undo and redo. Owns the history; every change makes a new tree.
+// The sheet: the plan and the picture's position, with undo and redo. Owns the history; every change makes a new tree and says in a sentence what it did.
 
 import { settled } from './questions.js';
+import { WORDS } from './words.js';
 
 const MOST_KEPT = 300; // changes that can be undone
 
 export class Sheet {
-  constructor(tree) { Object.assign(this, { tree, picture: null, k: 0, past: [], future: [], saved: tree }); }
+  constructor(tree, say) { Object.assign(this, { tree, say, picture: null, k: 0, past: [], future: [], saved: tree }); }
 
   get level() { return this.tree.levels[this.k]; }
   get unsaved() { return this.tree !== this.saved; }
 
-  change(tree, picture = this.picture) {
-    this.past.push([this.tree, this.picture]);
+  change(tree, words, picture = this.picture) {
+    this.past.push({ tree: this.tree, picture: this.picture, words });
     if (this.past.length > MOST_KEPT) this.past.shift();
-    [this.tree, this.picture, this.future] = [tree, picture, []];
+    Object.assign(this, { tree, picture, future: [] });
+    this.say(words);
   }
 
-  setLevel(level) { this.change({ ...this.tree, levels: this.tree.levels.with(this.k, settled(level)) }); }
+  setLevel(level, words) { this.change({ ...this.tree, levels: this.tree.levels.with(this.k, settled(level)) }, words); }
 
-  undo() { this.go(this.past, this.future); }
-  redo() { this.go(this.future, this.past); }
+  undo() { this.go(this.past, this.future, WORDS.undone); }
+  redo() { this.go(this.future, this.past, WORDS.redone); }
 
-  go(from, to) {
+  go(from, to, told) {
     if (!from.length) return;
-    to.push([this.tree, this.picture]);
-    [this.tree, this.picture] = from.pop();
-    this.k = Math.min(this.k, this.tree.levels.length - 1);
+    const { tree, picture, words } = from.pop();
+    to.push({ tree: this.tree, picture: this.picture, words });
+    Object.assign(this, { tree, picture, k: Math.min(this.k, tree.levels.length - 1) });
+    this.say(told(words));
   }
 }

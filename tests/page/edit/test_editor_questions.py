@@ -17,7 +17,7 @@ from echostep.plan.importers.summary import doors_in_gaps
 from echostep.plan.model import Plan, load_plan
 from echostep.plan.questions import with_questions
 from echostep.plan.writer import save_plan
-from page.test_editor import PICTURES, click, opened
+from page.edit.drawing import PICTURES, click, opened
 from plan.drawings.drawn_houses import DOOR, WALL, Gap, boxes, corners, leaf, loose
 
 LEFT_OUT = {"layer": "X-NEW"}

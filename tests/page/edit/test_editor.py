@@ -5,9 +5,6 @@ from __future__ import annotations
 
 import http.client
 import json
-import os
-import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -22,21 +19,10 @@ from echostep.page.editor import EditServer
 from echostep.plan.model import load_plan, parse_plan
 from echostep.plan.writer import plan_json, save_plan
 from page.browser import spot
-from waiting import PATIENCE_S, until
+from page.edit.drawing import PICTURES, click, drag, opened, saved
+from waiting import PATIENCE_S
 
 DEMO = ROOT / "host/echostep/plans/demo.json"
-PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
-PICTURE = (
-    '<svg xmlns="http://www.w3.org/2000/svg" width="400" height="300">'
-    '<rect x="50" y="50" width="300" height="200" fill="none" stroke="#888" stroke-width="8"/></svg>'
-)
-
-
-@pytest.fixture
-def served(tmp_path: Path) -> Iterator[EditServer]:
-    shutil.copy(DEMO, tmp_path / "plan.json")
-    with EditServer(tmp_path / "plan.json", port=0) as server:
-        yield server
 
 
 def asked(
@@ -154,34 +140,6 @@ def test_pictures_and_plans_that_are_none(tmp_path: Path) -> None:
         EditServer(tmp_path / "no/new.json", None, 0)
 
 
-@pytest.fixture
-def drawn(tmp_path: Path) -> Iterator[EditServer]:
-    (tmp_path / "picture.svg").write_text(PICTURE)
-    with EditServer(tmp_path / "new.json", tmp_path / "picture.svg", 0) as server:
-        yield server
-
-
-def opened(browser: Any, server: EditServer, **context: Any) -> Any:
-    page = browser.new_context(**({"viewport": {"width": 1200, "height": 760}} | context)).new_page()
-    page.set_default_timeout(1e3 * PATIENCE_S)
-    page.wrong = []
-    page.on("pageerror", lambda error: page.wrong.append(str(error)))
-    page.on("console", lambda said: page.wrong.append(said.text) if said.type == "error" else None)
-    page.goto(server.url)
-    assert until(lambda: page.evaluate("Boolean(window.echostep)")), page.wrong
-    return page
-
-
-def click(page: Any, x_m: float, y_m: float) -> None:
-    page.mouse.click(*spot(page, x_m, y_m))
-
-
-def saved(page: Any, server: EditServer) -> Any:
-    page.click("#save")
-    page.get_by_text("Saved new.json").wait_for()
-    return load_plan(server.file.path).levels[0]
-
-
 def test_two_walls_a_door_and_the_scale(browser: Any, drawn: EditServer) -> None:
     page = opened(browser, drawn)
     page.click('[data-tool="scale"]')  # 400 px are 20 m at first; the rectangle's upper side is 15 m
@@ -223,13 +181,6 @@ def test_two_walls_a_door_and_the_scale(browser: Any, drawn: EditServer) -> None
     assert sorted(level.walls.tolist()) == [[3.0, 7.0, 8.0, 7.0], [8.0, 7.0, 8.0, 11.0]]
     assert not page.wrong
     page.context.close()
-
-
-def drag(page: Any, begin: tuple[float, float], end: tuple[float, float], button: str = "left") -> None:
-    page.mouse.move(*spot(page, *begin))
-    page.mouse.down(button=button)
-    page.mouse.move(*spot(page, *end), steps=4)
-    page.mouse.up(button=button)
 
 
 def test_drawing_does_not_move_the_sheet_and_moving_it_draws_nothing(browser: Any, drawn: EditServer) -> None:

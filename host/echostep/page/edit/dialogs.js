@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// The editor's dialogs. In: a question. Out: a promise of the answer, null when it was cancelled. `map`: has the focus afterwards.
+
+import { WORDS } from './words.js';
+
+const byId = (id) => document.getElementById(id);
+
+// Shows a dialog until its form is sent with an answer that is not undefined, or until it is cancelled.
+function shown(dialog, answer) {
+  dialog.showModal();
+  return new Promise((resolve) => {
+    const end = (value) => { dialog.onclose = null; dialog.close(); byId('map').focus(); resolve(value); };
+    dialog.querySelector('form').onsubmit = (e) => { e.preventDefault(); const value = answer(); if (value !== undefined) end(value); };
+    dialog.querySelector('[type="button"]').onclick = () => end(null);
+    dialog.onclose = () => end(null);
+  });
+}
+
+export const isOpen = () => Boolean(document.querySelector('dialog[open]'));
+
+export function ask(question, answer) {
+  byId('question').textContent = question;
+  byId('answer').value = answer;
+  const done = shown(byId('ask'), () => byId('answer').value);
+  byId('answer').select();
+  return done;
+}
+
+// Name and levels of a connector; `names`: of all levels.
+export function askConnector(kind, names, { name, levels }) {
+  byId('ways-title').textContent = WORDS.connectorTitle(kind);
+  byId('ways-name').value = name;
+  byId('ways-few').textContent = '';
+  byId('ways-levels').replaceChildren(...names.map((text, k) => {
+    const label = document.createElement('label'), box = Object.assign(document.createElement('input'), { type: 'checkbox', value: k, checked: levels.includes(k) });
+    label.append(box, text);
+    return label;
+  }));
+  return shown(byId('ways'), () => {
+    const chosen = [...byId('ways-levels').querySelectorAll('input')].filter((box) => box.checked).map((box) => Number(box.value));
+    if (chosen.length > 1) return { name: byId('ways-name').value.trim(), levels: chosen };
+    byId('ways-few').textContent = WORDS.twoLevels;
+    return undefined;
+  });
+}

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: MIT
+"""The plan editor in a browser: open it, click and drag in metres of the plan, save.
+
+With ECHOSTEP_PICTURES=1 the pictures of the manual are made anew.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from board_runs import ROOT
+from echostep.page.editor import EditServer
+from echostep.plan.model import load_plan
+from page.browser import spot
+from waiting import PATIENCE_S, until
+
+PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
+
+
+def opened(browser: Any, server: EditServer, **context: Any) -> Any:
+    page = browser.new_context(**({"viewport": {"width": 1200, "height": 760}} | context)).new_page()
+    page.set_default_timeout(1e3 * PATIENCE_S)
+    page.wrong = []
+    page.on("pageerror", lambda error: page.wrong.append(str(error)))
+    page.on("console", lambda said: page.wrong.append(said.text) if said.type == "error" else None)
+    page.goto(server.url)
+    assert until(lambda: page.evaluate("Boolean(window.echostep)")), page.wrong
+    return page
+
+
+def click(page: Any, x_m: float, y_m: float) -> None:
+    page.mouse.click(*spot(page, x_m, y_m))
+
+
+def saved(page: Any, server: EditServer) -> Any:
+    page.click("#save")
+    page.get_by_text("Saved new.json").wait_for()
+    return load_plan(server.file.path).levels[0]
+
+
+def drag(page: Any, begin: tuple[float, float], end: tuple[float, float], button: str = "left") -> None:
+    page.mouse.move(*spot(page, *begin))
+    page.mouse.down(button=button)
+    page.mouse.move(*spot(page, *end), steps=4)
+    page.mouse.up(button=button)
