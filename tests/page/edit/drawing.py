@@ -44,3 +44,8 @@ def drag(page: Any, begin: tuple[float, float], end: tuple[float, float], button
     page.mouse.down(button=button)
     page.mouse.move(*spot(page, *end), steps=4)
     page.mouse.up(button=button)
+
+
+def status(page: Any) -> str:
+    """What the page says."""
+    return str(page.text_content("#status"))

@@ -4,12 +4,14 @@
 import { Asking } from './asking.js';
 import { ask, askConnector, isOpen } from './dialogs.js';
 import { box } from './geometry.js';
+import { paintGrid, squareOf } from './grid.js';
 import { paint } from './paint.js';
 import { Pointer } from './pointer.js';
 import { outlined } from './shapes.js';
 import { Sheet } from './sheet.js';
 import { startTheme } from './theme.js';
 import { Tools } from './tools.js';
+import { takesTyped, typed } from './typed.js';
 import { View } from './view.js';
 import { HINTS, WORDS } from './words.js';
 
@@ -36,7 +38,11 @@ function changed() {
 function draw() {
   waiting = false;
   asking.paint();
+  paintGrid(view);
   paint(tools, view, asking.current);
+  byId('door').hidden = tools.name !== 'door';
+  byId('typed').hidden = tools.name === 'door';
+  for (const field of byId('typed').elements) field.disabled = !takesTyped(tools);
   for (const button of document.querySelectorAll('[data-tool]')) button.setAttribute('aria-pressed', String(button.dataset.tool === tools.name));
   byId('step-back').disabled = !sheet.past.length;
   byId('step-forth').disabled = !sheet.future.length;
@@ -96,7 +102,7 @@ function turn(way) {
 }
 
 function step(e, [dx, dy]) {
-  const wide = [0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 25].find((m) => m * view.scale >= 8) ?? 50, by = e.shiftKey ? 0.05 : wide, [x, y] = tools.cross;
+  const by = e.shiftKey ? 0.05 : squareOf(view), [x, y] = tools.cross;
   tools.move([Math.round((x + dx * by) / 0.05) * 0.05, Math.round((y + dy * by) / 0.05) * 0.05]);
   view.keep(...tools.cross);
   if (!tools.draft && !tools.live) say(WORDS.cross(tools.cross));
@@ -106,6 +112,14 @@ function enter() {
   if (!tools.drags) tools.up(tools.cross, true);
   else if (tools.held) tools.up(tools.cross, false);
   else say(tools.down(tools.cross) ? WORDS.pickedUp : WORDS.nothing);
+}
+
+// Draws or moves by the typed length and angle.
+function go(e) {
+  e.preventDefault();
+  if (typed(tools, byId('length').value, byId('angle').value)) byId('typed').reset();
+  byId('length').focus();
+  changed();
 }
 
 function key(e) {
@@ -119,7 +133,10 @@ function key(e) {
     Enter: enter, ' ': enter, Escape: () => tools.end(), Delete: () => tools.chosen && tools.remove(tools.chosen), Backspace: () => tools.chosen && tools.remove(tools.chosen),
     '+': () => view.zoom(1.25), '=': () => view.zoom(1.25), '-': () => view.zoom(0.8), 0: show, a: () => asking.accept(), m: () => asking.place(), r: () => asking.reject(), q: () => asking.next(), PageUp: () => goLevel(sheet.k + 1), PageDown: () => goLevel(sheet.k - 1),
   }[name] ?? (KEYS[name] && (() => pick(KEYS[name])));
-  if (!done) return;
+  if (!done) {
+    if (/^[1-9.,]$/.test(name) && takesTyped(tools)) byId('length').focus(); // what is typed goes there
+    return;
+  }
   e.preventDefault();
   done();
   changed();
@@ -167,6 +184,8 @@ async function start() {
     closer: () => { view.zoom(1.25); changed(); }, farther: () => { view.zoom(0.8); changed(); },
   };
   for (const [id, done] of Object.entries(clicks)) byId(id).onclick = done;
+  byId('typed').onsubmit = go;
+  byId('typed').onkeydown = (e) => { if (e.key === 'Escape') map.focus(); };
   byId('level').onchange = () => goLevel(Number(byId('level').value));
   startTheme(byId('look'), changed);
   addEventListener('beforeunload', (e) => { if (sheet.unsaved) e.preventDefault(); });

@@ -7,7 +7,7 @@ const at = ([x, y]) => `x ${x.toFixed(2)}, y ${y.toFixed(2)} m`;
 const along = ([dx, dy]) => `${m(Math.hypot(dx, dy))}, ${deg(Math.atan2(dy, dx) * 180 / Math.PI)}`;
 
 export const KINDS = { wall: 'wall', end: 'corner', door: 'door', room: 'name', corner: 'corner', start: 'start', obstacle: 'obstacle', stairs: 'stairs', lift: 'lift', ramp: 'ramp' };
-const SNAPPED = { end: 'to a corner', wall: 'to a wall', 'right angle': 'at a right angle', grid: 'to the 5 cm grid' };
+const SNAPPED = { end: 'to a corner', wall: 'to a wall', 'right angle': 'at a right angle', grid: 'to the 5 cm grid', typed: 'as typed' };
 const capital = (text) => text[0].toUpperCase() + text.slice(1);
 
 const corners = (kind) => `Click the corners of the ${kind}, the first one last, or drag a rectangle`;
@@ -60,6 +60,8 @@ export const WORDS = {
   twoLevels: 'Choose two levels or more',
   noDirection: 'No direction: click farther away', noPicture: 'There is no picture to scale: start with --picture IMAGE',
   noScale: 'Scale unchanged: the distance is a number of metres',
+  badLength: (least, most) => `The length is a number of metres from ${least} to ${most}`, badAngle: 'The angle is a number of degrees, counter-clockwise from x',
+  needAngle: 'Type the angle too: degrees counter-clockwise from x', noFirst: 'First click where it begins', noChosen: 'First click on what is to be moved', noMove: 'Nothing changed: it does not fit there',
   levelExists: (name) => `There is a level ${name}`, noHeight: 'No level: its height is a number of metres',
   // questions of dialogs, and labels
   roomName: 'Name of the room', distance: 'Distance of the two points in metres', levelName: 'Name of the new level', levelHeight: 'Its height in metres above the ground',
