@@ -9,6 +9,7 @@ at once.
 
 from __future__ import annotations
 
+import logging
 import sys
 from typing import Annotated
 
@@ -68,6 +69,7 @@ def main() -> None:
     """Entry point: a mistake ends with one line and status 2; signals end a run after its files are written."""
     end_by_signals()
     tell_of_compiling()
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its cache lies, for a user without a home
     with to_people():
         status = _status()
         if not status and (lost := lost_result()):

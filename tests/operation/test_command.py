@@ -18,7 +18,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
-from command_line import PROGRAM
+from command_line import PROGRAM, echostep
 from operation.teams import ServedTeam, whole_team
 from team.network import box_to
 from team.team_broker import Broker, needs_broker
@@ -62,6 +62,14 @@ def test_the_command_serves_what_a_tracker_reports(tmp_path: Path) -> None:
         running.send_signal(signal.SIGINT)
         out, _ = running.communicate(timeout=PATIENCE_S)
     assert [member["name"] for member in json.loads(out)["members"]] == ["anna"]
+
+
+def test_the_table_in_a_file_ends_its_last_line(tmp_path: Path) -> None:
+    """What comes behind it, as an error, has a line of its own."""
+    nobody = "mqtt://127.0.0.1:9"  # the port `discard` [RFC 863]
+    done = echostep("command", nobody, "--plan", PLAN, "--seconds", 0.2, "--no-page", "--out", tmp_path / "o.mcap")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.endswith("no connection to the broker\n")
 
 
 def test_other_sites_cannot_open_the_socket_and_hostile_requests_do_nothing() -> None:

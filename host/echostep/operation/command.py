@@ -167,5 +167,7 @@ def _follow(run: _Run, page: TablePage | None, console: Console, seconds: float,
                     table_s = now_s
                     shown.update(drawn(console.height), refresh=True)
         finally:
-            if not views.as_json:
+            if draws:
                 shown.update(drawn(None))
+            elif not views.as_json:  # in a file the end of the live view would leave its last line open
+                console.print(drawn(None))
