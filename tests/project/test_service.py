@@ -175,7 +175,9 @@ def test_another_user_tracks_replays_and_looks_with_an_installation_that_only_ro
             "--port",
             str(free_port()),
         ]
-        run = subprocess.Popen(command, env=environment, cwd=out, stdout=printed, stderr=subprocess.STDOUT)
+        run = subprocess.Popen(
+            list(map(str, command)), env=environment, cwd=out, stdout=printed, stderr=subprocess.STDOUT
+        )
         try:
             assert until(lambda: "The page: " in log.read_text() or run.poll() is not None, 5.0 * PATIENCE_S)
             assert run.poll() is None, log.read_text()
