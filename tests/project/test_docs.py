@@ -302,7 +302,7 @@ def test_the_readme_says_what_it_is_before_its_commands() -> None:
         f"`{project['license']}`",
     ):
         assert words in first, words
-    for words in ("**For** ", "**Not built in hardware yet.**", "host/pictures/walk.webp"):
+    for words in ("**For** ", "**Not built in hardware yet.**", "host/pictures/page.webp"):
         assert words in first, words
 
 
