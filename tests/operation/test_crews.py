@@ -196,6 +196,7 @@ def test_a_commander_with_crews(browser: Any, monkeypatch: pytest.MonkeyPatch, t
         assert "inside 4:30, not asked yet, planned air 7:30 left: ask now" in page.inner_text(
             "#crew-list li:first-child"
         )
+        wait_for(page, "document.querySelector('#hint').hidden")
         shot(page, "crews", tmp_path)
         page.click("#crew-list li:first-child [data-does=check]")
         wait_for(page, f"{BUTTON} === 'Crews 2' && {LIST}.includes('answered 0:00 ago')")

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from operation.teams import TOWER, ServedTeam, place, whole_team
-from page.browser import PHONE, PICTURES, loaded_page, overflow, spot, wait_for
+from page.browser import PHONE, kept, loaded_page, overflow, spot, wait_for
 
 WIDE = {"viewport": {"width": 1280, "height": 720}}
 LOOKS: dict[str, dict[str, Any]] = {
@@ -28,7 +28,7 @@ def table(browser: Any, url: str, look: str) -> Any:
 
 
 def shot(page: Any, name: str, tmp_path: Path) -> None:
-    page.screenshot(path=(PICTURES or tmp_path) / f"table-{name}.png")
+    page.screenshot(path=kept(f"table-{name}.png", tmp_path))
 
 
 @pytest.mark.parametrize("look", LOOKS)

@@ -198,4 +198,15 @@ def wait_for(page: Any, holds: str) -> None:
 
 
 def picture(page: Any, name: str, tmp_path: Path) -> None:
-    page.screenshot(path=(PICTURES or tmp_path) / f"page-{name}.png")
+    page.screenshot(path=kept(f"page-{name}.png", tmp_path))
+
+
+@cache
+def manual() -> str:
+    """The text of the pages that show pictures."""
+    return "".join(path.read_text() for path in (ROOT / "host/docs").rglob("*.md"))
+
+
+def kept(name: str, tmp_path: Path) -> Path:
+    """Where a picture goes: to those of the manual when they are made anew and a page shows it."""
+    return (PICTURES if PICTURES and f"pictures/{name})" in manual() else tmp_path) / name
