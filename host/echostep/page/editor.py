@@ -32,7 +32,8 @@ from echostep.page.web.access import AccessControl
 from echostep.page.web.connections import Connections
 from echostep.page.web.gated_server import GatedServer
 from echostep.plan.model import Level, Plan, load_plan, parse_plan
-from echostep.plan.writer import plan_json
+from echostep.plan.two_points import parse_two_points
+from echostep.plan.writer import georeference_fields, plan_json
 from echostep.printing.lines import say
 
 PAGE = Path(__file__).parent / "edit"
@@ -143,6 +144,7 @@ class EditServer:
             Route("/picture", self._get_picture),
             Route("/plan", self._get_plan, methods=["GET"]),
             Route("/plan", self._post_plan, methods=["POST"]),
+            Route("/georeference", _post_two_points, methods=["POST"]),
         ]
         return Starlette(routes=[Mount(f"/{token}", routes=routes)])
 
@@ -170,13 +172,9 @@ class EditServer:
 
     async def _post_plan(self, request: Request) -> Response:
         """Write a posted plan, unless the file has changed since the page read it (If-Match)."""
-        try:
-            async with asyncio.timeout(POST_S):
-                raw = await _body(request)
-        except (TimeoutError, ClientDisconnect):
-            return _error(408, f"the plan did not arrive within {POST_S:.0f} s")
-        if raw is None:
-            return _error(413, f"larger than {MOST_BODY // 1_000_000} MB")
+        raw = await _body(request)
+        if isinstance(raw, Response):
+            return raw
         try:
             plan = parse_plan(raw)
         except ValueError as error:
@@ -191,13 +189,31 @@ class EditServer:
         return JSONResponse({"saved": self.file.path.name}, headers={"etag": f'"{state}"'})
 
 
-async def _body(request: Request) -> bytes | None:
-    """The body of a request; None when it is larger than `MOST_BODY`."""
+async def _post_two_points(request: Request) -> Response:
+    """The georeference of two posted points, and their distances; nothing is written."""
+    raw = await _body(request)
+    if isinstance(raw, Response):
+        return raw
+    try:
+        fit = await asyncio.to_thread(parse_two_points, raw)
+    except (ValueError, EchostepError) as error:
+        return _error(422, str(error))
+    return JSONResponse(
+        {"georeference": georeference_fields(fit.georeference), "plan_m": fit.plan_m, "earth_m": fit.earth_m}
+    )
+
+
+async def _body(request: Request) -> bytes | Response:
+    """The body of a request; an error when it is larger than `MOST_BODY` or takes longer than `POST_S`."""
     raw = bytearray()
-    async for part in request.stream():
-        raw += part
-        if len(raw) > MOST_BODY:
-            return None
+    try:
+        async with asyncio.timeout(POST_S):
+            async for part in request.stream():
+                raw += part
+                if len(raw) > MOST_BODY:
+                    return _error(413, f"larger than {MOST_BODY // 1_000_000} MB")
+    except (TimeoutError, ClientDisconnect):
+        return _error(408, f"the request did not arrive within {POST_S:.0f} s")
     return bytes(raw)
 
 

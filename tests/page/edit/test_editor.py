@@ -81,6 +81,28 @@ def test_what_is_no_plan_is_refused_by_its_field(served: EditServer, body: bytes
     assert [path.name for path in served.file.path.parent.iterdir()] == ["plan.json"]
 
 
+def test_two_points_are_fitted_and_nothing_is_written(served: EditServer) -> None:
+    before = served.file.path.read_bytes()
+    point = {"x_m": 0, "y_m": 0, "longitude_deg": 11.5, "latitude_deg": 48.1}
+    points = [point, {"x_m": 0, "y_m": 11.1194, "longitude_deg": 11.5, "latitude_deg": 48.1001}]  # 1e-4 degrees north
+    status, raw, _ = asked(served, "georeference", json.dumps({"points": points}).encode())
+    fit = json.loads(raw)
+    assert (status, fit["plan_m"], fit["earth_m"]) == (200, 11.1194, pytest.approx(11.12, abs=0.01))
+    assert fit["georeference"]["origin"] == pytest.approx([11.5, 48.1], abs=1e-6)
+    assert fit["georeference"]["rotation_deg"] == pytest.approx(0.0, abs=1e-6)
+    for body, code, names in (
+        (json.dumps({"points": [point, point]}).encode(), 422, "0.00 m apart on the plan"),
+        (json.dumps({"points": [point]}).encode(), 422, "a list of two points"),
+        (b" " * (plan_edit.MOST_BODY + 1), 413, "larger"),
+    ):
+        status, raw, _ = asked(served, "georeference", body)
+        assert (status, names in json.loads(raw)["error"]) == (code, True), raw
+    assert (
+        asked(served, "georeference", json.dumps({"points": points}).encode(), origin="http://evil.example")[0] == 404
+    )
+    assert served.file.path.read_bytes() == before
+
+
 def test_other_sites_and_wrong_tokens_cannot_post(served: EditServer) -> None:
     before, body = served.file.path.read_bytes(), plan_json(load_plan(DEMO)).encode()
     assert asked(served, "plan", body, origin="http://evil.example")[0] == 404

@@ -11,7 +11,7 @@ import pytest
 
 from echostep.page.editor import EditServer
 from page.browser import spot, wait_for
-from page.edit.drawing import PICTURES, click, drag, opened, saved, status
+from page.edit.drawing import click, drag, opened, saved, status
 
 PHONES = {"upright": (360, 740), "sideways": (740, 360)}
 
@@ -41,7 +41,7 @@ def test_walls_by_typed_lengths_and_angles(browser: Any, drawn: EditServer, tmp_
     ):
         assert typed(page, length, angle) == words
     page.mouse.move(*spot(page, 5.0, 5.51))
-    page.screenshot(path=(PICTURES or tmp_path) / "plan-edit-typed.png")
+    page.screenshot(path=tmp_path / "typed.png")
     assert typed(page, "4.37") == "Wall 4.37 m, 180.0°, as typed"  # in the direction of the draft
     assert typed(page, "2.5", "270") == "Wall 2.50 m, 270.0°, as typed"  # closes: the wall ends
     assert page.evaluate("echostep.tools.chain") is None

@@ -18,10 +18,16 @@ function shown(dialog, answer) {
 
 export const isOpen = () => Boolean(document.querySelector('dialog[open]'));
 
-export function ask(question, answer) {
+// `refusal(text)`: why a text is no answer; empty where it is one.
+export function ask(question, answer, refusal = () => '') {
   byId('question').textContent = question;
   byId('answer').value = answer;
-  const done = shown(byId('ask'), () => byId('answer').value);
+  byId('ask-wrong').textContent = '';
+  const done = shown(byId('ask'), () => {
+    const text = byId('answer').value, reason = refusal(text);
+    byId('ask-wrong').textContent = reason;
+    return reason ? undefined : text;
+  });
   byId('answer').select();
   return done;
 }

@@ -3,6 +3,7 @@
 
 import { Asking } from './asking.js';
 import { ask, askConnector, isOpen } from './dialogs.js';
+import { paintNorth } from './earth.js';
 import { box } from './geometry.js';
 import { paintGrid, squareOf } from './grid.js';
 import { paint } from './paint.js';
@@ -16,7 +17,7 @@ import { View } from './view.js';
 import { HINTS, WORDS } from './words.js';
 
 const byId = (id) => document.getElementById(id);
-const KEYS = { v: 'select', w: 'wall', d: 'door', x: 'erase', n: 'room', s: 'scale', o: 'origin', b: 'obstacle', t: 'stairs', l: 'lift', p: 'ramp', g: 'start' };
+const KEYS = { v: 'select', w: 'wall', d: 'door', x: 'erase', n: 'room', s: 'scale', o: 'origin', b: 'obstacle', t: 'stairs', l: 'lift', p: 'ramp', g: 'start', e: 'earth' };
 const FIRST_WIDTH_M = 20; // of a picture without a scale
 const view = new View(), map = byId('map');
 let sheet, tools, asking, stamp, waiting = false;
@@ -39,6 +40,7 @@ function draw() {
   waiting = false;
   asking.paint();
   paintGrid(view);
+  paintNorth(sheet.tree);
   paint(tools, view, asking.current);
   byId('door').hidden = tools.name !== 'door';
   byId('typed').hidden = tools.name === 'door';

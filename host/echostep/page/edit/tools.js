@@ -2,6 +2,7 @@
 // The tools: what a press, a move and a click on the sheet do. In: positions in metres. Out: changes of the sheet. Owns the held element, the draft and the selection.
 
 import { cutDoor, distance, ends, fillDoor, foot, hit, moveDoor, moveJoints, moveWall, onGrid, round, same, scaled, snap } from './geometry.js';
+import { earthClick } from './earth.js';
 import { OUTLINES, endOutline, outlineClick, rectangle, startClick } from './outline.js';
 import { questionAt } from './questions.js';
 import { hitShape, isShape, kindOf, movedShape, outlineOf, removedShape, sameShape, sides } from './shapes.js';
@@ -11,9 +12,9 @@ const REACH_PX = 14;
 const BY_DRAG = ['wall', 'start', ...OUTLINES]; // tools that draw by a drag too
 
 export class Tools {
-  // `desk`: ask(question, answer) -> promise of a text or null, askConnector(kind, fields), say(text), changed(), doorWidth() in metres, asked(question), placed(position)
+  // `desk`: ask(question, answer, refusal) -> promise of a text or null, askConnector(kind, fields), say(text), changed(), doorWidth() in metres, asked(question), placed(position)
   constructor(sheet, view, desk) {
-    Object.assign(this, { sheet, view, desk, name: 'select', pressed: null, held: null, live: null, chosen: null, draft: null, box: null, chain: null, points: [], cross: [0, 0] });
+    Object.assign(this, { sheet, view, desk, name: 'select', pressed: null, held: null, live: null, chosen: null, draft: null, box: null, chain: null, points: [], known: [], cross: [0, 0] });
   }
 
   get reach() { return REACH_PX / this.view.scale; }
@@ -36,11 +37,11 @@ export class Tools {
   }
 
   // End a chain of walls, release the held element.
-  stop() { Object.assign(this, { pressed: null, held: null, live: null, draft: null, box: null, chain: null, points: [] }); }
+  stop() { Object.assign(this, { pressed: null, held: null, live: null, draft: null, box: null, chain: null, points: [], known: [] }); }
 
-  // A second finger moves the sheet: give up what this press began, but not a chain of walls from before.
+  // A second finger moves the sheet: give up what this press began, but not what earlier ones did.
   cancel() {
-    if (!this.chain || this.pressed?.began) this.stop();
+    if (this.pressed?.began) this.stop();
     else Object.assign(this, { pressed: null, held: null, live: null });
   }
 
@@ -76,6 +77,7 @@ export class Tools {
     } else if (held) this.live = { picture: { ...sheet.picture, x: sheet.picture.x + p[0] - held.from[0], y: sheet.picture.y + p[1] - held.from[1] } };
     else if (this.chain?.box) this.box = rectangle(this.chain.at, this.snapped(p).at);
     else if (this.chain) this.draft = [...this.chain.at, ...this.snapped(p).at];
+    else if (this.name === 'earth' && this.points.length) this.draft = [...this.points[0], ...this.snapped(p).at];
     else if (this.name === 'scale' && this.points.length) this.draft = [...this.points[0], ...p];
     this.desk.changed();
   }
@@ -158,6 +160,7 @@ export class Tools {
   lift(p) { outlineClick(this, p); }
   ramp(p) { outlineClick(this, p); }
   start(p) { startClick(this, p); }
+  earth(p) { earthClick(this, p); }
 
   door(p) {
     const { sheet } = this, width = this.desk.doorWidth();

@@ -6,6 +6,8 @@ const deg = (degrees) => `${(((degrees % 360) + 360) % 360).toFixed(1).replace('
 const at = ([x, y]) => `x ${x.toFixed(2)}, y ${y.toFixed(2)} m`;
 const along = ([dx, dy]) => `${m(Math.hypot(dx, dy))}, ${deg(Math.atan2(dy, dx) * 180 / Math.PI)}`;
 
+const percent = (share) => (Math.abs(share) < 5e-4 ? 'the same' : `${Math.abs(100 * share).toFixed(1)} % ${share > 0 ? 'longer' : 'shorter'}`);
+
 export const KINDS = { wall: 'wall', end: 'corner', door: 'door', room: 'name', corner: 'corner', start: 'start', obstacle: 'obstacle', stairs: 'stairs', lift: 'lift', ramp: 'ramp' };
 const SNAPPED = { end: 'to a corner', wall: 'to a wall', 'right angle': 'at a right angle', grid: 'to the 5 cm grid', typed: 'as typed' };
 const capital = (text) => text[0].toUpperCase() + text.slice(1);
@@ -16,6 +18,7 @@ export const HINTS = {
   select: 'Drag walls, corners, doors, names, outlines and the start', wall: 'Click from corner to corner, or drag; End ends a wall. Two fingers or the right button move the sheet', door: 'Click on a wall',
   erase: 'Click on an element to delete it', room: 'Click into a room', obstacle: corners('obstacle'), stairs: corners('stairs'), lift: corners('lift'), ramp: corners('ramp'),
   start: 'Click where walks begin, then where the wearer looks; or drag', scale: 'Click two points whose distance you know', origin: 'Drag the picture',
+  earth: 'Click a point that you find on a map too, such as a corner of the building; then a second one far from it',
 };
 
 export const WORDS = {
@@ -30,6 +33,7 @@ export const WORDS = {
   deleted: (kind) => `Deleted the ${KINDS[kind]}`,
   pictureMoved: (by) => `Moved the picture by ${along(by)}`,
   scaled: (perPx) => `Scale: ${perPx} m a pixel`,
+  georeference: (bearing, plan, earth) => `Georeference: y points ${deg(bearing)} from north; ${m(plan)} here are ${m(earth)} on Earth, ${percent(earth / plan - 1)}`,
   levelAdded: (name, height) => `Level ${name} at ${m(height)}`,
   answered: { kept: 'Kept', added: 'Added', dropped: 'Dropped', deleted: 'Deleted', moved: 'Moved' },
   lastAnswer: (words) => `${words}. No question is left: Save`,
@@ -41,6 +45,8 @@ export const WORDS = {
   corner: (count, place) => `Corner ${count} at ${at(place)}`,
   looks: (place) => `Start at ${at(place)}: now click where the wearer looks`,
   wallEnded: 'Wall ended', ended: 'Ended', pickedUp: 'Picked up: arrows carry it, Enter puts it down',
+  firstPoint: (latitude, longitude) => `First point ${latitude.toFixed(6)}°, ${longitude.toFixed(6)}°: now click the second one, far from it`,
+  north: (bearing) => `north; y points ${deg(bearing)}`,
   second: 'Now the second point',
   cross: at,
   level: (name, height) => `Level ${name}, ${height} m`,
@@ -59,11 +65,14 @@ export const WORDS = {
   oneLevel: (kind) => `${capital(KINDS[kind])} join two levels or more: add the other one first (+ Level)`,
   twoLevels: 'Choose two levels or more',
   noDirection: 'No direction: click farther away', noPicture: 'There is no picture to scale: start with --picture IMAGE',
+  noGeoreference: (reason) => `No georeference: ${reason}. Click both points again`, silent: 'echostep does not answer, is it still running?',
+  noDegrees: 'Not latitude, then longitude. Like 48.137154, 11.576124, or 48°08\'13.8"N 11°34\'34.0"E, or the link of a map',
   noScale: 'Scale unchanged: the distance is a number of metres',
   badLength: (least, most) => `The length is a number of metres from ${least} to ${most}`, badAngle: 'The angle is a number of degrees, counter-clockwise from x',
   needAngle: 'Type the angle too: degrees counter-clockwise from x', noFirst: 'First click where it begins', noChosen: 'First click on what is to be moved', noMove: 'Nothing changed: it does not fit there',
   levelExists: (name) => `There is a level ${name}`, noHeight: 'No level: its height is a number of metres',
   // questions of dialogs, and labels
+  degrees: (k) => `Latitude, longitude of point ${k}, typed or pasted from a map`,
   roomName: 'Name of the room', distance: 'Distance of the two points in metres', levelName: 'Name of the new level', levelHeight: 'Its height in metres above the ground',
   connectorTitle: (kind) => capital(KINDS[kind]),
   add: 'Add', keep: 'Keep', drop: 'Drop', remove: 'Delete',
