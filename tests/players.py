@@ -6,16 +6,19 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import signal
+import subprocess
 import threading
 import time
 import tty
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from board_runs import quiet_rows
+from board_runs import quiet_rows, tool
 from echostep.simulation.devices.board import PythonBoard
 from twin.run import PtyBoard
 from waiting import PATIENCE_S
@@ -117,3 +120,17 @@ def twin_board(*faults: str, rows: Callable[[int], NDArray[Any]] = quiet_rows) -
             yield str(board.port)
     finally:
         board.close()
+
+
+@contextlib.contextmanager
+def walking_twin(folder: Path, *options: str) -> Iterator[tuple[str, str]]:
+    """A wearer who walks through the demo building: the ports of the board, real firmware in the simulator, and of a simulated MTx."""
+    command = [*tool("twin.run"), *options, "--out", str(folder)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
+        try:
+            assert running.stdout is not None
+            board, mtx = (running.stdout.readline().split()[1] for _ in range(2))
+            yield board, mtx
+        finally:
+            running.send_signal(signal.SIGINT)
+            running.wait(timeout=PATIENCE_S)

@@ -4,40 +4,23 @@
 from __future__ import annotations
 
 import re
-import signal
-import subprocess
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
-from board_runs import ROOT, needs_twin, tool
+from board_runs import ROOT, needs_twin
 from bridges import bridged
 from command_line import echostep, interrupt_after
 from echostep.recording.reading import open_recording
 from echostep.xsens import PROJECT
 from echostep_studies.simulation.devices.mtx_setup import MtxDevice
+from players import walking_twin
 from waiting import PATIENCE_S
 from xsens.mt_lines import on_a_terminal
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
 LEAST_BYTES = 12  # of a chunk on average: a message or two; single bytes took 10 s of a run of 25 s
 pytestmark = [pytest.mark.twin, needs_twin]
-
-
-@contextmanager
-def twin(folder: Path, *options: str) -> Iterator[tuple[str, str]]:
-    """The ports of the board, real firmware in the simulator, and of a simulated MTx."""
-    command = [*tool("twin.run"), *options, "--out", str(folder)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
-        try:
-            assert running.stdout is not None
-            board, mtx = (running.stdout.readline().split()[1] for _ in range(2))
-            yield board, mtx
-        finally:
-            running.send_signal(signal.SIGINT)
-            running.wait(timeout=PATIENCE_S)
 
 
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # in pyserial
@@ -47,7 +30,7 @@ def test_a_run_over_the_network_is_read_in_blocks_and_tracked(
 ) -> None:
     interrupt_after(10, monkeypatch)
     with (
-        twin(tmp_path) as (board_port, mtx_port),
+        walking_twin(tmp_path) as (board_port, mtx_port),
         bridged(board_port, scheme) as board,
         bridged(mtx_port, scheme) as mtx,
     ):
@@ -67,7 +50,7 @@ def test_a_wearer_who_stands_where_many_places_fit_is_named_in_none(
 ) -> None:
     monkeypatch.setattr("echostep.xsens.configuration.setup.TIMEOUT_S", 10.0)  # the device shares this process
     interrupt_after(10, monkeypatch)
-    with twin(tmp_path, "--still") as (board, _), on_a_terminal(MtxDevice(PROJECT)) as mtx:
+    with walking_twin(tmp_path, "--still") as (board, _), on_a_terminal(MtxDevice(PROJECT)) as mtx:
         done = echostep(
             "live", "--plan", PLAN, "--board", board, "--mtx", mtx, "--headless", "--start", "?", "--out", tmp_path,
             "--seconds", PATIENCE_S,

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import math
+import re
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,10 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from board_runs import needs_twin
+from command_line import echostep, interrupt_when
 from echostep.arrays import Floats
 from echostep.board.calibration import RangerSettings, ranges
 from echostep.board.messages import ROWS, Outcome
-from echostep.commands.actions.rangers import calibrate_rangers
+from echostep.commands.actions.rangers import PLAN_NEEDED, calibrate_rangers
 from echostep.commissioning.rangers.fit import BIAS, fit_ranger
 from echostep.commissioning.rangers.known_pings import KnownPings, known_pings
 from echostep.commissioning.rangers.poses import PosedPings
@@ -22,8 +26,10 @@ from echostep.commissioning.rangers.report import RangerReport, report
 from echostep.errors import EchostepError
 from echostep.localization.echoes.likelihood import EchoSettings
 from echostep.plan.model import load_plan
+from echostep.ports.chunks import BOARD, Chunk
 from echostep.printing.console import console_for_people
 from echostep.session.metadata import run_metadata
+from echostep.session.options import TrackingOptions
 from echostep.session.runs.recording import start_recording
 from echostep.settings import parse_settings
 from echostep.simulation.devices.board import PythonBoard
@@ -31,6 +37,8 @@ from echostep.simulation.scenario import demo_scenario
 from echostep.simulation.world.acoustics import PULSE_RANGER, SRF02, Acoustics
 from echostep.simulation.world.echoes import Echoes, echoes
 from echostep.walls.echo_sources import Walls
+from players import walking_twin
+from waiting import PATIENCE_S
 from walks import DEMO
 
 # A corridor 2 m wide with two rooms of 6 m x 4 m
@@ -204,7 +212,7 @@ def recorded(folder: Path) -> Path:
 def calibrated(walk: Path) -> str:
     """The settings that the command writes."""
     out = walk.parent / "rangers.toml"
-    calibrate_rangers([walk], DEMO, out, console_for_people(highlight=False))
+    calibrate_rangers([walk], TrackingOptions(DEMO), out, console_for_people(highlight=False))
     return out.read_text()
 
 
@@ -229,6 +237,31 @@ def test_swapped_rangers_of_a_recorded_walk_are_named(tmp_path: Path, monkeypatc
     assert not (tmp_path / "rangers.toml").exists()
 
 
-def test_a_recording_and_a_plan_are_asked_for(tmp_path: Path) -> None:
-    with pytest.raises(EchostepError, match="a recording and --plan are needed"):
-        calibrate_rangers([], None, tmp_path / "a.toml", console_for_people(highlight=False))
+def test_a_plan_is_asked_for(tmp_path: Path) -> None:
+    done = echostep("calibrate", "rangers", tmp_path / "walk.mcap")
+    assert done.returncode == 2
+    assert PLAN_NEEDED in " ".join(done.stderr.split())
+
+
+@pytest.mark.twin
+@pytest.mark.long
+@needs_twin
+@pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # in pyserial
+def test_a_wearer_who_walks_now_is_guided_recorded_and_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("echostep.commands.actions.rangers.GUIDED_S", 5 * PATIENCE_S)
+    of_board, out = Counter[str](), tmp_path / "rangers.toml"
+
+    def walked_enough(chunk: Chunk) -> bool:
+        """Half of the demo walk, however late the twin is."""
+        of_board[chunk.port] += len(chunk.data)
+        return of_board[BOARD] > 240_000
+
+    interrupt_when(walked_enough, monkeypatch)
+    with walking_twin(tmp_path) as (board, mtx):
+        done = echostep("calibrate", "rangers", "--plan", DEMO, "--board", board, "--mtx", mtx, "--out", out)
+    assert done.returncode == 0, done.stderr
+    assert "begin at the start that is marked on the plan" in " ".join(done.stdout.split())
+    assert (tmp_path / "rangers.mcap").exists()
+    assert len(re.findall(r"^(?:left|right): log-score of", done.stdout, re.MULTILINE)) == 2
+    if out.exists():
+        parse_settings(out.read_text(), "here")

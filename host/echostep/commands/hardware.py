@@ -6,11 +6,14 @@ In: the command's arguments and options. Out: findings, a flashed board, setting
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from echostep.commands.groups import Ports
+from echostep.errors import EchostepError
 from echostep.printing.lines import say
 
 app = typer.Typer()
@@ -72,7 +75,7 @@ def calibrate(
         list[str] | None,
         typer.Argument(
             help="gyros, mounting, compass, legs; without any, these four. accelerometers: of the parts on six sides. "
-            "rangers RECORDING: from a recorded walk on --plan."
+            "rangers: from a walk of a minute on --plan, or rangers RECORDING: from a recorded one."
         ),
     ] = None,
     board: Annotated[
@@ -81,7 +84,9 @@ def calibrate(
     foot: Annotated[
         str | None,
         typer.Option(
-            "--foot", metavar="PORT", help="Port of a foot board, for accelerometers; without it, it is searched for."
+            "--foot",
+            metavar="PORT",
+            help="Port of a foot board, for accelerometers and rangers; without it, it is searched for.",
         ),
     ] = None,
     out: Annotated[
@@ -95,16 +100,32 @@ def calibrate(
     plan: Annotated[
         Path | None, typer.Option("--plan", metavar="PLAN", help="Plan of the walk that calibrates the rangers.")
     ] = None,
+    mtx: Annotated[
+        str | None,
+        typer.Option("--mtx", metavar="PORT", help="Port of an MTx, for rangers; without it, it is searched for."),
+    ] = None,
 ) -> None:
     """Calibrate gyros, mounting, compass and legs, the accelerometers, or the rangers. Writes the results as settings."""
     if parts and parts[0] == "rangers":
-        from echostep.commands.actions.rangers import calibrate_rangers
-        from echostep.printing.console import console_for_people
-
-        calibrate_rangers([Path(p) for p in parts[1:]], plan, out, console_for_people(highlight=False))
+        _calibrate_rangers([Path(p) for p in parts[1:]], Ports(board, mtx, foot), plan, out)
         return
     from echostep.commissioning import calibrate as calibration
     from echostep.printing.console import console_for_people
 
     wearer = calibration.Wearer(thigh, shank, walked)
     calibration.calibrate(calibration.Ports(board, foot), parts or [], wearer, out, console_for_people(highlight=False))
+
+
+def _calibrate_rangers(recordings: list[Path], ports: Ports, plan: Path | None, out: Path) -> None:
+    """From recordings, or from a walk now, which is tracked with the settings that earlier calibrations wrote."""
+    from echostep.commands.actions import rangers
+    from echostep.printing.console import console_for_people
+    from echostep.session.options import TrackingOptions
+
+    if plan is None:
+        raise EchostepError(rangers.PLAN_NEEDED)
+    console, settings = console_for_people(highlight=False), None
+    if not recordings:
+        settings = out if out.exists() else None
+        recordings = [rangers.walk_now(replace(ports, seconds=rangers.GUIDED_S).options(), out.parent, console)]
+    rangers.calibrate_rangers(recordings, TrackingOptions(plan, settings_path=settings), out, console)

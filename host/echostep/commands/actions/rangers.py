@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`echostep calibrate rangers`: the wearer's own two rangers from a recorded walk on a plan.
+"""`echostep calibrate rangers`: the wearer's own two rangers from a walk on a plan, recorded before or now.
 
-In: a recording, a plan, a settings file. Out: findings and figures, settings. Owns the order: track, judge, write.
+In: a recording or ports, a plan, a settings file. Out: findings and figures, settings. Owns the instructions and the order: track, judge, write.
 """
 
 from __future__ import annotations
@@ -18,21 +18,29 @@ from echostep.errors import EchostepError
 from echostep.localization.echoes.rangers import echo_of
 from echostep.recording.parts.joining import open_parts
 from echostep.session.metadata import plan_of
-from echostep.session.options import TrackingOptions
+from echostep.session.options import PortOptions, TrackingOptions
+from echostep.session.runs.live import record
 from echostep.session.runs.replay import tracker_of
 from echostep.tracker import Tracker
 
 SURELY = 0.9  # share of the pings sent while `tracking`: of rangers that are swapped a search may find a place that looks alike; assumed
 NOTHING = "Nothing was written: mend it, and walk again."
-WALK = "walk for a minute along walls, round corners and past doors, from a start that is marked on the plan"
-RECORD = "echostep live --plan PLAN --record"
+GUIDED_S = 60.0  # 400 pings of each ranger
+GUIDE = (
+    "Rangers: begin at the start that is marked on the plan and walk for a minute: along a wall, once round on the spot in a corner, "
+    "stand for five seconds at an open door, and back along the other wall."
+)
+PLAN_NEEDED = "calibrate rangers: --plan is needed, that of the building where the wearer walks, with a marked start"
 
 
-def calibrate_rangers(paths: list[Path], plan_path: Path | None, out: Path, console: Console) -> None:
+def walk_now(ports: PortOptions, folder: Path, console: Console) -> Path:
+    """Record a minute during which the wearer walks as asked."""
+    console.print(GUIDE)
+    return record(ports, folder / "rangers.mcap")
+
+
+def calibrate_rangers(paths: list[Path], tracking: TrackingOptions, out: Path, console: Console) -> None:
     """Judge and fit the rangers of a walk; raises EchostepError where the walk cannot be used, or a ranger has a fault."""
-    if not paths or plan_path is None:
-        raise EchostepError(f"calibrate rangers: a recording and --plan are needed: {WALK}, with {RECORD} WALK.mcap")
-    tracking = TrackingOptions(plan_path)
     recording = open_parts(paths)
     tracker = tracker_of(recording, plan_of(tracking), tracking)
     pings = posed_pings(tracker, recording.portions())

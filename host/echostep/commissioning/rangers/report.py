@@ -61,7 +61,7 @@ def report(placed: PosedPings, walls: Walls, base: EchoSettings, recorded: Range
 def _unbelieved(placed: PosedPings) -> str:
     return (
         f"The place is known for {100 * placed.believed:.0f} % of the pings only: begin at a marked start, "
-        "on a plan that is the building's."
+        "on a plan that is the building's; echostep info tells what was received."
     )
 
 

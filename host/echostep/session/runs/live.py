@@ -85,8 +85,8 @@ def _last_start(folder: Path, plan: Plan, board: str, settings: Settings) -> Sta
     return start
 
 
-def record(ports: PortOptions, out: Path) -> None:
-    """Record the ports without tracking."""
+def record(ports: PortOptions, out: Path) -> Path:
+    """Record the ports without tracking; returns the recording's own name."""
     outlast_output()
     warm_up()
     byte_count: Counter[str] = Counter()
@@ -107,6 +107,7 @@ def record(ports: PortOptions, out: Path) -> None:
     foot = f"{byte_count[FOOT]} from the foot board" if ports.foot else f"{byte_count[MTX]} from the MTx"
     console.print(f"{recorder.path}: {byte_count[BOARD]} bytes from the board, {foot}{from_gateway}")
     recorder.check_whole()
+    return Path(recorder.path)
 
 
 def _passed(seconds: float | None) -> Callable[[], float | None]:
