@@ -81,14 +81,15 @@ def test_each_command_has_its_help(row: StudyCommand) -> None:
     assert all(f"--{option.name.replace('_', '-')}" in done.output for option in row.options)
 
 
-def test_the_help_lists_every_study_once_in_its_group_with_its_runs() -> None:
+def test_the_help_lists_every_study_once_in_its_group_with_its_runs_and_duration() -> None:
     done = CliRunner().invoke(app, ["evaluate", "--help"], env={"COLUMNS": "100"})
     assert [group for group in (PAPERS, OURS, REAL) if f"\n{group}:\n" not in done.output] == []
     listed = re.findall(r"^  (\w+)  +\S", done.output.partition(f"{PAPERS}:")[2], flags=re.M)
     assert listed == [row.name for group in (PAPERS, OURS, REAL) for row in STUDIES if row.group == group]
     assert sorted(listed) == sorted(row.name for row in STUDIES)
     words = " ".join(done.output.split())
-    assert "what they could not handle (simulated). 200 runs." in words
+    assert "what they could not handle (simulated). 200 runs: minutes." in words
+    assert "as an order of magnitude on two cores" in words
     assert all(row.described in words for row in STUDIES)
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from inspect import Parameter, Signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 import typer.core
@@ -23,7 +23,7 @@ PAPERS, OURS, REAL = "The papers' experiments, simulated", "Ours, simulated", "R
 
 
 class InGroups(typer.core.TyperGroup):
-    """Lists the studies in their groups, each with its whole help and its number of runs."""
+    """Lists the studies in their groups, each with its whole help, its number of runs, and how long they take."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 (called by typer)
         """Written by --help below the options."""
@@ -36,9 +36,12 @@ app = typer.Typer(
     cls=InGroups,
     no_args_is_help=True,
     help="The papers' experiments and ours, with figures and plots. "
-    "The number of runs is the default of --runs; a look takes --runs 2, and a bar shows the time that remains.",
+    "The number of runs is the default of --runs, and the duration is theirs, as an order of magnitude on two cores: of the processor time "
+    "of single runs in November 2026, without the minutes in which the kernels are compiled once. A look takes --runs 2, and a bar shows the "
+    "time that remains.",
 )
 
+Lasts = Literal["seconds", "minutes", "half an hour", "an hour", "hours"]
 Options = tuple[Parameter, ...]
 Given = dict[str, Any]  # values of the options by name
 
@@ -79,19 +82,23 @@ def _usual(name: str, runs: int, words: str, *own: Parameter) -> Options:
 
 @dataclass(frozen=True, slots=True)
 class StudyCommand:
-    """One row: `help`, the options in the order of --help, and what imports the study and makes it of a request and the options given."""
+    """One row: `help`, how long the default runs take, the options in the order of --help, and what makes the study of a request and the options.
+
+    The study is imported then.
+    """
 
     name: str
     group: str
     help: str
+    lasts: Lasts
     options: Options
     study: Callable[[StudyRequest, Given], Study[Any, Any]]
 
     @property
     def described(self) -> str:
-        """Its help, and how many runs it makes by default."""
-        runs = [option.default for option in self.options if option.name == "runs"]
-        return f"{self.help} {runs[0]} runs." if runs else self.help
+        """Its help, how many runs it makes by default, and how long they take."""
+        runs = [f"{option.default} runs: {self.lasts}" for option in self.options if option.name == "runs"]
+        return f"{self.help} {runs[0] if runs else self.lasts.capitalize()}."
 
 
 def _of(module: str) -> Any:
@@ -104,6 +111,7 @@ STUDIES = (
         "girard2011",
         PAPERS,
         "The 52 steps of Girard et al. 2011, their systems and ours, and what they could not handle (simulated).",
+        "minutes",
         _usual("girard2011", 200, "Walks to simulate."),
         lambda _request, _given: _of("girard2011.study").STUDY,
     ),
@@ -111,6 +119,7 @@ STUDIES = (
         "kits",
         OURS,
         "The 52 steps of Girard et al. 2011 with each kind of ranger and of foot (simulated; only SRF02 and MTx were ever worn).",
+        "minutes",
         _usual("kits", 100, "Walks to simulate."),
         lambda _request, _given: _of("girard2011.kits").STUDY,
     ),
@@ -118,6 +127,7 @@ STUDIES = (
         "echoes",
         OURS,
         "Echoes of simulated rangers, and how well the tracker's likelihood predicts them.",
+        "seconds",
         (
             SEED, JSON, _out("echoes"), _option("fit", bool, False, "Fit the likelihood's settings to simulated pings (minutes)."),
             _option("sweeps", Path | None, None, "Measured sweeps instead: walls.csv, and CSV files of pings by pose and bearing.", "DIR"),
@@ -128,6 +138,7 @@ STUDIES = (
         "incapacity",
         OURS,
         "Delay of the alarm for an incapacitated wearer, and rate of false alarms (simulated; recordings where they are).",
+        "an hour",
         (
             _runs(1000, "Wearers who cannot move."), _option("days", int, 5, "Working days of eight hours.", least=0), SEED, JSON,
             _data("Folder of the public recordings; without it $ECHOSTEP_DATA, or ../shared/data."),
@@ -138,6 +149,7 @@ STUDIES = (
         "lee2010",
         PAPERS,
         "The lap, the floors and the 3D track of Lee and Lee 2010, by their method and by ours (simulated).",
+        "minutes",
         _usual("lee2010", 100, "People to simulate."),
         lambda _request, _given: _of("lee2010.study").STUDY,
     ),
@@ -145,6 +157,7 @@ STUDIES = (
         "trails",
         PAPERS,
         "The trails of Fischer et al. 2008, by their dead reckoning and by ours (simulated).",
+        "minutes",
         _usual("trails", 10, "Walks of each trail, each by another person."),
         lambda _request, _given: _of("trails.study").STUDY,
     ),
@@ -152,6 +165,7 @@ STUDIES = (
         "legs",
         OURS,
         "Walks of 5 m by many simulated people, and what each fault of the sensors does; with --data, real legs against the feet.",
+        "seconds",
         _usual("legs", 100, "People to simulate.", _data("Real legs instead: folder of the public recordings.")),
         lambda _request, given: (
             _of("legs.recordings").recordings_study(given["data"]) if given["data"] else _of("legs.people").STUDY
@@ -161,6 +175,7 @@ STUDIES = (
         "gaits",
         OURS,
         "Walking, hurrying, crawling, sidestepping, stairs and ladders, by the foot alone and by one leg alone (simulated).",
+        "minutes",
         _usual("gaits", 20, "Courses in each manner."),
         lambda _request, _given: _of("gaits.study").STUDY,
     ),
@@ -168,6 +183,7 @@ STUDIES = (
         "floors",
         OURS,
         "Floors by pressure under weather, doors and fans, by stairs and lift (simulated).",
+        "minutes",
         _usual("floors", 50, "Runs of 20 minutes."),
         lambda _request, _given: _of("floors.study").STUDY,
     ),
@@ -175,6 +191,7 @@ STUDIES = (
         "storeys",
         OURS,
         "Walks through all floors of a building by stairs and lift (simulated).",
+        "half an hour",
         _usual("storeys", 10, "Walks through each building.", WESTPORT),
         lambda _request, given: _of("floors.storeys").storeys_study(given["data"]),
     ),
@@ -182,6 +199,7 @@ STUDIES = (
         "feet",
         REAL,
         "The foot on real recordings, one setting for all, beside the peers' figures.",
+        "minutes",
         (
             _data("Folder of the public recordings.", Parameter.empty), JSON,
             _option("out", Path | None, None, "Draw the tracks there.", "DIR"),
@@ -193,6 +211,7 @@ STUDIES = (
         "fischer2008",
         PAPERS,
         "The guided returns of Fischer et al. 2008: dead reckoning, their fusion and ours, and every sweep (simulated).",
+        "minutes",
         _usual("fischer2008", 1000, "Guided returns to simulate."),
         lambda request, _given: _of("fischer2008.study").fischer2008_study(request.runs, request.seed),
     ),
@@ -200,6 +219,7 @@ STUDIES = (
         "anywhere",
         OURS,
         "Wrong and unknown starts, kidnappings, wrong plans, poor echoes: found or not, and what is claimed (simulated).",
+        "an hour",
         _usual("anywhere", 200, "Walks of each row.", WESTPORT, _rows("kidnap/*", " Those of the peer: '*/amcl'.")),
         lambda _request, given: _of("anywhere.study").anywhere_study(given["data"], given["rows"]),
     ),
@@ -207,6 +227,7 @@ STUDIES = (
         "operation",
         OURS,
         "Three storeys in every manner of moving, a battery changed on the way, scored by ISO/IEC 18305 (simulated).",
+        "half an hour",
         _usual("operation", 10, "Operations of twenty minutes."),
         lambda _request, _given: _of("operation.study").operation_study(),
     ),
@@ -214,6 +235,7 @@ STUDIES = (
         "team",
         OURS,
         "Five wearers, one at a wrong start, each alone and told of its meetings by tap or radio range (simulated).",
+        "an hour",
         _usual("team", 10, "Teams of five wearers.", _rows("*/tap")),
         lambda _request, given: _of("team.study").team_study(given["rows"]),
     ),
@@ -221,6 +243,7 @@ STUDIES = (
         "clutter",
         REAL,
         "Laser scans of real buildings as pings: furniture, people and doors that the plan does not have.",
+        "half an hour",
         (
             _data("Folder of CARMEN logs: *.log, *.log.gz.", Parameter.empty),
             _option("starts", int, 50, "Unknown starts of each log.", least=0), SEED, JSON, _out("clutter"), SCHEDULER,
@@ -231,6 +254,7 @@ STUDIES = (
         "importers",
         REAL,
         "Drawings, models and maps of a folder, imported without options: time, sizes, counts, doors in gaps, enclosed rooms.",
+        "minutes",
         (_data("Folder of DXF, IFC, IMDF, OpenStreetMap, ROS or WRLD files, searched with its folders.", Parameter.empty), JSON),
         lambda _request, given: _of("importers.study").importers_study(given["data"]),
     ),
@@ -238,6 +262,7 @@ STUDIES = (
         "noplan",
         OURS,
         "Buildings drawn from a walk without a plan, beside FootSLAM; a second person on the drawing (simulated).",
+        "hours",
         _usual("noplan", 50, "Walks of each row.", WESTPORT, _rows("*/10min")),
         lambda request, given: _of("noplan.study").noplan_study(given["data"], given["rows"], request),
     ),
