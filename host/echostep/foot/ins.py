@@ -40,7 +40,7 @@ class Noise(NamedTuple):
     accel_share: float = 0.005  # of the acceleration: scale and alignment errors of a calibrated sensor
     gyro_share: float = 0.01  # of the rate
     change_share: float = 0.1  # of the force's change between two samples is lost, as in an impact
-    lever_m: float = 0.1  # sd of the lever arm from sensor to point of contact
+    lever_m: float = 0.07  # sd of the lever arm from sensor to point of contact
     rest_m_s: float = 0.005  # sd of a resting foot's velocity
     kept_s: float = 0.1  # correlation time of that velocity error: samples within it carry no more information
     flat_m: float = 0.01  # sd of a level floor's height from step to step
@@ -292,6 +292,22 @@ def _add_noise(
 @lean_kernel
 def update(nav: Nav, component: int, error: float, variance: float) -> None:
     """Scalar Kalman update: the error state `component` is measured as `error` with this variance; the correction goes into the state."""
+    row = nav.P[component]
+    share = error / (row[component] + variance)
+    for i in range(3):
+        nav.gyro_bias[i] += share * row[GYRO_BIAS + i]
+    _correct(nav, component, error, variance, SIZE)
+
+
+@lean_kernel
+def update_but_gyro_bias(nav: Nav, component: int, error: float, variance: float) -> None:
+    """The same, but gyro bias and its covariance keep their values: a Schmidt-Kalman update, whose cross-covariances are those of the full one."""
+    _correct(nav, component, error, variance, GYRO_BIAS)
+
+
+@lean_kernel
+def _correct(nav: Nav, component: int, error: float, variance: float, considered: int) -> None:
+    """A scalar update of all but the gyro bias; the covariance of the three states from `considered` on with each other stays (SIZE: of none)."""
     P = nav.P
     row = P[component]
     total = row[component] + variance
@@ -299,15 +315,16 @@ def update(nav: Nav, component: int, error: float, variance: float) -> None:
     for i in range(3):
         nav.position[i] += share * row[POS + i]
         nav.velocity[i] += share * row[VEL + i]
-        nav.gyro_bias[i] += share * row[GYRO_BIAS + i]
         nav.accel_bias[i] += share * row[ACCEL_BIAS + i]
     turned = turning(share * row[TILT], share * row[TILT + 1], share * row[TILT + 2])
     _set_attitude(nav, multiply(turned, nav.attitude))
     for k in range(1, SIZE + 1):
         i = (component + k) % SIZE  # the row itself last: the others need it as it was
         gain = row[i] / total
+        kept = considered <= i < considered + 3
         for j in range(SIZE):
-            P[i, j] -= gain * row[j]
+            if not (kept and considered <= j < considered + 3):
+                P[i, j] -= gain * row[j]
 
 
 @lean_kernel

@@ -26,12 +26,17 @@ UP = 2  # of the walk frame's axes
 RING = 64  # samples: 0.12 s at the highest rate, for the plateaus of `soft_limit`
 WINDOW_S = 0.03
 REST_RAD_S, REST_M_S2 = 1.6, 6.0  # rms over the window: `stillness_statistic` is 1 on the ellipse between them
+# A foot that swung faster stands less still, in proportion. Walking peaks at 5 to 8 rad/s; running beyond 10, and in its stances the foot turns by 2.
+CALM_SWING_RAD_S = 8.0
 CALM, STILL = 0.25, 0.03  # `stillness_statistic` of a standing foot, and of a foot at rest
 GATE = 16.8  # chi-square with six degrees of freedom (three velocities, three accelerations), 99 % quantile
 ROLL_M_S2 = 2.0  # acceleration of a sensor on a foot that rolls
 MOST_EXCESS = 1e3
 # Of a resting foot's force against gravity, with the bias of a sensor; a shuffling foot shows 1 to 4
 GRAVITY_ALONE_M_S2 = 1.0
+STEADY_M_S2 = (
+    2.0  # greatest change of that force while a foot rests, twice the above; a foot that glides brakes at 4 to 6 m/s2
+)
 # At most, of a foot that stands on a floor which accelerates: a lift takes up to 1.2 m/s2, and a standing person shifts.
 RIDING_RAD_S, RIDING_M_S2 = 0.15, 2.0
 LASTING_S = 0.15  # no swing is calm for so long: the stance is accepted, the velocity is corrected
@@ -140,10 +145,27 @@ def stillness_statistic(rate2: float, force2: float) -> float:
 
 
 @lean_kernel
-def rolling_velocity(nav: Nav, gyro: Floats, height_m: float) -> Vector:
-    """Velocity (3,) of a sensor at `height_m` above the contact of a foot that rolls without sliding: rate x height."""
-    rate = ins.apply(ins.rotation(nav.attitude), ins.difference(gyro, nav.gyro_bias))
-    return rate[1] * height_m, -rate[0] * height_m, 0.0
+def most_activity(swing_rad_s: float) -> float:
+    """Greatest `stillness_statistic` of a stance after a swing with this peak rate."""
+    return max(1.0, swing_rad_s / CALM_SWING_RAD_S) ** 2
+
+
+@lean_kernel
+def standing_velocity(nav: Nav, window: SampleWindow, height_m: float) -> Vector:
+    """Velocity (3,) that a sensor at `height_m` above the contact has now if its foot rolled without sliding in the middle of the window.
+
+    Rate x height at that sample, and what the accelerometer has added since: at the end of the window the heel may already rise.
+    """
+    newest, middle = window.added[0] - 1, _length(window) // 2
+    r = ins.rotation(nav.attitude)
+    rate = ins.apply(r, ins.difference(window.gyro[(newest - middle) % RING], nav.gyro_bias))
+    x, y, z = rate[1] * height_m, -rate[0] * height_m, 0.0
+    for k in range(middle):
+        slot = (newest - k) % RING
+        dt = window.t_s[slot] - window.t_s[(slot - 1) % RING]
+        f = ins.apply(r, ins.difference(window.accel[slot], nav.accel_bias))
+        x, y, z = x + dt * f[0], y + dt * f[1], z + dt * (f[2] - ins.GRAVITY_M_S2)
+    return x, y, z
 
 
 @lean_kernel
@@ -168,22 +190,25 @@ def normalized_innovation(nav: Nav, expected: Vector, variance: float, force: Ve
 
 @lean_kernel
 def rest_variance(nav: Nav, rate2: float) -> float:
-    """Variance (m/s)2 of a standing foot's velocity about `rolling_velocity`."""
+    """Variance (m/s)2 of a standing foot's velocity about rate x height."""
     return nav.noise.rest_m_s**2 + nav.noise.lever_m**2 * rate2
 
 
 @lean_kernel
 def deceleration_variance(force2: float) -> float:
-    """Additional variance (m/s)2 of a foot that may still decelerate: its acceleration over the window."""
-    return WINDOW_S**2 * force2
+    """Additional variance (m/s)2 of a foot that may still decelerate: its acceleration over half the window."""
+    return (0.5 * WINDOW_S) ** 2 * force2
 
 
 @lean_kernel
 def zero_velocity_update(nav: Nav, expected: Vector, variance: float, dt: float) -> None:
-    """Zero-velocity update; its variance is scaled so that the information per second does not depend on the sample rate."""
+    """Zero-velocity update; its variance is scaled so that the information per second does not depend on the sample rate.
+
+    The gyro bias keeps its value: how a foot rolls and creeps repeats itself at each step, and would be taken for a bias.
+    """
     repeated = max(1.0, nav.noise.kept_s / dt)  # samples with the same error
     for i in range(3):
-        ins.update(nav, VEL + i, expected[i] - nav.velocity[i], variance * repeated)
+        ins.update_but_gyro_bias(nav, VEL + i, expected[i] - nav.velocity[i], variance * repeated)
 
 
 @lean_kernel

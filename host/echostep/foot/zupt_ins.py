@@ -199,6 +199,8 @@ def _navigate(
     ins.propagate(nav, dt, s.period_s, s.force, accel, s.rate, gyro)
     _inflate_at_limits(s, nav, dt, accel, gyro)
     s.saturated += soft_limit.restore(nav, window, s.period_s, s.rate_peak)
+    if not s.in_stance:
+        s.swing_rad_s = max(s.swing_rad_s, math.sqrt(ins.dot(gyro, gyro)))
     if not _update_if_resting(s, nav, window, sample):
         stance.clear_rest(sums)
         s.rest_s = 0.0
@@ -231,13 +233,17 @@ def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Imu
     A rest against the gate is accepted if it lasts, or if no rest was accepted for long; then the covariance is inflated first. Where a foot has
     rested and is still, and all that contradicts it is vertical, the floor moves: a lift.
     """
-    dt, t_s, _, gyro = sample
+    dt, t_s = sample.dt, sample.t_s
     rate2, force2 = stance.activity(window, nav.gyro_bias)
     stillness = stance.stillness_statistic(rate2, force2)
-    s.lasting_s = s.lasting_s + dt if stillness < stance.CALM and stance.feels_gravity_alone(window) else 0.0
-    if stillness > 1.0:
+    _track_calm(s, nav, window, stillness, dt)
+    if stillness > stance.most_activity(s.swing_rad_s):
         return False
-    expected = stance.rolling_velocity(nav, gyro, s.height_m)
+    expected = stance.standing_velocity(nav, window, s.height_m)
+    if s.rest_s >= SETTLE_S and stance.may_ride(
+        rate2, force2
+    ):  # a floor that accelerates is noticed by the velocity of now
+        expected = (expected[0], expected[1], 0.0)
     variance = stance.rest_variance(nav, rate2)
     level, vertical = stance.normalized_innovation(nav, expected, variance, stance.mean_force(window))
     if s.rest_s >= SETTLE_S and level <= stance.GATE < level + vertical and stance.may_ride(rate2, force2):
@@ -253,6 +259,20 @@ def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Imu
         s.doubt_s = 0.0
     stance.zero_velocity_update(nav, expected, variance + stance.deceleration_variance(force2), dt)
     return True
+
+
+@lean_kernel
+def _track_calm(s: ZuptState, nav: Nav, window: SampleWindow, stillness: float, dt: float) -> None:
+    """Duration of the present calm, in which a foot feels gravity alone and from one direction: one that glides feels how it brakes."""
+    force = ins.apply(ins.rotation(nav.attitude), stance.mean_force(window))
+    if stillness >= stance.CALM or not stance.feels_gravity_alone(window):
+        s.lasting_s = 0.0
+        return
+    change = ins.difference(force, s.lasting_force)
+    if s.lasting_s == 0.0 or ins.dot(change, change) > stance.STEADY_M_S2**2:
+        s.lasting_force[0], s.lasting_force[1], s.lasting_force[2] = force
+        s.lasting_s = 0.0
+    s.lasting_s += dt
 
 
 @lean_kernel
@@ -328,6 +348,7 @@ def _end_stance(s: ZuptState, nav: Nav, compass: Magnetometer, events: Floats, e
     row[HEADING] = s.rest_yaw_rad
     s.stance_end_s = row[END_S]
     s.in_stance = 0
+    s.swing_rad_s = 0.0
     if not s.settled:
         _settle(s, nav)
     yaw = ins.heading(nav)

@@ -33,7 +33,8 @@ class ZuptState(Protocol):
     yaw_rad: float  # given to the attitude at levelling
     waited_s: float  # for levelling
     still_s: float
-    lasting_s: float
+    lasting_s: float  # of calm in which gravity alone is felt, from one direction
+    lasting_force: Floats  # specific force (walk frame) when it began
     doubt_s: float  # of rest against the innovation gate
     force_sum: Floats
     force_count: int
@@ -41,6 +42,7 @@ class ZuptState(Protocol):
     force_limit_s: Floats  # duration of each axis at its limit
     rate_limit_s: Floats
     rate_peak: Floats  # greatest rate of each axis
+    swing_rad_s: float  # greatest rate since the last stance
     rest_s: float
     rest_end_s: float
     rest_yaw_rad: float

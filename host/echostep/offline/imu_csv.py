@@ -19,7 +19,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.foot.steps import Track
+from echostep.foot.steps import Stance, Step, Track
 from echostep.offline.bursts import spread
 from echostep.offline.csv_table import CsvLimits, column_of, lines_of, number_of, open_samples, read_rows
 from echostep.offline.foreign_columns import ADVICE, OWN, Naming, read_header
@@ -28,6 +28,7 @@ from echostep.printing.file_mode import claim
 
 COLUMNS = ("t_s", "ax", "ay", "az", "gx", "gy", "gz")
 MAG_COLUMNS = ("mx", "my", "mz")
+RUN_STANCE_S = 0.12  # assumed; a walking foot is still for 0.2 to 0.5 s, a running one for 0.04 to 0.1 s
 TRACK_COLUMNS = ("t_s", "x", "y", "z", "heading_rad", "stance")
 
 
@@ -101,6 +102,19 @@ def write_foot_track(path: Path | str, track: Track) -> None:
         raise EchostepError(f"{path}: cannot write the track: {error.strerror}") from error
 
 
+def _describe_runs(track: Track) -> str:
+    """The steps that ended in a stance too brief for walking, and how well such a step is known, in words; empty without any."""
+    brief = [
+        math.sqrt(float(step.covariance[0, 0] + step.covariance[1, 1]))
+        for step, after in zip(track.events, track.events[1:], strict=False)
+        if isinstance(step, Step) and isinstance(after, Stance) and after.t_end_s - after.t_start_s < RUN_STANCE_S
+    ]
+    if not brief:
+        return ""
+    times = "once" if len(brief) == 1 else f"{len(brief)} times"
+    return f"; {times} the foot stood for less than {RUN_STANCE_S} s, as in a run: such a step is known to {max(brief):.2f} m (1 sd)"
+
+
 def describe_track(track: Track) -> str:
     """Distance, distance from start to end with its standard deviation, steps and skipped samples, in words."""
     steps = track.steps
@@ -110,7 +124,8 @@ def describe_track(track: Track) -> str:
     toe = "" if track.toe_known else "; the toe's direction is not known, heading_rad counts from the first rest"
     trusted, read = track.compass
     compass = f"; magnetometer trusted in {trusted} of {read} stances" if read else ""
+    runs = _describe_runs(track)
     return (
         f"{len(steps)} steps, {distance:.2f} m; the end is {np.hypot(end[0], end[1]):.2f} m from the beginning and {end[2]:+.2f} m in height, "
-        f"known to {end_sd_m(track):.2f} m (1 sd); {track.counts.samples} samples, {lost} skipped, {track.counts.gaps} gaps{compass}{toe}"
+        f"known to {end_sd_m(track):.2f} m (1 sd); {track.counts.samples} samples, {lost} skipped, {track.counts.gaps} gaps{runs}{compass}{toe}"
     )

@@ -67,8 +67,10 @@ def mocap(
 def mocap_3d(track: Track, *, t_s: Floats, truth_m: Floats) -> list[FootFigure]:
     """Against motion capture truth_m (n, 3), z up, at every t_s (n,); heights are compared about their means."""
     error = track.position_m[:, 2] - truth_m[:, 2]
+    xy, moving = places(track, t_s), ~_frozen(truth_m[:, :2])
     return [
-        FootFigure("2D RMSE", rmse(places(track, t_s), truth_m[:, :2])),
+        FootFigure("2D RMSE", rmse(xy, truth_m[:, :2])),
+        FootFigure("2D RMSE where the truth moves", rmse(xy[moving], truth_m[moving, :2])),
         FootFigure("height RMSE", float(np.std(error))),
         FootFigure("height at the end", float(error[-1] - error[0])),
     ]

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""What a standing foot tells its filter: twins of the kernels, a glide that is no rest, real feet in a hurry."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from echostep.arrays import Floats
+from echostep.foot import ins, stance
+from echostep.foot.steps import FootCounts, Stance, Step, Track, walk_track
+from echostep.offline.imu_csv import describe_track
+from echostep_studies.bench.recordings.feet import SETS
+from echostep_studies.frame.recordings import DATA, recordings_in
+from foot.test_foot import copied, errors_between, some_nav
+from needs_data import needs_data
+
+HEIGHT_M = 0.08
+
+
+def test_velocity_of_a_standing_foot_agrees_with_its_twin() -> None:
+    """Rate x height in the middle of the window, and the acceleration since."""
+    rng = np.random.default_rng(1)
+    nav, window = some_nav(rng), stance.new_window()
+    t = np.arange(20) * 0.005
+    accel, gyro = rng.standard_normal((20, 3)), rng.standard_normal((20, 3))
+    for sample in zip(t, accel, gyro, strict=True):
+        stance.add_sample(window, *sample)
+    r = np.array(ins.rotation(nav.attitude))
+    up = np.array([0.0, 0.0, 1.0])
+    in_window = t > t[-1] - stance.WINDOW_S - 1e-6
+    middle = len(t) - 1 - int(in_window.sum()) // 2
+    since = (accel[middle + 1 :] - nav.accel_bias) @ r.T - 9.81 * up
+    expected = np.cross(r @ (gyro[middle] - nav.gyro_bias), HEIGHT_M * up) + 0.005 * since.sum(0)
+    assert stance.standing_velocity(nav, window, HEIGHT_M) == pytest.approx(expected, abs=1e-9)
+
+
+def test_update_but_the_gyro_bias_agrees_with_the_textbook() -> None:
+    """The gain of the bias is zero; the covariance that follows from any gain, optimal or not, is Joseph's."""
+    rng = np.random.default_rng(5)
+    bias = slice(ins.GYRO_BIAS, ins.GYRO_BIAS + 3)
+    for at in range(ins.VEL, ins.VEL + 3):
+        nav = some_nav(rng)
+        before = copied(nav)
+        error, variance = 1e-3 * float(rng.standard_normal()), 0.3
+        ins.update_but_gyro_bias(nav, at, error, variance)
+        h = np.eye(ins.SIZE)[at : at + 1]
+        gain = before.P @ h.T / (h @ before.P @ h.T + variance)
+        gain[bias] = 0.0
+        joseph = np.eye(ins.SIZE) - gain @ h
+        assert pytest.approx(joseph @ before.P @ joseph.T + variance * gain @ gain.T, abs=1e-9) == nav.P
+        assert errors_between(before, nav) == pytest.approx((gain * error)[:15, 0], rel=1e-4, abs=1e-9)
+
+
+def test_a_glide_is_no_rest() -> None:
+    """A shuffling foot is calm for long, and its force has gravity's size; but it leans forward, then back."""
+    t = np.arange(600) / 200.0
+    along = np.interp(t, [1.0, 1.1, 1.5, 1.6], [0.0, 4.0, -4.0, 0.0])
+    shaken = np.where((t > 1.0) & (t < 1.1), 8.0 * (-1.0) ** np.arange(len(t)), 0.0)
+    accel = np.column_stack([along, 0.0 * t, ins.GRAVITY_M_S2 + shaken])
+    track = walk_track(t, accel, np.zeros((len(t), 3)))
+    moved_m = float(np.cumsum(along).sum() / 200.0**2)
+    assert track.position_m[-1, 0] == pytest.approx(moved_m, rel=0.1)
+
+
+def test_a_quick_foot_may_stand_less_still() -> None:
+    assert stance.most_activity(0.0) == stance.most_activity(stance.CALM_SWING_RAD_S) == 1.0
+    assert stance.most_activity(2.0 * stance.CALM_SWING_RAD_S) == 4.0
+
+
+@pytest.mark.parametrize(("stood_s", "said"), [(0.08, "; once the foot"), (0.3, "0 gaps;")])
+def test_a_run_is_said_to_be_one(stood_s: float, said: str) -> None:
+    events = [Step(1.0, 1.6, (1.5, 0.0, 0.0), 0.09**2 * np.eye(3), 0.0, 0.01), Stance(1.6, 1.6 + stood_s, 0.0)]
+    flags = np.zeros(2, bool)
+    track = Track(np.zeros(2), np.zeros((2, 3)), np.zeros(2), flags, list(events), FootCounts(2, 0, 0, 0, 0, 0))
+    assert said in describe_track(track)
+
+
+@pytest.mark.long
+@needs_data()
+def test_feet_in_a_hurry_are_no_further_off_than_they_say() -> None:
+    """Four trials with motion capture: 2D within 0.15 m, heights within 0.05 m, lengths of strides within their deviation."""
+    recordings = [recording for recording in recordings_in(DATA, SETS) if recording.group == "vicon_more"]
+    assert len(recordings) >= 4
+    for recording in recordings:
+        track = walk_track(recording.t_s, recording.accel, recording.gyro)
+        figures = {figure.metric: figure.value for figure in recording.judge(track)}
+        assert figures["2D RMSE where the truth moves"] < 0.15, recording.name
+        assert figures["height RMSE"] < 0.05, recording.name
+        assert recording.truth_m is not None
+        assert 0.5 < _normalized(track.steps, track.position_m[:, :2], recording.truth_m, recording.t_s) < 1.6
+
+
+def _normalized(steps: list[Step], track_m: Floats, truth_m: Floats, t_s: Floats) -> float:
+    """Root mean square of the error of a stride's length, from lift-off to lift-off, over its standard deviation."""
+    leaves = [*np.searchsorted(t_s, [step.t_start_s for step in steps]).tolist(), len(t_s) - 1]
+    ratios = []
+    for step, a, b in zip(steps, leaves, leaves[1:], strict=False):
+        moved, truly = track_m[b] - track_m[a], truth_m[b] - truth_m[a]
+        along = moved / math.hypot(*moved)
+        sd = math.sqrt(float(along @ step.covariance[:2, :2] @ along))
+        ratios.append((math.hypot(*moved) - math.hypot(*truly)) / sd)
+    return float(np.sqrt(np.mean(np.square(ratios))))
