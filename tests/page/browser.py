@@ -43,7 +43,7 @@ SETTLED = """(() => {
     return Math.abs(view.width - map.clientWidth) < 1 && Math.abs(view.height - map.clientHeight) < 1;
 })()"""  # the view has the size of the map
 READY = (
-    f"echostep.last?.told && document.querySelector('#walls path') && {SETTLED}"  # an estimate and a floor are drawn
+    f"window.echostep?.last?.told && document.querySelector('#walls path') && {SETTLED}"  # an estimate and a floor are drawn
 )
 SPOT = f"""([x_m, y_m]) => {{
     const {{ left, top }} = document.querySelector('#map').getBoundingClientRect(), [x, y] = echostep.view.toScreen(x_m, y_m);

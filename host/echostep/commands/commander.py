@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from echostep.commands.options import LOCAL, Host, Port, Seconds, TeamPlan, page_address, picture_file
+from echostep.commands.options import LOCAL, Host, Lang, Port, Seconds, TeamPlan, page_address, picture_file
 from echostep.printing.lines import complain
 
 app = typer.Typer()
@@ -52,12 +52,13 @@ def command(
     ] = None,
     host: Host = LOCAL,
     port: Port = None,
+    lang: Lang = None,
 ) -> None:
     """Follow a team on one plan, lost and silent ones first, on a page and as a table, and record it; or show a recording again."""
     from echostep.operation import command as commander
     from echostep.operation.views import Views
 
-    views = Views(page_address(page, host, port), picture, as_json=as_json)
+    views = Views(page_address(page, host, port, lang), picture, as_json=as_json)
     commander.command(_plan_file(plan, broker, team, out.parent), broker, team, seconds, views, out)
 
 

@@ -23,6 +23,7 @@ from echostep.commands.options import (
     GuideTo,
     Headless,
     Host,
+    Lang,
     Keep,
     MtxPort,
     Name,
@@ -133,6 +134,7 @@ class Output:
     page: Page = None
     host: Host = LOCAL
     port: Port = None
+    lang: Lang = None
     publish: Publish = None
     name: Name = ""
     team: Team = "team"
@@ -157,7 +159,7 @@ class Output:
         """Where to serve the page; None: no page."""
         if self.headless and self.page:
             raise EchostepError("--headless excludes --page: give one of the two")
-        return None if self.headless else page_address(self.page, self.host, self.port)
+        return None if self.headless else page_address(self.page, self.host, self.port, self.lang)
 
     def _outlet(self) -> Outlet | None:
         from echostep.team.endpoint import parse_outlet

@@ -7,6 +7,7 @@ In: nothing. Out: annotated types for the parameters of commands; what several o
 from __future__ import annotations
 
 from collections.abc import Callable
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
 
@@ -20,6 +21,13 @@ if TYPE_CHECKING:
     from echostep.page.server import Address
 
 Value = TypeVar("Value")
+
+
+class Language(StrEnum):
+    """Languages of the pages (`page/static/words.js`)."""
+
+    EN = "en"
+    DE = "de"
 
 
 def needs(package: str) -> Callable[[typer.CallbackParam, Value], Value]:
@@ -41,7 +49,7 @@ def picture_file(option: typer.CallbackParam, path: Path | None) -> Path | None:
     return path
 
 
-def page_address(page: bool | None, host: str, port: int | None) -> Address | None:
+def page_address(page: bool | None, host: str, port: int | None, lang: Language | None = None) -> Address | None:
     """Where to serve the page; None: no page. An address that cannot be served is an error if given, a notice if it is the default."""
     if page:
         require("--page", *PAGE)
@@ -52,7 +60,7 @@ def page_address(page: bool | None, host: str, port: int | None) -> Address | No
         return None
     from echostep.page.server import Address
 
-    return Address(host, port)
+    return Address(host, port, lang.value if lang else None)
 
 
 Columns = Annotated[
@@ -121,6 +129,10 @@ Host = Annotated[
 ]
 Port = Annotated[
     int | None, typer.Option("--port", help="TCP port of the page [8420, or a free one].", min=0, max=65535)
+]
+Lang = Annotated[
+    Language | None,
+    typer.Option("--lang", help="Language of the page; otherwise that of each browser.", show_default=False),
 ]
 BoardCommand = Annotated[
     str | None,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from echostep.commands.groups import Output, Ports, Tracking, with_groups
-from echostep.commands.options import LOCAL, BoardCommand, Host, Out, Port, RecordedSeed, Seed, page_address
+from echostep.commands.options import LOCAL, BoardCommand, Host, Lang, Out, Port, RecordedSeed, Seed, page_address
 from echostep.errors import EchostepError
 from echostep.printing.lines import say
 from echostep.simulation.kits import Kit
@@ -123,13 +123,14 @@ def replay(
 def page(
     host: Host = LOCAL,
     port: Port = None,
+    lang: Lang = None,
     browser: Annotated[
         bool,
         typer.Option("--open/--no-open", help="Open the page in a browser where there is one.", show_default=False),
     ] = True,
 ) -> None:
     """Play recordings that are dropped onto a page."""
-    address = page_address(True, host, port)
+    address = page_address(True, host, port, lang)
     from echostep.session.runs.dropped import serve_drops
 
     assert address

@@ -21,7 +21,7 @@ import uvicorn
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
@@ -44,6 +44,7 @@ from echostep.plan.model import Plan
 
 STATIC = Path(__file__).parent / "static"
 LOCAL = "127.0.0.1"
+HTML = '<html lang="en">'  # of a page; static/words.js reads which language was chosen
 PORT = 8420
 MOST_PAGES = 32  # open at the same time; further ones are refused
 TRY_AGAIN_LATER = 1013  # WebSocket close code [IANA]
@@ -53,10 +54,11 @@ BACKLOG = 320  # connections that wait to be accepted: as many as are accepted a
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """Where the page is served. `port` None: 8420, or any free port when 8420 is in use."""
+    """Where the page is served, and in which language. `port` None: 8420, or any free port when 8420 is in use; `lang` None: each browser's."""
 
     host: str = LOCAL
     port: int | None = None
+    lang: str | None = None
 
 
 class SocketSession(Protocol):
@@ -93,7 +95,7 @@ class SocketServer(Generic[S]):
 
     def __init__(self, site: PageSite[S], address: Address = Address()) -> None:
         self.sessions: set[S] = set()
-        self._site = site
+        self._site, self._lang = site, address.lang
         self._listener = open_listener(address)
         token = None if address.host in LOOPBACK and not users.has_other_users() else secrets.token_urlsafe(16)
         host, port = self._listener.getsockname()[:2]
@@ -185,7 +187,8 @@ class SocketServer(Generic[S]):
         self._loop = None
 
     async def _index(self, _: Request) -> Response:
-        return FileResponse(self._site.index)
+        page = await asyncio.to_thread(self._site.index.read_text, "utf-8")
+        return HTMLResponse(page.replace(HTML, f'<html lang="en" data-lang="{self._lang}">', 1) if self._lang else page)
 
     async def _lines(self, request: Request) -> Response:
         level = request.path_params["level"]

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The bell: tones and vibration of an alarm. Browsers allow neither before the first tap or key; until then a button invites to it.
 
+import { tr } from './words.js';
+
 const TONE_HZ = 880, TONE_S = 0.25, TONES = 3;  // assumed
 const VIBRATION_MS = [400, 200, 400];
 const active = () => navigator.userActivation?.hasBeenActive ?? false;
@@ -14,7 +16,7 @@ export class Bell {
   // A live page invites to the first tap with this text; a replay has no alarms.
   invite(isLive, text) {
     this.isLive = isLive;
-    this.invitation.textContent = text;
+    this.invitation.textContent = tr(text);
     this.invitation.hidden = !isLive || this.tapped;
   }
 

@@ -22,8 +22,10 @@ import { Tools } from './tools/tools.js';
 import { inUnits } from './tools/units.js';
 import { startTheme } from './theme.js';
 import { View } from './view.js';
+import { localise, missing, tr } from './words.js';
 
 const $ = (id) => document.getElementById(id);
+localise(document.body);
 
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas'));
 const panel = new Panel((level) => { setFollows(false); showLevel(level); });
@@ -45,7 +47,7 @@ const drops = new Drops(hint), charts = new Charts($('charts'), () => painter.co
 const tools = new Tools({ view, scene, planView, layers: scene.layers, charts, hint, enter, seek, changed: redraw, plan: () => plan, globe: () => globe, takesFiles: () => drops.takes });
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
-const drawn = (window.echostep = { frames: 0, view, scene, link, last: null });  // read by tests
+const drawn = (window.echostep = { frames: 0, view, scene, link, last: null, missing, tr });  // read by tests
 
 async function hello(message) {
   if (plan && (plan.digest !== message.plan.digest || title !== message.title)) startAnew();
@@ -211,7 +213,7 @@ function enter(next, byKey = false) {
 let hintEnds = 0;
 function hint(text, for_ms = 0) {
   clearTimeout(hintEnds);
-  $('hint').textContent = inUnits(text);
+  $('hint').textContent = tr(inUnits(text));
   $('hint').hidden = !text;
   if (for_ms) hintEnds = setTimeout(() => hint(''), for_ms);
 }

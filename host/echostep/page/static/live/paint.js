@@ -3,6 +3,7 @@
 
 import { paintDrawing } from './drawing.js';
 import { paintMarks } from '../marks.js';
+import { tr } from '../words.js';
 
 const GRADES = 4;  // shades of the particles' weight
 const PARTICLE_PX = 2.5;
@@ -64,8 +65,8 @@ export class Painter {
     pen.lineWidth = 3;
     pen.strokeStyle = this.colour.halo;
     pen.fillStyle = this.colour.good;
-    pen.strokeText('truth', sx + 12, sy - 8);
-    pen.fillText('truth', sx + 12, sy - 8);
+    pen.strokeText(tr('truth'), sx + 12, sy - 8);
+    pen.fillText(tr('truth'), sx + 12, sy - 8);
   }
 
   particles(view, { count, x0_m, y0_m, step_m, x, y, weight, level }, shownLevel) {

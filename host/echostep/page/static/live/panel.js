@@ -4,6 +4,7 @@
 import { drawnText } from './drawing.js';
 import { marksText } from '../marks.js';
 import { inUnits, scaleBar } from '../tools/units.js';
+import { tr } from '../words.js';
 
 const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕', ended: '■' };
 const SPOKEN_MS = 8000;  // shortest time between two positions for a screen reader
@@ -12,7 +13,7 @@ const MOST_BUTTONS = 3;  // floors as buttons on a phone; more of them are a lis
 const LEAST_RAD = 0.01;  // the arrow ignores smaller changes
 const LONG = 26, VERY_LONG = 60;  // letters of a status that is written smaller
 const $ = (id) => document.getElementById(id);
-const put = (id, metric) => { const text = inUnits(metric); if ($(id).textContent !== text) $(id).textContent = text; };  // unchanged text causes no new layout
+const put = (id, metric) => { const text = tr(inUnits(metric)); if ($(id).textContent !== text) $(id).textContent = text; };  // unchanged text causes no new layout
 
 export class Panel {
   constructor(onFloor) {
@@ -27,7 +28,7 @@ export class Panel {
     this.fault('');
     $('title').textContent = `${title}: ${plan.name}`;
     document.title = title;
-    $('goal').replaceChildren(new Option('Go to…', ''), new Option('a place on the map', 'map'),
+    $('goal').replaceChildren(new Option(tr('Go to…'), ''), new Option(tr('a place on the map'), 'map'),
       ...plan.levels.flatMap(({ rooms, name }, level) => rooms.map((room, k) => new Option(plan.levels.length > 1 ? `${room.name} (${name})` : room.name, `${level} ${k}`))));
     $('floors').hidden = plan.levels.length < 2;
     $('floors').classList.toggle('many', plan.levels.length > MOST_BUTTONS);
@@ -78,7 +79,7 @@ export class Panel {
   // The teammates who can be met: a list that is there only when there are any.
   team(names) {
     $('met').hidden = !names.length;
-    $('met').replaceChildren(new Option('I met…', ''), ...names.map((name) => new Option(name, name)));
+    $('met').replaceChildren(new Option(tr('I met…'), ''), ...names.map((name) => new Option(name, name)));
   }
 
   alarm(alarm) {
@@ -127,7 +128,8 @@ export class Panel {
   }
 
   status(status, words) {
-    Object.assign($('words').dataset, { status, long: words.length > VERY_LONG ? 'very' : String(words.length > LONG) });
+    const { length } = tr(words);
+    Object.assign($('words').dataset, { status, long: length > VERY_LONG ? 'very' : String(length > LONG) });
     $('mark').textContent = MARKS[status];
     put('status-text', words);
   }
@@ -142,7 +144,7 @@ export class Panel {
     [...$('floors').children].forEach((button, level) => {
       const share = estimate?.levels?.[level] ?? 0;
       button.setAttribute('aria-pressed', String(level === shownLevel));
-      button.setAttribute('aria-label', `${button.firstChild.textContent}, ${Math.round(100 * share)} % likely`);
+      button.setAttribute('aria-label', `${button.firstChild.textContent}, ${tr(`${Math.round(100 * share)} % likely`)}`);
       button.lastChild.style.width = `${100 * share}%`;
     });
   }
@@ -159,7 +161,7 @@ export class Panel {
     const now = performance.now(), { spoken } = this;
     if (text === spoken.text || (status === spoken.status && now - spoken.at < SPOKEN_MS)) return;
     this.spoken = { at: now, status, text };
-    $('live').textContent = inUnits(text);
+    $('live').textContent = tr(inUnits(text));
   }
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The time bar of a replay: play and pause, step, seek, speed.
 
+import { tr } from '../words.js';
+
 const $ = (id) => document.getElementById(id);
 
 export class Replay {
@@ -38,7 +40,7 @@ export class Replay {
     $('clock').textContent = text;
     bar.setAttribute('aria-valuetext', text);
     $('play').textContent = playing ? '❚❚' : '▶';
-    $('play').title = playing ? 'Pause' : 'Play';
+    $('play').title = tr(playing ? 'Pause' : 'Play');
     $('play').setAttribute('aria-label', $('play').title);
   }
 }

@@ -4,6 +4,7 @@
 
 import { Bell } from '../bell.js';
 import { inUnits } from '../tools/units.js';
+import { language, tr } from '../words.js';
 
 const BEGINS_MS = 2500;  // after which a sentence that has not begun is reported as not spoken; assumed
 const CUT_OFF = ['canceled', 'interrupted'];  // errors of a sentence that a newer one replaced [Web Speech API]
@@ -36,7 +37,7 @@ export class Speech {
     const now = guidance?.spoken ? { text: guidance.spoken, at_s: guidance.spoken_s, own: guidance.own } : null, { last } = this;
     if (now?.text === last?.text && now?.at_s === last?.at_s && now?.own === last?.own) return;
     this.last = now;
-    this.region.textContent = inUnits(now?.text ?? '');
+    this.region.textContent = tr(inUnits(now?.text ?? ''));
     if (this.on) this.say(now?.text);
   }
 
@@ -65,8 +66,8 @@ export class Speech {
     if (!window.speechSynthesis) return text && this.fail('this browser cannot speak');
     window.speechSynthesis.cancel();
     if (!text) return;
-    const sentence = this.sentence = new SpeechSynthesisUtterance(inUnits(text));  // kept in a field: browsers drop a sentence without a reference
-    sentence.lang = 'en';
+    const sentence = this.sentence = new SpeechSynthesisUtterance(tr(inUnits(text)));  // kept in a field: browsers drop a sentence without a reference
+    sentence.lang = language;
     sentence.onstart = () => { clearTimeout(this.late); this.fail(''); };
     sentence.onerror = ({ error }) => { if (!CUT_OFF.includes(error)) this.fail(error === 'not-allowed' ? 'the browser forbids it before the first tap' : `the browser says ${error}`); };
     this.late = setTimeout(() => this.fail('the browser has not begun'), BEGINS_MS);
@@ -75,7 +76,7 @@ export class Speech {
 
   fail(reason) {
     clearTimeout(this.late);
-    const text = reason && `Not spoken: ${reason}. Tap the page, and look at its sound.`;
+    const text = reason && tr(`Not spoken: ${reason}. Tap the page, and look at its sound.`);
     if (this.trouble.textContent !== text) this.trouble.textContent = text;
     this.trouble.hidden = !reason;
   }

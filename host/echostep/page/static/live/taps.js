@@ -2,6 +2,7 @@
 // A position that is being entered: its ghost on the map, what it would do in words, its confirmation; and the undoing of the last one.
 
 import { inUnits } from '../tools/units.js';
+import { tr } from '../words.js';
 
 const $ = (id) => document.getElementById(id);
 const FINGER_PX = 20;  // standard deviation of a tap on the screen
@@ -45,7 +46,7 @@ export class Taps {
   // What it would do, and where on the Earth it is.
   say() {
     const { x_m, y_m } = this.ghost;
-    $('sheet-text').textContent = inUnits([this.said, this.desk.globe()?.words(x_m, y_m)].filter(Boolean).join(' '));
+    $('sheet-text').textContent = [tr(inUnits(this.said)), this.desk.globe()?.words(x_m, y_m)].filter(Boolean).join(' ');
   }
 
   get sd() { return Math.max(LEAST_SD_M, FINGER_PX / this.view.scale); }
@@ -99,7 +100,7 @@ export class Taps {
   undoable(offer) {
     const isNew = offer && (offer.undo !== this.offer?.undo || offer.contradicted !== this.offer?.contradicted);
     if (isNew) {
-      $('undo-text').textContent = offer.contradicted ? 'The echoes do not fit the position that was set by hand.' : 'The position was set by hand.';
+      $('undo-text').textContent = tr(offer.contradicted ? 'The echoes do not fit the position that was set by hand.' : 'The position was set by hand.');
       $('undo').dataset.contradicted = String(offer.contradicted);
       $('undo').hidden = false;
     }

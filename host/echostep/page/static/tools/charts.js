@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Charts under the map: ranges, rates and heading over time, with what happened as ticks. In a replay of the whole walk, a tap seeks; live, of the last minute.
 
+import { tr } from '../words.js';
 import { inUnits } from './units.js';
 
 const LIVE_S = 60;  // shown of a live run
@@ -68,7 +69,7 @@ export class Charts {
     CHARTS.forEach((chart, k) => this.chart(chart, seen, x, k * each, each - 3, width));
     for (const { t_s } of this.events) if (t_s >= begin) this.rule(x(t_s), height, 'bad', [2, 3]);
     if (this.play) this.rule(x(this.play.t_s), height, 'ink', []);
-    canvas.setAttribute('aria-label', inUnits(this.words(seen)));
+    canvas.setAttribute('aria-label', tr(inUnits(this.words(seen))));
   }
 
   chart({ title, series, dots }, rows, x, top, height, width) {
@@ -79,7 +80,7 @@ export class Charts {
     pen.fillText(high.toFixed(high < 10 ? 1 : 0), 2, top + TOP_PX + 9);
     pen.fillText(low.toFixed(0), 2, top + height);
     let at = LEFT_PX;
-    for (const [text, colour] of [[title, 'faint'], ...series.map(([, name, text], k) => [`${k ? '▬' : '●'} ${text}`, name])]) {
+    for (const [text, colour] of [[tr(title), 'faint'], ...series.map(([, name, text], k) => [`${k ? '▬' : '●'} ${tr(text)}`, name])]) {
       pen.fillStyle = this.colours()[colour];
       pen.fillText(text, at, top + 11);
       at += pen.measureText(text).width + 12;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Files that are dropped onto the page, or chosen with its button: sent to the server one by one; what came of each is written in words.
 
+import { tr } from '../words.js';
+
 const $ = (id) => document.getElementById(id);
 const ELSEWHERE = 'This page shows a run; a recording plays on the page of: echostep page';
 
@@ -38,7 +40,7 @@ export class Drops {
   }
 
   say(text, isWrong) {
-    $('drop-text').textContent = text;
+    $('drop-text').textContent = tr(text);
     $('drop-text').dataset.wrong = String(isWrong);
     $('drop-text').hidden = !text;
     if (this.waits || !text) return;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The straight distance between two taps; a third tap begins anew.
 
+import { tr } from '../words.js';
 import { inUnits } from './units.js';
 
 export class Measure {
@@ -31,8 +32,9 @@ export class Measure {
     }
     Object.assign(pen, { font: '700 14px system-ui, sans-serif', textAlign: 'center', lineWidth: 4, strokeStyle: colour.halo, fillStyle: colour.ink });
     const [x, y] = [(pixels[0][0] + last[0]) / 2, (pixels[0][1] + last[1]) / 2 - 10];
-    pen.strokeText(this.text, x, y);
-    pen.fillText(this.text, x, y);
+    const text = tr(this.text);
+    pen.strokeText(text, x, y);
+    pen.fillText(text, x, y);
     pen.textAlign = 'left';
   }
 }

@@ -6,6 +6,7 @@ import { linkOf } from './hash.js';
 import { Heard } from './heard.js';
 import { LAYERS } from './layers.js';
 import { chooseUnit, chosenUnit } from './units.js';
+import { localise, startLanguage, tr } from '../words.js';
 
 const $ = (id) => document.getElementById(id);
 const BUTTONS = { measure: 'Measure', charts: 'Charts', link: 'Copy a link', picture: 'Picture (PNG)', geojson: 'GeoJSON', full: 'Full screen', files: 'Open files…' };
@@ -13,7 +14,8 @@ const HTML = `<form method="dialog"><h2>More</h2><button aria-label="Close">✕<
 <div tabindex="0" role="group" aria-label="Tools">
   <p class="row">${Object.entries(BUTTONS).map(([name, text]) => `<button id="tool-${name}" type="button">${text}</button>`).join('')}
     <label for="unit" class="unseen">Lengths in</label><select id="unit"><option value="m">metres</option><option value="ft">feet</option></select>
-    <label for="theme" class="unseen">Colours</label><select id="theme"><option value="auto">auto</option><option value="bright">bright</option><option value="dark">dark</option><option value="contrast">high contrast</option></select></p>
+    <label for="theme" class="unseen">Colours</label><select id="theme"><option value="auto">auto</option><option value="bright">bright</option><option value="dark">dark</option><option value="contrast">high contrast</option></select>
+    <label for="language" class="unseen">Language</label><select id="language"></select></p>
   <h3 id="layers-title">Layers</h3>
   <ul aria-labelledby="layers-title">${Object.entries(LAYERS).map(([name, text]) => `<li><label><input type="checkbox" id="layer-${name}"> ${text}</label></li>`).join('')}</ul>
   <h3>What happened</h3><ol id="events"></ol>
@@ -26,13 +28,15 @@ export class Tools {
     this.page = page;
     const dialog = this.dialog = document.createElement('dialog');
     dialog.id = 'tools';
-    dialog.setAttribute('aria-label', 'More');
+    dialog.setAttribute('aria-label', tr('More'));
     dialog.innerHTML = HTML;
+    localise(dialog);
     dialog.onclick = ({ target }) => { if (target === dialog) dialog.close(); };  // beside it
     document.body.append(dialog);
     new Heard($('messages'), $('heard'));
     this.wire();
     this.wireLayers();
+    startLanguage($('language'));
     this.setCharts(stored() === 'on');
     Object.assign(page.charts, { onEvents: (events) => this.events(events), isWanted: () => dialog.open });
   }
@@ -99,7 +103,7 @@ export class Tools {
   events(events) {
     const { play } = this.page.scene.frame ?? {}, begin = play?.begin_s ?? events[0]?.t_s ?? 0, whole = play ? Math.max(play.end_s - begin, 1e-3) : 1;
     $('events').replaceChildren(...events.map(({ t_s, text }) => {
-      const item = document.createElement('li'), at = `${Math.floor((t_s - begin) / 60)}:${String(Math.floor((t_s - begin) % 60)).padStart(2, '0')} ${text}`;
+      const item = document.createElement('li'), at = `${Math.floor((t_s - begin) / 60)}:${String(Math.floor((t_s - begin) % 60)).padStart(2, '0')} ${tr(text)}`;
       if (!play) item.textContent = at;
       else {
         const button = document.createElement('button');
@@ -110,7 +114,7 @@ export class Tools {
     }));
     $('ticks').replaceChildren(...(play ? events : []).map(({ t_s, text }) => {
       const tick = document.createElement('span');
-      tick.title = text;
+      tick.title = tr(text);
       tick.style.left = `${100 * (t_s - begin) / whole}%`;
       return tick;
     }));
