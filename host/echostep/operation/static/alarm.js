@@ -3,7 +3,7 @@
 // one tap leads back to what was seen before.
 
 import { Bell } from '../static/bell.js';
-import { put } from './text.js';
+import { say } from './text.js';
 
 const BLINK_MS = 1000;  // assumed; slower than the 3 flashes a second of WCAG 2.3.1
 const $ = (id) => document.getElementById(id);
@@ -37,7 +37,7 @@ export class Alarm {
     this.bell.ring();
     this.before ??= { level: this.level(), x: this.view.x, y: this.view.y, scale: this.view.scale, turn: this.view.turn };
     this.shown = row.id;
-    put($('mayday-text'), `▲ ${row.name}: mayday, ${place ? this.floor(place.level) : 'place not known'}`);
+    say($('mayday-text'), `▲ ${row.name}: mayday, ${place ? this.floor(place.level) : 'place not known'}`);
     $('mayday').hidden = false;
     $('mayday-back').hidden = !place;
     if (place) this.show(place);

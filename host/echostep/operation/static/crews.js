@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Crews and their accountability check (PAR): who is inside, since when, when it last answered, how much of the planned air is left. What is due is said.
 
-import { put } from './text.js';
+import { localise, tr } from '../static/words.js';
+import { put, say } from './text.js';
 
 const CHECK_SHARE = 1 / 3;  // of the planned air until a check is due, as team/messages/crews.py says
 const ORDER = ['over', 'due', 'inside', 'ready', 'out'];
 const SIGNS = { over: '▲', due: '△', inside: '●', ready: '○', out: '■' };
-const DOES = { enter: 'Enters', check: '✓ Answered', leave: 'Is out' };
+const DOES = { enter: 'Enters', check: 'Answered', leave: 'Is out' };
 const $ = (id) => document.getElementById(id);
 const HTML = `<form method="dialog"><h2>Crews</h2><button aria-label="Close">✕</button></form>
 <div tabindex="0" role="group" aria-label="Crews inside, and accountability check">
@@ -24,8 +25,9 @@ export class Crews {
   constructor(signed, send) {
     Object.assign(this, { signed, send, crews: [], items: new Map(), dialog: document.createElement('dialog'), said: '' });
     this.dialog.id = 'crews';
-    this.dialog.setAttribute('aria-label', 'Crews');
+    this.dialog.setAttribute('aria-label', tr('Crews'));
     this.dialog.innerHTML = HTML;
+    localise(this.dialog);
     this.dialog.onclick = ({ target }) => { if (target === this.dialog) this.dialog.close(); };  // beside it
     document.body.append(this.dialog);
     $('crews-button').onclick = () => this.dialog.showModal();
@@ -53,7 +55,7 @@ export class Crews {
       const item = this.items.get(crew.id) ?? this.make(crew.id);
       if ($('crew-list').children[k] !== item) $('crew-list').insertBefore(item, $('crew-list').children[k] ?? null);
       item.dataset.state = crew.state;
-      [`${SIGNS[crew.state]} ${crew.name}`, crew.words, crew.members.join(', ')].forEach((text, j) => put(item.children[j], text));
+      [`${SIGNS[crew.state]} ${crew.name}`, tr(crew.words), crew.members.join(', ')].forEach((text, j) => put(item.children[j], text));
       const inside = ['over', 'due', 'inside'].includes(crew.state);
       [...item.lastChild.children].forEach((button) => { button.hidden = (button.dataset.does === 'enter') === inside; });
     });
@@ -62,11 +64,11 @@ export class Crews {
 
   sum(shown, isPast) {
     const urgent = shown.filter(({ state }) => ['over', 'due'].includes(state)), inside = shown.filter(({ state }) => !['ready', 'out'].includes(state)).length;
-    put($('crew-sum'), shown.length ? `${inside} inside${urgent.length ? `, ${urgent.length} to be asked now` : ''}` : 'No crew yet.');
-    put($('crews-button'), `Crews${inside ? ` ${inside}` : ''}${urgent.length ? ' !' : ''}`);
+    say($('crew-sum'), shown.length ? `${inside} inside${urgent.length ? `, ${urgent.length} to be asked now` : ''}` : 'No crew yet.');
+    put($('crews-button'), `${tr('Crews')}${inside ? ` ${inside}` : ''}${urgent.length ? ' !' : ''}`);
     $('crews-button').classList.toggle('urgent', urgent.length > 0);
     const text = isPast ? '' : urgent.slice(0, 3).map(({ name, state }) => `${name}: ${state === 'over' ? 'planned air is over' : 'check due'}`).join('. ');
-    put($('crew-due'), text);
+    say($('crew-due'), text);
     if ($('crew-due').hidden !== !text) $('crew-due').hidden = !text;
   }
 
@@ -76,7 +78,7 @@ export class Crews {
     row.className = 'row';
     row.append(...Object.entries(DOES).map(([does, text]) => {
       const button = document.createElement('button');
-      Object.assign(button, { type: 'button', textContent: text, onclick: () => this.act('crew_does', { id, does }) });
+      Object.assign(button, { type: 'button', textContent: does === 'check' ? `✓ ${tr(text)}` : tr(text), onclick: () => this.act('crew_does', { id, does }) });
       button.dataset.does = does;
       return button;
     }));

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The list of wearers and the details of one, in words; and the text for screen readers when a wearer needs help.
 
-import { put } from './text.js';
+import { tr } from '../static/words.js';
+import { put, say } from './text.js';
 
 export const SIGNS = { mayday: '▲', asked: '△', lost: '✕', stale: '◌', uncertain: '◐', waiting: '○', tracking: '●', ended: '■' };
 const URGENT = ['mayday', 'asked', 'lost', 'stale'];
@@ -26,8 +27,8 @@ export class List {
       item.button.dataset.open = row.open_alarm;
       put(item.sign, SIGNS[row.state] ?? '!');
       put(item.name, teams > 1 ? `${row.name} (${row.team})` : row.name);
-      put(item.said, row.words);
-      put(item.note, row.notes.join('; '));
+      say(item.said, row.words);
+      say(item.note, row.notes.join('; '));
     });
     if (focused?.isConnected && document.activeElement !== focused) focused.focus({ preventScroll: true });
     this.announce(rows, isPast);
@@ -71,7 +72,7 @@ export class List {
   head() {
     const row = this.rows.find(({ id }) => id === this.chosen);
     put($('who'), row ? `${SIGNS[row.state] ?? '!'} ${row.name} (${row.team})` : '');
-    put($('said'), row?.words ?? '');
+    say($('said'), row?.words ?? '');
     $('acknowledge').hidden = !row?.open_alarm;
   }
 
@@ -85,7 +86,7 @@ export class List {
     $('facts').replaceChildren(...facts(details.facts));
     $('history').replaceChildren(...details.history.map(({ unix_s, text: what }) => {
       const item = document.createElement('li');
-      item.textContent = `${new Date(1000 * unix_s).toLocaleTimeString('en-GB')} ${what}`;
+      item.textContent = `${new Date(1000 * unix_s).toLocaleTimeString('en-GB')} ${tr(what)}`;
       return item;
     }));
   }
@@ -103,8 +104,8 @@ export class List {
       .filter(([, value]) => value).map(([name, value]) => ({ name, value }))));
     rescuers.forEach(({ id, name, words, sent }, k) => {
       const item = $('rescuers').children[k] ?? $('rescuers').appendChild(rescuer()), button = item.firstChild;
-      put(button, `${sent ? '✓ ' : ''}Send ${name}${sent ? ' again' : ''}`);
-      put(item.lastChild, [words, sent].filter(Boolean).join(', '));
+      put(button, `${sent ? '✓ ' : ''}${tr(`Send ${name}${sent ? ' again' : ''}`)}`);
+      say(item.lastChild, [words, sent].filter(Boolean).join(', '));
       button.onclick = () => this.onSend(id);
     });
     while ($('rescuers').children.length > rescuers.length) $('rescuers').lastChild.remove();
@@ -115,7 +116,7 @@ export class List {
     const said = rows.filter(({ id, state }) => URGENT.includes(state) && this.states.get(id) !== state).map(({ name, words }) => `${name}: ${words}`);
     if (isPast) return;
     this.states = new Map(rows.map(({ id, state }) => [id, state]));
-    if (said.length) put($('live'), said.slice(0, 3).join('. '));
+    if (said.length) say($('live'), said.slice(0, 3).join('. '));
   }
 }
 
@@ -123,7 +124,7 @@ export class List {
 function facts(rows) {
   return rows.flatMap(({ name, value }) => [['dt', name], ['dd', value]].map(([tag, of]) => {
     const element = document.createElement(tag);
-    element.textContent = of;
+    element.textContent = tr(of);
     return element;
   }));
 }

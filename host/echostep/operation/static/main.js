@@ -7,6 +7,7 @@ import { Link } from '../static/link.js';
 import { PlanView } from '../static/plan.js';
 import { startTheme } from '../static/theme.js';
 import { View } from '../static/view.js';
+import { localise, missing, startLanguage, tr } from '../static/words.js';
 import { titled } from '../static/tools/titles.js';
 import { Alarm } from './alarm.js';
 import { Crews } from './crews.js';
@@ -14,13 +15,14 @@ import { Floors } from './floors.js';
 import { List } from './list.js';
 import { Painter } from './paint.js';
 import { Sheet } from './sheet.js';
-import { put } from './text.js';
+import { put, say } from './text.js';
 import { TimeBar } from './timebar.js';
 import { Trails } from './trails.js';
 import { parseFrame, placesOf } from './wire.js';
 
 const TAP_PX = 28;  // a wearer within this distance of a tap is chosen
 const $ = (id) => document.getElementById(id);
+localise(document.body);
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas')), trails = new Trails($('trails'), $('trails-next'));
 const scene = { places: new Map(), rows: [], marks: [], level: 0, chosen: null };
 const floors = new Floors((level) => showLevel(level));
@@ -34,7 +36,7 @@ const showLegend = startLegend($('legend-button'), COMMAND, COMMAND_KEYS), crews
 const timeBar = new TimeBar((kind, fields) => link.send(kind, fields));
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
-const drawn = (window.echostep = { frames: 0, view, scene, link, last: null });  // read by tests
+const drawn = (window.echostep = { frames: 0, view, scene, link, last: null, missing, tr });  // read by tests
 
 async function hello(message) {
   plan = message.plan;
@@ -69,7 +71,7 @@ function connection(open) {
   if (open) return;
   $('words').dataset.status = 'broken';
   $('mark').textContent = '✕';
-  $('status-text').textContent = 'this page is not connected';
+  say($('status-text'), 'this page is not connected');
 }
 
 // Store a frame; it is drawn with the next animation frame. A hidden page draws nothing, so it reports no frame as drawn and gets no more of them.
@@ -98,10 +100,10 @@ function frame(received) {
 function status({ summary, refused, connected, fault }) {
   put($('mark'), connected ? '●' : '✕');
   if ($('words').dataset.status !== (connected ? 'tracking' : 'broken')) $('words').dataset.status = connected ? 'tracking' : 'broken';
-  put($('status-text'), connected ? 'connected' : 'no connection to the broker: the last known state');
-  put($('summary'), (timeBar.isPast ? 'the past: ' : '') + summary);
+  say($('status-text'), connected ? 'connected' : 'no connection to the broker: the last known state');
+  say($('summary'), (timeBar.isPast ? 'the past: ' : '') + summary);
   const why = [fault, refused && `rejected: ${refused}`].filter(Boolean).join('; ');
-  put($('refused'), why);
+  say($('refused'), why);
   if ($('refused').hidden !== !why) $('refused').hidden = !why;
 }
 
@@ -128,7 +130,7 @@ function goTo({ x, y, level }) {
 }
 
 function fault(text) {
-  $('fault').textContent = text;
+  say($('fault'), text);
   $('fault').hidden = !text;
 }
 
@@ -181,7 +183,7 @@ function place([x_m, y_m], pixel) {
 
 let hinted = 0;
 function hint(text) {
-  $('hint').textContent = text;
+  say($('hint'), text);
   $('hint').hidden = false;
   clearTimeout(hinted);
   hinted = setTimeout(() => { $('hint').hidden = true; }, 6000);
@@ -203,6 +205,7 @@ $('north').onclick = () => view.northUp();
 window.addEventListener('error', ({ message }) => fault(`This page has a fault: ${message}. Reload it.`));
 window.addEventListener('unhandledrejection', ({ reason }) => fault(`This page has a fault: ${reason?.message ?? reason}. Reload it.`));
 view.onChanged = ask;
+startLanguage($('language'));
 startTheme($('theme'), () => { painter.recolour(); view.changed(); });
 view.resize($('map').clientWidth, $('map').clientHeight);
 new ResizeObserver(([{ contentRect }]) => view.resize(contentRect.width, contentRect.height)).observe($('map'));

@@ -2,6 +2,7 @@
 // What a commander can do at a place of the map: set a mark, or remove the one that is there; and the commander's name, with which marks and acknowledgements are signed.
 
 import { markWords } from '../static/marks.js';
+import { tr } from '../static/words.js';
 
 const KINDS = ['cleared', 'hazard', 'meeting'];
 const $ = (id) => document.getElementById(id);
@@ -30,7 +31,7 @@ export class Sheet {
 
   open(at, mark, pixel, size) {
     Object.assign(this, { at, mark });
-    $('sheet-text').textContent = mark ? `${markWords(mark.mark)}, set by ${mark.by}` : 'Mark this place';
+    $('sheet-text').textContent = tr(mark ? `${markWords(mark.mark)}, set by ${mark.by}` : 'Mark this place');
     for (const kind of KINDS) $(`mark-${kind}`).hidden = Boolean(mark);
     $('mark-remove').hidden = !mark;
     $('sheet').hidden = false;

@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Texts of elements.
 
+import { tr } from '../static/words.js';
+
 // Unchanged text causes no new layout.
 export const put = (element, text) => { if (element.textContent !== text) element.textContent = text; };
+
+// In the reader's language.
+export const say = (element, text) => put(element, tr(text));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The time bar over the whole operation: go back, hold, play, return to now. While the past is shown, what calls for help now is said beside it.
 
+import { tr } from '../static/words.js';
 import { put } from './text.js';
 
 const $ = (id) => document.getElementById(id);
@@ -51,18 +52,18 @@ export class TimeBar {
     const { t_s, end_s, playing, times, now, live, open_alarms } = time, bar = $('time');
     bar.max = end_s;
     if (!this.holding && !this.isOnItsWay(t_s)) bar.value = t_s;
-    const day = new Date(1000 * unix_s).toLocaleTimeString('en-GB'), behind = live ? `${minutes(end_s - t_s)} ago` : `${minutes(t_s)} of ${minutes(end_s)}`;
-    const text = now ? `${day}, now` : `${day}, ${behind}`;
+    const day = new Date(1000 * unix_s).toLocaleTimeString('en-GB'), behind = live ? `${minutes(end_s - t_s)} ago` : `${minutes(t_s)} / ${minutes(end_s)}`;
+    const text = tr(now ? `${day}, now` : `${day}, ${behind}`);
     put($('clock'), text);
     bar.setAttribute('aria-valuetext', text);
     put($('play'), playing ? '❚❚' : '▶');
-    $('play').setAttribute('aria-label', playing ? 'Hold' : 'Play');
+    $('play').setAttribute('aria-label', tr(playing ? 'Hold' : 'Play'));
     $('on').disabled = now;
     $('now').hidden = !live;
     $('now').disabled = now;
-    put($('now'), !now && open_alarms ? `Now: ▲ ${open_alarms}` : 'Now');
+    put($('now'), tr(!now && open_alarms ? `Now: ▲ ${open_alarms}` : 'Now'));
     $('now').classList.toggle('urgent', !now && open_alarms > 0);
-    $('now').setAttribute('aria-label', !now && open_alarms ? `Return to now: ${open_alarms} open mayday${open_alarms > 1 ? 's' : ''}` : 'Return to now');
+    $('now').setAttribute('aria-label', tr(!now && open_alarms ? `Return to now: open maydays: ${open_alarms}` : 'Return to now'));
     if (document.activeElement !== $('times')) $('times').value = String(times);
     $('times').disabled = now;
     document.body.dataset.past = String(!now && live);

@@ -31,5 +31,5 @@ export const markWords = (mark) => LOOKS[mark]?.words ?? mark;
 export function marksText(marks, levels) {
   const counts = Object.keys(LOOKS).map((kind) => [kind, marks.filter(({ mark }) => mark === kind)]).filter(([, of]) => of.length);
   const floors = [...new Set(marks.filter(({ mark }) => mark === 'hazard').map(({ level }) => levels[level]?.name))].filter(Boolean).join(', ');
-  return counts.length ? `marks: ${counts.map(([kind, of]) => `${of.length} ${LOOKS[kind].words}`).join(', ')}${floors && levels.length > 1 ? ` (hazards: ${floors})` : ''}` : '';
+  return counts.length ? `marks: ${counts.map(([kind, of]) => `${of.length} ${LOOKS[kind].words}`).join(', ')}${floors && levels.length > 1 ? `, hazards on ${floors}` : ''}` : '';
 }

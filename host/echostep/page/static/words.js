@@ -89,7 +89,7 @@ export function localise(root) {
     const { data } = texts.currentNode, text = data.replace(/\s+/g, ' ').trim();
     if (text) texts.currentNode.data = data.match(/^\s*/)[0] + tr(text) + data.match(/\s*$/)[0];
   }
-  for (const name of ['aria-label', 'title', 'placeholder']) {
+  for (const name of ['aria-label', 'title', 'placeholder', 'data-empty']) {
     for (const element of root.querySelectorAll(`[${name}]`)) element.setAttribute(name, tr(element.getAttribute(name)));
   }
 }

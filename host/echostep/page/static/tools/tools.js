@@ -18,8 +18,8 @@ const HTML = `<form method="dialog"><h2>More</h2><button aria-label="Close">✕<
     <label for="language" class="unseen">Language</label><select id="language"></select></p>
   <h3 id="layers-title">Layers</h3>
   <ul aria-labelledby="layers-title">${Object.entries(LAYERS).map(([name, text]) => `<li><label><input type="checkbox" id="layer-${name}"> ${text}</label></li>`).join('')}</ul>
-  <h3>What happened</h3><ol id="events"></ol>
-  <h3>What this page said</h3><ol id="heard"></ol>
+  <h3>What happened</h3><ol id="events" data-empty="nothing yet"></ol>
+  <h3>What this page said</h3><ol id="heard" data-empty="nothing yet"></ol>
 </div>`;
 
 export class Tools {
