@@ -7,7 +7,7 @@ import { Link } from '../static/link.js';
 import { PlanView } from '../static/plan.js';
 import { startTheme } from '../static/theme.js';
 import { View } from '../static/view.js';
-import { localise, missing, startLanguage, tr } from '../static/words.js';
+import { localise, missing, tr } from '../static/words.js';
 import { titled } from '../static/tools/titles.js';
 import { Alarm } from './alarm.js';
 import { Crews } from './crews.js';
@@ -100,7 +100,7 @@ function frame(received) {
 function status({ summary, refused, connected, fault }) {
   put($('mark'), connected ? '●' : '✕');
   if ($('words').dataset.status !== (connected ? 'tracking' : 'broken')) $('words').dataset.status = connected ? 'tracking' : 'broken';
-  say($('status-text'), connected ? 'connected' : 'no connection to the broker: the last known state');
+  say($('status-text'), connected ? 'connected' : 'no broker: the last known state');
   say($('summary'), (timeBar.isPast ? 'the past: ' : '') + summary);
   const why = [fault, refused && `rejected: ${refused}`].filter(Boolean).join('; ');
   say($('refused'), why);
@@ -205,7 +205,6 @@ $('north').onclick = () => view.northUp();
 window.addEventListener('error', ({ message }) => fault(`This page has a fault: ${message}. Reload it.`));
 window.addEventListener('unhandledrejection', ({ reason }) => fault(`This page has a fault: ${reason?.message ?? reason}. Reload it.`));
 view.onChanged = ask;
-startLanguage($('language'));
 startTheme($('theme'), () => { painter.recolour(); view.changed(); });
 view.resize($('map').clientWidth, $('map').clientHeight);
 new ResizeObserver(([{ contentRect }]) => view.resize(contentRect.width, contentRect.height)).observe($('map'));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The legend: what each sign on the map means, and the keys; a dialog that a button or the keys L and ? open, on the wearer's and the commander's page.
+// The legend: what each sign on the map means, the keys, the choice of the language; a dialog that a button or the keys L and ? open, on the wearer's and the commander's page.
 
-import { localise, tr } from './words.js';
+import { localise, startLanguage, tr } from './words.js';
 
 const line = (d, colour = 'wall', width = 1.5, more = '') => `<path d="${d}" fill="none" stroke="var(--${colour})" stroke-width="${width}" ${more}/>`;
 const shape = (d, colour, fill = colour) => `<path d="${d}" fill="${fill === 'none' ? 'none' : `var(--${fill})`}" stroke="var(--${colour})" stroke-width="2"/>`;
@@ -66,10 +66,11 @@ export function startLegend(button, groups, keys) {
   dialog.setAttribute('aria-label', tr('Legend'));
   const rows = (entries) => entries.map(([picture, words]) => `<li><svg viewBox="-16 -12 32 24" aria-hidden="true">${picture}</svg><span>${words}</span></li>`).join('');
   const names = Object.entries(keys).map(([key, words]) => `<li><kbd>${key}</kbd><span>${words}</span></li>`).join('');
-  dialog.innerHTML = `<form method="dialog"><h2>Legend</h2><button aria-label="Close">✕</button></form><div tabindex="0" role="group" aria-label="Signs">${groups.map(([title, entries]) => `<h3>${title}</h3><ul>${rows(entries)}</ul>`).join('')}<h3 id="keys-title">Keys on the map</h3><ul>${names}</ul></div>`;
+  dialog.innerHTML = `<form method="dialog"><h2>Legend</h2><label for="language" class="unseen">Language</label><select id="language"></select><button aria-label="Close">✕</button></form><div tabindex="0" role="group" aria-label="Signs">${groups.map(([title, entries]) => `<h3>${title}</h3><ul>${rows(entries)}</ul>`).join('')}<h3 id="keys-title">Keys on the map</h3><ul>${names}</ul></div>`;
   dialog.onclick = ({ target }) => { if (target === dialog) dialog.close(); };  // beside it
   localise(dialog);
   document.body.append(dialog);
+  startLanguage(document.getElementById('language'));
   const open = (atKeys) => {
     dialog.showModal();
     document.getElementById(atKeys ? 'keys-title' : 'legend').scrollIntoView();

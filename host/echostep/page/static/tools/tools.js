@@ -6,7 +6,7 @@ import { linkOf } from './hash.js';
 import { Heard } from './heard.js';
 import { LAYERS } from './layers.js';
 import { chooseUnit, chosenUnit } from './units.js';
-import { localise, startLanguage, tr } from '../words.js';
+import { localise, tr } from '../words.js';
 
 const $ = (id) => document.getElementById(id);
 const BUTTONS = { measure: 'Measure', charts: 'Charts', link: 'Copy a link', picture: 'Picture (PNG)', geojson: 'GeoJSON', full: 'Full screen', files: 'Open files…' };
@@ -14,12 +14,11 @@ const HTML = `<form method="dialog"><h2>More</h2><button aria-label="Close">✕<
 <div tabindex="0" role="group" aria-label="Tools">
   <p class="row">${Object.entries(BUTTONS).map(([name, text]) => `<button id="tool-${name}" type="button">${text}</button>`).join('')}
     <label for="unit" class="unseen">Lengths in</label><select id="unit"><option value="m">metres</option><option value="ft">feet</option></select>
-    <label for="theme" class="unseen">Colours</label><select id="theme"><option value="auto">auto</option><option value="bright">bright</option><option value="dark">dark</option><option value="contrast">high contrast</option></select>
-    <label for="language" class="unseen">Language</label><select id="language"></select></p>
+    <label for="theme" class="unseen">Colours</label><select id="theme"><option value="auto">auto</option><option value="bright">bright</option><option value="dark">dark</option><option value="contrast">high contrast</option></select></p>
   <h3 id="layers-title">Layers</h3>
   <ul aria-labelledby="layers-title">${Object.entries(LAYERS).map(([name, text]) => `<li><label><input type="checkbox" id="layer-${name}"> ${text}</label></li>`).join('')}</ul>
-  <h3>What happened</h3><ol id="events" data-empty="nothing yet"></ol>
-  <h3>What this page said</h3><ol id="heard" data-empty="nothing yet"></ol>
+  <h3>What happened</h3><ol id="events" tabindex="0" data-empty="nothing yet"></ol>
+  <h3>What this page said</h3><ol id="heard" tabindex="0" data-empty="nothing yet"></ol>
 </div>`;
 
 export class Tools {
@@ -36,7 +35,6 @@ export class Tools {
     new Heard($('messages'), $('heard'));
     this.wire();
     this.wireLayers();
-    startLanguage($('language'));
     this.setCharts(stored() === 'on');
     Object.assign(page.charts, { onEvents: (events) => this.events(events), isWanted: () => dialog.open });
   }
