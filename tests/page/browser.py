@@ -42,9 +42,7 @@ SETTLED = """(() => {
     const map = document.querySelector('#map'), { view } = echostep;
     return Math.abs(view.width - map.clientWidth) < 1 && Math.abs(view.height - map.clientHeight) < 1;
 })()"""  # the view has the size of the map
-READY = (
-    f"window.echostep?.last?.told && document.querySelector('#walls path') && {SETTLED}"  # an estimate and a floor are drawn
-)
+READY = f"window.echostep?.last?.told && document.querySelector('#walls path') && {SETTLED}"  # an estimate and a floor are drawn
 SPOT = f"""([x_m, y_m]) => {{
     const {{ left, top }} = document.querySelector('#map').getBoundingClientRect(), [x, y] = echostep.view.toScreen(x_m, y_m);
     return {SETTLED} && [left + x, top + y];

@@ -16,7 +16,7 @@ from board_runs import ROOT
 
 HOST = ROOT / "host/echostep"
 FOLDERS = ("page/static", "page/static/live", "page/static/tools", "operation/static")
-ELSEWHERE = ("export.js", "theme.js", "words.js")  # GeoJSON, queries of styles, names of languages
+ELSEWHERE = ("export.js", "theme.js", "language.js")  # GeoJSON, queries of styles, names of languages
 # Functions and classes whose texts a page shows; None: all of the module.
 MODULES: dict[str, tuple[str, ...] | None] = {
     "guidance/cues.py": ("NO_HEADING", "NEVER_KNOWN", "Guide"),

@@ -74,7 +74,11 @@ def catalogue(name: str) -> dict[str, str]:
 
 def names(plan: Plan) -> set[str]:
     """The names on a plan, which are in no catalogue."""
-    return {plan.name, *(level.name for level in plan.levels), *(room.name for level in plan.levels for room in level.rooms)}
+    return {
+        plan.name,
+        *(level.name for level in plan.levels),
+        *(room.name for level in plan.levels for room in level.rooms),
+    }
 
 
 def page_of(browser: Any, url: str, lang: str, ready: str, **how: Any) -> Any:
@@ -114,7 +118,10 @@ def test_every_text_of_the_source_has_an_entry(browser: Any, url: str) -> None:
 
 def test_a_text_without_entry_is_found(browser: Any, url: str) -> None:
     page = page_of(browser, url, "de", READY)
-    assert page.evaluate("echostep.tr('lost: a new sentence. Turn left.')") == "Position verloren: a new sentence. Links abbiegen."
+    assert (
+        page.evaluate("echostep.tr('lost: a new sentence. Turn left.')")
+        == "Position verloren: a new sentence. Links abbiegen."
+    )
     assert "a new sentence" in page.evaluate(MISSING)
     assert page.evaluate("echostep.tr('within 0.4 m · heading SE 135° ±5°')") == "auf 0,4 m genau · Kurs SO 135° ±5°"
     assert page.evaluate("echostep.tr('2 floors up')") == "2 Geschosse höher"
@@ -137,7 +144,7 @@ def test_how_a_language_is_chosen(browser: Any, url: str) -> None:
 
 
 def test_the_command_knows_the_languages_of_the_pages() -> None:
-    listed = re.search(r"LANGUAGES = \{(.*?)\}", (STATIC / "words.js").read_text("utf-8"))
+    listed = re.search(r"LANGUAGES = \{(.*?)\}", (STATIC / "language.js").read_text("utf-8"))
     assert listed
     assert re.findall(r"(\w+):", listed[1]) == [lang.value for lang in Language]
 
@@ -175,7 +182,9 @@ def wearers_moments() -> list[PageScene]:
     *before, alarm = moments()
     known = replace(before[0], streams=replace(RATES, wrong=""))
     statuses = [replace(known, t_s=10.0 + k, status_text=text) for k, text in enumerate(STATUSES)]
-    cues = [replace(known, t_s=30.0 + k, guidance=ShownGuidance("off", text, 0.4, 27.0, ())) for k, text in enumerate(CUES)]
+    cues = [
+        replace(known, t_s=30.0 + k, guidance=ShownGuidance("off", text, 0.4, 27.0, ())) for k, text in enumerate(CUES)
+    ]
     return [*before, *statuses, *cues, alarm]
 
 

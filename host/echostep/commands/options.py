@@ -24,7 +24,7 @@ Value = TypeVar("Value")
 
 
 class Language(StrEnum):
-    """Languages of the pages (`page/static/words.js`)."""
+    """Languages of the pages (`page/static/language.js`)."""
 
     EN = "en"
     DE = "de"

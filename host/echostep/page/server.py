@@ -44,7 +44,7 @@ from echostep.plan.model import Plan
 
 STATIC = Path(__file__).parent / "static"
 LOCAL = "127.0.0.1"
-HTML = '<html lang="en">'  # of a page; static/words.js reads which language was chosen
+HTML = '<html lang="en">'  # of a page; static/language.js reads which language was chosen
 PORT = 8420
 MOST_PAGES = 32  # open at the same time; further ones are refused
 TRY_AGAIN_LATER = 1013  # WebSocket close code [IANA]

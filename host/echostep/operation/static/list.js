@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The list of wearers and the details of one, in words; and the text for screen readers when a wearer needs help.
 
-import { tr } from '../static/words.js';
+import { tr } from '../static/language.js';
 import { put, say } from './text.js';
 
 export const SIGNS = { mayday: '▲', asked: '△', lost: '✕', stale: '◌', uncertain: '◐', waiting: '○', tracking: '●', ended: '■' };

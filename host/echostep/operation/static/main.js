@@ -7,7 +7,7 @@ import { Link } from '../static/link.js';
 import { PlanView } from '../static/plan.js';
 import { startTheme } from '../static/theme.js';
 import { View } from '../static/view.js';
-import { localise, missing, tr } from '../static/words.js';
+import { localise, missing, tr } from '../static/language.js';
 import { titled } from '../static/tools/titles.js';
 import { Alarm } from './alarm.js';
 import { Crews } from './crews.js';

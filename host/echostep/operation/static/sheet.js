@@ -2,7 +2,7 @@
 // What a commander can do at a place of the map: set a mark, or remove the one that is there; and the commander's name, with which marks and acknowledgements are signed.
 
 import { markWords } from '../static/marks.js';
-import { tr } from '../static/words.js';
+import { tr } from '../static/language.js';
 
 const KINDS = ['cleared', 'hazard', 'meeting'];
 const $ = (id) => document.getElementById(id);

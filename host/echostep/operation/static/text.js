@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Texts of elements.
 
-import { tr } from '../static/words.js';
+import { tr } from '../static/language.js';
 
 // Unchanged text causes no new layout.
 export const put = (element, text) => { if (element.textContent !== text) element.textContent = text; };

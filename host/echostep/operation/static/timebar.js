@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The time bar over the whole operation: go back, hold, play, return to now. While the past is shown, what calls for help now is said beside it.
 
-import { tr } from '../static/words.js';
+import { tr } from '../static/language.js';
 import { put } from './text.js';
 
 const $ = (id) => document.getElementById(id);

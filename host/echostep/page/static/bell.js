@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The bell: tones and vibration of an alarm. Browsers allow neither before the first tap or key; until then a button invites to it.
 
-import { tr } from './words.js';
+import { tr } from './language.js';
 
 const TONE_HZ = 880, TONE_S = 0.25, TONES = 3;  // assumed
 const VIBRATION_MS = [400, 200, 400];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The legend: what each sign on the map means, the keys, the choice of the language; a dialog that a button or the keys L and ? open, on the wearer's and the commander's page.
 
-import { localise, startLanguage, tr } from './words.js';
+import { localise, startLanguage, tr } from './language.js';
 
 const line = (d, colour = 'wall', width = 1.5, more = '') => `<path d="${d}" fill="none" stroke="var(--${colour})" stroke-width="${width}" ${more}/>`;
 const shape = (d, colour, fill = colour) => `<path d="${d}" fill="${fill === 'none' ? 'none' : `var(--${fill})`}" stroke="var(--${colour})" stroke-width="2"/>`;

@@ -22,7 +22,7 @@ import { Tools } from './tools/tools.js';
 import { inUnits } from './tools/units.js';
 import { startTheme } from './theme.js';
 import { View } from './view.js';
-import { localise, missing, tr } from './words.js';
+import { localise, missing, tr } from './language.js';
 
 const $ = (id) => document.getElementById(id);
 localise(document.body);

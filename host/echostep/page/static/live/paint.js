@@ -3,7 +3,7 @@
 
 import { paintDrawing } from './drawing.js';
 import { paintMarks } from '../marks.js';
-import { tr } from '../words.js';
+import { tr } from '../language.js';
 
 const GRADES = 4;  // shades of the particles' weight
 const PARTICLE_PX = 2.5;

@@ -4,7 +4,7 @@
 import { drawnText } from './drawing.js';
 import { marksText } from '../marks.js';
 import { inUnits, scaleBar } from '../tools/units.js';
-import { tr } from '../words.js';
+import { tr } from '../language.js';
 
 const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕', ended: '■' };
 const SPOKEN_MS = 8000;  // shortest time between two positions for a screen reader

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The time bar of a replay: play and pause, step, seek, speed.
 
-import { tr } from '../words.js';
+import { tr } from '../language.js';
 
 const $ = (id) => document.getElementById(id);
 

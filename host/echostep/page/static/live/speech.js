@@ -4,7 +4,7 @@
 
 import { Bell } from '../bell.js';
 import { inUnits } from '../tools/units.js';
-import { language, tr } from '../words.js';
+import { language, tr } from '../language.js';
 
 const BEGINS_MS = 2500;  // after which a sentence that has not begun is reported as not spoken; assumed
 const CUT_OFF = ['canceled', 'interrupted'];  // errors of a sentence that a newer one replaced [Web Speech API]

@@ -2,7 +2,7 @@
 // A position that is being entered: its ghost on the map, what it would do in words, its confirmation; and the undoing of the last one.
 
 import { inUnits } from '../tools/units.js';
-import { tr } from '../words.js';
+import { tr } from '../language.js';
 
 const $ = (id) => document.getElementById(id);
 const FINGER_PX = 20;  // standard deviation of a tap on the screen

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Charts under the map: ranges, rates and heading over time, with what happened as ticks. In a replay of the whole walk, a tap seeks; live, of the last minute.
 
-import { tr } from '../words.js';
+import { tr } from '../language.js';
 import { inUnits } from './units.js';
 
 const LIVE_S = 60;  // shown of a live run

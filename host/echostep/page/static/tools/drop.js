@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Files that are dropped onto the page, or chosen with its button: sent to the server one by one; what came of each is written in words.
 
-import { tr } from '../words.js';
+import { tr } from '../language.js';
 
 const $ = (id) => document.getElementById(id);
 const ELSEWHERE = 'This page shows a run; a recording plays on the page of: echostep page';

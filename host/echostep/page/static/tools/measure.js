@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The straight distance between two taps; a third tap begins anew.
 
-import { tr } from '../words.js';
+import { tr } from '../language.js';
 import { inUnits } from './units.js';
 
 export class Measure {

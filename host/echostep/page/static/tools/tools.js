@@ -6,7 +6,7 @@ import { linkOf } from './hash.js';
 import { Heard } from './heard.js';
 import { LAYERS } from './layers.js';
 import { chooseUnit, chosenUnit } from './units.js';
-import { localise, tr } from '../words.js';
+import { localise, tr } from '../language.js';
 
 const $ = (id) => document.getElementById(id);
 const BUTTONS = { measure: 'Measure', charts: 'Charts', link: 'Copy a link', picture: 'Picture (PNG)', geojson: 'GeoJSON', full: 'Full screen', files: 'Open files…' };
