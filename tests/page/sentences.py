@@ -49,15 +49,18 @@ WORDS = re.compile(r"[a-z]{2}.* .*[a-z]|^[A-Z][a-z]+[a-z.!?]$")
 NO_WORDS = re.compile(r"[<{/]|system-ui|^\(|^transform |, select,|^#|^sign |^circle |^name ")
 # Texts that are put together from variables: what a page gets of them.
 WHOLE = {
-    "Take the 7 7": ("Take the stairs up", "Take the lift down", "Take the ramp up", "Take the stairs down", "Take the lift up", "Take the ramp down"),
-    "7: 7 places fit; walk on, turn into a room7": ("lost: 7 places fit; walk on, turn into a room or tap where you are", "uncertain: 7 places fit; walk on, turn into a room"),
+    "Take the 7 7": tuple(f"Take the {way} {to}" for way in ("stairs", "lift", "ramp") for to in ("up", "down")),
+    "7: 7 places fit; walk on, turn into a room7": (
+        "lost: 7 places fit; walk on, turn into a room or tap where you are",
+        "uncertain: 7 places fit; walk on, turn into a room",
+    ),
     " or tap where you are": (),
     "lost: 7 for 7 s": ("lost: nothing from the foot for 7 s", "lost: no step of the foot for 7 s"),
     "nothing from the foot": ("Stop. There is nothing from the foot.",),
     "no step of the foot": ("Stop. There is no step of the foot.",),
     "There is 7": (),
     " (without counter, acceleration or rate of turn)": (
-        "the MTx sends no usable samples (without counter, acceleration or rate of turn): look at its settings, its port and its RX line: echostep doctor",
+        "the MTx sends no usable samples (without counter, acceleration or rate of turn): look at its settings",
     ),
     "drop its plan": (),
 }  # fmt: skip

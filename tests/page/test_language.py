@@ -39,7 +39,8 @@ CUT = """(() => {
     const pen = document.createElement('canvas').getContext('2d'), wrong = [], ARROW = 24;
     for (const element of document.querySelectorAll('body *')) {
         if (!element.offsetParent || element.closest('.unseen, svg, h1, #map, #floors, #floor, .name')) continue;  // names of a plan may be cut off
-        const style = getComputedStyle(element), { clientWidth: width, clientHeight: height } = element, name = `${element.id || element.tagName}: ${element.innerText}`;
+        const style = getComputedStyle(element), { clientWidth: width, clientHeight: height } = element;
+        const name = `${element.id || element.tagName}: ${element.innerText}`;
         pen.font = `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`;
         if (element.tagName === 'SELECT' && pen.measureText(element.selectedOptions[0]?.text ?? '').width > width - ARROW) wrong.push(name);
         if (style.overflowX === 'hidden' || element.tagName === 'BUTTON') if (element.scrollWidth > width + 1) wrong.push(name);
@@ -138,7 +139,8 @@ def test_how_a_language_is_chosen(browser: Any, url: str) -> None:
         page = loaded_page(browser, server.url, {"locale": "en-GB"}, f"{LANG} === 'de'")
         wait_for(page, "document.querySelector('#help').textContent === 'Notruf'")
         page.click("#legend-button")
-        page.select_option("#language", "en")
+        with page.expect_navigation():  # it loads itself again
+            page.select_option("#language", "en")
         wait_for(page, f"{LANG} === 'en' && document.querySelector('#help').textContent === 'Help!'")
         page.context.close()
 
