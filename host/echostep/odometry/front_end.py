@@ -51,6 +51,7 @@ from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk, Portion, portion_of
 from echostep.ports.people.check_in import PERSON
 from echostep.ports.people.meeting import MEETING
+from echostep.ports.people.tap import POINT
 from echostep.ports.people.team_beacons import TEAM_BEACONS
 from echostep.ports.people.teammate import TEAM
 from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
@@ -174,7 +175,7 @@ class FrontEnd:
 
     def _count_unknown_ports(self, portion: Portion) -> None:
         for k, port in enumerate(portion.ports):
-            if port not in (BOARD, MTX, FOOT, GATEWAY, PERSON, TEAM, MEETING, TEAM_BEACONS):
+            if port not in (BOARD, MTX, FOOT, GATEWAY, PERSON, TEAM, MEETING, TEAM_BEACONS, POINT):
                 self._unknown_ports += int((portion.port == k).sum())
 
     def _count_bad_times(self, board: Arrivals, times: Times) -> None:

@@ -24,10 +24,11 @@ from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.output.table import Table
 from echostep.scorecard.card import FLOOR_PENALTY_M, score
 from echostep.scorecard.error_statistics import error_statistics, quantile
+from echostep.scorecard.own_track import track_of
 from echostep_studies.bench.judgement import true_levels
 from echostep_studies.frame.report import as_dict, as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
-from echostep_studies.operation.own_tracks import track_of, truth_of
+from echostep_studies.operation.true_tracks import truth_of
 from echostep_studies.operation.walks import HALF_M, OperationWalk, operation
 
 ASKED_CE95_M, ASKED_FLOOR = 0.5, 0.995  # what an operation asks for, assumed: a door; hardly ever another floor

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: MIT
+"""A recording of a simulated acceptance walk with the Python board, made faster than it is walked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cache
+from pathlib import Path
+
+from echostep.ports.chunks import Chunk
+from echostep.ports.people.tap import POINT, Tap
+from echostep.recording.recorder import Recorder
+from echostep.session.acceptance.protocol import Protocol
+from echostep.session.acceptance.survey import corridor
+from echostep.session.metadata import SIMULATED, run_metadata
+from echostep.simulation.devices.board import PythonBoard
+from echostep.simulation.scenario import START_NS, Scenario
+from twin.acceptance_walk import times_s, waypoints
+
+CORRIDOR, ROUNDS = "10x2", 2
+
+
+@cache
+def walk(text: str = CORRIDOR, rounds: int = ROUNDS) -> tuple[Protocol, tuple[Chunk, ...], tuple[Chunk, ...]]:
+    """The protocol, the chunks of both ports, and the taps at the moments when the trunk is at the points."""
+    protocol = corridor(text)
+    plan, visits = protocol.plan(), protocol.visits(rounds)
+    scenario = Scenario(plan, waypoints(protocol.points, visits, plan), 3, PythonBoard(3))
+    taps = tuple(
+        Chunk(POINT, START_NS + round(t_s * 1e9), Tap(visit.point, visit.standing).encode())
+        for t_s, visit in zip(times_s(scenario.walk, protocol.points, visits), visits, strict=True)
+    )
+    return protocol, tuple(scenario.chunks()), taps
+
+
+def record(path: Path, protocol: Protocol, *streams: Sequence[Chunk]) -> Path:
+    """The chunks of these streams in the order of their arrival, as the recording of an acceptance walk."""
+    plan = protocol.plan()
+    metadata = run_metadata(plan, plan.start, 3, "acceptance", source=SIMULATED) | protocol.metadata
+    recorder = Recorder(path, metadata)
+    for chunk in ordered(streams):
+        recorder.write(chunk)
+    recorder.close()
+    return path
+
+
+def ordered(streams: Sequence[Sequence[Chunk]]) -> Iterator[Chunk]:
+    """Chunks of several streams in the order of their arrival."""
+    yield from sorted((chunk for stream in streams for chunk in stream), key=lambda chunk: chunk.t_arrival_ns)
