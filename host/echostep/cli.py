@@ -15,7 +15,7 @@ from typing import Annotated
 
 import typer
 
-from echostep.commands import beacons, commander, files, hardware, plan, recordings, runs
+from echostep.commands import acceptance, beacons, commander, files, hardware, plan, recordings, runs
 from echostep.commands.studies import add_studies
 from echostep.errors import EchostepError, IncompleteError, words_of
 from echostep.extras import EXTRAS, lacks
@@ -34,7 +34,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     help="Indoor pedestrian tracking.",
 )
-for nameless in (runs, files, commander, hardware, recordings):
+for nameless in (runs, files, commander, hardware, acceptance, recordings):
     app.add_typer(nameless.app)
 add_studies(app)
 for name, group in {"beacons": beacons, "plan": plan}.items():

@@ -1,18 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A simulated wearer who walks the protocol of `echostep acceptance`: where the way leads, and when a point is reached.
+"""The twin walks the protocol of `echostep acceptance` in real time (`make twin CORRIDOR=20x2`).
 
-In: the protocol's points and visits; a simulated walk. Out: waypoints; the time of each visit. Owns how long the wearer stands on a point.
+In: the lengths of a corridor. Out: two ports, as `twin.run` has them; a line each time a point is reached. Owns both pseudo terminals, and how long the
+wearer stands on a point. The walk begins when the board's port is opened; afterwards the wearer stands until it is closed.
 """
 
 from __future__ import annotations
 
+import argparse
+import contextlib
+import signal
+import sys
+import time
 from collections.abc import Sequence
 
 import numpy as np
 
 from echostep.plan.model import Plan
 from echostep.session.acceptance.protocol import Point, Visit
+from echostep.session.acceptance.survey import corridor
 from echostep.simulation.people.walker import Walk, Waypoint
+from echostep.simulation.scenario import Scenario
+from twin.run import IDLE_MS, PtyBoard, PtyMtx, playing, wait_for_opening
 
 STOP_S = 1.5  # on a point that is visited standing; assumed
 NEAR_M, SAME_M = 0.5, 0.02  # a point is about here; the trunk is as near to it as it comes
@@ -39,3 +48,39 @@ def times_s(walk: Walk, points: Sequence[Point], visits: Sequence[Visit]) -> lis
         times.append(float(walk.t_s[begin + int(nearest[len(nearest) // 2])]))
         begin += leaves
     return times
+
+
+def play(text: str, rounds: int, seed: int) -> None:
+    """Walk the protocol of a corridor once, then stand until the board's port is closed."""
+    protocol, board, mtx = corridor(text), PtyBoard(), PtyMtx()
+    plan, visits = protocol.plan(), protocol.visits(rounds)
+    with contextlib.closing(board):
+        scenario = Scenario(plan, waypoints(protocol.points, visits, plan), seed, board)
+        due = [*zip(times_s(scenario.walk, protocol.points, visits), visits, strict=True)]
+        print(f"board {board.port}\nmtx   {mtx.port}\n\nIn another terminal:\n  .venv/bin/echostep acceptance --corridor {text} "
+              f"--rounds {rounds} --board {board.port} --mtx {mtx.port}\n\nPress Enter there at each point. Ctrl-C ends.", flush=True)  # fmt: skip
+        wait_for_opening(board, mtx)
+        for now_s in playing(scenario, board, mtx):
+            while due and now_s >= due[0][0]:
+                print(f"at point {protocol.points[due.pop(0)[1].point].name}", flush=True)
+        while board.is_open:
+            board.advance(scenario.sensors.rows(0, IDLE_MS))
+            mtx.answer_requests()
+            time.sleep(IDLE_MS * 1e-3)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("corridor", metavar="LENGTHxWIDTH")
+    parser.add_argument("--rounds", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
+    with contextlib.suppress(KeyboardInterrupt):
+        play(options.corridor, options.rounds, options.seed)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -61,16 +61,15 @@ def short_names(paths: Sequence[Path]) -> list[str]:
 
 def page(report: ScoreReport) -> str:
     """The page as HTML."""
-    title = escape(report.title)
-    parts = [f"<h1>{title}</h1>", *(f'<p class="note">{escape(line)}</p>' for line in _notes(report)), _table(report)]
+    parts = [*(f'<p class="note">{escape(line)}</p>' for line in _notes(report)), _table(report)]
     parts += ["<h2>Distribution of the errors</h2>"]
-    parts.append(_picture(draw_distribution(report.scored, report.names), "Share of the points below each error.", ""))
+    parts.append(picture(draw_distribution(report.scored, report.names), "Share of the points below each error.", ""))
     for one, name in zip(report.scored, report.names, strict=True):
         parts.append(f"<h2>{escape(name)}</h2>")
         words = (
             f"CE95 is {one.card.ce95_m:.2f} m; colours beyond it are alike. A line joins a position to the true place."
         )
-        parts.append(_picture(draw_on_plan(one, report.plan), words, f"Errors of {name} on the plan"))
+        parts.append(picture(draw_on_plan(one, report.plan), words, f"Errors of {name} on the plan"))
         stanford = draw_stanford(one)
         if stanford is None:
             parts.append("<p>The track states no radius: there is no Stanford diagram.</p>")
@@ -78,11 +77,16 @@ def page(report: ScoreReport) -> str:
             words = (
                 f"Stanford diagram: the {one.radius_name} that the track states against its error; both end at 100 m."
             )
-            parts.append(_picture(stanford, words, f"Stanford diagram of {name}"))
-    body = "\n".join(parts)
+            parts.append(picture(stanford, words, f"Stanford diagram of {name}"))
+    return document(report.title, parts)
+
+
+def document(title: str, parts: Sequence[str]) -> str:
+    """A whole page of HTML parts under a title, which is escaped here."""
+    body = "\n".join([f"<h1>{escape(title)}</h1>", *parts])
     return (
         f'<!doctype html>\n<html lang="en">\n<head><meta charset="utf-8">'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{title}</title>'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{escape(title)}</title>'
         f"<style>{STYLE}</style></head>\n<body><main>\n{body}\n</main></body>\n</html>\n"
     )
 
@@ -106,7 +110,8 @@ def _table(report: ScoreReport) -> str:
     )
 
 
-def _picture(figure: Figure, words: str, alt: str) -> str:
+def picture(figure: Figure, words: str, alt: str) -> str:
+    """A figure with its caption, inside the page."""
     data = base64.b64encode(as_svg(figure)).decode()
     return (
         f'<figure><img alt="{escape(alt or words)}" src="data:image/svg+xml;base64,{data}">'

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from echostep.board.frames import BoardReader, StaleFirmwareError, encode
 from echostep.board.messages import Identify
@@ -24,6 +24,7 @@ from echostep.localization.particles.start import Start
 from echostep.plan.model import Plan
 from echostep.ports.arrival_clock import SleepWatch, now_ns
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk
+from echostep.ports.people.tap import POINT
 from echostep.ports.serial_ports import SerialPorts, check_different
 from echostep.ports.usb_number import usb_number
 from echostep.printing.people import outlast_output
@@ -51,8 +52,20 @@ if TYPE_CHECKING:
 BAUD = dict.fromkeys((BOARD, MTX, FOOT, GATEWAY), 115200)
 
 
-def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -> None:
-    """Track a wearer and record everything."""
+class Guide(Protocol):
+    """Leads a wearer from point to point: `metadata` for the recording."""
+
+    metadata: dict[str, str]
+
+    def pop(self) -> list[bytes]:
+        """Taps since the last call."""
+
+    def is_over(self) -> bool:
+        """Whether the run ends."""
+
+
+def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions, guide: Guide | None = None) -> Path:
+    """Track a wearer and record everything, with the taps of a guide if there is one; returns the recording."""
     plan = plan_of(tracking)
     path = tracking.settings_path
     settings_toml = read_settings(path) if path else ""
@@ -69,13 +82,18 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -
         _identify(opened)
         metadata = run_metadata(plan, tracker.start, seed, "live", settings_toml) | clock_metadata()
         session.arrivals.urls = opened.urls
+        if guide is not None:
+            metadata |= guide.metadata
+            session.message_sources.append((POINT, guide.pop))
         with session:
             with start_recording(folder / "walk.mcap", metadata, ports.keep, ports.split) as recorder:
-                chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session)
+                ended = guide.is_over if guide is not None else is_asked
+                chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session, ended)
                 session.track(portions_of(chunks, 1), None, recorder)
             print_notices(recorder.notices)
             session.finish("live")
         recorder.check_whole()
+    return recorder.path
 
 
 def _last_start(folder: Path, plan: Plan, board: str, settings: Settings) -> Start:
@@ -140,17 +158,18 @@ def _recorded_chunks(
     rate_hz: float,
     seconds: float | None,
     session: Session | None = None,
+    ended: Callable[[], bool] = is_asked,
 ) -> Iterator[Chunk | None]:
     """Chunks of the ports, check-ins and meetings of the page, messages of teammates, each recorded before it is used; the MTx is set up."""
-    chunks = with_right_names(_chunks_for(ports, seconds), ports)
+    chunks = with_right_names(_chunks_for(ports, seconds, ended), ports)
     if session is not None:
         chunks = with_messages(chunks, session.message_sources, lambda _: now_ns())
     chunks = _with_subscription(with_role_check(recorded(chunks, recorder), ports.urls), ports)
     return _with_mtx_setup(chunks, ports, rate_hz) if MTX in ports.names else chunks
 
 
-def _chunks_for(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk | None]:
-    """Chunks of the ports for so many seconds, None: until a signal; then what has arrived. None as a chunk when nothing came for a while."""
+def _chunks_for(ports: SerialPorts, seconds: float | None, ended: Callable[[], bool]) -> Iterator[Chunk | None]:
+    """Chunks of the ports for so many seconds, until a signal or until it has `ended`; then what has arrived. None when nothing came for a while."""
     end_s = math.inf if seconds is None else time.monotonic() + seconds
     watch = SleepWatch()
     for chunk in ports.chunks():
@@ -158,7 +177,7 @@ def _chunks_for(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk | N
         if slept_s := watch.slept_s():
             console.print(f"The computer slept for {slept_s:.0f} s: nothing was received; the position is uncertain")
         yield chunk
-        if is_asked() or time.monotonic() >= end_s:
+        if is_asked() or ended() or time.monotonic() >= end_s:
             ports.stop()
 
 

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+"""`echostep acceptance`: the guided walk, live, and the page of it.
+
+In: a protocol, ports. Out: plan, recording, track and page in one folder. Owns what is called simulated: a board behind a pseudo terminal.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from echostep.errors import EchostepError
+from echostep.session.acceptance.guide import Guide
+from echostep.session.acceptance.page import write_page
+from echostep.session.acceptance.protocol import Protocol
+from echostep.session.console import console
+from echostep.session.metadata import SIMULATED
+from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
+from echostep.session.results import output_folder
+from echostep.session.runs.live import live
+
+PLAN_NAME = "acceptance-plan.json"
+PSEUDO_TERMINALS = "/dev/pts/"  # of Linux [pts(4)]: no board has one
+
+
+def acceptance(
+    protocol: Protocol, rounds: int, ports: PortOptions, output: OutputOptions, settings: Path | None = None
+) -> list[str]:
+    """Guide the walk, record and track it, and write its page; returns the lines about it."""
+    plan_path = output_folder(output.folder) / PLAN_NAME
+    try:
+        plan_path.write_text(protocol.plan_text, encoding="utf-8")
+    except OSError as error:
+        raise EchostepError(
+            f"{plan_path}: cannot write the plan: {error.strerror}; give another folder with --out"
+        ) from error
+    tracking = TrackingOptions(plan_path, settings_path=settings, seed=0)
+    fields = {"note": "acceptance walk"}
+    if _is_simulated(ports):
+        fields |= {"note": "acceptance walk, simulated: a port is a pseudo terminal", "source": SIMULATED}
+    guide = Guide(
+        protocol, rounds, sys.stdin, lambda words: console.print(words, markup=False, highlight=False), fields
+    )
+    return write_page(live(tracking, ports, output, guide))
+
+
+def _is_simulated(ports: PortOptions) -> bool:
+    """Whether a port is a pseudo terminal, as the twin's."""
+    given = (ports.board, ports.mtx, ports.foot)
+    return any(os.path.realpath(port).startswith(PSEUDO_TERMINALS) for port in given if port is not None)
