@@ -30,7 +30,7 @@ twin: $(READY) ## play board and MTx on two pseudo terminals until Ctrl-C; STILL
 	@tools/apt.sh $(APT_PACKAGES)
 	$(MAKE) -C firmware
 	$(MAKE) -C tools/twin
-	$(TOOL) $(if $(CORRIDOR),twin.acceptance_walk $(CORRIDOR),twin.run $(if $(STILL),--still) $(if $(KIT),--kit $(KIT)))
+	$(if $(CORRIDOR),$(TOOL) twin.acceptance_walk $(CORRIDOR),$(TOOL) twin.run $(if $(STILL),--still) $(if $(KIT),--kit $(KIT)))
 
 demo: $(READY) ## track a simulated walk through the real firmware in the simulator; KIT=2026: with the parts of 2026 (default: papers)
 	@if tools/apt.sh $(APT_PACKAGES); then \

@@ -46,6 +46,7 @@ STARTED_BY = {
     "reliability.team_load": HERE,
     "reliability.team_operation": "tools/test_operation_tool.py",
     "reliability.viewers": "tools/test_long_runs.py",
+    "twin.acceptance_walk": "session/acceptance/test_acceptance_command.py",
     "twin.measure": HERE,
     "twin.run": "commands/test_live.py",
 }

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The twin walks the protocol of `echostep acceptance` in real time (`make twin CORRIDOR=20x2`).
 
-In: the lengths of a corridor. Out: two ports, as `twin.run` has them; a line each time a point is reached. Owns both pseudo terminals, and how long the
-wearer stands on a point. The walk begins when the board's port is opened; afterwards the wearer stands until it is closed.
+In: the lengths of a corridor. Out: two ports, as `twin.run` has them; a line each time a point is reached. Owns both pseudo terminals, and how
+long the wearer stands on a point. The walk begins when the board's port is opened; afterwards the wearer stands until it is closed.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import START_NS, Scenario
 from twin.acceptance_walk import times_s, waypoints
 
-CORRIDOR, ROUNDS = "10x2", 2
+CORRIDOR, ROUNDS = "8x2", 2
 
 
 @cache
@@ -33,11 +33,13 @@ def walk(text: str = CORRIDOR, rounds: int = ROUNDS) -> tuple[Protocol, tuple[Ch
     return protocol, tuple(scenario.chunks()), taps
 
 
-def record(path: Path, protocol: Protocol, *streams: Sequence[Chunk]) -> Path:
-    """The chunks of these streams in the order of their arrival, as the recording of an acceptance walk."""
+def record(
+    path: Path, protocol: Protocol, *streams: Sequence[Chunk], metadata: Mapping[str, str] | None = None
+) -> Path:
+    """The chunks of these streams in the order of their arrival, as a recording with the protocol in its metadata, or other fields."""
     plan = protocol.plan()
-    metadata = run_metadata(plan, plan.start, 3, "acceptance", source=SIMULATED) | protocol.metadata
-    recorder = Recorder(path, metadata)
+    fields = run_metadata(plan, plan.start, 3, "acceptance", source=SIMULATED)
+    recorder = Recorder(path, fields | (protocol.metadata if metadata is None else metadata))
     for chunk in ordered(streams):
         recorder.write(chunk)
     recorder.close()

@@ -25,8 +25,8 @@ class PointError(NamedTuple):
 
     name: str
     taps: int
-    east_m: float
-    north_m: float
+    x_m: float
+    y_m: float
     mean_m: float
 
 
@@ -60,6 +60,6 @@ def by_point(walked: Walked, scored: Scored) -> list[PointError]:
         if at.true_level is not None:
             here &= at.true_level == point.level
         if here.any():
-            east, north = (at.xy_m - at.true_xy_m)[here].mean(axis=0).tolist()
-            rows.append(PointError(point.name, int(here.sum()), east, north, float(at.error_m[here].mean())))
+            x_m, y_m = (at.xy_m - at.true_xy_m)[here].mean(axis=0).tolist()
+            rows.append(PointError(point.name, int(here.sum()), x_m, y_m, float(at.error_m[here].mean())))
     return rows

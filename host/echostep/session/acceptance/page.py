@@ -25,6 +25,11 @@ from echostep.session.metadata import is_simulated
 
 SIMULATED = "Simulated: no board was worn. The figures show that the protocol works, not how well the tracker does."
 MEASURED = "Measured: recorded from a board's ports."
+# Of the metrics, those that surveyed points can tell and a page has room for
+SHOWN = (
+    "horizontal error, mean", "horizontal error, rms", "bias", "CE50 (CEP)", "CE95", "horizontal error, max", "VE95", "SE95",
+    "floor detection", "availability", "95 % ellipse holds", "95 % radius holds", "protection radius holds",
+)  # fmt: skip
 
 
 def write_page(recording: Path) -> list[str]:
@@ -54,8 +59,8 @@ def page(walked: Walked, scored: Scored) -> str:
         "<h2>Errors at the points</h2>", _metrics(walked, scored),
         picture(draw_on_plan(scored, walked.plan), words, ""),
         _table(
-            ("point", "taps", "mean error (m)", "east (m)", "north (m)"),
-            ((p.name, p.taps, f"{p.mean_m:.2f}", f"{p.east_m:+.2f}", f"{p.north_m:+.2f}") for p in by_point(walked, scored)),
+            ("point", "taps", "mean error (m)", "mean in x (m)", "mean in y (m)"),
+            ((p.name, p.taps, f"{p.mean_m:.2f}", f"{p.x_m:+.2f}", f"{p.y_m:+.2f}") for p in by_point(walked, scored)),
         ),
         "<p class=\"note\">A tap in passing is itself late or early: a tenth of a second is a tenth of a metre at a walk.</p>",
         "<h2>Echoes by angle</h2>", *_heard(walked),
@@ -86,7 +91,7 @@ def _metrics(walked: Walked, scored: Scored) -> str:
     )
     rows.append(("95 % radius as stated, median", *radii, "what the tracker says of its own error"))
     for metric in METRICS:
-        if metric.value(scored.card) is not None:
+        if metric.name in SHOWN and metric.value(scored.card) is not None:
             texts = (as_text(metric.value(c.card), metric.unit) for c in columns.values())
             rows.append((metric.name, *texts, f"{metric.meaning}{f' [{metric.source}]' if metric.source else ''}"))
     return _table(("metric", *columns, "what it is"), rows)
@@ -118,3 +123,10 @@ def _table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
         for name, *cells in rows
     )
     return f'<div class="wide"><table>{f"<thead><tr>{head}</tr></thead>" if heads else ""}<tbody>{body}</tbody></table></div>'
+
+
+def _cell(cell: object) -> str:
+    """A cell; one that begins with a figure is not broken."""
+    text = str(cell)
+    kind = ' class="figure"' if text[:2].strip("+-")[:1].isdigit() and len(text) < 12 else ""
+    return f"<td{kind}>{escape(text)}</td>"

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""The real command beside the twin, which walks the protocol; every point is tapped by Enter when the twin says that it is reached."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from board_runs import needs_twin, tool
+from command_line import PROGRAM, echostep
+from waiting import PATIENCE_S
+
+TAPS = 17  # of two rounds by five points, and the first
+
+
+@needs_twin
+@pytest.mark.long
+def test_the_twin_walks_the_protocol(tmp_path: Path) -> None:
+    twin = subprocess.Popen([*tool("twin.acceptance_walk"), "8x2", "--rounds", "2"], stdout=subprocess.PIPE, text=True)
+    live = None
+    try:
+        assert twin.stdout is not None
+        board, mtx = (twin.stdout.readline().split()[1] for _ in range(2))
+        command = ["acceptance", "--corridor", "8x2", "--rounds", "2", "--board", board, "--mtx", mtx, "--no-page"]
+        live = subprocess.Popen(
+            [*PROGRAM, *command, "--out", tmp_path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        assert live.stdin is not None
+        reached = (line for line in iter(twin.stdout.readline, "") if line.startswith("at point"))
+        for _ in range(TAPS):
+            next(reached)
+            live.stdin.write("\n")
+            live.stdin.flush()
+        said, _ = live.communicate(timeout=PATIENCE_S)
+    finally:
+        for process in filter(None, (live, twin)):
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=PATIENCE_S)
+    assert live.returncode == 0, said
+    figures = re.search(r"17 taps with a position: mean ([\d.]+) m, CE50 [\d.]+ m, CE95 ([\d.]+) m \(simulated\)", said)
+    assert figures, said
+    assert float(figures[2]) < 0.5
+    (made,) = tmp_path.glob("*.html")
+    first = made.read_bytes()
+    assert b"Simulated: no board was worn" in first
+    again = echostep("acceptance", "--recording", made.with_suffix(".mcap"))
+    assert again.returncode == 0, again.stderr
+    assert made.read_bytes() == first
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        [],
+        ["--corridor", "20x2", "--plan", "plan.json"],
+        ["--plan", "plan.json"],
+        ["--points", "points.csv"],
+        ["--recording", "w.mcap", "--corridor", "20x2"],
+    ],
+)
+def test_one_place_is_given(given: list[str]) -> None:
+    done = echostep("acceptance", *given)
+    assert done.returncode == 2
+    assert "give --corridor LENGTHxWIDTH, or --plan FILE with --points FILE, or --recording FILE" in done.stderr

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""The guide: lines that are typed become taps in the order of the visits."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+
+from echostep.ports.people.tap import Tap, parse_tap
+from echostep.session.acceptance import guide as guides
+from echostep.session.acceptance.guide import Guide
+from echostep.session.acceptance.protocol import FIELD
+from echostep.session.acceptance.survey import corridor
+from echostep.session.acceptance.walked import Taps, TimedTap
+from waiting import until
+
+
+def taps_of(typed: str) -> tuple[list[Tap | None], list[str], Guide]:
+    """The taps of these lines, and what was said."""
+    said: list[str] = []
+    guide = Guide(corridor("20x2"), 1, io.StringIO(typed), said.append, {"source": "live"})
+    taps: list[Tap | None] = []
+    wanted = typed.count("\n")
+    assert until(lambda: guide._typed.qsize() >= wanted)
+    taps += [parse_tap(payload) for payload in guide.pop()]
+    return taps, said, guide
+
+
+def test_enter_is_the_next_point() -> None:
+    taps, said, guide = taps_of("\n\n")
+    assert taps == [Tap(0, standing=True), Tap(1, standing=True)]
+    assert "Stand on point 1, look to point 2" in said[1]
+    assert said[-1].startswith("2 of 8, round 1 of 1: stop")
+    assert said[-1].endswith(" 3")
+    assert guide.metadata["source"] == "live"
+    assert FIELD in guide.metadata
+
+
+def test_a_name_skips_the_points_that_were_missed() -> None:
+    taps, said, _ = taps_of("\n4\n\n")
+    assert taps == [Tap(0, standing=True), Tap(3, standing=True), Tap(4, standing=True)]
+    assert "2 points left out." in said
+
+
+def test_a_tap_is_taken_back() -> None:
+    taps, said, _ = taps_of("u\n\n4\nu\n\n")
+    assert taps == [Tap(0, standing=True), Tap(3, standing=True), Tap(None), Tap(1, standing=True)]
+    assert "There is no tap to take back." in said
+
+
+def test_other_lines_are_no_taps() -> None:
+    taps, said, _ = taps_of("9\n" + 1000 * "x" + "\n")
+    assert taps == []
+    assert sum("is no point that is still to come" in line for line in said) > 1
+    assert max(map(len, said)) < 200
+
+
+def test_the_run_ends_after_the_last_point(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, said, guide = taps_of(9 * "\n" + "\n")
+    assert "All points were tapped." in said
+    assert not guide.is_over()
+    monkeypatch.setattr(guides, "REST_S", 0.0)
+    assert guide.is_over()
+
+
+def test_bytes_that_are_no_tap_are_counted() -> None:
+    taps = Taps(points=2)
+    for payload in (
+        b"",
+        b"{}",
+        b'{"point":2}',
+        b'{"point":-1}',
+        b'{"point":true}',
+        b"\xff",
+        b'{"point":0}' + 200 * b" ",
+        Tap(None).encode(),
+    ):
+        taps.receive(payload, 1.0)
+    assert (taps.kept, taps.bad, taps.taken_back) == ([], 8, 0)
+    taps.receive(Tap(1).encode(), float("nan"))
+    assert taps.bad == 9
+    taps.receive(Tap(1, standing=True).encode(), 2.0)
+    assert taps.kept == [TimedTap(2.0, 1, standing=True)]
+    taps.receive(Tap(None).encode(), 3.0)
+    assert (taps.kept, taps.taken_back) == ([], 1)
