@@ -2,7 +2,7 @@
 """The twin walks the protocol of `echostep acceptance` in real time (`make twin CORRIDOR=20x2`).
 
 In: the lengths of a corridor. Out: two ports, as `twin.run` has them; a line each time a point is reached. Owns both pseudo terminals, and how
-long the wearer stands on a point. The walk begins when the board's port is opened; afterwards the wearer stands until it is closed.
+long the wearer stands on a point. The walk begins when the board's port is opened.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import argparse
 import contextlib
 import signal
 import sys
-import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,11 +18,12 @@ import numpy as np
 from echostep.plan.model import Plan
 from echostep.session.acceptance.protocol import Point, Visit
 from echostep.session.acceptance.survey import corridor
-from echostep.simulation.people.walker import Walk, Waypoint
+from echostep.simulation.people.walker import Person, Walk, Waypoint
 from echostep.simulation.scenario import Scenario
-from twin.run import IDLE_MS, PtyBoard, PtyMtx, playing, wait_for_opening
+from twin.run import PtyBoard, PtyMtx, playing, wait_for_opening
 
 STOP_S = 1.5  # on a point that is visited standing; assumed
+WEARER = Person(stand_s=10.0)  # at both ends: longer than the foot takes for its first position, and the guide's rest
 NEAR_M, SAME_M = 0.5, 0.02  # a point is about here; the trunk is as near to it as it comes
 
 
@@ -51,22 +51,20 @@ def times_s(walk: Walk, points: Sequence[Point], visits: Sequence[Visit]) -> lis
 
 
 def play(text: str, rounds: int, seed: int) -> None:
-    """Walk the protocol of a corridor once, then stand until the board's port is closed."""
+    """Walk the protocol of a corridor once, or until the board's port is closed."""
     protocol, board, mtx = corridor(text), PtyBoard(), PtyMtx()
     plan, visits = protocol.plan(), protocol.visits(rounds)
     with contextlib.closing(board):
-        scenario = Scenario(plan, waypoints(protocol.points, visits, plan), seed, board)
+        scenario = Scenario(plan, waypoints(protocol.points, visits, plan), seed, board, WEARER)
         due = [*zip(times_s(scenario.walk, protocol.points, visits), visits, strict=True)]
         print(f"board {board.port}\nmtx   {mtx.port}\n\nIn another terminal:\n  .venv/bin/echostep acceptance --corridor {text} "
               f"--rounds {rounds} --board {board.port} --mtx {mtx.port}\n\nPress Enter there at each point. Ctrl-C ends.", flush=True)  # fmt: skip
         wait_for_opening(board, mtx)
         for now_s in playing(scenario, board, mtx):
+            if not board.is_open:
+                return
             while due and now_s >= due[0][0]:
                 print(f"at point {protocol.points[due.pop(0)[1].point].name}", flush=True)
-        while board.is_open:
-            board.advance(scenario.sensors.rows(0, IDLE_MS))
-            mtx.answer_requests()
-            time.sleep(IDLE_MS * 1e-3)
 
 
 def main() -> int:

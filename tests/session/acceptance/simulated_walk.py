@@ -15,7 +15,7 @@ from echostep.session.acceptance.survey import corridor
 from echostep.session.metadata import SIMULATED, run_metadata
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import START_NS, Scenario
-from twin.acceptance_walk import times_s, waypoints
+from twin.acceptance_walk import WEARER, times_s, waypoints
 
 CORRIDOR, ROUNDS = "8x2", 2
 
@@ -25,12 +25,17 @@ def walk(text: str = CORRIDOR, rounds: int = ROUNDS) -> tuple[Protocol, tuple[Ch
     """The protocol, the chunks of both ports, and the taps at the moments when the trunk is at the points."""
     protocol = corridor(text)
     plan, visits = protocol.plan(), protocol.visits(rounds)
-    scenario = Scenario(plan, waypoints(protocol.points, visits, plan), 3, PythonBoard(3))
+    scenario = Scenario(plan, waypoints(protocol.points, visits, plan), 3, PythonBoard(3), WEARER)
     taps = tuple(
-        Chunk(POINT, START_NS + round(t_s * 1e9), Tap(visit.point, visit.standing).encode())
+        tap_chunk(START_NS + round(t_s * 1e9), Tap(visit.point, visit.standing, START_NS + round(t_s * 1e9)))
         for t_s, visit in zip(times_s(scenario.walk, protocol.points, visits), visits, strict=True)
     )
     return protocol, tuple(scenario.chunks()), taps
+
+
+def tap_chunk(t_arrival_ns: int, tap: Tap) -> Chunk:
+    """A tap as a chunk."""
+    return Chunk(POINT, t_arrival_ns, tap.encode())
 
 
 def record(

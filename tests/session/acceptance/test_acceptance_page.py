@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,11 +27,12 @@ pytestmark = pytest.mark.long
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A simulated walk with a tap that was taken back, and one that names no point."""
+    """A simulated walk with a tap that was taken back, and two that name no point; the taps reach a run that is 2 s behind."""
     protocol, chunks, taps = walk()
+    late = [replace(tap, t_arrival_ns=tap.t_arrival_ns + 2_000_000_000) for tap in taps]
     odd = (Tap(4).encode(), Tap(None).encode(), Tap(5).encode(), b"\xff{")
-    after = [Chunk(POINT, taps[2].t_arrival_ns + k, body) for k, body in enumerate(odd, 1)]
-    return record(tmp_path_factory.mktemp("walk") / "walk.mcap", protocol, chunks, taps, after)
+    after = [Chunk(POINT, late[2].t_arrival_ns + k, body) for k, body in enumerate(odd, 1)]
+    return record(tmp_path_factory.mktemp("walk") / "walk.mcap", protocol, chunks, late, after)
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ import io
 
 import pytest
 
+from echostep.ports.arrival_clock import now_ns
 from echostep.ports.people.tap import Tap, parse_tap
 from echostep.session.acceptance import guide as guides
 from echostep.session.acceptance.guide import Guide
@@ -16,14 +17,18 @@ from echostep.session.acceptance.walked import Taps, TimedTap
 from waiting import until
 
 
-def taps_of(typed: str) -> tuple[list[Tap | None], list[str], Guide]:
+def taps_of(typed: str) -> tuple[list[Tap], list[str], Guide]:
     """The taps of these lines, and what was said."""
     said: list[str] = []
     guide = Guide(corridor("20x2"), 1, io.StringIO(typed), said.append, {"source": "live"})
-    taps: list[Tap | None] = []
+    taps: list[Tap] = []
     wanted = typed.count("\n")
     assert until(lambda: guide._typed.qsize() >= wanted)
-    taps += [parse_tap(payload) for payload in guide.pop()]
+    began_ns = now_ns()
+    for tap in map(parse_tap, guide.pop()):
+        assert tap is not None
+        assert 0 < tap.t_ns <= began_ns
+        taps.append(Tap(tap.point, tap.standing))
     return taps, said, guide
 
 
@@ -66,21 +71,22 @@ def test_the_run_ends_after_the_last_point(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_bytes_that_are_no_tap_are_counted() -> None:
     taps = Taps(points=2)
-    for payload in (
+    hostile = (
         b"",
         b"{}",
         b'{"point":2}',
         b'{"point":-1}',
         b'{"point":true}',
         b"\xff",
+        b'{"point":0,"t_ns":1e300}',
         b'{"point":0}' + 200 * b" ",
-        Tap(None).encode(),
-    ):
-        taps.receive(payload, 1.0)
-    assert (taps.kept, taps.bad, taps.taken_back) == ([], 8, 0)
-    taps.receive(Tap(1).encode(), float("nan"))
-    assert taps.bad == 9
-    taps.receive(Tap(1, standing=True).encode(), 2.0)
+    )
+    for payload in (*hostile, Tap(None).encode()):
+        taps.receive(payload, float)
+    assert (taps.kept, taps.bad, taps.taken_back) == ([], 9, 0)
+    taps.receive(Tap(1).encode(), lambda _: float("nan"))
+    assert taps.bad == 10
+    taps.receive(Tap(1, standing=True, t_ns=2).encode(), float)
     assert taps.kept == [TimedTap(2.0, 1, standing=True)]
-    taps.receive(Tap(None).encode(), 3.0)
+    taps.receive(Tap(None).encode(), float)
     assert (taps.kept, taps.taken_back) == ([], 1)

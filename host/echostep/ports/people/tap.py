@@ -12,6 +12,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from echostep.ports.chunks import LATEST_NS
 from echostep.ports.people.payloads import decoded
 
 POINT = "point"  # name of the port
@@ -20,10 +21,14 @@ MOST_POINTS = 100  # of a protocol; assumed
 
 
 class Tap(msgspec.Struct, frozen=True):
-    """The wearer is at this point (its index), `standing` or passing by; None takes back the newest tap."""
+    """At `t_ns` of the host's clock the wearer was at this point (its index), `standing` or passing by; None takes back the newest tap.
+
+    The chunk may be later: it waits while the run is behind its ports.
+    """
 
     point: Annotated[int, Meta(ge=0, lt=MOST_POINTS)] | None
     standing: bool = False
+    t_ns: Annotated[int, Meta(ge=0, lt=LATEST_NS)] = 0
 
     def encode(self) -> bytes:
         """The tap as JSON: the bytes of a chunk."""

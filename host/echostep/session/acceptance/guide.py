@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import TextIO
 
+from echostep.ports.arrival_clock import now_ns
 from echostep.ports.people.tap import Tap
 from echostep.session.acceptance.protocol import Protocol, Visit
 
@@ -32,7 +33,7 @@ class Guide:
         self._points, self._rounds = protocol.points, rounds
         self._visits = protocol.visits(rounds)
         self._say = say
-        self._typed: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._typed: queue.SimpleQueue[tuple[int, str]] = queue.SimpleQueue()  # with the time of each line
         self._tapped: list[int] = []  # numbers of the visits
         self._ended_s: float | None = None
         self._begun = False
@@ -42,7 +43,7 @@ class Guide:
         """Queue the lines; it ends with the input, of which a closed terminal is one."""
         try:
             while line := lines.readline(MOST_LETTERS):
-                self._typed.put(line.strip())
+                self._typed.put((now_ns(), line.strip()))
         except (OSError, ValueError):
             return
 
@@ -61,7 +62,7 @@ class Guide:
             self._say(self._request())
         payloads = []
         while not self._typed.empty():
-            tap = self._tap(self._typed.get())
+            tap = self._tap(*self._typed.get())
             if tap is not None:
                 payloads.append(tap.encode())
                 self._ended_s = time.monotonic() if self._next == len(self._visits) else None
@@ -72,12 +73,12 @@ class Guide:
         """Whether the last point was tapped, and the wearer has stood since."""
         return self._ended_s is not None and time.monotonic() - self._ended_s >= REST_S
 
-    def _tap(self, typed: str) -> Tap | None:
+    def _tap(self, t_ns: int, typed: str) -> Tap | None:
         """The tap of a line; None for one that is none, which is said."""
         if typed == UNDO:
             if self._tapped:
                 self._tapped.pop()
-                return Tap(None)
+                return Tap(None, t_ns=t_ns)
             self._say("There is no tap to take back.")
             return None
         rest = range(self._next, len(self._visits))
@@ -88,7 +89,7 @@ class Guide:
         if missed := number - self._next:
             self._say(f"{missed} point{'s' if missed > 1 else ''} left out.")
         self._tapped.append(number)
-        return Tap(*self._visits[number])
+        return Tap(*self._visits[number], t_ns)
 
     def _request(self) -> str:
         """What the wearer does next."""

@@ -7,13 +7,14 @@ In: a recording. Out: `Walked`: estimates, taps and pings with their times. Owns
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from echostep.localization.estimate import Estimate
 from echostep.plan.model import Plan
-from echostep.ports.chunks import Portion
 from echostep.ports.people.tap import POINT, parse_tap
 from echostep.recording.reading import Recording, open_recording
 from echostep.session.acceptance.heard import SeenPings
@@ -42,13 +43,13 @@ class Taps:
     taken_back: int = 0
     bad: int = 0
 
-    def receive(self, payload: bytes, t_s: float) -> None:
-        """Add the tap of a chunk that arrived at `t_s`, or take back the newest one."""
+    def receive(self, payload: bytes, time_of: Callable[[int], float]) -> None:
+        """Add the tap of a chunk, or take back the newest one; `time_of`: time of undelayed bytes that arrive then, NaN before any bytes."""
         tap = parse_tap(payload)
         if tap is not None and tap.point is None and self.kept:
             self.kept.pop()
             self.taken_back += 1
-        elif tap is None or tap.point is None or tap.point >= self.points or math.isnan(t_s):
+        elif tap is None or tap.point is None or tap.point >= self.points or math.isnan(t_s := time_of(tap.t_ns)):
             self.bad += 1
         else:
             self.kept.append(TimedTap(t_s, tap.point, tap.standing))
@@ -82,14 +83,12 @@ def walk_again(path: Path) -> Walked:
         walked.arrivals.note(portion)
         for piece in portion.cut_after(POINT):
             walked.estimates.extend(tracker.take(piece))
-            _receive(walked, piece)
+            if tap := piece.of(POINT).received:
+                walked.taps.receive(tap, partial(_time_of, tracker))
     return walked
 
 
-def _receive(walked: Walked, piece: Portion) -> None:
-    """The tap at the end of a piece, if there is one: its time is that of undelayed bytes which arrive then."""
-    tap = piece.of(POINT)
-    if len(tap.row):
-        newest_s = walked.tracker.front_end.newest_s
-        late_ns = 0 if math.isnan(newest_s) else int(piece.t_arrival_ns[-1]) - walked.tracker.arrival_ns(newest_s)
-        walked.taps.receive(tap.received, newest_s + 1e-9 * late_ns)
+def _time_of(tracker: Tracker, t_ns: int) -> float:
+    """Time of undelayed bytes that arrive at `t_ns`, by the newest ones; NaN before any."""
+    newest_s = tracker.front_end.newest_s
+    return math.nan if math.isnan(newest_s) else newest_s + 1e-9 * (t_ns - tracker.arrival_ns(newest_s))
