@@ -47,6 +47,8 @@ def test_the_twin_walks_the_protocol(tmp_path: Path) -> None:
     (made,) = tmp_path.glob("*.html")
     first = made.read_bytes()
     assert b"Simulated: no board was worn" in first
+    recorded = made.with_suffix(".mcap").read_bytes()
+    assert not [name for name in (board, mtx, str(tmp_path)) if name.encode() in recorded + first]
     again = echostep("acceptance", "--recording", made.with_suffix(".mcap"))
     assert again.returncode == 0, again.stderr
     assert made.read_bytes() == first

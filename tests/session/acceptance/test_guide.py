@@ -22,13 +22,16 @@ def taps_of(typed: str) -> tuple[list[Tap], list[str], Guide]:
     said: list[str] = []
     guide = Guide(corridor("20x2"), 1, io.StringIO(typed), said.append, {"source": "live"})
     taps: list[Tap] = []
-    wanted = typed.count("\n")
-    assert until(lambda: guide._typed.qsize() >= wanted)
-    began_ns = now_ns()
-    for tap in map(parse_tap, guide.pop()):
-        assert tap is not None
-        assert 0 < tap.t_ns <= began_ns
-        taps.append(Tap(tap.point, tap.standing))
+
+    def is_read() -> bool:
+        for tap in map(parse_tap, guide.pop()):
+            assert tap is not None
+            assert 0 < tap.t_ns <= now_ns()
+            taps.append(Tap(tap.point, tap.standing))
+        return "No more lines can be typed: what was tapped counts; Ctrl-C ends." in said
+
+    assert until(is_read)
+    said.pop()
     return taps, said, guide
 
 

@@ -23,6 +23,7 @@ from echostep.plan.model import load_plan, parse_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.ports.datagram_key import Opener, seal
 from echostep.ports.people.check_in import parse_person
+from echostep.ports.people.tap import Tap, parse_tap
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import Recorder
 from echostep.recording.repair.recovery import Recovery
@@ -157,6 +158,7 @@ TARGETS: dict[str, Target] = {
     "xbus": Target(lambda: bytes_of(MTX), lambda data: MessageReader().feed(data, ended=True)),
     "gateway": Target(lambda: encode(message(7, 3.0, 0.5, 10.0), 0) * 3, lambda data: Gateway().read(data, 10.0)),
     "datagram": Target(lambda: seal(KEY, b"frames", 1), Opener(KEY).open),
+    "tap": Target(Tap(1, standing=True, t_ns=1).encode, parse_tap),
     "person": Target(lambda: b'{"x_m":1.0,"y_m":2.0,"level":0,"sd_m":0.5}', parse_person),
     "websocket": Target(lambda: b'{"kind":"go_to","x_m":1.0,"y_m":2.0,"level":0}', text(parse_request)),
     "mqtt": Target(lambda: report_bytes(report()), decode),

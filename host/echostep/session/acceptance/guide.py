@@ -11,6 +11,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import TextIO
 
 from echostep.ports.arrival_clock import now_ns
@@ -18,8 +19,9 @@ from echostep.ports.people.tap import Tap
 from echostep.session.acceptance.protocol import Protocol, Visit
 
 UNDO = "u"
+HELP = "Enter: at the point that is asked for; its name and Enter: at another one; u and Enter: that was no tap; Ctrl-C ends."
 REST_S = 5.0  # for which the wearer stands after the last tap: estimates come twice a second
-MOST_LETTERS = 64  # of a line that is looked at; a name has at most 32
+MOST_LETTERS, MOST_LINES = 64, 16  # of a line that is looked at, a name has at most 32; of lines that wait
 
 
 class Guide:
@@ -33,19 +35,19 @@ class Guide:
         self._points, self._rounds = protocol.points, rounds
         self._visits = protocol.visits(rounds)
         self._say = say
-        self._typed: queue.SimpleQueue[tuple[int, str]] = queue.SimpleQueue()  # with the time of each line
+        # Lines with their times; None: no more come
+        self._typed: queue.Queue[tuple[int, str | None]] = queue.Queue(MOST_LINES)
         self._tapped: list[int] = []  # numbers of the visits
         self._ended_s: float | None = None
         self._begun = False
         threading.Thread(target=self._read, args=(lines,), daemon=True).start()
 
     def _read(self, lines: TextIO) -> None:
-        """Queue the lines; it ends with the input, of which a closed terminal is one."""
-        try:
+        """Queue the lines up to the end of the input, which is also that of a terminal that was closed."""
+        with suppress(OSError, ValueError):
             while line := lines.readline(MOST_LETTERS):
                 self._typed.put((now_ns(), line.strip()))
-        except (OSError, ValueError):
-            return
+        self._typed.put((now_ns(), None))
 
     @property
     def _next(self) -> int:
@@ -56,14 +58,15 @@ class Guide:
         """Taps since the last call; says what to do next."""
         if not self._begun:
             self._begun = True
-            self._say(
-                "Enter: at the point that is asked for; a point's name and Enter: at that one; u and Enter: that was no tap; Ctrl-C ends."
-            )
+            self._say(HELP)
             self._say(self._request())
         payloads = []
-        while not self._typed.empty():
-            tap = self._tap(*self._typed.get())
-            if tap is not None:
+        for _ in range(self._typed.qsize()):
+            t_ns, typed = self._typed.get()
+            if typed is None:
+                self._say("No more lines can be typed: what was tapped counts; Ctrl-C ends.")
+                break
+            if (tap := self._tap(t_ns, typed)) is not None:
                 payloads.append(tap.encode())
                 self._ended_s = time.monotonic() if self._next == len(self._visits) else None
             self._say(self._request())

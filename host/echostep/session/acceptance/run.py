@@ -6,9 +6,12 @@ In: a protocol, ports. Out: plan, recording, track and page in one folder. Owns 
 
 from __future__ import annotations
 
+import io
 import os
 import sys
+from functools import partial
 from pathlib import Path
+from typing import TextIO
 
 from echostep.errors import EchostepError
 from echostep.session.acceptance.guide import Guide
@@ -39,10 +42,15 @@ def acceptance(
     fields = {"note": "acceptance walk"}
     if _is_simulated(ports):
         fields |= {"note": "acceptance walk, simulated: a port is a pseudo terminal", "source": SIMULATED}
-    guide = Guide(
-        protocol, rounds, sys.stdin, lambda words: console.print(words, markup=False, highlight=False), fields
-    )
+    guide = Guide(protocol, rounds, _lines(), partial(console.print, markup=False, highlight=False), fields)
     return write_page(live(tracking, ports, output, guide))
+
+
+def _lines() -> TextIO:
+    """What is typed; bytes that are no text are lines, too, and there may be no input at all."""
+    if isinstance(sys.stdin, io.TextIOWrapper):
+        sys.stdin.reconfigure(errors="replace")
+    return sys.stdin or io.StringIO()
 
 
 def _is_simulated(ports: PortOptions) -> bool:

@@ -22,6 +22,7 @@ from echostep.session.acceptance.protocol import Protocol, recorded_protocol
 from echostep.session.arrivals import Arrivals
 from echostep.session.losses import Losses
 from echostep.session.options import TrackingOptions
+from echostep.session.progress import with_bar
 from echostep.session.runs.replay import tracker_of
 from echostep.tracker import Tracker
 
@@ -79,7 +80,7 @@ def walk_again(path: Path) -> Walked:
         recording, protocol, plan, tracker, [], Taps(len(protocol.points)), SeenPings(), Losses(tracker), Arrivals()
     )
     tracker.watchers.append(walked.pings.note)
-    for portion in recording.portions():
+    for portion in with_bar(recording.portions(), f"tracking {path.name} again", lambda: recording.fraction):
         walked.arrivals.note(portion)
         for piece in portion.cut_after(POINT):
             walked.estimates.extend(tracker.take(piece))
