@@ -44,7 +44,7 @@ def record(
     """The chunks of these streams in the order of their arrival, as a recording with the protocol in its metadata, or other fields."""
     plan = protocol.plan()
     fields = run_metadata(plan, plan.start, 3, "acceptance", source=SIMULATED)
-    recorder = Recorder(path, fields | (protocol.metadata if metadata is None else metadata))
+    recorder = Recorder(path, {**fields, **(protocol.metadata if metadata is None else metadata)})
     for chunk in ordered(streams):
         recorder.write(chunk)
     recorder.close()

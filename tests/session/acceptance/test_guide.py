@@ -13,7 +13,7 @@ from echostep.session.acceptance import guide as guides
 from echostep.session.acceptance.guide import Guide
 from echostep.session.acceptance.protocol import FIELD
 from echostep.session.acceptance.survey import corridor
-from echostep.session.acceptance.walked import Taps, TimedTap
+from echostep.session.acceptance.walked import Taps
 from waiting import until
 
 
@@ -85,11 +85,10 @@ def test_bytes_that_are_no_tap_are_counted() -> None:
         b'{"point":0}' + 200 * b" ",
     )
     for payload in (*hostile, Tap(None).encode()):
-        taps.receive(payload, float)
+        taps.receive(payload)
     assert (taps.kept, taps.bad, taps.taken_back) == ([], 9, 0)
-    taps.receive(Tap(1).encode(), lambda _: float("nan"))
-    assert taps.bad == 10
-    taps.receive(Tap(1, standing=True, t_ns=2).encode(), float)
-    assert taps.kept == [TimedTap(2.0, 1, standing=True)]
-    taps.receive(Tap(None).encode(), float)
+    tap = Tap(1, standing=True, t_ns=2)
+    taps.receive(tap.encode())
+    assert taps.kept == [tap]
+    taps.receive(Tap(None).encode())
     assert (taps.kept, taps.taken_back) == ([], 1)

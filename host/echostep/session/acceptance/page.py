@@ -35,7 +35,7 @@ SHOWN = (
 def write_page(recording: Path) -> list[str]:
     """Track a recording again and write its page beside it; returns the most important figures, and where the page is. Raises EchostepError."""
     walked = walk_again(recording)
-    scored = score_taps(walked, walked.taps.kept)
+    scored = score_taps(walked, walked.timed)
     text, out = page(walked, scored), recording.with_suffix(".html")
     try:
         out.write_text(text, encoding="utf-8")
@@ -82,8 +82,8 @@ def _metrics(walked: Walked, scored: Scored) -> str:
     """The metrics that have a value, for all taps, those standing and those passing."""
     columns = {"all": scored}
     for name, standing in (("standing", True), ("passing", False)):
-        taps = [tap for tap in walked.taps.kept if tap.standing is standing]
-        if taps and len(taps) < len(walked.taps.kept):
+        taps = [tap for tap in walked.timed if tap.standing is standing]
+        if taps and len(taps) < len(walked.timed):
             columns[name] = score_taps(walked, taps)
     rows: list[tuple[object, ...]] = [("points", *(c.card.points for c in columns.values()), "taps with a position")]
     radii = (
