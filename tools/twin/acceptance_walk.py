@@ -22,7 +22,7 @@ from echostep.simulation.people.walker import Person, Walk, Waypoint
 from echostep.simulation.scenario import Scenario
 from twin.run import PtyBoard, PtyMtx, playing, wait_for_opening
 
-STOP_S = 3.0  # on a point that is visited standing; assumed
+STOP_S = 1.5  # on a point that is visited standing; assumed
 WEARER = Person(stand_s=10.0)  # at both ends: longer than the foot takes for its first position, and the guide's rest
 NEAR_M, SAME_M = 0.5, 0.02  # a point is about here; the trunk is as near to it as it comes
 

@@ -7,13 +7,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
+from board_runs import ELF, TWIN
+from echostep.board.frames import encode
+from echostep.board.messages import Identify
 from echostep.ports.chunks import Chunk
 from echostep.ports.people.tap import POINT, Tap
 from echostep.recording.recorder import Recorder
 from echostep.session.acceptance.protocol import Protocol
 from echostep.session.acceptance.survey import corridor
 from echostep.session.metadata import SIMULATED, run_metadata
-from echostep.simulation.devices.board import PythonBoard
+from echostep.simulation.devices.board import BoardProcess, PythonBoard
 from echostep.simulation.scenario import START_NS, Scenario
 from twin.acceptance_walk import WEARER, times_s, waypoints
 
@@ -21,16 +24,21 @@ CORRIDOR, ROUNDS = "8x2", 2
 
 
 @cache
-def walk(text: str = CORRIDOR, rounds: int = ROUNDS) -> tuple[Protocol, tuple[Chunk, ...], tuple[Chunk, ...]]:
-    """The protocol, the chunks of both ports, and the taps at the moments when the trunk is at the points."""
-    protocol = corridor(text)
-    plan, visits = protocol.plan(), protocol.visits(rounds)
-    scenario = Scenario(plan, waypoints(protocol.points, visits, plan), 3, PythonBoard(3), WEARER)
+def walk(*, twin: bool = False) -> tuple[Protocol, tuple[Chunk, ...], tuple[Chunk, ...]]:
+    """The protocol, the chunks of both ports, and the taps at the moments when the trunk is at the points. `twin`: of the real firmware."""
+    protocol = corridor(CORRIDOR)
+    plan, visits = protocol.plan(), protocol.visits(ROUNDS)
+    board = BoardProcess([str(TWIN), "--elf", str(ELF)]) if twin else PythonBoard(3)
+    if twin:
+        board.send(encode(Identify(), 0))
+    scenario = Scenario(plan, waypoints(protocol.points, visits, plan), 3, board, WEARER)
     taps = tuple(
         tap_chunk(START_NS + round(t_s * 1e9), Tap(visit.point, visit.standing, START_NS + round(t_s * 1e9)))
         for t_s, visit in zip(times_s(scenario.walk, protocol.points, visits), visits, strict=True)
     )
-    return protocol, tuple(scenario.chunks()), taps
+    chunks = tuple(scenario.chunks())
+    scenario.close()
+    return protocol, chunks, taps
 
 
 def tap_chunk(t_arrival_ns: int, tap: Tap) -> Chunk:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from board_runs import needs_twin
 from command_line import echostep
 from echostep.board.messages import SCHEMA_HASH
 from echostep.errors import EchostepError
@@ -96,6 +97,24 @@ def test_the_page_is_made_again_from_a_copy_of_the_recording(recording: Path, tm
     assert "Measured" not in text
     assert f"protocol 0x{SCHEMA_HASH:08X}" in text
     assert not [part for part in (str(recording.parent), "walk.mcap", str(Path.home()), ' src="http') if part in text]
+
+
+@needs_twin
+def test_the_page_of_the_real_firmware(tmp_path: Path) -> None:
+    """The firmware in the twin, whose wearer walks the protocol; the taps come at the moments when the trunk is at the points."""
+    done = echostep("acceptance", "--recording", record(tmp_path / "walk.mcap", *walk(twin=True)))
+    assert done.returncode == 0, done.stderr
+    figures = re.search(
+        r"17 taps with a position: mean [\d.]+ m, CE50 ([\d.]+) m, CE95 ([\d.]+) m \(simulated\)", done.stdout
+    )
+    assert figures, done.stdout
+    assert float(figures[1]) < 0.15
+    assert float(figures[2]) < 0.3
+    rows = dict(re.findall(r'row">([^<]+)</th><td[^>]*>([^<]*)</td></tr>', (tmp_path / "walk.html").read_text()))
+    assert re.fullmatch(rf"[\d.]+, protocol 0x{SCHEMA_HASH:08X}", rows["firmware of the board"])
+    assert rows["taps"] == "17, 0 taken back, 0 unusable"
+    assert rows["MTx against the board"].endswith("ppm, by SyncOut edges")
+    assert rows["recording"] == "whole"
 
 
 def test_a_recording_without_taps_or_protocol_says_so(tmp_path: Path) -> None:
