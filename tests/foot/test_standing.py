@@ -72,9 +72,12 @@ def test_a_quick_foot_may_stand_less_still() -> None:
 
 @pytest.mark.parametrize(("stood_s", "said"), [(0.08, "; once the foot"), (0.3, "0 gaps;")])
 def test_a_run_is_said_to_be_one(stood_s: float, said: str) -> None:
-    events = [Step(1.0, 1.6, (1.5, 0.0, 0.0), 0.09**2 * np.eye(3), 0.0, 0.01), Stance(1.6, 1.6 + stood_s, 0.0)]
+    events: list[Step | Stance] = [
+        Step(1.0, 1.6, (1.5, 0.0, 0.0), 0.09**2 * np.eye(3), 0.0, 0.01),
+        Stance(1.6, 1.6 + stood_s, 0.0),
+    ]
     flags = np.zeros(2, bool)
-    track = Track(np.zeros(2), np.zeros((2, 3)), np.zeros(2), flags, list(events), FootCounts(2, 0, 0, 0, 0, 0))
+    track = Track(np.zeros(2), np.zeros((2, 3)), np.zeros(2), flags, events, FootCounts(2, 0, 0, 0, 0, 0))
     assert said in describe_track(track)
 
 
