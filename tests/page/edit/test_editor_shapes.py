@@ -131,7 +131,7 @@ def test_stairs_of_one_level_are_refused(browser: Any, drawn: EditServer) -> Non
     page = opened(browser, drawn)
     page.click('[data-tool="stairs"]')
     drag(page, (5.0, 5.0), (7.0, 7.0))
-    assert status(page) == "Stairs join two levels or more: add the other one first (+ Level)"
+    assert status(page) == "No stairs drawn: there is one level. Add the other one first (+ Level)"
     assert page.evaluate("[echostep.sheet.past.length, echostep.tools.chain]") == [0, None]
     page.context.close()
 

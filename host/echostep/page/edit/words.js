@@ -62,7 +62,7 @@ export const WORDS = {
   noWall: 'No wall here: a door is cut into a wall', short: (width) => `This wall is shorter than ${m(width)}`,
   noRoomForDoor: 'No wall here that is long enough: click on a wall',
   noOutline: 'An outline has three corners or more: nothing drawn', givenUp: (kind) => `No ${KINDS[kind]} drawn`,
-  oneLevel: (kind) => `${capital(KINDS[kind])} join two levels or more: add the other one first (+ Level)`,
+  oneLevel: (kind) => `No ${KINDS[kind]} drawn: there is one level. Add the other one first (+ Level)`,
   twoLevels: 'Choose two levels or more',
   noDirection: 'No direction: click farther away', noPicture: 'There is no picture to scale: start with --picture IMAGE',
   noGeoreference: (reason) => `No georeference: ${reason}. Click both points again`, silent: 'echostep does not answer, is it still running?',
