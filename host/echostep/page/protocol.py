@@ -24,6 +24,7 @@ from echostep.page.elements.alarm import ShownAlarm
 from echostep.page.elements.drawn_walls import ShownDrawing
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
+from echostep.page.elements.likely_places import shown_places
 from echostep.page.elements.marks import BeaconMark, ShownMark
 from echostep.page.elements.meetings import ShownMeeting
 from echostep.page.elements.scene import PageScene, ParticleSample
@@ -344,7 +345,7 @@ def _estimate(scene: PageScene, parts: FrameParts) -> ShownEstimate | None:
         z_sd_m=e.z_sd_m,
         protection_m=e.protection_m if np.isfinite(e.protection_m) else None,
         hypotheses=tuple(
-            ShownHypothesis(k + 1, h.probability, h.x_m, h.y_m, h.level) for k, h in enumerate(e.hypotheses)
+            ShownHypothesis(k + 1, h.probability, h.x_m, h.y_m, h.level) for k, h in enumerate(shown_places(e))
         ),
         places=parts.places,
     )

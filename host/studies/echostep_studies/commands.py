@@ -36,8 +36,8 @@ app = typer.Typer(
     cls=InGroups,
     no_args_is_help=True,
     help="The papers' experiments and ours, with figures and plots. "
-    "The number of runs is the default of --runs, and the duration is theirs, as an order of magnitude on two cores: of the processor time "
-    "of single runs in November 2026, without the minutes in which the kernels are compiled once. A look takes --runs 2, and a bar shows the "
+    "The number of runs is the default of --runs, and the duration is theirs, as an order of magnitude on two cores (November 2026), "
+    "without the minutes in which the kernels are compiled once. A look takes --runs 2, and a bar shows the "
     "time that remains.",
 )
 

@@ -16,6 +16,7 @@ from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.particles.places import LikelyPlace
 from echostep.localization.particles.start import Start
 from echostep.page.elements.guidance import guidance_of_cue
+from echostep.page.elements.likely_places import shown_places
 from echostep.page.elements.scene import status_text
 from echostep.page.elements.taps import Taps
 from echostep.page.live import LivePage
@@ -78,6 +79,14 @@ def test_the_sentence_names_each_place_once_with_the_numbers_of_its_rings() -> N
         "places that fit: 1, 3 in North corridor 67 % · 2 in South corridor 31 %"
     )
     assert taps.places(told()) == ""
+
+
+@pytest.mark.parametrize(("status", "shown"), [(TrackStatus.UNCERTAIN, 0), (TrackStatus.LOST, 1)])
+def test_a_single_place_is_listed_where_no_position_is_claimed(status: TrackStatus, shown: int) -> None:
+    """As on a walk without a plan, whose position is uncertain after some minutes; of a search the likeliest place may be the only one."""
+    estimate = replace(told(status=status), hypotheses=PLACES[:1])
+    assert len(shown_places(estimate)) == shown
+    assert len(shown_places(replace(estimate, hypotheses=PLACES))) == len(PLACES)
 
 
 @pytest.mark.parametrize("size", SIZES)

@@ -1,15 +1,22 @@
 # SPDX-License-Identifier: MIT
 """The places that fit, as a sentence: "1, 3 in North corridor 62 % · 2 in South corridor 31 %"; the numbers are those of the rings on the map.
 
-In: hypotheses, their places in words, a plan. Out: words. Owns nothing.
+In: an estimate, its hypotheses' places in words, a plan. Out: which are shown; words. Owns nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from echostep.localization.estimate import Estimate, claims_place
 from echostep.localization.particles.places import LikelyPlace
 from echostep.plan.model import Plan
+
+
+def shown_places(estimate: Estimate) -> tuple[LikelyPlace, ...]:
+    """The hypotheses that are listed and ringed: not a single one where the position, which has its ellipse, is claimed."""
+    is_position = len(estimate.hypotheses) == 1 and claims_place(estimate.status)
+    return () if is_position else estimate.hypotheses
 
 
 def places_text(hypotheses: Sequence[LikelyPlace], words: Sequence[str], plan: Plan) -> str:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from echostep.localization.estimate import Estimate, TrackStatus, claims_place
-from echostep.page.elements.likely_places import places_text
+from echostep.page.elements.likely_places import places_text, shown_places
 from echostep.page.elements.scene import PageScene, format_metres
 from echostep.plan.model import Plan
 from echostep.plan.places.bearing import KNOWN_HEADING_RAD
@@ -63,9 +63,10 @@ class Taps:
         """Both, kept for the next page that asks."""
         if self._last[0] is not estimate:
             words = self.whereabouts.words
-            places = tuple(words(h.x_m, h.y_m, h.level) for h in estimate.hypotheses)
+            shown = shown_places(estimate)
+            places = tuple(words(h.x_m, h.y_m, h.level) for h in shown)
             where = words(estimate.x_m, estimate.y_m, estimate.level) if claims_place(estimate.status) else ""
-            self._last = estimate, where, places_text(estimate.hypotheses, places, self._plan)
+            self._last = estimate, where, places_text(shown, places, self._plan)
         return self._last[1:]
 
     def refusal(self, check_in: CheckIn) -> str:
