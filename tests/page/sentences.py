@@ -60,7 +60,7 @@ WHOLE = {
     "no step of the foot": ("Stop. There is no step of the foot.",),
     "There is 7": (),
     " (without counter, acceleration or rate of turn)": (
-        "the MTx sends no usable samples (without counter, acceleration or rate of turn): look at its settings",
+        "the MTx sends no usable samples (without counter, acceleration or rate of turn)",
     ),
     "drop its plan": (),
 }  # fmt: skip
