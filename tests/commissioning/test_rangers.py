@@ -252,16 +252,19 @@ def test_a_wearer_who_walks_now_is_guided_recorded_and_judged(tmp_path: Path, mo
     of_board, out = Counter[str](), tmp_path / "rangers.toml"
 
     def walked_enough(chunk: Chunk) -> bool:
-        """Half of the demo walk, however late the twin is."""
+        """A fifth of the demo walk, however late the twin is: the fit, which other tests have, would need more pings."""
         of_board[chunk.port] += len(chunk.data)
-        return of_board[BOARD] > 240_000
+        return of_board[BOARD] > 100_000
 
     interrupt_when(walked_enough, monkeypatch)
     with walking_twin(tmp_path) as (board, mtx):
         done = echostep("calibrate", "rangers", "--plan", DEMO, "--board", board, "--mtx", mtx, "--out", out)
     assert done.returncode == 0, done.stderr
-    assert "begin at the start that is marked on the plan" in " ".join(done.stdout.split())
+    words = " ".join(done.stdout.split())
+    assert "begin at the start that is marked on the plan" in words
     assert (tmp_path / "rangers.mcap").exists()
-    assert len(re.findall(r"^(?:left|right): log-score of", done.stdout, re.MULTILINE)) == 2
-    if out.exists():
-        parse_settings(out.read_text(), "here")
+    assert (
+        len(re.findall(r"The (?:left|right) ranger sent \d+ pings where the place is known: 200 are needed", words))
+        == 2
+    )
+    assert not out.exists()
