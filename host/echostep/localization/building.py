@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.localization.drawn_places import DrawnPlaces
 from echostep.localization.echoes.likelihood import EchoModel
 from echostep.localization.echoes.range_table import range_table_of
 from echostep.localization.echoes.unplanned import Background, background
@@ -24,9 +25,11 @@ from echostep.walls.level_sheet import LevelSheet, level_of
 class Building:
     """Data of a plan, shared by all filters on it: walls, sheet of levels, floor; tables are made when a cloud first needs them."""
 
-    def __init__(self, walls: Walls, sheet: LevelSheet | None = None) -> None:
-        self.walls = walls
-        self.sheet = sheet
+    def __init__(
+        self, walls: Walls, sheet: LevelSheet | None = None, drawn: DrawnPlaces = DrawnPlaces()
+    ) -> None:
+        """`drawn`: how well its places are known, where it was drawn by a walk."""
+        self.walls, self.sheet, self.drawn = walls, sheet, drawn
         self.floor = walkable_floor(walls.index.walls)
         self.indoors = indoors(self.floor)
         self.upper_levels = None

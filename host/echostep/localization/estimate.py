@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.jit import lean_kernel
+from echostep.jit import inline_kernel, lean_kernel
 from echostep.localization.limits import BELIEVED, HALF_STOREY_M, LOST_M, PROBABLE, SURE, TRACKING_M
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.places import LikelyPlace, hypotheses
@@ -70,16 +70,29 @@ def moments(x_m: Floats, y_m: Floats, heading_rad: Floats, weight: Floats, near_
 
 @lean_kernel
 def weight_about(
-    x_m: Floats, y_m: Floats, z_m: Floats, weight: Floats, place_m: tuple[float, float, float], limit_m: tuple[float, float]
+    x_m: Floats, y_m: Floats, z_m: Floats, weight: Floats, place_m: tuple[float, float, float], limit_m: tuple[float, float],
+    map_sd_m: float = 0.0,
 ) -> tuple[float, float]:  # fmt: skip
-    """Weight of the particles (n,) within each of two distances of a place in the map, and within HALF_STOREY_M of its height."""
+    """Weight of the particles (n,) within each of two distances of a place in the map, and within HALF_STOREY_M of its height.
+
+    `map_sd_m`: standard deviation per axis of the map itself there. A particle then counts by the probability that the map is off by less than what
+    is left to the limit: a lower bound of that of the sum of both errors.
+    """
     near, about = 0.0, 0.0
     for i in range(len(weight)):
         if abs(z_m[i] - place_m[2]) < HALF_STOREY_M:
             distance = math.hypot(x_m[i] - place_m[0], y_m[i] - place_m[1])
-            near += weight[i] if distance < limit_m[0] else 0.0
-            about += weight[i] if distance < limit_m[1] else 0.0
+            near += weight[i] * _within(limit_m[0] - distance, map_sd_m)
+            about += weight[i] * _within(limit_m[1] - distance, map_sd_m)
     return near, about
+
+
+@inline_kernel
+def _within(left_m: float, sd_m: float) -> float:
+    """Probability that a place in two dimensions is off by less than `left_m`."""
+    if left_m <= 0.0:
+        return 0.0
+    return 1.0 if sd_m <= 0.0 else 1.0 - math.exp(-0.5 * (left_m / sd_m) ** 2)
 
 
 class TrackStatus(StrEnum):
@@ -178,14 +191,15 @@ SURELY = Right(1.0)
 
 def estimate(
     cloud: Cloud, t_s: float, walk_heading_rad: float, step: int, sd_m: float = 0.0, right: Right = SURELY,
-    elsewhere: Elsewhere | None = None, search: Cloud | None = None,
+    elsewhere: Elsewhere | None = None, search: Cloud | None = None, map_sd_m: float = 0.0,
 ) -> Estimate:  # fmt: skip
     """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean], and how likely small errors are.
 
     The mean of a cloud with several likely places may lie in none of them: the position is then that of the likeliest place, if that has more than
     half of the weight, and MUCH_LIKELIER times that near the mean. `sd_m`: standard deviation per axis to be added; `right`: probability that the
     cloud is right, otherwise the trunk is `elsewhere`. While tracking, the covariance is the cloud's; otherwise that of the mixture of both about the
-    position. The hypotheses are those of `search`, if there is one.
+    position. The hypotheses are those of `search`, if there is one. `map_sd_m`: standard deviation per axis of the map itself there, as a drawing
+    states it; it is part of `sd_m`, and makes small errors less likely.
     """
     weight = cloud.weight
     levels, z, z_sd = _heights(cloud, weight)
@@ -199,10 +213,13 @@ def estimate(
         m = _moments_at(places[0], m, cloud, weight)
     x, y, xx, xy, yy, east, north, near, about = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
+    limits_m = (TRACKING_M, LOST_M)
+    if map_sd_m > 0.0:
+        near, about = weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, weight, (x, y, z), limits_m, map_sd_m)
     near, about = right.here * near, right.here * about
     is_right = right.here
     if search is not None:
-        beside = weight_about(search.map_x_m, search.y_m, search.z_m, search.weight, (x, y, z), (TRACKING_M, LOST_M))
+        beside = weight_about(search.map_x_m, search.y_m, search.z_m, search.weight, (x, y, z), limits_m, map_sd_m)
         near, about = near + right.search * beside[0], about + right.search * beside[1]
         levels = _levels_of_both(levels, _heights(search, search.weight)[0], right)
         is_right = min(right.here + right.search * beside[0], 1.0)

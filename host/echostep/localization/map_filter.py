@@ -171,6 +171,7 @@ class MapFilter:
     def _new_cloud(self, start: Start, walk_heading_rad: float) -> Cloud:
         """A cloud of a start; a search, where the place is unknown."""
         s, b = self._settings, self._building
+        start = b.drawn.widened(start)
         cloud = Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor)
         if is_unknown(start) and len(b.floor.x_m):
             cloud.grid = grid_of(start, walk_heading_rad, *self._table(), b.floor, b.sheet, s, self._rng)
@@ -320,11 +321,15 @@ class MapFilter:
         belief = self.belief
         hidden_sd_m = HIDDEN_SD_M * self.cloud.hidden_share
         sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M)
+        map_sd_m = self._map_sd_m()
+        if map_sd_m > 0.0:
+            sd_m = math.hypot(sd_m, map_sd_m)
         right = Right(belief.probability(belief.tracked), belief.probability(belief.search))
         search = belief.search.cloud if belief.search else None
         new = estimate(
-            self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, self._building.elsewhere, search
-        )
+            self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, self._building.elsewhere, search,
+            map_sd_m,
+        )  # fmt: skip
         if self._height is not None:
             new = replace(new, z_m=self._height.height_m, z_sd_m=self._height.sd_m)
         return replace(
@@ -332,3 +337,10 @@ class MapFilter:
             plan_fits=belief.plan_fits,
             outside=self._building.weight_outside(self.cloud.x_m, self.cloud.y_m, self.cloud.weight),
         )
+
+    def _map_sd_m(self) -> float:
+        """Standard deviation per axis of a drawing where the tracked cloud is; 0 on other plans."""
+        if not self._building.drawn.are_stated:
+            return 0.0
+        at = self._believed(0.0)
+        return self._building.drawn.sd_m(at.x_m, at.y_m, at.level)

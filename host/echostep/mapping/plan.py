@@ -58,7 +58,12 @@ def plan_in(mapped: Mapped, moved: Moved, start: Pose, name: str) -> tuple[Plan,
         walls = np.round(moved(drawing.walls.reshape(-1, 2)).reshape(-1, 4), ROUND)
         length_m = np.hypot(*(walls[:, 2:] - walls[:, :2]).T)
         long = length_m > LEAST_M
-        level = Level(str(k - first_level), round(float(heights[k]), 1), walls[long])
+        doubtful = np.round(moved(drawing.doubtful.reshape(-1, 2)).reshape(-1, 4), ROUND)
+        doubtful = doubtful[np.hypot(*(doubtful[:, 2:] - doubtful[:, :2]).T) > LEAST_M]
+        places = np.round(np.column_stack([moved(drawing.place_sd[:, :2]), drawing.place_sd[:, 2]]), ROUND)
+        level = Level(
+            str(k - first_level), round(float(heights[k]), 1), walls[long], doubtful=doubtful, place_sd=places
+        )
         levels.append(with_wells(replace(level, doors=_doors(level, walked[k])), k, wells))
         lengths_m += length_m[long].tolist()
         variances += (drawing.sd_m[long] ** 2).tolist()

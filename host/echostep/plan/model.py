@@ -36,6 +36,10 @@ def _no_segments() -> Floats:
     return np.zeros((0, 4))
 
 
+def _no_places() -> Floats:
+    return np.zeros((0, 3))
+
+
 @dataclass(frozen=True, slots=True)
 class Room:
     """A room's name and its position; its outline (n, 2) in metres, None where the plan has none."""
@@ -78,7 +82,8 @@ class Question:
 class Level:
     """One level: `walls` (n, 4) and `windows` (k, 4) are x0, y0, x1, y1 in map metres; doors are gaps in them; obstacles are outlines (m, 2).
 
-    `doubtful` (d, 4): walls of an older plan that echoes passed; they block nothing.
+    `doubtful` (d, 4): walls of an older plan that echoes passed, or of a drawing that are not known well enough; they block nothing. `place_sd`
+    (k, 3): x, y of a drawn wall, and the standard deviation per axis of its place in the building.
     """
 
     name: str
@@ -90,10 +95,16 @@ class Level:
     obstacles: tuple[Floats, ...] = ()
     doubtful: Floats = field(default_factory=_no_segments)
     questions: tuple[Question, ...] = ()
+    place_sd: Floats = field(default_factory=_no_places)
 
     def __repr__(self) -> str:
         """Name, height and size."""
         return f"<Level {short(self.name)}, {self.height_m:g} m: {len(self.walls)} walls, {len(self.rooms)} rooms>"
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether it was drawn by a walk, and most of its walls are not known well enough: it is no plan."""
+        return len(self.place_sd) > 0 and _length_m(self.doubtful) > _length_m(self.walls)
 
     @property
     def solid(self) -> Floats:
@@ -168,6 +179,11 @@ class Plan:
         return any(len(level.solid) for level in self.levels)
 
 
+def _length_m(walls: Floats) -> float:
+    """Length of segments (n, 4)."""
+    return float(np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum())
+
+
 # Where there is no plan, the map begins where the walk begins: x to the right of the first heading, y ahead.
 NO_PLAN = Plan("no plan", (Level("", 0.0, _no_segments()),), Pose(0.0, 0.0, 0.5 * math.pi), "")
 
@@ -238,6 +254,7 @@ def _level(fields: LevelFields, where: str) -> Level:
         obstacles=tuple(_outline(corners, f"{where}.obstacles[{i}]") for i, corners in enumerate(fields.obstacles)),
         doubtful=_segments(fields.doubtful, f"{where}.doubtful"),
         questions=tuple(_question(question, f"{where}.questions[{i}]") for i, question in enumerate(fields.questions)),
+        place_sd=np.array(fields.place_sd, np.float64).reshape(-1, 3),
     )
 
 

@@ -56,6 +56,9 @@ class QuestionFields(Struct):
     proposed: bool = False
 
 
+PlaceDeviation = tuple[Metres, Metres, Deviation]
+
+
 class LevelFields(Struct):
     """One level."""
 
@@ -67,6 +70,7 @@ class LevelFields(Struct):
     windows: Segments = []
     obstacles: list[Outline] = []
     doubtful: Segments = []
+    place_sd: Annotated[list[PlaceDeviation], Meta(description="a list of [x, y, standard deviation] in metres")] = []
     questions: list[QuestionFields] = []
 
 

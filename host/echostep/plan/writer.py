@@ -51,6 +51,8 @@ def _level(level: Level) -> dict[str, Any]:
         tree["windows"] = level.windows.tolist()
     if len(level.doubtful):
         tree["doubtful"] = level.doubtful.tolist()
+    if len(level.place_sd):
+        tree["place_sd"] = level.place_sd.tolist()
     if level.doors:
         tree["doors"] = [_door(door) for door in level.doors]
     if level.obstacles:

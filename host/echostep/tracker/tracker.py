@@ -20,6 +20,7 @@ from echostep.errors import EchostepError
 from echostep.localization.beacon_map import BeaconPlace
 from echostep.localization.belief import STATED
 from echostep.localization.building import Building
+from echostep.localization.drawn_places import DrawnPlaces
 from echostep.localization.echoes.rangers import echo_of
 from echostep.localization.estimate import Estimate, Right, TrackStatus, estimate, unobserved
 from echostep.localization.map_filter import MapFilter
@@ -80,7 +81,7 @@ class Tracker:
         self.start = self._start_of(start or plan.start, waits)
         self.front_end = FrontEnd(s.mtx, s.ranger, s.foot, s.gait, s.wearer, s.gyro, s.iron, s.imus)
         self.laid_out = lay_out_levels(plan)
-        self._building = Building(self.laid_out.walls, self.laid_out.sheet)
+        self._building = Building(self.laid_out.walls, self.laid_out.sheet, DrawnPlaces(plan.levels))
         self.filter: MapFilter | None = None  # from the first segment on
         self.gateway = Gateway()
         self.alarm = WearerAlarm()

@@ -7,7 +7,7 @@ In: a graph, its pings. Out: `Drawing`. Owns the order: first the lines that hav
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,7 @@ from echostep.mapping.walls.evidence import (
     ping_poses,
 )
 from echostep.mapping.walls.lines import Lines, find_lines, joined
+from echostep.mapping.walls.place_sd import are_known, placed_pieces
 from echostep.mapping.walls.segments import ACROSS, ANY, ASKEW, Run, find_runs, meets, segments_of
 from echostep.mapping.walls.wall_sd import wall_sds
 
@@ -38,12 +39,15 @@ ALONG_RAD = 2.0 * ALONG_SD_RAD  # of a piece from the course of the path, within
 @dataclass(frozen=True, slots=True)
 class Drawing:
     """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of the distance of each from the places beside it; `paths_m`: the
-    corrected path (k, 2) of each walk, or each piece of it on this level.
+    corrected path (k, 2) of each walk, or each piece of it on this level. `doubtful` (d, 4): walls whose place in the building is not known well
+    enough. `place_sd` (p, 3): x, y of pieces of both, and the standard deviation per axis of their place in the building.
     """
 
     walls: Floats
     sd_m: Floats
     paths_m: tuple[Floats, ...]
+    doubtful: Floats = field(default_factory=lambda: np.zeros((0, 4)))
+    place_sd: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 def draw(graph: Graph, pings: Pings) -> tuple[Drawing, ...]:
@@ -105,7 +109,11 @@ def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
         add_sights(both, poses, pings.range_m, ahead, cells)
         straight = both
     walls = segments_of(straight, runs, cells)
-    return Drawing(walls, wall_sds(graph, pings, poses, straight, runs, cells.of), paths)
+    sd_m = wall_sds(graph, pings, poses, straight, runs, cells.of)
+    placed = placed_pieces(graph, pings, poses, straight, runs, cells.of)
+    known = are_known(walls, placed)
+    rows = np.array([(*piece.at_m, piece.sd_m) for piece in placed]).reshape(-1, 3)
+    return Drawing(walls[known], sd_m[known], paths, walls[~known], rows)
 
 
 def _without_lone(runs: list[Run], lines: Lines, least_m: float, heard: _Heard, of: Ints) -> list[Run]:

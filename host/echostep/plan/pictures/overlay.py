@@ -91,6 +91,7 @@ def north_up(plan: Plan) -> Plan:
             walls=turn(level.walls),
             windows=turn(level.windows),
             doubtful=turn(level.doubtful),
+            place_sd=np.column_stack([turn(level.place_sd[:, :2]), level.place_sd[:, 2]]),
             obstacles=tuple(turn(corners) for corners in level.obstacles),
             doors=tuple(replace(door, line=_four(turn, door.line)) for door in level.doors),
             rooms=tuple(

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.localization.building import Building
+from echostep.localization.drawn_places import DrawnPlaces
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.start import Start
@@ -59,7 +60,7 @@ def track(
     The CPU time is that of the updates, without the tables that a plan needs once.
     """
     laid_out = lay_out_levels(plan)
-    building = Building(laid_out.walls, laid_out.sheet)
+    building = Building(laid_out.walls, laid_out.sheet, DrawnPlaces(plan.levels))
     settings = FilterSettings(cloud=cloud or CloudSettings(), plan_sd_m=plan.uncertainty_m or 0.0)
     warm = _new_filter(building, start, segments, settings, seed)
     for segment in segments[:WARM_UP]:

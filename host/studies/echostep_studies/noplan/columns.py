@@ -26,7 +26,10 @@ JOINED_COLUMNS = {
     "name": "row", "joined": "joined", "misplaced": "misplaced", "runs": "runs", "joined_rmse_m": "RMSE m", "worst_rmse_m": "worst",
     "drawn_pc": "drawn %", "closures": "closures", "wrong": "wrong",
 }  # fmt: skip
-SECOND_COLUMNS = {"name": "row", "mean_m": "mean m", "worst_m": "worst mean m", "lost": "lost", "runs": "runs"}
+SECOND_COLUMNS = {
+    "name": "row", "mean_m": "mean m", "worst_m": "worst mean m", "lost": "lost", "runs": "runs", "tracking_pc": "says tracking %",
+    "false_tracking_pc": "false tracking %", "beyond_pc": "beyond radius %", "refused": "refused",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,12 +61,20 @@ class DrawnRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SecondRun:
-    """Another person, tracked on the drawing: mean error, and that at the end."""
+    """Another person, tracked on the drawing: mean error, and that at the end.
+
+    Of all claims, the shares that say tracking, that say so more than 1 m off or on a wrong floor, and that are off by more than their protection
+    radius; storeys that are refused as a plan, of those drawn.
+    """
 
     name: str
     seed: int
     mean_m: float
     end_m: float
+    tracking: float
+    false_tracking: float
+    beyond: float
+    refused: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,13 +100,17 @@ class DrawnSummary:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SecondSummary:
-    """Means over the runs, the worst one, those that end lost."""
+    """Means over the runs, the worst one, those that end lost; storeys of all runs that are refused."""
 
     name: str
     runs: int
     mean_m: float
     worst_m: float
     lost: int
+    tracking_pc: float
+    false_tracking_pc: float
+    beyond_pc: float
+    refused: int
 
 
 RunRow = DrawnRun | SecondRun | PairRun
@@ -132,9 +147,14 @@ def _drawn_summary(group: Sequence[DrawnRun]) -> DrawnSummary:
 def _second_summary(group: Sequence[SecondRun]) -> SecondSummary:
     means = [row.mean_m for row in group]
     lost = sum(row.end_m > LOST_END_M for row in group)
+    shares = {
+        f"{key}_pc": 100.0 * float(np.mean([getattr(row, key) for row in group]))
+        for key in ("tracking", "false_tracking", "beyond")
+    }
     return SecondSummary(
-        name=group[0].name, runs=len(group), mean_m=float(np.mean(means)), worst_m=max(means), lost=lost
-    )
+        name=group[0].name, runs=len(group), mean_m=float(np.mean(means)), worst_m=max(means), lost=lost,
+        refused=sum(row.refused for row in group), **shares,
+    )  # fmt: skip
 
 
 def tables(rows: list[SummaryRow], request: StudyRequest) -> list[Table]:

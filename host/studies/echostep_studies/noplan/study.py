@@ -8,6 +8,7 @@ first seed. Owns nothing.
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from fnmatch import fnmatch
 from functools import partial
@@ -23,7 +24,8 @@ from echostep.mapping.mapper import map_walk
 from echostep.mapping.picture import draw_picture
 from echostep.mapping.plan import plan_in
 from echostep.plan.model import Plan
-from echostep_studies.bench.filtering import track
+from echostep_studies.bench.filtering import Claim, track
+from echostep_studies.bench.judgement import TRACKING, TruePlaces, judge, true_levels
 from echostep_studies.bench.recordings import hallways
 from echostep_studies.bench.recordings.foot_metrics import rmse
 from echostep_studies.bench.sites import Site
@@ -43,6 +45,7 @@ from echostep_studies.noplan.joined import (
 )
 from echostep_studies.noplan.judgement import (
     closure_columns,
+    heights_m,
     known_start,
     levels_of,
     path_columns,
@@ -175,9 +178,23 @@ def _second(name: str, site: Site, drawn: Plan, levels: list[int], seed: int) ->
     walk: SimulatedWalk = walked(Site(site.built, tuple(points)), seed + 500_000)
     begin = walk.pose_at(walk.segments[0].segment.t0_s)
     run = track(walk.segments, drawn, Start(replace(begin, level=levels.index(begin.level))), seed)
-    places = np.array([(c.x_m, c.y_m) for c in run.claims])
-    error = np.hypot(*(places - true_path(walk, np.array([c.t_s for c in run.claims]))).T)
-    return SecondRun(name=name, seed=seed, mean_m=float(error.mean()), end_m=float(error[-1]))
+    return second_row(name, seed, walk, drawn, levels, run.claims)
+
+
+def second_row(
+    name: str, seed: int, walk: SimulatedWalk, drawn: Plan, levels: list[int], claims: Sequence[Claim]
+) -> SecondRun:
+    """The claims of another person against the truth, in the frame of the building."""
+    t_s = np.array([c.t_s for c in claims])
+    truth = true_path(walk, t_s)
+    right = true_levels(truth, heights_m(walk, t_s), walk.built)[:, levels]
+    judged = judge(claims, TruePlaces(truth, right), np.zeros(len(t_s)))
+    error = np.hypot(*(np.array([(c.x_m, c.y_m) for c in claims]) - truth).T)
+    return SecondRun(
+        name=name, seed=seed, mean_m=float(error.mean()), end_m=float(error[-1]),
+        tracking=float(np.mean(judged.status == TRACKING)), false_tracking=float(judged.false_tracking.mean()),
+        beyond=float(judged.beyond_protection.mean()), refused=sum(level.is_refused for level in drawn.levels),
+    )  # fmt: skip
 
 
 def noplan_study(data: Path | None, pattern: str, request: StudyRequest) -> Study[RunRow, SummaryRow]:
