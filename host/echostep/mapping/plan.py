@@ -18,6 +18,7 @@ from echostep.arrays import Floats
 from echostep.mapping.graph.directions import right_angles_off
 from echostep.mapping.mapper import Mapped
 from echostep.mapping.stairs import connector, wells_of, with_wells
+from echostep.mapping.walls.drawing import Drawing
 from echostep.plan.model import Door, Level, Plan, Pose
 from echostep.plan.places.gaps import door_gaps
 
@@ -55,22 +56,37 @@ def plan_in(mapped: Mapped, moved: Moved, start: Pose, name: str) -> tuple[Plan,
     walked = tuple(tuple(moved(path) for path in drawing.paths_m) for drawing in mapped.drawings)
     levels, lengths_m, variances = [], [], []
     for k, drawing in enumerate(mapped.drawings):
-        walls = np.round(moved(drawing.walls.reshape(-1, 2)).reshape(-1, 4), ROUND)
-        length_m = np.hypot(*(walls[:, 2:] - walls[:, :2]).T)
-        long = length_m > LEAST_M
-        doubtful = np.round(moved(drawing.doubtful.reshape(-1, 2)).reshape(-1, 4), ROUND)
-        doubtful = doubtful[np.hypot(*(doubtful[:, 2:] - doubtful[:, :2]).T) > LEAST_M]
-        places = np.round(np.column_stack([moved(drawing.place_sd[:, :2]), drawing.place_sd[:, 2]]), ROUND)
-        level = Level(
-            str(k - first_level), round(float(heights[k]), 1), walls[long], doubtful=doubtful, place_sd=places
+        level = _level(drawing, moved, str(k - first_level), round(float(heights[k]), 1))
+        levels.append(
+            level if level.is_refused else with_wells(replace(level, doors=_doors(level, walked[k])), k, wells)
         )
-        levels.append(with_wells(replace(level, doors=_doors(level, walked[k])), k, wells))
-        lengths_m += length_m[long].tolist()
-        variances += (drawing.sd_m[long] ** 2).tolist()
+        if not level.is_refused:
+            every = drawing.all_walls
+            lengths_m += _length_m(every).tolist()
+            variances += (every[:, 4] ** 2).tolist()
     sd = round(math.sqrt(float(np.average(variances, weights=lengths_m))), ROUND) if variances else None
     connectors = tuple(connector(well, number) for number, well in enumerate(wells, 1))
     plan = Plan(name, tuple(levels), replace(start, level=first_level), "", connectors, uncertainty_m=sd)
     return plan, walked
+
+
+def _level(drawing: Drawing, moved: Moved, name: str, height_m: float) -> Level:
+    """A drawn level in the frame of the plan."""
+    walls, doubtful = (_long(moved(rows.reshape(-1, 2)).reshape(-1, 4)) for rows in (drawing.walls, drawing.doubtful))
+    places = np.round(np.column_stack([moved(drawing.place_sd[:, :2]), drawing.place_sd[:, 2]]), ROUND)
+    return Level(name, height_m, walls, doubtful=doubtful, place_sd=places)
+
+
+def _long(walls: Floats) -> Floats:
+    """Segments (n, 4), rounded, without those that are too short."""
+    rounded = np.round(walls, ROUND)
+    return rounded[_length_m(rounded) > LEAST_M]
+
+
+def _length_m(walls: Floats) -> Floats:
+    """Length (n,) of segments."""
+    lengths: Floats = np.hypot(*(walls[:, 2:4] - walls[:, :2]).T)
+    return lengths
 
 
 def _turn(mapped: Mapped, heading_rad: float) -> float:
@@ -104,5 +120,5 @@ def _doors(level: Level, paths: tuple[Floats, ...]) -> tuple[Door, ...]:
     walked = shapely.MultiLineString([path for path in paths if len(path) > 1])
     return tuple(
         replace(door, state="open") if shapely.LineString((door.line[:2], door.line[2:])).intersects(walked) else door
-        for door in door_gaps(level)
+        for door in door_gaps(replace(level, walls=level.heard))
     )

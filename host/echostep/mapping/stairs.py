@@ -65,14 +65,20 @@ def with_wells(level: Level, index: int, wells: list[Well]) -> Level:
     for well in wells:
         if index not in well.levels:
             continue
-        lines = shapely.difference(shapely.linestrings(level.walls.reshape(-1, 2, 2)), well.area.buffer(CLEAR_M))
-        parts = [part for part in shapely.get_parts(lines) if part.length > LEAST_M]
-        outside = [np.array(part.coords).ravel() for part in parts]
+        outside, doubtful = (_outside(walls, well) for walls in (level.walls, level.doubtful))
         doors = [door for door in level.doors if not _line_of(door).intersects(well.area)]
         rim, ways = _rim(well, index)
         doors += [Door((float(a), float(b), float(c), float(d)), "open") for a, b, c, d in ways]
-        level = replace(level, walls=np.array(outside + rim).reshape(-1, 4).round(3), doors=tuple(doors))
+        walls = np.concatenate([outside, np.array(rim).reshape(-1, 4)])
+        level = replace(level, walls=walls.round(3), doubtful=doubtful.round(3), doors=tuple(doors))
     return level
+
+
+def _outside(walls: Floats, well: Well) -> Floats:
+    """What is left of walls (n, 4) outside of a well."""
+    lines = shapely.difference(shapely.linestrings(walls.reshape(-1, 2, 2)), well.area.buffer(CLEAR_M))
+    parts = [part for part in shapely.get_parts(lines) if part.length > LEAST_M]
+    return np.array([np.array(part.coords).ravel() for part in parts]).reshape(-1, 4)
 
 
 def _line_of(door: Door) -> shapely.LineString:

@@ -25,6 +25,7 @@ from echostep.page.elements.drawn_walls import ShownDrawing, WalkDrawing, shown_
 from echostep.page.shared_drawing import SharedDrawing
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Pose
+from echostep.plan.places.refusals import refusals
 from echostep.plan.writer import plan_json
 
 if TYPE_CHECKING:
@@ -197,8 +198,8 @@ def main() -> None:
 
 
 def _plan_bytes(mapped: Mapped, start: Pose, name: str) -> bytes:
-    """plan.json of a drawing whose walk begins at `start`; empty before a wall is drawn."""
+    """plan.json of a drawing whose walk begins at `start`, also of one that is refused: its reader is told so; empty before a wall is drawn."""
     from echostep.mapping.plan import plan_of
 
     plan, _ = plan_of(mapped, start, name)
-    return plan_json(plan).encode() if plan.is_drawn else b""
+    return plan_json(plan).encode() if plan.is_drawn or refusals(plan) else b""

@@ -29,6 +29,8 @@ FORMAT_VERSION = 1
 ConnectorKind = plan_file.ConnectorKind
 DoorState = plan_file.DoorState
 QuestionAbout = plan_file.QuestionAbout
+# Standard deviation per axis of a drawn storey's places, beyond which it is refused: 95 % are within 2.5 m, a room, assumed
+MOST_PLACE_SD_M = 1.0
 WITHOUT_LENGTH = "a wall without length: both ends are the same point"
 
 
@@ -103,8 +105,18 @@ class Level:
 
     @property
     def is_refused(self) -> bool:
-        """Whether it was drawn by a walk, and most of its walls are not known well enough: it is no plan."""
-        return len(self.place_sd) > 0 and _length_m(self.doubtful) > _length_m(self.walls)
+        """Whether it was drawn by a walk, and most of its places are not known to a room: it is no plan."""
+        return is_no_plan(self.place_sd)
+
+    @property
+    def heard(self) -> Floats:
+        """All segments that echoes are compared with: those that are solid, and the doubtful walls of a drawing.
+
+        Of these the distance from places beside them is known better than their place in the building.
+        """
+        if not len(self.place_sd) or self.is_refused:
+            return self.solid
+        return np.concatenate((self.solid, self.doubtful))
 
     @property
     def solid(self) -> Floats:
@@ -112,6 +124,11 @@ class Level:
         if not len(self.windows) and not self.obstacles:
             return self.walls
         return np.concatenate((self.walls, self.windows, *(sides(corners) for corners in self.obstacles)))
+
+
+def is_no_plan(place_sd: Floats) -> bool:
+    """Whether most of a drawn storey's places (k, 3) are not known to a room."""
+    return len(place_sd) > 0 and float(np.median(place_sd[:, 2])) > MOST_PLACE_SD_M
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,13 +192,8 @@ class Plan:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether it has anything that blocks people and echoes: NO_PLAN has not."""
-        return any(len(level.solid) for level in self.levels)
-
-
-def _length_m(walls: Floats) -> float:
-    """Length of segments (n, 4)."""
-    return float(np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum())
+        """Whether it has anything that echoes are compared with: NO_PLAN, and a drawing that is refused, have not."""
+        return any(len(level.heard) for level in self.levels)
 
 
 # Where there is no plan, the map begins where the walk begins: x to the right of the first heading, y ahead.

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from echostep.errors import EchostepError
 from echostep.plan.model import Plan
+from echostep.plan.places.refusals import refusals
 from echostep.printing.file_mode import claim
 from echostep.team.endpoint import Endpoint
 from echostep.team.inbox import ListenerThread
@@ -47,6 +48,8 @@ def plan_file(
     payload, drawn = _fetched(broker, name, team, print_line)
     path = _kept(payload, name, folder)
     print_line(f"{_described(drawn)}: {path}")
+    for sentence in refusals(drawn):
+        print_line(sentence)
     return path
 
 
@@ -111,4 +114,10 @@ def _described(plan: Plan) -> str:
     """A drawing in words."""
     sd = "" if plan.uncertainty_m is None else f", to {100.0 * plan.uncertainty_m:.0f} cm (1 sd)"
     storeys = f" on {len(plan.levels)} storeys" if len(plan.levels) > 1 else ""
-    return f"{plan.name}: {sum(len(level.walls) for level in plan.levels)} walls{storeys}{sd}"
+    return f"{plan.name}: {sum(len(level.heard) for level in plan.levels)} walls{storeys}{sd}{_doubt(plan)}"
+
+
+def _doubt(plan: Plan) -> str:
+    """How many of its walls are doubtful."""
+    doubtful = sum(len(level.doubtful) for level in plan.levels if not level.is_refused)
+    return f"; {doubtful} of them are doubtful" if doubtful else ""

@@ -56,13 +56,13 @@ class LaidOutPlan:
 def lay_out_levels(plan: Plan) -> LaidOutPlan:
     """The sheet of a plan; raises EchostepError for a plan too wide for its tiles."""
     sheet = level_sheet_of(plan)
-    walls = [level.solid + k * sheet.pitch_m * np.array([1.0, 0.0, 1.0, 0.0]) for k, level in enumerate(plan.levels)]
+    walls = [level.heard + k * sheet.pitch_m * np.array([1.0, 0.0, 1.0, 0.0]) for k, level in enumerate(plan.levels)]
     return LaidOutPlan(Walls(np.concatenate(walls) if len(walls) > 1 else walls[0]), sheet)
 
 
 def level_sheet_of(plan: Plan) -> LevelSheet:
     """The sheet of a plan: levels and connectors, without walls."""
-    ends = np.concatenate([level.solid.reshape(-1, 2) for level in plan.levels])
+    ends = np.concatenate([level.heard.reshape(-1, 2) for level in plan.levels])
     low, high = (float(ends[:, 0].min()), float(ends[:, 0].max())) if len(ends) else (0.0, 0.0)
     outlines = [c.outline_m for c in plan.connectors]
     serves = np.zeros((len(outlines), len(plan.levels)), np.bool_)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.mapping.graph.directions import LEAST_EVIDENCE
 from echostep.mapping.joining import Join, join_walks
@@ -21,9 +22,11 @@ from echostep.mapping.mapper import Mapped, drawn, solve_walk
 from echostep.mapping.picture import draw_picture
 from echostep.mapping.plan import Walked, plan_of
 from echostep.mapping.walls.completion import complete
+from echostep.mapping.walls.place_sd import OFF_M
 from echostep.path import MeasuredSegment
 from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import NO_PLAN, Plan, Pose
+from echostep.plan.places.refusals import refusals
 from echostep.plan.writer import save_plan
 from echostep.recording.reading import Recording, open_recording
 from echostep.session.console import console
@@ -72,7 +75,7 @@ def _drawn(walks: Walks, start: Pose, name: str) -> Result:
     else:
         mapped = drawn(walks[0][1])
     plan, walked_m = plan_of(mapped, start, name)
-    if not plan.is_drawn:
+    if not plan.is_drawn and not refusals(plan):
         raise EchostepError(
             f"{walks[0][0]}: no walls were heard beside the path: is a ranger covered, or was it walked outside?"
         )
@@ -150,14 +153,22 @@ def _say(line: str) -> None:
 
 def described(mapped: Mapped, plan: Plan) -> list[str]:
     """What was drawn, in words."""
-    walls = np.concatenate([level.walls for level in plan.levels])
+    walls = np.concatenate([level.heard for level in plan.levels])
     doors = [door for level in plan.levels for door in level.doors]
-    length_m = float(np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum())
+    length_m = _length_m(walls)
     opened = sum(door.state == "open" for door in doors)
     lines = [
         f"{len(walls)} walls, {length_m:.0f} m, to {100.0 * (plan.uncertainty_m or 0.0):.0f} cm (1 sd) beside the path of"
         f" {_walked_m(mapped):.0f} m; {len(doors)} openings, {opened} walked through"
     ]
+    places = np.concatenate([level.place_sd[:, 2] for level in plan.levels])
+    if len(places):
+        doubtful_m = sum(_length_m(level.doubtful) for level in plan.levels)
+        lines.append(
+            f"in the building the walls are known to {np.median(places):.1f} m (1 sd), the worst to {places.max():.1f} m;"
+            f" {doubtful_m:.0f} m are doubtful: no second passage confirmed them, or they may be more than {OFF_M} m off"
+        )
+    lines += refusals(plan)
     if len(plan.levels) > 1:
         heights = ", ".join(f"{level.height_m:+.1f}" for level in plan.levels)
         lines.append(f"{len(plan.levels)} floors at {heights} m, {len(plan.connectors)} stairs")
@@ -172,6 +183,11 @@ def described(mapped: Mapped, plan: Plan) -> list[str]:
     else:
         lines.append("no place was passed twice: the drift of the foot is in the drawing")
     return lines
+
+
+def _length_m(walls: Floats) -> float:
+    """Length of segments (n, 4)."""
+    return float(np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum())
 
 
 def _walked_m(mapped: Mapped) -> float:

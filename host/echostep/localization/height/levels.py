@@ -175,7 +175,9 @@ class UpperLevels:
     def __init__(self, floor: Floor, sheet: LevelSheet) -> None:
         self._sheet = sheet
         self._grid = inside_grid(floor.x_m, floor.y_m)
-        self._is_above = sheet.height_m > max(0.0, float(sheet.height_m.min())) + HALF_STOREY_M
+        above = sheet.height_m > max(0.0, float(sheet.height_m.min())) + HALF_STOREY_M
+        # A storey whose drawing is refused has no floor: there, nothing is known to be air
+        self._is_above = above & (np.bincount(level_of(floor.x_m, sheet), minlength=len(above)) > 0)
 
     def log_loss(self, x_m: Floats, y_m: Floats, path_m: float) -> Floats | None:
         """Loss of log-weight (n,) of places on the sheet on this length of path; None if none is in the air."""

@@ -28,6 +28,7 @@ from echostep.mapping.walls.lines import Lines, find_lines, joined
 from echostep.mapping.walls.place_sd import are_known, placed_pieces
 from echostep.mapping.walls.segments import ACROSS, ANY, ASKEW, Run, find_runs, meets, segments_of
 from echostep.mapping.walls.wall_sd import wall_sds
+from echostep.plan.model import is_no_plan
 
 # Of wall on one line, at least; shorter ones must be detected again, or be across the path. One passer-by in 15, in 70, goes along for longer, when
 # one second is the mean
@@ -39,15 +40,23 @@ ALONG_RAD = 2.0 * ALONG_SD_RAD  # of a piece from the course of the path, within
 @dataclass(frozen=True, slots=True)
 class Drawing:
     """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of the distance of each from the places beside it; `paths_m`: the
-    corrected path (k, 2) of each walk, or each piece of it on this level. `doubtful` (d, 4): walls whose place in the building is not known well
-    enough. `place_sd` (p, 3): x, y of pieces of both, and the standard deviation per axis of their place in the building.
+    corrected path (k, 2) of each walk, or each piece of it on this level. `doubtful` (d, 4), `doubtful_sd_m` (d,): the same of short walls that no
+    second passage confirmed, or whose place in the building is not known well enough. `place_sd` (p, 3): x, y of pieces of both, and the standard deviation per axis of their place in the building.
     """
 
     walls: Floats
     sd_m: Floats
     paths_m: tuple[Floats, ...]
     doubtful: Floats = field(default_factory=lambda: np.zeros((0, 4)))
+    doubtful_sd_m: Floats = field(default_factory=lambda: np.zeros(0))
     place_sd: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+
+    @property
+    def all_walls(self) -> Floats:
+        """All walls with their standard deviation (n + d, 5)."""
+        return np.concatenate(
+            [np.column_stack([self.walls, self.sd_m]), np.column_stack([self.doubtful, self.doubtful_sd_m])]
+        )
 
 
 def draw(graph: Graph, pings: Pings) -> tuple[Drawing, ...]:
@@ -111,9 +120,12 @@ def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
     walls = segments_of(straight, runs, cells)
     sd_m = wall_sds(graph, pings, poses, straight, runs, cells.of)
     placed = placed_pieces(graph, pings, poses, straight, runs, cells.of)
-    known = are_known(walls, placed)
+    again = np.array([_is_confirmed(straight, run, placed_pings, cells.of) for run in runs], np.bool_)
+    known = again & are_known(len(runs), placed)
     rows = np.array([(*piece.at_m, piece.sd_m) for piece in placed]).reshape(-1, 3)
-    return Drawing(walls[known], sd_m[known], paths, walls[~known], rows)
+    if is_no_plan(rows):
+        known[:] = False
+    return Drawing(walls[known], sd_m[known], paths, walls[~known], sd_m[~known], rows)
 
 
 def _without_lone(runs: list[Run], lines: Lines, least_m: float, heard: _Heard, of: Ints) -> list[Run]:
@@ -130,13 +142,31 @@ def _without_lone(runs: list[Run], lines: Lines, least_m: float, heard: _Heard, 
 
 def _is_of_a_person(run: Run, lines: Lines, heard: _Heard, of: Ints) -> bool:
     """Whether a piece may be of a person: detected in one passage, and along the path or along no direction of the building."""
-    normal = lines.normal_rad[run.line]
-    along = math.cos(normal) * heard.poses[:, 1] - math.sin(normal) * heard.poses[:, 0]
-    own = np.flatnonzero((of == run.line) & (along >= run.low_m) & (along <= run.high_m))
-    if (np.diff(np.sort(heard.way_m[own])) > PASSAGE_M).any():
+    own = _own(lines, run, heard, of)
+    if _passages(heard.way_m[own]) > 1:
         return False
+    normal = lines.normal_rad[run.line]
     off = np.abs((normal - heard.course_rad[own]) % math.pi - 0.5 * math.pi)
     return not lines.aligned[run.line] or bool(np.median(off) < ALONG_RAD)
+
+
+def _is_confirmed(lines: Lines, run: Run, heard: _Heard, of: Ints) -> bool:
+    """Whether a second passage detected a piece, or it is longer than what a person leaves."""
+    if run.high_m - run.low_m >= (LONE_M if lines.aligned[run.line] else LONE_ASKEW_M):
+        return True
+    return _passages(heard.way_m[_own(lines, run, heard, of)]) > 1
+
+
+def _own(lines: Lines, run: Run, heard: _Heard, of: Ints) -> Ints:
+    """The pings that detected a piece."""
+    normal = lines.normal_rad[run.line]
+    along = math.cos(normal) * heard.poses[:, 1] - math.sin(normal) * heard.poses[:, 0]
+    return np.flatnonzero((of == run.line) & (along >= run.low_m) & (along <= run.high_m))
+
+
+def _passages(way_m: Floats) -> int:
+    """In how many passages pings at these lengths of the path (k,) were heard."""
+    return int((np.diff(np.sort(way_m)) > PASSAGE_M).sum()) + min(len(way_m), 1)
 
 
 def _selected(lines: Lines, which: Bools) -> Lines:

@@ -20,10 +20,11 @@ from echostep.mapping.walls.lines import Lines
 from echostep.mapping.walls.segments import Run
 
 COURSE_M = 15.0  # from the start to the place that gives the direction
-SCALE_SD = 0.005  # of all lengths of a walk: those of the three surveyed hallways of gx5_gcp are 0.1, 0.4 and 0.7 % too long
+SCALE_SD = (
+    0.005  # of all lengths of a walk: those of the three surveyed hallways of gx5_gcp are 0.1, 0.4 and 0.7 % too long
+)
 PIECE_M = 4.0  # of wall, that is known alike: a stretch of path beside it has half a closure's length
-# A wall is drawn where it is farther off than OFF_M with a probability of 0.05 at most; a storey, where half of its walls are; assumed
-OFF_M, LEAST_KNOWN = 0.5, 0.5
+OFF_M = 0.5  # a wall is drawn where it is farther off with a probability of 0.05 at most; assumed: half of a passage
 MOST_SD_M = OFF_M / 1.96
 AT_ONCE = 64  # pieces that are solved together: an hour's walk has 15,000 unknowns, each 8 bytes of two columns
 
@@ -44,7 +45,9 @@ class Heard(NamedTuple):
     node: Ints
 
 
-def placed_pieces(graph: Graph, pings: Pings, poses: Floats, lines: Lines, runs: list[Run], of: Ints) -> list[PlacedPiece]:
+def placed_pieces(
+    graph: Graph, pings: Pings, poses: Floats, lines: Lines, runs: list[Run], of: Ints
+) -> list[PlacedPiece]:
     """All runs in pieces that were heard; `poses` (k, 3): corrected place and axis of each ping; `of` (k,): the line that explains it."""
     which, heard = [], []
     for number, run in enumerate(runs):
@@ -57,21 +60,20 @@ def placed_pieces(graph: Graph, pings: Pings, poses: Floats, lines: Lines, runs:
         normal_rad = float(lines.normal_rad[runs[number].line])
         normal = np.array([math.cos(normal_rad), math.sin(normal_rad)])
         line_sd_m = float(lines.sd_m[runs[number].line])
-        across, worst = (math.sqrt(max(v, 0.0)) for v in (float(normal @ own @ normal), float(np.linalg.eigvalsh(own)[-1])))
+        across, worst = (
+            math.sqrt(max(v, 0.0)) for v in (float(normal @ own @ normal), float(np.linalg.eigvalsh(own)[-1]))
+        )
         placed.append(PlacedPiece(number, piece.at_m, math.hypot(across, line_sd_m), math.hypot(worst, line_sd_m)))
     return placed
 
 
-def are_known(walls: Floats, placed: list[PlacedPiece]) -> Bools:
-    """Which walls (n, 4) are known well enough to be drawn; none where these are the smaller part of a storey: it is no plan."""
-    variance, count = np.zeros(len(walls)), np.zeros(len(walls))
+def are_known(walls: int, placed: list[PlacedPiece]) -> Bools:
+    """Which of so many walls are known well enough to be drawn."""
+    variance, count = np.zeros(walls), np.zeros(walls)
     for piece in placed:
         variance[piece.run] += piece.across_sd_m**2
         count[piece.run] += 1.0
     known: Bools = (count > 0.0) & (variance < count * MOST_SD_M**2)
-    length_m = np.hypot(*(walls[:, 2:] - walls[:, :2]).T)
-    if length_m[known].sum() < LEAST_KNOWN * length_m.sum():
-        known[:] = False
     return known
 
 

@@ -54,7 +54,7 @@ def walk_drawing(mapped: Mapped) -> WalkDrawing:
     level = mapped.graph.level_of(np.arange(len(pose)))
     newest = int(level[level != BETWEEN][-1])
     drawing = mapped.drawings[newest]
-    walls = np.column_stack([drawing.walls, drawing.sd_m])
+    walls = drawing.all_walls
     middle = 0.5 * (walls[:, 0:2] + walls[:, 2:4]) - pose[-1, :2]
     nearest = np.argsort(np.hypot(*middle.T), kind="stable")[:MOST_WALLS]
     thinned = np.linspace(0, len(pose) - 1, min(len(pose), MOST_POINTS)).round().astype(np.int64)

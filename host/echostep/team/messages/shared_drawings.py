@@ -14,6 +14,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan.model import Plan, parse_plan
+from echostep.plan.places.refusals import refusals
 from echostep.team.messages.report import is_printable
 
 MOST_BYTES = 1 << 20  # of a drawing: an hour in a furnished office has 30 kB
@@ -42,7 +43,7 @@ def checked_drawing(payload: bytes) -> Plan:
     except ValueError as error:
         raise EchostepError(str(error)) from error
     if not plan.is_drawn:
-        raise EchostepError("it shows no wall")
+        raise EchostepError("; ".join(refusals(plan)) or "it shows no wall")
     names = [plan.name, *(stairs.name for stairs in plan.connectors)]
     for level in plan.levels:
         names += [level.name, *(room.name for room in level.rooms), *(door.name for door in level.doors)]
@@ -54,13 +55,16 @@ def checked_drawing(payload: bytes) -> Plan:
 
 def _check_size(plan: Plan) -> None:
     """Raises EchostepError for more than a walk can have drawn: laying it out would take minutes."""
-    walls = np.concatenate([level.solid for level in plan.levels])
+    walls = np.concatenate([level.heard for level in plan.levels])
     length_m = float(np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum())
     outlines = [*(connector.outline_m for connector in plan.connectors)]
     others = len(plan.connectors)
     for level in plan.levels:
         outlines += [*level.obstacles, *(room.outline_m for room in level.rooms if room.outline_m is not None)]
         others += sum(map(len, (level.rooms, level.doors, level.questions, level.obstacles, level.doubtful)))
+        others -= len(level.heard) - len(
+            level.solid
+        )  # doubtful walls that are compared with echoes are counted as walls
     extent_m = float(np.ptp(np.concatenate([walls.reshape(-1, 2), *_others(plan), *outlines]), axis=0).max())
     for size, most, what in (
         (len(plan.levels), MOST_STOREYS, "storeys"),
@@ -73,7 +77,7 @@ def _check_size(plan: Plan) -> None:
         if size > most:
             raise EchostepError(f"it has {size:.0f} {what}, more than {most:.0f}")
     for level in plan.levels:
-        _check_meetings(level.solid)
+        _check_meetings(level.heard)
 
 
 def _others(plan: Plan) -> Iterator[Floats]:
@@ -82,6 +86,7 @@ def _others(plan: Plan) -> Iterator[Floats]:
         yield np.array([[plan.start.x_m, plan.start.y_m]])
     for level in plan.levels:
         yield level.doubtful.reshape(-1, 2)
+        yield level.place_sd[:, :2]
         yield np.array([door.line for door in level.doors]).reshape(-1, 2)
         yield np.array([room.at_m for room in level.rooms]).reshape(-1, 2)
 
