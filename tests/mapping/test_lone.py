@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A short piece of wall in a hall, heard once: drawn where it is across the path, for echoes of people lie along it."""
+"""A short piece of wall in a hall, heard once: doubtful where it is across the path, nothing along it, for there echoes of people lie."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from echostep.arrays import Ints
+from echostep.arrays import Floats, Ints
 from echostep.mapping.mapper import map_walk
 from echostep.path import MeasuredSegment, PathSegment
 
@@ -53,7 +53,18 @@ def test_a_piece_along_an_askew_path_is_a_wall_if_it_is_longer_than_people_go_al
 
 
 def drawn_in_hall_m(walk: list[MeasuredSegment]) -> float:
-    """Length of what is drawn in the hall, 5 m or more from its door."""
-    walls = map_walk(walk).drawing.walls
+    """Length of what is drawn in the hall, doubtful or not."""
+    return in_hall_m(map_walk(walk).drawing.all_walls)
+
+
+def in_hall_m(walls: Floats) -> float:
+    """Length of walls (n, 4 or more) 5 m or more from the hall's door."""
     in_hall = walls[walls[:, [0, 2]].min(1) > CORRIDOR_M + 5.0]
-    return float(np.hypot(*(in_hall[:, 2:] - in_hall[:, :2]).T).sum())
+    return float(np.hypot(*(in_hall[:, 2:4] - in_hall[:, :2]).T).sum())
+
+
+def test_what_no_second_pass_confirmed_is_doubtful() -> None:
+    """A piece of 2 m across the path, which one passage heard."""
+    drawing = map_walk(through_a_hall(math.radians(25.0))).drawing
+    assert in_hall_m(drawing.walls) == 0.0
+    assert in_hall_m(drawing.doubtful) > 1.0

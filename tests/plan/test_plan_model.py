@@ -35,6 +35,7 @@ FULL: dict[str, Any] = GOOD | {
             "windows": [[0, 3, 4, 3]],
             "doors": [{"line": [0, 1, 0, 2], "state": "open", "name": "street"}, {"line": [0, 0, 0, 1]}],
             "obstacles": [[[1, 1], [2, 1], [2, 2], [1, 1]]],
+            "place_sd": [[2, 0, 0.2], [4, 1.5, 0.3]],
             "rooms": [{"name": "A", "at": [2, 1], "outline": [[0, 0], [4, 0], [4, 3], [0, 3]]}],
             "questions": [
                 {"text": "a door?", "about": "door", "at": [0, 1], "lines": [[0, 1, 0, 2]], "proposed": True},
@@ -110,6 +111,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"georeference": {"origin": [0]}}, "georeference.origin"),
     ({"georeference": {"origin": [0, 9], "rotation_deg": "north"}}, "georeference.rotation_deg"),
     ({"uncertainty_m": -1}, "uncertainty_m"),
+    ({"levels": [{"walls": [], "place_sd": [[0, 0, -1]]}]}, r"place_sd\[0\]\[2\]"),
 ]
 
 
@@ -172,6 +174,8 @@ def same(one: Plan, other: Plan) -> None:
         assert a.questions == b.questions
         assert same_array(a.walls, b.walls)
         assert same_array(a.windows, b.windows)
+        assert same_array(a.doubtful, b.doubtful)
+        assert same_array(a.place_sd, b.place_sd)
         assert all(same_array(p, q) for p, q in zip(a.obstacles, b.obstacles, strict=True))
     for p, q in zip(one.connectors, other.connectors, strict=True):
         assert (p.kind, p.name, p.levels) == (q.kind, q.name, q.levels)

@@ -25,9 +25,9 @@ from echostep.walls.level_sheet import LevelSheet, level_of
 class Building:
     """Data of a plan, shared by all filters on it: walls, sheet of levels, floor; tables are made when a cloud first needs them."""
 
-    def __init__(self, walls: Walls, sheet: LevelSheet | None = None, drawn: DrawnPlaces = DrawnPlaces()) -> None:
+    def __init__(self, walls: Walls, sheet: LevelSheet | None = None, drawn: DrawnPlaces | None = None) -> None:
         """`drawn`: how well its places are known, where it was drawn by a walk."""
-        self.walls, self.sheet, self.drawn = walls, sheet, drawn
+        self.walls, self.sheet, self.drawn = walls, sheet, drawn or DrawnPlaces()
         self.floor = walkable_floor(walls.index.walls)
         self.indoors = indoors(self.floor)
         self.upper_levels = None

@@ -61,6 +61,11 @@ def _draw_level(axes: Axes, level: Level, walked_m: Sequence[Floats], built: Lev
         for outline in built.obstacles:
             axes.fill(*outline.T, color=OBSTACLE)
     axes.add_collection(LineCollection(_lines(level.walls), colors=WALL, linewidths=1.6, label="drawn"))
+    if len(level.doubtful):
+        doubtful = LineCollection(
+            _lines(level.doubtful), colors=WALL, linewidths=0.8, linestyles="--", label="doubtful"
+        )
+        axes.add_collection(doubtful)
     doors = np.array([door.line for door in level.doors if door.state == "open"]).reshape(-1, 4)
     axes.add_collection(
         LineCollection(_lines(doors), colors=DOOR, linewidths=1.2, linestyles=":", label="walked through")

@@ -45,7 +45,7 @@ CORNERS = [[k % 9, 7 * k % 9] for k in range(7500)]
 
 def level(**parts: Any) -> bytes:
     """A drawing of two walls with other parts."""
-    return drawing(levels=[{"walls": WALLS, **parts}])
+    return drawing(levels=[{"name": "0", "walls": WALLS, **parts}])
 
 
 def test_a_drawing_is_a_plan() -> None:
@@ -72,6 +72,9 @@ def test_a_drawing_is_a_plan() -> None:
         (level(rooms=[{"name": "a", "at": [90_000, 1]}]), "m from end to end"),
         (level(doors=[{"line": [0, 0, 0, 90_000]}]), "m from end to end"),
         (level(doubtful=[[0, 0, 0, 90_000]]), "m from end to end"),
+        (level(place_sd=[[0, 90_000, 0.1]]), "m from end to end"),
+        (level(place_sd=[[0, 0, 0.1]], doubtful=WALLS * 5000), "10002 walls, more than"),
+        (level(walls=[], place_sd=[[0, 0, 1.5]], doubtful=WALLS), r"refused as a plan: .* known to 1.5 m only"),
         (level(obstacles=[[[0, 0], [9, 0], [9, 90_000]]]), "m of wall, more than"),
         (level(rooms=[{"name": "a", "at": [1, 1], "outline": CORNERS}] * 2), "15000 corners of outlines, more than"),
         (drawing(start={"x": 90_000.0, "y": 1.0, "heading_deg": 90.0}), "m from end to end"),

@@ -39,9 +39,11 @@ ALONG_RAD = 2.0 * ALONG_SD_RAD  # of a piece from the course of the path, within
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of the distance of each from the places beside it; `paths_m`: the
-    corrected path (k, 2) of each walk, or each piece of it on this level. `doubtful` (d, 4), `doubtful_sd_m` (d,): the same of short walls that no
-    second passage confirmed, or whose place in the building is not known well enough. `place_sd` (p, 3): x, y of pieces of both, and the standard deviation per axis of their place in the building.
+    """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of the distance of each from the places beside it.
+
+    `doubtful` (d, 4), `doubtful_sd_m` (d,): the same of short walls that no second passage confirmed, and of those whose place in the building is
+    not known well enough. `place_sd` (p, 3): x, y of pieces of both, and the standard deviation per axis of their place in the building. `paths_m`:
+    the corrected path (k, 2) of each walk, or each piece of it on this level.
     """
 
     walls: Floats
