@@ -24,6 +24,7 @@ from echostep.interruption import holding_signals, is_asked
 from echostep.localization.estimate import Estimate
 from echostep.output.terminal import TerminalView
 from echostep.page.elements.true_position import TruePath
+from echostep.plan.places.refusals import refusals
 from echostep.ports.chunks import Portion
 from echostep.ports.people.check_in import PERSON
 from echostep.ports.people.meeting import MEETING
@@ -101,6 +102,8 @@ class Session:
         self._interrupted = False
 
     def __enter__(self) -> Self:
+        for sentence in refusals(self.tracker.plan):
+            _print_line(sentence)
         with ExitStack() as opened:  # closes what is open already when a later part cannot be opened
             self._open_drawing(opened)
             self._open_page(opened)
