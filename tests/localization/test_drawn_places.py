@@ -64,7 +64,7 @@ def test_tracking_is_claimed_where_the_drawing_allows_it(sd_m: float, status: Tr
     tracked.cloud.x_m[:], tracked.cloud.y_m[:] = 2.0, 4.0  # as if echoes had gathered it
     e = tracked.update(step(0))
     assert e.status is status
-    assert math.sqrt(e.xx_m2) == pytest.approx(sd_m, rel=0.1)
+    assert math.sqrt(e.xx_m2) > 0.99 * sd_m
     assert e.protection_m > 3.0 * sd_m
 
 
@@ -89,9 +89,8 @@ def test_a_map_that_may_be_off_makes_small_errors_less_likely() -> None:
 def test_a_drawn_storey_that_is_not_known_to_a_room_is_refused() -> None:
     """Its walls are compared with no echo, and a sentence names it; doubtful walls of one that is known are compared."""
     known, refused = (drawing([2.0, 4.0, sd_m]).levels[0] for sd_m in (0.3, 1.2))
-    doubtful = {"walls": ROOM[:1], "doubtful": ROOM[1:]}
-    assert len(replace(known, **doubtful).heard) == 4
-    assert len(replace(known, **doubtful).solid) == 1
+    partly = replace(known, walls=ROOM[:1], doubtful=ROOM[1:])
+    assert (len(partly.heard), len(partly.solid)) == (4, 1)
     plan = Plan("by anna", (known, replace(refused, name="1", walls=ROOM[:0], doubtful=ROOM)), None, "")
     (sentence,) = refusals(plan)
     assert sentence.startswith("floor 1 of by anna is refused as a plan")
