@@ -66,6 +66,7 @@ def plan_in(mapped: Mapped, moved: Moved, start: Pose, name: str, turn_sd_rad: f
         )
         if not level.is_refused:
             every = drawing.all_walls
+            every = every[_length_m(every) > LEAST_M]
             lengths_m += _length_m(every).tolist()
             variances += (every[:, 4] ** 2).tolist()
     sd = round(math.sqrt(float(np.average(variances, weights=lengths_m))), ROUND) if variances else None

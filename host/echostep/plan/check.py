@@ -51,7 +51,7 @@ def check_plan(plan: Plan) -> list[PlanFinding]:
 
 
 def _level(level: Level, i: int, faces: Faces) -> Iterator[PlanFinding]:
-    solid = level.solid
+    solid = level.heard
     lines = shapely.linestrings(solid.reshape(-1, 2, 2))
     tree = shapely.STRtree(lines)
     yield from _gaps(solid, tree, i)

@@ -15,7 +15,6 @@ from echostep.mapping.graph.fragments import Fragments
 from echostep.mapping.graph.graph import Closure, FittedWalls, Graph
 from echostep.mapping.graph.nodes import Nodes
 from echostep.mapping.walls.place_sd import (
-    COURSE_M,
     MOST_SD_M,
     SCALE_SD,
     Heard,
@@ -24,13 +23,14 @@ from echostep.mapping.walls.place_sd import (
     place_covariances,
 )
 
-STEP_SD_M, COUNT = 0.03, 61  # of each metre of path; nodes, a metre apart
+STEP_SD_M, STEP_M, COUNT = 0.03, 0.9, 61  # of each step of path; its length; nodes
+COURSE = 17  # the first node more than 15 m from the start
 
 
 def straight(turn_sd_rad: float, closures: list[Closure] | None = None) -> Graph:
     """A path along the x axis."""
     pose = np.zeros((COUNT, 3))
-    pose[:, 0] = np.arange(COUNT)
+    pose[:, 0] = STEP_M * np.arange(COUNT)
     gaps = COUNT - 1
     nodes = Nodes(pose[:, 0], pose, np.full(gaps, STEP_SD_M), np.full(gaps, turn_sd_rad), pose[:, 0])
     none, integers = np.zeros(0), np.zeros(0, np.int64)
@@ -41,37 +41,41 @@ def straight(turn_sd_rad: float, closures: list[Closure] | None = None) -> Graph
 
 
 def sds(graph: Graph, node: int) -> Floats:
-    """Standard deviations along x and y of a place a metre beside a node."""
-    place = Heard(graph.pose[node, :2] + [0.0, 1.0], np.array([node]))
-    (covariance,) = place_covariances(graph, [place])
-    return np.sqrt(np.diag(covariance))
+    """Standard deviations along x and y of the place of a node."""
+    (covariance,) = place_covariances(graph, [Heard(graph.pose[node, :2], np.array([node]))])
+    deviations: Floats = np.sqrt(np.diag(covariance))
+    return deviations
 
 
 def test_a_place_is_known_as_well_as_the_way_to_it() -> None:
-    """Along the way: the steps and the scale; across it nothing but the steps, where the heading is known."""
+    """Along the way: the steps and the scale; across it the steps, of which those to the place 15 m away turn the frame."""
     graph = straight(1e-4)
     for node in (20, 40, 60):
-        along, _ = sds(graph, node)
-        assert along == pytest.approx(math.hypot(STEP_SD_M * math.sqrt(node), SCALE_SD * node), rel=0.02)
+        along, across = sds(graph, node)
+        assert along == pytest.approx(math.hypot(STEP_SD_M * math.sqrt(node), SCALE_SD * STEP_M * node), rel=0.02)
+        steps = node - COURSE + COURSE * (1.0 - node / COURSE) ** 2
+        assert across == pytest.approx(STEP_SD_M * math.sqrt(steps), rel=0.02)
     drifting = [sds(straight(math.radians(0.3)), node)[1] for node in (20, 40, 60)]
     assert drifting[0] < drifting[1] < drifting[2]
-    assert drifting[2] > 3.0 * sds(graph, 60)[1]
+    assert drifting[2] > 2.0 * sds(graph, 60)[1]
 
 
 def test_a_return_makes_the_place_known() -> None:
-    """The last node is tied to the first: half of the way is the farthest from what is known, and no more the end."""
-    tie = Closure(0, COUNT - 1, np.array([COUNT - 1.0, 0.0, 0.0]), np.diag([1e4, 1e4, 1e4]), 20.0)
-    lost, tied = straight(math.radians(0.3)), straight(math.radians(0.3), [tie])
-    assert sds(tied, COUNT - 1)[1] < 0.2 * sds(lost, COUNT - 1)[1]
-    assert sds(tied, 30)[1] > sds(tied, COUNT - 1)[1]
+    """The course and the last node are tied to the first: half of the way is the farthest from what is known, and no more the end."""
+    ties = [
+        Closure(0, node, np.array([STEP_M * node, 0.0, 0.0]), np.diag([1e4, 1e4, 1e4]), 20.0)
+        for node in (COURSE, COUNT - 1)
+    ]
+    lost, tied = straight(math.radians(0.3)), straight(math.radians(0.3), ties)
+    assert sds(tied, COUNT - 1)[1] < 0.1 * sds(lost, COUNT - 1)[1]
+    assert sds(tied, 40)[1] > 1.5 * sds(tied, COUNT - 1)[1]
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-50.0, 50.0), st.floats(-50.0, 50.0))
 def test_a_map_that_is_laid_elsewhere_is_as_well_known(turn: float, x_m: float, y_m: float) -> None:
     """The start, and the direction to the first place 15 m away, are the frame: it may lie anywhere."""
     graph = straight(math.radians(0.3))
-    here = place_covariances(graph, [Heard(np.array([40.0, 1.0]), np.array([40]))])[0]
-    assert graph.pose[round(COURSE_M) + 1, 0] > COURSE_M
+    here = place_covariances(graph, [Heard(np.array([36.0, 1.0]), np.array([40]))])[0]
     c, s = math.cos(turn), math.sin(turn)
     moved = np.array([[c, -s], [s, c]])
     nodes = graph.nodes
@@ -80,7 +84,7 @@ def test_a_map_that_is_laid_elsewhere_is_as_well_known(turn: float, x_m: float, 
         Nodes(nodes.t_s, pose, nodes.sd_m, nodes.turn_sd_rad, nodes.way_m), graph.fragments, pose, graph.walls
     )
     other.solve()
-    there = place_covariances(other, [Heard(moved @ [40.0, 1.0] + [x_m, y_m], np.array([40]))])[0]
+    there = place_covariances(other, [Heard(moved @ [36.0, 1.0] + [x_m, y_m], np.array([40]))])[0]
     np.testing.assert_allclose(moved.T @ there @ moved, here, atol=1e-6)
 
 
