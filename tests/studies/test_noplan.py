@@ -12,12 +12,14 @@ import pytest
 
 from board_runs import ROOT
 from echostep.errors import EchostepError
+from echostep.localization.estimate import TrackStatus
 from echostep.mapping.graph.graph import Closure
 from echostep.mapping.graph.nodes import Nodes
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.check import check_plan
 from echostep.plan.model import Level, load_plan
 from echostep.simulation.scenario import DEMO_WAYPOINTS
+from echostep_studies.bench.filtering import Claim
 from echostep_studies.bench.sites import Site, plan_of
 from echostep_studies.bench.walks import SimulatedWalk
 from echostep_studies.frame.recordings import DATA
@@ -27,7 +29,7 @@ from echostep_studies.noplan.footslam import RADIUS_M, footslam, hexagon
 from echostep_studies.noplan.judgement import closure_columns, known_start, path_columns, wall_columns
 from echostep_studies.noplan.real_clutter import walked_log, with_stated_drift
 from echostep_studies.noplan.sites import furnished, loop_walls
-from echostep_studies.noplan.study import drawn_rows, names_of, noplan_study, one_run
+from echostep_studies.noplan.study import drawn_rows, names_of, noplan_study, one_run, second_row
 from needs_data import needs_data
 from studies.carmen_logs import WALLS as WALLS_OF_LOG
 from studies.carmen_logs import write_log
@@ -83,6 +85,26 @@ def test_a_closure_is_wrong_along_what_it_claims_to_know() -> None:
     assert (row.closures, row.wrong) == (2, 1)
 
 
+def test_a_second_person_is_judged_in_the_building() -> None:
+    """A right claim, one that is 1.5 m off and says tracking, one that says uncertain, one that is 3 m off with a radius of 1 m."""
+    walk = along_the_corridor()
+    claims = [
+        Claim(float(k), k + off, 1.5, 0, 0.0, status, radius)
+        for k, (off, status, radius) in enumerate(
+            [
+                (0.1, TrackStatus.TRACKING, 0.5),
+                (1.5, TrackStatus.TRACKING, 2.0),
+                (1.5, TrackStatus.UNCERTAIN, math.inf),
+                (3.0, TrackStatus.TRACKING, 1.0),
+            ]
+        )
+    ]
+    refused = Level("1", 3.0, WALLS[:0], doubtful=WALLS, place_sd=np.array([[0.0, 0.0, 1.5]]))
+    drawn = replace(walk.built, levels=(*walk.built.levels, refused))
+    row = second_row("second/corridor", 1, walk, drawn, [0, 0], claims)
+    assert (row.tracking, row.false_tracking, row.beyond, row.refused) == (0.75, 0.5, 0.25, 1)
+
+
 def test_footslam_finds_its_way_round_a_block() -> None:
     """Six laps of a block of 12 x 8 m by a foot that turns 4 degrees a lap too far: the map holds the laps together."""
     corners = np.array([[0.0, 0.0], [12.0, 0.0], [12.0, 8.0], [0.0, 8.0]])
@@ -130,6 +152,7 @@ def test_one_walk_gives_its_rows(tmp_path: Path) -> None:
     assert row.wrong == 0
     assert row.absent < 0.1
     assert second.mean_m < 1.0
+    assert (second.false_tracking, second.beyond, second.refused) == (0.0, 0.0, 0)
     assert (tmp_path / "office.png").stat().st_size > 20_000
 
 
