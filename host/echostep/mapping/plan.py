@@ -91,8 +91,8 @@ def _turned(drawing: Drawing, mapped: Mapped, turn_sd_rad: float) -> Drawing:
 def _level(drawing: Drawing, moved: Moved, name: str, height_m: float) -> Level:
     """A drawn level in the frame of the plan."""
     walls, doubtful = (_long(moved(rows.reshape(-1, 2)).reshape(-1, 4)) for rows in (drawing.walls, drawing.doubtful))
-    places: Floats = np.round(np.column_stack([moved(drawing.place_sd[:, :2]), drawing.place_sd[:, 2]]), ROUND)
-    return Level(name, height_m, walls, doubtful=doubtful, place_sd=places)
+    places: Floats = np.column_stack([moved(drawing.place_sd[:, :2]), drawing.place_sd[:, 2]])
+    return Level(name, height_m, walls, doubtful=doubtful, place_sd=places.round(ROUND))
 
 
 def _long(walls: Floats) -> Floats:
