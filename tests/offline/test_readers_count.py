@@ -109,7 +109,7 @@ READERS: dict[str, tuple[Callable[[Path], str], str]] = {
     "decode, MT: samples": (lambda f: decoded(f, MTX + STRANGE), "and refuse 1 of another length"),
     "info, board": (lambda f: described(f, "board", BOARD), r"board frames: \d+ good, 1 bad, 4 lost"),
     "info, MTx": (lambda f: described(f, "mtx", MTX + STRANGE), "refused: 1 of another length"),
-    "info, file": (lambda f: described(f, "mtx", MTX, bytes(99)), r"damaged: 99 bytes in 1 places are not valid"),
+    "info, file": (lambda f: described(f, "mtx", MTX, bytes(99)), r"99 damaged bytes in one place were not used, the first at byte"),
     "foot: no number": (lambda f: foot(f, {3: "x,1,2,3,4,5,6"}), "^1 rows without a number in some column: skipped"),
     "foot: decimal commas": (lambda f: foot(f, {3: "0,03,1,2,3,4,5,6"}), "^1 rows without a number in some column: skipped"),
     "foot: half a magnetometer": (

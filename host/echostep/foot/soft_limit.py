@@ -18,11 +18,11 @@ from echostep.jit import lean_kernel
 
 # Assumed; the recordings of `evaluate feet` whose gyros have a wider range keep every figure.
 HIGH_RAD_S = 4.0  # no limit of a gyro for feet is lower
-FLAT_PER_S = 3.0  # greatest change of a flat rate, as a share of it per second: 1.5 % in 5 ms
+FLAT_PER_S = 2.0  # greatest change of a flat rate, as a share of it per second: 1 % in 5 ms
 STEP_S = 0.005  # over which the change of a rate is measured, so that noise at high sample rates is none
 FEWEST, SHORTEST_S = 2, 0.009  # steps of a plateau between samples, and its duration
 FLANK_S = 0.015  # on either side of a plateau
-STEEP = 2.0  # least slope of a flank, in units of the greatest of a flat rate
+STEEP = 3.0  # least slope of a flank, in units of the greatest of a flat rate
 NEAR = 0.94  # least height of a plateau, as a share of the greatest rate of the axis so far
 LONGEST_STEP_S = 0.03  # between two samples of a plateau
 UNSURE = 2.0  # sd of the angle, as a share of it: a heel strike has several peaks, and the flanks show one
