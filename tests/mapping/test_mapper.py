@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -185,7 +186,7 @@ def beside(span_s: float) -> list[MeasuredSegment]:
 
 
 def test_a_recording_becomes_a_plan_that_tracks(tmp_path: Path) -> None:
-    """`echostep map` of a recorded demo; the same walk is tracked on the drawing, and never lost."""
+    """`echostep map` of a recorded demo; the same walk is tracked on the drawing, and never lost, though uncertain at first: as the drawing is."""
     scenario = demo_scenario(PLAN, 4, PythonBoard(4))
     with start_recording(tmp_path / "walk.mcap", run_metadata(NO_PLAN, NO_PLAN.start, 4, "no plan")) as recorder:
         for chunk in scenario.chunks():
@@ -199,7 +200,7 @@ def test_a_recording_becomes_a_plan_that_tracks(tmp_path: Path) -> None:
     assert checked.returncode == 0, checked.stdout
     tracked = echostep("replay", recorder.path, "--plan", "plan.json", "--headless", "--out", "again", cwd=tmp_path)
     assert tracked.returncode == 0, tracked.stderr
-    assert "never lost" in tracked.stdout
+    assert re.search(r"never lost|lost for 0 s of 85 s, uncertain for [0-4] s", tracked.stdout), tracked.stdout
     refused = echostep("map", recorder.path, "-o", "plan.json", "--picture", "plan.xyz", cwd=tmp_path)
     assert refused.returncode == 2
 

@@ -115,7 +115,7 @@ def test_a_broker_that_dies_is_said_and_the_last_state_stays(browser: Any) -> No
     with ServedTeam(whole_team()) as served:
         page = table(browser, served.page.url, "phone")
         served.show(connected=False, fault="connection refused")
-        wait_for(page, "document.querySelector('#status-text').textContent.startsWith('no connection to the broker')")
+        wait_for(page, "document.querySelector('#status-text').textContent.startsWith('no broker')")
         wait_for(page, "document.querySelector('#refused').textContent === 'connection refused'")
         assert page.locator("#list li").count() == 8
         served.show(connected=True)
