@@ -45,8 +45,18 @@ MODULES: dict[str, tuple[str, ...] | None] = {
     "team/messages/marks.py": ("Errand",),
     "team/publish.py": ("receipt",),
 }
+# What the plan editor shows, refusals included.
+EDITOR: dict[str, tuple[str, ...] | None] = {
+    "page/editor.py": ("_body", "_post_plan"),
+    "plan/check.py": ("_gaps", "_doors", "_open_rooms", "_with_leak", "NOT_ENCLOSED"),
+    "plan/importers/dxf/doors.py": ("questions",),
+    "plan/importers/dxf/drawing.py": ("_left_out_walls",),
+    "plan/places/reachability.py": None,
+    "plan/questions.py": None,
+    "plan/two_points.py": ("fit_two_points", "_percent"),
+}
 WORDS = re.compile(r"[a-z]{2}.* .*[a-z]|^[A-Z][a-z]+[a-z.!?]$")
-NO_WORDS = re.compile(r"[<{/]|system-ui|^\(|^transform |, select,|^#|^sign |^circle |^name ")
+NO_WORDS = re.compile(r"[<{/]|system-ui|^\(|^trans(form|late)\b|, select,|^#|^sign |^circle |^name ")
 # Texts that are put together from variables: what a page gets of them.
 WHOLE = {
     "Take the 7 7": tuple(f"Take the {way} {to}" for way in ("stairs", "lift", "ramp") for to in ("up", "down")),
@@ -63,6 +73,13 @@ WHOLE = {
         "the MTx sends no usable samples (without counter, acceleration or rate of turn)",
     ),
     "drop its plan": (),
+    "is not enclosed by walls, doors and gaps": ("room 7 is not enclosed by walls, doors and gaps",),
+    "no door": (),
+    "open room": (),
+    "ends in no wall": ("door 7 ends in no wall",),
+    "ends 7 m from any wall": ("door 7 ends 7 m from any wall",),
+    "right angle": (),
+    "picture of 7": (),
 }  # fmt: skip
 CODE = re.compile(
     r"""(?:^|(?<=\s))//[^\n]*|'(?:[^'\\\n]|\\.)*'|"[^"\n]*"|(?<=\()/(?:[^/\\\n]|\\.)+/|(?s:.)""", re.MULTILINE
@@ -72,13 +89,24 @@ TEMPLATE = re.compile(r"\$\{|\\.|(?s:.)")
 
 def page_texts() -> set[str]:
     """Texts in the scripts of both pages."""
-    files = [path for folder in FOLDERS for path in (HOST / folder).glob("*.js") if path.name not in ELSEWHERE]
-    return _plain(text for path in files for text in _literals(path.read_text("utf-8")))
+    return _plain(_scripts(*FOLDERS))
+
+
+def editor_texts() -> set[str]:
+    """Texts in the scripts of the plan editor, and in what the host sends to it."""
+    sent = (text for name, parts in EDITOR.items() for text in _constants(HOST / name, parts, refusals=True))
+    return _plain(itertools.chain(_scripts("page/edit"), sent))
 
 
 def host_texts() -> set[str]:
     """Texts in what the host sends to a page."""
     return _plain(text for name, parts in MODULES.items() for text in _constants(HOST / name, parts))
+
+
+def _scripts(*folders: str) -> Iterator[str]:
+    """The strings of the scripts in these folders."""
+    files = [path for folder in folders for path in (HOST / folder).glob("*.js") if path.name not in ELSEWHERE]
+    return (text for path in files for text in _literals(path.read_text("utf-8")))
 
 
 def _plain(texts: Iterator[str]) -> set[str]:
@@ -117,12 +145,12 @@ def _literals(script: str) -> Iterator[str]:
                 stack[-1] = f"{text}7"
 
 
-def _constants(path: Path, parts: tuple[str, ...] | None) -> Iterator[str]:
-    """The strings of these parts of a module, without docstrings and without errors, which are for the terminal."""
+def _constants(path: Path, parts: tuple[str, ...] | None, *, refusals: bool = False) -> Iterator[str]:
+    """The strings of these parts of a module, without docstrings, and without errors where these are for the terminal."""
     tree = ast.parse(path.read_text("utf-8"))
     wanted = [node for node in ast.walk(tree) if parts is None or _name(node) in parts] if parts else [tree]
     assert wanted, path
-    left_out = {id(inner) for node in ast.walk(tree) if _is_left_out(node) for inner in ast.walk(node)}
+    left_out = {id(inner) for node in ast.walk(tree) if _is_left_out(node, refusals) for inner in ast.walk(node)}
     for node in itertools.chain.from_iterable(map(ast.walk, wanted)):
         if id(node) in left_out:
             continue
@@ -140,11 +168,11 @@ def _name(node: ast.AST) -> str:
     return getattr(node, "name", "")
 
 
-def _is_left_out(node: ast.AST) -> bool:
-    """Docstrings, what is raised, annotations."""
+def _is_left_out(node: ast.AST, refusals: bool) -> bool:
+    """Docstrings, what is raised unless `refusals`, annotations."""
     if isinstance(node, ast.Expr):
         return isinstance(node.value, ast.Constant)
-    return isinstance(node, ast.Raise)
+    return isinstance(node, ast.Raise) and not refusals
 
 
 def _alternatives(part: ast.expr) -> list[str]:
@@ -154,6 +182,6 @@ def _alternatives(part: ast.expr) -> list[str]:
     chosen = part.value if isinstance(part, ast.FormattedValue) else part
     if isinstance(chosen, ast.IfExp):
         return _alternatives(chosen.body) + _alternatives(chosen.orelse)
-    if isinstance(chosen, ast.BinOp) and isinstance(chosen.left, ast.Constant) and isinstance(chosen.op, ast.Mult):
-        return ["", str(chosen.left.value)]
+    if isinstance(chosen, ast.BinOp) and isinstance(chosen.left, ast.Constant) and isinstance(chosen.left.value, str):
+        return ["", chosen.left.value]
     return ["7"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,24 +13,31 @@ from typing import Any
 import pytest
 
 from echostep.commands.options import Language
+from echostep.page.editor import EditServer
 from echostep.page.elements.guidance import ShownGuidance
 from echostep.page.elements.scene import PageScene
 from echostep.page.mailbox import Mailbox
 from echostep.page.server import LOCAL as HERE
 from echostep.page.server import STATIC, Address, PageServer
-from echostep.plan.model import Plan
+from echostep.plan.importers.formats import import_plan
+from echostep.plan.model import Plan, load_plan
+from echostep.plan.questions import with_questions
+from echostep.plan.writer import save_plan
 from echostep.team.messages.crews import Crew
 from echostep.team.messages.report import ReportedAlarm
 from operation.teams import BASE, NAMES, TOWER, ServedTeam, place, whole_team
 from page.browser import READY, loaded_page, overflow, wait_for
+from page.edit.drawing import click, status
+from page.edit.test_editor_questions import doubtful_house
 from page.frames import scene, served
-from page.sentences import host_texts, page_texts
+from page.sentences import editor_texts, host_texts, page_texts
 from page.web.test_page_sizes import RATES, UNREACHED, moments
 from plan.imported_plans import seven_floors
 
 TABLE_READY = (
     "window.echostep?.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
 )
+EDITOR_READY = "Boolean(window.echostep)"
 LOCALES = {"en": "en-GB", "de": "de-DE"}
 HOLE = re.compile(r"\{(\w+)\}")
 MISSING = "[...echostep.missing]"
@@ -38,7 +45,7 @@ LANG = "document.documentElement.lang"
 CUT = """(() => {
     const pen = document.createElement('canvas').getContext('2d'), wrong = [], ARROW = 24;
     for (const element of document.querySelectorAll('body *')) {
-        if (!element.offsetParent || element.closest('.unseen, svg, h1, #map, #floors, #floor, .name')) continue;  // names of a plan may be cut off
+        if (!element.offsetParent || element.closest('.unseen, svg, h1, #map, #floors, #floor, #level, .name')) continue;  // names may be cut
         const style = getComputedStyle(element), { clientWidth: width, clientHeight: height } = element;
         const name = `${element.id || element.tagName}: ${element.innerText}`;
         pen.font = `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`;
@@ -115,6 +122,19 @@ def test_every_text_of_the_source_has_an_entry(browser: Any, url: str) -> None:
     page.evaluate("(texts) => texts.forEach((text) => echostep.tr(text))", sorted(texts))
     assert set(page.evaluate(MISSING)) - names(seven_floors()) - {"echostep", "GeoJSON"} == set()
     page.context.close()
+
+
+def test_every_text_of_the_editor_has_an_entry(browser: Any, tmp_path: Path) -> None:
+    with EditServer(tmp_path / "new.json", port=0) as server:
+        page = page_of(browser, server.url, "de", EDITOR_READY)
+        texts = editor_texts()
+        assert len(texts) > 90
+        page.evaluate("(texts) => texts.forEach((text) => echostep.tr(text))", sorted(texts))
+        page.evaluate(
+            "import(`${location.href}static/words.js`).then(({ KINDS }) => Object.values(KINDS).forEach(echostep.tr))"
+        )
+        assert page.evaluate(MISSING) == []
+        page.context.close()
 
 
 def test_a_text_without_entry_is_found(browser: Any, url: str) -> None:
@@ -226,3 +246,69 @@ def test_nothing_is_cut_off_on_the_commanders_page(browser: Any, lang: str, tmp_
         assert page.evaluate(LANG) == lang
         assert not page.wrong
         page.context.close()
+
+
+@pytest.mark.parametrize("lang", LOCALES)
+def test_nothing_is_cut_off_in_the_editor(browser: Any, lang: str, tmp_path: Path) -> None:
+    doubtful = with_questions(import_plan(doubtful_house(tmp_path / "house.dxf")))
+    save_plan(doubtful, tmp_path / "plan.json")
+    with EditServer(tmp_path / "plan.json", port=0) as server:
+        page = page_of(browser, server.url, lang, EDITOR_READY)
+        shots = iter(range(100))
+
+        def check(*, axe: bool = True) -> None:
+            page.screenshot(path=tmp_path / f"editor-{lang}-{next(shots)}.png")
+            assert page.evaluate(CUT) == [], status(page)
+            assert overflow(page) == (0, 0)
+            assert not axe or violations(page) == [], status(page)
+
+        check()
+        for tool in page.query_selector_all("[data-tool]"):
+            tool.click()
+            check(axe=False)
+        for _ in doubtful.levels[0].questions:
+            page.click("#answer-next")
+            check(axe=False)
+        page.click("#answer-yes")
+        page.click("#whole")
+        refuse_two_points(page, check)
+        page.click("#add")
+        check()
+        page.fill("#answer", "Attic")
+        page.click("#yes")
+        wait_for(page, "/\\d/.test(document.querySelector('#answer').value)")  # its height
+        page.click("#yes")
+        wait_for(page, "echostep.sheet.k === 1")
+        page.click("[data-tool='stairs']")
+        click(page, 3.0, 3.0)
+        click(page, 4.0, 3.0)
+        click(page, 4.0, 5.0)
+        page.click("#end")
+        check()
+        page.click("#ways button[value='yes']")
+        page.click("#step-back")
+        check()
+        page.click("#save")
+        wait_for(page, "!echostep.sheet.unsaved")
+        check()
+        assert ("gesichert" in status(page)) == (lang == "de")
+        people = names(load_plan(tmp_path / "plan.json"))
+        assert set(page.evaluate(MISSING)) - people == set()
+        assert page.evaluate(LANG) == lang
+        assert ["422" in text for text in page.wrong] == [True]  # the two points
+        page.context.close()
+
+
+def refuse_two_points(page: Any, check: Callable[[], None]) -> None:
+    """Type the degrees of two points that are farther apart on Earth than on the plan."""
+    page.click("[data-tool='earth']")
+    for x_m, degrees in ((1.0, "48.1, 11.5"), (9.0, "48.2, 11.5")):
+        click(page, x_m, 4.0)
+        page.fill("#answer", "?")
+        page.click("#yes")
+        check()
+        page.fill("#answer", degrees)
+        page.click("#yes")
+        check()
+    wait_for(page, "/[.?!…] /.test(document.querySelector('#status').textContent)")
+    check()

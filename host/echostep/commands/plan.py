@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from echostep.commands.options import picture_file
+from echostep.commands.options import Lang, picture_file
 from echostep.errors import EchostepError
 from echostep.extras import PAGE, lacks, require
 from echostep.printing.lines import say
@@ -221,12 +221,13 @@ def edit(
         int | None, typer.Option("--port", help="Port of the page [8420, or a free one].", min=0, max=65535)
     ] = None,
     headless: Annotated[bool, typer.Option("--headless", help="Open no browser: print the address alone.")] = False,
+    lang: Lang = None,
 ) -> None:
     """Draw and drag walls and doors on a page in the browser, until Ctrl-C."""
     require("the plan editor", *PAGE)
     from echostep.page.editor import edit_plan
 
-    edit_plan(file, picture, port, browser=not headless)
+    edit_plan(file, picture, port, lang.value if lang else None, browser=not headless)
 
 
 def _level(plan: Plan, name: str) -> int:

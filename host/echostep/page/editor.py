@@ -27,7 +27,7 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount, Route
 
 from echostep.errors import EchostepError
-from echostep.page.server import STATIC, STOP_S, Address, open_listener
+from echostep.page.server import STATIC, STOP_S, Address, open_listener, page_in
 from echostep.page.web.access import AccessControl
 from echostep.page.web.connections import Connections
 from echostep.page.web.gated_server import GatedServer
@@ -37,7 +37,15 @@ from echostep.plan.writer import georeference_fields, plan_json
 from echostep.printing.lines import say
 
 PAGE = Path(__file__).parent / "edit"
-SHARED = ("style.css", "icon.svg", "theme.js", "view.js")  # files of the live page
+SHARED = (
+    "style.css",
+    "icon.svg",
+    "theme.js",
+    "view.js",
+    "language.js",
+    "*-pages.json",
+    "*-edit.json",
+)  # files of the live page
 MOST_BODY = 8_000_000  # bytes of a plan: a browser draws so much smoothly
 MOST_PICTURE = 32_000_000  # bytes
 POST_S = 20.0  # time for a posted plan to arrive
@@ -106,10 +114,14 @@ class PlanFile:
 class EditServer:
     """Serves the editor until it is closed; raises EchostepError when the plan, the picture or the port cannot be opened."""
 
-    def __init__(self, plan: Path, picture: Path | None = None, port: int | None = None) -> None:
+    def __init__(
+        self, plan: Path, picture: Path | None = None, port: int | None = None, lang: str | None = None
+    ) -> None:
         self.file = PlanFile(plan)
         self._picture = None if picture is None else _picture(picture)
-        self._pages = {name: STATIC / name for name in SHARED} | {path.name: path for path in PAGE.iterdir()}
+        self._lang = lang
+        shared = [path for name in SHARED for path in STATIC.glob(name)]
+        self._pages = {path.name: path for path in (*shared, *PAGE.iterdir())}
         self._listener = open_listener(Address(port=port))
         token = secrets.token_urlsafe(16)
         self.url = f"http://127.0.0.1:{self._listener.getsockname()[1]}/{token}/"
@@ -149,7 +161,7 @@ class EditServer:
         return Starlette(routes=[Mount(f"/{token}", routes=routes)])
 
     async def _index(self, _: Request) -> Response:
-        return FileResponse(self._pages["index.html"])
+        return await page_in(self._pages["index.html"], self._lang)
 
     async def _static(self, request: Request) -> Response:
         path = self._pages.get(request.path_params["name"])
@@ -243,11 +255,11 @@ def _picture(path: Path) -> tuple[bytes, str]:
     raise EchostepError(f"{path}: neither PNG, JPEG nor SVG: convert the picture to one of these")
 
 
-def edit_plan(plan: Path, picture: Path | None, port: int | None, *, browser: bool) -> None:
-    """Serve the editor until Ctrl-C. `browser`: open it in the browser too."""
+def edit_plan(plan: Path, picture: Path | None, port: int | None, lang: str | None, *, browser: bool) -> None:
+    """Serve the editor until Ctrl-C. `lang` None: the browser's language; `browser`: open it in the browser too."""
     import webbrowser
 
-    with EditServer(plan, picture, port) as server:
+    with EditServer(plan, picture, port, lang) as server:
         say(f"Draw {plan} at {server.url} (until Ctrl-C).")
         sys.stdout.flush()
         if browser:

@@ -44,7 +44,7 @@ from echostep.plan.model import Plan
 
 STATIC = Path(__file__).parent / "static"
 LOCAL = "127.0.0.1"
-HTML = '<html lang="en">'  # of a page; static/language.js reads which language was chosen
+HTML = '<html lang="en"'  # of a page; static/language.js reads which language was chosen
 PORT = 8420
 MOST_PAGES = 32  # open at the same time; further ones are refused
 TRY_AGAIN_LATER = 1013  # WebSocket close code [IANA]
@@ -187,8 +187,7 @@ class SocketServer(Generic[S]):
         self._loop = None
 
     async def _index(self, _: Request) -> Response:
-        page = await asyncio.to_thread(self._site.index.read_text, "utf-8")
-        return HTMLResponse(page.replace(HTML, f'<html lang="en" data-lang="{self._lang}">', 1) if self._lang else page)
+        return await page_in(self._site.index, self._lang)
 
     async def _lines(self, request: Request) -> Response:
         level = request.path_params["level"]
@@ -264,6 +263,12 @@ class PageServer(SocketServer[PageSession]):
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._mailbox.on_publish = None
         super().__exit__(kind, error, at)
+
+
+async def page_in(path: Path, lang: str | None) -> Response:
+    """A page in a language; None: in that of each browser."""
+    page = await asyncio.to_thread(path.read_text, "utf-8")
+    return HTMLResponse(page.replace(HTML, f'{HTML} data-lang="{lang}"', 1) if lang else page)
 
 
 def open_listener(address: Address) -> socket.socket:

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The panel of questions: shows one after the other, and gives the answers to the sheet. In: sheet, view, tools, desk. Owns the question that is shown.
 
+import { tr } from './language.js';
 import { accept, put, reject } from './questions.js';
 import { WORDS } from './words.js';
 
@@ -76,9 +77,9 @@ export class Asking {
   paint() {
     const { open, current } = this;
     byId('questions').hidden = !open.length;
-    byId('asked').textContent = current ? WORDS.question(open.findIndex(([, question]) => question === current) + 1, open.length, current.text) : '';
+    byId('asked').textContent = current ? tr(WORDS.question(open.findIndex(([, question]) => question === current) + 1, open.length, current.text)) : '';
     byId('answer-move').disabled = current?.about === 'wall';
-    byId('answer-yes').textContent = current?.proposed ? WORDS.add : WORDS.keep;
-    byId('answer-no').textContent = current?.proposed ? WORDS.drop : WORDS.remove;
+    byId('answer-yes').textContent = tr(current?.proposed ? WORDS.add : WORDS.keep);
+    byId('answer-no').textContent = tr(current?.proposed ? WORDS.drop : WORDS.remove);
   }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The editor's dialogs. In: a question. Out: a promise of the answer, null when it was cancelled. `map`: has the focus afterwards.
 
+import { tr } from './language.js';
 import { WORDS } from './words.js';
 
 const byId = (id) => document.getElementById(id);
@@ -9,10 +10,11 @@ const byId = (id) => document.getElementById(id);
 function shown(dialog, answer) {
   dialog.showModal();
   return new Promise((resolve) => {
-    const end = (value) => { dialog.onclose = null; dialog.close(); byId('map').focus(); resolve(value); };
+    let given = null;
+    const end = (value) => { given = value; dialog.close(); };
     dialog.querySelector('form').onsubmit = (e) => { e.preventDefault(); const value = answer(); if (value !== undefined) end(value); };
     dialog.querySelector('[type="button"]').onclick = () => end(null);
-    dialog.onclose = () => end(null);
+    dialog.onclose = () => { byId('map').focus(); resolve(given); }; // not before: this event would close the next question
   });
 }
 
@@ -20,12 +22,12 @@ export const isOpen = () => Boolean(document.querySelector('dialog[open]'));
 
 // `refusal(text)`: why a text is no answer; empty where it is one.
 export function ask(question, answer, refusal = () => '') {
-  byId('question').textContent = question;
+  byId('question').textContent = tr(question);
   byId('answer').value = answer;
   byId('ask-wrong').textContent = '';
   const done = shown(byId('ask'), () => {
     const text = byId('answer').value, reason = refusal(text);
-    byId('ask-wrong').textContent = reason;
+    byId('ask-wrong').textContent = tr(reason);
     return reason ? undefined : text;
   });
   byId('answer').select();
@@ -34,7 +36,7 @@ export function ask(question, answer, refusal = () => '') {
 
 // Name and levels of a connector; `names`: of all levels.
 export function askConnector(kind, names, { name, levels }) {
-  byId('ways-title').textContent = WORDS.connectorTitle(kind);
+  byId('ways-title').textContent = tr(WORDS.connectorTitle(kind));
   byId('ways-name').value = name;
   byId('ways-few').textContent = '';
   byId('ways-levels').replaceChildren(...names.map((text, k) => {
@@ -45,7 +47,7 @@ export function askConnector(kind, names, { name, levels }) {
   return shown(byId('ways'), () => {
     const chosen = [...byId('ways-levels').querySelectorAll('input')].filter((box) => box.checked).map((box) => Number(box.value));
     if (chosen.length > 1) return { name: byId('ways-name').value.trim(), levels: chosen };
-    byId('ways-few').textContent = WORDS.twoLevels;
+    byId('ways-few').textContent = tr(WORDS.twoLevels);
     return undefined;
   });
 }

@@ -2,6 +2,7 @@
 // The georeference by two clicks: two places of the plan whose latitude and longitude are known. The server computes it (plan/two_points.py). Owns the arrow to north.
 
 import { readDegrees } from './degrees.js';
+import { tr } from './language.js';
 import { WORDS } from './words.js';
 
 const byId = (id) => document.getElementById(id);
@@ -40,5 +41,5 @@ export function paintNorth({ georeference }) {
   byId('north').hidden = !georeference;
   if (!georeference) return;
   byId('north-arrow').setAttribute('transform', `rotate(${-bearing(georeference)})`);
-  byId('north-text').textContent = WORDS.north(bearing(georeference));
+  byId('north-text').textContent = tr(WORDS.north(bearing(georeference)));
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The grid under the sheet and the scale bar. In: the view. Owns their elements. An arrow key moves the cross by a square of the grid.
 
+import { tr } from './language.js';
+
 const STEPS_M = [0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 25, 50, 100, 250, 500, 1000, 2500];
 const SQUARE_PX = 14, BAR_PX = 60; // sides of a square and length of the bar at least
 const byId = (id) => document.getElementById(id);
@@ -21,6 +23,6 @@ export function paintGrid(view) {
   byId('grid').setAttribute('d', [...down, ...across].join(''));
   const metres = atLeast(BAR_PX, view);
   byId('bar').style.width = `${metres * view.scale}px`;
-  byId('bar-text').textContent = `${metres} m`;
-  byId('square').textContent = `▦ ${square} m`;
+  byId('bar-text').textContent = tr(`${metres} m`);
+  byId('square').textContent = `▦ ${tr(`${square} m`)}`;
 }

@@ -7,6 +7,7 @@ import { paintNorth } from './earth.js';
 import { box } from './geometry.js';
 import { paintGrid, squareOf } from './grid.js';
 import { paint } from './paint.js';
+import { localise, missing, tr } from './language.js';
 import { Pointer } from './pointer.js';
 import { outlined } from './shapes.js';
 import { Sheet } from './sheet.js';
@@ -22,8 +23,9 @@ const FIRST_WIDTH_M = 20; // of a picture without a scale
 const view = new View(), map = byId('map');
 let sheet, tools, asking, stamp, waiting = false;
 
-const say = (text) => { byId('status').textContent = text; };
-const wrong = (text) => { byId('wrong').textContent = text; };
+// The plan's own names stay as they are: its title and its list of levels.
+const say = (text) => { byId('status').textContent = tr(text); };
+const wrong = (text) => { byId('wrong').textContent = tr(String(text)); };
 
 function doorWidth() {
   const width = byId('width').valueAsNumber;
@@ -49,7 +51,7 @@ function draw() {
   byId('step-back').disabled = !sheet.past.length;
   byId('step-forth').disabled = !sheet.future.length;
   byId('save').toggleAttribute('data-unsaved', sheet.unsaved);
-  byId('title').textContent = sheet.unsaved ? WORDS.unsaved(sheet.tree.name) : sheet.tree.name;
+  byId('title').textContent = sheet.unsaved ? `${sheet.tree.name} ${tr(WORDS.unsaved)}` : sheet.tree.name;
   const names = sheet.tree.levels.map((level) => level.name), options = byId('level');
   if (names.join('\n') !== [...options.options].map((o) => o.text).join('\n')) options.replaceChildren(...names.map((name, k) => new Option(name, k)));
   options.value = sheet.k;
@@ -87,7 +89,7 @@ async function save(over = false) {
     const headers = { 'content-type': 'application/json', ...(over ? {} : { 'if-match': stamp }) };
     const answer = await fetch('plan', { method: 'POST', headers, body: JSON.stringify(tree), signal: AbortSignal.timeout(30000) });
     const reply = await answer.json().catch(() => ({}));
-    if (answer.status === 409 && confirm(WORDS.writeOver(reply.error))) { await save(true); return; }
+    if (answer.status === 409 && confirm(tr(WORDS.writeOver(reply.error)))) { await save(true); return; }
     if (!answer.ok) { wrong(WORDS.notSaved(reply.error ?? answer.status)); return; }
     stamp = answer.headers.get('etag');
     sheet.saved = tree;
@@ -167,6 +169,7 @@ async function loadPicture(name) {
 }
 
 async function start() {
+  localise(document.body);
   const answer = await fetch('plan'), tree = await answer.json();
   if (!answer.ok) { wrong(tree.error); return; }
   stamp = answer.headers.get('etag');
@@ -193,7 +196,7 @@ async function start() {
   addEventListener('beforeunload', (e) => { if (sheet.unsaved) e.preventDefault(); });
   const asked = asking.open.length && WORDS.questions(asking.open.length);
   say(sheet.picture && !sheet.picture.set ? WORDS.scaleFirst : asked || HINTS.select);
-  window.echostep = { view, sheet, tools, asking };
+  window.echostep = { view, sheet, tools, asking, missing, tr };
 }
 
 start().catch((error) => wrong(WORDS.noStart(error.message)));

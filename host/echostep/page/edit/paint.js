@@ -3,6 +3,7 @@
 
 import { ends, length } from './geometry.js';
 import { middle, outlined, outlineOf, sides, size, startOn } from './shapes.js';
+import { tr } from './language.js';
 import { KINDS, WORDS } from './words.js';
 
 const SVG = 'http://www.w3.org/2000/svg';
@@ -46,7 +47,7 @@ function paintShapes({ tree, sheet: { k }, chosen }, view) {
   const rows = outlined(tree, k), closed = (kind) => rows.filter((row) => row.kind === kind).map(({ outline }) => `M${outline.map((p) => p.join(' ')).join('L')}Z`).join('');
   byId('obstacles').setAttribute('d', closed('obstacle'));
   byId('connectors').setAttribute('d', closed('connector'));
-  const names = rows.filter(({ way }) => way).map(({ outline, way, name }) => mark('text', view.toScreen(...middle(outline)), name || KINDS[way]));
+  const names = rows.filter(({ way }) => way).map(({ outline, way, name }) => mark('text', view.toScreen(...middle(outline)), name || tr(KINDS[way])));
   return startOn(tree, k) ? [...names, startMark(tree.start, view, chosen?.kind === 'start')] : names;
 }
 
@@ -60,9 +61,9 @@ function chosenRows({ tree, level, sheet: { k }, chosen }) {
 
 // The length of what is drawn or moved, or the size of a rectangle: [text, position].
 function measured({ draft, box, live }, rows) {
-  if (box) return [WORDS.size(...size(box)), middle(box)];
+  if (box) return [tr(WORDS.size(...size(box))), middle(box)];
   const row = draft ?? (live && rows.length === 1 ? rows[0] : null);
-  return row && length(row) > 0 ? [WORDS.length(...ends(row)), middle(ends(row))] : ['', [0, 0]];
+  return row && length(row) > 0 ? [tr(WORDS.length(...ends(row))), middle(ends(row))] : ['', [0, 0]];
 }
 
 export function paint(tools, view, shown) {

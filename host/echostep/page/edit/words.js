@@ -54,7 +54,7 @@ export const WORDS = {
   question: (k, count, text) => `${k} of ${count}: ${text}`,
   questions: (count) => `${count} questions of the import are marked: answer them one by one, or Move, Door and Delete as you like`,
   scaleFirst: 'Set the scale first: Scale, then two points whose distance you know',
-  unsaved: (name) => `${name} (not saved)`,
+  unsaved: '(not saved)',
   length: (from, to) => along([to[0] - from[0], to[1] - from[1]]),
   size: (width, height) => `${width.toFixed(2)} × ${m(height)}`,
   // why nothing changed

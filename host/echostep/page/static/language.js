@@ -4,7 +4,7 @@
 // which is translated too. A text that no entry has as a whole is taken apart at its separators. What has no entry stays as it is: names of rooms and people.
 
 export const LANGUAGES = { en: 'English', de: 'Deutsch' };
-const PARTS = ['pages', 'host'];  // what the pages say themselves, and what the host sends
+const PARTS = document.documentElement.dataset.parts?.split(' ') ?? ['pages', 'host'];  // what a page says itself, and what the host sends it; a later entry replaces an earlier one
 const SEPARATORS = [' · ', '; ', ': ', ', '], SENTENCE = /([.?!…]) /g, END = '\n';
 const NUMBER = '(-?\\d+(?:\\.\\d+)?)', TEXT = '((?:(?!, |; |: | · |[.?!…] ).)+?)';
 const MOST_KNOWN = 2000;  // texts whose translation is kept
