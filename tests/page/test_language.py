@@ -218,7 +218,9 @@ def test_nothing_is_cut_off_on_the_commanders_page(browser: Any, lang: str, tmp_
     team.put_bytes(*crew.message)
     with ServedTeam(team) as table:
         page = page_of(browser, table.page.url, lang, TABLE_READY)
-        page.click("#invitation")
+        page.keyboard.press(
+            "Shift"
+        )  # no click on the invitation: where a script was evaluated before it was made, that counted as a gesture
         shots = iter(range(100))
 
         def check() -> None:

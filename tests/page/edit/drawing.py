@@ -49,3 +49,8 @@ def drag(page: Any, begin: tuple[float, float], end: tuple[float, float], button
 def status(page: Any) -> str:
     """What the page says."""
     return str(page.text_content("#status"))
+
+
+def says(page: Any, words: str) -> None:
+    """The page comes to say this: an answer in a dialog arrives after the click."""
+    assert until(lambda: status(page) == words), f"{status(page)!r}, not {words!r}"

@@ -18,7 +18,7 @@ from echostep.page import editor as plan_edit
 from echostep.page.editor import EditServer
 from echostep.plan.model import load_plan, parse_plan
 from echostep.plan.writer import plan_json, save_plan
-from page.browser import spot
+from page.browser import spot, wait_for
 from page.edit.drawing import PICTURES, click, drag, opened, saved
 from waiting import PATIENCE_S
 
@@ -300,6 +300,7 @@ def test_keys_alone_draw_a_wall_a_door_and_a_room(browser: Any, drawn: EditServe
     press("Enter")
     page.keyboard.type("Hall")
     press("Enter")
+    wait_for(page, "echostep.sheet.level.rooms?.length")  # an answer in a dialog arrives after the key
     press("Control+s")
     page.get_by_text("Saved new.json").wait_for()
     level = load_plan(drawn.file.path).levels[0]

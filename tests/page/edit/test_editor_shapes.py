@@ -12,8 +12,7 @@ from echostep.page.editor import EditServer
 from echostep.plan.model import Plan, Pose, load_plan, parse_plan
 from echostep.plan.writer import save_plan
 from page.browser import wait_for
-from page.edit.drawing import click, drag, opened, status
-from waiting import until
+from page.edit.drawing import click, drag, opened, says
 
 HOUSE = b"""{"echostep_plan": 1, "name": "house", "levels": [
     {"name": "Ground", "height_m": 0, "walls": [[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0, 8, 0, 0]], "rooms": []},
@@ -46,7 +45,7 @@ def test_an_obstacle_corner_by_corner_and_by_a_drag(browser: Any, house: EditSer
     page.click('[data-tool="obstacle"]')
     for place in ((2.0, 2.0), (4.0, 2.0), (4.0, 3.5), (2.0, 2.0)):
         click(page, *place)
-    assert status(page) == "Obstacle 2.00 m by 1.50 m"
+    says(page, "Obstacle 2.00 m by 1.50 m")
     drag(page, (6.0, 2.0), (8.0, 3.0))
     for place in ((9.0, 2.0), (10.0, 2.0), (10.0, 3.0)):
         click(page, *place)
@@ -60,23 +59,23 @@ def test_an_obstacle_corner_by_corner_and_by_a_drag(browser: Any, house: EditSer
     click(page, 1.0, 6.0)
     click(page, 2.0, 6.0)
     page.keyboard.press("Escape")
-    assert status(page) == "An outline has three corners or more: nothing drawn"
+    says(page, "An outline has three corners or more: nothing drawn")
     page.click('[data-tool="select"]')
     drag(page, (7.0, 2.5), (7.5, 4.5))
-    assert status(page) == "Moved the obstacle by 2.06 m, 76.0°"
+    says(page, "Moved the obstacle by 2.06 m, 76.0°")
     drag(page, (8.5, 5.0), (9.0, 6.0))  # the chosen one's corner
     page.click('[data-tool="erase"]')
     click(page, 3.7, 2.5)
-    assert status(page) == "Deleted the obstacle"
+    says(page, "Deleted the obstacle")
     assert [corners.tolist() for corners in written(page, house).levels[0].obstacles] == [
         [[6.5, 4], [8.5, 4], [9, 6], [6.5, 5]],
         [[9, 2], [10, 2], [10, 3]],
     ]
     for words in ("Deleted the obstacle", "Moved the corner by 1.12 m, 63.4°", "Moved the obstacle by 2.06 m, 76.0°"):
         page.click("#step-back")
-        assert status(page) == f"Undone: {words}"
+        says(page, f"Undone: {words}")
     page.click("#step-forth")
-    assert status(page) == "Again: Moved the obstacle by 2.06 m, 76.0°"
+    says(page, "Again: Moved the obstacle by 2.06 m, 76.0°")
     assert not page.wrong
     page.context.close()
 
@@ -88,7 +87,7 @@ def test_stairs_and_a_lift_join_levels(browser: Any, house: EditServer) -> None:
     chosen = "[...document.querySelectorAll('#ways-levels input')].map((box) => box.checked)"
     assert page.evaluate(chosen) == [True, True, False]  # this level and the next higher one
     page.click("#ways [value='yes']")
-    assert status(page) == "Stairs: Ground, First"
+    says(page, "Stairs: Ground, First")
     page.click('[data-tool="lift"]')
     drag(page, (5.0, 6.0), (7.0, 8.0))
     page.get_by_label("First").uncheck()
@@ -98,7 +97,7 @@ def test_stairs_and_a_lift_join_levels(browser: Any, house: EditServer) -> None:
     page.get_by_label("Cellar").check()
     page.fill("#ways-name", "Lift A")
     page.keyboard.press("Enter")
-    assert status(page) == "Lift: Ground, First, Cellar"
+    says(page, "Lift: Ground, First, Cellar")
     wait_for(page, "[...document.querySelectorAll('#marks text')].map((e) => e.textContent).join() === 'stairs,Lift A'")
     page.select_option("#level", "2")
     wait_for(page, "[...document.querySelectorAll('#marks text')].map((e) => e.textContent).join() === 'Lift A'")
@@ -114,11 +113,11 @@ def test_stairs_and_a_lift_join_levels(browser: Any, house: EditServer) -> None:
     page.click('[data-tool="ramp"]')
     drag(page, (8.0, 1.0), (9.0, 3.0))
     page.click("#ways [type='button']")
-    assert status(page) == "No ramp drawn"
+    says(page, "No ramp drawn")
     page.click('[data-tool="erase"]')
     page.select_option("#level", "0")
     click(page, 2.0, 6.0)
-    assert status(page) == "Deleted the stairs"
+    says(page, "Deleted the stairs")
     assert [(way.kind, way.name) for way in written(page, house).connectors] == [("lift", "Lift B")]
     page.click("#step-back")
     page.click("#step-back")
@@ -131,7 +130,7 @@ def test_stairs_of_one_level_are_refused(browser: Any, drawn: EditServer) -> Non
     page = opened(browser, drawn)
     page.click('[data-tool="stairs"]')
     drag(page, (5.0, 5.0), (7.0, 7.0))
-    assert status(page) == "No stairs drawn: there is one level. Add the other one first (+ Level)"
+    says(page, "No stairs drawn: there is one level. Add the other one first (+ Level)")
     assert page.evaluate("[echostep.sheet.past.length, echostep.tools.chain]") == [0, None]
     page.context.close()
 
@@ -140,9 +139,9 @@ def test_the_start_is_set_moved_and_deleted(browser: Any, house: EditServer) -> 
     page = opened(browser, house)
     page.click('[data-tool="start"]')
     click(page, 2.0, 2.0)
-    assert status(page) == "Start at x 2.00, y 2.00 m: now click where the wearer looks"
+    says(page, "Start at x 2.00, y 2.00 m: now click where the wearer looks")
     click(page, 2.0, 4.0)
-    assert status(page) == "Start at x 2.00, y 2.00 m, looking 90.0°"
+    says(page, "Start at x 2.00, y 2.00 m, looking 90.0°")
     start = start_of(page, house)
     assert (start.x_m, start.y_m, start.level) == (2.0, 2.0, 0)
     assert start.heading_rad == pytest.approx(1.5708, abs=1e-4)
@@ -150,14 +149,14 @@ def test_the_start_is_set_moved_and_deleted(browser: Any, house: EditServer) -> 
     page.select_option("#level", "1")
     wait_for(page, "!document.querySelector('#start')")
     drag(page, (5.0, 5.0), (8.0, 8.0))  # another place, on the first floor
-    assert status(page) == "Start at x 5.00, y 5.00 m, looking 45.0°"
+    says(page, "Start at x 5.00, y 5.00 m, looking 45.0°")
     page.click('[data-tool="select"]')
     drag(page, (5.0, 5.0), (6.0, 5.0))
     start = start_of(page, house)
     assert (start.x_m, start.y_m, start.level) == (6.0, 5.0, 1)
     page.focus("#map")
     page.keyboard.press("Delete")
-    assert status(page) == "Deleted the start"
+    says(page, "Deleted the start")
     assert written(page, house).start is None
     page.keyboard.press("Control+z")
     assert start_of(page, house).x_m == 6.0
@@ -207,7 +206,7 @@ def test_fingers_draw_stairs_on_a_phone_held_either_way(
     page.screenshot(path=tmp_path / f"stairs-{held}.png")
     found = Axe().run(page)
     page.tap("#ways [value='yes']")  # the tap that opened the dialog chose nothing in it
-    assert until(lambda: status(page) == "Stairs: Ground, First"), status(page)
+    says(page, "Stairs: Ground, First")
     after = Axe().run(page)
     page.screenshot(path=tmp_path / f"drawn-{held}.png")
     wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")

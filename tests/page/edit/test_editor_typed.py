@@ -11,7 +11,7 @@ import pytest
 
 from echostep.page.editor import EditServer
 from page.browser import spot, wait_for
-from page.edit.drawing import click, drag, opened, saved, status
+from page.edit.drawing import click, drag, opened, saved, says, status
 
 PHONES = {"upright": (360, 740), "sideways": (740, 360)}
 
@@ -79,7 +79,7 @@ def test_an_outline_the_start_and_movements_are_typed(browser: Any, drawn: EditS
     assert level.obstacles[0].tolist() == [[3, 3.77], [4.23, 3.77], [4.23, 4.77]]
     for words in ("Moved the wall by 1.11 m, 90.0°", "Moved the obstacle by 0.77 m, 90.0°"):
         page.click("#step-back")
-        assert status(page) == f"Undone: {words}"
+        says(page, f"Undone: {words}")
     assert not page.wrong
     page.context.close()
 
@@ -93,7 +93,7 @@ def test_digits_on_the_sheet_go_to_the_length(browser: Any, drawn: EditServer) -
     page.keyboard.press("ArrowUp")  # the draft gives the direction
     page.keyboard.type("3.21")
     page.keyboard.press("Enter")
-    assert status(page) == "Wall 3.21 m, 90.0°, as typed"
+    says(page, "Wall 3.21 m, 90.0°, as typed")
     page.keyboard.press("Escape")
     page.keyboard.press("d")
     page.keyboard.press("2")  # no length belongs to this tool
@@ -138,7 +138,7 @@ def test_fingers_type_on_a_phone_held_either_way(browser: Any, drawn: EditServer
     page.fill("#length", "2.22")
     page.fill("#angle", "45")
     page.tap("#go")
-    assert status(page) == "Wall 2.22 m, 45.0°, as typed"
+    says(page, "Wall 2.22 m, 45.0°, as typed")
     page.screenshot(path=tmp_path / f"typed-{held}.png")
     found = Axe().run(page)
     assert found.violations_count == 0, found.generate_report()
