@@ -124,7 +124,7 @@ def test_a_recorded_operation_is_played_in_a_browser(browser: Any, tmp_path: Pat
     with TablePage(operation, "Recorded", Address(port=0), tape) as served:
         served.publish(player.scene())
         page = table(browser, served.url, "phone")
-        wait_for(page, f"{SHOWN}.includes(' of ')")
+        wait_for(page, f"{SHOWN}.includes(' / ')")
         assert page.is_hidden("#now")
         page.select_option("#times", "32")
 
