@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -13,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from board_runs import ROOT, needs_twin, tool
+from board_runs import ROOT, needs_twin
 from command_line import echostep, interrupt_after, interrupt_when
 from echostep.board.faults.findings import Severity
 from echostep.commissioning import port_search
@@ -25,7 +24,7 @@ from echostep.recording.device import sender
 from echostep.recording.reading import open_recording
 from echostep.xsens import PROJECT
 from echostep_studies.simulation.devices.mtx_setup import FACTORY, MtxDevice
-from players import babbling_port, pseudo_terminal, python_board
+from players import babbling_port, pseudo_terminal, python_board, walking_twin
 from waiting import PATIENCE_S
 from xsens.mt_lines import on_a_terminal
 
@@ -128,24 +127,10 @@ def test_a_search_without_a_board_says_what_is_there(monkeypatch: pytest.MonkeyP
         assert words in done.stderr
 
 
-@contextmanager
-def two_boards(folder: Path) -> Iterator[tuple[str, str]]:
-    """The ports of a belt board and a foot board, real firmware in two simulators."""
-    command = [*tool("twin.run"), "--kit", "2026", "--out", str(folder)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as twin:
-        try:
-            assert twin.stdout is not None
-            board, foot = (twin.stdout.readline().split()[1] for _ in range(2))
-            yield board, foot
-        finally:
-            twin.send_signal(signal.SIGINT)
-            twin.wait(timeout=PATIENCE_S)
-
-
 @needs_twin
 def test_two_boards_are_found_told_apart_tracked_and_replayed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     track = tmp_path / "live/track.csv"
-    with two_boards(tmp_path) as (board, foot):
+    with walking_twin(tmp_path, "--kit", "2026") as (board, foot):
         seen = [PortSeen(port, Role.BOARD, "", number) for port, number in ((foot, "17"), (board, "4"))]
         monkeypatch.setattr(port_search, "list_seen", lambda: seen)
         swapped = echostep("record", "--board", foot, "--foot", board, "--out", tmp_path / "a.mcap", "--seconds", 30)
@@ -171,7 +156,7 @@ def test_two_boards_are_found_told_apart_tracked_and_replayed(tmp_path: Path, mo
 
 @needs_twin
 def test_a_foot_board_alone_at_the_boards_port_is_named(tmp_path: Path) -> None:
-    with two_boards(tmp_path) as (_, foot):
+    with walking_twin(tmp_path, "--kit", "2026") as (_, foot):
         done = echostep("record", "--board", foot, "--out", tmp_path / "a.mcap", "--seconds", 30)
     assert f"{foot} is the foot board, not the sensor board: name its port with --foot {foot}" in done.stderr
 

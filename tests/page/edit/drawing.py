@@ -15,6 +15,7 @@ from echostep.plan.model import load_plan
 from page.browser import spot
 from waiting import PATIENCE_S, until
 
+PHONES = {"upright": (360, 740), "sideways": (740, 360)}
 PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
 
 
@@ -27,6 +28,16 @@ def opened(browser: Any, server: EditServer, **context: Any) -> Any:
     page.goto(server.url)
     assert until(lambda: page.evaluate("Boolean(window.echostep)")), page.wrong
     return page
+
+
+def on_phone(browser: Any, server: EditServer, held: str) -> Any:
+    """The page on a phone that is held in one of the ways of PHONES."""
+    width, height = PHONES[held]
+    return opened(browser, server, viewport={"width": width, "height": height}, has_touch=True, is_mobile=True)
+
+
+def tap(page: Any, x_m: float, y_m: float) -> None:
+    page.touchscreen.tap(*spot(page, x_m, y_m))
 
 
 def click(page: Any, x_m: float, y_m: float) -> None:

@@ -18,13 +18,12 @@ from echostep.plan.georeference import EarthTransform
 from echostep.plan.model import Georeference, Plan, load_plan
 from echostep.plan.writer import save_plan
 from page.browser import wait_for
-from page.edit.drawing import PICTURES, click, opened, status
+from page.edit.drawing import PHONES, PICTURES, click, on_phone, opened, status, tap
 from waiting import until
 
 DEMO = ROOT / "host/echostep/plans/demo.json"
 TRUE = Georeference(11.5755, 48.1374, 0.3)  # y points 17.2 degrees west of north
 CORNERS = ((1.0, 1.0), (25.0, 13.0))  # of the demo's outer walls: 26.83 m apart
-PHONES = {"upright": (360, 740), "sideways": (740, 360)}
 
 
 @pytest.fixture
@@ -145,13 +144,10 @@ def test_keys_alone_give_the_georeference(browser: Any, bare: EditServer) -> Non
 def test_fingers_on_a_phone_held_either_way(browser: Any, bare: EditServer, held: str, tmp_path: Path) -> None:
     from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
 
-    width, height = PHONES[held]
-    page = opened(browser, bare, viewport={"width": width, "height": height}, has_touch=True, is_mobile=True)
+    page = on_phone(browser, bare, held)
     page.tap('[data-tool="earth"]')
     for corner, text in zip(CORNERS, pasted(), strict=True):
-        left, top = page.evaluate(f"echostep.view.toScreen(...{json.dumps(corner)})")
-        box = page.locator("#map").bounding_box()
-        page.touchscreen.tap(box["x"] + left, box["y"] + top)
+        tap(page, *corner)
         page.locator("#ask[open]").wait_for()
         page.fill("#answer", "x")
         page.tap("#yes")

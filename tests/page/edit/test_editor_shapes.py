@@ -12,13 +12,12 @@ from echostep.page.editor import EditServer
 from echostep.plan.model import Plan, Pose, load_plan, parse_plan
 from echostep.plan.writer import save_plan
 from page.browser import wait_for
-from page.edit.drawing import click, drag, opened, says
+from page.edit.drawing import PHONES, click, drag, on_phone, opened, says, tap
 
 HOUSE = b"""{"echostep_plan": 1, "name": "house", "levels": [
     {"name": "Ground", "height_m": 0, "walls": [[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0, 8, 0, 0]], "rooms": []},
     {"name": "First", "height_m": 3, "walls": [[0, 0, 12, 0]], "rooms": []},
     {"name": "Cellar", "height_m": -3, "walls": [[0, 0, 12, 0]], "rooms": []}]}"""
-PHONES = {"upright": (360, 740), "sideways": (740, 360)}
 
 
 @pytest.fixture
@@ -195,13 +194,10 @@ def test_fingers_draw_stairs_on_a_phone_held_either_way(
 ) -> None:
     from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
 
-    width, height = PHONES[held]
-    page = opened(browser, house, viewport={"width": width, "height": height}, has_touch=True, is_mobile=True)
+    page = on_phone(browser, house, held)
     page.tap('[data-tool="stairs"]')
     for x, y in ((2, 3), (5, 3), (5, 6), (2, 6), (2, 3)):
-        left, top = page.evaluate(f"echostep.view.toScreen({x}, {y})")
-        box = page.locator("#map").bounding_box()
-        page.touchscreen.tap(box["x"] + left, box["y"] + top)
+        tap(page, x, y)
     page.locator("#ways[open]").wait_for()
     page.screenshot(path=tmp_path / f"stairs-{held}.png")
     found = Axe().run(page)

@@ -11,9 +11,7 @@ import pytest
 
 from echostep.page.editor import EditServer
 from page.browser import spot, wait_for
-from page.edit.drawing import click, drag, opened, saved, says, status
-
-PHONES = {"upright": (360, 740), "sideways": (740, 360)}
+from page.edit.drawing import PHONES, click, drag, on_phone, opened, saved, says, status, tap
 
 
 def typed(page: Any, length: str, angle: str = "") -> str:
@@ -129,12 +127,9 @@ def test_the_grid_and_the_scale_bar_fit_the_zoom(browser: Any, drawn: EditServer
 def test_fingers_type_on_a_phone_held_either_way(browser: Any, drawn: EditServer, held: str, tmp_path: Path) -> None:
     from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
 
-    width, height = PHONES[held]
-    page = opened(browser, drawn, viewport={"width": width, "height": height}, has_touch=True, is_mobile=True)
+    page = on_phone(browser, drawn, held)
     page.tap('[data-tool="wall"]')
-    left, top = page.evaluate("echostep.view.toScreen(5, 5)")
-    box = page.locator("#map").bounding_box()
-    page.touchscreen.tap(box["x"] + left, box["y"] + top)
+    tap(page, 5, 5)
     page.fill("#length", "2.22")
     page.fill("#angle", "45")
     page.tap("#go")
