@@ -27,7 +27,7 @@ from echostep.team.messages.crews import Crew
 from echostep.team.messages.report import ReportedAlarm
 from operation.teams import BASE, NAMES, TOWER, ServedTeam, place, whole_team
 from page.browser import READY, loaded_page, overflow, wait_for
-from page.edit.drawing import click, status
+from page.edit.drawing import answer, answered, click, status
 from page.edit.test_editor_questions import doubtful_house
 from page.frames import scene, served
 from page.sentences import editor_texts, host_texts, page_texts
@@ -288,6 +288,7 @@ def test_nothing_is_cut_off_in_the_editor(browser: Any, lang: str, tmp_path: Pat
         page.click("#end")
         check()
         page.click("#ways button[value='yes']")
+        answered(page)
         page.click("#step-back")
         check()
         page.click("#save")
@@ -309,8 +310,7 @@ def refuse_two_points(page: Any, check: Callable[[], None]) -> None:
         page.fill("#answer", "?")
         page.click("#yes")
         check()
-        page.fill("#answer", degrees)
-        page.click("#yes")
+        answer(page, degrees)
         check()
     wait_for(page, "/[.?!…] /.test(document.querySelector('#status').textContent)")
     check()

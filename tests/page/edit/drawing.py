@@ -12,7 +12,7 @@ from typing import Any
 from board_runs import ROOT
 from echostep.page.editor import EditServer
 from echostep.plan.model import load_plan
-from page.browser import spot
+from page.browser import spot, wait_for
 from waiting import PATIENCE_S, until
 
 PHONES = {"upright": (360, 740), "sideways": (740, 360)}
@@ -48,6 +48,19 @@ def saved(page: Any, server: EditServer) -> Any:
     page.click("#save")
     page.get_by_text("Saved new.json").wait_for()
     return load_plan(server.file.path).levels[0]
+
+
+def answer(page: Any, text: str) -> None:
+    """Type the answer to the question in the dialog, and wait until the sheet has it."""
+    page.locator("#ask[open]").wait_for()
+    page.fill("#answer", text)
+    page.press("#answer", "Enter")
+    answered(page)
+
+
+def answered(page: Any) -> None:
+    """The last answer has arrived: a dialog closes before it gives it."""
+    wait_for(page, "!echostep.isOpen()")
 
 
 def drag(page: Any, begin: tuple[float, float], end: tuple[float, float], button: str = "left") -> None:

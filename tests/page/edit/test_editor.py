@@ -18,8 +18,8 @@ from echostep.page import editor as plan_edit
 from echostep.page.editor import EditServer
 from echostep.plan.model import load_plan, parse_plan
 from echostep.plan.writer import plan_json, save_plan
-from page.browser import spot, wait_for
-from page.edit.drawing import PICTURES, click, drag, opened, saved
+from page.browser import spot
+from page.edit.drawing import PICTURES, answer, click, drag, opened, saved
 from waiting import PATIENCE_S
 
 DEMO = ROOT / "host/echostep/plans/demo.json"
@@ -167,8 +167,7 @@ def test_two_walls_a_door_and_the_scale(browser: Any, drawn: EditServer) -> None
     page.click('[data-tool="scale"]')  # 400 px are 20 m at first; the rectangle's upper side is 15 m
     click(page, 2.5, 12.5)
     click(page, 17.5, 12.5)
-    page.fill("#answer", "7.5")
-    page.keyboard.press("Enter")
+    answer(page, "7.5")
     picture = page.evaluate("echostep.sheet.picture")
     assert [picture["perPx"], picture["x"], picture["y"]] == pytest.approx([0.025, 1.25, 6.25], abs=0.02)
     page.click("#whole")
@@ -244,8 +243,7 @@ def test_a_plan_is_traced_from_a_picture(browser: Any, tmp_path: Path) -> None:
         page.click('[data-tool="scale"]')  # 20 m wide at first, in truth 26 m
         click(page, 20 / 26, 20 / 26)
         click(page, 25 * 20 / 26, 20 / 26)
-        page.fill("#answer", "24")
-        page.keyboard.press("Enter")
+        answer(page, "24")
         page.click('[data-tool="origin"]')
         page.mouse.move(*spot(page, 3, 3))
         page.mouse.down()
@@ -261,8 +259,7 @@ def test_a_plan_is_traced_from_a_picture(browser: Any, tmp_path: Path) -> None:
             click(page, x, 8.5)
         page.click('[data-tool="room"]')
         click(page, 3.6, 11.3)
-        page.fill("#answer", "Office 1")
-        page.keyboard.press("Enter")
+        answer(page, "Office 1")
         page.click('[data-tool="wall"]')
         click(page, 6.2, 8.5)
         page.mouse.move(*spot(page, 6.2, 12.0))
@@ -298,9 +295,8 @@ def test_keys_alone_draw_a_wall_a_door_and_a_room(browser: Any, drawn: EditServe
     press("ArrowUp")
     press("n")
     press("Enter")
-    page.keyboard.type("Hall")
-    press("Enter")
-    wait_for(page, "echostep.sheet.level.rooms?.length")  # an answer in a dialog arrives after the key
+    answer(page, "Hall")
+    assert page.evaluate("echostep.sheet.level.rooms.length") == 1
     press("Control+s")
     page.get_by_text("Saved new.json").wait_for()
     level = load_plan(drawn.file.path).levels[0]

@@ -18,7 +18,7 @@ from echostep.plan.georeference import EarthTransform
 from echostep.plan.model import Georeference, Plan, load_plan
 from echostep.plan.writer import save_plan
 from page.browser import wait_for
-from page.edit.drawing import PHONES, PICTURES, click, on_phone, opened, status, tap
+from page.edit.drawing import PHONES, PICTURES, answer, answered, click, on_phone, opened, status, tap
 from waiting import until
 
 DEMO = ROOT / "host/echostep/plans/demo.json"
@@ -41,12 +41,6 @@ def pasted(factor: float = 1.0) -> list[str]:
     return [f"{lat:.7f}, {lon:.7f}" for lon, lat in degrees]
 
 
-def answer(page: Any, text: str) -> None:
-    page.locator("#ask[open]").wait_for()
-    page.fill("#answer", text)
-    page.press("#answer", "Enter")
-
-
 def written(page: Any, server: EditServer) -> Plan:
     page.click("#save")
     page.get_by_text("Saved plan.json").wait_for()
@@ -62,7 +56,8 @@ def test_two_corners_give_the_georeference(browser: Any, bare: EditServer, tmp_p
     assert page.is_hidden("#north")
     page.click('[data-tool="earth"]')
     click(page, *CORNERS[0])
-    answer(page, "the corner at the bakery")
+    page.fill("#answer", "the corner at the bakery")
+    page.press("#answer", "Enter")
     assert "Not latitude, then longitude" in page.text_content("#ask-wrong")
     answer(page, pasted()[0])
     says(page, "First point 48.1374")
@@ -70,6 +65,7 @@ def test_two_corners_give_the_georeference(browser: Any, bare: EditServer, tmp_p
     click(page, 20.0, 5.0)
     page.locator("#ask[open]").wait_for()
     page.click("#no")  # not there
+    answered(page)
     page.click("#whole")
     click(page, *CORNERS[1])
     answer(page, pasted(1.01)[1])

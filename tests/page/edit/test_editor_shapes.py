@@ -12,7 +12,7 @@ from echostep.page.editor import EditServer
 from echostep.plan.model import Plan, Pose, load_plan, parse_plan
 from echostep.plan.writer import save_plan
 from page.browser import wait_for
-from page.edit.drawing import PHONES, click, drag, on_phone, opened, says, tap
+from page.edit.drawing import PHONES, answered, click, drag, on_phone, opened, says, tap
 
 HOUSE = b"""{"echostep_plan": 1, "name": "house", "levels": [
     {"name": "Ground", "height_m": 0, "walls": [[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0, 8, 0, 0]], "rooms": []},
@@ -109,6 +109,7 @@ def test_stairs_and_a_lift_join_levels(browser: Any, house: EditServer) -> None:
     assert page.input_value("#ways-name") == "Lift A"
     page.fill("#ways-name", "Lift B")
     page.keyboard.press("Enter")
+    answered(page)
     page.click('[data-tool="ramp"]')
     drag(page, (8.0, 1.0), (9.0, 3.0))
     page.click("#ways [type='button']")
@@ -176,6 +177,7 @@ def test_keys_alone_draw_stairs_and_the_start(browser: Any, house: EditServer) -
     press("Escape")
     page.locator("#ways[open]").wait_for()
     press("Enter")
+    answered(page)
     press("g")
     press("Enter")
     press("ArrowLeft")

@@ -5,20 +5,22 @@ import { tr } from './language.js';
 import { WORDS } from './words.js';
 
 const byId = (id) => document.getElementById(id);
+let waiting = null; // the dialog whose answer has not arrived: a closed one tells it in an event, later
 
 // Shows a dialog until its form is sent with an answer that is not undefined, or until it is cancelled.
 function shown(dialog, answer) {
   dialog.showModal();
+  waiting = dialog;
   return new Promise((resolve) => {
     let given = null;
     const end = (value) => { given = value; dialog.close(); };
     dialog.querySelector('form').onsubmit = (e) => { e.preventDefault(); const value = answer(); if (value !== undefined) end(value); };
     dialog.querySelector('[type="button"]').onclick = () => end(null);
-    dialog.onclose = () => { byId('map').focus(); resolve(given); }; // not before: this event would close the next question
+    dialog.onclose = () => { waiting = null; byId('map').focus(); resolve(given); }; // not before: this event would close the next question
   });
 }
 
-export const isOpen = () => Boolean(document.querySelector('dialog[open]'));
+export const isOpen = () => waiting !== null;
 
 // `refusal(text)`: why a text is no answer; empty where it is one.
 export function ask(question, answer, refusal = () => '') {

@@ -196,7 +196,7 @@ async function start() {
   addEventListener('beforeunload', (e) => { if (sheet.unsaved) e.preventDefault(); });
   const asked = asking.open.length && WORDS.questions(asking.open.length);
   say(sheet.picture && !sheet.picture.set ? WORDS.scaleFirst : asked || HINTS.select);
-  window.echostep = { view, sheet, tools, asking, missing, tr };
+  window.echostep = { view, sheet, tools, asking, isOpen, missing, tr };
 }
 
 start().catch((error) => wrong(WORDS.noStart(error.message)));
