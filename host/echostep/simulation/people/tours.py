@@ -2,20 +2,24 @@
 """Waypoints along a way through a building, stairs and lifts included.
 
 In: a plan and places, one after the other. Out: waypoints for `walker`. Owns nothing. The ways between are the shortest that a person can walk.
-Stairs are walked as two flights and a landing a storey, along the longer side of their outline; a lift is ridden in its middle.
+Stairs are walked as two flights and a landing a storey, along the longer side of their outline, and round the walls that stand in the way of a
+straight flight: curved stairs, or a corner in the stairwell. A lift is ridden in its middle.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from shapely import Polygon
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.plan.cropping import is_clear
 from echostep.plan.model import Connector, Plan
+from echostep.plan.polyline import way_m
 from echostep.plan.routing import Route, RoutePlace, Routes
 from echostep.simulation.people.walker import Waypoint
 
@@ -32,7 +36,7 @@ def tour(plan: Plan, places: Sequence[RoutePlace]) -> list[Waypoint]:
     way: list[Waypoint] = []
     for start, end in zip(places, places[1:], strict=False):
         way += waypoints(plan, routes.way(start, end))[1 if way else 0 :]
-    return _spaced(way)
+    return _spaced(_round_walls(plan, routes, way))
 
 
 def room_tour(plan: Plan) -> list[Waypoint]:
@@ -60,7 +64,7 @@ def room_tour(plan: Plan) -> list[Waypoint]:
             here, visited, walked_m = goal, visited + 1, walked_m + route.length_m
     if len(way) < 2:
         raise EchostepError(f"plan {plan.name}: a tour needs two places with a way between them: name some rooms in it")
-    return _spaced(way)
+    return _spaced(_round_walls(plan, routes, way))
 
 
 def _nearest(rooms: Sequence[RoutePlace], here: RoutePlace) -> RoutePlace:
@@ -126,6 +130,31 @@ def _flights(outline_m: Floats, entered_m: Floats) -> tuple[Floats, Floats, Floa
     ends = [middle - reach * unit, middle + reach * unit]
     ends.sort(key=lambda p: float(np.hypot(*(p - entered_m))))
     return ends[0], ends[1], 0.25 * across
+
+
+def _round_walls(plan: Plan, routes: Routes, way: Sequence[Waypoint]) -> list[Waypoint]:
+    """The way with a detour for each straight piece that meets a wall of the level nearest to its middle height."""
+    points = list(way[:1])
+    for start, end in pairwise(way):
+        points += [*_detour(plan, routes, start, end), end]
+    return points
+
+
+def _detour(plan: Plan, routes: Routes, start: Waypoint, end: Waypoint) -> list[Waypoint]:
+    """Waypoints between two others, where a wall is between them: on the shortest way round it, which rises evenly."""
+    z0, z1 = start[-1], end[-1]
+    level = min(range(len(plan.levels)), key=lambda k: abs(plan.levels[k].height_m - 0.5 * (z0 + z1)))
+    if start[:2] == end[:2] or is_clear(plan.levels[level].solid, start[:2], end[:2]):
+        return []
+    try:
+        route = routes.way(*(RoutePlace(w[0], w[1], level) for w in (start, end)))
+    except EchostepError:  # no way leads round it
+        return []
+    if len(route.stretches) > 1:
+        return []
+    line = np.vstack([start[:2], route.stretches[0].line_m, end[:2]])
+    shares = [way_m(line[: k + 1]) / way_m(line) for k in range(1, len(line) - 1)]
+    return [(x, y, 0.0, z0 + s * (z1 - z0)) for (x, y), s in zip(line[1:-1].tolist(), shares, strict=True)]
 
 
 def _spaced(way: list[Waypoint]) -> list[Waypoint]:
