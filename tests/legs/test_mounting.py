@@ -47,6 +47,16 @@ def test_the_axis_of_walking_is_found_from_three_axes(walked: Walk, seed: int) -
     assert not walking_axis(t_s, rng.standard_normal((len(t_s), 3))).clear
 
 
+@pytest.mark.parametrize("span_s", [2.6, 4.0, 8.0])
+def test_soft_tissue_that_turns_faster_than_the_leg_swings_does_not_take_the_axis(walked: Walk, span_s: float) -> None:
+    """Two to four times a stride the thigh's soft tissue turns the sensor about the leg, in the sum faster than the leg swings."""
+    at = (walked.t_s > 2.5) & (walked.t_s < 2.5 + span_s)
+    t_s, pitch = walked.t_s[at][::10], walked.thigh_rad_s[at][::10]
+    wobble = sum(2.0 * np.sin(2.0 * math.pi * 0.95 * k * t_s + k) for k in (2, 3, 4))
+    found = walking_axis(t_s, np.column_stack([0.1 * wobble, pitch, wobble]))
+    assert abs(float(found.axis[1])) > math.cos(math.radians(15.0))
+
+
 def test_turns_that_leak_into_the_pitch_cost_no_length_and_make_no_stairs(walked: Walk) -> None:
     t_s, thigh, shank, belt = (c[::10] for c in (walked.t_s, walked.thigh_rad_s, walked.calf_rad_s, walked.belt_rad_s))
     level = sum(s.length_m for s in _strides(t_s, thigh, shank, belt))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -97,6 +98,20 @@ def test_the_left_leg_that_was_lifted_before_the_walk(recordings: list[LegRecord
     strides = [s for s in strides_of([left], StrideSettings()) if s.t_start_s > begin_s]
     assert not any(Flag.BACKWARD in s.flags for s in strides)
     assert sum(s.length_m for s in strides) == pytest.approx(left.walked_m(begin_s, end_s), rel=0.05)
+
+
+@needs_data("legs_qmt")
+def test_short_pieces_of_a_walk_with_their_own_axes_of_walking(recordings: list[LegRecording]) -> None:
+    """5 m cut out of the walk, in 2.5 to 4 s: no piece is read as much shorter, by whichever axis its own samples give."""
+    for leg in (r for r in recordings if r.group == "qmt"):
+        begin_s, end_s = leg.walk_s()
+        for t0 in np.arange(begin_s + 1.5, end_s - 6.0, 3.0).tolist():
+            t1 = float(np.interp(leg.walked_m(-math.inf, t0) + 5.0, leg.way_m, leg.way_s))
+            inside = (leg.t_s >= t0) & (leg.t_s < t1)
+            arrays = (c[inside] for c in (leg.t_s, leg.thigh, leg.shank, leg.belt))
+            piece = LegRecording(leg.group, leg.name, *arrays, leg.way_s, leg.way_m)
+            length = sum(s.length_m for s in strides_of([piece], StrideSettings()))
+            assert length == pytest.approx(5.0, rel=0.15), f"{leg.name} leg at {t0:.1f} s"
 
 
 @needs_data("legs_qmt")

@@ -3,8 +3,9 @@
 
 In: angular rates of one sensor of a leg that walks. Out: `Mounting`: a unit vector, how well it is defined. Owns the frequencies.
 
-The axis is the first principal axis of the rates near the frequency of strides [de Vries 2010, functional calibration]. Slower rates are
-turns of the whole body, and faster ones come from soft tissue, which at each heel strike turns the sensor about the leg by more than the leg swings.
+The axis is the first principal axis of the rates at the frequency of strides [de Vries 2010, functional calibration], at which a leg swings by 20 to
+30 degrees either way and turns about itself by 5. Slower rates are turns of the whole body. Faster ones come from soft tissue, which at each heel
+strike turns the sensor about the leg: they are as large as the swing, on a thigh at 2 m/s already at twice the frequency of strides.
 """
 
 from __future__ import annotations
@@ -15,10 +16,9 @@ import numpy as np
 
 from echostep.arrays import Floats
 
-GRID_HZ = 50.0  # ten times the highest frequency that is used
-SLOW_S = 2.4  # running mean that is subtracted: twice the time of a usual stride
-FAST_S = 0.2  # running mean: halves 3 Hz, the third harmonic of strides; removes impacts [soft tissue, 10 to 20 Hz: Wakeling 2003]
-FEWEST_S = 3.0  # of samples: two strides
+GRID_HZ = 50.0  # of the rates: far above BAND_HZ
+BAND_HZ = (0.4, 1.4)  # of strides: from a slow walk (1.6 s a stride, 0.6 Hz) to a run, with a margin below; assumed
+FEWEST_S = 1.5  # of samples: more than a stride
 # Least ratio of the first to the second principal rate: below it another axis swings as far
 CLEAR_RATIO = 1.3
 
@@ -41,18 +41,10 @@ def walking_axis(t_s: Floats, rates: Floats) -> Mounting:
     if len(t_s) < 2 or t_s[-1] - t_s[0] < FEWEST_S:
         return Mounting(np.eye(3)[int(np.argmax(rates.std(axis=0)))] if len(rates) else np.eye(3)[0], 1.0)
     grid = np.arange(t_s[0], t_s[-1], 1.0 / GRID_HZ)
-    even = np.column_stack([np.interp(grid, t_s, column) for column in rates.T])
-    band = _running_mean(even, FAST_S) - _running_mean(even, SLOW_S)
-    powers, axes = np.linalg.eigh(band.T @ band / len(band))
+    spectrum = np.fft.rfft([np.interp(grid, t_s, column) for column in rates.T])
+    hz = np.fft.rfftfreq(len(grid), 1.0 / GRID_HZ)
+    band = spectrum[:, (hz >= BAND_HZ[0]) & (hz <= BAND_HZ[1])]
+    powers, axes = np.linalg.eigh((band @ band.conj().T).real)
     axis = axes[:, -1]
     ratio = float(np.sqrt(powers[-1] / max(powers[-2], 1e-12)))
     return Mounting(axis * np.sign(axis[int(np.argmax(np.abs(axis)))]), ratio)
-
-
-def _running_mean(rates: Floats, span_s: float) -> Floats:
-    """Running mean of rates (n, 3) on the grid, ends repeated."""
-    half = round(0.5 * span_s * GRID_HZ)
-    padded = np.pad(rates, ((half + 1, half), (0, 0)), mode="edge")
-    total = np.cumsum(padded, axis=0)
-    mean: Floats = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-    return mean
