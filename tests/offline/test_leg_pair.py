@@ -12,7 +12,6 @@ import pytest
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.legs.stride import Flag, StrideSettings, distance_sd_m
-from echostep.legs.strides import SCALE_SD
 from echostep.offline.leg_csv import LegSamples, load_pair
 from echostep.offline.leg_pair import LEGS_DIFFER, track_pair
 from echostep.offline.leg_track import track_default
@@ -45,7 +44,7 @@ def test_the_mean_of_both_with_a_smaller_uncertainty(legs: tuple[LegSamples, Leg
     assert pair.distance_m == pytest.approx(np.mean(alone), rel=0.005)
     assert sum(s.length_m for s in pair.strides) == pytest.approx(pair.distance_m, abs=0.01)
     assert track_pair(*legs[::-1], StrideSettings()).distance_m == pytest.approx(pair.distance_m, rel=0.002)
-    scale_sd = np.sqrt(SCALE_SD**2 - LEGS_DIFFER**2 / 4.0)
+    scale_sd = np.sqrt(StrideSettings().scale_sd ** 2 - LEGS_DIFFER**2 / 4.0)
     assert distance_sd_m(pair.strides) == pytest.approx(scale_sd * pair.distance_m, rel=0.05)
     assert any("the other leg measures" in note and "more" in note for note in pair.notes)
     assert np.hypot(pair.rows[-1, 4] - 20.0, pair.rows[-1, 5] - 10.0) < 2.0

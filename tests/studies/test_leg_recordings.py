@@ -83,11 +83,12 @@ def test_folders_without_recordings_are_named(tmp_path: Path) -> None:
 @needs_data("legs_gaittoolbox")
 def test_a_turn_and_a_stop_in_motion_capture(recordings: list[LegRecording]) -> None:
     for recording in (r for r in recordings if r.group == "gaittoolbox"):
-        strides = strides_of([recording], StrideSettings())
+        assert recording.lengths is not None
+        strides = strides_of([recording], StrideSettings(recording.lengths))
         assert not any(s.flags & (Flag.STAIRS_UP | Flag.STAIRS_DOWN | Flag.BACKWARD | Flag.UNSEEN) for s in strides)
         last = [s for s in strides if Flag.STANDING not in s.flags][-1]
         assert last.length_m == pytest.approx(recording.walked_m(last.t_start_s, last.t_end_s), abs=0.2)
-        assert sum(s.length_m for s in strides) == pytest.approx(7.8, rel=0.05)
+        assert sum(s.length_m for s in strides) == pytest.approx(recording.walked_m(-math.inf, math.inf), rel=0.05)
 
 
 @needs_data("legs_qmt")

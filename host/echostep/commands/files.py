@@ -76,8 +76,12 @@ def legs(
             "Both legs: the other one in columns other_thigh_rad_s... of the same file, or in a second file.",
         ),
     ],
-    thigh: Annotated[float, typer.Option("--thigh", metavar="M", help="Hip to knee, metres.")],
-    shank: Annotated[float, typer.Option("--shank", metavar="M", help="Knee to ankle, or to the floor, metres.")],
+    thigh: Annotated[
+        float | None, typer.Option("--thigh", metavar="M", help="Hip to knee, metres; without it, a usual adult's.")
+    ] = None,
+    shank: Annotated[
+        float | None, typer.Option("--shank", metavar="M", help="Knee to ankle or to the floor, metres; likewise.")
+    ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV).")] = Path("track.csv"),
     profile: Annotated[
         str,

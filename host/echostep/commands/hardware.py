@@ -92,8 +92,12 @@ def calibrate(
     out: Annotated[
         Path, typer.Option("--out", metavar="FILE", help="Settings file to write; its other sections are kept.")
     ] = Path("calibration.toml"),
-    thigh: Annotated[float, typer.Option("--thigh", metavar="M", help="Hip to knee, metres.")] = 0.43,
-    shank: Annotated[float, typer.Option("--shank", metavar="M", help="Knee to ankle, metres.")] = 0.43,
+    thigh: Annotated[
+        float | None, typer.Option("--thigh", metavar="M", help="Hip to knee, metres; without it, a usual adult's.")
+    ] = None,
+    shank: Annotated[
+        float | None, typer.Option("--shank", metavar="M", help="Knee to ankle, metres; likewise.")
+    ] = None,
     walked: Annotated[
         float, typer.Option("--walked", metavar="M", help="Length of the walk that calibrates the legs, metres.")
     ] = 10.0,

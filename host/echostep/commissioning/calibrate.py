@@ -51,8 +51,8 @@ class Ports(NamedTuple):
 class Wearer:
     """Lengths of the wearer's leg, hip to knee and knee to ankle, and of the walk that calibrates the legs."""
 
-    thigh_m: float
-    shank_m: float
+    thigh_m: float | None
+    shank_m: float | None
     walked_m: float
 
 

@@ -26,6 +26,9 @@ import numpy as np
 from echostep.arrays import Floats
 
 GRAVITY_M_S2 = 9.81
+# Of thigh and shank alike, where they are not known: adults of both sexes are 1.65 m high in the mean [NCD-RisC 2016, world], times 0.245 and 0.246
+# [Winter 2009].
+USUAL_M = 0.405
 # Dorsiflexion of the ankle every 4 % of the stride from heel strike to toe off, degrees [Perry 1992; Winter 2009; Kadaba 1990, read to a degree].
 DORSIFLEXION_DEG = (2, 1, -1, 1, 3, 6, 8, 9, 10, 11, 13, 13, 12, 8, 1, -7, -13, -16, -16)
 DORSIFLEXION_STEP = 0.04  # phase between two values
@@ -58,9 +61,14 @@ FLOOR_TO_ANKLE_RATIO = 0.285 / 0.246
 class LegLengths:
     """`thigh_m`: hip to knee. `shank_m`: knee to ankle, or to the floor. `scale`: factor on all lengths, from a walk of known length."""
 
-    thigh_m: float = 0.43
-    shank_m: float = 0.43
+    thigh_m: float = USUAL_M
+    shank_m: float = USUAL_M
     scale: float = 1.0
+
+    @property
+    def measured(self) -> bool:
+        """Whether the lengths are the wearer's own, not the usual ones."""
+        return (self.thigh_m, self.shank_m) != (USUAL_M, USUAL_M)
 
     @property
     def measured_to_floor(self) -> bool:

@@ -37,11 +37,9 @@ LEAST_PASSED = 0.12  # share of the stride that the hips move in single support;
 LONGEST_ON_STAIRS_M = 1.0  # length of a stride
 STAIRS_M, STAIRS_RISE_M = 0.57, 0.34  # two treads of 28.5 and 17 cm; houses differ by 2 cm each [DIN 18065]
 STAIRS_WEIGHT = 0.15  # of the length by the angles
-SCALE_SD = 0.078  # of the scale common to all strides: the spread between persons, whether their legs are measured or not [14 legs of 7 people]
-CALIBRATED_SD = 0.025  # the same after a walk of known length: it changes by 2 to 3 % with a person's speed
-OWN_SD_M = 0.04  # of one stride, besides
-EDGE_SD_M = 0.08  # of an edge of a walk
-BLIND_SD_M = 0.4  # of a stride that this leg does not show
+OWN_SD_M = 0.06  # of one stride, besides the scale: 99 strides of four real legs
+EDGE_SD_M = 0.12  # of an edge of a walk: ten edges of the same legs
+BLIND_SD_M = 0.4  # of a stride that this leg does not show, at least
 LOOK = 3  # grid samples on either side, from which a rate is computed
 SWING_END = 0.35  # of the peak rate: below it the swing is over
 STANCE = 62  # percent of a stride
@@ -282,7 +280,7 @@ class StrideEstimator:
         if self._bout.lead < leg_swings.BACKWARD_LEAD:
             return 0.0, 0.0, Flag.BACKWARD, max(BLIND_SD_M, abs(length))
         if length < SHORTEST_M or way.passed() < LEAST_PASSED * length:
-            return 0.0, 0.0, Flag.UNSEEN, BLIND_SD_M
+            return 0.0, 0.0, Flag.UNSEEN, max(BLIND_SD_M, abs(length))
         if stairs and length < LONGEST_ON_STAIRS_M:
             length = STAIRS_M + STAIRS_WEIGHT * (length - STAIRS_M)
             return length, STAIRS_RISE_M if Flag.STAIRS_UP in stairs else -STAIRS_RISE_M, stairs, 2.0 * OWN_SD_M
@@ -373,8 +371,7 @@ class StrideEstimator:
 
     def _add_stride(self, t0: float, t1: float, length: float, sd: float, rise: float, flags: Flag) -> None:
         """Report a stride."""
-        scale_sd = CALIBRATED_SD if self.settings.calibrated else SCALE_SD
-        self._strides.append(Stride(t0, t1, length, sd, scale_sd, rise, flags))
+        self._strides.append(Stride(t0, t1, length, sd, self.settings.scale_sd, rise, flags))
 
     def _drop(self) -> None:
         """Drop grid values that are no longer needed."""

@@ -20,7 +20,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.legs.clipping import ClippingRepair
 from echostep.legs.heading import CompassErrors, Heading, HeadingSettings
-from echostep.legs.kinematics import LegLengths
+from echostep.legs.kinematics import USUAL_M, LegLengths
 from echostep.legs.stride import Flag, Stride, StrideSettings
 from echostep.legs.strides import StrideEstimator
 from echostep.path import STANDING_PIECE_S, PathSegment
@@ -46,8 +46,8 @@ class WearerSettings:
     `leg_left_m`: distance of the leg with the gyros to the left of the trunk (negative: right leg); in a curve the outer leg moves farther.
     """
 
-    thigh_m: float = 0.43
-    shank_m: float = 0.43
+    thigh_m: float = USUAL_M
+    shank_m: float = USUAL_M
     leg_scale: float = 1.0
     leg_left_m: float = -0.09
 

@@ -29,10 +29,8 @@ SILENT_S = 0.5  # the foot is silent when its newest sample is older than the le
 KEPT_S = 30.0  # of leg samples and foot segments
 MAX_LENGTH_ERROR = 0.35  # share by which the legs' length may differ from the foot's; beyond it no leg gyros are worn
 MIN_OVERLAP_M = 3.0  # of the foot's path, to compare lengths
-# Weight of the prior scale, 1, as a length of path: the scale varies by 7.8 % between persons, and the foot gives the scale of 8 m to 2 % (4 cm a
-# stride).
-PRIOR_M = 0.6
-ALIGNED_SD = 0.025  # of the scale after that: a person's scale changes by 2 to 3 % with speed
+ALIGNED_SD = 0.025  # of the scale that the foot gives: a person's scale changes by 2 to 3 % with speed
+STRIDES_SD = 0.05  # of the same, over the root of the path (m) that gives it: 0.06 m a stride of 1.4 m
 REJOIN_SD_RAD = math.radians(2.0)  # of the angle between foot and legs where the foot takes over
 BRIDGE_M_S, BRIDGE_M = 0.4, 1.5  # standard deviation of an unobserved gap: per second, and at most
 BRIEF_S = 1.0  # a longer gap counts as unobserved
@@ -107,7 +105,7 @@ class FootLegsHandover:
         if foot_m < MIN_OVERLAP_M or not abs(legs_m / foot_m - 1.0) < MAX_LENGTH_ERROR:
             return False
         self._compared_m = (self._compared_m[0] + foot_m, self._compared_m[1] + legs_m)
-        self._leg_scale = (self._compared_m[0] + PRIOR_M) / (self._compared_m[1] + PRIOR_M)
+        self._leg_scale = self._compared_m[0] / self._compared_m[1]
         remembered = (s for s in self._kept_segments if _is_straight(s) and s.t1_s >= path.remembered_s)
         straight = list(remembered) or [self._kept_segments[-1]]
         turns = [segment.heading1_rad - path.heading_rad(segment.t1_s) for segment in straight]
@@ -122,7 +120,10 @@ class FootLegsHandover:
     def _as_common(self, segment: PathSegment) -> PathSegment:
         """A segment of the legs in the common frame; where the foot has given its scale, the scale is known as well as that."""
         scaled = rotated_segment(segment, self._leg_turn_rad, self._leg_scale)
-        return replace(scaled, scale_sd=min(scaled.scale_sd, ALIGNED_SD)) if self._compared_m[0] > 0.0 else scaled
+        if self._compared_m[0] == 0.0:
+            return scaled
+        sd = math.hypot(ALIGNED_SD, STRIDES_SD / math.sqrt(self._compared_m[0]))
+        return replace(scaled, scale_sd=min(scaled.scale_sd, sd))
 
     def _return_to_foot(self) -> list[PathSegment]:
         """Make the foot active again at its first straight stride, once the legs have reached it or CATCH_UP_S is over."""

@@ -7,7 +7,7 @@ In: lengths (m) from the command line or the wizard. Out: `LegLengths`, the scal
 from __future__ import annotations
 
 from echostep.errors import EchostepError
-from echostep.legs.kinematics import LegLengths
+from echostep.legs.kinematics import USUAL_M, LegLengths
 
 # Assumed, all of them.
 LENGTH_RANGE_M = (0.2, 0.75)  # thigh or shank: a quarter of a height of 0.8 m, and 0.285 (to the floor) of 2.6 m
@@ -16,8 +16,9 @@ WALKED_RANGE_M = (3.0, 1000.0)  # length of the walk: two strides at least, and 
 SCALE_RANGE = (0.3, 3.0)  # computed over true length; beyond it another walk or unit is likely: 3.28 feet are a metre
 
 
-def checked_lengths(thigh_m: float, shank_m: float, scale: float = 1.0) -> LegLengths:
-    """The lengths, when a person can have them; raises EchostepError otherwise."""
+def checked_lengths(thigh_m: float | None, shank_m: float | None, scale: float = 1.0) -> LegLengths:
+    """The lengths, when a person can have them, the usual ones for None; raises EchostepError otherwise."""
+    thigh_m, shank_m = (USUAL_M if length is None else length for length in (thigh_m, shank_m))
     for name, length in (("--thigh", thigh_m), ("--shank", shank_m)):
         if not LENGTH_RANGE_M[0] <= length <= LENGTH_RANGE_M[1]:
             hint = ": in centimetres? give metres" if CENTIMETRES[0] < length < CENTIMETRES[1] else ""

@@ -19,7 +19,6 @@ import numpy as np
 from echostep.arrays import Bools, Floats
 from echostep.errors import EchostepError
 from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings
-from echostep.legs.strides import SCALE_SD
 from echostep.offline.leg_csv import LegSamples
 from echostep.offline.leg_track import (
     LegTrack,
@@ -64,7 +63,8 @@ def track_pair(
     ratio, notes = _ratio(moves[:, seen.all(axis=0) & _straight(t_s, heading)].sum(axis=1))
     alone = seen.any(axis=0) & ~seen.all(axis=0)
     distance = _summed((np.where(alone, seen * ratio[:, None], 0.5) * moves).sum(axis=0))
-    strides = with_turns(_joint_strides(t_s, distance, seen, legs), t_s, heading)
+    differ = 0.0 if settings.calibrated else LEGS_DIFFER
+    strides = with_turns(_joint_strides(t_s, distance, seen, legs, differ), t_s, heading)
     loose = (
         f"the sensors of {name} leg rest during a walk: are they worn?" for name in np.array(NAMES)[idle.any(axis=1)]
     )
@@ -127,10 +127,11 @@ def _ratio(common_m: Floats) -> tuple[Floats, tuple[str, ...]]:
     return common_m.mean() / common_m, (note,)
 
 
-def _joint_strides(t_s: Floats, distance: Floats, seen: Bools, legs: Legs) -> tuple[Stride, ...]:
+def _joint_strides(t_s: Floats, distance: Floats, seen: Bools, legs: Legs, differ: float) -> tuple[Stride, ...]:
     """Strides of the first leg, and of the other before and after them, with the lengths (m) and the uncertainty of both.
 
-    A stride that either leg shows has no unknown length any more. Independent errors of two legs halve in squares; so do those of their scales.
+    A stride that either leg shows has no unknown length any more. Independent errors of two legs halve in squares; so do those of their scales, by
+    which they `differ` (sd).
     """
     strides = _in_order(*legs)
     times = np.array([(s.t_start_s, s.t_end_s) for s in strides]).reshape(-1, 2)
@@ -145,9 +146,7 @@ def _joint_strides(t_s: Floats, distance: Floats, seen: Bools, legs: Legs) -> tu
             joint.append(replace(stride, length_m=float(lengths[k])))
             continue
         sd = math.sqrt(float(variances[shows[:, k], k].sum())) / legs_showing
-        scale_sd = stride.scale_sd
-        if legs_showing == 2 and scale_sd == SCALE_SD:
-            scale_sd = math.sqrt(scale_sd**2 - 0.25 * LEGS_DIFFER**2)
+        scale_sd = math.sqrt(stride.scale_sd**2 - 0.25 * differ**2) if legs_showing == 2 else stride.scale_sd
         flags = stride.flags & ~UNKNOWN
         joint.append(replace(stride, length_m=float(lengths[k]), length_sd_m=sd, scale_sd=scale_sd, flags=flags))
     return tuple(joint)

@@ -61,10 +61,10 @@ def _own_track(imu: Imu, name: str) -> Track:
 
 @dataclass(frozen=True, slots=True)
 class LegOptions:
-    """Lengths of the leg (hip to knee, knee to ankle or floor), the wearer's stride scale, and the true length of the walk if known."""
+    """Lengths of the leg (hip to knee, knee to ankle or floor), the wearer's stride scale, and the true length of the walk; None if not known."""
 
-    thigh_m: float
-    shank_m: float
+    thigh_m: float | None
+    shank_m: float | None
     profile: str = DEFAULT
     scale: float | None = None
     walked_m: float | None = None
@@ -82,7 +82,7 @@ def legs(paths: list[Path], out: Path, options: LegOptions, picture: Path | None
         console.print(f"{path.name}: {note}")
     if lengths.measured_to_floor and profile == DEFAULT:
         ankle = f"{lengths.to_ankle_m:.3f} m to the ankle"
-        console.print(f"--shank {options.shank_m:g} is taken as knee to floor: {ankle}")
+        console.print(f"--shank {lengths.shank_m:g} is taken as knee to floor: {ankle}")
     settings = StrideSettings(lengths, calibrated=scale is not None)
     if len(pair) == 2 and profile != DEFAULT:
         raise EchostepError(f"--profile {profile} is a method for one leg: give one file, without columns other_...")

@@ -17,7 +17,7 @@ from echostep.arrays import Floats
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import Flag, Stride, StrideSettings, distance_sd_m
 from echostep.legs.strides import StrideEstimator
-from echostep.simulation.people.leg_angles import stair_angles
+from echostep.simulation.people.leg_angles import LegDimensions, stair_angles
 
 CYCLES, RATE_HZ, STAND_S, EASE_S = 15, 100.0, 2.0, 0.8
 AMPLITUDE_SD, TIME_SD = 0.08, 0.05  # of a person against the curves
@@ -119,7 +119,7 @@ def _strides(manner: LegManner, rng: np.random.Generator) -> list[Stride]:
     for curve, posture in zip(curves, manner.posture_rad, strict=True):
         rate = np.gradient(posture * down + amplitude * moves * curve) * RATE_HZ
         rates.append(rate + BIAS_RAD_S * rng.standard_normal() + NOISE_RAD_S * rng.standard_normal(len(t_s)))
-    legs = StrideEstimator(StrideSettings(LegLengths()), (1.0, 1.0))
+    legs = StrideEstimator(StrideSettings(LegLengths(LegDimensions().thigh_m, LegDimensions().shank_m)), (1.0, 1.0))
     return [*legs.feed(t_s, rates[0], rates[1]), *legs.finish()]
 
 
