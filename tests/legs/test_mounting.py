@@ -13,11 +13,11 @@ from echostep.legs.angle_grid import AngleGrid
 from echostep.legs.gyro_bias import GyroBias
 from echostep.legs.leg_angles import LegAngles, SwingAngles
 from echostep.legs.mounting import walking_axis
-from echostep.legs.stride import HALF_PELVIS_M, Flag, Stride, StrideSettings, about_trunk, leg_left_m
+from echostep.legs.stride import HALF_PELVIS_M, Flag, Stride, StrideSettings, about_trunk, distance_sd_m, leg_left_m
 from echostep.legs.strides import StrideEstimator
 from echostep.legs.walking_bout import Swing, leaving_share, stairs_flag
 from echostep.offline.leg_csv import LegSamples
-from echostep.offline.leg_track import track_default
+from echostep.offline.leg_track import doubts, track_default
 from echostep.simulation.people.walker import Person, Walk, Waypoint, walk
 from foot.foot_walks import any_rotation
 
@@ -115,6 +115,19 @@ def test_motion_before_the_walk_does_not_fix_the_signs(walked: Walk) -> None:
     strides = track_default(LegSamples(times, joined[0], joined[1], nothing, nothing), StrideSettings()).strides
     later = sum(s.length_m for s in strides if s.t_start_s > 5.5)
     assert later == pytest.approx(sum(s.length_m for s in _strides(t_s, thigh, shank, None)), abs=0.4)
+
+
+@pytest.mark.parametrize("sign", [(1.0, -1.0), (-1.0, 1.0)])
+def test_a_walk_that_is_taken_for_none_is_uncertain_by_its_length(walked: Walk, sign: tuple[float, float]) -> None:
+    """With a wrong sign the leg shows no walk: what it then does not show may be as long as the walk."""
+    t_s, thigh, shank = (c[::10] for c in (walked.t_s, walked.thigh_rad_s, walked.calf_rad_s))
+    legs = StrideEstimator(sign=sign)
+    strides = (*legs.feed(t_s, thigh, shank), *legs.finish())
+    missing_m = 12.0 - sum(s.length_m for s in strides)
+    assert missing_m > 6.0
+    assert missing_m < 2.0 * distance_sd_m(strides)
+    assert doubts(strides)
+    assert doubts(strides[:2])
 
 
 def test_the_side_of_the_leg_is_found_by_the_pelvis_and_counts_in_turns(walked: Walk) -> None:

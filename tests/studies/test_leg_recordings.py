@@ -109,8 +109,8 @@ def test_short_pieces_of_a_walk_with_their_own_axes_of_walking(recordings: list[
         for t0 in np.arange(begin_s + 1.5, end_s - 6.0, 3.0).tolist():
             t1 = float(np.interp(leg.walked_m(-math.inf, t0) + 5.0, leg.way_m, leg.way_s))
             inside = (leg.t_s >= t0) & (leg.t_s < t1)
-            arrays = (c[inside] for c in (leg.t_s, leg.thigh, leg.shank, leg.belt))
-            piece = LegRecording(leg.group, leg.name, *arrays, leg.way_s, leg.way_m)
+            t_s, thigh, shank, belt = (c[inside] for c in (leg.t_s, leg.thigh, leg.shank, leg.belt))
+            piece = replace(leg, t_s=t_s, thigh=thigh, shank=shank, belt=belt)
             length = sum(s.length_m for s in strides_of([piece], StrideSettings()))
             assert length == pytest.approx(5.0, rel=0.15), f"{leg.name} leg at {t0:.1f} s"
 

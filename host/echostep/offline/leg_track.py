@@ -98,7 +98,7 @@ def doubts(strides: tuple[Stride, ...]) -> tuple[str, ...]:
     steps = [s for s in strides if not s.flags & (Flag.STANDING | Flag.GAP)]
     if len(steps) > 2 and sum(Flag.BACKWARD in s.flags for s in steps) > 0.5 * len(steps):
         return ("most steps go backward: are the columns of thigh and shank exchanged?",)
-    if len(steps) > 2 and sum(bool(s.flags & (Flag.UNSEEN | Flag.BACKWARD)) for s in steps) >= 0.5 * len(steps):
+    if steps and sum(bool(s.flags & (Flag.UNSEEN | Flag.BACKWARD)) for s in steps) >= 0.5 * len(steps):
         return ("half or more of this is no walk that one leg can observe: do not trust the distance",)
     return () if steps else ("no step was seen",)
 
