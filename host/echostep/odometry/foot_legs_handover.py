@@ -98,8 +98,10 @@ class FootLegsHandover:
 
     def _align_legs(self, path: LegPath, leg_segments: list[PathSegment]) -> bool:
         """Set the legs' scale and rotation from the foot over the time that both cover; False when their lengths disagree."""
-        begin_s = max(self._kept_segments[0].t0_s, leg_segments[0].t0_s) if leg_segments else math.inf
-        end_s = self._kept_segments[-1].t1_s
+        if not leg_segments:
+            return False
+        begin_s = max(self._kept_segments[0].t0_s, leg_segments[0].t0_s)
+        end_s = min(self._kept_segments[-1].t1_s, leg_segments[-1].t1_s)  # the legs' last stride comes later
         foot_m = _length_m(self._kept_segments, begin_s, end_s)
         legs_m = _length_m(leg_segments, begin_s, end_s)
         if foot_m < MIN_OVERLAP_M or not abs(legs_m / foot_m - 1.0) < MAX_LENGTH_ERROR:
