@@ -76,6 +76,7 @@ class PathSegment:
     `sd_m`: standard deviation of the move per axis. `turn_sd_rad`: growth of the yaw's standard deviation. `step`: steps so far.
     `anchor_sd_m`: standard deviation of each end per axis, the same at both. `rise_m`: height gained by the foot, with its standard deviation,
     infinite where no foot measured it. `scale_sd`: growth of the standard deviation of the scale that all lengths share. `belt`: of a foot's step.
+    `running`: the foot rests too briefly for a walk.
     """
 
     t0_s: float
@@ -92,6 +93,7 @@ class PathSegment:
     rise_sd_m: float = math.inf
     scale_sd: float = 0.0
     belt: BeltEvidence | None = None
+    running: bool = False
 
     @property
     def unobserved(self) -> bool:

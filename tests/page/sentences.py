@@ -39,6 +39,7 @@ MODULES: dict[str, tuple[str, ...] | None] = {
     "plan/places/standing.py": ("_reason", "StandingGround"),
     "plan/places/whereabouts.py": None,
     "session/results.py": ("summary_words",),
+    "tracker/running.py": None,
     "session/runs/dropped.py": ("DroppedFiles", "WAITING", "PREPARING", "_track"),
     "team/commander.py": ("notes",),
     "team/cot.py": ("alarm_words",),

@@ -26,6 +26,8 @@ from echostep.path import STANDING_PIECE_S, PathSegment
 HALVES = 7  # stances whose median duration counts
 STANCE_RANGE_S = (0.1, 0.8)  # duration of a stance in walking; longer ones are standing
 HALF_STANCE_RANGE_S = (0.1, 0.35)
+RUN_STANCE_S = 0.12  # assumed; a walking foot is still for 0.2 to 0.5 s, a running one for 0.04 to 0.1 s
+RUN_MEMORY = 2  # stances of which the briefest decides whether the foot runs: a turn within a run takes longer, assumed
 STRAIGHT_STEP_M = 0.6  # least length of a step that shows the direction of travel
 STRAIGHT_STEP_RAD = math.radians(15.0)  # largest turn of such a step
 FORWARD_RAD = math.radians(45.0)  # largest angle of a forward step to the toe
@@ -52,6 +54,7 @@ class TrunkPath:
         self._anchor: tuple[float, float, float, float] | None = None  # t, x, y, heading
         self._foot_xy = (0.0, 0.0)
         self._halves: deque[float] = deque([settings.half_stance_s], maxlen=HALVES)
+        self._rests_s: deque[float] = deque(maxlen=RUN_MEMORY)
         self._toe = ToeAngle()
         self.steps = 0
 
@@ -66,16 +69,18 @@ class TrunkPath:
             sample_index = int(np.searchsorted(until_s - self._anchor[0], STANDING_PIECE_S))
             if sample_index == len(t_s):
                 break
+            self._rests_s.clear()
             segments.append((sample_index, self._standing_segment(float(until_s[sample_index]))))
         return segments
 
     def add_stance(self, stance: Stance) -> list[PathSegment]:
         """The segment of standing up to half a stance before the end of this stance, if there is any."""
         segments = []
+        duration_s = stance.t_end_s - stance.t_start_s
+        self._rests_s.append(duration_s)
         until_s = stance.t_end_s - self._half_s()
         if self._anchor is not None and until_s > self._anchor[0]:
             segments.append(self._standing_segment(until_s))
-        duration_s = stance.t_end_s - stance.t_start_s
         if STANCE_RANGE_S[0] < duration_s < STANCE_RANGE_S[1]:
             self._halves.append(0.5 * duration_s)
         return segments
@@ -101,8 +106,9 @@ class TrunkPath:
         t_s = max(t_s, t0)
         self._anchor = (t_s, x, y, heading)
         return PathSegment(
-            t0, t_s, x - x0, y - y0, heading0, heading, sd_m, turn_sd_rad, self.steps, self._settings.anchor_sd_m
-        )
+            t0, t_s, x - x0, y - y0, heading0, heading, sd_m, turn_sd_rad, self.steps, self._settings.anchor_sd_m,
+            running=self._runs,
+        )  # fmt: skip
 
     def _standing_segment(self, t_s: float) -> PathSegment:
         """The segment from the last anchor to the same position at `t_s`, the new anchor."""
@@ -110,13 +116,17 @@ class TrunkPath:
         t0, x, y, heading = self._anchor
         self._anchor = (t_s, x, y, heading)
         return PathSegment(
-            t0, t_s, 0.0, 0.0, heading, heading, 0.0, 0.0, self.steps, self._settings.anchor_sd_m, 0.0, 0.0
-        )
+            t0, t_s, 0.0, 0.0, heading, heading, 0.0, 0.0, self.steps, self._settings.anchor_sd_m, 0.0, 0.0, running=self._runs
+        )  # fmt: skip
 
     def _trunk_xy(self, heading: float) -> tuple[float, float]:
         """Position of the trunk over the foot, for this heading of the trunk; left of the heading is (-sin, cos)."""
         left = self._settings.foot_left_m
         return self._foot_xy[0] + left * math.sin(heading), self._foot_xy[1] - left * math.cos(heading)
+
+    @property
+    def _runs(self) -> bool:
+        return min(self._rests_s, default=math.inf) < RUN_STANCE_S
 
     def _half_s(self) -> float:
         """Half the usual duration of a stance."""

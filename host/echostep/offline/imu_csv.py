@@ -20,6 +20,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.foot.steps import Stance, Step, Track
+from echostep.foot.trunk_path import RUN_STANCE_S
 from echostep.offline.bursts import spread
 from echostep.offline.csv_table import CsvLimits, column_of, lines_of, number_of, open_samples, read_rows
 from echostep.offline.foreign_columns import ADVICE, OWN, Naming, read_header
@@ -28,7 +29,6 @@ from echostep.printing.file_mode import claim
 
 COLUMNS = ("t_s", "ax", "ay", "az", "gx", "gy", "gz")
 MAG_COLUMNS = ("mx", "my", "mz")
-RUN_STANCE_S = 0.12  # assumed; a walking foot is still for 0.2 to 0.5 s, a running one for 0.04 to 0.1 s
 TRACK_COLUMNS = ("t_s", "x", "y", "z", "heading_rad", "stance")
 
 

@@ -46,6 +46,7 @@ from echostep.output.foxglove import (
     topic,
     walls,
 )  # fmt: skip
+from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.model import Plan
 from echostep.ports.chunks import BOARD, Portion
@@ -81,6 +82,7 @@ STEP = topic(
     "/step",
     fields(
         "echostep.Step", t_s=NUMBER, step=WHOLE, x_m=NUMBER, y_m=NUMBER, length_m=NUMBER, duration_s=NUMBER, speed_m_s=NUMBER, heading_deg=NUMBER,
+        sd_m=NUMBER, running=TRUTH,
     ),
 )  # fmt: skip
 ECHO = tuple(
@@ -111,8 +113,15 @@ class Derived:
         self._board = BoardReader()
         self._walls_sent = False
         self._last: Estimate | None = None
+        self._segments: dict[int, PathSegment] = {}  # of the steps since the last portion
+        tracker.watchers.append(self._watch)
         self._track: list[Place] = []
         self._last_echo: dict[int, tuple[int, float]] = {}
+
+    def _watch(self, measured: MeasuredSegment | None, estimate: Estimate) -> None:
+        """Keep the first segment of each step: it is the one that moves."""
+        if measured is not None:
+            self._segments.setdefault(estimate.step, measured.segment)
 
     def take(self, portion: Portion, estimates: list[Estimate]) -> list[DerivedMessage]:
         """The messages of a portion: from its board frames by kind, then from its estimates."""
@@ -124,6 +133,7 @@ class Derived:
             notes += self._echoes(frames, t_ns) + _pressures(frames, t_ns) + self._status(frames, t_ns)
         for estimate in estimates:
             notes += self._estimate(estimate)
+        self._segments.clear()
         return notes
 
     def _echoes(self, frames: Frames, t_ns: Any) -> list[DerivedMessage]:
@@ -196,6 +206,8 @@ class Derived:
             "t_s": e.t_s, "step": e.step, "x_m": e.x_m, "y_m": e.y_m, "length_m": length_m, "duration_s": duration_s,
             "heading_deg": math.degrees(e.heading_rad),
         }  # fmt: skip
+        if (segment := self._segments.get(e.step)) is not None:
+            body |= {"sd_m": segment.sd_m, "running": segment.running}
         if duration_s > 0.0:
             body["speed_m_s"] = length_m / duration_s
         return [DerivedMessage(STEP, t_ns, body)]

@@ -27,6 +27,7 @@ from echostep.localization.estimate import Estimate, claims_place
 from echostep.plan.model import Level, Plan
 from echostep.plan.places.bearing import heading_words
 from echostep.tracker import Tracker
+from echostep.tracker.running import running_note
 
 REFRESH_S = 0.1
 MAX_FINDINGS = 3  # shown at a time
@@ -153,6 +154,8 @@ class TerminalView:
             Text(health(self._tracker), style="grey62"),
             *(Text(str(finding), style="bold red") for finding in findings(self._tracker)),
         ]
+        if gait := running_note(self._tracker.state.last_segment, self._last):
+            parts.append(Text(gait))
         if notice:
             parts.append(Text(notice, style="bold"))
         self._live.update(Panel(Group(*parts, self._progress), title=self._title, expand=False), refresh=True)

@@ -38,6 +38,7 @@ from echostep.plan.routing import RoutePlace
 from echostep.ports.arrival_clock import now_ns
 from echostep.ports.chunks import BOARD, FOOT, MTX, Portion
 from echostep.tracker import Tracker
+from echostep.tracker.running import running_note
 
 # Assumed, all of them:
 TRAIL_STEP_M = 0.02  # the trail gets a point when x or y has changed by this much
@@ -268,6 +269,7 @@ class LivePage:
             estimate=unobserved(scene.estimate, scene.estimate.t_s + age_s),
             echo_lines=(),
             status_text=f"lost: {reason} for {age_s:.0f} s",
+            gait="",
             guidance=scene.guidance and scene.guidance.stopped(f"There is {reason}", scene.t_s),
             beacons=tuple(replace(mark, heard=False) for mark in scene.beacons),
         )
@@ -288,6 +290,7 @@ class LivePage:
             status_text=status_text(estimate, accepts_taps=not self._replay, no_plan=not self._tracker.plan.is_drawn),
             particles=self._scene.particles if published is None else sample_of(published),
             echo_lines=self._echo_lines(measured, estimate),
+            gait=running_note(None if measured is None else measured.segment, estimate),
             guidance=self._guidance(estimate),
             beacons=beacon_marks(self._tracker, estimate.t_s),
             truth=self.truth.at(estimate.t_s) if self.truth else None,

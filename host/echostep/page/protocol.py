@@ -183,6 +183,7 @@ class FrameHeader:
     seq: int
     t_s: float
     words: str
+    gait: str
     told: ShownEstimate | None
     beams: tuple[EchoLine, ...]
     streams: StreamRates | None
@@ -295,6 +296,7 @@ def frame(scene: PageScene, parts: FrameParts) -> bytes:
         seq=parts.seq,
         t_s=scene.t_s,
         words=scene.status_text,
+        gait=scene.gait,
         told=_estimate(scene, parts),
         beams=scene.echo_lines,
         streams=scene.streams,

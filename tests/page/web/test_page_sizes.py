@@ -51,6 +51,7 @@ PLACES = (LikelyPlace(0.62, 12.0, 7.0, 1, 0.4, 0.0), LikelyPlace(0.31, 4.0, 10.0
 RATES = StreamRates(
     100.0, 31.0, 12345, 678, 90, True, 0, "the board has no rangers: look at its plug (docs/mistakes.md)"
 )
+RUNNING = "running: position good to about 12.3 m"
 MAYDAY = ShownAlarm("mayday", "Mayday: a fall 14 s ago. No team is connected: only this page says so.", "Mayday.", 1)
 
 
@@ -62,7 +63,7 @@ def moments() -> list[PageScene]:
     return [
         replace(known, status_text="tracking, 0.2 m"),
         replace(scene(3.0), estimate=lost, status_text=status_text(lost)),
-        replace(scene(4.0), estimate=several, status_text=status_text(several), streams=RATES),
+        replace(scene(4.0), estimate=several, status_text=status_text(several), streams=RATES, gait=RUNNING),
         replace(scene(5.0), estimate=several, status_text=status_text(several), streams=RATES, alarm=MAYDAY),
     ]  # fmt: skip
 

@@ -51,7 +51,7 @@ class PageScene:
 
     `arrived_ns`: host's monotonic clock when the bytes of the estimate arrived. `trail_count`: number of points of the trail up to this moment.
     `guidance`: of the run; that to a destination chosen on a page is added by the page's session. `echoes_fit`: the plan explains the last echoes.
-    `truth`: the true position, where it is known.
+    `truth`: the true position, where it is known. `gait`: that the wearer runs, in words.
     """
 
     arrived_ns: int
@@ -69,6 +69,7 @@ class PageScene:
     truth: TruePosition | None = None
     alarm: ShownAlarm | None = None
     met: ShownMeeting | None = None
+    gait: str = ""
 
 
 def is_placed(estimate: Estimate, plan: Plan) -> bool:

@@ -45,12 +45,14 @@ export class Panel {
     }));
   }
 
-  frame({ told: estimate, words: said, streams, guidance, goal, beams, beacons, play, ended, alarm, errand }) {
+  frame({ told: estimate, words: said, gait, streams, guidance, goal, beams, beacons, play, ended, alarm, errand }) {
     const status = ended ? 'ended' : estimate?.status ?? 'waiting', words = ended ? `ended: ${ended}${play ? '. ▶ plays it again' : ''}` : said;
     this.status(status, words);
     put('place', estimate ? positionText(estimate, this.plan.levels) : '');
     put('places', estimate?.places ?? '');
     $('places').hidden = !estimate?.places;
+    put('gait', gait);
+    $('gait').hidden = !gait;
     put('echoes', estimate ? echoText(beams, estimate.placed) : '');
     put('health', streams ? rateText(streams) : 'no bytes yet');
     put('wrong', streams?.wrong ?? '');
