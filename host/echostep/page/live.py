@@ -28,6 +28,7 @@ from echostep.page.elements.marks import ShownMark, beacon_marks
 from echostep.page.elements.meetings import shown_meeting
 from echostep.page.elements.scene import MOST_SHOWN, PageScene, is_placed, sample_of, status_text
 from echostep.page.elements.stream_rates import StreamRateMeter
+from echostep.page.elements.taps import PointPress, ShownPoints
 from echostep.page.elements.true_position import TruePath
 from echostep.page.elements.undo_offer import UndoClock, echoes_fit
 from echostep.page.mailbox import Mailbox
@@ -182,6 +183,14 @@ class LivePage:
     def pop_meetings(self) -> Iterator[str]:
         """Names of the teammates that the pages have reported as met since the last call."""
         return self._mailbox.pop_meetings()
+
+    def set_points(self, points: ShownPoints) -> None:
+        """Show on all pages which surveyed point comes next; from then on they take taps at points."""
+        self._mailbox.set_points(points)
+
+    def pop_presses(self) -> Iterator[PointPress]:
+        """Taps at surveyed points that the pages have sent since the last call."""
+        return self._mailbox.pop_presses()
 
     def note_arrival(self) -> None:
         """Bytes have arrived: their time is the start of the latency of the scenes that follow."""

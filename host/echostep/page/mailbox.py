@@ -17,6 +17,7 @@ from typing import TypeVar
 from echostep.page.elements.drawn_walls import ShownDrawing
 from echostep.page.elements.marks import ShownMark
 from echostep.page.elements.scene import PageScene
+from echostep.page.elements.taps import PointPress, ShownPoints
 from echostep.page.over_time import OverTime
 from echostep.plan.model import Plan
 from echostep.plan.routing import RoutePlace
@@ -94,9 +95,11 @@ class Mailbox:
             ShownDrawing, ...
         ] = ()  # in order of `t_s`; a live run has the newest only; replaced, never changed
         self.team: tuple[str, ...] = ()  # names of the teammates who can be met; replaced, never changed
+        self.points: ShownPoints | None = None  # of an acceptance walk; replaced, never changed
         self.on_publish: Callable[[], None] | None = None
         self._check_ins: queue.Queue[CheckIn | Undo | Call] = queue.Queue(MOST_CHECK_INS)
         self._met: queue.Queue[str] = queue.Queue(MOST_CHECK_INS)
+        self._presses: queue.Queue[PointPress] = queue.Queue(MOST_CHECK_INS)
 
     def publish(self, scene: PageScene) -> None:
         """Store a new scene and call `on_publish`; called in the tracker's thread."""
@@ -132,6 +135,11 @@ class Mailbox:
         self.team = names
         self._announce()
 
+    def set_points(self, points: ShownPoints) -> None:
+        """Show which surveyed point comes next and call `on_publish`."""
+        self.points = points
+        self._announce()
+
     def keep(self, scene: PageScene) -> None:
         """Add the scene of an estimate to what is shown over time, and to the history that is played after `end`, if the run keeps one."""
         self.over_time.add(scene)
@@ -164,6 +172,14 @@ class Mailbox:
     def pop_meetings(self) -> Iterator[str]:
         """Remove and yield the names of teammates reported as met; never blocks."""
         return _popped(self._met)
+
+    def add_press(self, press: PointPress) -> bool:
+        """Queue a tap at a surveyed point; False when it is refused: in a replay, or with a full queue."""
+        return self._put(self._presses, press)
+
+    def pop_presses(self) -> Iterator[PointPress]:
+        """Remove and yield the taps at surveyed points; never blocks."""
+        return _popped(self._presses)
 
     def _put(self, waiting: queue.Queue[T], item: T) -> bool:
         if self.replay:

@@ -29,7 +29,7 @@ from echostep.page.elements.marks import BeaconMark, ShownMark
 from echostep.page.elements.meetings import ShownMeeting
 from echostep.page.elements.scene import PageScene, ParticleSample
 from echostep.page.elements.stream_rates import StreamRates
-from echostep.page.elements.taps import Considered
+from echostep.page.elements.taps import Considered, ShownPoints
 from echostep.page.elements.true_position import TruePosition
 from echostep.page.elements.undo_offer import UndoOffer
 from echostep.page.over_time import COLUMNS, Event, OverTime
@@ -177,7 +177,7 @@ class FrameHeader:
     """One moment. `seq`: the page returns it when the frame is drawn. `goal`: the destination that was chosen on a page of this run.
 
     `errand`: who sent the wearer there, in words; empty when the wearer chose it. `team`: names of the teammates for meetings, when they have
-    changed; `met`: result of the newest meeting.
+    changed; `met`: result of the newest meeting. `points`: what an acceptance walk asks for, when that has changed. `gait`: that the wearer runs.
     """
 
     seq: int
@@ -200,6 +200,7 @@ class FrameHeader:
     alarm: ShownAlarm | None
     marks: tuple[ShownMark, ...] | None
     team: tuple[str, ...] | None
+    points: ShownPoints | None
     met: ShownMeeting | None
     ended: str | None
     kind: Literal["frame"] = "frame"
@@ -285,6 +286,7 @@ class FrameParts:
     marks: tuple[ShownMark, ...] | None = None
     drawing: ShownDrawing | None = None
     team: tuple[str, ...] | None = None
+    points: ShownPoints | None = None
     ended: str | None = None
 
 
@@ -313,6 +315,7 @@ def frame(scene: PageScene, parts: FrameParts) -> bytes:
         alarm=scene.alarm,
         marks=parts.marks,
         team=parts.team,
+        points=parts.points,
         met=scene.met,
         ended=parts.ended,
     )

@@ -20,6 +20,7 @@ MOST_REQUEST = 2048  # characters
 MOST_NAME = 32  # characters of a wearer's name, as in reports
 FASTEST = 32.0  # times as fast as it was recorded
 Integer = Annotated[int, Meta(gt=-(1 << 53), lt=1 << 53)]  # that JavaScript represents exactly
+Count = Annotated[int, Meta(ge=0, lt=1 << 31)]
 
 
 class Entered(EnteredPlace, frozen=True, tag_field="kind", tag="check_in"):
@@ -34,6 +35,19 @@ class Met(msgspec.Struct, frozen=True, tag_field="kind", tag="met"):
     """The wearer stands beside a teammate of this name."""
 
     name: Annotated[str, Meta(min_length=1, max_length=MOST_NAME)]
+
+
+class AtPoint(msgspec.Struct, frozen=True, tag_field="kind", tag="at_point"):
+    """In an acceptance walk, while the page shows visit `number`: the wearer is at the point that it names, or at another one by its name."""
+
+    number: Count
+    name: Annotated[str, Meta(max_length=MOST_NAME)] = ""
+
+
+class NoTap(msgspec.Struct, frozen=True, tag_field="kind", tag="no_tap"):
+    """The newest tap at a surveyed point was none."""
+
+    number: Count
 
 
 class GoTo(msgspec.Struct, frozen=True, tag_field="kind", tag="go_to"):
@@ -83,7 +97,9 @@ class StepBy(msgspec.Struct, frozen=True, tag_field="kind", tag="skip"):
     by: Integer
 
 
-_OwnRequest = Undo | Call | Consider | Met | GoTo | EndGuidance | FrameDrawn | SetPlaying | SetSpeed | Seek | StepBy
+_OwnRequest = (
+    Undo | Call | Consider | Met | AtPoint | NoTap | GoTo | EndGuidance | FrameDrawn | SetPlaying | SetSpeed | Seek | StepBy
+)  # fmt: skip
 Request = CheckIn | _OwnRequest
 _REQUESTS = msgspec.json.Decoder(Entered | _OwnRequest)
 

@@ -21,13 +21,17 @@ from echostep.page.elements.drawn_walls import NO_DRAWING, ShownDrawing
 from echostep.page.elements.guidance import Destination, ShownGuidance
 from echostep.page.elements.marks import ShownMark
 from echostep.page.elements.scene import PageScene, ParticleSample, is_placed
+from echostep.page.elements.taps import NO_TAP, PointPress, ShownPoints
 from echostep.page.guarded_socket import MOST_UNDRAWN, GuardedSocket
 from echostep.page.mailbox import Mailbox
 from echostep.page.protocol import FRAME_S
 from echostep.page.replay_cursor import ReplayCursor
 from echostep.page.shared import Shared
 from echostep.plan.places.bearing import heading_words
+from echostep.ports.arrival_clock import now_ns
 from echostep.ports.people.check_in import Call, CheckIn, Undo
+
+TOO_BUSY = "Not accepted: this is a replay, or the tracker is too busy."
 
 
 class PageSession(GuardedSocket):
@@ -52,6 +56,7 @@ class PageSession(GuardedSocket):
         self._marks: tuple[ShownMark, ...] | None = None  # that the page has
         self._drawing: ShownDrawing | None = None  # that the page has
         self._team: tuple[str, ...] | None = None  # that the page has
+        self._points: ShownPoints | None = None  # that the page has
         self._trail_count = 0  # points of the trail that the page has
         self._told_end = False
         self._frame_due = True  # the page needs a frame, even of the same scene
@@ -89,8 +94,8 @@ class PageSession(GuardedSocket):
                 await self._take(request, "It is too late to undo this." if is_late else "")
             case Call():
                 await self._take(request, "")
-            case requests.Met(name):
-                await self._meet(name)
+            case requests.Met() | requests.AtPoint() | requests.NoTap():
+                await self._pass_on(request)
             case requests.GoTo() if request.level < levels:
                 self._mailbox.set_goal(request.goal)
             case requests.EndGuidance():
@@ -105,19 +110,32 @@ class PageSession(GuardedSocket):
     async def _take(self, request: CheckIn | Undo | Call, refusal: str) -> None:
         """Pass a check-in, its undoing or a call on to the tracker, or send the page the reason of a refusal."""
         if not refusal and not self._mailbox.add_check_in(request):
-            refusal = "Not accepted: this is a replay, or the tracker is too busy."
+            refusal = TOO_BUSY
         if refusal:
             self._counts.refused += 1
             await self.tell(protocol.encode(protocol.Refused(refusal)))
 
-    async def _meet(self, name: str) -> None:
-        """Pass a meeting with a teammate on to the tracker, or send the page the reason of a refusal."""
-        is_heard = name in self._mailbox.team
-        if is_heard and self._mailbox.add_meeting(name):
-            return
-        self._counts.refused += 1
-        refusal = "Not accepted: this is a replay, or the tracker is too busy." if is_heard else f"{name} is not heard."
-        await self.tell(protocol.encode(protocol.Refused(refusal)))
+    async def _pass_on(self, request: requests.Met | requests.AtPoint | requests.NoTap) -> None:
+        """Pass a meeting with a teammate or a tap at a surveyed point on, or send the page the reason of a refusal."""
+        if refusal := self._meet(request.name) if isinstance(request, requests.Met) else self._press(request):
+            self._counts.refused += 1
+            await self.tell(protocol.encode(protocol.Refused(refusal)))
+
+    def _meet(self, name: str) -> str:
+        """Queue a meeting; the reason of a refusal, else empty."""
+        if name not in self._mailbox.team:
+            return f"{name} is not heard."
+        return "" if self._mailbox.add_meeting(name) else TOO_BUSY
+
+    def _press(self, request: requests.AtPoint | requests.NoTap) -> str:
+        """Queue a tap at a surveyed point for the guide of the walk; the reason of a refusal, else empty."""
+        points, number = self._mailbox.points, request.number
+        if points is None:
+            return "Not accepted: no points are measured in this run."
+        if points.number != number:
+            return "Not accepted: the walk is at another point by now."
+        typed = request.name if isinstance(request, requests.AtPoint) else NO_TAP
+        return "" if self._mailbox.add_press(PointPress(now_ns(), number, typed)) else TOO_BUSY
 
     async def _send(self) -> None:
         """Send a frame when there is something new, not before `FRAME_S` after the last one."""
@@ -141,6 +159,7 @@ class PageSession(GuardedSocket):
             self._follow_goal()
             self._frame_due = self._frame_due or self._marks is not self._mailbox.marks
             self._frame_due = self._frame_due or self._team is not self._mailbox.team
+            self._frame_due = self._frame_due or self._points is not self._mailbox.points
             scene = self._cursor.scene(time.monotonic()) if self._cursor else self._mailbox.latest
             if scene is None:
                 continue
@@ -163,7 +182,7 @@ class PageSession(GuardedSocket):
         new_estimate = self._cursor is None and (self._last is None or scene.estimate is not self._last.estimate)
         self._undrawn[self._seq] = scene.arrived_ns if new_estimate else None
         begin = min(self._trail_count, scene.trail_count)  # a replay may go back
-        drawing = self._mailbox.drawing_at(scene.t_s)
+        drawing, points = self._mailbox.drawing_at(scene.t_s), self._mailbox.points
         parts = protocol.FrameParts(
             seq=self._seq,
             where=self._shared.taps.where(scene.estimate) if scene.estimate else "",
@@ -180,9 +199,10 @@ class PageSession(GuardedSocket):
             marks=self._mailbox.marks if self._marks is not self._mailbox.marks else None,
             drawing=(drawing or NO_DRAWING) if drawing is not self._drawing else None,
             team=self._mailbox.team if self._team is not self._mailbox.team else None,
+            points=points if points is not self._points else None,
             ended=self._mailbox.summary if self._cursor is None or self._cursor.at_end else None,
         )
-        self._marks, self._team, self._drawing = self._mailbox.marks, self._mailbox.team, drawing
+        self._marks, self._team, self._drawing, self._points = self._mailbox.marks, self._mailbox.team, drawing, points
         self._last, self._trail_count, self._particles = scene, scene.trail_count, scene.particles
         return protocol.frame(scene, parts)
 

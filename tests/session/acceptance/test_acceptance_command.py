@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The real command beside the twin, which walks the protocol; every point is tapped by Enter when the twin says that it is reached."""
+"""The real command beside the twin, which walks the protocol; points are tapped by Enter and on the page in turn, when the twin says that one is reached."""
 
 from __future__ import annotations
 
+import json
 import re
 import signal
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 
 from board_runs import needs_twin, tool
 from command_line import PROGRAM, echostep
+from page.frames import opened_url
 from waiting import PATIENCE_S
 
 TAPS = 17  # of two rounds by five points, and the first
@@ -25,16 +27,22 @@ def test_the_twin_walks_the_protocol(tmp_path: Path) -> None:
     try:
         assert twin.stdout is not None
         board, mtx = (twin.stdout.readline().split()[1] for _ in range(2))
-        command = ["acceptance", "--corridor", "8x2", "--rounds", "2", "--board", board, "--mtx", mtx, "--no-page"]
+        command = ["acceptance", "--corridor", "8x2", "--rounds", "2", "--board", board, "--mtx", mtx, "--port", "0"]
         live = subprocess.Popen(
             [*PROGRAM, *command, "--out", tmp_path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
         assert live.stdin is not None
+        assert live.stdout is not None
+        url = next(line.split()[-1] for line in iter(live.stdout.readline, "") if line.startswith("The page:"))
         reached = (line for line in iter(twin.stdout.readline, "") if line.startswith("at point"))
-        for _ in range(TAPS):
-            next(reached)
-            live.stdin.write("\n")
-            live.stdin.flush()
+        with opened_url(url) as page:
+            for number in range(TAPS):
+                next(reached)
+                if number % 2:
+                    page.send(json.dumps({"kind": "at_point", "number": number}))
+                else:
+                    live.stdin.write("\n")
+                    live.stdin.flush()
         said, _ = live.communicate(timeout=PATIENCE_S)
     finally:
         for process in filter(None, (live, twin)):

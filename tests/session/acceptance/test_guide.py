@@ -4,9 +4,14 @@
 from __future__ import annotations
 
 import io
+from typing import cast
 
 import pytest
 
+from echostep.page.elements.taps import PointPress, ShownPoints
+from echostep.page.live import LivePage
+from echostep.page.mailbox import Mailbox
+from echostep.plan.model import NO_PLAN
 from echostep.ports.arrival_clock import now_ns
 from echostep.ports.people.tap import Tap, parse_tap
 from echostep.session.acceptance import guide as guides
@@ -62,6 +67,51 @@ def test_other_lines_are_no_taps() -> None:
     assert taps == []
     assert sum("is no point that is still to come" in line for line in said) > 1
     assert max(map(len, said)) < 200
+
+
+def test_the_buttons_of_a_page_are_the_keys() -> None:
+    """The same taps, at the time of the press; a second press of a button that named an earlier point is none."""
+    presses = [(0, ""), (0, ""), (1, "4"), (4, "u"), (4, "u"), (1, "9"), (1, ""), (9, "")]
+    mailbox, pressed_ns = Mailbox(NO_PLAN, "test", replay=False), now_ns()
+    guide = Guide(corridor("20x2"), 1, io.StringIO(), lambda _: None, {})
+    guide.attach(cast(LivePage, mailbox))
+    guide.pop()
+    assert mailbox.points == ShownPoints(
+        0,
+        "1",
+        "Stand on point 1, look to point 2, and stay. Press while you stand.",
+        ("1", "2", "3", "4", "5"),
+        undo=False,
+    )
+    for k, (number, typed) in enumerate(presses):
+        assert mailbox.add_press(PointPress(pressed_ns + k, number, typed))
+    payloads = guide.pop()
+    assert payloads == [
+        Tap(0, standing=True, t_ns=pressed_ns).encode(),
+        Tap(3, standing=True, t_ns=pressed_ns + 2).encode(),
+        Tap(None, t_ns=pressed_ns + 3).encode(),
+        Tap(1, standing=True, t_ns=pressed_ns + 6).encode(),
+    ]
+    typed_taps, _, _ = taps_of("\n4\nu\n9\n\n")
+    assert [tap and (tap.point, tap.standing) for tap in map(parse_tap, payloads)] == [
+        (tap.point, tap.standing) for tap in typed_taps
+    ]
+    assert mailbox.points.number == 2
+    assert mailbox.points.name == "3"
+    assert mailbox.points.text == "2 of 8, round 1 of 1: stop with both feet beside it, press, walk on"
+    assert mailbox.points.undo
+
+
+def test_after_the_last_point_no_button_is_left() -> None:
+    mailbox = Mailbox(NO_PLAN, "test", replay=False)
+    guide = Guide(corridor("20x2"), 1, io.StringIO(), lambda _: None, {})
+    guide.attach(cast(LivePage, mailbox))
+    for number in range(10):
+        mailbox.add_press(PointPress(now_ns(), number, ""))
+    assert len(guide.pop()) == 9
+    assert mailbox.points
+    assert (mailbox.points.name, mailbox.points.later) == ("", ())
+    assert mailbox.points.text.startswith("The last point. Stand still for 5 s")
 
 
 def test_the_run_ends_after_the_last_point(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Taps: the preview of a check-in's effect.
+"""Taps: the preview of a check-in's effect; the surveyed point that an acceptance walk asks for.
 
 In: a plan; a check-in that a page considers, and the scene that it was shown. Out: `Considered`: plain data. Owns what is known of the plan's spaces.
 One thread asks at a time.
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from echostep.localization.estimate import Estimate, TrackStatus, claims_place
 from echostep.page.elements.likely_places import places_text, shown_places
@@ -21,6 +21,7 @@ from echostep.plan.places.standing import StandingGround
 from echostep.plan.places.whereabouts import Whereabouts
 from echostep.ports.people.check_in import CheckIn
 
+NO_TAP = "u"  # as a line of the terminal: the newest tap at a point was none
 DOUBTED_M = 1.0  # a check-in that is farther than this outside the ellipse of a fitting place is doubted; assumed
 
 
@@ -39,6 +40,29 @@ class Considered:
     possible: bool
     text: str
     kind: Literal["considered"] = "considered"
+
+
+@dataclass(frozen=True, slots=True)
+class ShownPoints:
+    """What an acceptance walk asks for. The field names are keys of the frame's JSON.
+
+    `number`: of the visit that comes next, to `name`, empty when all are over; `text`: what to do there. `later`: names of all points still to come.
+    `undo`: there is a tap that can be taken back.
+    """
+
+    number: int
+    name: str
+    text: str
+    later: tuple[str, ...]
+    undo: bool
+
+
+class PointPress(NamedTuple):
+    """At `t_ns` of the host's clock a page that showed visit `number` had its button pressed; `typed`: as a line of the terminal."""
+
+    t_ns: int
+    number: int
+    typed: str
 
 
 class Taps:

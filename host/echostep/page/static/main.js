@@ -8,6 +8,7 @@ import { Link } from './link.js';
 import { Painter } from './live/paint.js';
 import { Panel } from './live/panel.js';
 import { PlanView } from './plan.js';
+import { Points } from './live/points.js';
 import { Replay } from './live/replay.js';
 import { Speech } from './live/speech.js';
 import { Taps } from './live/taps.js';
@@ -38,11 +39,12 @@ const taps = new Taps(view, {
   keptHeading: () => (scene.frame?.told?.heading_known ? scene.frame.told.heading_rad : null),
 });
 const link = new Link({
-  onHello: hello, onFrame: frame, onRefused: (reason) => hint(reason, 6000), onFailed: failed, onConsidered: (answer) => taps.considered(answer), onState: connection,
+  onHello: hello, onFrame: frame, onRefused: refused, onFailed: failed, onConsidered: (answer) => taps.considered(answer), onState: connection,
 });
 const speech = new Speech($('speech'), $('sentence'), $('invitation'), $('unspoken'));
 const showLegend = startLegend($('legend-button'), LIVE, LIVE_KEYS);
 const replay = new Replay((kind, fields) => link.send(kind, fields));
+const points = new Points((kind, fields) => link.send(kind, fields));
 const drops = new Drops(hint), charts = new Charts($('charts'), () => painter.colour, seek);
 const tools = new Tools({ view, scene, planView, layers: scene.layers, charts, hint, enter, seek, changed: redraw, plan: () => plan, globe: () => globe, takesFiles: () => drops.takes });
 const painted = new MessageChannel();
@@ -57,6 +59,7 @@ async function hello(message) {
   view.north = plan.north_rad;
   scene.trail.count = 0;
   scene.drawing = null;
+  points.show(null);
   invited = false;
   panel.hello(message);
   const begins = message.replay && $('replay').hidden;
@@ -119,6 +122,11 @@ async function showLevel(level) {
   view.changed();
 }
 
+function refused(reason) {
+  points.ready();
+  hint(reason, 6000);
+}
+
 function connection(open) {
   connected = open;
   if (open) broken = false;
@@ -137,6 +145,7 @@ function frame(received) {
   if (received.cloud) scene.cloud = received.cloud;
   if (received.drawing) panel.drawing(scene.drawing = received.drawing.path.length ? received.drawing : null);
   if (received.team) panel.team(received.team);
+  if (received.points) points.show(received.points);
   if (received.met && received.met.number !== metNumber) {
     metNumber = received.met.number;
     hint(received.met.text, 8000);

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Guides the wearer from point to point, and takes the taps.
 
-In: lines that are typed: Enter is the next point, a name that point, `u` takes the newest tap back. Out: the bytes of taps; what to do next, in
-words. Owns the thread that reads the lines, and how far the walk has come.
+In: lines that are typed, or the same from a page's buttons: Enter is the next point, a name that point, `u` takes the newest tap back. Out: the
+bytes of taps; what to do next, in words. Owns the thread that reads the lines, and how far the walk has come.
 """
 
 from __future__ import annotations
@@ -10,16 +10,23 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
+from echostep.page.elements.taps import NO_TAP, ShownPoints
 from echostep.ports.arrival_clock import now_ns
 from echostep.ports.people.tap import Tap
 from echostep.session.acceptance.protocol import Protocol, Visit
 
-UNDO = "u"
-HELP = "Enter: at the point that is asked for; its name and Enter: at another one; u and Enter: that was no tap; Ctrl-C ends."
+if TYPE_CHECKING:
+    from echostep.page.live import LivePage
+
+HELP = (
+    "Enter: at the point that is asked for; its name and Enter: at another one; u and Enter: that was no tap; Ctrl-C ends. "
+    "The page has buttons for the same."
+)
+KEY, BUTTON = "Enter", "press"  # what the wearer does at a point, in words
 REST_S = 5.0  # for which the wearer stands after the last tap: estimates come twice a second
 MOST_LETTERS, MOST_LINES = 64, 16  # of a line that is looked at, a name has at most 32; of lines that wait
 
@@ -40,6 +47,7 @@ class Guide:
         self._tapped: list[int] = []  # numbers of the visits
         self._ended_s: float | None = None
         self._begun = False
+        self._page: LivePage | None = None
         threading.Thread(target=self._read, args=(lines,), daemon=True).start()
 
     def _read(self, lines: TextIO) -> None:
@@ -48,6 +56,10 @@ class Guide:
             while line := lines.readline(MOST_LETTERS):
                 self._typed.put((now_ns(), line.strip()))
         self._typed.put((now_ns(), None))
+
+    def attach(self, page: LivePage) -> None:
+        """Show the points on a page, whose buttons do as the keys."""
+        self._page = page
 
     @property
     def _next(self) -> int:
@@ -59,18 +71,39 @@ class Guide:
         if not self._begun:
             self._begun = True
             self._say(HELP)
-            self._say(self._request())
+            self._ask()
         payloads = []
-        for _ in range(self._typed.qsize()):
-            t_ns, typed = self._typed.get()
+        for t_ns, typed in self._waiting():
             if typed is None:
                 self._say("No more lines can be typed: what was tapped counts; Ctrl-C ends.")
-                break
+                continue
             if (tap := self._tap(t_ns, typed)) is not None:
                 payloads.append(tap.encode())
                 self._ended_s = time.monotonic() if self._next == len(self._visits) else None
-            self._say(self._request())
+            self._ask()
         return payloads
+
+    def _waiting(self) -> Iterator[tuple[int, str | None]]:
+        """Lines, and presses of buttons that named the next visit when they were shown: a second press of a button that was slow is none."""
+        for _ in range(self._typed.qsize()):
+            yield self._typed.get()
+        for press in self._page.pop_presses() if self._page else ():
+            if press.number == self._next:
+                yield press.t_ns, press.typed
+
+    def _ask(self) -> None:
+        """Say what the wearer does next, on the terminal and on the page."""
+        number, name = self._next, self._name(self._next)
+        self._say(f"{self._request(KEY)}: {name}" if number and name else self._request(KEY))
+        if self._page:
+            later = dict.fromkeys(self._name(k) for k in range(number, len(self._visits)))
+            self._page.set_points(
+                ShownPoints(number, name, self._request(BUTTON), tuple(later), undo=bool(self._tapped))
+            )
+
+    def _name(self, number: int) -> str:
+        """Name of the point of a visit; empty after the last one."""
+        return self._points[self._visits[number].point].name if number < len(self._visits) else ""
 
     def is_over(self) -> bool:
         """Whether the last point was tapped, and the wearer has stood since."""
@@ -78,7 +111,7 @@ class Guide:
 
     def _tap(self, t_ns: int, typed: str) -> Tap | None:
         """The tap of a line; None for one that is none, which is said."""
-        if typed == UNDO:
+        if typed == NO_TAP:
             if self._tapped:
                 self._tapped.pop()
                 return Tap(None, t_ns=t_ns)
@@ -94,21 +127,24 @@ class Guide:
         self._tapped.append(number)
         return Tap(*self._visits[number], t_ns)
 
-    def _request(self) -> str:
-        """What the wearer does next."""
+    def _request(self, press: str) -> str:
+        """What the wearer does next, by a key or a button; the point's name follows."""
         number = self._next
         if number == len(self._visits):
             return f"The last point. Stand still for {REST_S:.0f} s: the page follows."
-        visit, name = self._visits[number], self._points[self._visits[number].point].name
         if not number:
-            return f"Stand on point {name}, look to point {self._points[1].name}, and stay. Enter while you stand."
+            at, ahead = self._points[:2]
+            return (
+                f"Stand on point {at.name}, look to point {ahead.name}, and stay. {press.capitalize()} while you stand."
+            )
         round_number = (number - 1) // (2 * (len(self._points) - 1)) + 1
-        return f"{number} of {len(self._visits) - 1}, round {round_number} of {self._rounds}: {_manner(visit, len(self._points))} {name}"
+        manner = _manner(self._visits[number], len(self._points), press)
+        return f"{number} of {len(self._visits) - 1}, round {round_number} of {self._rounds}: {manner}"
 
 
-def _manner(visit: Visit, points: int) -> str:
+def _manner(visit: Visit, points: int, press: str) -> str:
     """How a point is visited."""
     turns = visit.point in (0, points - 1)
     if visit.standing:
-        return "stop with both feet beside it, Enter" + (", then turn slowly on the spot:" if turns else ", walk on:")
-    return "Enter as you arrive, then turn slowly on the spot:" if turns else "Enter as you pass:"
+        return f"stop with both feet beside it, {press}, {'then turn slowly on the spot' if turns else 'walk on'}"
+    return f"{press} as you arrive, then turn slowly on the spot" if turns else f"{press} as you pass"

@@ -47,6 +47,7 @@ from echostep.xsens.configuration.startup import MtxStart
 from echostep.xsens.reader import warm_up
 
 if TYPE_CHECKING:
+    from echostep.page.live import LivePage
     from echostep.team.endpoint import Outlet
 
 BAUD = dict.fromkeys((BOARD, MTX, FOOT, GATEWAY), 115200)
@@ -56,6 +57,9 @@ class Guide(Protocol):
     """Leads a wearer from point to point: `metadata` for the recording."""
 
     metadata: dict[str, str]
+
+    def attach(self, page: LivePage) -> None:
+        """Show the points on a page, too."""
 
     def pop(self) -> list[bytes]:
         """Taps since the last call."""
@@ -86,6 +90,8 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions, g
             metadata |= guide.metadata
             session.message_sources.append((POINT, guide.pop))
         with session:
+            if guide is not None and session.page is not None:
+                guide.attach(session.page)
             with start_recording(folder / "walk.mcap", metadata, ports.keep, ports.split) as recorder:
                 ended = guide.is_over if guide is not None else is_asked
                 chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session, ended)
