@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The real command beside the twin, which walks the protocol; points are tapped by Enter and on the page in turn, when the twin says that one is reached."""
+"""The real command beside the twin, which walks the protocol; Enter and the page tap in turn the points that the twin says it reached."""
 
 from __future__ import annotations
 
