@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from echostep.arrays import Floats
 from echostep.simulation.world.acoustics import (
     PIPE_RADIUS_M,
     SRF02,
@@ -237,3 +238,56 @@ def test_no_walls_no_echoes() -> None:
     found = echoes(np.zeros((5, 2)), np.zeros(5), np.zeros((0, 4)), np.zeros(2), np.random.default_rng(1), SRF02)
     assert not found.own_us.any()
     assert not found.cross_us.any()
+
+
+def lengths(found: Echoes) -> Floats:
+    """Ranges (n,) of the left ranger."""
+    metres: Floats = found.own_us[:, 0].astype(np.float64) * (0.5e-6 * SPEED_M_S)
+    return metres
+
+
+def shares_of(found: Echoes, ways_m: list[float]) -> list[float]:
+    """Share of the pings at each of these ranges, of the left ranger."""
+    return [float(np.mean(np.abs(lengths(found) - way) < 2e-3)) for way in ways_m]
+
+
+def two_walls(heading_deg: float, acoustics: Acoustics) -> Echoes:
+    """Pings between two walls that do not quite meet, so that nothing comes back by both."""
+    walls = [[-1.4, 2.0, 1.5, 2.0], [-1.5, -2.0, -1.5, 1.6]]
+    return listen(walls, acoustics, heading_deg=heading_deg, n=2_000)
+
+
+def test_a_beam_that_a_wall_turns_away_is_scattered_where_it_meets_walls() -> None:
+    """At 30 degrees the left ranger's beam goes by (-1.155, 2) and (-1.5, 1.402): 2.309 and 3.0 m."""
+    deaf_to_slants = QUIET._replace(size=20.0)  # hears walls within 11 degrees
+    assert (two_walls(30.0, deaf_to_slants).own_us == 0).all()
+    found = two_walls(30.0, deaf_to_slants._replace(scatter=0.35))
+    shares = shares_of(found, [2.309, 3.0])
+    assert shares == pytest.approx([0.35, 0.65 * 0.35], abs=0.03)
+    assert np.mean(lengths(found) == 0.0) == pytest.approx(1.0 - sum(shares), abs=1e-9)
+
+
+def test_an_echo_by_a_mirror_is_not_scattered() -> None:
+    assert lengths(two_walls(0.0, QUIET._replace(scatter=0.9))) == pytest.approx(2.0, abs=1e-3)
+
+
+def test_a_share_of_first_echoes_is_missed_and_the_next_is_reported() -> None:
+    """The next comes from the same wall by way of the wearer, or from behind what was missed; out of hearing it is none."""
+    missing = QUIET._replace(missed=0.2)
+    near, far = [[-5.0, 1.0, 5.0, 1.0]], [[-5.0, 4.0, 5.0, 4.0]]
+    assert shares_of(listen(near, missing, n=2_000), [1.0, 2.0]) == pytest.approx([0.8, 0.2], abs=0.03)
+    assert shares_of(listen(far, missing, n=2_000), [4.0, 0.0]) == pytest.approx([0.8, 0.2], abs=0.03)
+    behind = [[-5.0, 1.0, 5.0, 1.0], [0.1, 1.0, 0.1, 0.6]]  # its end at 0.608 m answers first
+    assert shares_of(listen(behind, missing, n=2_000), [0.608, 1.0]) == pytest.approx([0.8, 0.2], abs=0.03)
+
+
+def test_what_is_missed_says_nothing_of_noise_and_shifts_no_other_draw() -> None:
+    wall = [[-9.0, 2.0, 9.0, 2.0]]
+    sure, missing = (
+        lengths(listen(wall, SRF02, n=4_000)),
+        lengths(listen(wall, SRF02._replace(missed=0.3), n=4_000)),
+    )
+    right = np.abs(missing - 2.0) < 0.5
+    assert np.mean(right) == pytest.approx(0.7, abs=0.03)
+    assert (missing[right] == sure[right]).all()
+    assert missing[right].std() == pytest.approx(sure.std(), rel=0.05)

@@ -39,6 +39,12 @@ class Acoustics(NamedTuple):
         0.025  # which wavefront crosses the threshold, phasing; with the bias 3-4 cm [Robot Electronics, sonar FAQ]
     )
     bias_m: float = 0.025  # standard deviation over rangers
+    # Share of the first echoes that are missed though they are loud enough, and share of the places where the beam meets a wall that scatter it back
+    # if no echo came by mirrors. Known of other rangers in a small room (`evaluate echoes`), not of an SRF02 in a building
+    missed: float = 0.0
+    scatter: float = 0.0
+    # Level of such a place against a wall, assumed: ghosts reach 3.4 m of a ranger's 4.5 m [real sweeps of 40 kHz rangers]
+    scatter_db: float = -6.0
 
 
 SRF02 = Acoustics()

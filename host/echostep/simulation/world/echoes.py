@@ -5,7 +5,8 @@ In: walls, positions and headings of the trunk, a seeded generator. Out: times o
 the other ranger's. Owns nothing.
 
 Walls reflect sound of 40 kHz as mirrors reflect light [Kuc and Siegel 1987]: a wall answers from the foot of the perpendicular, the image of
-an image gives the path by two walls (corners, and from one ranger to the other between two walls), and an edge answers weakly.
+an image gives the path by two walls (corners, and from one ranger to the other between two walls), and an edge answers weakly. A share of the first
+echoes is missed; then a later one is reported: of what stands behind, by the same wall twice, or from where the beam is scattered (`scattering`).
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel
-from echostep.simulation.world.acoustics import FIRST_NULL, SRF02, Acoustics, path_db, rod_db, wall_db
+from echostep.simulation.world.acoustics import FIRST_NULL, SRF02, Acoustics, path_db, rod_db
 from echostep.simulation.world.image_sources import (
     blocked,
     distance,
@@ -31,10 +32,12 @@ from echostep.simulation.world.image_sources import (
     reflection,
     wall_edges,
 )
+from echostep.simulation.world.scattering import chance_of, scattered_range
 
 Counts = NDArray[np.uint16]
 
 CHUNK_POSES = 64  # poses that share one list of near walls
+PULSE_M = 0.1  # an echo that is missed hides the next within so much: a pulse of 16 periods at 40 kHz lasts 7 cm, there and back, and rings, assumed
 OWN, CROSS = 0, 1
 
 
@@ -100,13 +103,15 @@ class Search(NamedTuple):
     """The search for the nearest audible echo of one pose.
 
     `walls` (m, 4); `lit` (k,): indices of the walls that reach into a ranger's cone. `threshold_db`, `nearest_m` (2 rangers, own or cross):
-    the lowest level that is detected, and the range of the nearest echo found so far, which the stages below update.
+    the lowest level that is detected, and the range of the nearest echo found so far, which the stages below update; `earliest_m` (2,): own echoes
+    from nearer are not received.
     """
 
     walls: Floats
     lit: Ints
     threshold_db: Floats
     nearest_m: Floats
+    earliest_m: Floats
     acoustics: Acoustics
 
 
@@ -115,22 +120,54 @@ def _nearest_echoes(
     trunk: Floats, heading: Floats, walls: Floats, edges: Floats, noise: Floats, a: Acoustics, range_m: Floats
 ) -> None:
     """Fill `range_m` (n, 2 rangers, own or cross): range of the nearest detected echo, with noise; 0 for none."""
-    nearest, threshold_db = np.zeros((2, 2)), np.zeros((2, 2))
+    nearest, threshold_db, earliest = np.zeros((2, 2)), np.zeros((2, 2)), np.zeros(2)
     lit = np.zeros(len(walls), np.int64)
     for k in range(len(heading)):
         rangers = RangerPair(trunk[k, 0], trunk[k, 1], -math.sin(heading[k]), math.cos(heading[k]))
-        nearest[:] = a.maximum_m + 1e-9
+        nearest[:], earliest[:] = a.maximum_m + 1e-9, a.minimum_m
         threshold_db[:, OWN] = a.threshold_db + a.threshold_sd_db * noise[k, :, 0]
         threshold_db[:, CROSS] = a.threshold_db + a.threshold_sd_db * noise[k, :, 2]
-        search = Search(walls, lit[: _find_lit(rangers, walls, a, lit)], threshold_db, nearest, a)
-        _search_walls(rangers, search)
-        _search_edges(rangers, edges, search)
-        _search_wall_pairs(rangers, search)
+        search = Search(walls, lit[: _find_lit(rangers, walls, a, lit)], threshold_db, nearest, earliest, a)
+        _search_all(rangers, edges, search)
         for side in range(2):
+            if nearest[side, OWN] <= a.maximum_m and chance_of(noise[k, side, 0]) < a.missed:
+                _search_later(rangers, side, edges, search)
+            if nearest[side, OWN] > a.maximum_m and a.scatter > 0.0:
+                _search_scattered(rangers, side, chance_of(noise[k, side, 1]), search)
             for kind in (OWN, CROSS):
                 if nearest[side, kind] <= a.maximum_m:
                     noisy = nearest[side, kind] + a.noise_m * noise[k, side, 1 + 2 * kind]
                     range_m[k, side, kind] = max(noisy, a.minimum_m)
+
+
+@kernel
+def _search_all(rangers: RangerPair, edges: Floats, search: Search) -> None:
+    """The nearest echoes that come back by mirrors and from edges."""
+    _search_walls(rangers, search, 1)
+    _search_edges(rangers, edges, search)
+    _search_wall_pairs(rangers, search)
+
+
+@kernel
+def _search_later(rangers: RangerPair, side: int, edges: Floats, search: Search) -> None:
+    """The next echo of a ranger that missed the first: of another reflector, or of a wall, the wearer and the wall once more."""
+    search.earliest_m[side] = search.nearest_m[side, OWN] + PULSE_M
+    search.nearest_m[side, OWN] = search.acoustics.maximum_m + 1e-9
+    _search_all(rangers, edges, search)
+    _search_walls(rangers, search, 2)
+
+
+@kernel
+def _search_scattered(rangers: RangerPair, side: int, chance: float, search: Search) -> None:
+    """The echo of a ranger that nothing came back to by mirrors."""
+    sign = 1.0 if side == 0 else -1.0
+    axis, threshold_db = (sign * rangers.axis_x, sign * rangers.axis_y), search.threshold_db[side, OWN]
+    earliest_m = search.earliest_m[side]
+    range_m = scattered_range(
+        (rangers.x, rangers.y), axis, search.walls, earliest_m, threshold_db, chance, search.acoustics
+    )
+    if range_m > 0.0:
+        search.nearest_m[side, OWN] = range_m
 
 
 @kernel
@@ -146,8 +183,8 @@ def _find_lit(rangers: RangerPair, walls: Floats, a: Acoustics, lit: Ints) -> in
 
 
 @kernel
-def _search_walls(rangers: RangerPair, search: Search) -> None:
-    """Echoes straight back from the foot of the perpendicular on each wall."""
+def _search_walls(rangers: RangerPair, search: Search, times: int) -> None:
+    """Echoes straight back from the foot of the perpendicular on each wall, or so many `times`, with the wearer between."""
     walls, a, nearest = search.walls, search.acoustics, search.nearest_m
     for w in search.lit:
         s = foot(rangers.x, rangers.y, walls[w])
@@ -155,10 +192,12 @@ def _search_walls(rangers: RangerPair, search: Search) -> None:
             continue
         x, y = walls[w, 0] + s * (walls[w, 2] - walls[w, 0]), walls[w, 1] + s * (walls[w, 3] - walls[w, 1])
         side, away, off = _direction(rangers, x, y)
-        if away < a.minimum_m or away >= nearest[side, OWN] or wall_db(away, off, a) < search.threshold_db[side, OWN]:
+        range_m = times * away
+        if range_m < search.earliest_m[side] or range_m >= nearest[side, OWN]:
             continue
-        if not blocked(rangers.x, rangers.y, x, y, walls, w, w):
-            nearest[side, OWN] = away
+        level = path_db(range_m, off, off, 2 * times - 1, a) + (times - 1) * a.body_db
+        if level >= search.threshold_db[side, OWN] and not blocked(rangers.x, rangers.y, x, y, walls, w, w):
+            nearest[side, OWN] = range_m
 
 
 @kernel
@@ -168,7 +207,7 @@ def _search_edges(rangers: RangerPair, edges: Floats, search: Search) -> None:
     for e in range(len(edges)):
         x, y = edges[e, 0], edges[e, 1]
         side, away, off = _direction(rangers, x, y)
-        if away < a.minimum_m or away >= nearest[side, OWN]:
+        if away < search.earliest_m[side] or away >= nearest[side, OWN]:
             continue
         if rod_db(away, off, a.frame_radius_m, a) < search.threshold_db[side, OWN]:
             continue
@@ -225,7 +264,8 @@ def _consider_pair(
     sender, _, off_out = _direction(rangers, b[0], b[1])
     side, _, off_back = _direction(rangers, c[0], c[1])
     kind = OWN if sender == side else CROSS
-    if range_m < a.minimum_m or range_m >= search.nearest_m[side, kind]:
+    least_m = search.earliest_m[side] if kind == OWN else a.minimum_m
+    if range_m < least_m or range_m >= search.nearest_m[side, kind]:
         return
     level = path_db(range_m, off_out, off_back, 2, a)
     if distance(px, py, b[0], b[1], c[0], c[1]) < a.body_m:
