@@ -6,7 +6,6 @@ In: a recording, a tracker on its plan. Out: `PosedPings`. Owns nothing.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import NamedTuple
@@ -14,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization.estimate import Estimate
 from echostep.path import MeasuredSegment
 from echostep.ports.chunks import Portion
 from echostep.tracker import Tracker
+from echostep.tracker.ping_poses import placed_pings
 
 
 class PosedPings(NamedTuple):
@@ -44,7 +44,7 @@ class SwappedTracker(Tracker):
 
 def posed_pings(tracker: Tracker, portions: Iterable[Portion]) -> PosedPings:
     """Track a walk and place its pings."""
-    rows: list[Floats] = []
+    rows: list[Floats] = [np.zeros((0, 5))]
     every, part = 0, 0
 
     def watch(measured: MeasuredSegment | None, estimate: Estimate) -> None:
@@ -53,27 +53,12 @@ def posed_pings(tracker: Tracker, portions: Iterable[Portion]) -> PosedPings:
             return
         every += len(measured.t_s)
         part = measured.ranger_part or part
-        if estimate.status is TrackStatus.TRACKING and not measured.segment.unobserved:
-            rows.append(_placed(measured, estimate, tracker.laid_out.sheet.pitch_m))
+        on_sheet = [0.0, estimate.level * tracker.laid_out.sheet.pitch_m, 0.0, 0.0, 0.0]
+        rows.append(placed_pings(measured, estimate) + on_sheet)
 
     tracker.watchers.append(watch)
     for portion in portions:
         tracker.take(portion)
-    found = np.concatenate(rows) if rows else np.zeros((0, 5))
+    found = np.concatenate(rows)
     ranger, x, y, axis, range_m = found.T
     return PosedPings(ranger.astype(np.int64), x, y, axis, range_m, len(found) / max(every, 1), part)
-
-
-def _placed(measured: MeasuredSegment, estimate: Estimate, pitch_m: float) -> Floats:
-    """Rows (k, 5) of a segment's pings: back from the estimate at its end, along the way in the walk frame."""
-    segment = measured.segment
-    span_s = segment.t1_s - segment.t0_s
-    share = np.clip((measured.t_s - segment.t0_s) / span_s, 0.0, 1.0) if span_s > 0.0 else np.ones(len(measured.t_s))
-    way_x, way_y = segment.way_m(share)
-    back_x, back_y = segment.dx_m - way_x, segment.dy_m - way_y
-    turn = estimate.heading_rad - segment.heading1_rad
-    c, s = math.cos(turn), math.sin(turn)
-    x = estimate.x_m + estimate.level * pitch_m - (c * back_x - s * back_y)
-    y = estimate.y_m - (s * back_x + c * back_y)
-    axis = estimate.heading_rad - (1.0 - share) * segment.turn_rad + measured.off_heading_rad
-    return np.column_stack([measured.ranger, x, y, axis, measured.range_m])

@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization.estimate import Estimate
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan
+from echostep.tracker.ping_poses import placed_pings
 
 # Assumed, all of them.
 REACH_M = 3.0  # along the axis to the wall: half of an SRF02's reach
@@ -38,31 +39,14 @@ class SeenPing(NamedTuple):
 
 @dataclass(slots=True)
 class SeenPings:
-    """Watches a tracker: the pings that were sent between two estimates which are both `tracking`."""
+    """Watches a tracker: the pings that were sent while it says `tracking`."""
 
     pings: list[SeenPing] = field(default_factory=list)
-    _last: Estimate | None = None
 
     def note(self, measured: MeasuredSegment | None, new: Estimate) -> None:
-        """Keep the pings of a segment, from poses between the estimate before it and that at its end."""
-        last, self._last = self._last, new
-        if measured is None or last is None or last.level != new.level or new.t_s <= last.t_s:
-            return
-        if not (last.status is new.status is TrackStatus.TRACKING):
-            return
-        turn_rad = new.heading_rad - measured.segment.heading1_rad
-        rows = zip(
-            measured.t_s.tolist(),
-            measured.off_heading_rad.tolist(),
-            measured.ranger.tolist(),
-            measured.range_m.tolist(),
-            strict=True,
-        )
-        for t_s, off_rad, ranger, range_m in rows:
-            share = min(max((t_s - last.t_s) / (new.t_s - last.t_s), 0.0), 1.0)
-            x_m, y_m = last.x_m + share * (new.x_m - last.x_m), last.y_m + share * (new.y_m - last.y_m)
-            axis_rad = measured.segment.heading_rad(t_s) + turn_rad + off_rad
-            self.pings.append(SeenPing(x_m, y_m, new.level, axis_rad, ranger, range_m))
+        """Keep the pings of a segment."""
+        for ranger, x_m, y_m, axis_rad, range_m in placed_pings(measured, new).tolist():
+            self.pings.append(SeenPing(x_m, y_m, new.level, axis_rad, int(ranger), range_m))
 
 
 class HeardShare(NamedTuple):
