@@ -2,7 +2,7 @@
 """What ends a run from outside: Ctrl-C, SIGTERM, SIGQUIT, and a terminal that is closed (SIGHUP).
 
 In: signals. Out: one KeyboardInterrupt, after which the run writes its files. Owns the handlers, and whether a signal has come. A second Ctrl-C ends
-at once.
+at once. Waiting for a condition (`wait_for`) ends with a signal, too.
 
 An exception between two bytecodes would tear a portion: recorded but not tracked, or tracked but not written. So the loop of a run holds the signal
 back, and its source asks for it between two portions; a live run then takes what its ports have received, and no more. That also finds one that came
@@ -14,13 +14,14 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import TypeVar
 
 Item = TypeVar("Item")
 SIGNAL_POLL_S = 0.1  # a run that ends this late ends at once
+POLL_S = 0.05  # of a condition that is waited for: a USB port that restarts is away for longer; assumed
 _asked = threading.Event()  # a signal has come since `end_by_signals`
 _holding = threading.Event()  # the first one is held back
 HANGUP: signal.Signals | None = getattr(signal, "SIGHUP", None)  # missing on Windows, as is SIGQUIT
@@ -66,6 +67,16 @@ def sleep(span_s: float) -> None:
         if is_asked():
             raise KeyboardInterrupt
         time.sleep(min(left_s, SIGNAL_POLL_S))
+
+
+def wait_for(poll: Callable[[], Item | None], longest_s: float) -> Item | None:
+    """The first value that is not None; None after the longest time. Ends as `sleep` does."""
+    end_s = time.monotonic() + longest_s
+    while time.monotonic() < end_s:
+        if (value := poll()) is not None:
+            return value
+        sleep(POLL_S)
+    return None
 
 
 def _end(_number: int, _frame: FrameType | None) -> None:

@@ -19,7 +19,7 @@ from numba.core.registry import cpu_target
 
 from board_runs import ROOT
 from command_line import PROGRAM, echostep
-from echostep.interruption import end_by_signals, holding_signals, is_asked, sleep
+from echostep.interruption import end_by_signals, holding_signals, is_asked, sleep, wait_for
 from echostep.ports.chunks import Chunk
 from echostep.recording.mcap_records import MCAP_MAGIC
 from echostep.recording.reading import open_recording
@@ -146,11 +146,19 @@ def test_a_held_signal_ends_a_wait_and_a_second_ends_at_once() -> None:
             with pytest.raises(KeyboardInterrupt):
                 sleep(PATIENCE_S)
             with pytest.raises(KeyboardInterrupt):
+                wait_for(lambda: None, PATIENCE_S)
+            with pytest.raises(KeyboardInterrupt):
                 signal.raise_signal(signal.SIGINT)
     finally:
         end_by_signals()  # forgets the two
         for number, handler in handlers:
             signal.signal(number, handler)
+
+
+def test_a_wait_gives_the_first_value_and_none_after_the_longest_time() -> None:
+    values = iter([None, 0, 1])
+    assert wait_for(lambda: next(values), PATIENCE_S) == 0
+    assert wait_for(lambda: None, 0.0) is None
 
 
 def check_files(out: Path, live: subprocess.Popen[bytes]) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Processes of Python that a campaign starts, and waiting for what they do.
+"""Processes of Python that a campaign starts.
 
 In: arguments of the interpreter. Out: running processes, which end with the context. Owns nothing.
 """
@@ -10,15 +10,11 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TypeVar
 
 END_S = 20.0  # for the end of a process after SIGINT; then it is killed
-POLL_S = 0.1
-T = TypeVar("T")
 
 
 def start_python(opened: ExitStack, arguments: Sequence[str], errors: Path | None = None) -> subprocess.Popen[str]:
@@ -41,13 +37,3 @@ def end(running: subprocess.Popen[str]) -> None:
     except subprocess.TimeoutExpired:
         running.kill()
         running.communicate()
-
-
-def wait_for(condition: Callable[[], T | None], longest_s: float) -> T | None:
-    """The first value that is not None; None after the longest time."""
-    end_s = time.monotonic() + longest_s
-    while time.monotonic() < end_s:
-        if (value := condition()) is not None:
-            return value
-        time.sleep(POLL_S)
-    return None

@@ -23,6 +23,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from echostep.guidance.cues import CueKind
+from echostep.interruption import wait_for
 from echostep.plan.model import Plan, load_plan
 from echostep.ports.chunks import Chunk
 from echostep.session.chunk_streams import paced, portions_of, with_messages
@@ -43,7 +44,7 @@ from places import PLAN, TWIN
 from reliability.broker import broker
 from reliability.campaign import options
 from reliability.operation_crews import INSIDE, RESCUE, SimulatedCrews, crews_written
-from reliability.processes import start_python, wait_for
+from reliability.processes import start_python
 from reliability.team_load import report_at
 
 FALLEN_WAY: tuple[Waypoint, ...] = (

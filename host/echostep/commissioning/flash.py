@@ -13,7 +13,7 @@ import re
 import shutil
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -28,6 +28,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 from echostep.commissioning.probe import probe
 from echostep.commissioning.serial_ports import BOARD_NAME, Role, access_findings, find, list_seen
 from echostep.errors import EchostepError
+from echostep.interruption import wait_for
 from echostep.ports.chunks import BOARD
 from echostep.ports.port_faults import PORT_FAULTS
 
@@ -36,7 +37,6 @@ BOOTLOADER_S = 10.0  # longest wait for its port; the bootloader runs for eight 
 RESTART_S = 10.0  # longest wait for the port and the first message of the firmware
 PROBE_S = 1.2
 ACCESS_S = 2.0  # longest wait for udev to set the permissions of the port
-POLL_S = 0.05
 AVRDUDE_S = 120.0
 READER_S = 2.0  # for the last of avrdude's output; assumed
 FLASH_MAX = 32768 - 4096  # bytes; the bootloader occupies the rest of the ATmega32U4
@@ -138,20 +138,11 @@ def enter_bootloader(port: str) -> str:
         fresh = next((s.path for s in seen if s.role is Role.BOOTLOADER or s.path not in before), None)
         return fresh or (port if gone and Path(port).exists() else None)
 
-    bootloader = _await(bootloader_port, BOOTLOADER_S)
+    bootloader = wait_for(bootloader_port, BOOTLOADER_S)
     if bootloader is None:
         raise EchostepError(f"{port}: the board did not enter its bootloader in {BOOTLOADER_S:.0f} s: {PRESS}")
-    _await(lambda: bootloader if os.access(bootloader, os.R_OK | os.W_OK) else None, ACCESS_S)
+    wait_for(lambda: bootloader if os.access(bootloader, os.R_OK | os.W_OK) else None, ACCESS_S)
     return bootloader
-
-
-def _await(poll: Callable[[], str | None], seconds: float) -> str | None:
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        if (result := poll()) is not None:
-            return result
-        time.sleep(POLL_S)
-    return None
 
 
 def write(avrdude: str, port: str, path: Path) -> None:
@@ -216,22 +207,26 @@ def _error_line(output: str) -> str:
 
 def _confirm(port: str) -> str:
     """Wait for the board's port, and for the first message of its firmware."""
-    back = _await(lambda: port if Path(port).exists() else find(list_seen(), Role.BOARD, BOARD_NAME), RESTART_S)
+    back = wait_for(lambda: port if Path(port).exists() else find(list_seen(), Role.BOARD, BOARD_NAME), RESTART_S)
     if back is None:
         raise EchostepError(
             f"written and verified, but the board did not come back in {RESTART_S:.0f} s: unplug it and plug it in again"
         )
-    deadline = time.monotonic() + RESTART_S
-    while time.monotonic() < deadline:
-        try:
-            probed = probe({BOARD: back}, PROBE_S)
-        except EchostepError:  # the bootloader's port is going away
-            time.sleep(POLL_S)
-            continue
-        if probed.stale_firmware:
-            return f"written and verified; {probed.stale_firmware}"
-        if i := probed.reports.identity:
-            return f"written and verified; firmware {i.version_major}.{i.version_minor}.{i.version_patch} answers at {back}"
+    if said := wait_for(lambda: _answer(back), RESTART_S):
+        return said
     raise EchostepError(
         f"written and verified, but {back} is silent: unplug the board and plug it in again, then: echostep doctor"
     )
+
+
+def _answer(port: str) -> str | None:
+    """What the firmware at a port says; None while it is silent, or the bootloader's port is going away."""
+    try:
+        probed = probe({BOARD: port}, PROBE_S)
+    except EchostepError:
+        return None
+    if probed.stale_firmware:
+        return f"written and verified; {probed.stale_firmware}"
+    if i := probed.reports.identity:
+        return f"written and verified; firmware {i.version_major}.{i.version_minor}.{i.version_patch} answers at {port}"
+    return None
