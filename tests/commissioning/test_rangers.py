@@ -197,12 +197,12 @@ def test_a_walk_that_is_not_believed_or_too_short_gives_no_settings() -> None:
     assert unbelieved.values == short.values == {}
 
 
-def recorded(folder: Path) -> Path:
+def recorded(folder: Path, settings_toml: str = "") -> Path:
     """The simulated demo walk."""
     plan = load_plan(DEMO)
     scenario = demo_scenario(plan, 3, PythonBoard(3))
     with start_recording(
-        folder / "walk.mcap", run_metadata(plan, plan.start, 1, "simulated", source="simulated")
+        folder / "walk.mcap", run_metadata(plan, plan.start, 1, "simulated", settings_toml, source="simulated")
     ) as recorder:
         for chunk in scenario.chunks():
             recorder.write(chunk)

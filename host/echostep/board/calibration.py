@@ -49,7 +49,8 @@ class Echo(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class RangerSettings:
     """`speed_of_sound_m_s`; `delay_s` from the time stamp of the trigger to the ultrasonic burst; `ahead_deg`: how far both rangers look ahead of
-    abeam, as the belt carries them; `left_bias_m`, `right_bias_m`: what each measures too much (`echostep calibrate rangers`).
+    abeam, as the belt carries them; `left_bias_m`, `right_bias_m`: what each measures too much (`echostep calibrate rangers`). `learn`: after each
+    live walk on a plan, suggest settings of its rangers.
     """
 
     speed_of_sound_m_s: float = SPEED_OF_SOUND_M_S
@@ -57,6 +58,7 @@ class RangerSettings:
     ahead_deg: float = 0.0
     left_bias_m: float = 0.0
     right_bias_m: float = 0.0
+    learn: bool = False
 
     def __post_init__(self) -> None:
         """Raise ValueError for rangers that do not look aside, or measure what no ranger does."""

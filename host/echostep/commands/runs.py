@@ -80,7 +80,13 @@ def live(
 
     outputs = output.options(out)
     plan = _plan_file(tracking.plan, outputs.outlet, out)
-    live_run.live(tracking.options(plan, seed), ports.options(), outputs)
+    options = tracking.options(plan, seed)
+    recording = live_run.live(options, ports.options(), outputs)
+    if options.settings_path is not None:
+        from echostep.commands.actions.learning import learn_rangers
+        from echostep.session.console import console
+
+        learn_rangers(recording, options, console)
 
 
 @app.command()

@@ -188,9 +188,9 @@ class LivePage:
         """Show on all pages which surveyed point comes next; from then on they take taps at points."""
         self._mailbox.set_points(points)
 
-    def pop_presses(self) -> Iterator[PointPress]:
-        """Taps at surveyed points that the pages have sent since the last call."""
-        return self._mailbox.pop_presses()
+    def take_presses(self, take: Callable[[PointPress], bool]) -> None:
+        """Call `take` with each tap at a surveyed point, in the server's thread; it returns whether the tap was accepted."""
+        self._mailbox.on_press = take
 
     def note_arrival(self) -> None:
         """Bytes have arrived: their time is the start of the latency of the scenes that follow."""

@@ -96,10 +96,12 @@ class Mailbox:
         ] = ()  # in order of `t_s`; a live run has the newest only; replaced, never changed
         self.team: tuple[str, ...] = ()  # names of the teammates who can be met; replaced, never changed
         self.points: ShownPoints | None = None  # of an acceptance walk; replaced, never changed
+        self.on_press: Callable[[PointPress], bool] | None = (
+            None  # takes taps at points at once, in the server's thread
+        )
         self.on_publish: Callable[[], None] | None = None
         self._check_ins: queue.Queue[CheckIn | Undo | Call] = queue.Queue(MOST_CHECK_INS)
         self._met: queue.Queue[str] = queue.Queue(MOST_CHECK_INS)
-        self._presses: queue.Queue[PointPress] = queue.Queue(MOST_CHECK_INS)
 
     def publish(self, scene: PageScene) -> None:
         """Store a new scene and call `on_publish`; called in the tracker's thread."""
@@ -174,12 +176,8 @@ class Mailbox:
         return _popped(self._met)
 
     def add_press(self, press: PointPress) -> bool:
-        """Queue a tap at a surveyed point; False when it is refused: in a replay, or with a full queue."""
-        return self._put(self._presses, press)
-
-    def pop_presses(self) -> Iterator[PointPress]:
-        """Remove and yield the taps at surveyed points; never blocks."""
-        return _popped(self._presses)
+        """Hand on a tap at a surveyed point; False when it is refused: in a replay, or by the guide of the walk."""
+        return not self.replay and self.on_press is not None and self.on_press(press)
 
     def _put(self, waiting: queue.Queue[T], item: T) -> bool:
         if self.replay:

@@ -4,14 +4,13 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from typing import cast
 
 import pytest
 
 from echostep.page.elements.taps import PointPress, ShownPoints
 from echostep.page.live import LivePage
-from echostep.page.mailbox import Mailbox
-from echostep.plan.model import NO_PLAN
 from echostep.ports.arrival_clock import now_ns
 from echostep.ports.people.tap import Tap, parse_tap
 from echostep.session.acceptance import guide as guides
@@ -69,22 +68,34 @@ def test_other_lines_are_no_taps() -> None:
     assert max(map(len, said)) < 200
 
 
+class Page:
+    """A page that keeps what it is told to show, and whose buttons are pressed."""
+
+    points: ShownPoints
+
+    def set_points(self, points: ShownPoints) -> None:
+        self.points = points
+
+    def take_presses(self, take: Callable[[PointPress], bool]) -> None:
+        self.take = take
+
+
 def test_the_buttons_of_a_page_are_the_keys() -> None:
     """The same taps, at the time of the press; a second press of a button that named an earlier point is none."""
     presses = [(0, ""), (0, ""), (1, "4"), (4, "u"), (4, "u"), (1, "9"), (1, ""), (9, "")]
-    mailbox, pressed_ns = Mailbox(NO_PLAN, "test", replay=False), now_ns()
+    page, pressed_ns = Page(), now_ns()
     guide = Guide(corridor("20x2"), 1, io.StringIO(), lambda _: None, {})
-    guide.attach(cast(LivePage, mailbox))
-    guide.pop()
-    assert mailbox.points == ShownPoints(
+    guide.attach(cast(LivePage, page))
+    assert guide.pop() == []
+    assert page.points == ShownPoints(
         0,
         "1",
         "Stand on point 1, look to point 2, and stay. Press while you stand.",
         ("1", "2", "3", "4", "5"),
         undo=False,
     )
-    for k, (number, typed) in enumerate(presses):
-        assert mailbox.add_press(PointPress(pressed_ns + k, number, typed))
+    taken = [page.take(PointPress(pressed_ns + k, number, typed)) for k, (number, typed) in enumerate(presses)]
+    assert taken == [True, False, True, True, False, True, True, False]
     payloads = guide.pop()
     assert payloads == [
         Tap(0, standing=True, t_ns=pressed_ns).encode(),
@@ -96,22 +107,32 @@ def test_the_buttons_of_a_page_are_the_keys() -> None:
     assert [tap and (tap.point, tap.standing) for tap in map(parse_tap, payloads)] == [
         (tap.point, tap.standing) for tap in typed_taps
     ]
-    assert mailbox.points.number == 2
-    assert mailbox.points.name == "3"
-    assert mailbox.points.text == "2 of 8, round 1 of 1: stop with both feet beside it, press, walk on"
-    assert mailbox.points.undo
+    assert (page.points.number, page.points.name) == (2, "3")
+    assert page.points.text == "2 of 8, round 1 of 1: stop with both feet beside it, press, walk on"
+    assert page.points.undo
 
 
 def test_after_the_last_point_no_button_is_left() -> None:
-    mailbox = Mailbox(NO_PLAN, "test", replay=False)
+    page = Page()
     guide = Guide(corridor("20x2"), 1, io.StringIO(), lambda _: None, {})
-    guide.attach(cast(LivePage, mailbox))
-    for number in range(10):
-        mailbox.add_press(PointPress(now_ns(), number, ""))
+    guide.attach(cast(LivePage, page))
+    assert guide.pop() == []
+    assert all(page.take(PointPress(now_ns(), number, "")) for number in range(9))  # at once, before the run goes on
+    assert (page.points.name, page.points.later) == ("", ())
+    assert page.points.text.startswith("The last point. Stand still for 5 s")
     assert len(guide.pop()) == 9
-    assert mailbox.points
-    assert (mailbox.points.name, mailbox.points.later) == ("", ())
-    assert mailbox.points.text.startswith("The last point. Stand still for 5 s")
+
+
+def test_a_flood_of_presses_is_refused_while_the_run_is_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guides, "MOST_TAPS", 4)
+    page = Page()
+    guide = Guide(corridor("20x2"), 1, io.StringIO(), lambda _: None, {})
+    guide.attach(cast(LivePage, page))
+    guide.pop()
+    taken = [page.take(PointPress(now_ns(), k % 2, "u" if k % 2 else "")) for k in range(8)]
+    assert taken == 4 * [True] + 4 * [False]
+    assert len(guide.pop()) == 4
+    assert page.take(PointPress(now_ns(), 0, ""))
 
 
 def test_the_run_ends_after_the_last_point(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from echostep.commissioning.calibrate import read_sections, write_sections
+from echostep.commissioning.calibrate import Sections, read_sections, write_sections
 from echostep.commissioning.rangers.faults import SWAPPED
 from echostep.commissioning.rangers.poses import PosedPings, SwappedTracker, posed_pings
-from echostep.commissioning.rangers.report import report
+from echostep.commissioning.rangers.report import RangerReport, report
 from echostep.errors import EchostepError
 from echostep.localization.echoes.rangers import echo_of
 from echostep.recording.parts.joining import open_parts
@@ -41,24 +41,36 @@ def walk_now(ports: PortOptions, folder: Path, console: Console) -> Path:
 
 def calibrate_rangers(paths: list[Path], tracking: TrackingOptions, out: Path, console: Console) -> None:
     """Judge and fit the rangers of a walk; raises EchostepError where the walk cannot be used, or a ranger has a fault."""
-    recording = open_parts(paths)
-    tracker = tracker_of(recording, plan_of(tracking), tracking)
-    pings = posed_pings(tracker, recording.portions())
+    tracker, pings = tracked(paths, tracking)
     if pings.believed < SURELY <= _swapped(paths, tracker).believed:
         raise EchostepError(f"{SWAPPED} {NOTHING}")
-    usual = echo_of(pings.part, tracker.settings.echo)
-    found = report(pings, tracker.laid_out.walls, usual, tracker.settings.ranger)
+    found = report_of(tracker, pings)
     for line in found.lines:
         console.print(line)
     if found.faults:
         raise EchostepError("\n".join([*found.faults, NOTHING]))
     if not found.values:
         return
-    sections = read_sections(out)
-    for section, values in found.values.items():
-        sections.setdefault(section, {}).update(values)
-    write_sections(out, sections)
+    write_sections(out, merged(read_sections(out), found))
     console.print(f"{out}: use it with --settings {out}")
+
+
+def tracked(paths: list[Path], tracking: TrackingOptions) -> tuple[Tracker, PosedPings]:
+    """A tracker that has taken a walk, and the walk's pings at the places where it believed them to be sent."""
+    recording = open_parts(paths)
+    tracker = tracker_of(recording, plan_of(tracking), tracking)
+    return tracker, posed_pings(tracker, recording.portions())
+
+
+def report_of(tracker: Tracker, pings: PosedPings) -> RangerReport:
+    """Faults, or fitted settings, beside those of the walk."""
+    usual = echo_of(pings.part, tracker.settings.echo)
+    return report(pings, tracker.laid_out.walls, usual, tracker.settings.ranger)
+
+
+def merged(sections: Sections, found: RangerReport) -> Sections:
+    """Settings with what was fitted."""
+    return sections | {name: sections.get(name, {}) | values for name, values in found.values.items()}
 
 
 def _swapped(paths: list[Path], tracker: Tracker) -> PosedPings:

@@ -3,6 +3,8 @@
 
 In: lines that are typed, or the same from a page's buttons: Enter is the next point, a name that point, `u` takes the newest tap back. Out: the
 bytes of taps; what to do next, in words. Owns the thread that reads the lines, and how far the walk has come.
+
+What is typed or pressed counts at once, in the thread that brings it, so the next point is asked for while the run is behind its ports.
 """
 
 from __future__ import annotations
@@ -10,11 +12,11 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, TextIO
 
-from echostep.page.elements.taps import NO_TAP, ShownPoints
+from echostep.page.elements.taps import NO_TAP, PointPress, ShownPoints
 from echostep.ports.arrival_clock import now_ns
 from echostep.ports.people.tap import Tap
 from echostep.session.acceptance.protocol import Protocol, Visit
@@ -28,7 +30,10 @@ HELP = (
 )
 KEY, BUTTON = "Enter", "press"  # what the wearer does at a point, in words
 REST_S = 5.0  # for which the wearer stands after the last tap: estimates come twice a second
-MOST_LETTERS, MOST_LINES = 64, 16  # of a line that is looked at, a name has at most 32; of lines that wait
+MOST_LETTERS, MOST_TAPS = (
+    64,
+    1000,
+)  # of a line that is looked at, a name has at most 32; of taps that wait while the run is behind
 
 
 class Guide:
@@ -42,24 +47,25 @@ class Guide:
         self._points, self._rounds = protocol.points, rounds
         self._visits = protocol.visits(rounds)
         self._say = say
-        # Lines with their times; None: no more come
-        self._typed: queue.Queue[tuple[int, str | None]] = queue.Queue(MOST_LINES)
+        self._lines = lines
+        self._lock = threading.RLock()
+        self._waiting: queue.Queue[Tap] = queue.Queue(MOST_TAPS)
         self._tapped: list[int] = []  # numbers of the visits
         self._ended_s: float | None = None
         self._begun = False
         self._page: LivePage | None = None
-        threading.Thread(target=self._read, args=(lines,), daemon=True).start()
 
-    def _read(self, lines: TextIO) -> None:
-        """Queue the lines up to the end of the input, which is also that of a terminal that was closed."""
+    def _read(self) -> None:
+        """Take the lines up to the end of the input, which is also that of a terminal that was closed."""
         with suppress(OSError, ValueError):
-            while line := lines.readline(MOST_LETTERS):
-                self._typed.put((now_ns(), line.strip()))
-        self._typed.put((now_ns(), None))
+            while line := self._lines.readline(MOST_LETTERS):
+                self._take(now_ns(), line.strip())
+        self._say("No more lines can be typed: what was tapped counts; Ctrl-C ends.")
 
     def attach(self, page: LivePage) -> None:
         """Show the points on a page, whose buttons do as the keys."""
         self._page = page
+        page.take_presses(self.press)
 
     @property
     def _next(self) -> int:
@@ -67,29 +73,29 @@ class Guide:
         return self._tapped[-1] + 1 if self._tapped else 0
 
     def pop(self) -> list[bytes]:
-        """Taps since the last call; says what to do next."""
+        """Taps since the last call; the first one says what to do."""
         if not self._begun:
             self._begun = True
             self._say(HELP)
             self._ask()
-        payloads = []
-        for t_ns, typed in self._waiting():
-            if typed is None:
-                self._say("No more lines can be typed: what was tapped counts; Ctrl-C ends.")
-                continue
+            threading.Thread(target=self._read, daemon=True).start()
+        return [self._waiting.get().encode() for _ in range(self._waiting.qsize())]
+
+    def press(self, press: PointPress) -> bool:
+        """Take the press of a button; False where it showed an earlier visit: a second press of a slow button is none."""
+        with self._lock:
+            return press.number == self._next and self._take(press.t_ns, press.typed)
+
+    def _take(self, t_ns: int, typed: str) -> bool:
+        """Queue the tap of a line and say what to do next; False while too many taps wait."""
+        with self._lock:
+            if self._waiting.full():
+                return False
             if (tap := self._tap(t_ns, typed)) is not None:
-                payloads.append(tap.encode())
+                self._waiting.put(tap)
                 self._ended_s = time.monotonic() if self._next == len(self._visits) else None
             self._ask()
-        return payloads
-
-    def _waiting(self) -> Iterator[tuple[int, str | None]]:
-        """Lines, and presses of buttons that named the next visit when they were shown: a second press of a button that was slow is none."""
-        for _ in range(self._typed.qsize()):
-            yield self._typed.get()
-        for press in self._page.pop_presses() if self._page else ():
-            if press.number == self._next:
-                yield press.t_ns, press.typed
+        return True
 
     def _ask(self) -> None:
         """Say what the wearer does next, on the terminal and on the page."""
