@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from rich.console import Console
+from typer.testing import CliRunner
 
 from commissioning.test_rangers import calibrated, pings_of, recorded
+from echostep.cli import app
 from echostep.commands.actions import learning
 from echostep.commands.actions.learning import learn_rangers
 from echostep.commissioning.rangers.poses import PosedPings
@@ -107,3 +109,16 @@ def test_a_walk_that_was_doubted_or_is_without_plan_teaches_nothing(
 
 def test_a_plan_that_is_gone_ends_no_run(walk: Path, tmp_path: Path) -> None:
     assert said(walk, tmp_path / "gone.json").startswith("Rangers: nothing was learned: ")
+
+
+def test_the_live_command_learns_when_its_run_is_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[tuple[Path, Path | None]] = []
+    settings = tmp_path / "own.toml"
+    settings.write_text(LEARN)
+    monkeypatch.setattr("echostep.session.runs.live.live", lambda *_: tmp_path / "walk.mcap")
+    monkeypatch.setattr(learning, "learn_rangers", lambda walk, tracking, _: seen.append((walk, tracking.plan_path)))
+    given = ["live", "--plan", str(DEMO), "--board", "socket://localhost:1", "--no-page"]
+    for more in ([], ["--settings", str(settings)]):
+        done = CliRunner().invoke(app, [*given, *more])
+        assert done.exit_code == 0, done.output
+    assert seen == [(tmp_path / "walk.mcap", DEMO)]
