@@ -60,3 +60,15 @@ def test_sensors_that_have_never_moved_say_nothing() -> None:
     windows = stillness.add_foot(t_s, np.hstack([values] * 3), np.hstack([values] * 3))
     assert [window.end_s for _, window in windows] == [2.5, 3.0, 3.5]
     assert WINDOW_S == 0.5
+
+
+def test_times_that_step_back_over_a_window_are_skipped_in_whatever_portions() -> None:
+    """Arrival times of a computer that is too busy do: the second portion's last sample belongs to the window that its first one has ended."""
+    t_s, portions = np.array([0.1, 0.4, 0.55, 0.49, 0.7, 1.05, 0.9, 1.6]), ([0, 2], [2, 4], [4, 5], [5, 8])
+    values = np.zeros((len(t_s), 6))
+    whole, single, cut = (MotionWindows(np.ones(6)) for _ in range(3))
+    expected = whole.add(t_s, values)
+    assert [index for index, _ in expected] == [2, 5, 7]
+    one_by_one = [(k + i, w) for k in range(len(t_s)) for i, w in single.add(t_s[k : k + 1], values[k : k + 1])]
+    assert one_by_one == expected
+    assert [(a + i, w) for a, b in portions for i, w in cut.add(t_s[a:b], values[a:b])] == expected

@@ -78,10 +78,10 @@ class MotionWindows:
     def add(self, t_s: Floats, values: Floats) -> list[tuple[int, Window]]:
         """Windows completed by samples `values` (n, c) at `t_s` (n,), each with the index of the sample that does.
 
-        Samples of an earlier window are skipped.
+        Samples of an earlier window than any before them are skipped.
         """
         index = np.floor(t_s / WINDOW_S).astype(np.int64)
-        fresh = np.flatnonzero(index >= self._index)
+        fresh = np.flatnonzero(index == np.maximum.accumulate(np.maximum(index, self._index)))
         if not len(fresh):
             return []
         before, last = self._count, int(index[fresh[-1]])
