@@ -18,11 +18,12 @@ from echostep.simulation.people.tours import room_tour, tour
 from echostep.simulation.people.walker import RATE_HZ, Person, Waypoint, walk
 from echostep_studies.bench import sites
 from echostep_studies.floors.storeys import through
+from echostep_studies.frame.recordings import DATA
 from echostep_studies.noplan import sites as drawn_sites
 from echostep_studies.operation.walks import waypoints as operation_waypoints
 from echostep_studies.simulation.tower import tour as tower_tour
 from echostep_studies.simulation.tower import tower
-from needs_data import DATA, needs_data
+from needs_data import needs_data
 
 PERSON = Person(corner_m=0.3)  # as in the studies
 STOREY_M, INNER_M, OUTER_M = 3.5, 2.0, 3.2  # of a quarter of a winding stair about the origin

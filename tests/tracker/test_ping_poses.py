@@ -11,7 +11,7 @@ import pytest
 
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.session.acceptance.heard import SeenPing, SeenPings
+from echostep.session.acceptance.heard import SeenPings
 from echostep.tracker.ping_poses import placed_pings
 
 # 2 m along the walk frame's x axis in 2 s; in the map, along its y axis to (5, 8)
@@ -50,4 +50,4 @@ def test_seen_pings_are_these_on_the_estimates_level() -> None:
     seen.note(MEASURED, END)
     seen.note(None, END)
     assert len(seen.pings) == 3
-    assert seen.pings[2] == SeenPing(pytest.approx(5.0), pytest.approx(8.0), 2, pytest.approx(math.pi), 0, 2.0)
+    assert tuple(seen.pings[2]) == pytest.approx((5.0, 8.0, 2, math.pi, 0, 2.0))
