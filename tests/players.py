@@ -124,7 +124,7 @@ def twin_board(*faults: str, rows: Callable[[int], NDArray[Any]] = quiet_rows) -
 
 @contextlib.contextmanager
 def walking_twin(folder: Path, *options: str) -> Iterator[tuple[str, str]]:
-    """A wearer who walks through the demo building: the ports of the board, real firmware in the simulator, and of an MTx or a foot board."""
+    """A walk through the demo building in the twin: the ports of the board, real firmware in the simulator, and of an MTx or a foot board."""
     command = [*tool("twin.run"), *options, "--out", str(folder)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
         try:

@@ -129,3 +129,12 @@ def test_bytes_and_the_name_reach_the_disk(tmp_path: Path, monkeypatch: pytest.M
         recorder.write(Chunk("board", 1, b"bytes"))
     assert synced[-1] == (tmp_path / "a.mcap").stat().st_ino
     assert background_writer.SYNC_S <= 1.0
+
+
+def test_the_files_of_a_run_are_found_by_any_of_them(tmp_path: Path) -> None:
+    first = tmp_path / "[my-party]-0001.mcap"
+    parts = [names.part_name(first, number) for number in (2, 10)]
+    for path in (first, *parts, tmp_path / "[my-party]-00012.mcap", names.part_name(tmp_path / "m-0001.mcap", 2)):
+        path.touch()
+    for any_of_them in (first, *parts):
+        assert names.files_of(any_of_them) == [first, *parts]

@@ -39,9 +39,8 @@ STAIRS_M, STAIRS_RISE_M = 0.57, 0.34  # two treads of 28.5 and 17 cm; houses dif
 STAIRS_WEIGHT = 0.15  # of the length by the angles
 OWN_SD_M = 0.06  # of one stride, besides the scale: 99 strides of four real legs
 EDGE_SD_M = 0.12  # of an edge of a walk: ten edges of the same legs
-BLIND_SD_M = (
-    0.65  # of a stride that this leg does not show, at least: half of a usual one, for it may be none or a whole one
-)
+# Of a stride that this leg does not show, at least: half of a usual one, for it may be none or a whole one
+BLIND_SD_M = 0.65
 LOOK = 3  # grid samples on either side, from which a rate is computed
 SWING_END = 0.35  # of the peak rate: below it the swing is over
 STANCE = 62  # percent of a stride

@@ -23,6 +23,7 @@ except ImportError:  # Windows: there an open file cannot be removed
     fcntl = None  # type: ignore[assignment]
 
 SUFFIX = ".mcap"
+PART_SIGN = "-part"  # between the name of a run's first file and the number of a later one
 LEAST_KEPT = 2  # of `remove_older`: the run's own recording and the one before
 
 
@@ -64,6 +65,17 @@ def new_name(wanted: Path) -> Path:
     return wanted.with_stem(f"{wanted.stem}-{number:04}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}")
 
 
+def part_name(first: Path, number: int) -> Path:
+    """The name of a later part of the run whose first file this is."""
+    return first.with_stem(f"{first.stem}{PART_SIGN}{number:04}")
+
+
+def files_of(recording: Path) -> list[Path]:
+    """The files of a run in their order, by any of them."""
+    first = recording.with_stem(re.sub(rf"{PART_SIGN}\d{{4}}$", "", recording.stem))
+    return [first, *sorted(first.parent.glob(f"{glob.escape(first.stem)}{PART_SIGN}[0-9][0-9][0-9][0-9]{SUFFIX}"))]
+
+
 def link_newest(newest: Path, wanted: Path) -> bool:
     """Make `wanted` a second name of the newest recording; False: a file without another name has it, or links are not possible there."""
     try:
@@ -86,11 +98,9 @@ def remove_older(wanted: Path, keep: int) -> list[Path]:
     for _, path in sorted(_numbered(wanted))[: -max(keep, LEAST_KEPT)]:
         with suppress(OSError):
             if not is_being_written(path):
-                path.unlink()
-                removed.append(path)
-                for part in path.parent.glob(f"{glob.escape(path.stem)}-part[0-9][0-9][0-9][0-9]{SUFFIX}"):
-                    part.unlink()
-                    removed.append(part)
+                for file in files_of(path):
+                    file.unlink()
+                    removed.append(file)
     return removed
 
 

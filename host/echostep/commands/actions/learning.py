@@ -18,6 +18,7 @@ from echostep.commissioning.rangers.report import RangerReport
 from echostep.errors import EchostepError
 from echostep.localization.echoes.rangers import echo_of
 from echostep.printing.file_mode import claim
+from echostep.recording.names import files_of
 from echostep.recording.reading import open_recording
 from echostep.session.metadata import plan_of
 from echostep.session.options import TrackingOptions
@@ -25,7 +26,6 @@ from echostep.settings import parse_settings
 from echostep.tracker import Tracker
 
 ENDING = "-rangers.toml"  # of the file, after the recording's name
-PART = "-part"  # between a recording's name and the number of a part [recording/names.py]
 NOTHING = "Rangers: nothing was learned"
 
 
@@ -53,13 +53,14 @@ def _learned(recording: Path, on_plan: TrackingOptions, sections: Sections) -> s
     """Track the walk again, fit, write; the sentence about it."""
     if not plan_of(on_plan).is_drawn:
         return f"{NOTHING}: without a plan no echo has a known distance"
-    name = recording.stem.split(PART)[0]
-    tracker, pings = tracked(sorted(recording.parent.glob(f"{name}*{recording.suffix}")), on_plan)
+    files = files_of(recording)
+    tracker, pings = tracked(files, on_plan)
     if pings.believed < SURELY:
         return f"{NOTHING}: the place was doubted for {100.0 * (1.0 - pings.believed):.0f} % of the pings"
     found = report_of(tracker, pings)
     if not found.values:
         return f"{NOTHING}: {' '.join(found.faults or found.lines[-1:])}"
+    name = files[0].stem
     out = recording.with_name(f"{name}{ENDING}")
     try:
         claim(out)

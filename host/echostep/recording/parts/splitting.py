@@ -17,6 +17,7 @@ from threading import Thread
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
 from echostep.recording.background_writer import BackgroundWriter
+from echostep.recording.names import part_name
 from echostep.recording.recorder import NEXT, PART, PART_NAME, RUN, Recorder
 
 UNITS = {"MB": 1e6, "GB": 1e9, "min": 60e9, "h": 3600e9}  # bytes, or nanoseconds
@@ -79,7 +80,7 @@ class SplitRecorder(Recorder):
         super().write(chunk)
 
     def _begin_part(self, t_ns: int) -> None:
-        path = self._first.with_stem(f"{self._first.stem}-part{self._part + 1:04}")
+        path = part_name(self._first, self._part + 1)
         try:
             file = BackgroundWriter(path)
         except EchostepError as error:

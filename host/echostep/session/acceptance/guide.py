@@ -30,10 +30,8 @@ HELP = (
 )
 KEY, BUTTON = "Enter", "press"  # what the wearer does at a point, in words
 REST_S = 5.0  # for which the wearer stands after the last tap: estimates come twice a second
-MOST_LETTERS, MOST_TAPS = (
-    64,
-    1000,
-)  # of a line that is looked at, a name has at most 32; of taps that wait while the run is behind
+MOST_LETTERS = 64  # of a line that is looked at; a name has at most 32
+MOST_TAPS = 1000  # that wait while the run is behind
 
 
 class Guide:
