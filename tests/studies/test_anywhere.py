@@ -39,7 +39,7 @@ def run_of(
     """Claims a second and `pace_m` apart."""
     k = np.arange(len(error_m), dtype=float)
     codes = np.array([CODE[s] for s in status])
-    return JudgedRun(k, pace_m * k, np.array(error_m), codes, np.full(len(k), protection_m))
+    return JudgedRun(k, pace_m * k, np.array(error_m), codes, np.full(len(k), protection_m), np.full(len(k), math.nan))
 
 
 # ---- columns ----
@@ -83,7 +83,7 @@ def test_false_alarms_begin_while_tracking() -> None:
 
 
 def claim(t_s: float, x_m: float, status: TrackStatus = TRACKING, plan_fits: float = 1.0) -> Claim:
-    return Claim(t_s, x_m, 0.0, 0, 0.0, status, math.inf, plan_fits)
+    return Claim(t_s, x_m, 0.0, 0, 0.0, status, math.inf, plan_fits, covariance_m2=(0.04, 0.0, 0.01))
 
 
 def test_a_wrong_floor_is_a_storey_off() -> None:
@@ -91,6 +91,16 @@ def test_a_wrong_floor_is_a_storey_off() -> None:
     right = np.array([[True, False], [False, True], [False, True]])
     run = judge(claims, TruePlaces(np.zeros((3, 2)), right), np.zeros(3))
     assert run.error_m.tolist() == [0.0, 3.5, 6.0]
+
+
+def test_an_ellipse_holds_what_is_within_it_on_the_right_floor() -> None:
+    """0.2 m along x and 0.1 m along y: 95 % within 2.45 times that."""
+    claims = [claim(0.0, 0.48), claim(1.0, 0.50), claim(2.0, 0.0), claim(3.0, 0.0), claim(4.0, 0.0, UNCERTAIN)]
+    true_m = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 0.24], [0.0, 0.0], [0.0, 0.0]])
+    right = np.array([[True], [True], [True], [False], [True]])
+    assert judge(claims, TruePlaces(true_m, right), np.zeros(5)).in_ellipse.tolist() == [True, False, True, False]
+    unstated = Claim(0.0, 0.0, 0.0, 0, 0.0, TRACKING, math.inf)
+    assert judge([unstated], TruePlaces(true_m[:1], right[:1]), np.zeros(1)).in_ellipse.tolist() == []
 
 
 SQUARE_M = np.array([[0, 0], [2, 0], [2, 2], [0, 2]], float)
@@ -127,7 +137,7 @@ def test_a_summary_by_hand() -> None:
     (row,) = summaries(rows)
     expected = {
         "runs": 2, "found": 0.5, "listed": 0.5, "found_m": 0.0, "mean_m": 0.2, "median_m": 2.15, "lost": 1, "false_tracking": 0.5, "false_lost": 0.0,
-        "beyond_protection": 0.0, "alarm_s": 3600.0, "alarm_in_5s": 0.0, "false_alarms_h": 0.0, "named": 0.5, "tracking": 1.0,
+        "beyond_protection": 0.0, "alarm_s": 3600.0, "alarm_in_5s": 0.0, "false_alarms_h": 0.0, "named": 0.5, "tracking": 1.0, "in_ellipse": 0.5,
         "most_particles": 300, "times_real_time": 100.0,
     }  # fmt: skip
     assert isinstance(row, JudgedSummary)

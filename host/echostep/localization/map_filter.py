@@ -19,6 +19,7 @@ from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.belief import PLAN_FITS, STATED, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
 from echostep.localization.building import Building
 from echostep.localization.echoes.likelihood import EchoSettings
+from echostep.localization.echoes.range_bias import RangeBias
 from echostep.localization.echoes.unplanned import RangeMemory, UnplannedDensities, UsablePings, evidence_share
 from echostep.localization.estimate import Estimate, Right, estimate, weight_about
 from echostep.localization.grid.cells import GridCells
@@ -66,6 +67,7 @@ class MapFilter:
         self._model, self._blurred = echo_models(self._settings)
         echo = with_plan_error(self._settings)
         self._pings = UsablePings(building.background(self._model), echo)
+        self._bias = RangeBias(self.echo.sd_m)
         cloud = self._new_cloud(start, walk_heading_rad)
         prior = (1.0 if cloud.is_searching else STATED) if building.has_walls else BY_DEFINITION
         self.belief = Belief(cloud, prior, PLAN_FITS if building.has_walls else 1.0)
@@ -91,6 +93,7 @@ class MapFilter:
         if echo != self._settings.echo:
             self._settings = replace(self._settings, echo=echo)
             self._model, self._blurred = echo_models(self._settings)
+            self._bias = RangeBias(echo.sd_m)
             self._pings.set_ranger_model(self._building.background(self._model), with_plan_error(self._settings))
 
     @property
@@ -244,7 +247,9 @@ class MapFilter:
     def _follow(self, measured: MeasuredSegment, change: HeightChange) -> None:
         """Propagate along an observed segment; a cloud resamples itself after each reweighting that needs it."""
         segment = measured.segment
-        pings, unplanned = self._pings.take(measured if self._building.has_walls else measured.without_pings)
+        pings, unplanned = self._pings.take(
+            self._bias.corrected(measured) if self._building.has_walls else measured.without_pings
+        )
         move, path_m = move_of(segment), math.hypot(segment.dx_m, segment.dy_m)
         self._way.add(move, pings, change)
         clouds, share = self.belief.clouds, evidence_share(segment.turn_rad)
@@ -263,6 +268,8 @@ class MapFilter:
                 each.cloud.reweight(loss)
         if self._building.has_walls:
             self._compare(path_m)
+            if len(pings.share) and self.plan_supports:
+                self._bias.learn_behind(self.cloud, move, pings, self._building.walls, self._model)
 
     def _follow_with(
         self, each: CloudHypothesis, move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float

@@ -26,14 +26,18 @@ FOUND_COLUMNS = {
 }  # fmt: skip
 CLAIM_COLUMNS = {
     "name": "", "tracking": "says tracking %", "false_tracking": "false tracking %", "false_lost": "false lost %",
-    "beyond_protection": "beyond radius %", "alarm_s": "alarm s", "alarm_in_5s": "in 5 s %", "false_alarms_h": "false alarms /h",
+    "beyond_protection": "beyond radius %", "in_ellipse": "in ellipse %", "alarm_s": "alarm s", "alarm_in_5s": "in 5 s %",
+    "false_alarms_h": "false alarms /h",
 }  # fmt: skip
-SHARES = ("found", "listed", "false_tracking", "false_lost", "beyond_protection", "alarm_in_5s", "named", "tracking")
+SHARES = (
+    "found", "listed", "false_tracking", "false_lost", "beyond_protection", "in_ellipse", "alarm_in_5s", "named", "tracking",
+)  # fmt: skip
 _NOTES = (
     "found: within 1 m on the right floor from some moment within {search} m on until the end; then: all claims after that.",
     "median: of all claims.",
     "listed: the last claim is right, or has the true place among its hypotheses. lost: runs that end more than 3 m off.",
     "false tracking, false lost, beyond radius: shares of all claims. alarm: 95 % of errors above 3 m are flagged (do not say tracking) so soon.",
+    "in ellipse: of the claims that say tracking, those whose 95 % ellipse holds the true place.",
     "false alarms: tracking turns to lost at an error below 0.5 m. named: the run ends with 'this plan does not fit'. x real time: CPU time.",
 )
 
@@ -55,7 +59,10 @@ class ClaimsRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JudgedRow(ClaimsRow):
-    """The same where the claims are judged; `found_errors_m`: of all claims after the wearer is found."""
+    """The same where the claims are judged; `found_errors_m`: of all claims after the wearer is found.
+
+    `ellipses`: claims that say tracking with a covariance; `in_ellipse`: of these, those whose 95 % ellipse holds the true place.
+    """
 
     found_m: float | None
     listed: bool
@@ -66,6 +73,8 @@ class JudgedRow(ClaimsRow):
     false_tracking: int
     false_lost: int
     beyond_protection: int
+    ellipses: int
+    in_ellipse: int
     alarms_s: list[float]
     false_alarms: int
 
@@ -96,6 +105,7 @@ class JudgedSummary(ClaimsSummary):
     false_tracking: float
     false_lost: float
     beyond_protection: float
+    in_ellipse: float | None
     alarm_s: float | None
     alarm_in_5s: float | None
     false_alarms_h: float | None
@@ -123,6 +133,7 @@ def run_row(name: str, seed: int, judged: JudgedRun | None, run: FilterRun) -> C
         error_m=np.round(judged.error_m, 3).tolist(), protection_m=np.round(judged.protection_m, 3).tolist(),
         judged_span_s=judged.span_s, false_tracking=int(judged.false_tracking.sum()),
         false_lost=int(judged.false_lost.sum()), beyond_protection=int(judged.beyond_protection.sum()),
+        ellipses=len(judged.in_ellipse), in_ellipse=int(judged.in_ellipse.sum()),
         alarms_s=judged.alarm_delays_s, false_alarms=judged.false_alarms,
     )  # fmt: skip
 
@@ -149,6 +160,7 @@ def _judged_summary(summary: ClaimsSummary, runs: Sequence[JudgedRow]) -> Judged
     distances_m = [r.found_m for r in runs if r.found_m is not None]
     after = [e for r in runs for e in r.found_errors_m]
     delays = [s for r in runs for s in r.alarms_s]
+    ellipses = sum(r.ellipses for r in runs)
     hours = sum(r.judged_span_s for r in runs) / 3600.0
     return JudgedSummary(
         **as_dict(summary),
@@ -162,6 +174,7 @@ def _judged_summary(summary: ClaimsSummary, runs: Sequence[JudgedRow]) -> Judged
         false_tracking=_rounded(sum(r.false_tracking for r in runs) / claims),
         false_lost=_rounded(sum(r.false_lost for r in runs) / claims),
         beyond_protection=_rounded(sum(r.beyond_protection for r in runs) / claims),
+        in_ellipse=_rounded(sum(r.in_ellipse for r in runs) / ellipses) if ellipses else None,
         alarm_s=_rounded(float(np.quantile(delays, 0.95))) if delays else None,
         alarm_in_5s=_rounded(float(np.mean([s <= ALARM_S for s in delays]))) if delays else None,
         false_alarms_h=_rounded(sum(r.false_alarms for r in runs) / hours) if hours else None,

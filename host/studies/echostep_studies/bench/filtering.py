@@ -6,6 +6,7 @@ In: segments, a plan, a start. Out: `FilterRun`: estimates, number of particles,
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +30,7 @@ WARM_UP = 3  # segments for which a throw-away filter runs first, so that no com
 class Claim:
     """Claim of a method at a time: a position with status and protection radius, how probable it is that the plan fits, and other `places`.
 
-    `places`: x, y (m), level of each hypothesis that is listed.
+    `places`: x, y (m), level of each hypothesis that is listed. `covariance_m2`: xx, xy, yy; NaN of a method that states none.
     """
 
     t_s: float
@@ -41,6 +42,7 @@ class Claim:
     protection_m: float
     plan_fits: float = 1.0
     places: tuple[tuple[float, float, int], ...] = ()
+    covariance_m2: tuple[float, float, float] = (math.nan, math.nan, math.nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,4 +88,5 @@ def _new_filter(
 
 def _claim(e: Estimate) -> Claim:
     places = tuple((h.x_m, h.y_m, h.level) for h in e.hypotheses)
-    return Claim(e.t_s, e.x_m, e.y_m, e.level, e.z_m, e.status, e.protection_m, e.plan_fits, places)
+    covariance_m2 = e.xx_m2, e.xy_m2, e.yy_m2
+    return Claim(e.t_s, e.x_m, e.y_m, e.level, e.z_m, e.status, e.protection_m, e.plan_fits, places, covariance_m2)

@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.localization.estimate import TrackStatus
+from echostep.localization.estimate import CHI2_95, TrackStatus
 from echostep.plan.model import Plan
 from echostep_studies.bench.filtering import Claim
 
@@ -43,7 +43,8 @@ class TruePlaces:
 
 @dataclass(frozen=True, slots=True)
 class JudgedRun:
-    """Of n claims, each (n,): time (s), true way walked since the search began (m), error (m), status (a code above), protection radius (m).
+    """Of n claims, each (n,): time (s), true way walked since the search began (m), error (m), status (a code above), protection radius (m), and the
+    error's square over the covariance, `normalised`: NaN where none is stated, infinite on a wrong floor.
 
     `listed`: whether the last claim has the true place, at least among its hypotheses. `search_m`: way after which the wearer must be found.
     """
@@ -53,6 +54,7 @@ class JudgedRun:
     error_m: Floats
     status: Floats
     protection_m: Floats
+    normalised: Floats
     listed: bool = True
     search_m: float = SEARCH_M
 
@@ -79,6 +81,12 @@ class JudgedRun:
     def beyond_protection(self) -> Bools:
         """Claims whose error is greater than their protection radius."""
         return self.error_m > self.protection_m
+
+    @property
+    def in_ellipse(self) -> Bools:
+        """Of the claims that say "tracking" with a covariance, (m,): whether the 95 % ellipse holds the true place."""
+        stated = (self.status == TRACKING) & ~np.isnan(self.normalised)
+        return self.normalised[stated] <= CHI2_95
 
     @property
     def alarm_delays_s(self) -> list[float]:
@@ -149,10 +157,19 @@ def judge(claims: Sequence[Claim], true: TruePlaces, walked_m: Floats, search_m:
     """Claims (n,) against the truth at their times; `walked_m` (n,) since the search began."""
     place = np.array([(c.x_m, c.y_m) for c in claims]).reshape(-1, 2)
     error_m = errors_m(place, np.array([c.level for c in claims]), true)
+    normalised = _normalised(claims, place - true.xy_m, error_m)
     return JudgedRun(
         np.array([c.t_s for c in claims]), walked_m, error_m, np.array([float(CODES[c.status]) for c in claims]),
-        np.minimum([c.protection_m for c in claims], FARTHEST_M), _listed(claims[-1], error_m[-1], true), search_m,
+        np.minimum([c.protection_m for c in claims], FARTHEST_M), normalised, _listed(claims[-1], error_m[-1], true), search_m,
     )  # fmt: skip
+
+
+def _normalised(claims: Sequence[Claim], away_m: Floats, error_m: Floats) -> Floats:
+    """Squares of errors (n, 2) over the covariances of the claims; infinite on a wrong floor, where `error_m` (n,) is more than that."""
+    xx, xy, yy = np.array([c.covariance_m2 for c in claims]).reshape(-1, 3).T
+    dx, dy = away_m.T
+    square = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
+    return np.where(error_m > np.hypot(dx, dy), square + math.inf, square)
 
 
 def _listed(claim: Claim, error_m: float, true: TruePlaces) -> bool:
