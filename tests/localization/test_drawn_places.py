@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from echostep.localization.building import Building
+from echostep.localization.cloud_estimate import weight_about
 from echostep.localization.drawn_places import DrawnPlaces
-from echostep.localization.estimate import TrackStatus, weight_about
+from echostep.localization.estimate import TrackStatus
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.start import Start
 from echostep.path import MeasuredSegment, PathSegment

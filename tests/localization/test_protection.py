@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization.estimate import RISK, estimate
+from echostep.localization.cloud_estimate import estimate
+from echostep.localization.estimate import RISK
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.start import ANY_LEVEL, Start
 from echostep.localization.settings import CloudSettings

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from echostep.localization.building import Building
+from echostep.localization.cloud_estimate import Right, estimate
 from echostep.localization.echoes.likelihood import EchoSettings, echo_model
 from echostep.localization.echoes.unplanned import RangeMemory
-from echostep.localization.estimate import Estimate, Right, TrackStatus, estimate
+from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.grid.search_grid import SearchGrid
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.start import Start

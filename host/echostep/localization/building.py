@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.localization.cloud_estimate import Elsewhere
 from echostep.localization.drawn_places import DrawnPlaces
 from echostep.localization.echoes.likelihood import EchoModel
 from echostep.localization.echoes.range_table import range_table_of
 from echostep.localization.echoes.unplanned import Background, background
-from echostep.localization.estimate import Elsewhere
 from echostep.localization.grid.cells import GridCells, grid_cells
 from echostep.localization.height.levels import UpperLevels
 from echostep.walls.echo_sources import Walls

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The estimate: moments of the cloud.
+"""The estimate: a position with its covariance, and a status that states how far to trust it.
 
-In: a cloud. Out: `Estimate`, immutable: position, covariance, heading, level, and a status that states how far to trust it. Owns nothing.
+In: what `cloud_estimate` has computed. Out: `Estimate`, immutable, and what is read from it: ellipse, whether it claims a place. Owns nothing.
 """
 
 from __future__ import annotations
@@ -14,85 +14,13 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import NamedTuple
 
-import numpy as np
-
-from echostep.arrays import Floats
-from echostep.jit import inline_kernel, lean_kernel
-from echostep.localization.limits import BELIEVED, HALF_STOREY_M, LOST_M, PROBABLE, SURE, TRACKING_M
-from echostep.localization.particles.cloud import Cloud
-from echostep.localization.particles.places import LikelyPlace, hypotheses
+from echostep.localization.limits import LOST_M, TRACKING_M
+from echostep.localization.particles.places import LikelyPlace
 
 CHI2_95 = 5.991464547107979  # 95 % quantile of chi-square, two degrees of freedom
-# Times the weight near the mean of a cloud of several places, with which the likeliest of them is its position, assumed
-MUCH_LIKELIER = 2.0
 RISK = 1e-3  # probability of an error beyond the protection radius
-# Of the protection radius of a normal distribution: errors of echoes and steps have heavier tails.
-TAIL = 1.5
-SPREAD_M = 0.75  # standard deviation of a cloud above which its hypotheses are listed, assumed
+TAIL = 1.5  # of the protection radius of a normal distribution, assumed: errors of echoes and steps have heavier tails
 WALKER_M_S = 1.5  # speed at which an unobserved position spreads per axis: a brisk walk
-
-
-class Moments(NamedTuple):
-    """Weighted mean (m), covariance (m2), mean unit vector of the headings, and weight within two distances of the mean."""
-
-    x_m: float
-    y_m: float
-    xx_m2: float
-    xy_m2: float
-    yy_m2: float
-    east: float
-    north: float
-    near: float
-    about: float
-
-
-@lean_kernel
-def moments(x_m: Floats, y_m: Floats, heading_rad: Floats, weight: Floats, near_m: float, about_m: float) -> Moments:
-    """Weighted moments of particles (n,) in the map."""
-    x, y, east, north = 0.0, 0.0, 0.0, 0.0
-    for i in range(len(weight)):
-        w = weight[i]
-        x += w * x_m[i]
-        y += w * y_m[i]
-        east += w * math.cos(heading_rad[i])
-        north += w * math.sin(heading_rad[i])
-    xx, xy, yy, near, about = 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(len(weight)):
-        w, dx, dy = weight[i], x_m[i] - x, y_m[i] - y
-        square = dx * dx + dy * dy
-        xx += w * dx * dx
-        xy += w * dx * dy
-        yy += w * dy * dy
-        near += w if square < near_m * near_m else 0.0
-        about += w if square < about_m * about_m else 0.0
-    return Moments(x, y, xx, xy, yy, east, north, near, about)
-
-
-@lean_kernel
-def weight_about(
-    x_m: Floats, y_m: Floats, z_m: Floats, weight: Floats, place_m: tuple[float, float, float], limit_m: tuple[float, float],
-    map_sd_m: float = 0.0,
-) -> tuple[float, float]:  # fmt: skip
-    """Weight of the particles (n,) within each of two distances of a place in the map, and within HALF_STOREY_M of its height.
-
-    `map_sd_m`: standard deviation per axis of the map itself there. A particle then counts by the probability that the map is off by less than what
-    is left to the limit: a lower bound of that of the sum of both errors.
-    """
-    near, about = 0.0, 0.0
-    for i in range(len(weight)):
-        if abs(z_m[i] - place_m[2]) < HALF_STOREY_M:
-            distance = math.hypot(x_m[i] - place_m[0], y_m[i] - place_m[1])
-            near += weight[i] * _within(limit_m[0] - distance, map_sd_m)
-            about += weight[i] * _within(limit_m[1] - distance, map_sd_m)
-    return near, about
-
-
-@inline_kernel
-def _within(left_m: float, sd_m: float) -> float:
-    """Probability that a place in two dimensions is off by less than `left_m`."""
-    if left_m <= 0.0:
-        return 0.0
-    return 1.0 if sd_m <= 0.0 else 1.0 - math.exp(-0.5 * (left_m / sd_m) ** 2)
 
 
 class TrackStatus(StrEnum):
@@ -110,7 +38,7 @@ class Estimate:
     `level` is the likeliest one (an index into the plan's), `levels` the probability of each, `z_m` the height in the plan's metres.
     `protection_m`: radius on that level beyond which the error is with probability RISK, infinite where none is that safe. `right`: probability that
     the cloud is right; `plan_fits`: that the plan is the building's; `outside`: that the trunk is outside of the building.
-    `hypotheses`: the likely places of a cloud wider than SPREAD_M, or on several levels, the likeliest first.
+    `hypotheses`: the likely places of a wide cloud, or of one on several levels, the likeliest first.
 
     >>> import echostep
     >>> last = echostep.replay("walk.mcap", "demo.json").estimates[-1]
@@ -177,135 +105,6 @@ def ellipse95(xx_m2: float, xy_m2: float, yy_m2: float) -> Ellipse:
     mean, half = 0.5 * (xx_m2 + yy_m2), math.hypot(0.5 * (xx_m2 - yy_m2), xy_m2)
     major, minor = (math.sqrt(max(v, 0.0) * CHI2_95) for v in (mean + half, mean - half))
     return Ellipse(major, minor, 0.5 * math.atan2(2.0 * xy_m2, xx_m2 - yy_m2))
-
-
-class Right(NamedTuple):
-    """Probability that the trunk is in the tracked cloud, `here`, and in that of a search."""
-
-    here: float
-    search: float = 0.0
-
-
-SURELY = Right(1.0)
-
-
-def estimate(
-    cloud: Cloud, t_s: float, walk_heading_rad: float, step: int, sd_m: float = 0.0, right: Right = SURELY,
-    elsewhere: Elsewhere | None = None, search: Cloud | None = None, map_sd_m: float = 0.0,
-) -> Estimate:  # fmt: skip
-    """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean], and how likely small errors are.
-
-    The mean of a cloud with several likely places may lie in none of them: the position is then that of the likeliest place, if that has more than
-    half of the weight, and MUCH_LIKELIER times that near the mean. `sd_m`: standard deviation per axis to be added; `right`: probability that the
-    cloud is right, otherwise the trunk is `elsewhere`. While tracking, the covariance is the cloud's; otherwise that of the mixture of both about the
-    position. The hypotheses are those of `search`, if there is one. `map_sd_m`: standard deviation per axis of the map itself there, as a drawing
-    states it; it is part of `sd_m`, and makes small errors less likely.
-    """
-    weight = cloud.weight
-    levels, z, z_sd = _heights(cloud, weight)
-    m = moments(cloud.map_x_m, cloud.y_m, cloud.turn_rad + walk_heading_rad, weight, TRACKING_M, LOST_M)
-    places: tuple[LikelyPlace, ...] = ()
-    if search is not None or m.xx_m2 + m.yy_m2 > SPREAD_M**2 or max(levels) < BELIEVED:
-        places = (
-            cloud.places(walk_heading_rad) if search is None else places_of_both(cloud, search, right, walk_heading_rad)
-        )
-    if search is None and places and places[0].probability > PROBABLE:
-        m = _moments_at(places[0], m, cloud, weight)
-    x, y, xx, xy, yy, east, north, near, about = m
-    spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
-    limits_m = (TRACKING_M, LOST_M)
-    if map_sd_m > 0.0:
-        near, about = weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, weight, (x, y, z), limits_m, map_sd_m)
-    near, about = right.here * near, right.here * about
-    is_right = right.here
-    if search is not None:
-        beside = weight_about(search.map_x_m, search.y_m, search.z_m, search.weight, (x, y, z), limits_m, map_sd_m)
-        near, about = near + right.search * beside[0], about + right.search * beside[1]
-        levels = _levels_of_both(levels, _heights(search, search.weight)[0], right)
-        is_right = min(right.here + right.search * beside[0], 1.0)
-    status = _status(near, about, max(levels))
-    xx, yy = xx + sd_m**2, yy + sd_m**2
-    protection_m = _protection_m(xx, xy, yy, is_right * max(levels))
-    if status is not TrackStatus.TRACKING and elsewhere is not None:
-        xx, xy, yy = elsewhere.mixed((x, y), (xx, xy, yy), is_right)
-    return Estimate(
-        t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status, levels.index(max(levels)), levels, z, z_sd,
-        protection_m, is_right, places,
-    )  # fmt: skip
-
-
-def places_of_both(cloud: Cloud, search: Cloud, right: Right, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:
-    """The likely places of the tracked cloud and of a search, if the trunk is in one of them."""
-    both = (cloud, search)
-    weight = np.concatenate([cloud.weight * right.here, search.weight * right.search])
-    x, y, turn = (np.concatenate([getattr(each, name) for each in both]) for name in ("map_x_m", "y_m", "turn_rad"))
-    level = np.concatenate([each.level for each in both])
-    return hypotheses(x, y, level, turn + walk_heading_rad, weight / weight.sum())
-
-
-def _moments_at(place: LikelyPlace, mean: Moments, cloud: Cloud, weight: Floats) -> Moments:
-    """The moments about a place, with its heading; those about the mean, if they have half as much weight near them."""
-    distance_m = np.hypot(cloud.map_x_m - place.x_m, cloud.y_m - place.y_m)
-    near, about = (float(weight[distance_m < limit_m].sum()) for limit_m in (TRACKING_M, LOST_M))
-    if near < MUCH_LIKELIER * mean.near:
-        return mean
-    dx, dy = mean.x_m - place.x_m, mean.y_m - place.y_m
-    xx, xy, yy = mean.xx_m2 + dx * dx, mean.xy_m2 + dx * dy, mean.yy_m2 + dy * dy
-    length = math.hypot(mean.east, mean.north)
-    east, north = length * math.cos(place.heading_rad), length * math.sin(place.heading_rad)
-    return Moments(place.x_m, place.y_m, xx, xy, yy, east, north, near, about)
-
-
-def _status(near: float, about: float, level: float) -> TrackStatus:
-    """Status from the probabilities of errors below TRACKING_M and below LOST_M, and that of the likeliest level."""
-    if near >= SURE and level >= BELIEVED:
-        return TrackStatus.TRACKING
-    return TrackStatus.UNCERTAIN if about >= PROBABLE else TrackStatus.LOST
-
-
-def _protection_m(xx_m2: float, xy_m2: float, yy_m2: float, right: float) -> float:
-    """Radius beyond which the error is with probability RISK: of a normal distribution along its longer axis.
-
-    `right`: probability of the place and its level; being wrong takes part of the risk.
-    """
-    rest = RISK - (1.0 - right)
-    if rest <= 0.0:
-        return math.inf
-    return TAIL * ellipse95(xx_m2, xy_m2, yy_m2).major_m * math.sqrt(-2.0 * math.log(rest) / CHI2_95)
-
-
-class Elsewhere(NamedTuple):
-    """Mean (m) and covariance (m2) of the places in a building where the trunk may be if the cloud is wrong."""
-
-    x_m: float
-    y_m: float
-    xx_m2: float
-    xy_m2: float
-    yy_m2: float
-
-    def mixed(
-        self, at_m: tuple[float, float], covariance_m2: tuple[float, float, float], right: float
-    ) -> tuple[float, float, float]:
-        """Second moments xx, xy, yy (m2) about `at_m` of the mixture of a cloud there and of these places."""
-        dx, dy = self.x_m - at_m[0], self.y_m - at_m[1]
-        away = (self.xx_m2 + dx * dx, self.xy_m2 + dx * dy, self.yy_m2 + dy * dy)
-        xx, xy, yy = (right * c + (1.0 - right) * a for c, a in zip(covariance_m2, away, strict=True))
-        return xx, xy, yy
-
-
-def _levels_of_both(one: tuple[float, ...], other: tuple[float, ...], right: Right) -> tuple[float, ...]:
-    """Probability of each level, if the trunk is in one of both clouds."""
-    both = [right.here * a + right.search * b for a, b in zip(one, other, strict=True)]
-    return tuple(p / sum(both) for p in both)
-
-
-def _heights(cloud: Cloud, weight: Floats) -> tuple[tuple[float, ...], float, float]:
-    """Probability of each level; mean and standard deviation of the height."""
-    if cloud.sheet is None:
-        return (1.0,), 0.0, 0.0
-    share = np.bincount(cloud.level, weight, len(cloud.sheet.height_m))
-    z = float(weight @ cloud.z_m)
-    return tuple(share.tolist()), z, math.sqrt(float(weight @ (cloud.z_m - z) ** 2))
 
 
 def claims_place(status: str) -> bool:

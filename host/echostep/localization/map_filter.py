@@ -18,10 +18,11 @@ from echostep.board.gateway import BeaconReading
 from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.belief import PLAN_FITS, STATED, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
 from echostep.localization.building import Building
+from echostep.localization.cloud_estimate import Right, estimate, weight_about
 from echostep.localization.echoes.likelihood import EchoSettings
 from echostep.localization.echoes.range_bias import RangeBias
 from echostep.localization.echoes.unplanned import RangeMemory, UnplannedDensities, UsablePings, evidence_share
-from echostep.localization.estimate import Estimate, Right, estimate, weight_about
+from echostep.localization.estimate import Estimate
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.start import grid_about, grid_of, is_unknown
 from echostep.localization.height.height_filter import RelativeHeight, RidingHeight
@@ -32,15 +33,9 @@ from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.start import ANY_LEVEL, Air, Start
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
-from echostep.localization.team.meetings import (
-    WRONG,
-    Meeting,
-    MeetingEffect,
-    MeetingMemory,
-    moved_by,
-    start_at,
-    weigh_by,
-)
+from echostep.localization.team.meeting import WRONG, Meeting, start_at
+from echostep.localization.team.meeting_memory import MeetingEffect, MeetingMemory, moved_by
+from echostep.localization.team.meetings import weigh_by
 from echostep.localization.window import RecentWay
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
@@ -269,7 +264,9 @@ class MapFilter:
         if self._building.has_walls:
             self._compare(path_m)
             if len(pings.share) and self.plan_supports:
-                self._bias.learn_behind(self.cloud, move, pings, self._building.walls, self._model)
+                self._bias.learn_behind(
+                    self.cloud.arrays, self.cloud.weight, move, pings, self._building.walls, self._model
+                )
 
     def _follow_with(
         self, each: CloudHypothesis, move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float

@@ -14,7 +14,7 @@ from typing import Any
 from echostep.board.gateway import BeaconReading
 from echostep.localization.estimate import Estimate
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.team.meetings import TimedMeeting
+from echostep.localization.team.meeting import TimedMeeting
 from echostep.path import MeasuredSegment
 from echostep.ports.people.check_in import CheckIn
 

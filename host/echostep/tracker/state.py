@@ -15,7 +15,7 @@ from echostep.board.frames import FrameCounts
 from echostep.board.gateway import GatewayCounts
 from echostep.board.messages import Identity, Status
 from echostep.localization.estimate import Estimate
-from echostep.localization.team.meetings import MeetingNews
+from echostep.localization.team.meeting_memory import MeetingNews
 from echostep.odometry.front_end import FrontEndCounts
 from echostep.path import PathSegment
 from echostep.ports.people.team_beacons import SharedBeacon

@@ -20,21 +20,16 @@ from echostep.errors import EchostepError
 from echostep.localization.beacon_map import BeaconPlace
 from echostep.localization.belief import STATED
 from echostep.localization.building import Building
+from echostep.localization.cloud_estimate import Right, estimate
 from echostep.localization.drawn_places import DrawnPlaces
 from echostep.localization.echoes.rangers import echo_of
-from echostep.localization.estimate import Estimate, Right, TrackStatus, estimate, unobserved
+from echostep.localization.estimate import Estimate, TrackStatus, unobserved
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.kernels import systematic
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import FilterSettings
-from echostep.localization.team.meetings import (
-    MeetingEffect,
-    MeetingQueue,
-    TimedMeeting,
-    carries_position,
-    on_the_way,
-    start_at,
-)
+from echostep.localization.team.meeting import TimedMeeting, carries_position, on_the_way, start_at
+from echostep.localization.team.meeting_memory import MeetingEffect, MeetingQueue
 from echostep.localization.team.shared_beacons import TeamBeaconMap, shared_beacons
 from echostep.odometry.front_end import FrontEnd
 from echostep.path import MeasuredSegment, PathSegment

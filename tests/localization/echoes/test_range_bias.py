@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
@@ -13,8 +11,7 @@ import pytest
 from echostep.arrays import Floats, Ints
 from echostep.localization.echoes.likelihood import EchoModel, EchoSettings, detection, echo_model, normal
 from echostep.localization.echoes.range_bias import RangeBias
-from echostep.localization.particle_arrays import Move, PingBatch
-from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particle_arrays import Move, ParticleArrays, PingBatch
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.walls.echo_sources import Walls
 from naive.walls import echo_sources
@@ -109,13 +106,12 @@ def test_pings_are_placed_behind_a_cloud_that_has_moved() -> None:
     """The cloud is at the end of a move of 4 m along y on the map, 4 m along x in the walk frame."""
     echo = EchoSettings()
     walls = Walls(CORRIDOR[:, [1, 0, 3, 2]])  # a corridor along y
-    cloud = SimpleNamespace(
-        x_m=np.full(8, 1.4), y_m=np.full(8, 9.0), turn_rad=np.full(8, 0.5 * math.pi), weight=np.full(8, 0.125)
-    )
+    x, y, turn = (np.full(8, value) for value in (1.4, 9.0, 0.5 * math.pi))
+    cloud = ParticleArrays(x, y, turn, np.ones(8), np.zeros(8))
     axis = np.array(TURNS_RAD)[np.arange(40) % 2]  # in the walk frame; left is -x on the map
     pings = pings_of(np.where(axis > 0.0, 1.4, 1.6) + 0.05, np.arange(40, dtype=np.int64) % 2, axis)
     bias = RangeBias(echo.sd_m)
-    bias.learn_behind(cast(Cloud, cloud), Move(4.0, 0.0, 0.0, 0.0), pings, walls, echo_model(echo))
+    bias.learn_behind(cloud, np.full(8, 0.125), Move(4.0, 0.0, 0.0, 0.0), pings, walls, echo_model(echo))
     placed = np.full(40, 1.4), 9.0 - 4.0 * (1.0 - pings.share), axis + 0.5 * math.pi
     slowly = learnt_slowly(pings, placed, EXACT, CORRIDOR[:, [1, 0, 3, 2]], echo_model(echo), echo.sd_m)
     assert (bias.mean_m, bias.var_m2) == pytest.approx(slowly)

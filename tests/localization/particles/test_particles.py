@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from echostep.localization.cloud_estimate import estimate
 from echostep.localization.echoes.likelihood import EchoSettings, echo_model, log_echo
-from echostep.localization.estimate import TrackStatus, ellipse95, estimate, trust
+from echostep.localization.estimate import TrackStatus, ellipse95, trust
 from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import BENDS, Cloud
 from echostep.localization.particles.kernels import (

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from echostep.angles import mean_angle
-from echostep.localization.estimate import moments, weight_about
+from echostep.localization.cloud_estimate import moments, weight_about
 from echostep.localization.limits import HALF_STOREY_M
 from echostep.localization.particles import places as module
 from echostep.localization.particles.places import hypotheses

@@ -19,22 +19,9 @@ from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import CloudSettings
-from echostep.localization.team.meetings import (
-    MOST_NAMES,
-    PLACE_M,
-    RENEWED_M,
-    WRONG,
-    Meeting,
-    MeetingEffect,
-    MeetingMemory,
-    best_omega,
-    covariance,
-    information,
-    on_the_way,
-    places_at,
-    start_at,
-    weigh,
-)
+from echostep.localization.team.meeting import WRONG, Meeting, covariance, on_the_way, start_at
+from echostep.localization.team.meeting_memory import MOST_NAMES, PLACE_M, RENEWED_M, MeetingEffect, MeetingMemory
+from echostep.localization.team.meetings import best_omega, information, places_at, weigh
 from echostep.path import Odometer, PathSegment
 from echostep.plan.model import Plan, Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of

@@ -21,7 +21,8 @@ from echostep.localization.building import Building
 from echostep.localization.estimate import Estimate, digest
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.start import Start
-from echostep.localization.team.meetings import RENEWED_M, Meeting, MeetingEffect, MeetingMemory, MeetingQueue
+from echostep.localization.team.meeting import Meeting
+from echostep.localization.team.meeting_memory import RENEWED_M, MeetingEffect, MeetingMemory, MeetingQueue
 from echostep.localization.team.shared_beacons import MOST_TEAMMATES, TeamBeaconMap
 from echostep.page.elements.marks import beacon_marks
 from echostep.path import Odometer

@@ -10,7 +10,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.localization.team.meetings import MeetingEffect
+from echostep.localization.team.meeting_memory import MeetingEffect
 from echostep.page.elements.meetings import WORDS, ShownMeeting
 from echostep.page.mailbox import Mailbox
 from echostep.page.requests import Met, parse_request

@@ -22,8 +22,7 @@ from echostep.arrays import Floats
 from echostep.board.calibration import LEAST_RANGE_M
 from echostep.jit import kernel
 from echostep.localization.echoes.likelihood import EchoModel, detection, normal
-from echostep.localization.particle_arrays import Move, PingBatch
-from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particle_arrays import Move, ParticleArrays, PingBatch
 from echostep.path import MeasuredSegment
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.index import WallIndex
@@ -59,9 +58,11 @@ class RangeBias:
             (self.mean_m, self.var_m2), pings, x, y, axis, covariance_m2, index, model
         )
 
-    def learn_behind(self, cloud: Cloud, move: Move, pings: PingBatch, walls: Walls, model: EchoModel) -> None:
-        """By corrected pings on a move, at whose end the cloud is now."""
-        weight, rest = cloud.weight, 1.0 - pings.share
+    def learn_behind(
+        self, cloud: ParticleArrays, weight: Floats, move: Move, pings: PingBatch, walls: Walls, model: EchoModel
+    ) -> None:
+        """By corrected pings on a move, at whose end the particles (n,) of these weights are now."""
+        rest = 1.0 - pings.share
         x, y, turn = float(weight @ cloud.x_m), float(weight @ cloud.y_m), mean_angle(cloud.turn_rad, weight)
         c, s = math.cos(turn), math.sin(turn)
         place_m = (

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The update of a filter's clouds by meetings with other wearers.
 
-In: a cloud with its probability, a `Meeting`. Out: the same cloud, reweighted, and how well the meeting fits it; which meetings count. Owns the model
-and its constants, when each teammate was met, and the meetings that wait.
+In: a cloud with its probability, a `Meeting`. Out: the same cloud, reweighted, and how well the meeting fits it. Owns the model.
 
 The cloud is that at the begin of a segment, the meeting happened during it, up to a stride later: `on_the_way` gives it the displacement until
 then, and each particle is reweighted at its place displaced by it.
@@ -23,99 +22,21 @@ badly.
 from __future__ import annotations
 
 import math
-from collections import Counter
-from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
-from msgspec import structs
 
 from echostep.arrays import Bools, Floats
 from echostep.localization.belief import CloudHypothesis
-from echostep.localization.estimate import TAIL, ellipse95
-from echostep.localization.limits import HALF_STOREY_M, LOST_M, PROBABLE
+from echostep.localization.limits import HALF_STOREY_M, PROBABLE
 from echostep.localization.particles.cloud import Cloud
-from echostep.path import Odometer, PathSegment
-from echostep.ports.people.check_in import MOST_SD_M, CheckIn
-from echostep.ports.people.meeting import parse_meeting
+from echostep.localization.team.meeting import RANGE_BODY_SD_M, WRONG, Meeting, covariance
 
 # Assumed, not measured.
-SIDE_SD_M = 0.6  # per axis, of the offset between two people side by side: an arm's length
-MOVED_M_S = 1.0  # speed at which a teammate may have gone on since the report: a walk
-WIDEST_M = 10.0  # 95 % radius of the wearer's place by a meeting, above which the meeting adds nothing to the plan
-RANGE_BODY_SD_M = 0.1  # of a radio range: what bodies and antennas add
-WRONG = {"tracking": 0.02, "uncertain": 0.2}  # probability that a meeting is wrong, by the teammate's status
 MOST_DOUBT = math.log(WRONG["tracking"])  # of all ranges of one teammate: then this teammate is wrong
 LEAST_WRONG = 1e-6  # probability that a range is wrong, at least, in a ratio
 LEAST_SD_OF_CLOUD_M = 0.02  # of a cloud without spread
 FARTHEST = -4.6  # log of the prior, relative to its peak, at which 99 % of a normal distribution lie inside: a far mode is no tail of it
 LEAST_FACTOR = -200.0  # log of the least weight that a meeting leaves
-# Path on which a wearer's own echoes, or drift, renew the filter's information
-RENEWED_M = 10.0
-CONTRADICTIONS = 2  # teammates who have to contradict a believed cloud: one of a team is at a wrong start, as simulated
-PLACE_M = 2.0  # radio range within which the teammate's place is the wearer's, as after a tap; reflections are longer, hardly ever shorter
-MOST_NAMES = 4096  # teammates and beacons that are remembered: the most of a team's beacons that a tracker keeps
-MOST_WAITING = 64  # meetings that wait for their segment
-
-
-@dataclass(frozen=True, slots=True)
-class Meeting:
-    """A meeting as the filter uses it: the fields of a `MeetingMessage`, and the displacement (walk frame) since the moment of the cloud.
-
-    `share`: the power of its likelihood, 1 / number of meetings that rest on one measurement.
-    """
-
-    name: str
-    status: str
-    x_m: float
-    y_m: float
-    level: int
-    xx_m2: float
-    xy_m2: float
-    yy_m2: float
-    age_s: float = 0.0
-    level_probability: float = 1.0
-    range_m: float | None = None
-    range_sd_m: float = 0.0
-    beacon: int | None = None
-    way_x_m: float = 0.0
-    way_y_m: float = 0.0
-    share: float = 1.0
-
-
-TimedMeeting = tuple[float, Meeting]  # time (s) of a meeting, -inf where it is not known
-
-
-def on_the_way(meeting: Meeting, segment: PathSegment, t_s: float) -> Meeting:
-    """The meeting at this time with the displacement since the begin of its segment; unchanged for an unobserved segment."""
-    span_s = segment.t1_s - segment.t0_s
-    if segment.unobserved or span_s <= 0.0:
-        return meeting
-    share = min(max((t_s - segment.t0_s) / span_s, 0.0), 1.0)
-    return replace(meeting, way_x_m=share * segment.dx_m, way_y_m=share * segment.dy_m)
-
-
-def carries_position(meeting: Meeting) -> bool:
-    """Whether the teammate's place is known: its status is not lost, its 95 % radius is below LOST_M, and the report is not too old."""
-    radius_m = ellipse95(meeting.xx_m2, meeting.xy_m2, meeting.yy_m2).major_m
-    (xx, xy), (_, yy) = covariance(meeting).tolist()
-    return meeting.status in WRONG and radius_m <= LOST_M and ellipse95(xx, xy, yy).major_m <= WIDEST_M
-
-
-def covariance(meeting: Meeting) -> Floats:
-    """Covariance (2, 2) of the wearer's place given the meeting (m2): the teammate's with heavier tails, its way since the report, the offset."""
-    own = np.array([[meeting.xx_m2, meeting.xy_m2], [meeting.xy_m2, meeting.yy_m2]])
-    offset_m2 = (MOVED_M_S * meeting.age_s) ** 2 + (SIDE_SD_M**2 if meeting.range_m is None else 0.0)
-    total: Floats = TAIL**2 * own + offset_m2 * np.eye(2)
-    return total
-
-
-def start_at(meeting: Meeting) -> CheckIn:
-    """A start by a meeting alone: about the teammate, within the radio's range and the way until then, with any heading."""
-    range_m = 0.0 if meeting.range_m is None else meeting.range_m
-    way_m2 = meeting.way_x_m**2 + meeting.way_y_m**2
-    sd_m = math.sqrt(0.5 * (float(np.trace(covariance(meeting))) + range_m**2 + way_m2))
-    return CheckIn(meeting.x_m, meeting.y_m, None, min(max(sd_m, RANGE_BODY_SD_M), MOST_SD_M), meeting.level)
 
 
 def log_density(meeting: Meeting, place: Floats, on_level: Bools, levels: int) -> Floats:
@@ -217,118 +138,6 @@ def _range_variance(meeting: Meeting, away: Floats, spread: Floats) -> Floats:
     along = _along(away)
     variance: Floats = np.einsum("ni,ij,nj->n", along, spread, along) + meeting.range_sd_m**2 + RANGE_BODY_SD_M**2
     return variance
-
-
-class MeetingEffect(StrEnum):
-    """The effect of a meeting on the tracked cloud.
-
-    `used`: the cloud agrees, and was reweighted; `moved`: the cloud was doubted, or others contradicted it too, and the one that is tracked now lies
-    about the teammate; `contradicts`: the teammate is elsewhere, and nothing was changed; `empty`: the teammate does not know its own place;
-    `repeated`: nothing is new since the last meeting with this teammate.
-    """
-
-    USED = "used"
-    MOVED = "moved"
-    CONTRADICTS = "contradicts"
-    EMPTY = "empty"
-    REPEATED = "repeated"
-
-
-@dataclass(frozen=True, slots=True)
-class MeetingNews:
-    """The newest meeting: its number, counted from 1, with whom, and what it did."""
-
-    number: int
-    name: str
-    effect: MeetingEffect
-
-
-class MeetingMemory:
-    """Decides which meetings may count: a teammate's position counts again after RENEWED_M of the wearer's own path."""
-
-    def __init__(self, odometer: Odometer) -> None:
-        """`odometer`: of the wearer's path."""
-        self._odometer = odometer
-        # Mark on the path at the last meeting with each teammate, or range to a beacon of theirs
-        self._met_m: dict[tuple[str, int | None], float] = {}
-        self._contradicted_m: list[float] = []  # marks at the contradictions since the last agreement
-
-    def refusal(self, meeting: Meeting) -> MeetingEffect | None:
-        """Why a meeting does not count; None where it does, which is remembered."""
-        if not carries_position(meeting):
-            return MeetingEffect.EMPTY
-        key = meeting.name, meeting.beacon
-        last_m = self._met_m.pop(key, -math.inf)
-        repeated = self._odometer.since_m(last_m) < RENEWED_M
-        self._met_m[key] = last_m if repeated else self._odometer.path_m
-        if len(self._met_m) > MOST_NAMES:
-            self._met_m.pop(next(iter(self._met_m)))
-        return MeetingEffect.REPEATED if repeated else None
-
-    def forget_beacons(self) -> None:
-        """Reset the ranges to beacons: a search has begun, whose cloud they have not reweighted yet."""
-        self._met_m = {key: m for key, m in self._met_m.items() if key[1] is None}
-
-    def agree(self) -> None:
-        """A teammate agrees with the cloud: earlier contradictions are cancelled."""
-        self._contradicted_m.clear()
-
-    def contradict(self) -> int:
-        """A teammate contradicts the cloud; returns how many have done so in the last RENEWED_M without an agreement since."""
-        recent_m = [m for m in self._contradicted_m if self._odometer.since_m(m) < RENEWED_M]
-        self._contradicted_m = [*recent_m, self._odometer.path_m][-MOST_NAMES:]
-        return len(self._contradicted_m)
-
-
-def moved_probability(here: float, meeting: Meeting, count: int) -> float:
-    """Probability that the meeting is right where `count` meetings contradict a cloud that is right with probability `here`.
-
-    If the cloud is right, all of them are wrong: odds of here wrong^count; otherwise this one is right with 1 - wrong.
-    """
-    wrong = WRONG[meeting.status]
-    return (1.0 - here) * (1.0 - wrong) / (here * wrong**count + 1.0 - here)
-
-
-def moved_by(meeting: Meeting, here: float, count: int) -> float | None:
-    """Probability of the teammate's place where `count` contradictions move the cloud there; None where they do not. `here`: that it is right."""
-    moved = moved_probability(here, meeting, count)
-    is_alone = count < CONTRADICTIONS and here >= PROBABLE
-    return None if (meeting.range_m or 0.0) > PLACE_M or is_alone or moved < PROBABLE else moved
-
-
-class MeetingQueue:
-    """Meetings that wait for their segment. `counts`: of all meetings by what they did; `bad` ones are no meetings."""
-
-    def __init__(self) -> None:
-        self.counts: Counter[str] = Counter()
-        self.news: MeetingNews | None = None
-        self._waiting: list[TimedMeeting] = []
-
-    def receive(self, payload: bytes, levels: int) -> Meeting | None:
-        """The meeting in the bytes of a chunk, on a plan of so many levels; bytes that are none are counted."""
-        message = parse_meeting(payload)
-        if message is None or message.level >= levels:
-            self.counts["bad"] += 1
-            return None
-        return Meeting(**structs.asdict(message))
-
-    def add(self, meeting: Meeting, t_s: float) -> None:
-        """Keep a meeting of this time; of too many the oldest are dropped."""
-        self._waiting = [*self._waiting, (-math.inf if math.isnan(t_s) else t_s, meeting)][-MOST_WAITING:]
-
-    def pop(self, t_s: float) -> list[TimedMeeting]:
-        """The waiting meetings up to a time."""
-        ready = [(met_s, meeting) for met_s, meeting in self._waiting if met_s <= t_s]
-        self._waiting = [(met_s, meeting) for met_s, meeting in self._waiting if met_s > t_s]
-        return ready
-
-    def note(self, meeting: Meeting, effect: MeetingEffect) -> None:
-        """Count the effect of a meeting; a range to a teammate's beacon is not reported as news."""
-        if meeting.beacon is not None:
-            self.counts[f"beacon {effect.value}"] += 1
-            return
-        self.counts[effect.value] += 1
-        self.news = MeetingNews(1 if self.news is None else self.news.number + 1, meeting.name, effect)
 
 
 def weigh_range(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> float:

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from echostep.board.gateway import BeaconReading
 from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.team.meetings import Meeting, TimedMeeting
+from echostep.localization.team.meeting import Meeting, TimedMeeting
 from echostep.ports.people.team_beacons import SharedBeacon, parse_team_beacons
 
 MOST_TEAMMATES = 64  # whose beacons are kept, the newest, assumed

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from echostep.localization.team.meetings import MeetingEffect
+from echostep.localization.team.meeting_memory import MeetingEffect
 from echostep.tracker.state import TrackerState
 
 WORDS = {
