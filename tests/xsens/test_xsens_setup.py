@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.xsens import PROJECT, MtxReader, OutputFormat, encode_frame
-from echostep.xsens.configuration.requests import project_requests, reset_heading, set_rate
+from echostep.xsens.configuration.requests import project_requests, set_rate
 from echostep.xsens.configuration.setup import FIRST_TRIES, TIMEOUT_S, MtxSetup, State
 from echostep.xsens.frames import FrameReader
 from echostep_studies.simulation.devices.mtx_setup import FACTORY, DeviceState, MtxDevice
@@ -243,7 +243,6 @@ def test_messages_are_the_ones_of_the_manual() -> None:
     assert frames["ReqOutputMode"] == "faffd00031"  # MT0100P.N, 5.3.2
     assert frames["SetOutputMode"] == "faffd00200 0629".replace(" ", "")
     assert encode_frame(0x10).hex() == "faff1000f1"
-    assert encode_frame(reset_heading().mid, reset_heading().payload).hex() == "faffa40200015a"
 
 
 def test_what_waited_in_the_system_is_no_rate() -> None:

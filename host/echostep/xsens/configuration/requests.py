@@ -159,11 +159,6 @@ def _rate_fault(wanted: dict[int, int], answer: bytes) -> str:
     return f"it would send {', '.join(faults)}" if faults else ""
 
 
-def reset_heading() -> Request:
-    """ResetOrientation, heading reset; accepted also while measuring [LLCP, ResetOrientation]."""
-    return Request("ResetOrientation", 0xA4, b"\x00\x01")
-
-
 def error_text(payload: bytes) -> str:
     """Text for the payload of an error message [LLCP, Error]."""
     code = payload[0] if payload else -1
