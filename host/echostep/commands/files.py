@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from echostep.commands.options import Columns, Units, needs, picture_file
+from echostep.commands.options import Columns, Shank, Thigh, Units, needs, picture_file
 from echostep.extras import require
 
 app = typer.Typer()
@@ -76,12 +76,8 @@ def legs(
             "Both legs: the other one in columns other_thigh_rad_s... of the same file, or in a second file.",
         ),
     ],
-    thigh: Annotated[
-        float | None, typer.Option("--thigh", metavar="M", help="Hip to knee, metres; without it, a usual adult's.")
-    ] = None,
-    shank: Annotated[
-        float | None, typer.Option("--shank", metavar="M", help="Knee to ankle or to the floor, metres; likewise.")
-    ] = None,
+    thigh: Thigh = None,
+    shank: Shank = None,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV).")] = Path("track.csv"),
     profile: Annotated[
         str,

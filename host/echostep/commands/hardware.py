@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from echostep.commands.groups import Ports
+from echostep.commands.options import Shank, Thigh
 from echostep.errors import EchostepError
 from echostep.printing.lines import say
 
@@ -92,12 +93,8 @@ def calibrate(
     out: Annotated[
         Path, typer.Option("--out", metavar="FILE", help="Settings file to write; its other sections are kept.")
     ] = Path("calibration.toml"),
-    thigh: Annotated[
-        float | None, typer.Option("--thigh", metavar="M", help="Hip to knee, metres; without it, a usual adult's.")
-    ] = None,
-    shank: Annotated[
-        float | None, typer.Option("--shank", metavar="M", help="Knee to ankle, metres; likewise.")
-    ] = None,
+    thigh: Thigh = None,
+    shank: Shank = None,
     walked: Annotated[
         float, typer.Option("--walked", metavar="M", help="Length of the walk that calibrates the legs, metres.")
     ] = 10.0,

@@ -76,6 +76,12 @@ Units = Annotated[
     typer.Option("--units", metavar="UNIT,...", help="Units of the file: ms, us, ns; g, mg; deg/s, deg; hPa, kPa."),
 ]
 LOCAL = "127.0.0.1"
+Thigh = Annotated[
+    float | None, typer.Option("--thigh", metavar="M", help="Hip to knee, metres; without it, a usual adult's.")
+]
+Shank = Annotated[
+    float | None, typer.Option("--shank", metavar="M", help="Knee to ankle or to the floor, metres; likewise.")
+]
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
 TeamPlan = Annotated[
     Path,

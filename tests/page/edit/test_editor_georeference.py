@@ -47,7 +47,8 @@ def written(page: Any, server: EditServer) -> Plan:
     return load_plan(server.file.path)
 
 
-def says(page: Any, words: str) -> None:
+def mentions(page: Any, words: str) -> None:
+    """These words come to be part of what the page says."""
     assert until(lambda: words in status(page)), status(page)
 
 
@@ -60,7 +61,7 @@ def test_two_corners_give_the_georeference(browser: Any, bare: EditServer, tmp_p
     page.press("#answer", "Enter")
     assert "Not latitude, then longitude" in page.text_content("#ask-wrong")
     answer(page, pasted()[0])
-    says(page, "First point 48.1374")
+    mentions(page, "First point 48.1374")
     page.click("#closer")  # the first point stays
     click(page, 20.0, 5.0)
     page.locator("#ask[open]").wait_for()
@@ -69,7 +70,7 @@ def test_two_corners_give_the_georeference(browser: Any, bare: EditServer, tmp_p
     page.click("#whole")
     click(page, *CORNERS[1])
     answer(page, pasted(1.01)[1])
-    says(page, "Georeference: y points 342.8° from north; 26.83 m here are 27.10 m on Earth, 1.0 % longer")
+    mentions(page, "Georeference: y points 342.8° from north; 26.83 m here are 27.10 m on Earth, 1.0 % longer")
     assert page.text_content("#north-text") == "north; y points 342.8°"
     turned = page.get_attribute(
         "#north-arrow", "transform"
@@ -102,7 +103,7 @@ def test_distances_that_disagree_are_refused(browser: Any, bare: EditServer, fac
     for corner, text in zip(CORNERS, pasted(factor), strict=True):
         click(page, *corner)
         answer(page, text)
-    says(page, "No georeference: the two points are 26.83 m apart on the plan and " + words)
+    mentions(page, "No georeference: the two points are 26.83 m apart on the plan and " + words)
     assert page.evaluate("[echostep.sheet.past.length, echostep.tools.points.length, echostep.tools.known.length]") == [
         0,
         0,
@@ -119,7 +120,7 @@ def test_a_server_that_has_ended_is_told(browser: Any, bare: EditServer) -> None
     for corner, text in zip(CORNERS, pasted(), strict=True):
         click(page, *corner)
         answer(page, text)
-    says(page, "No georeference: echostep does not answer, is it still running?")
+    mentions(page, "No georeference: echostep does not answer, is it still running?")
     page.context.close()
 
 
@@ -131,7 +132,7 @@ def test_keys_alone_give_the_georeference(browser: Any, bare: EditServer) -> Non
         page.evaluate(f"echostep.tools.cross = {json.dumps(corner)}")
         page.keyboard.press("Enter")
         answer(page, text)
-    says(page, "the same")
+    mentions(page, "the same")
     assert not page.wrong
     page.context.close()
 
@@ -152,7 +153,7 @@ def test_fingers_on_a_phone_held_either_way(browser: Any, bare: EditServer, held
         assert found.violations_count == 0, found.generate_report()
         page.fill("#answer", text)
         page.tap("#yes")
-        says(page, text[:8]) if corner == CORNERS[0] else says(page, "Georeference: y points 342.8°")
+        mentions(page, text[:8]) if corner == CORNERS[0] else mentions(page, "Georeference: y points 342.8°")
     found = Axe().run(page)
     page.screenshot(path=tmp_path / f"earth-{held}.png")
     assert found.violations_count == 0, found.generate_report()
