@@ -240,6 +240,20 @@ def detection(distance_m: float, off_axis_rad: float, kind: float, m: EchoModel)
 
 
 @inline_kernel
+def likeliest_source(
+    count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel
+) -> tuple[int, float, float]:
+    """Which of `count` sources, nearest first, is likeliest the first that is detected; the probabilities of that, and that none is detected."""
+    unheard, answers, first = 1.0, 0.0, 0
+    for k in range(count):
+        heard = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], m)
+        unheard -= heard
+        if heard > answers:
+            answers, first = heard, k
+    return first, answers, unheard
+
+
+@inline_kernel
 def normal(x: float, sd: float) -> float:
     """Normal density about zero."""
     z = x / sd

@@ -21,13 +21,14 @@ from echostep.angles import mean_angle
 from echostep.arrays import Floats
 from echostep.board.calibration import LEAST_RANGE_M
 from echostep.jit import kernel
-from echostep.localization.echoes.likelihood import EchoModel, detection, normal
+from echostep.localization.echoes.likelihood import EchoModel, likeliest_source, normal
 from echostep.localization.particle_arrays import Move, ParticleArrays, PingBatch
 from echostep.path import MeasuredSegment
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.index import WallIndex
 
-STAYS = 0.5  # share of the variance of a range's error that stays with the ranger, assumed
+# Share of the variance of a range's error that stays with the ranger, assumed; without a bias `hall` of `evaluate anywhere` fails
+STAYS = 0.5
 
 
 class RangeBias:
@@ -82,17 +83,13 @@ def learn_bias(
 ) -> tuple[float, float]:  # fmt: skip
     """Mean and variance of the bias after the echoes, whose ranges are without the mean before."""
     distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
-    before_m, (mean_m, var_m2) = bias[0], bias
+    mean_m, var_m2 = bias
+    before_m = mean_m
     for i in range(len(x)):
         if pings.range_m[i] <= 0.0:
             continue
         count = echo_sources(x[i], y[i], axis[i], walls, distance_m, off_axis_rad, kind)
-        unheard, answers, first = 1.0, 0.0, 0
-        for k in range(count):
-            heard = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], model)
-            unheard -= heard
-            if heard > answers:
-                answers, first = heard, k
+        first, answers, _ = likeliest_source(count, distance_m, off_axis_rad, kind, model)
         if answers <= 0.0:
             continue
         c, s = math.cos(axis[i]), math.sin(axis[i])

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.jit import kernel
-from echostep.localization.echoes.likelihood import EchoModel, detection
+from echostep.localization.echoes.likelihood import EchoModel, likeliest_source
 from echostep.localization.estimate import Estimate
 from echostep.path import MeasuredSegment
 from echostep.walls.echo_sources import MOST_SOURCES, echo_sources
@@ -75,10 +75,5 @@ def expected_range(x: float, y: float, axis_rad: float, index: WallIndex, model:
     """Range of the likeliest first echo at a pose; NaN when it is likelier that no echo comes."""
     distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
     count = echo_sources(x, y, axis_rad, index, distance_m, off_axis_rad, kind)
-    no_echo, best, range_m = 1.0, 0.0, np.nan  # no_echo: probability that no source up to here has been detected
-    for k in range(count):
-        first_echo = no_echo * detection(distance_m[k], off_axis_rad[k], kind[k], model)
-        no_echo -= first_echo
-        if first_echo > best:
-            best, range_m = first_echo, distance_m[k]
-    return range_m if best > no_echo else np.nan
+    first, answers, unheard = likeliest_source(count, distance_m, off_axis_rad, kind, model)
+    return distance_m[first] if answers > unheard else np.nan
