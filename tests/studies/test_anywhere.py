@@ -39,7 +39,7 @@ def run_of(
     """Claims a second and `pace_m` apart."""
     k = np.arange(len(error_m), dtype=float)
     codes = np.array([CODE[s] for s in status])
-    return JudgedRun(k, pace_m * k, np.array(error_m), codes, np.full(len(k), protection_m), np.full(len(k), math.nan))
+    return JudgedRun(k, pace_m * k, np.array(error_m), codes, np.full(len(k), protection_m), np.zeros(0, np.bool_))
 
 
 # ---- columns ----
@@ -99,6 +99,13 @@ def test_an_ellipse_holds_what_is_within_it_on_the_right_floor() -> None:
     true_m = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 0.24], [0.0, 0.0], [0.0, 0.0]])
     right = np.array([[True], [True], [True], [False], [True]])
     assert judge(claims, TruePlaces(true_m, right), np.zeros(5)).in_ellipse.tolist() == [True, False, True, False]
+    wide = Claim(
+        0.0, 5.0, 0.0, 0, 0.0, TRACKING, math.inf, covariance_m2=(9.0, 0.0, 9.0)
+    )  # further off than a storey is high
+    assert [
+        judge([wide], TruePlaces(np.zeros((1, 2)), floor), np.zeros(1)).in_ellipse.tolist()
+        for floor in (right[:1], right[3:4])
+    ] == [[True], [False]]
     unstated = Claim(0.0, 0.0, 0.0, 0, 0.0, TRACKING, math.inf)
     assert judge([unstated], TruePlaces(true_m[:1], right[:1]), np.zeros(1)).in_ellipse.tolist() == []
 

@@ -14,6 +14,9 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import NamedTuple
 
+import numpy as np
+
+from echostep.arrays import Bools, Floats
 from echostep.localization.limits import LOST_M, TRACKING_M
 from echostep.localization.particles.places import LikelyPlace
 
@@ -84,12 +87,8 @@ class Estimate:
 
     def holds(self, x_m: float, y_m: float) -> bool:
         """Whether a place lies in the 95 % ellipse; in an ellipse without area, only its centre does."""
-        dx, dy = x_m - self.x_m, y_m - self.y_m
-        determinant = self.xx_m2 * self.yy_m2 - self.xy_m2**2
-        if determinant <= 0.0:
-            return dx == dy == 0.0
-        square = self.yy_m2 * dx * dx - 2.0 * self.xy_m2 * dx * dy + self.xx_m2 * dy * dy
-        return square <= CHI2_95 * determinant
+        error_m, covariance_m2 = (x_m - self.x_m, y_m - self.y_m), (self.xx_m2, self.xy_m2, self.yy_m2)
+        return bool(in_ellipse95(np.array(error_m), np.array(covariance_m2)))
 
 
 class Ellipse(NamedTuple):
@@ -98,6 +97,17 @@ class Ellipse(NamedTuple):
     major_m: float
     minor_m: float
     angle_rad: float
+
+
+def in_ellipse95(error_m: Floats, covariance_m2: Floats) -> Bools:
+    """Whether errors (..., 2) lie in the 95 % ellipses of covariances (..., 3: xx, xy, yy); in an ellipse without area, only its centre does.
+
+    False where a covariance is NaN.
+    """
+    (dx, dy), (xx, xy, yy) = np.moveaxis(error_m, -1, 0), np.moveaxis(covariance_m2, -1, 0)
+    determinant = xx * yy - xy**2
+    inside = yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy <= CHI2_95 * determinant
+    return np.where(determinant > 0.0, inside, (determinant <= 0.0) & (dx == 0.0) & (dy == 0.0))
 
 
 def ellipse95(xx_m2: float, xy_m2: float, yy_m2: float) -> Ellipse:

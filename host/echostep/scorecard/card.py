@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.localization.estimate import CHI2_95
+from echostep.localization.estimate import in_ellipse95
 from echostep.plan.model import Plan
 from echostep.scorecard.error_statistics import ErrorStatistics, error_statistics, quantile
 from echostep.scorecard.matching import Matched, is_surveyed, known, match
@@ -136,13 +136,8 @@ def _ellipse_holds(track: ScoredPath, at: Matched, error_m: Floats) -> float | N
     """Share of the points whose 95 % ellipse holds the truth."""
     if track.covariance_m2 is None:
         return None
-    xx, xy, yy = track.covariance_m2[at.row].T
-    dx, dy = error_m.T
-    determinant = xx * yy - xy**2
-    inside = yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy <= CHI2_95 * determinant
-    # An ellipse without area has its centre alone
-    held = np.where(determinant > 0.0, inside, (dx == 0.0) & (dy == 0.0))
-    return _share(held, np.isfinite(determinant))
+    covariance_m2 = track.covariance_m2[at.row]
+    return _share(in_ellipse95(error_m, covariance_m2), np.isfinite(covariance_m2.sum(1)))
 
 
 def _holds(radius_m: Floats | None, error_m: Floats) -> float | None:

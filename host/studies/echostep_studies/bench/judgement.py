@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.localization.estimate import CHI2_95, TrackStatus
+from echostep.localization.estimate import TrackStatus, in_ellipse95
 from echostep.plan.model import Plan
 from echostep_studies.bench.filtering import Claim
 
@@ -40,13 +40,17 @@ class TruePlaces:
     xy_m: Floats
     level_right: Bools
 
+    def right(self, level: Ints) -> Bools:
+        """Whether levels (n,) are right."""
+        return self.level_right[np.arange(len(level)), level]
+
 
 @dataclass(frozen=True, slots=True)
 class JudgedRun:
-    """Of n claims, each (n,): time (s), true way walked since the search began (m), error (m), status (a code above), protection radius (m), and the
-    error's square over the covariance, `normalised`: NaN where none is stated, infinite on a wrong floor.
+    """Of n claims, each (n,): time (s), true way walked since the search began (m), error (m), status (a code above), protection radius (m).
 
-    `listed`: whether the last claim has the true place, at least among its hypotheses. `search_m`: way after which the wearer must be found.
+    `in_ellipse` (m,): of the claims that say "tracking" with a covariance, whether the 95 % ellipse holds the true place, on its floor. `listed`:
+    whether the last claim has the true place, at least among its hypotheses. `search_m`: way after which the wearer must be found.
     """
 
     t_s: Floats
@@ -54,7 +58,7 @@ class JudgedRun:
     error_m: Floats
     status: Floats
     protection_m: Floats
-    normalised: Floats
+    in_ellipse: Bools
     listed: bool = True
     search_m: float = SEARCH_M
 
@@ -81,12 +85,6 @@ class JudgedRun:
     def beyond_protection(self) -> Bools:
         """Claims whose error is greater than their protection radius."""
         return self.error_m > self.protection_m
-
-    @property
-    def in_ellipse(self) -> Bools:
-        """Of the claims that say "tracking" with a covariance, (m,): whether the 95 % ellipse holds the true place."""
-        stated = (self.status == TRACKING) & ~np.isnan(self.normalised)
-        return self.normalised[stated] <= CHI2_95
 
     @property
     def alarm_delays_s(self) -> list[float]:
@@ -149,27 +147,20 @@ def errors_m(place_m: Floats, level: Ints, true: TruePlaces) -> Floats:
     """Errors (n,) of places (n, 2) on levels (n,); on a wrong floor at least FLOOR_M."""
     away = place_m - true.xy_m
     error_m = np.hypot(away[:, 0], away[:, 1])
-    right = true.level_right[np.arange(len(level)), level]
-    return np.asarray(np.where(right, error_m, np.maximum(error_m, FLOOR_M)))
+    return np.asarray(np.where(true.right(level), error_m, np.maximum(error_m, FLOOR_M)))
 
 
 def judge(claims: Sequence[Claim], true: TruePlaces, walked_m: Floats, search_m: float = SEARCH_M) -> JudgedRun:
     """Claims (n,) against the truth at their times; `walked_m` (n,) since the search began."""
     place = np.array([(c.x_m, c.y_m) for c in claims]).reshape(-1, 2)
-    error_m = errors_m(place, np.array([c.level for c in claims]), true)
-    normalised = _normalised(claims, place - true.xy_m, error_m)
+    level, status = np.array([c.level for c in claims]), np.array([float(CODES[c.status]) for c in claims])
+    error_m, covariance_m2 = errors_m(place, level, true), np.array([c.covariance_m2 for c in claims]).reshape(-1, 3)
+    held = in_ellipse95(place - true.xy_m, covariance_m2) & true.right(level)
+    stated = (status == TRACKING) & ~np.isnan(covariance_m2).any(1)
     return JudgedRun(
-        np.array([c.t_s for c in claims]), walked_m, error_m, np.array([float(CODES[c.status]) for c in claims]),
-        np.minimum([c.protection_m for c in claims], FARTHEST_M), normalised, _listed(claims[-1], error_m[-1], true), search_m,
+        np.array([c.t_s for c in claims]), walked_m, error_m, status,
+        np.minimum([c.protection_m for c in claims], FARTHEST_M), held[stated], _listed(claims[-1], error_m[-1], true), search_m,
     )  # fmt: skip
-
-
-def _normalised(claims: Sequence[Claim], away_m: Floats, error_m: Floats) -> Floats:
-    """Squares of errors (n, 2) over the covariances of the claims; infinite on a wrong floor, where `error_m` (n,) is more than that."""
-    xx, xy, yy = np.array([c.covariance_m2 for c in claims]).reshape(-1, 3).T
-    dx, dy = away_m.T
-    square = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
-    return np.where(error_m > np.hypot(dx, dy), square + math.inf, square)
 
 
 def _listed(claim: Claim, error_m: float, true: TruePlaces) -> bool:
