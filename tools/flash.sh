@@ -25,7 +25,7 @@ if [ -z "$hex" ]; then
 fi
 [ -r "$hex" ] || fail "$hex: there is no such file"
 digest=$({ sha256sum "$hex" 2>/dev/null || shasum -a 256 "$hex"; } | cut -d " " -f 1)
-[ ! -r "$hex.sha256" ] || [ "$(cut -d " " -f 1 "$hex.sha256")" = "$digest" ] || fail "$hex: its SHA-256 is $digest, not that of $hex.sha256: make firmware"
+[ ! -r "$hex.sha256" ] || [ "$(head -n 1 "$hex.sha256" | cut -d " " -f 1)" = "$digest" ] || fail "$hex: its SHA-256 is $digest, not that of $hex.sha256: make firmware"
 echo "$hex: SHA-256 $digest"
 
 # Opening the port at 1200 Bd and closing it starts the bootloader, which appears as another port or as this one anew.

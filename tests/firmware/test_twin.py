@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections import Counter
+from contextlib import closing
+from pathlib import Path
 
-from board_runs import Bench, kinds, needs_twin, pings
+from board_runs import ROOT, TWIN, Bench, kinds, needs_twin, pings
 from echostep.board import messages as m
+from echostep.simulation.devices.board import BoardProcess
 
 pytestmark = needs_twin
 
@@ -40,6 +44,23 @@ def test_the_first_words_are_identity_and_configuration(bench: Bench) -> None:
     assert found[0].schema_hash == m.SCHEMA_HASH
     assert found[0].reset_cause == m.ResetCause.POWER_ON
     assert isinstance(found[1], m.Configuration)
+
+
+def test_the_shipped_firmware_works_with_this_host(bench: Bench, tmp_path: Path) -> None:
+    """The bytes that are flashed, whichever compiler made them, beside those that this machine's compiler has made."""
+    shipped = tmp_path / "shipped.elf"
+    to_elf = ["avr-objcopy", "-I", "ihex", "-O", "elf32-avr", "--rename-section", ".sec1=.text"]
+    subprocess.run([*to_elf, ROOT / "host/echostep/firmware/echostep.hex", shipped], check=True)
+    other = Bench(BoardProcess([str(TWIN), "--elf", str(shipped)]))
+    with closing(other.board):
+        found, expected = other.run(3_000), bench.run(3_000)
+    assert isinstance(found[0], m.Identity)
+    assert found[0].schema_hash == m.SCHEMA_HASH
+    assert found[0][1:] == expected[0][1:], "of another version: make firmware"
+    assert kinds(found).keys() == kinds(expected).keys()
+    assert kinds(found)["Ping"] >= 2 * 28
+    assert other.reader.counts.lost == other.reader.counts.rejected == 0
+    assert other.status.healthy == 0x7F
 
 
 def test_trigger_stamps_follow_the_bus(bench: Bench) -> None:
