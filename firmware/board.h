@@ -14,10 +14,10 @@
 
 uint32_t clock_now(void);
 
-/* Whether `now` is at or after `due`; correct while the two are less than 17.9 minutes apart. */
-static inline bool ticks_reached(uint32_t now, uint32_t due)
+/* Whether `now` is at or after `then`; correct while the two are less than 17.9 minutes apart. */
+static inline bool ticks_reached(uint32_t now, uint32_t then)
 {
-	return (int32_t)(now - due) >= 0;
+	return (int32_t)(now - then) >= 0;
 }
 
 /* A rising edge of the SyncOut input, which on a foot board is the data-ready line of its part. */

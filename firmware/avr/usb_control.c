@@ -123,8 +123,10 @@ static bool acknowledge(void)
 static bool send_descriptor(const struct setup *s)
 {
 	uint8_t length = usb_descriptor_length(s->value);
+	if (!length)
+		return false;
 	reply.descriptor = s->value;
-	return length && send(DESCRIBING, length, s->length);
+	return send(DESCRIBING, length, s->length);
 }
 
 /* A host may set the same configuration again: the endpoints start anew, and an open port stays open. */
