@@ -68,7 +68,8 @@ static bool take_key(unsigned address)
 /* true: the bootloader waits before it starts the program. */
 static bool bootloader_stays(uint8_t cause)
 {
-	bool key = take_key(KEY_ADDRESS_OLD) | take_key(avr->ramend - 1u);
+	bool old = take_key(KEY_ADDRESS_OLD);
+	bool key = take_key(avr->ramend - 1u) || old;
 
 	fill(BOOTLOADER_DATA, BOOTLOADER_DATA_SIZE);
 	fill(avr->ramend + 1u - BOOTLOADER_STACK, BOOTLOADER_STACK - 2u);

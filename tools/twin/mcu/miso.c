@@ -15,7 +15,7 @@
 #define HIGH_MIN_V (0.2 * SUPPLY_V + 0.9)
 #define MISO 3 /* of port B */
 
-static enum { ZEROS, ONES, NOISE, KINDS } undefined;
+static enum kind { ZEROS, ONES, NOISE, KINDS } undefined;
 static double resistor_ohm; /* between MISO and 3.3 V, 0: none */
 
 /* The Thevenin voltage of all resistors; 0 without any. */
@@ -67,7 +67,7 @@ bool miso_fault(const char *name, const char *value)
 		resistor_ohm = !strcmp(value, "2200") ? 2200.0 : 0.0;
 		return resistor_ohm > 0.0 || !strcmp(value, "none");
 	}
-	for (int k = 0; !strcmp(name, "miso_undefined") && k < KINDS; k++)
+	for (enum kind k = ZEROS; !strcmp(name, "miso_undefined") && k < KINDS; k++)
 		if (!strcmp(value, kinds[k])) {
 			undefined = k;
 			return true;

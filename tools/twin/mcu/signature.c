@@ -16,9 +16,10 @@ static uint8_t signature[SIGNATURE_SIZE], vectors[SIGNATURE_SIZE];
  * firmware does not use. */
 static avr_cycle_count_t hide_signature(avr_t *a, avr_cycle_count_t when, void *param)
 {
+	(void)a;
 	(void)when;
 	(void)param;
-	memcpy(a->flash + SIGNATURE, vectors, sizeof vectors);
+	memcpy(avr->flash + SIGNATURE, vectors, sizeof vectors);
 	return 0;
 }
 

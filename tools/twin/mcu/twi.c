@@ -222,8 +222,9 @@ static void write_plain(avr_t *a, avr_io_addr_t register_address, uint8_t value,
 
 static uint8_t read_plain(avr_t *a, avr_io_addr_t register_address, void *param)
 {
+	(void)a;
 	(void)param;
-	return a->data[register_address];
+	return avr->data[register_address];
 }
 
 /* The pins: a part that holds a line low; else the pull-ups. */

@@ -19,7 +19,7 @@ static struct bank *bank_of_cpu(struct endpoint *e) { return &e->bank[is_control
 
 static uint8_t interrupts_of(struct endpoint *e)
 {
-	struct bank *b = &e->bank[e->cpu];
+	const struct bank *b = &e->bank[e->cpu];
 	uint8_t flags = e->flags & (uint8_t)~RWAL;
 
 	if (is_control(e) || !(flags & FIFOCON))
@@ -55,7 +55,7 @@ void usb_refresh(void)
 
 void usb_offer_bank(struct endpoint *e)
 {
-	struct bank *b = &e->bank[e->cpu];
+	const struct bank *b = &e->bank[e->cpu];
 
 	if (is_in(e) && !b->full)
 		e->flags |= TXINI | FIFOCON;
@@ -68,6 +68,7 @@ static uint8_t read_register(avr_t *a, avr_io_addr_t address, void *param)
 	struct endpoint *e = selected();
 	struct bank *b = bank_of_cpu(e);
 
+	(void)a;
 	(void)param;
 	switch (address) {
 	case UEINTX: return interrupts_of(e);
@@ -78,7 +79,7 @@ static uint8_t read_register(avr_t *a, avr_io_addr_t address, void *param)
 	case UESTA0X: return (uint8_t)((e->cfg1 & ALLOC ? 0x80 : 0) | (e->bank[0].full + e->bank[1].full));
 	case UEDATX: return b->read < b->length ? b->bytes[b->read++] : 0;
 	case UEBCLX: return (uint8_t)(is_in(e) && !is_control(e) ? b->length : b->length - b->read);
-	default: return a->data[address];
+	default: return avr->data[address];
 	}
 }
 

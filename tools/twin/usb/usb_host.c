@@ -58,7 +58,7 @@ static void begin_request(const uint8_t *bytes)
 
 static void set_line_state(bool open)
 {
-	uint8_t bytes[16] = { 0x21, 0x22, open ? DTR_RTS : 0 };
+	const uint8_t bytes[16] = { 0x21, 0x22, open ? DTR_RTS : 0 };
 
 	is_open = open;
 	bench_trace(open ? "port opened" : "port closed");
@@ -254,8 +254,9 @@ static void watch(void)
 
 static avr_cycle_count_t poll(avr_t *a, avr_cycle_count_t when, void *param)
 {
+	(void)a;
 	(void)param;
-	if (a->cycle % FRAME < CONTROL_POLL || !requesting) {
+	if (avr->cycle % FRAME < CONTROL_POLL || !requesting) {
 		watch();
 		if (state == ENUMERATING || state == RUNNING)
 			usb_frame(frame_number++);

@@ -53,7 +53,7 @@ int usb_in(uint8_t endpoint, uint8_t *bytes, bool *toggle)
 	if (!e)
 		return USB_SILENCE;
 
-	struct bank *b = bank_for_host(e);
+	const struct bank *b = bank_for_host(e);
 
 	if (e->stalled) {
 		e->flags |= STALLEDI;
