@@ -4,6 +4,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
+DEMO_READY := $(if $(wildcard $(READY)),$(READY),$(VENV)/demo-ready)
+LISTS := tools/setup.py host/tested-versions.txt host/pyproject.toml host/studies/pyproject.toml
 ELF := firmware/build/echostep.elf
 SHIPPED := host/echostep/firmware/echostep.hex
 TOOL := env PYTHONPATH=tools:tests $(BIN)/python -m
@@ -16,11 +18,17 @@ help: ## list the targets
 
 setup: $(READY) ## make .venv with the host package, its tests and its tools
 
-$(READY): host/pyproject.toml host/studies/pyproject.toml
+$(BIN)/python:
 	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || tools/apt.sh python3-venv
 	$(PYTHON) -m venv $(VENV)
-	tools/setup.sh $(BIN)
-	touch $@
+
+$(READY): $(LISTS) | $(BIN)/python
+	@$(BIN)/python tools/setup.py tests
+	@touch $@
+
+$(VENV)/demo-ready: $(LISTS) | $(BIN)/python
+	@$(BIN)/python tools/setup.py demo
+	@touch $@
 
 firmware: ## build the firmware (firmware/build/echostep.elf and .hex) and put it into the host package
 	$(MAKE) -C firmware
@@ -32,12 +40,12 @@ twin: $(READY) ## play board and MTx on two pseudo terminals until Ctrl-C; STILL
 	$(MAKE) -C tools/twin
 	$(if $(CORRIDOR),$(TOOL) twin.acceptance_walk $(CORRIDOR),$(TOOL) twin.run $(if $(STILL),--still) $(if $(KIT),--kit $(KIT)))
 
-demo: $(READY) ## track a simulated walk through the real firmware in the simulator; KIT=2026: with the parts of 2026 (default: papers)
+demo: $(DEMO_READY) ## track a simulated walk through the real firmware in the simulator; KIT=2026: with the parts of 2026 (default: papers)
 	@if tools/apt.sh $(APT_PACKAGES); then \
 		$(MAKE) --quiet -C firmware && $(MAKE) --quiet -C tools/twin && \
 		$(BIN)/echostep demo --out out/demo --board-command "$(TWIN) --elf $(ELF)" $(if $(KIT),--kit $(KIT)) $(DEMO); \
 	else \
-		echo "No right to install the AVR tools: the demo runs on the Python board, not on the real firmware."; \
+		echo "The demo runs on the Python board, not on the real firmware."; \
 		$(BIN)/echostep demo --out out/demo $(if $(KIT),--kit $(KIT)) $(DEMO); \
 	fi
 
@@ -48,7 +56,7 @@ quick: $(READY) ## run the tests that need no twin, browser, process, study or m
 	$(BIN)/python -m pytest -q -n auto --dist worksteal -m "not (twin or browser or process or study or long or speed)"
 
 test: $(READY) ## run every test
-	@tools/apt.sh $(APT_PACKAGES) $(TEST_PACKAGES) || echo "No right to install the AVR tools, Mosquitto, Chromium, clang and OpenSCAD: tests that need them are skipped and named."
+	@tools/apt.sh $(APT_PACKAGES) $(TEST_PACKAGES) || echo "Tests that need them are skipped and named."
 	@if command -v avr-gcc >/dev/null && [ -e /usr/include/simavr/sim_avr.h ]; then $(MAKE) --quiet -C firmware && $(MAKE) --quiet -C tools/twin; fi
 	$(MAKE) --quiet --jobs 2 check suite
 
@@ -79,7 +87,7 @@ bench: $(VENV)/peers ## speed of the host as ratios against others, in the same 
 	$(BIN)/python -m echostep_studies.speed.bench
 
 page-speed: $(READY) ## latency and frame rate of the live page and of the commander's page in Chromium
-	@tools/apt.sh chromium || echo "Chromium is not installed."
+	@tools/apt.sh chromium || true
 	$(BIN)/python -m pytest -q -s -m speed tests/page/web/test_page_speed.py tests/operation/test_table_speed.py
 
 operation: $(READY) ## 20 wearers, crews and a commander, whose page is at http://127.0.0.1:8420/ meanwhile (simulated); PORT=9000: there
@@ -142,7 +150,7 @@ flips: $(READY) ## flip 314 random bits of a recording, one at a time, and damag
 	$(TOOL) reliability.damaged_blocks
 
 hardware: $(READY) ## checks the nets of the wiring; the printed boxes: STL in out/hardware, checked to be closed, and their pictures; not built yet
-	@tools/apt.sh openscad || echo "OpenSCAD is not installed, and this user may not install it."
+	@tools/apt.sh openscad || true
 	$(TOOL) hardware.nets
 	$(TOOL) hardware.boxes
 

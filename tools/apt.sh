@@ -1,21 +1,32 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Install Debian packages that are missing; exit 1 without a word of error when this user may not.
+# Install Debian packages that are missing; where that fails, say why in one line and exit 1.
 missing=""
 for package in "$@"; do
 	dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q "ok installed" || missing="$missing $package"
 done
 [ -z "$missing" ] && exit 0
-command -v apt-get >/dev/null || exit 1
+fail() {
+	echo "Not installed:$missing: $1"
+	exit 1
+}
+command -v apt-get >/dev/null || fail "there is no apt-get on this system."
 if [ "$(id -u)" = 0 ]; then
 	as_root=""
 elif command -v sudo >/dev/null && sudo -n true 2>/dev/null; then
 	as_root="sudo -n"
 else
-	exit 1
+	fail "this user has no right to (neither root nor sudo without a password)."
 fi
+log=$(mktemp) || exit 1
+trap 'rm -f "$log"' EXIT
 echo "Installing:$missing"
 export DEBIAN_FRONTEND=noninteractive
-{ $as_root apt-get update && $as_root apt-get install -y --no-install-recommends $missing; } >/tmp/echostep-apt.log 2>&1 && exit 0
-echo "apt failed; see /tmp/echostep-apt.log"
-exit 1
+# A list that cannot be renewed may still name packages that can be fetched.
+$as_root apt-get update >"$log" 2>&1
+$as_root apt-get install -y --no-install-recommends $missing >>"$log" 2>&1 && exit 0
+if grep -q "is expired" "$log"; then
+	fail "apt's package list has expired."
+fi
+reason=$(grep -m 1 "^E: " "$log" || grep -m 1 "^W: " "$log") || reason="apt-get failed without a word."
+fail "apt says: ${reason#?: }"

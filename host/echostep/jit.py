@@ -4,8 +4,11 @@
 In: functions. Out: the same, compiled when first called and cached in the folder that `kernel_cache` names; the commands are told of each. Owns the
 options.
 
+A *kernel* is called from Python; a *part* is called by kernels and other parts alone. A part has no wrapper for Python, which is a fifth of the work
+of compiling, and none of its versions is made for one constant: numba makes them while it still takes `k = 0` before a loop for the type of `k`.
+
 numba counts references to every array that one kernel hands to another, atomically. In kernels that run once per sample or particle that takes longer
-than their work: `lean_kernel` counts none, so it returns numbers or tuples of them and makes no arrays. numba has no public option for this.
+than their work: a lean one counts none, so it returns numbers or tuples of them and makes no arrays. numba has no public option for this.
 """
 
 from __future__ import annotations
@@ -14,37 +17,86 @@ import sys
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from numba import config, njit
+from numba import config, njit, types
 from numba.core import event
+from numba.extending import models, register_model, typeof_impl
 from numba.np import linalg
 
 from echostep.kernel_cache import cache_folder, on_compiling
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-_OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy"}  # a division by zero is inf or NaN, as in numpy
-_UNCOUNTED: dict[str, Any] = {**_OPTIONS, "_nrt": False}
-_COUNTED: dict[str, Any] = {**_OPTIONS, "_nrt": True}
+# A division by zero is inf or NaN, as in numpy. The wrapper left out is the one by which C would call a kernel.
+_KERNEL: dict[str, Any] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+_PART: dict[str, Any] = {**_KERNEL, "no_cpython_wrapper": True}
+_LEAN, _COUNTED, _INLINE = {"_nrt": False}, {"_nrt": True}, {"forceinline": True}
 
 
 def kernel(function: Function) -> Function:
-    """A kernel that may make arrays, but for when a lean kernel calls it: then it is compiled as lean as its caller."""
-    return _compiled(function, _OPTIONS)
+    """A kernel that may make arrays, but for when a lean one calls it: then it is compiled as lean as its caller."""
+    return _compiled(function, _KERNEL)
 
 
 def lean_kernel(function: Function) -> Function:
     """A kernel that makes no arrays and counts no references to those that it is given."""
-    return _compiled(function, _UNCOUNTED)
-
-
-def allocating_kernel(function: Function) -> Function:
-    """A kernel that makes arrays although a lean kernel calls it."""
-    return _compiled(function, _COUNTED)
+    return _compiled(function, _KERNEL | _LEAN)
 
 
 def inline_kernel(function: Function) -> Function:
-    """A kernel that is copied into each of its callers and compiled with their options."""
-    return _compiled(function, {**_OPTIONS, "inline": "always"})
+    """A kernel that the compiler copies into each kernel that calls it."""
+    return _compiled(function, _KERNEL | _INLINE)
+
+
+def part(function: Function) -> Function:
+    """A part that may make arrays, but for when a lean one calls it."""
+    return _part(function, _PART)
+
+
+def lean_part(function: Function) -> Function:
+    """A part that makes no arrays and counts no references."""
+    return _part(function, _PART | _LEAN)
+
+
+def allocating_part(function: Function) -> Function:
+    """A part that makes arrays although a lean one calls it."""
+    return _part(function, _PART | _COUNTED)
+
+
+def inline_part(function: Function) -> Function:
+    """A part that the compiler copies into each of its callers."""
+    return _part(function, _PART | _INLINE)
+
+
+class _Part:
+    """What numba compiles of a part. Called from Python, where it would crash for want of a wrapper, it raises TypeError."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        self.py_func = function
+        self.dispatcher: Any = _compiled(function, options)
+
+    def __call__(self, *_arguments: object) -> None:
+        raise TypeError(f"{self.py_func.__qualname__} is a part of kernels: Python cannot call it")
+
+
+class _PartType(types.Dispatcher):  # type: ignore[misc]
+    """The type of a part: a constant among its arguments is a number like any other."""
+
+    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
+        unliteral: Callable[[Any], Any] = types.unliteral
+        numbers = {name: unliteral(kind) for name, kind in kws.items()}
+        return super().get_call_type(context, tuple(map(unliteral, args)), numbers)
+
+
+register_model(_PartType)(models.OpaqueModel)
+
+
+@typeof_impl.register(_Part)
+def _type_of_part(value: _Part, _context: object) -> _PartType:
+    return _PartType(value.dispatcher)
+
+
+def _part(function: Function, options: dict[str, Any]) -> Function:
+    return cast("Function", _Part(function, options))
 
 
 def _compiled(function: Function, options: dict[str, Any]) -> Function:

@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: MIT
 """The versions of all packages with which the tests have passed (`make lock`), with the hashes of their files, as requirements for pip.
 
-In: the installed packages; the package index, which uv asks for the hashes. Out: host/tested-versions.txt. Owns that file. `make setup` installs
-these versions where the package index has them; `make audit` looks for known faults of them.
+In: the installed packages; the package index, which uv asks for what other systems and Pythons need, and for the hashes. Out:
+host/tested-versions.txt, in two parts: what `make demo` installs, and what `make test` needs besides. Owns that file. `tools/setup.py` installs
+from it; `make audit` looks for known faults of these versions.
 """
 
 from __future__ import annotations
 
 import argparse
-import platform
+import re
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 from packaging.utils import canonicalize_name
 
@@ -18,32 +21,51 @@ from places import ROOT
 from release.licences import for_developers
 
 FILE = ROOT / "host/tested-versions.txt"
+OLDEST = "3.11.2"  # Debian 12's
+DEMO = ("./host[page,plots]", "hatchling")  # hatchling installs the checkout itself
+ALL = ("./host[dev]", "./host/studies[cluster]", "hatchling")
 HEAD = (
-    "# Versions with which the tests have passed, and the hashes of their files: "
+    "# Versions with which the tests have passed, and the hashes of their files, for every system and Python: "
     "written by make lock, installed by make setup, checked by make audit.\n"
 )
+TESTS = "# What make test needs besides.\n"
 
 
-def versions() -> str:
-    """A line for each package that echostep and its tests need."""
+def installed() -> str:
+    """A line for each installed package that echostep and its tests need."""
     packages = for_developers().items()
     return "".join(f"{canonicalize_name(name)}=={package.version}\n" for name, package in packages)
 
 
-def with_hashes(lines: str, uv: str) -> str:
-    """The same lines, each followed by the hashes of all files of that version, whatever system and Python they are for."""
-    options = ("--quiet", "--no-deps", "--generate-hashes", "--no-header", "--no-annotate", "--python-version")
-    command = [uv, "pip", "compile", *options, platform.python_version(), "-"]
-    return subprocess.run(command, input=lines, capture_output=True, text=True, check=True).stdout
+def resolved(wanted: tuple[str, ...], preferred: str, uv: str) -> str:
+    """All that these requirements need on any system and Python, with the hashes of all files; of the preferred versions where they fit."""
+    with tempfile.TemporaryDirectory() as folder:
+        lines = Path(folder, "versions.txt")
+        lines.write_text(preferred)
+        own = ("--no-emit-package", "echostep", "--no-emit-package", "echostep-studies")
+        layout = ("--quiet", "--no-header", "--no-annotate", "--generate-hashes", "--output-file", str(lines))
+        command = [uv, "pip", "compile", "--universal", "--python-version", OLDEST, *own, *layout, "-"]
+        subprocess.run(command, input="\n".join(wanted), cwd=ROOT, stdout=subprocess.DEVNULL, text=True, check=True)
+        return "".join(
+            line for line in lines.read_text().splitlines(keepends=True) if not line.startswith("#")
+        ).lstrip()
+
+
+def entries(lines: str) -> list[str]:
+    """Each package with its hashes."""
+    return re.findall(r"^\S.*\n(?: .*\n)*", lines, re.MULTILINE)
 
 
 def main() -> int:
     """Write the file."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--uv", default="uv", help="the program that asks the package index (default uv)")
-    lines = versions()
-    FILE.write_text(HEAD + with_hashes(lines, parser.parse_args().uv))
-    print(f"{FILE}: {len(lines.splitlines())} packages")
+    uv = parser.parse_args().uv
+    everything = entries(resolved(ALL, installed(), uv))
+    demo = entries(resolved(DEMO, "".join(everything), uv))
+    besides = [entry for entry in everything if entry not in demo]
+    FILE.write_text("".join([HEAD, *demo, TESTS, *besides]))
+    print(f"{FILE}: {len(everything)} packages, of which {len(demo)} for the demo")
     return 0
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from echostep.arrays import Bools, Ints, Octets
 from echostep.board.messages import BY_ID, GREATEST, ROWS, SCHEMA_HASH, SCHEMA_SEED, Message
 from echostep.errors import EchostepError
-from echostep.jit import kernel, lean_kernel
+from echostep.jit import kernel, lean_part
 
 MAX_ENCODED = 65  # bytes; payloads are at most 64 bytes [protocol/README.md], COBS adds one
 HEAD = 3  # bytes before the body: id, sequence
@@ -214,7 +214,7 @@ def _find_frames(
     return count, start, -1
 
 
-@lean_kernel
+@lean_part
 def _decode_frame(stream: Octets, start: int, end: int, payload: Octets, schema: _Schema, tally: Ints) -> bool:
     """Decode stream[start:end] into `payload` (id, sequence, body, checksum); false, and counted, if COBS, length or checksum is wrong."""
     if not SHORTEST - 1 <= end - start <= MAX_ENCODED:
@@ -233,7 +233,7 @@ def _decode_frame(stream: Octets, start: int, end: int, payload: Octets, schema:
     return True
 
 
-@lean_kernel
+@lean_part
 def _decode_cobs(stream: Octets, begin: int, end: int, payload: Octets) -> bool:
     """Decode COBS of one frame of at most MAX_ENCODED bytes; false when a block ends behind the frame [Cheshire, Baker 1999]."""
     n = 0
@@ -250,7 +250,7 @@ def _decode_cobs(stream: Octets, begin: int, end: int, payload: Octets) -> bool:
     return True
 
 
-@lean_kernel
+@lean_part
 def _is_valid(payload: Octets, size: int, schema: _Schema) -> bool:
     """Whether the schema has this message, with this size and these enumeration values; an identity must have this host's schema."""
     identifier = payload[0]
@@ -262,13 +262,13 @@ def _is_valid(payload: Octets, size: int, schema: _Schema) -> bool:
     return identifier != _IDENTITY or _schema_hash(payload, schema) == schema.hash
 
 
-@lean_kernel
+@lean_part
 def _schema_hash(payload: Octets, schema: _Schema) -> int:
     """The schema's hash in the payload of an identity."""
     return _uint32(payload, HEAD + schema.hash_offset)
 
 
-@lean_kernel
+@lean_part
 def _uint32(payload: Octets, offset: int) -> int:
     """A little-endian number of 32 bits."""
     value = 0
@@ -277,7 +277,7 @@ def _uint32(payload: Octets, offset: int) -> int:
     return value
 
 
-@lean_kernel
+@lean_part
 def _count_sequence(sequence: int, identifier: int, ticks: int, schema: _Schema, tally: Ints) -> None:
     """Count a good frame, and the frames lost before it. `ticks`: the first four bytes of the body.
 

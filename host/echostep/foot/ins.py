@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.jit import lean_kernel
+from echostep.jit import lean_kernel, lean_part
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -80,7 +80,7 @@ def rotation(q: Floats | Quaternion) -> Matrix:
     )
 
 
-@lean_kernel
+@lean_part
 def multiply(a: Floats | Quaternion, b: Floats | Quaternion) -> Quaternion:
     """Quaternion product a b, of unit length again."""
     w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
@@ -91,7 +91,7 @@ def multiply(a: Floats | Quaternion, b: Floats | Quaternion) -> Quaternion:
     return w / size, x / size, y / size, z / size
 
 
-@lean_kernel
+@lean_part
 def turning(x: float, y: float, z: float) -> Quaternion:
     """Quaternion of a rotation vector (rad)."""
     angle = math.sqrt(x * x + y * y + z * z)
@@ -99,25 +99,25 @@ def turning(x: float, y: float, z: float) -> Quaternion:
     return math.cos(0.5 * angle), k * x, k * y, k * z
 
 
-@lean_kernel
+@lean_part
 def dot(a: Floats | Vector, b: Floats | Vector) -> float:
     """Scalar product of two (3,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@lean_kernel
+@lean_part
 def apply(r: Matrix, v: Floats | Vector) -> Vector:
     """The product r v of a (3, 3) and a (3,)."""
     return dot(r[0], v), dot(r[1], v), dot(r[2], v)
 
 
-@lean_kernel
+@lean_part
 def difference(a: Floats | Vector, b: Floats | Vector) -> Vector:
     """The difference a - b of two (3,)."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@lean_kernel
+@lean_part
 def _distance(a: Floats, b: Floats) -> float:
     """Distance between two (3,)."""
     d = difference(a, b)
@@ -138,7 +138,7 @@ def heading(nav: Nav) -> float:
     return math.atan2(sine, cosine)
 
 
-@lean_kernel
+@lean_part
 def set_level(nav: Nav, force: Vector, yaw: float, at_rest: bool) -> None:
     """Attitude: roll and pitch from the direction of the mean specific force (3,), yaw as given. If `at_rest`, accelerometer bias from its norm."""
     size = max(math.sqrt(dot(force, force)), 1e-9)
@@ -154,19 +154,19 @@ def set_level(nav: Nav, force: Vector, yaw: float, at_rest: bool) -> None:
     _set_attitude(nav, multiply(turning(0.0, 0.0, yaw), flat))
 
 
-@lean_kernel
+@lean_part
 def _set_attitude(nav: Nav, q: Quaternion) -> None:
     """Set the attitude."""
     nav.attitude[0], nav.attitude[1], nav.attitude[2], nav.attitude[3] = q
 
 
-@lean_kernel
+@lean_part
 def turn_by(nav: Nav, rotation_vector: Vector) -> None:
     """Turn the attitude by a rotation vector (rad) in the walk frame."""
     _set_attitude(nav, multiply(turning(rotation_vector[0], rotation_vector[1], rotation_vector[2]), nav.attitude))
 
 
-@lean_kernel
+@lean_part
 def set_covariance(nav: Nav, tilt_sd: float, velocity_sd: float, gyro_bias_sd: float, accel_bias_sd: float) -> None:
     """Covariance after levelling, velocity zero, from standard deviations; accelerometer bias and the tilt that it causes are correlated."""
     nav.velocity[:] = 0.0
@@ -229,7 +229,7 @@ def propagate(nav: Nav, dt: float, period: float, force0: Floats, force1: Floats
     _add_noise(nav.P, nav.noise, dt, accel, turn, lost_m_s, lost_rad)
 
 
-@lean_kernel
+@lean_part
 def _mean(share: float, earlier: Floats, later: Floats, bias: Floats) -> Vector:
     """Mean of two samples (3,), the later one weighted by `share`, less the bias."""
     rest = 1.0 - share
@@ -240,13 +240,13 @@ def _mean(share: float, earlier: Floats, later: Floats, bias: Floats) -> Vector:
     )
 
 
-@lean_kernel
+@lean_part
 def _sculling(j: int, k: int, force0: Floats, force1: Floats, rate0: Floats, rate1: Floats) -> float:
     """The component perpendicular to axes j and k of rate0 x force1 + force0 x rate1."""
     return rate0[j] * force1[k] - rate0[k] * force1[j] + force0[j] * rate1[k] - force0[k] * rate1[j]
 
 
-@lean_kernel
+@lean_part
 def _propagate_errors(m: Floats, f: Vector, r: Matrix, dt: float) -> None:
     """Propagate errors over dt: m <- F m, F = 1 + dt (dp = v, dv = -[f x] tilt - R b_a, dtilt = -R b_g); applied to P and to P' it gives F P F'."""
     for c in range(SIZE):
@@ -265,7 +265,7 @@ def _propagate_errors(m: Floats, f: Vector, r: Matrix, dt: float) -> None:
         m[YAW, c] -= turned
 
 
-@lean_kernel
+@lean_part
 def _add_noise(
     P: Floats, noise: Noise, dt: float, accel: Vector, rate: Vector, lost_m_s: float, lost_rad: float
 ) -> None:
@@ -305,7 +305,7 @@ def update_but_gyro_bias(nav: Nav, component: int, error: float, variance: float
     _correct(nav, component, error, variance, GYRO_BIAS)
 
 
-@lean_kernel
+@lean_part
 def _correct(nav: Nav, component: int, error: float, variance: float, considered: int) -> None:
     """A scalar update of all but the gyro bias; the covariance of the three states from `considered` on with each other stays (SIZE: of none)."""
     P = nav.P
@@ -327,7 +327,7 @@ def _correct(nav: Nav, component: int, error: float, variance: float, considered
                 P[i, j] -= gain * row[j]
 
 
-@lean_kernel
+@lean_part
 def turn(nav: Nav, centre: Floats, angle: float) -> None:
     """Correct the yaw by an angle (rad), and position and velocity since the foot left `centre` (3,) with it."""
     c, s = math.cos(angle), math.sin(angle)
@@ -338,7 +338,7 @@ def turn(nav: Nav, centre: Floats, angle: float) -> None:
     _set_attitude(nav, multiply(turning(0.0, 0.0, angle), nav.attitude))
 
 
-@lean_kernel
+@lean_part
 def decouple(nav: Nav, component: int, variance: float) -> None:
     """Give the error state `component` this variance, and no covariance with any other."""
     nav.P[component, :] = 0.0
@@ -346,14 +346,14 @@ def decouple(nav: Nav, component: int, variance: float) -> None:
     nav.P[component, component] = variance
 
 
-@lean_kernel
+@lean_part
 def reset_height(nav: Nav, height_m: float) -> None:
     """Set the height to that of a level floor, and correct nothing by it: the drift of a runner's steps has a bias, which is not modelled."""
     decouple(nav, POS + 2, nav.noise.flat_m**2)
     nav.position[2] = height_m
 
 
-@lean_kernel
+@lean_part
 def reset_reference(nav: Nav) -> None:
     """Make the present position and yaw the reference: their errors belong to the steps already reported."""
     for component in (POS, POS + 1, POS + 2, TILT + 2):

@@ -19,7 +19,7 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.foot import ins
 from echostep.foot.ins import YAW, Nav
-from echostep.jit import allocating_kernel, lean_kernel
+from echostep.jit import allocating_part, lean_part
 
 FEWEST = 3  # samples of a stance
 STRANGE = 0.1  # gate on strength and vertical component, as a share of the strength
@@ -58,7 +58,7 @@ def new_compass() -> Magnetometer:
     )
 
 
-@lean_kernel
+@lean_part
 def accumulate(compass: Magnetometer, nav: Nav, mag: Floats) -> None:
     """Add the field (3,), body frame, at a sample of rest to the sum."""
     if not (math.isfinite(mag[0]) and math.isfinite(mag[1]) and math.isfinite(mag[2])):
@@ -72,7 +72,7 @@ def accumulate(compass: Magnetometer, nav: Nav, mag: Floats) -> None:
     compass.sample_count[0] += 1.0
 
 
-@allocating_kernel
+@allocating_part
 def correction(compass: Magnetometer, nav: Nav, yaw: float) -> float:
     """Yaw correction (rad) at the end of a stance with this yaw, 0 while the field is not trusted; corrects the gyro bias in `nav`, too."""
     count = compass.sample_count[0]
@@ -95,7 +95,7 @@ def correction(compass: Magnetometer, nav: Nav, yaw: float) -> float:
     return _update_field(compass, nav, h, c, s)
 
 
-@allocating_kernel
+@allocating_part
 def _start(compass: Magnetometer, nav: Nav, h: Floats, strength: float, c: float, s: float) -> None:
     """Initialise north by the first stance's field, iron by zero."""
     compass.field[:] = 0.0
@@ -107,7 +107,7 @@ def _start(compass: Magnetometer, nav: Nav, h: Floats, strength: float, c: float
     compass.yaw_variance[0] = nav.P[YAW, YAW]
 
 
-@allocating_kernel
+@allocating_part
 def _strange(compass: Magnetometer, h: Floats, strength: float) -> bool:
     """Whether strength or vertical component leave the gate about the running means, which are then updated."""
     usual = compass.usual[STRENGTH]
@@ -118,7 +118,7 @@ def _strange(compass: Magnetometer, h: Floats, strength: float) -> bool:
     return off > STRANGE
 
 
-@allocating_kernel
+@allocating_part
 def _update_field(compass: Magnetometer, nav: Nav, h: Floats, c: float, s: float) -> float:
     """Kalman updates of north and iron with both horizontal components, and of the yaw when the field is trusted; returns the yaw correction."""
     x, unit2 = compass.field, compass.usual[STRENGTH] ** 2
@@ -148,7 +148,7 @@ def _update_field(compass: Magnetometer, nav: Nav, h: Floats, c: float, s: float
     return turned
 
 
-@allocating_kernel
+@allocating_part
 def _update(compass: Magnetometer, row: Floats, error: float, noise: float, trusted: bool) -> float:
     """Scalar update of north and iron; returns the yaw's correction. Without trust the yaw's error is a consider state [Schmidt 1966]."""
     P = compass.P

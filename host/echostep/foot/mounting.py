@@ -15,7 +15,7 @@ import math
 from echostep.arrays import Floats
 from echostep.foot import ins
 from echostep.foot.ins import Nav, Vector
-from echostep.jit import lean_kernel
+from echostep.jit import lean_part
 
 # A whole stride has a larger second moment of the tilt; the first half step of a walk has less, and may tip toe up only.
 ENOUGH_RAD2_S = 0.1
@@ -25,7 +25,7 @@ LEAST_ANISOTROPY = 0.6
 MEMORY = 0.95
 
 
-@lean_kernel
+@lean_part
 def tilt(nav: Nav) -> Vector:
     """Tilt of the foot against its level: rotation vector (3,), z = 0, in the levelled axes of the foot itself."""
     r = ins.rotation(nav.attitude)
@@ -43,7 +43,7 @@ def tilt(nav: Nav) -> Vector:
     return (x / size * angle, y / size * angle, 0.0) if size > 1e-9 else (0.0, 0.0, 0.0)
 
 
-@lean_kernel
+@lean_part
 def accumulate(square: Floats, cube: Floats, tipped: Vector, dt: float) -> None:
     """Add a sample of a swing, tipped by (3,) rad since the last stance: second moments xx, xy, yy and third moment times the vector."""
     x, y, _ = tipped
@@ -54,7 +54,7 @@ def accumulate(square: Floats, cube: Floats, tipped: Vector, dt: float) -> None:
     cube[1] += dt * (x * x + y * y) * y
 
 
-@lean_kernel
+@lean_part
 def toe(square: Floats, cube: Floats) -> float:
     """Angle (rad) from the foot's yaw to its toe; NaN while the foot has not tipped enough."""
     whole = square[0] + square[2]

@@ -14,7 +14,7 @@ from echostep.arrays import Floats
 from echostep.foot import ins
 from echostep.foot.ins import TILT, VEL, YAW, Nav, Vector
 from echostep.foot.stance import RING, SampleWindow
-from echostep.jit import lean_kernel
+from echostep.jit import lean_part
 
 # Assumed; the recordings of `evaluate feet` whose gyros have a wider range keep every figure.
 HIGH_RAD_S = 4.0  # no limit of a gyro for feet is lower
@@ -28,7 +28,7 @@ LONGEST_STEP_S = 0.03  # between two samples of a plateau
 UNSURE = 2.0  # sd of the angle, as a share of it: a heel strike has several peaks, and the flanks show one
 
 
-@lean_kernel
+@lean_part
 def restore(nav: Nav, window: SampleWindow, period_s: float, peak: Floats) -> int:
     """Correct attitude and velocity for the plateaus that ended FLANK_S ago; returns the number of their samples. Updates `peak` (3,) rad/s."""
     newest = window.added[0] - 1
@@ -43,7 +43,7 @@ def restore(nav: Nav, window: SampleWindow, period_s: float, peak: Floats) -> in
     return count
 
 
-@lean_kernel
+@lean_part
 def _flat(window: SampleWindow, axis: int, back: int, step: int) -> bool:
     """Whether the rate is high and flat from the sample `back` + `step` before the newest to the one `back` before it."""
     newest = window.added[0] - 1
@@ -54,7 +54,7 @@ def _flat(window: SampleWindow, axis: int, back: int, step: int) -> bool:
     return 0.0 < dt < LONGEST_STEP_S and rate > HIGH_RAD_S and change < FLAT_PER_S * rate * dt
 
 
-@lean_kernel
+@lean_part
 def _restore_axis(nav: Nav, window: SampleWindow, axis: int, end: int, step: int, peak: float) -> int:
     """Correct for the plateau of an axis whose last sample is `end` before the newest; returns its samples, 0 when it is none."""
     newest = window.added[0] - 1
@@ -80,7 +80,7 @@ def _restore_axis(nav: Nav, window: SampleWindow, axis: int, end: int, step: int
     return begin - end + 1
 
 
-@lean_kernel
+@lean_part
 def _slope(window: SampleWindow, axis: int, back: int, step: int) -> float:
     """Slope of the rate (rad/s2) from the sample `back` + `step` before the newest to the one `back` before it."""
     newest = window.added[0] - 1
@@ -89,7 +89,7 @@ def _slope(window: SampleWindow, axis: int, back: int, step: int) -> float:
     return change / max(window.t_s[now] - window.t_s[before], 1e-4)
 
 
-@lean_kernel
+@lean_part
 def _impulse(nav: Nav, window: SampleWindow, begin: int, end: int) -> Vector:
     """Integral (3,) of the specific force (walk frame) since the plateau began, weighted by the share of the angle omitted until then."""
     newest = window.added[0] - 1
@@ -106,7 +106,7 @@ def _impulse(nav: Nav, window: SampleWindow, begin: int, end: int) -> Vector:
     return ins.apply(ins.rotation(nav.attitude), (x, y, z))
 
 
-@lean_kernel
+@lean_part
 def _turn(nav: Nav, axis: int, angle: float, impulse: Vector) -> None:
     """Turn the attitude by an angle (rad) about an axis of the sensor, and what the velocity got since; the covariance grows by both together."""
     r = ins.rotation(nav.attitude)
@@ -123,7 +123,7 @@ def _turn(nav: Nav, axis: int, angle: float, impulse: Vector) -> None:
     nav.P[YAW, YAW] += UNSURE**2 * z * z
 
 
-@lean_kernel
+@lean_part
 def _component(k: int) -> int:
     """The error state of velocity 0 to 2, attitude 3 to 5."""
     return VEL + k if k < 3 else TILT + k - 3

@@ -20,7 +20,7 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.foot import ins
 from echostep.foot.ins import GYRO_BIAS, TILT, VEL, Nav, Vector
-from echostep.jit import lean_kernel
+from echostep.jit import lean_kernel, lean_part
 
 UP = 2  # of the walk frame's axes
 RING = 64  # samples: 0.12 s at the highest rate, for the plateaus of `soft_limit`
@@ -94,7 +94,7 @@ def add_sample(window: SampleWindow, t_s: float, accel: Floats, gyro: Floats) ->
     window.added[0] += 1
 
 
-@lean_kernel
+@lean_part
 def mean_force(window: SampleWindow) -> Vector:
     """Mean specific force (3,) over the window."""
     newest, n = window.added[0] - 1, _length(window)
@@ -105,14 +105,14 @@ def mean_force(window: SampleWindow) -> Vector:
     return x / n, y / n, z / n
 
 
-@lean_kernel
+@lean_part
 def feels_gravity_alone(window: SampleWindow) -> bool:
     """Whether the size of the mean specific force is that of gravity, whatever the level: `activity` hardly shows a smooth acceleration."""
     force = mean_force(window)
     return abs(math.sqrt(ins.dot(force, force)) - ins.GRAVITY_M_S2) < GRAVITY_ALONE_M_S2
 
 
-@lean_kernel
+@lean_part
 def _length(window: SampleWindow) -> int:
     """Number of samples within WINDOW_S before the newest."""
     newest = window.added[0] - 1
@@ -123,7 +123,7 @@ def _length(window: SampleWindow) -> int:
     return n
 
 
-@lean_kernel
+@lean_part
 def activity(window: SampleWindow, bias: Floats) -> tuple[float, float]:
     """Mean squares over the window: angular rate (rad/s)2; specific force less gravity along its mean (m/s2)2 [Skog et al. 2010, eq. 12]."""
     newest, n = window.added[0] - 1, _length(window)
@@ -138,7 +138,7 @@ def activity(window: SampleWindow, bias: Floats) -> tuple[float, float]:
     return rate2 / n, force2 / n
 
 
-@lean_kernel
+@lean_part
 def stillness_statistic(rate2: float, force2: float) -> float:
     """The SHOE statistic of `activity`; a stance needs a value below 1."""
     return rate2 / REST_RAD_S**2 + force2 / REST_M_S2**2
@@ -168,7 +168,7 @@ def standing_velocity(nav: Nav, window: SampleWindow, height_m: float) -> Vector
     return x, y, z
 
 
-@lean_kernel
+@lean_part
 def normalized_innovation(nav: Nav, expected: Vector, variance: float, force: Vector) -> tuple[float, float]:
     """Chi-square of the innovations of velocity (from `expected`) and acceleration (from 0), given the mean specific force (3,).
 
@@ -188,19 +188,19 @@ def normalized_innovation(nav: Nav, expected: Vector, variance: float, force: Ve
     return level, vertical
 
 
-@lean_kernel
+@lean_part
 def rest_variance(nav: Nav, rate2: float) -> float:
     """Variance (m/s)2 of a standing foot's velocity about rate x height."""
     return nav.noise.rest_m_s**2 + nav.noise.lever_m**2 * rate2
 
 
-@lean_kernel
+@lean_part
 def deceleration_variance(force2: float) -> float:
     """Additional variance (m/s)2 of a foot that may still decelerate: its acceleration over half the window."""
     return (0.5 * WINDOW_S) ** 2 * force2
 
 
-@lean_kernel
+@lean_part
 def zero_velocity_update(nav: Nav, expected: Vector, variance: float, dt: float) -> None:
     """Zero-velocity update; its variance is scaled so that the information per second does not depend on the sample rate.
 
@@ -211,7 +211,7 @@ def zero_velocity_update(nav: Nav, expected: Vector, variance: float, dt: float)
         ins.update_but_gyro_bias(nav, VEL + i, expected[i] - nav.velocity[i], variance * repeated)
 
 
-@lean_kernel
+@lean_part
 def inflate_covariance(nav: Nav, excess: float) -> None:
     """Multiply the covariance of all errors but the biases by `excess` (cross-covariances with the biases by its root).
 
@@ -226,20 +226,20 @@ def inflate_covariance(nav: Nav, excess: float) -> None:
                 nav.P[j, i] *= factor
 
 
-@lean_kernel
+@lean_part
 def may_ride(rate2: float, force2: float) -> bool:
     """Whether a foot with this `activity` may stand in a lift that starts or stops."""
     return rate2 < RIDING_RAD_S**2 and force2 < RIDING_M_S2**2
 
 
-@lean_kernel
+@lean_part
 def follow_floor(nav: Nav, expected: Vector, variance: float) -> None:
     """A floor accelerates with the foot that stands on it: reset the vertical velocity, so that neither level nor biases are corrected by it."""
     ins.decouple(nav, VEL + UP, variance)
     nav.velocity[UP] = expected[UP]
 
 
-@lean_kernel
+@lean_part
 def clear_rest(sums: ZaruSums) -> None:
     """Clear the sums: the foot moves, and an unfinished rest gives no update."""
     for i in range(3):
@@ -247,7 +247,7 @@ def clear_rest(sums: ZaruSums) -> None:
     sums.part_s[0] = sums.whole_s[0] = sums.squares[0] = 0.0
 
 
-@lean_kernel
+@lean_part
 def zero_angular_rate_update(nav: Nav, sums: ZaruSums, dt: float, gyro0: Floats, gyro1: Floats) -> bool:
     """Zero-angular-rate update of the gyro bias after each half second of rest; whether there was one.
 
@@ -273,7 +273,7 @@ def zero_angular_rate_update(nav: Nav, sums: ZaruSums, dt: float, gyro0: Floats,
     return True
 
 
-@lean_kernel
+@lean_part
 def _bias_variance(sums: ZaruSums, mean: Vector) -> float:
     """Variance of the mean rate (3,) from its scatter over the parts of this rest, which contains sensor noise and sway."""
     span_s: float = sums.whole_s[0]
@@ -281,7 +281,7 @@ def _bias_variance(sums: ZaruSums, mean: Vector) -> float:
     return BIAS_FLOOR_RAD_S**2 + max(scatter, 0.0) / 3.0 * PARTS / (PARTS - 1) * SWAY_S / span_s
 
 
-@lean_kernel
+@lean_part
 def _update_bias(nav: Nav, sums: ZaruSums, mean: Vector, variance: float) -> None:
     """Bias update per axis with a gate against slow turns; repeated rejections inflate the bias' covariance."""
     for i in range(3):

@@ -38,7 +38,7 @@ from echostep.foot.zupt_state import (
     ZuptInsState,
     ZuptState,
 )
-from echostep.jit import lean_kernel
+from echostep.jit import lean_kernel, lean_part
 
 CONFIRM_S = 0.03  # a stance is reported after so much rest
 SETTLE_S = 0.2  # after so much rest the step before it has been corrected
@@ -97,7 +97,7 @@ def process(foot: ZuptInsState, samples: Samples, output: Output) -> int:
     return event_count
 
 
-@lean_kernel
+@lean_part
 def _usable(s: ZuptState, t_s: float, accel: Floats, gyro: Floats) -> bool:
     """Whether a sample is finite, possible and later than the last one; counts those that are not."""
     possible = math.isfinite(t_s)
@@ -116,7 +116,7 @@ def _usable(s: ZuptState, t_s: float, accel: Floats, gyro: Floats) -> bool:
     return True
 
 
-@lean_kernel
+@lean_part
 def _track_period(s: ZuptState, dt: float) -> None:
     """Running median of the sample period; missing samples do not bias it."""
     if s.period_s == 0.0:
@@ -125,7 +125,7 @@ def _track_period(s: ZuptState, dt: float) -> None:
         s.period_s *= 1.0 + PERIOD_GAIN if dt > s.period_s else 1.0 - PERIOD_GAIN
 
 
-@lean_kernel
+@lean_part
 def _restart(
     s: ZuptState, nav: Nav, sums: ZaruSums, compass: Magnetometer, dt: float, events: Floats, event_count: int
 ) -> int:
@@ -144,7 +144,7 @@ def _restart(
     return event_count
 
 
-@lean_kernel
+@lean_part
 def _find_level(
     s: ZuptState, nav: Nav, window: SampleWindow, sample: ImuSample, events: Floats, event_count: int
 ) -> int:
@@ -171,7 +171,7 @@ def _find_level(
     return event_count
 
 
-@lean_kernel
+@lean_part
 def _start_navigation(s: ZuptState, nav: Nav, t_s: float, tilt_sd_rad: float, velocity_sd_m_s: float) -> None:
     """Start navigation at this sample; the unobserved time goes into the position's covariance."""
     ins.set_covariance(nav, tilt_sd_rad, velocity_sd_m_s, nav.noise.gyro_bias, nav.noise.accel_bias)
@@ -183,7 +183,7 @@ def _start_navigation(s: ZuptState, nav: Nav, t_s: float, tilt_sd_rad: float, ve
     s.rest_end_s = t_s
 
 
-@lean_kernel
+@lean_part
 def _navigate(
     s: ZuptState,
     nav: Nav,
@@ -226,7 +226,7 @@ def _navigate(
     return event_count
 
 
-@lean_kernel
+@lean_part
 def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: ImuSample) -> bool:
     """Detect rest by both tests of `stance` and apply the zero-velocity update; whether the foot rests.
 
@@ -261,7 +261,7 @@ def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Imu
     return True
 
 
-@lean_kernel
+@lean_part
 def _track_calm(s: ZuptState, nav: Nav, window: SampleWindow, stillness: float, dt: float) -> None:
     """Duration of the present calm, in which a foot feels gravity alone and from one direction: one that glides feels how it brakes."""
     force = ins.apply(ins.rotation(nav.attitude), stance.mean_force(window))
@@ -275,7 +275,7 @@ def _track_calm(s: ZuptState, nav: Nav, window: SampleWindow, stillness: float, 
     s.lasting_s += dt
 
 
-@lean_kernel
+@lean_part
 def _inflate_at_limits(s: ZuptState, nav: Nav, dt: float, accel: Floats, gyro: Floats) -> None:
     """Inflate velocity, tilt and yaw variances while an axis repeats a reading near the end of its range: the true value is unknown."""
     for i in range(3):
@@ -294,13 +294,13 @@ def _inflate_at_limits(s: ZuptState, nav: Nav, dt: float, accel: Floats, gyro: F
             nav.P[YAW, YAW] += rate * axis[2] ** 2
 
 
-@lean_kernel
+@lean_part
 def _limit_variance(value: float, span_s: float, dt: float) -> float:
     """Growth over `dt` of the variance of the integral of `value`, at its limit for `span_s` with a constant error."""
     return (LOST_SHARE * value) ** 2 * (2.0 * span_s - dt) * dt if span_s > 0.0 else 0.0
 
 
-@lean_kernel
+@lean_part
 def _begin_stance(s: ZuptState, nav: Nav, begin_s: float, events: Floats, event_count: int) -> int:
     """Begin a stance; write the step that led to it if there was a stance before."""
     s.in_stance = 1
@@ -317,7 +317,7 @@ def _begin_stance(s: ZuptState, nav: Nav, begin_s: float, events: Floats, event_
     return event_count
 
 
-@lean_kernel
+@lean_part
 def _write_step(s: ZuptState, nav: Nav, row: Floats) -> None:
     """Fill an event row with the step since `origin`; fade the sums of the mounting."""
     row[KIND], row[START_S], row[END_S] = STEP, s.stance_end_s, s.stance_begin_s
@@ -333,14 +333,14 @@ def _write_step(s: ZuptState, nav: Nav, row: Floats) -> None:
         s.tilt_cube[i] *= mounting.MEMORY
 
 
-@lean_kernel
+@lean_part
 def _settle(s: ZuptState, nav: Nav) -> None:
     """Count the errors of the next step from here."""
     s.settled = 1
     ins.reset_reference(nav)
 
 
-@lean_kernel
+@lean_part
 def _end_stance(s: ZuptState, nav: Nav, compass: Magnetometer, events: Floats, event_count: int) -> int:
     """Write the stance, which ended with its last rest, and apply the magnetometer's yaw correction."""
     row = events[event_count]

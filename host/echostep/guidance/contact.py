@@ -14,7 +14,7 @@ import math
 from typing import Protocol
 
 from echostep.arrays import record_dtype
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 
 # Assumed, not measured.
 PERIODS = 1.5  # silence at least, in the times between measurements that were usual: one may be missing
@@ -73,7 +73,7 @@ def update_contact(
     return contact.back > 0.0
 
 
-@kernel
+@part
 def _note_known(contact: Contact, t_s: float, x: float, y: float) -> None:
     """The place is known: the allowed silence doubles after a return, and is the first one again after SAFE_S of contact.
 

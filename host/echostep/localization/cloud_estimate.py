@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.jit import inline_kernel, lean_kernel
+from echostep.jit import inline_part, lean_kernel
 from echostep.localization.estimate import CHI2_95, RISK, TAIL, Estimate, TrackStatus, ellipse95
 from echostep.localization.limits import BELIEVED, HALF_STOREY_M, LOST_M, PROBABLE, SURE, TRACKING_M
 from echostep.localization.particles.cloud import Cloud
@@ -78,7 +78,7 @@ def weight_about(
     return near, about
 
 
-@inline_kernel
+@inline_part
 def _within(left_m: float, sd_m: float) -> float:
     """Probability that a place in two dimensions is off by less than `left_m`."""
     if left_m <= 0.0:

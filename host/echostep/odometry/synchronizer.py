@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from echostep.arrays import Floats, Ints, Records, record_dtype
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 
 PING_AGE_S = 0.1  # longest time from the trigger of a ping to its report: a cycle of both rangers takes 71 ms [faults/health.py, PINGS_HZ]
@@ -212,7 +212,7 @@ def _pop_ready(
     return count
 
 
-@kernel
+@part
 def _push(s: _State, waiting: Records, ping: _Measurement) -> None:
     """Insert a ping by time, after equal ones. A ping older than the last popped segment is late; beyond MAX_WAITING the oldest is dropped."""
     if ping.t_s < s.popped_s:
@@ -230,7 +230,7 @@ def _push(s: _State, waiting: Records, ping: _Measurement) -> None:
         s.dropped += 1
 
 
-@kernel
+@part
 def _pop(s: _State, waiting: Records, until_s: float, popped: Records, count: int) -> int:
     """Move the pings up to a time to `popped` (n,) from `count` on; returns the new count."""
     n = 0

@@ -15,7 +15,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
 from echostep.errors import EchostepError
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.plan.cropping import is_clear
 from echostep.plan.model import Plan
 from echostep.plan.polyline import way_m
@@ -238,7 +238,7 @@ def _search(
     return _trace(before, first, last, rows, columns)
 
 
-@kernel
+@part
 def _trace(before: Ints, first: int, last: int, rows: int, columns: int) -> Ints:
     """The trail to cell `last`, followed back through each cell's predecessor; (0, 3) when it was not reached."""
     count, cell = 1, last
@@ -272,7 +272,7 @@ def _straighten(blocked: Bools, trail: Ints) -> Ints:
     return corners[:n]
 
 
-@kernel
+@part
 def _sees(blocked: Bools, a: Ints, b: Ints) -> bool:
     """Whether the straight line between the centres of two cells crosses free cells only."""
     steps = 2 * max(abs(b[0] - a[0]), abs(b[1] - a[1])) + 1

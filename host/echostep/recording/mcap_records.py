@@ -22,7 +22,7 @@ from mcap.records import Channel, Header, Metadata, Schema
 from mcap.records import Chunk as ChunkRecord
 
 from echostep.arrays import Octets
-from echostep.jit import kernel
+from echostep.jit import part
 
 # Layout of the records, bytes [MCAP format specification].
 MCAP_MAGIC = b"\x89MCAP0\r\n"
@@ -77,7 +77,7 @@ def _decompress(compression: str, compressed: bytes, size: int) -> bytes | None:
     return compressed if not compression else None
 
 
-@kernel
+@part
 def read_uint(buffer: Octets, offset: int, size: int) -> int:
     """A little-endian unsigned number of `size` bytes; negative from 2^63 on."""
     value = 0

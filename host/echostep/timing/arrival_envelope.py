@@ -23,7 +23,7 @@ from typing import Protocol
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 
 BUCKET_S = 1.0  # device time for which one point is kept, assumed
 KEPT_BUCKETS = 60  # buckets in the fit, one minute; assumed
@@ -52,7 +52,7 @@ class ArrivalClock(Protocol):
     early_lag_s: float  # of the least early one
 
 
-@kernel
+@part
 def reset(clock: ArrivalClock) -> None:
     """Discard all points and the line."""
     clock.kept = 0
@@ -91,13 +91,13 @@ def update(clock: ArrivalClock, device_s: float, t_arrival_ns: int) -> None:
             _fit(clock)
 
 
-@kernel
+@part
 def line(clock: ArrivalClock, device_s: float) -> float:
     """Lag of undelayed bytes of device time `device_s`."""
     return clock.offset_s + clock.drift * (device_s - clock.pivot_s)
 
 
-@kernel
+@part
 def _believed_lag(clock: ArrivalClock, bucket: int, lag: float, t_arrival_ns: int) -> float:
     """The lag to use for an early arrival: that of the least early one when `CONFIRMING` of them came within the kept buckets, else infinite."""
     if clock.early == 0 or bucket - clock.early_bucket > KEPT_BUCKETS:
@@ -112,7 +112,7 @@ def _believed_lag(clock: ArrivalClock, bucket: int, lag: float, t_arrival_ns: in
     return clock.early_lag_s
 
 
-@kernel
+@part
 def _fit(clock: ArrivalClock) -> None:
     """Fit the most probable line under all points; the mean delay is the mean height of the points above the hull at the pivot."""
     n = clock.kept
@@ -131,7 +131,7 @@ def _fit(clock: ArrivalClock) -> None:
         clock.offset_s = min(clock.offset_s, y[k] - slope * (x[k] - pivot))
 
 
-@kernel
+@part
 def _height(x: Floats, y: Floats, hull: Ints, pivot: float) -> float:
     """Height of the hull at the pivot, interpolated between two vertices."""
     for k in range(len(hull) - 1):
@@ -190,7 +190,7 @@ def lower_hull(x: Floats, y: Floats) -> Ints:
     return hull[:n]
 
 
-@kernel
+@part
 def _turn(x: Floats, y: Floats, a: int, b: int, c: int) -> float:
     """Twice the signed area of the triangle a, b, c: positive for a left turn."""
     return (x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a])

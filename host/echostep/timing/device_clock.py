@@ -20,7 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from echostep.arrays import record_dtype
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.timing import arrival_envelope as arrival
 from echostep.timing.arrival_envelope import CONFIRMING, KEPT_BUCKETS, ArrivalClock
 
@@ -83,14 +83,14 @@ def read(clock: DeviceClock, value: int, t_arrival_ns: int, restarted: bool, lea
     return _advance(clock, delta + wraps * clock.modulus, t_arrival_ns)
 
 
-@kernel
+@part
 def _elapsed_s(clock: DeviceClock, t_arrival_ns: int) -> float:
     """Time from the arrival of the newest value, had it not been delayed, to this arrival."""
     newest_s = clock.epoch_s + clock.newest * clock.unit_s
     return (t_arrival_ns - clock.origin_ns) * 1e-9 - newest_s - arrival.line(clock, newest_s)
 
 
-@kernel
+@part
 def _agrees(clock: DeviceClock, delta: int, late_s: float, wraps: int) -> bool:
     """Whether an arrival is about where a counter `delta` counts from the newest one puts it.
 
@@ -104,7 +104,7 @@ def _agrees(clock: DeviceClock, delta: int, late_s: float, wraps: int) -> bool:
     return abs(late_s - wraps * wrap_s) <= limit_s
 
 
-@kernel
+@part
 def _is_old(clock: DeviceClock, delta: int, late_s: float) -> bool:
     """Whether counter and arrival both are those of a time before the newest message: it stands twice in a recording, or in the wrong place.
 
@@ -118,7 +118,7 @@ def _is_old(clock: DeviceClock, delta: int, late_s: float) -> bool:
     return abs(late_s + wraps * wrap_s) <= AHEAD_S + RATE_ERROR * before_s
 
 
-@kernel
+@part
 def _contradiction(
     clock: DeviceClock, value: int, delta: int, t_arrival_ns: int, restarted: bool, leads: bool
 ) -> float:
@@ -146,7 +146,7 @@ def _contradiction(
     return _advance(clock, delta + wraps * clock.modulus, t_arrival_ns)
 
 
-@kernel
+@part
 def _extend_run(clock: DeviceClock, late_s: float, t_arrival_ns: int) -> None:
     """Count one more arrival time that contradicts; another one than those before begins a new run. Messages of one chunk count once."""
     if clock.run == 0 or abs(late_s - clock.run_late_s) > AHEAD_S:
@@ -156,7 +156,7 @@ def _extend_run(clock: DeviceClock, late_s: float, t_arrival_ns: int) -> None:
     clock.run_newest_ns = t_arrival_ns
 
 
-@kernel
+@part
 def _advance(clock: DeviceClock, delta: int, t_arrival_ns: int) -> float:
     """Device seconds of the value `delta` counts from the newest one, which it becomes when it is newer; -1: without an arrival time to use."""
     unwrapped = clock.newest + delta
@@ -168,7 +168,7 @@ def _advance(clock: DeviceClock, delta: int, t_arrival_ns: int) -> float:
     return seconds
 
 
-@kernel
+@part
 def _begin(clock: DeviceClock, value: int, t_arrival_ns: int, seconds: float) -> float:
     """Begin a new epoch: `value` is at device time `seconds`."""
     clock.started = 1

@@ -19,7 +19,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from echostep.arrays import Floats, Ints, record_dtype
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 
 VOTES = 50  # samples: half a second at 100 Hz
 KEPT = 256  # edges in the ring: more than two seconds at 100 Hz
@@ -60,7 +60,7 @@ def new_edges(period_s: float) -> Any:
     return edges
 
 
-@kernel
+@part
 def reset(s: SyncEdges) -> None:
     """Discard all edges and votes, after a restart of the board or the MTx."""
     s.period_s = s.nominal_s
@@ -93,7 +93,7 @@ def add(s: SyncEdges, edge: int, t_s: float) -> None:
         s.period_s = period_s if period_s > 0.0 else s.nominal_s
 
 
-@kernel
+@part
 def _is_stray(s: SyncEdges, steps: int, t_s: float) -> bool:
     """Whether an edge, by its count so many after the newest one, comes too early for it."""
     measured = s.locked == 1 and s.newest - s.first >= VOTES
@@ -120,7 +120,7 @@ def time_of(s: SyncEdges, counter: int, by_arrival_s: float) -> float:
     return t_s if abs(t_s - by_arrival_s) < MATCH_PERIODS * s.nominal_s else np.nan
 
 
-@kernel
+@part
 def _vote(s: SyncEdges, counter: int, by_arrival_s: float) -> None:
     """Add the vote of one sample, and lock the offset that has the majority of the last votes."""
     ahead = round((by_arrival_s - s.newest_s) / s.period_s)

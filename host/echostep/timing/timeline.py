@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.timing import arrival_envelope as arrival
 from echostep.timing import device_clock as clocks
 from echostep.timing import sync_edges as sync
@@ -168,7 +168,7 @@ def _assign_times(
         times.mtx_newest_s[message_index] = mtx_clock.newest_s
 
 
-@kernel
+@part
 def _board_time(board: DeviceClock, edges: SyncEdges, ticks: int, t_arrival_ns: int, kind: int) -> float:
     """`t_s` of a board message; a SyncOut edge is kept, a restart discards the edges."""
     if kind == SILENT:
@@ -182,7 +182,7 @@ def _board_time(board: DeviceClock, edges: SyncEdges, ticks: int, t_arrival_ns: 
     return t_s
 
 
-@kernel
+@part
 def _mtx_time(
     board: DeviceClock, mtx: DeviceClock, edges: SyncEdges, counter: int, t_arrival_ns: int, latency_s: float
 ) -> float:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Int32s
-from echostep.jit import allocating_kernel, inline_kernel, kernel, lean_kernel
+from echostep.jit import allocating_part, inline_kernel, inline_part, kernel, lean_kernel, lean_part, part
 from echostep.walls.index import (
     BEARINGS,
     CONE_RAD,
@@ -131,7 +131,7 @@ def _tabulate(tiles: Int32s, index: WallIndex) -> WallIndex:
     )  # fmt: skip
 
 
-@kernel
+@part
 def _appended(table: SourceTable, tile: int, more: SourceTable) -> SourceTable:
     """`table` of `tile` tiles with one tile more, in arrays that are at least doubled when they grow."""
     unit, rows = tile * BEARINGS, table.tile_start[tile]
@@ -152,7 +152,7 @@ def _appended(table: SourceTable, tile: int, more: SourceTable) -> SourceTable:
     return SourceTable(tile_start, start, order, all_rows, screen_start, hiding)
 
 
-@kernel
+@part
 def _room(numbers: Int32s, size: int) -> Int32s:
     """The same numbers in an array that holds at least `size`."""
     if len(numbers) >= size:
@@ -195,7 +195,7 @@ def first_sources(receiver: Receiver, axis_rad: float, index: WallIndex, limits:
     return n
 
 
-@inline_kernel
+@inline_part
 def _add_sources(
     receiver: Receiver, walls: Floats, faces: SourceTable, points: SourceTable, u: int, limits: Limits, sources: SourceList,
 ) -> int:  # fmt: skip
@@ -207,7 +207,7 @@ def _add_sources(
     return n
 
 
-@lean_kernel
+@lean_part
 def _sources_of_unit(
     receiver: Receiver, walls: Floats, faces: SourceTable, points: SourceTable, u: int, limits: Limits, sources: SourceList,
 ) -> int:  # fmt: skip
@@ -215,14 +215,14 @@ def _sources_of_unit(
     return _add_sources(receiver, walls, faces, points, u, limits, sources)
 
 
-@inline_kernel
+@inline_part
 def bearing(axis_rad: float) -> int:
     """Which of the BEARINGS of `SourceTable` an axis has."""
     turns = axis_rad * (0.5 / math.pi)
     return min(int((turns - math.floor(turns)) * BEARINGS), BEARINGS - 1)
 
 
-@allocating_kernel
+@allocating_part
 def _sources_of_missing_tile(
     receiver: Receiver, tile: int, u: int, index: WallIndex, limits: Limits, sources: SourceList
 ) -> int:
@@ -231,7 +231,7 @@ def _sources_of_missing_tile(
     return _sources_of_unit(receiver, index.walls, faces, points, u, limits, sources)
 
 
-@inline_kernel
+@inline_part
 def _add_faces(
     receiver: Receiver, walls: Floats, faces: SourceTable, u: int, limits: Limits, sources: SourceList
 ) -> tuple[int, float]:
@@ -266,7 +266,7 @@ def _add_faces(
     return n, reach_m
 
 
-@inline_kernel
+@inline_part
 def _add_points(
     receiver: Receiver,
     walls: Floats,
@@ -298,7 +298,7 @@ def _add_points(
     return n
 
 
-@inline_kernel
+@inline_part
 def hidden(px: float, py: float, qx: float, qy: float, walls: Floats, table: SourceTable, i: int) -> bool:
     """Whether one of the walls that can hide row i stands between p and q."""
     for j in range(table.screen_start[i], table.screen_start[i + 1]):  # noqa: SIM110 (numba)
@@ -307,7 +307,7 @@ def hidden(px: float, py: float, qx: float, qy: float, walls: Floats, table: Sou
     return False
 
 
-@inline_kernel
+@inline_part
 def _angle(cosine: float) -> float:
     """Arc cosine within the cone, to 1e-8: its series in 1 - cosine."""
     x = max(1.0 - cosine, 0.0)
@@ -316,7 +316,7 @@ def _angle(cosine: float) -> float:
     return math.sqrt(2.0 * x) * series
 
 
-@inline_kernel
+@inline_part
 def _insert(n: int, d: float, off: float, new_kind: float, sources: SourceList) -> int:
     """Insert a source among n, nearest first; beyond MOST_SOURCES the farthest is dropped."""
     distance_m, off_axis, kind = sources

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.plan.routing import mark_near_walls
 
 # Assumed, not measured.
@@ -96,7 +96,7 @@ def _walls_in_sight(blocked: Bools, sight: int) -> Ints:
     return in_sight
 
 
-@kernel
+@part
 def _directions_met(r: int, c: int, blocked: Bools, sight: int) -> int:
     """In how many directions a blocked cell is met."""
     rows, columns = blocked.shape

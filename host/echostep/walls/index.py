@@ -17,7 +17,7 @@ from numba.extending import typeof_impl
 
 from echostep.arrays import Floats, Int32s
 from echostep.errors import EchostepError
-from echostep.jit import inline_kernel, kernel, lean_kernel
+from echostep.jit import inline_part, kernel, lean_kernel, part
 
 TILE_M = 1.0
 EAR_REACH_M = 6.3  # greatest distance of an echo source: a little more than the rangers' 6 m
@@ -136,14 +136,14 @@ def _walls_by_tile(walls: Floats, x0: float, y0: float, columns: int, rows: int)
     return start, ids
 
 
-@inline_kernel
+@inline_part
 def _row_span(walls: Floats, w: int, y0: float, rows: int) -> tuple[int, int]:
     """Rows of tiles that a wall touches."""
     low, high = min(walls[w, 1], walls[w, 3]), max(walls[w, 1], walls[w, 3])
     return max(int((low - JOIN_M - y0) / TILE_M), 0), min(int((high + JOIN_M - y0) / TILE_M) + 1, rows)
 
 
-@inline_kernel
+@inline_part
 def _column_span(walls: Floats, w: int, r: int, x0: float, y0: float, columns: int) -> tuple[int, int]:
     """Columns of tiles that a wall touches within a row."""
     ax, ay, bx, by = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
@@ -156,7 +156,7 @@ def _column_span(walls: Floats, w: int, r: int, x0: float, y0: float, columns: i
     return max(int((low - JOIN_M - x0) / TILE_M), 0), min(int((high + JOIN_M - x0) / TILE_M) + 1, columns)
 
 
-@inline_kernel
+@inline_part
 def tile_at(x: float, y: float, index: WallIndex) -> int:
     """Number of the tile that holds a point; -1 outside, and for a point that is not finite."""
     column, row = (x - index.x0_m) / TILE_M, (y - index.y0_m) / TILE_M
@@ -165,7 +165,7 @@ def tile_at(x: float, y: float, index: WallIndex) -> int:
     return int(row) * index.columns + int(column)
 
 
-@inline_kernel
+@inline_part
 def segments_cross(ax: float, ay: float, bx: float, by: float, walls: Floats, j: int) -> bool:
     """Whether the segment a-b meets wall j; touching counts, gliding along it does not."""
     cx, cy, dx, dy = walls[j, 0], walls[j, 1], walls[j, 2], walls[j, 3]
@@ -199,7 +199,7 @@ def crosses_wall(ax: float, ay: float, bx: float, by: float, index: WallIndex) -
     return False
 
 
-@kernel
+@part
 def _clipped(c0: float, r0: float, c1: float, r1: float, columns: int, rows: int) -> tuple[float, float, float, float]:
     """The part of a move that is on the grid, in tiles [Liang, Barsky 1984]; -1 for none and for a move that is not finite."""
     if not (math.isfinite(c1 - c0) and math.isfinite(r1 - r0)):
@@ -215,7 +215,7 @@ def _clipped(c0: float, r0: float, c1: float, r1: float, columns: int, rows: int
     )  # fmt: skip
 
 
-@kernel
+@part
 def _within(offset: float, along: float, width: float, enter: float, leave: float) -> tuple[float, float]:
     """Share of a move at which it enters 0 to `width` along one axis, and at which it leaves."""
     if along == 0.0:

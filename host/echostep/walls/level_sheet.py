@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.plan.model import Plan
 from echostep.walls.echo_sources import Walls
 
@@ -87,7 +87,7 @@ def level_of(x_m: Floats, sheet: LevelSheet) -> Ints:
     return np.clip(np.floor((x_m - sheet.x0_m) / sheet.pitch_m), 0, last).astype(np.int64)
 
 
-@kernel
+@part
 def level_on_sheet(x: float, sheet: LevelSheet) -> int:
     """`level_of` for one place, in kernels."""
     return min(max(math.floor((x - sheet.x0_m) / sheet.pitch_m), 0), len(sheet.height_m) - 1)
@@ -123,7 +123,7 @@ def end_of_connector(z: float, c: int, margin: float, s: LevelSheet) -> float:
     return min(max(z, low - margin), high + margin)
 
 
-@kernel
+@part
 def _inside(x: float, y: float, corners: Floats, first: int, beyond: int) -> bool:
     """Whether a polygon, corners[first:beyond], holds a point: a ray from it to the east crosses an odd number of sides."""
     odd = False

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Int32s
-from echostep.jit import kernel, lean_kernel
+from echostep.jit import lean_part, part
 from echostep.walls.index import EAR_REACH_M, FACE, JOIN_M, SourceTable
 from echostep.walls.tile_geometry import SLACK_M, by_bearing, covered, frame
 
@@ -38,7 +38,7 @@ class Strip(NamedTuple):
     high: float
 
 
-@kernel
+@part
 def tile_faces(corners: Floats, near: Int32s, walls: Floats, slant: float) -> SourceTable:
     """The walls of `near` that can answer a tile, unless other walls cover them, with their screens."""
     faces, starts = np.empty((len(near), FACE)), np.zeros(len(near) + 1, np.int32)
@@ -72,7 +72,7 @@ def tile_faces(corners: Floats, near: Int32s, walls: Floats, slant: float) -> So
     return SourceTable(total, bearings, order, faces[:count].copy(), starts[: count + 1].copy(), screens[:used].copy())
 
 
-@lean_kernel
+@lean_part
 def _face_screens(
     w: int, near: Int32s, walls: Floats, strip: Strip, slant: float, screens: Int32s, spans: Floats
 ) -> tuple[int, int]:
@@ -100,7 +100,7 @@ def _face_screens(
     return count, covering
 
 
-@lean_kernel
+@lean_part
 def _extent(corners: Floats, x: float, y: float, tx: float, ty: float) -> tuple[float, float, float, float]:
     """Least and greatest s of four corners along a wall, and least and greatest h over it."""
     s0, s1, low, high = np.inf, -np.inf, np.inf, -np.inf
@@ -111,7 +111,7 @@ def _extent(corners: Floats, x: float, y: float, tx: float, ty: float) -> tuple[
     return s0, s1, low, high
 
 
-@lean_kernel
+@lean_part
 def _clip(
     walls: Floats, u: int, x: float, y: float, tx: float, ty: float, s0: float, s1: float
 ) -> tuple[float, float, float, float]:

@@ -11,13 +11,13 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats, Int32s
-from echostep.jit import inline_kernel, kernel, lean_kernel
+from echostep.jit import inline_part, lean_part, part
 from echostep.walls.index import BEARINGS, CONE_RAD
 
 SLACK_M = 1e-6  # rounding of lengths
 
 
-@inline_kernel
+@inline_part
 def frame(walls: Floats, w: int) -> tuple[float, float, float, float, float]:
     """Start of a wall, its unit tangent and its length."""
     ux, uy = walls[w, 2] - walls[w, 0], walls[w, 3] - walls[w, 1]
@@ -25,7 +25,7 @@ def frame(walls: Floats, w: int) -> tuple[float, float, float, float, float]:
     return walls[w, 0], walls[w, 1], ux / length, uy / length, length
 
 
-@lean_kernel
+@lean_part
 def covered(spans: Floats, low: float, high: float, overlap: float) -> bool:
     """Whether spans (from, to, h there, h there) leave no gap between low and high; two that do not join must overlap by `overlap`."""
     reach, height = low, np.nan
@@ -41,7 +41,7 @@ def covered(spans: Floats, low: float, high: float, overlap: float) -> bool:
     return True
 
 
-@kernel
+@part
 def by_bearing(centre: Floats, spread: Floats, distance: Floats) -> tuple[Int32s, Int32s]:
     """For each bearing of an axis, the rows that may be within CONE_RAD of it, nearest first, as starts and row numbers."""
     start, order, count = np.zeros(BEARINGS + 1, np.int32), np.empty(BEARINGS * len(centre), np.int32), 0

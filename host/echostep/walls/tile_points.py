@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Int32s
-from echostep.jit import inline_kernel, kernel, lean_kernel
+from echostep.jit import inline_part, lean_part, part
 from echostep.walls.index import EAR_REACH_M, JOIN_M, POINT, TILE_M, SourceTable, WallIndex
 from echostep.walls.tile_geometry import SLACK_M, by_bearing, covered, frame
 
@@ -31,7 +31,7 @@ class Wedge(NamedTuple):
     high: float
 
 
-@kernel
+@part
 def tile_points(corners: Floats, near: Int32s, index: WallIndex) -> SourceTable:
     """Ends of the walls of `near` within EAR_REACH_M of a tile: a row for each sector in which an end is a corner or an edge, with its screens.
 
@@ -75,7 +75,7 @@ def tile_points(corners: Floats, near: Int32s, index: WallIndex) -> SourceTable:
     return SourceTable(total, bearings, order, rows, starts[: count + 1].copy(), screens[:used].copy())
 
 
-@kernel
+@part
 def _sectors(x: float, y: float, end: int, index: WallIndex, corners: Floats, sectors: Floats, rays: Floats) -> int:
     """Sectors about the wall end x, y, and what it is in each, into `sectors`; their number, 0 where a joined end is the source instead."""
     walls, count = index.walls, 0
@@ -99,7 +99,7 @@ def _sectors(x: float, y: float, end: int, index: WallIndex, corners: Floats, se
     return _kinds(x, y, rays[:count], corners, sectors)
 
 
-@inline_kernel
+@inline_part
 def _goes_before(walls: Floats, u: int, its_end: int, x: float, y: float, end: int) -> bool:
     """Whether an end of wall u is the source instead of the joined end at x, y: of joined ends the least in x, y, number is."""
     ux, uy = walls[u, 2 * its_end], walls[u, 2 * its_end + 1]
@@ -110,7 +110,7 @@ def _goes_before(walls: Floats, u: int, its_end: int, x: float, y: float, end: i
     return 2 * u + its_end < end
 
 
-@kernel
+@part
 def _kinds(x: float, y: float, rays: Floats, corners: Floats, sectors: Floats) -> int:
     """The sectors between the walls that leave x, y, into `sectors`: kind for a ranger in the sector, unit vectors of its sides.
 
@@ -144,14 +144,14 @@ def _kinds(x: float, y: float, rays: Floats, corners: Floats, sectors: Floats) -
     return count
 
 
-@inline_kernel
+@inline_part
 def in_sector(dx: float, dy: float, ax: float, ay: float, bx: float, by: float) -> bool:
     """Whether direction d lies in the sector from a counter-clockwise to b; a = b = 0 is all round."""
     after_a, before_b = ax * dy - ay * dx >= 0.0, dx * by - dy * bx >= 0.0
     return (after_a and before_b) if ax * by - ay * bx > 0.0 else (after_a or before_b)
 
 
-@lean_kernel
+@lean_part
 def _sector_meets(x: float, y: float, a: Floats, b: Floats, corners: Floats) -> bool:
     """Whether a tile may reach into the sector narrower than a half turn from a to b about x, y."""
     left_of_a, right_of_b = False, False
@@ -162,7 +162,7 @@ def _sector_meets(x: float, y: float, a: Floats, b: Floats, corners: Floats) -> 
     return left_of_a and right_of_b
 
 
-@kernel
+@part
 def _point_screens(
     x: float, y: float, corners: Floats, near: Int32s, walls: Floats, screens: Int32s
 ) -> tuple[int, float, float]:
@@ -201,7 +201,7 @@ def _point_screens(
     return count, math.atan2(-my, -mx), math.atan(max(wedge.high, -wedge.low)) if narrow else math.pi
 
 
-@lean_kernel
+@lean_part
 def _wedge_of_tile(x: float, y: float, mx: float, my: float, corners: Floats) -> tuple[Wedge, bool]:
     """The wedge in which a tile, its middle at (mx, my) from x, y, is seen from there; and whether it is all ahead and x, y outside."""
     inside = corners[0, 0] <= x <= corners[2, 0] and corners[0, 1] <= y <= corners[2, 1]
@@ -217,7 +217,7 @@ def _wedge_of_tile(x: float, y: float, mx: float, my: float, corners: Floats) ->
     return Wedge(ex, ey, low, high), not inside and nearest > JOIN_M
 
 
-@lean_kernel
+@lean_part
 def _clip_to_wedge(
     ax: float, ay: float, bx: float, by: float, wedge: Wedge, corners: Floats, x: float, y: float
 ) -> tuple[float, float, bool]:

@@ -14,14 +14,14 @@ import math
 import numpy as np
 
 from echostep.arrays import Int32s
-from echostep.jit import kernel
+from echostep.jit import part
 from echostep.walls.index import EAR_REACH_M, JOIN_M, TILE_M, SourceTable, WallIndex
 from echostep.walls.tile_faces import tile_faces
 from echostep.walls.tile_geometry import SLACK_M
 from echostep.walls.tile_points import tile_points
 
 
-@kernel
+@part
 def tile_sources(tile: int, index: WallIndex, slant: float) -> tuple[SourceTable, SourceTable]:
     """Faces and points that can be detected from a tile, for sound up to `slant` (tangent) off the normal of a wall."""
     corners = np.empty((4, 2))
@@ -33,7 +33,7 @@ def tile_sources(tile: int, index: WallIndex, slant: float) -> tuple[SourceTable
     return tile_faces(corners, near, index.walls, slant), tile_points(corners, near, index)
 
 
-@kernel
+@part
 def _walls_near(tile: int, index: WallIndex) -> Int32s:
     """Numbers of the walls that may be within EAR_REACH_M of a tile, ascending."""
     reach = math.ceil((EAR_REACH_M + JOIN_M) / TILE_M)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Ints, Octets
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 
 PREAMBLE = 0xFA  # this and the next two [Manual 5.3.1]
 BUS_ID = 0xFF  # of a device alone, and of a master
@@ -158,7 +158,7 @@ def _find_frames(stream: Octets, ended: bool, longest: int, rows: Ints, tally: I
     return count, begin
 
 
-@kernel
+@part
 def _running_sums(stream: Octets) -> Octets:
     """Sums mod 256 (n + 1,) of the first k bytes."""
     sums = np.empty(len(stream) + 1, np.uint8)
@@ -170,7 +170,7 @@ def _running_sums(stream: Octets) -> Octets:
     return sums
 
 
-@kernel
+@part
 def _header(stream: Octets, begin: int, longest: int) -> tuple[int, int]:
     """Size of the header at `begin` and length of the payload; `_UNFINISHED` when bytes are missing.
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.xsens.mtdata import ACCEL, ATTITUDE, COLUMNS, GYRO, MAG
 
 # Results of the gates, in the order of the gates; also entries of the tally. LOST is an entry only.
@@ -90,7 +90,7 @@ def apply_gates(messages: Messages, limits: Floats, state: Ints, tally: Ints) ->
     return passed, waits
 
 
-@kernel
+@part
 def _sample_gate(row: Floats, counter: int, sent: Bools, bus: int, state: Ints, limits: Floats) -> int:
     """GOOD for a whole, possible sample of the followed device, else the first gate that it fails."""
     if counter < 0 or not sent[_ACCEL] or not sent[_GYRO]:
@@ -100,7 +100,7 @@ def _sample_gate(row: Floats, counter: int, sent: Bools, bus: int, state: Ints, 
     return _value_gate(row, sent, limits)
 
 
-@kernel
+@part
 def _note_other(counter: int, bus: int, state: Ints) -> None:
     """Note the counter of a message that is no sample: devices count satellite messages with the samples."""
     if counter < 0 or bus != state[DEVICE] or counter == state[OTHER]:
@@ -110,7 +110,7 @@ def _note_other(counter: int, bus: int, state: Ints) -> None:
         state[OTHERS] += 1
 
 
-@kernel
+@part
 def _counter_gate(counter: int, waiting: int, state: Ints) -> int:
     """GOOD for a counter that follows the last accepted one or the one that waits (-1: none), REPEATED for one of these two, else BAD_COUNTER."""
     if state[ACCEPTED] < 0:
@@ -122,7 +122,7 @@ def _counter_gate(counter: int, waiting: int, state: Ints) -> int:
     return GOOD if follows or confirms else BAD_COUNTER
 
 
-@kernel
+@part
 def _accept(counter: int, bus: int, state: Ints, tally: Ints) -> None:
     """Make this the last accepted counter, and count the counters missing before it as lost, except after a jump back."""
     gap = (counter - state[ACCEPTED]) & 0xFFFF
@@ -133,7 +133,7 @@ def _accept(counter: int, bus: int, state: Ints, tally: Ints) -> None:
     state[OTHER], state[OTHERS] = -1, 0
 
 
-@kernel
+@part
 def _value_gate(row: Floats, sent: Bools, limits: Floats) -> int:
     """The first gate that a sample fails, for the quantities that were sent: finite, |q| = 1, within the sensor's range."""
     for group in range(_GROUPS):

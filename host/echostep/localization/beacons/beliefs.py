@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.jit import kernel, lean_kernel
+from echostep.jit import kernel, lean_kernel, lean_part, part
 
 TWO_PI = 2.0 * math.pi
 X, Y, AXIS = 0, 1, 2  # states: place on the sheet (m), direction of the beacon's axis (rad)
@@ -58,7 +58,7 @@ def set_beliefs(
         beliefs.doubt[i, slot] = 1.0
 
 
-@kernel
+@part
 def place_dropped(beliefs: BeaconBeliefs, slot: int, x: Floats, y: Floats, place_var: float) -> None:
     """Beliefs of a beacon that was just dropped: it lies about each particle (x, y), each (n,), within this variance (m2); its axis is unknown."""
     for i in range(len(beliefs.mean)):
@@ -76,7 +76,7 @@ def resample_beliefs(beliefs: BeaconBeliefs, chosen: Ints) -> None:
     _gather_rows(beliefs.doubt, chosen)
 
 
-@lean_kernel
+@lean_part
 def _gather_rows(rows: Floats, chosen: Ints) -> None:
     """Set rows[i] = rows[chosen[i]] in place, for ascending `chosen`; `rows` (n, columns).
 
@@ -90,7 +90,7 @@ def _gather_rows(rows: Floats, chosen: Ints) -> None:
             _copy_row(rows[chosen[i]], rows[i])
 
 
-@lean_kernel
+@lean_part
 def _copy_row(source: Floats, target: Floats) -> None:
     """Set target[k] = source[k]. Slices of their own let the compiler copy several values at once."""
     for k in range(len(target)):
@@ -103,7 +103,7 @@ def wrap_angle(angle: float) -> float:
     return angle - TWO_PI * math.floor((angle + math.pi) / TWO_PI)
 
 
-@lean_kernel
+@lean_part
 def correct(
     mean: Floats, cov: Floats, hx: float, hy: float, h_axis: float, innovation: float, noise_var: float
 ) -> None:

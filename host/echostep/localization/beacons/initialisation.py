@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.localization.beacons.beliefs import wrap_angle
 from echostep.localization.limits import THREE_SD2
 
@@ -62,14 +62,14 @@ def locate_beacon(readings: Floats) -> LocatedBeacon:
     return LocatedBeacon(x, y, fitting >= FITTING * len(readings))
 
 
-@kernel
+@part
 def _extent(readings: Floats) -> float:
     """Diagonal (m) of the box that holds the boot's places."""
     x, y = readings[:, X], readings[:, Y]
     return math.hypot(x.max() - x.min(), y.max() - y.min())
 
 
-@kernel
+@part
 def _search(readings: Floats, x: float, y: float, cells: int, step_m: float) -> tuple[float, float, bool]:
     """The place of least cost on a grid of so many cells to each side of (x, y), and whether all places apart from it cost more by MARGIN."""
     side = 2 * cells + 1
@@ -88,7 +88,7 @@ def _search(readings: Floats, x: float, y: float, cells: int, step_m: float) -> 
     return x + (at_i - cells) * step_m, y + (at_j - cells) * step_m, only
 
 
-@kernel
+@part
 def _cost(readings: Floats, x: float, y: float, axes: Floats) -> float:
     """Cost of a place: squared normalised residuals of the ranges, and of the bearings from their mean axis. `axes` (n,) is overwritten."""
     cost, sine, cosine = 0.0, 0.0, 0.0

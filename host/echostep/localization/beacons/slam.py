@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.jit import kernel, lean_kernel
+from echostep.jit import kernel, lean_kernel, lean_part, part
 from echostep.localization.beacons.beliefs import (
     AXIS,
     AXIS_AXIS,
@@ -144,7 +144,7 @@ def reweight(
     return in_place / total, after * after / squares
 
 
-@lean_kernel
+@lean_part
 def _range_density(
     mean: Floats, cov: Floats, x: float, y: float, range_m: float, model: BeaconModel, outliers: float, in_place: float
 ) -> float:
@@ -172,7 +172,7 @@ def _range_density(
     return density
 
 
-@lean_kernel
+@lean_part
 def _bearing_density(
     mean: Floats, cov: Floats, x: float, y: float, bearing: float, model: BeaconModel, learn: bool
 ) -> float:
@@ -215,7 +215,7 @@ def propose_heading_jumps(
             log_weight[i] += price
 
 
-@kernel
+@part
 def _recover(
     particles: ParticleArrays, beliefs: BeaconBeliefs, measurement: BeaconMeasurement, model: BeaconModel,
     rng: np.random.Generator,

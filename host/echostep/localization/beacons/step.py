@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.localization.beacons.beliefs import BeaconBeliefs, BeaconMeasurement, X, Y, place_dropped, set_beliefs
 from echostep.localization.beacons.initialisation import locate_beacon
 from echostep.localization.beacons.model import BeaconModel
@@ -84,7 +84,7 @@ def update_by_reading(
     return size
 
 
-@kernel
+@part
 def _wait(particles: ParticleArrays, beacons: Beacons, measurement: BeaconMeasurement) -> None:
     """Keep a reading, and after each LOCATE_EVERY of them look for the place that they allow.
 
@@ -106,7 +106,7 @@ def _wait(particles: ParticleArrays, beacons: Beacons, measurement: BeaconMeasur
         _trust(beacons, k)
 
 
-@kernel
+@part
 def _trust(beacons: Beacons, k: int) -> None:
     """Beacon k has been placed: no reading contradicts it yet."""
     beacons.health.known[k] = True
@@ -115,7 +115,7 @@ def _trust(beacons: Beacons, k: int) -> None:
     beacons.waiting.taken[k] = 0
 
 
-@kernel
+@part
 def mean_place(particles: ParticleArrays) -> tuple[float, float]:
     """Weighted mean of the places (m)."""
     total, x, y = 0.0, 0.0, 0.0

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from echostep.arrays import Floats
-from echostep.jit import inline_kernel, lean_kernel
+from echostep.jit import inline_kernel, inline_part, lean_kernel, lean_part
 from echostep.walls.tile_points import CORNER, EDGE
 
 # Assumed, not measured.
@@ -191,13 +191,13 @@ def planned_density(
     return hit + unheard * stray * strays
 
 
-@inline_kernel
+@inline_part
 def outlier_density(range_m: float, m: EchoModel) -> float:
     """Density per metre of an outlier; range 0: the probability of no echo."""
     return SILENT_SHARE if range_m <= 0.0 else (1.0 - SILENT_SHARE) / (m.maximum_m - m.minimum_m)
 
 
-@inline_kernel
+@inline_part
 def hidden_density(range_m: float, first_m: float, m: EchoModel) -> float:
     """Density per metre of a range if the view is hidden, and the plan's first source is at `first_m`; range 0: the probability of no echo."""
     if range_m <= 0.0:
@@ -207,7 +207,7 @@ def hidden_density(range_m: float, first_m: float, m: EchoModel) -> float:
     return (1.0 - SILENT_SHARE) * (nearer + (1.0 - HIDDEN_NEARER) / (m.maximum_m - m.minimum_m))
 
 
-@lean_kernel
+@lean_part
 def echo_density(
     range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel
 ) -> float:
@@ -239,7 +239,7 @@ def detection(distance_m: float, off_axis_rad: float, kind: float, m: EchoModel)
     return 1.0 / (1.0 + math.exp(-margin)) if margin > LEAST_LOGIT else 0.0
 
 
-@inline_kernel
+@inline_part
 def likeliest_source(
     count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel
 ) -> tuple[int, float, float]:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Int32s
-from echostep.jit import allocating_kernel, kernel, lean_kernel
+from echostep.jit import kernel, lean_kernel
 from echostep.localization.echoes.likelihood import SILENT_SHARE, EchoModel, EchoSettings, detection, hidden_density
 from echostep.localization.particle_arrays import PingBatch
 from echostep.path import Odometer
@@ -137,7 +137,7 @@ def _expected(
     return expected
 
 
-@allocating_kernel
+@kernel
 def _grown(row: Int32s) -> Int32s:
     """The grid with each unknown cell that has a known neighbour given that neighbour's row."""
     rows, columns = row.shape

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Int32s, Ints
-from echostep.jit import inline_kernel, kernel, lean_kernel
+from echostep.jit import inline_part, kernel, lean_kernel, lean_part
 from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, SECTORS, UNKNOWN
 from echostep.localization.grid.cells import CLOSED, EAST_WALL, NORTH_WALL, GridCells
 from echostep.walls.floor import CELL_M
@@ -46,7 +46,7 @@ class LevelFactors(NamedTuple):
     log_top: float
 
 
-@inline_kernel
+@inline_part
 def rotation_of(layer: int, layers: int) -> float:
     """Rotation walk -> map in the middle of a layer."""
     return 2.0 * math.pi * (layer + 0.5) / layers
@@ -90,13 +90,13 @@ def shift_and_weigh(
     return kept, top, before, after
 
 
-@inline_kernel
+@inline_part
 def _sector(angle_rad: float) -> int:
     turns = angle_rad * (0.5 / math.pi)
     return min(int((turns - math.floor(turns)) * SECTORS), SECTORS - 1)
 
 
-@lean_kernel
+@lean_part
 def _shift(turn: float, dx: float, dy: float, offset: Floats) -> tuple[int, int]:
     """Whole cells (east, north) by which a layer moves; the rest goes to its offset (2,)."""
     c, s = math.cos(turn), math.sin(turn)
@@ -106,7 +106,7 @@ def _shift(turn: float, dx: float, dy: float, offset: Floats) -> tuple[int, int]
     return int(east), int(north)
 
 
-@lean_kernel
+@lean_part
 def _moved(cell: int, east: int, north: int, cells: GridCells) -> tuple[int, bool]:
     """The cell so far off, -1 where no trunk can be, and whether a wall stands on the way: by turns to the east and to the north."""
     crossed = False
@@ -148,7 +148,7 @@ def spread(
     return GridStates(new_cell[:count].copy(), new_weight[:count].copy(), new_first, states.offset_m)
 
 
-@lean_kernel
+@lean_part
 def _spread_into(
     h: int, states: GridStates, beside: float, turned: float, scratch: Weights, touched: Int32s, cells: GridCells
 ) -> int:
@@ -171,7 +171,7 @@ def _spread_into(
     return found
 
 
-@lean_kernel
+@lean_part
 def _collect(
     found: int, least: float, scratch: Weights, touched: Int32s, cell: Int32s, weight: Weights, count: int
 ) -> int:
@@ -185,7 +185,7 @@ def _collect(
     return count
 
 
-@lean_kernel
+@lean_part
 def _deposit(at: int, w: float, beside: float, scratch: Weights, touched: Int32s, found: int, cells: GridCells) -> int:
     """Add a weight to a cell and its open neighbours; returns the number of touched cells."""
     rest = w
@@ -200,7 +200,7 @@ def _deposit(at: int, w: float, beside: float, scratch: Weights, touched: Int32s
     return _add(at, rest, scratch, touched, found)
 
 
-@inline_kernel
+@inline_part
 def _add(at: int, w: float, scratch: Weights, touched: Int32s, found: int) -> int:
     if scratch[at] == 0.0:
         touched[found] = at

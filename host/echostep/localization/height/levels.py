@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.jit import kernel, lean_kernel
+from echostep.jit import kernel, lean_kernel, part
 from echostep.localization.limits import HALF_STOREY_M, THREE_SD2
 from echostep.localization.particle_arrays import Move, ParticleArrays
 from echostep.walls.floor import Floor
@@ -150,7 +150,7 @@ def change_levels(
     return (1.0 - gain) * lag_variance, top + math.log(after / before)
 
 
-@kernel
+@part
 def _connector_left(x: float, y: float, dx: float, dy: float, level: int, sheet: LevelSheet) -> int:
     """The connector that held the middle of a move (dx, dy) to (x, y) on the sheet, else the one that held its start; -1: none."""
     shift = level * sheet.pitch_m

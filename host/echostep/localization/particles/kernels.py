@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.jit import inline_kernel, kernel, lean_kernel
+from echostep.jit import inline_part, kernel, lean_kernel
 from echostep.localization.particle_arrays import Move, ParticleArrays
 from echostep.walls.index import WallIndex, crosses_wall
 
@@ -91,7 +91,7 @@ def propagate(
     return top, 1.0 - crossed / total
 
 
-@inline_kernel
+@inline_part
 def rotated(c: float, s: float, by_rad: float, to_rad: float) -> tuple[float, float]:
     """Cosine and sine of `to_rad` from those of the angle before it turned by `by_rad`: to 1e-12 by series, exactly where it turned much."""
     if abs(by_rad) > SMALL_RAD:

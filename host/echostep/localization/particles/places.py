@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.localization.limits import ROOM_M
 
 # Assumed, not measured.
@@ -112,7 +112,7 @@ def _take(
     return total, mean_x, mean_y, float(on_level), spread / total, east / total, north / total
 
 
-@kernel
+@part
 def _middle(heaviest: int, particles: _Particles, left: Floats) -> tuple[float, float, int]:
     """Mean place and level of what is left in a square."""
     total, x_m, y_m, on_level = 0.0, 0.0, 0.0, -1
@@ -125,6 +125,6 @@ def _middle(heaviest: int, particles: _Particles, left: Floats) -> tuple[float, 
     return x_m / total, y_m / total, on_level
 
 
-@kernel
+@part
 def _is_near(dx_m: float, dy_m: float) -> bool:
     return dx_m * dx_m + dy_m * dy_m < ROOM_M * ROOM_M

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.jit import inline_kernel, kernel, lean_kernel
+from echostep.jit import inline_part, kernel, lean_kernel
 from echostep.localization.echoes.likelihood import SURE_COS, EchoModel, outlier_density, planned_density
 from echostep.localization.particle_arrays import Move, ParticleArrays, PingBatch
 from echostep.localization.particles.kernels import (
@@ -107,7 +107,7 @@ def propagate_and_reweight(
     return MoveProgress(done, k), math.log(lowest), passed
 
 
-@inline_kernel
+@inline_part
 def ping_of(pings: PingBatch, k: int) -> WeightedPing:
     """The k-th ping of a batch."""
     return WeightedPing(

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.jit import inline_kernel, kernel
+from echostep.jit import inline_part, kernel
 from echostep.mapping.graph.fragments import Fragments
 from echostep.mapping.graph.graph import FittedWalls
 from echostep.mapping.graph.nodes import Nodes
@@ -106,7 +106,7 @@ def _associate(order: Ints, longs: int, p: _Placed) -> tuple[Ints, Floats, Float
     return of, w_normal[:count].copy(), w_rho[:count].copy()
 
 
-@inline_kernel
+@inline_part
 def _beside(centre: Floats, normal: float, x: float, y: float, wall_normal: float) -> tuple[float, float, float]:
     """Turn of a fragment against a wall's normal, distance of its middle from the wall's line, and place along it from (x, y)."""
     turned = (normal - wall_normal + math.pi) % (2.0 * math.pi) - math.pi

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.mapping.graph.companions import density_along_path, people_share
 from echostep.mapping.graph.fragments import Fragments
 from echostep.mapping.graph.nodes import Nodes
@@ -114,7 +114,7 @@ def _smoothed(seen: Seen) -> Smoothed:
     return Smoothed(direction, evidence)
 
 
-@kernel
+@part
 def _likelihood(off_rad: float, sd_rad: float) -> float:
     """Density of a fragment's direction, so far from one of the building's: along it, or any."""
     r = right_angles_off(off_rad)
@@ -124,7 +124,7 @@ def _likelihood(off_rad: float, sd_rad: float) -> float:
     )
 
 
-@kernel
+@part
 def _diffuse(belief: Floats, variance: float) -> None:
     """Spread a distribution on the circle (CELLS,) by so much variance: steps to the two neighbours, which keep it exactly."""
     steps = math.ceil(variance / (0.5 * CELL_RAD**2))

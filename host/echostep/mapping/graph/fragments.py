@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.mapping.graph.nodes import Nodes, Pings
 
 LEAST, MISSES = 4, 3  # pings that begin a piece; pings in a row off the line that end it
@@ -157,7 +157,7 @@ def fit_line(at: Floats, axis: Floats, range_m: Floats, member: Ints) -> tuple[f
     return normal, rho + c * cx + s * cy, math.sqrt(total / n)
 
 
-@kernel
+@part
 def _row(at: Floats, axis: Floats, member: Ints, fit: tuple[float, float, float]) -> Floats:
     """The piece of these pings as a row; an sd of infinity where the wall is outside of the cone."""
     normal, rho, rms = fit

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.jit import inline_kernel, kernel
+from echostep.jit import inline_part, kernel, part
 
 OFF_SD_M, OFF_SD_RAD = 0.07, math.radians(2.5)  # of two fragments of one wall, each bent by its own stretch of path
 CHANCE_M, CHANCE_RAD = 1.5, math.radians(45.0)  # half widths within which a fragment of another wall would lie anywhere
@@ -69,7 +69,7 @@ def match(new: Pieces, old: Pieces, pivot: Floats, shifts_m: Floats, turns_rad: 
     return score
 
 
-@kernel
+@part
 def _add_older(fits: Floats, free: Floats, piece: PlacedFragment, old: Pieces, j: int, shifts_m: Floats) -> None:
     """Raise `fits` and lower `free` (shifts, shifts) by the evidence of the older fragment j for a fragment at each shift."""
     n, old_half = len(shifts_m), old.half_m[j]
@@ -103,7 +103,7 @@ def _add_older(fits: Floats, free: Floats, piece: PlacedFragment, old: Pieces, j
                 free[a, b] = min(free[a, b], shared * FREE_RATIO)
 
 
-@inline_kernel
+@inline_part
 def normal(x: float, sd: float) -> float:
     """Normal density about zero."""
     z = x / sd

@@ -15,7 +15,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Octets
 from echostep.errors import EchostepError
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.recording.mcap_records import (
     HEAD_SIZE,
     MCAP_MAGIC,
@@ -64,7 +64,7 @@ def record_end(file: Octets, begin: int, is_channel: Bools) -> int:
     return body + length if opcode == CHUNK or length <= OTHER_LIMIT else -1
 
 
-@kernel
+@part
 def _may_follow(file: Octets, begin: int) -> bool:
     """Whether the file ends at `begin`, or a record may begin there; its body may be missing."""
     if begin + HEAD_SIZE > len(file):

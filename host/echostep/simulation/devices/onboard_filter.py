@@ -27,7 +27,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.extras import require
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 
 GRAVITY_M_S2 = 9.81
 GAP_S = 0.25  # over a longer time between two samples the attitude is not propagated: samples are missing
@@ -106,7 +106,7 @@ def _filter(samples: _Samples, gains: _Gains, matrices: Floats) -> None:
         matrices[k] = r
 
 
-@kernel
+@part
 def _attitude_at_rest(accel: Floats, mag: Floats) -> Floats:
     """Attitude (3, 3) of a sensor at rest from one sample; without a field the sensor's x axis is taken as north."""
     force = math.sqrt(np.sum(accel**2))
@@ -127,7 +127,7 @@ def _attitude_at_rest(accel: Floats, mag: Floats) -> Floats:
     return r
 
 
-@kernel
+@part
 def _rotation_matrix(v: Floats) -> Floats:
     """Rotation matrix (3, 3) of a rotation vector (3,) [Rodrigues]."""
     angle = math.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
@@ -137,14 +137,14 @@ def _rotation_matrix(v: Floats) -> Floats:
     return np.eye(3) + a * cross + b * (cross @ cross)
 
 
-@kernel
+@part
 def _tilt_error(r: Floats, accel: Floats) -> Floats:
     """Rotation vector (3,) in the world that turns the specific force to the vertical, as if the sensor did not accelerate."""
     up = r @ accel / GRAVITY_M_S2
     return np.array([up[1], -up[0], 0.0])
 
 
-@kernel
+@part
 def _heading_error(r: Floats, mag: Floats) -> Floats:
     """Rotation vector (3,) about the vertical that turns the horizontal part of the field to the north."""
     field = r @ mag

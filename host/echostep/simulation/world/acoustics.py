@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 
 SILENT_DB = -1e3
 # Of a piston's directivity 2 J1(x) / x; the side lobes beyond are 17 dB down each way and not modelled
@@ -75,7 +75,7 @@ def directivity_db(off_axis_rad: float, size: float) -> float:
     return 20.0 * math.log10(max(total, 1e-9))
 
 
-@kernel
+@part
 def path_db(range_m: float, off_out_rad: float, off_in_rad: float, bounces: int, a: Acoustics) -> float:
     """Level of an echo from flat walls: half the way of the sound, angles off the axis when it leaves and when it comes back."""
     spread = -20.0 * math.log10(max(range_m, 1e-3)) - 2.0 * a.absorption_db_m * (range_m - 1.0)

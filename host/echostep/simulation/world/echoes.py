@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Floats, Ints
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.simulation.world.acoustics import FIRST_NULL, SRF02, Acoustics, path_db, rod_db
 from echostep.simulation.world.image_sources import (
     blocked,
@@ -140,7 +140,7 @@ def _nearest_echoes(
                     range_m[k, side, kind] = max(noisy, a.minimum_m)
 
 
-@kernel
+@part
 def _search_all(rangers: RangerPair, edges: Floats, search: Search) -> None:
     """The nearest echoes that come back by mirrors and from edges."""
     _search_walls(rangers, search, 1)
@@ -148,7 +148,7 @@ def _search_all(rangers: RangerPair, edges: Floats, search: Search) -> None:
     _search_wall_pairs(rangers, search)
 
 
-@kernel
+@part
 def _search_later(rangers: RangerPair, side: int, edges: Floats, search: Search) -> None:
     """The next echo of a ranger that missed the first: of another reflector, or of a wall, the wearer and the wall once more."""
     search.earliest_m[side] = search.nearest_m[side, OWN] + PULSE_M
@@ -157,7 +157,7 @@ def _search_later(rangers: RangerPair, side: int, edges: Floats, search: Search)
     _search_walls(rangers, search, 2)
 
 
-@kernel
+@part
 def _search_scattered(rangers: RangerPair, side: int, chance: float, search: Search) -> None:
     """The echo of a ranger that nothing came back to by mirrors."""
     sign = 1.0 if side == 0 else -1.0
@@ -170,7 +170,7 @@ def _search_scattered(rangers: RangerPair, side: int, chance: float, search: Sea
         search.nearest_m[side, OWN] = range_m
 
 
-@kernel
+@part
 def _find_lit(rangers: RangerPair, walls: Floats, a: Acoustics, lit: Ints) -> int:
     """Fill `lit` with the indices of the walls that reach into a ranger's cone; returns their number."""
     cosine = math.sqrt(1.0 - min(FIRST_NULL / a.size, 1.0) ** 2)
@@ -182,7 +182,7 @@ def _find_lit(rangers: RangerPair, walls: Floats, a: Acoustics, lit: Ints) -> in
     return count
 
 
-@kernel
+@part
 def _search_walls(rangers: RangerPair, search: Search, times: int) -> None:
     """Echoes straight back from the foot of the perpendicular on each wall, or so many `times`, with the wearer between."""
     walls, a, nearest = search.walls, search.acoustics, search.nearest_m
@@ -200,7 +200,7 @@ def _search_walls(rangers: RangerPair, search: Search, times: int) -> None:
             nearest[side, OWN] = range_m
 
 
-@kernel
+@part
 def _search_edges(rangers: RangerPair, edges: Floats, search: Search) -> None:
     """Echoes straight back from the ends of walls, (e, 6) of `wall_edges`; none from the inside of a corner."""
     a, nearest = search.acoustics, search.nearest_m
@@ -217,7 +217,7 @@ def _search_edges(rangers: RangerPair, edges: Floats, search: Search) -> None:
             nearest[side, OWN] = away
 
 
-@kernel
+@part
 def _search_wall_pairs(rangers: RangerPair, search: Search) -> None:
     """Echoes by two walls: to the sending ranger (a corner) or to the other one [Girard 2011, Figure 3b].
 
@@ -249,7 +249,7 @@ def _search_wall_pairs(rangers: RangerPair, search: Search) -> None:
                 _consider_pair(rangers, (bx, by), (cx, cy), 0.5 * math.sqrt(way2), (first, last), search)
 
 
-@kernel
+@part
 def _consider_pair(
     rangers: RangerPair,
     b: tuple[float, float],
@@ -276,7 +276,7 @@ def _consider_pair(
         search.nearest_m[side, kind] = range_m
 
 
-@kernel
+@part
 def _direction(rangers: RangerPair, x: float, y: float) -> tuple[int, float, float]:
     """Which ranger a point faces (0 left, 1 right), its distance, and its angle off that ranger's axis."""
     away = max(math.hypot(x - rangers.x, y - rangers.y), 1e-9)

@@ -11,20 +11,20 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 
 TOUCH_M = 1e-3  # walls closer than this meet
 REFLECTED_M = 0.01  # beyond a wall's end that still reflects: a tenth of the first Fresnel zone's radius at 2 m, 40 kHz
 
 
-@kernel
+@part
 def foot(px: float, py: float, wall: Floats) -> float:
     """Where along a wall's line its nearest point to p lies: 0 at the wall's start, 1 at its end."""
     ux, uy = wall[2] - wall[0], wall[3] - wall[1]
     return ((px - wall[0]) * ux + (py - wall[1]) * uy) / (ux * ux + uy * uy)
 
 
-@kernel
+@part
 def mirror(px: float, py: float, wall: Floats) -> tuple[float, float]:
     """The mirror image of p in the line of a wall."""
     ux, uy = wall[2] - wall[0], wall[3] - wall[1]
@@ -32,7 +32,7 @@ def mirror(px: float, py: float, wall: Floats) -> tuple[float, float]:
     return px - s * uy, py + s * ux
 
 
-@kernel
+@part
 def crossing(px: float, py: float, qx: float, qy: float, wall: Floats) -> float:
     """The share of the way p-q at which it meets a wall; -1 when it does not."""
     rx, ry, sx, sy = qx - px, qy - py, wall[2] - wall[0], wall[3] - wall[1]
@@ -44,7 +44,7 @@ def crossing(px: float, py: float, qx: float, qy: float, wall: Floats) -> float:
     return t if 0.0 < t < 1.0 and 0.0 <= u <= 1.0 else -1.0
 
 
-@kernel
+@part
 def reflection(px: float, py: float, qx: float, qy: float, wall: Floats) -> tuple[float, float, bool]:
     """Point of a wall at which the way p-q meets it, and whether it does, to REFLECTED_M.
 
@@ -62,7 +62,7 @@ def reflection(px: float, py: float, qx: float, qy: float, wall: Floats) -> tupl
     return wall[0] + u * sx, wall[1] + u * sy, meets
 
 
-@kernel
+@part
 def is_before(px: float, py: float, x: float, y: float, wall: Floats) -> bool:
     """Whether p lies before a wall as seen from its point (x, y): at an end of the wall, p must be on the wall's side of that end.
 
@@ -73,7 +73,7 @@ def is_before(px: float, py: float, x: float, y: float, wall: Floats) -> bool:
     return (at > more or of_p > 0.0) and (at < 1.0 - more or of_p < 1.0)
 
 
-@kernel
+@part
 def blocked(px: float, py: float, qx: float, qy: float, walls: Floats, but: int, but_too: int) -> bool:
     """Whether a wall other than the two numbered stands between p and q; walls that only touch p or q do not."""
     way = math.hypot(qx - px, qy - py)
@@ -85,7 +85,7 @@ def blocked(px: float, py: float, qx: float, qy: float, walls: Floats, but: int,
     return False
 
 
-@kernel
+@part
 def distance(px: float, py: float, bx: float, by: float, cx: float, cy: float) -> float:
     """Distance of p from the segment b-c."""
     ux, uy = cx - bx, cy - by
@@ -94,7 +94,7 @@ def distance(px: float, py: float, bx: float, by: float, cx: float, cy: float) -
     return math.hypot(bx + s * ux - px, by + s * uy - py)
 
 
-@kernel
+@part
 def in_double_cone(px: float, py: float, ax: float, ay: float, cosine: float, wall: Floats) -> bool:
     """Whether any point of a wall lies in the cones around the axis a and its opposite: an end does, or the wall cuts the axis."""
     bx, by, cx, cy = wall[0] - px, wall[1] - py, wall[2] - px, wall[3] - py
@@ -120,7 +120,7 @@ def wall_edges(walls: Floats) -> Floats:
     return edges[:count].copy()
 
 
-@kernel
+@part
 def _edge(walls: Floats, w: int, e: int, edge: Floats) -> bool:
     """Fill one edge from an end of a wall; False when it is none, or that of an earlier wall."""
     x, y = walls[w, e], walls[w, e + 1]
@@ -142,7 +142,7 @@ def _edge(walls: Floats, w: int, e: int, edge: Floats) -> bool:
     return meeting < 2 and not straight
 
 
-@kernel
+@part
 def _is_beside(x: float, y: float, wall: Floats) -> bool:
     """Whether a point lies more than 2 TOUCH_M outside of the box around a wall: a quick answer for nearly all walls."""
     more = 2.0 * TOUCH_M
@@ -151,7 +151,7 @@ def _is_beside(x: float, y: float, wall: Floats) -> bool:
     return y < min(wall[1], wall[3]) - more or y > max(wall[1], wall[3]) + more
 
 
-@kernel
+@part
 def inside_corner(x: float, y: float, edge: Floats) -> bool:
     """Whether the direction (x, y) from an edge lies inside the corner of less than 180 degrees that its walls make."""
     ux, uy, vx, vy = edge[2], edge[3], edge[4], edge[5]

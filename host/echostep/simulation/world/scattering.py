@@ -10,7 +10,7 @@ sides, so that any angle is heard; the echo then has the length of the whole way
 from __future__ import annotations
 
 from echostep.arrays import Floats
-from echostep.jit import kernel
+from echostep.jit import part
 from echostep.simulation.world.acoustics import Acoustics, path_db
 from echostep.simulation.world.image_sources import TOUCH_M, crossing
 
@@ -18,7 +18,7 @@ WALLS_MET = 4  # by one beam: each way between two walls is a metre or more, and
 DIGITS = 1048576.0  # 2^20: what a deviate has below 1e-6 says nothing of its value
 
 
-@kernel
+@part
 def scattered_range(
     place: tuple[float, float], axis: tuple[float, float], walls: Floats, earliest_m: float, threshold_db: float,
     chance: float, a: Acoustics,
@@ -41,7 +41,7 @@ def scattered_range(
     return 0.0
 
 
-@kernel
+@part
 def _first_wall(x: float, y: float, dx: float, dy: float, walls: Floats, reach_m: float) -> tuple[int, float]:
     """The wall that a ray meets first, more than TOUCH_M away, and the way to it; -1 where none is within reach."""
     found, nearest = -1, reach_m
@@ -52,7 +52,7 @@ def _first_wall(x: float, y: float, dx: float, dy: float, walls: Floats, reach_m
     return found, nearest
 
 
-@kernel
+@part
 def chance_of(normal_deviate: float) -> float:
     """A number that is even between 0 and 1, by the last digits of a normal deviate: independent of its value, and no other draw is shifted."""
     return (normal_deviate * DIGITS) % 1.0

@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep_studies.barometer.vertical_model import (
     BETWEEN_S,
     CALM,
@@ -137,7 +137,7 @@ def filter_samples(state: State, heights_m: Floats, free: bool, seen: Floats, st
             joint[i] = chain
 
 
-@kernel
+@part
 def _chain_joint(later: Floats, earlier: Floats) -> Floats:
     """p(now, long before) from p(now, before) and p(before, long before)."""
     total = earlier.sum(axis=1)
@@ -166,7 +166,7 @@ def smooth_backward(joint: Floats, last: Floats) -> Floats:
     return smoothed
 
 
-@kernel
+@part
 def _step(state: State, heights_m: Floats, free: bool, gap: bool, dt: float, seen: Floats, merged: Merged) -> None:
     """One step of time: every hypothesis with each of its successors, updated and merged into the state."""
     weights, means, covariances = state
@@ -201,7 +201,7 @@ def _step(state: State, heights_m: Floats, free: bool, gap: bool, dt: float, see
                     covariances[s, a, b] = p[s, a, b] / w[s] - means[s, a] * means[s, b]
 
 
-@kernel
+@part
 def _departures(state: State, s: int, free: bool, dt: float, seen: Floats, merged: Merged) -> float:
     """Transitions from level ground to stairs and lifts; returns the weight that leaves s."""
     weights, here = state[0], s - s % WAYS
@@ -216,7 +216,7 @@ def _departures(state: State, s: int, free: bool, dt: float, seen: Floats, merge
     return gone
 
 
-@kernel
+@part
 def _air_transitions(state: State, s: int, dt: float, seen: Floats, merged: Merged) -> float:
     """Transitions of the air from hypothesis s to all others; returns the weight that leaves s.
 
@@ -230,7 +230,7 @@ def _air_transitions(state: State, s: int, dt: float, seen: Floats, merged: Merg
     return _from_gust(state, s, dt, seen, merged)
 
 
-@kernel
+@part
 def _from_calm(state: State, s: int, dt: float, seen: Floats, merged: Merged) -> float:
     """A gust begins; on level ground the weather term may jump. Returns the weight that leaves s."""
     weights = state[0]
@@ -254,7 +254,7 @@ def _from_calm(state: State, s: int, dt: float, seen: Floats, merged: Merged) ->
     return gone
 
 
-@kernel
+@part
 def _jump_weather(state: State, s: int, share: float, sd: float, seen: Floats, merged: Merged) -> None:
     """Hypothesis s with this share of the weight and a jump (sd, m) of the weather term."""
     x, c = copy_hypothesis(state, s, merged)
@@ -262,7 +262,7 @@ def _jump_weather(state: State, s: int, share: float, sd: float, seen: Floats, m
     merge_successor(x, c, share, s, s, seen, merged)
 
 
-@kernel
+@part
 def _from_gust(state: State, s: int, dt: float, seen: Floats, merged: Merged) -> float:
     """A gust jumps, changes between held and fading, becomes weather, or ends. Returns the weight that leaves s."""
     weights, level, air = state[0], s % WAYS == ON, s % MODES // WAYS
@@ -290,7 +290,7 @@ def _from_gust(state: State, s: int, dt: float, seen: Floats, merged: Merged) ->
     return gone + share
 
 
-@kernel
+@part
 def _arrivals(state: State, s: int, heights_m: Floats, free: bool, dt: float, seen: Floats, merged: Merged) -> float:
     """Transitions from stairs and lifts to level ground, and of stairs to the other direction; returns the weight that leaves s."""
     weights, means, covariances = state
@@ -321,7 +321,7 @@ def _arrivals(state: State, s: int, heights_m: Floats, free: bool, dt: float, se
     return gone
 
 
-@kernel
+@part
 def _reinitialise_after_gap(
     state: State, s: int, heights_m: Floats, free: bool, dt: float, seen: Floats, merged: Merged
 ) -> None:
@@ -355,7 +355,7 @@ def _reinitialise_after_gap(
         merge_successor(x, c, weight * share, own * MODES + target, s, last, merged)
 
 
-@kernel
+@part
 def _after_gap(state: State, s: int, dt: float, shifted: bool, merged: Merged) -> tuple[Floats, Floats]:
     """Copy of hypothesis s after a gap: at rest, no gust, weather propagated, with a shift of the building's pressure if `shifted`."""
     x, c = copy_hypothesis(state, s, merged)
@@ -367,7 +367,7 @@ def _after_gap(state: State, s: int, dt: float, shifted: bool, merged: Merged) -
     return x, c
 
 
-@kernel
+@part
 def _shift_probability(dt: float, shifted: int) -> float:
     """Probability over dt that the building's pressure shifted (`shifted` 1), or did not (0)."""
     share = probability_within(SHIFTS + 0.5 * GUST_BEGINS, dt)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from echostep.arrays import Floats
-from echostep.jit import kernel
+from echostep.jit import part
 
 State = tuple[Floats, Floats, Floats]  # weights, means, covariances
 Merged = tuple[
@@ -70,7 +70,7 @@ PLACE_COST, GAIT_COST, RANGE_COST = 3.0, 1.5, 2.0  # nats per second of contradi
 FOOT_LEVEL_M_S = 0.1  # sd of the vertical speed that a foot on level ground shows, over a second
 
 
-@kernel
+@part
 def copy_hypothesis(state: State, s: int, merged: Merged) -> tuple[Floats, Floats]:
     """Mean and covariance of hypothesis s, to be changed."""
     x, c = merged[4], merged[5]
@@ -81,13 +81,13 @@ def copy_hypothesis(state: State, s: int, merged: Merged) -> tuple[Floats, Float
     return x, c
 
 
-@kernel
+@part
 def probability_within(rate: float, dt: float) -> float:
     """Probability that an event of this rate (1/s) happens within dt."""
     return 1.0 - math.exp(-rate * dt)
 
 
-@kernel
+@part
 def reset_component(x: Floats, c: Floats, a: int, sd: float) -> None:
     """Set component a to 0 with this sd, uncorrelated."""
     x[a] = 0.0
@@ -96,7 +96,7 @@ def reset_component(x: Floats, c: Floats, a: int, sd: float) -> None:
     c[a, a] = sd**2
 
 
-@kernel
+@part
 def move_component(x: Floats, c: Floats, a: int, b: int, rest: float) -> None:
     """Set component b to exactly `rest` and add the difference to component a, with its covariance."""
     x[a] += x[b] - rest
@@ -106,7 +106,7 @@ def move_component(x: Floats, c: Floats, a: int, b: int, rest: float) -> None:
     x[b] = rest
 
 
-@kernel
+@part
 def condition_on_value(x: Floats, c: Floats, a: int, value: float, width: float) -> float:
     """Multiply the Gaussian by exp(-(x_a - value)^2 / (2 width^2)); returns the mean of that factor."""
     spread = c[a, a] + width**2
@@ -115,7 +115,7 @@ def condition_on_value(x: Floats, c: Floats, a: int, value: float, width: float)
     return width / math.sqrt(spread) * math.exp(-0.5 * off**2 / spread)
 
 
-@kernel
+@part
 def update_component(x: Floats, c: Floats, a: int, off: float, spread: float) -> None:
     """Kalman update by a measurement of component a with innovation `off` and innovation variance `spread`."""
     gain = (c[HEIGHT, a] / spread, c[RATE, a] / spread, c[WEATHER, a] / spread, c[GUST, a] / spread)
@@ -125,7 +125,7 @@ def update_component(x: Floats, c: Floats, a: int, off: float, spread: float) ->
             c[i, j] -= gain[i] * gain[j] * spread
 
 
-@kernel
+@part
 def merge_successor(
     x: Floats, c: Floats, weight: float, target: int, source: int, seen: Floats, merged: Merged
 ) -> None:
@@ -148,7 +148,7 @@ def merge_successor(
     xi[target, source] += weight
 
 
-@kernel
+@part
 def _propagate(x: Floats, c: Floats, way: int, air: int, dt: float) -> None:
     """Propagate: random walk of the weather, decay of a fading gust, vertical speed towards the mean of stairs or lift."""
     c[WEATHER, WEATHER] += WEATHER_M**2 * dt
@@ -182,7 +182,7 @@ def _propagate(x: Floats, c: Floats, way: int, air: int, dt: float) -> None:
     c[RATE, RATE] += noise
 
 
-@kernel
+@part
 def _evidence_cost(x: Floats, way: int, seen: Floats) -> float:
     """Cost (nats per second) of this mode by gait, plan and the range of levels."""
     cost = 0.0
@@ -193,7 +193,7 @@ def _evidence_cost(x: Floats, way: int, seen: Floats) -> float:
     return cost
 
 
-@kernel
+@part
 def _foot_likelihood(x: Floats, c: Floats, way: int, seen: Floats) -> float:
     """Likelihood of the foot's vertical speed: on stairs it measures RATE (and updates it), elsewhere, also in a lift, it is 0."""
     stairs = STAIRS_UP <= way < LIFT_UP
@@ -205,7 +205,7 @@ def _foot_likelihood(x: Floats, c: Floats, way: int, seen: Floats) -> float:
     return math.exp(-0.5 * off**2 / spread) / math.sqrt(2.0 * math.pi * spread)
 
 
-@kernel
+@part
 def _pressure_likelihood(x: Floats, c: Floats, seen: Floats) -> float:
     """Likelihood of the claimed height as a mixture of a good sample and an outlier; the update is weighted by the good share."""
     h0, h1, h2, h3 = (

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.jit import kernel
+from echostep.jit import part
 from echostep.localization.beacons.beliefs import BeaconMeasurement, empty_beliefs, resample_beliefs, set_beliefs
 from echostep.localization.beacons.model import BeaconModel, BeaconSettings, beacon_model
 from echostep.localization.beacons.slam import initial_health, propose_heading_jumps
@@ -74,7 +74,7 @@ def set_beacons(cloud: BeaconCloud, beacons: Floats, place_sd_m: float, axis_sd_
     cloud.beacons.health.known[:] = True
 
 
-@kernel
+@part
 def update_by_ultrasound(
     world: BeaconGround, cloud: BeaconCloud, walker: GuidedWalker, tick: int, order: Ints, rng: np.random.Generator
 ) -> bool:
@@ -93,7 +93,7 @@ def update_by_ultrasound(
     return measured
 
 
-@kernel
+@part
 def _propagate(cloud: BeaconCloud, dx: float, dy: float, rng: np.random.Generator) -> None:
     """Move the particles by (dx, dy) in the walk frame, and let some of them try a jump of the heading."""
     length = math.hypot(dx, dy)
@@ -104,7 +104,7 @@ def _propagate(cloud: BeaconCloud, dx: float, dy: float, rng: np.random.Generato
         propose_heading_jumps(particles.turn_rad, particles.log_weight, length, cloud.model, rng)
 
 
-@kernel
+@part
 def _reweight(cloud: BeaconCloud, measurement: BeaconMeasurement, rng: np.random.Generator) -> None:
     """Update by one measurement; systematic resampling when too few particles carry the weight."""
     particles, has_plan = cloud.particles, len(cloud.walls.walls) > 0
@@ -115,7 +115,7 @@ def _reweight(cloud: BeaconCloud, measurement: BeaconMeasurement, rng: np.random
         resample_beliefs(cloud.beacons.beliefs, chosen)
 
 
-@kernel
+@part
 def _propagate_on_open_ground(particles: ParticleArrays, move: Move, rng: np.random.Generator) -> None:
     """Move every particle on open ground, without walls."""
     x, y, turn, scale, _ = particles
@@ -127,7 +127,7 @@ def _propagate_on_open_ground(particles: ParticleArrays, move: Move, rng: np.ran
         y[i] += scale[i] * (s * move.dx_m + c * move.dy_m) + move.sd_m * rng.standard_normal()
 
 
-@kernel
+@part
 def _keep_chosen(particles: ParticleArrays, chosen: Ints) -> None:
     """Replace the particles by the chosen ones (n,) in place, with equal weights; their number stays."""
     x, y, turn, scale, log_weight = particles

@@ -15,7 +15,7 @@ from echostep.arrays import Floats
 from echostep.guidance.contact import Contact, allowed_silence, update_contact
 from echostep.guidance.cues import GuidanceSettings
 from echostep.guidance.target import turn_ahead
-from echostep.jit import kernel
+from echostep.jit import part
 from echostep.localization.beacons.step import mean_place
 from echostep.plan.polyline import nearest
 from echostep_studies.fischer2008.beacon_cloud import BeaconCloud
@@ -38,7 +38,7 @@ class Advice(NamedTuple):
     at_exit: bool
 
 
-@kernel
+@part
 def advise_by_fusion(fusion: Fusion, trail: Floats, walker: GuidedWalker) -> Advice:
     """One guidance event by the paper's fusion."""
     note_reliable(fusion)
@@ -46,7 +46,7 @@ def advise_by_fusion(fusion: Fusion, trail: Floats, walker: GuidedWalker) -> Adv
     return Advice(fusion.x, fusion.y, turn, rest_m < ARRIVED_M)
 
 
-@kernel
+@part
 def note_contact(contact: Contact, walker: GuidedWalker, tick: int, measured: bool) -> bool:
     """Whether the walker is to go back; `measured`: a beacon measures now. Places are those of dead reckoning."""
     t_s = tick * TICK_S
@@ -54,7 +54,7 @@ def note_contact(contact: Contact, walker: GuidedWalker, tick: int, measured: bo
     return update_contact(contact, t_s, known_s, walker.path_x, walker.path_y, False, SILENCE_S)
 
 
-@kernel
+@part
 def advise_by_cloud(
     cloud: BeaconCloud, contact: Contact, trail: Floats, deployed: bool, walker: GuidedWalker, tick: int
 ) -> Advice:
@@ -67,7 +67,7 @@ def advise_by_cloud(
     return Advice(x, y, turn, rest_m < ARRIVED_M and tick * TICK_S - contact.known_s < silence_s)
 
 
-@kernel
+@part
 def _mean_turn(
     cloud: BeaconCloud, trail: Floats, deployed: bool, measured: float, since_tick: float
 ) -> tuple[float, float]:
@@ -92,7 +92,7 @@ def _mean_turn(
     return math.atan2(north, east), rest / total
 
 
-@kernel
+@part
 def _target(path: Floats, x: float, y: float, heading: float, from_m: float, to_m: float) -> tuple[float, float]:
     """Turn (rad) from a heading at (x, y) to the target AHEAD_M along a path (k, 2), and the distance of its end (m).
 

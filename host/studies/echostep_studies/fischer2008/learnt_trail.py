@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.localization.beacons.beliefs import X, Y
 from echostep.plan.polyline import along, way_m
 from echostep.simulation.world.beacon_ground import BeaconGround
@@ -52,7 +52,7 @@ def _walk_in(
         dead_reckon(world, inside, walker)
 
 
-@kernel
+@part
 def believed_trail(cloud: BeaconCloud, i: int, exit_m: Floats) -> Floats:
     """The way back as particle i believes it, (b + 1, 2): from beacon to beacon to the exit. An unknown beacon has the place of the next one."""
     count = len(cloud.beacons.health.known)
@@ -66,7 +66,7 @@ def believed_trail(cloud: BeaconCloud, i: int, exit_m: Floats) -> Floats:
     return path
 
 
-@kernel
+@part
 def span_near_heard(path: Floats, recent: Bools) -> tuple[float, float]:
     """Lengths (m) along a path (b + 1, 2) between which the walker must be: from one beacon before those heard (b,) to one behind.
 

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from echostep.arrays import Floats, record_dtype
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.simulation.world.beacon_ground import BeaconGround, is_in_reach, measure
 from echostep_studies.fischer2008.walker import GuidedWalker
 
@@ -33,20 +33,20 @@ class Fusion(Protocol):
 FUSION = record_dtype(Fusion)
 
 
-@kernel
+@part
 def start_fusion(fusion: Fusion, x: float, y: float) -> None:
     """Start at a place that is known exactly."""
     fusion.x, fusion.y, fusion.reliable_x, fusion.reliable_y = x, y, x, y
 
 
-@kernel
+@part
 def add_step(fusion: Fusion, dx: float, dy: float) -> None:
     """Move the estimate by one dead-reckoned step (m, walk frame), rotated by the heading's offset."""
     c, s = math.cos(fusion.offset), math.sin(fusion.offset)
     fusion.x, fusion.y = fusion.x + c * dx - s * dy, fusion.y + s * dx + c * dy
 
 
-@kernel
+@part
 def fuse_nearest(world: BeaconGround, walker: GuidedWalker, fusion: Fusion, rng: np.random.Generator) -> None:
     """One ultrasound event: all beacons in reach measure, and the measurement with the shortest range is fused."""
     closest, shortest_m, its_bearing = -1, np.inf, 0.0
@@ -78,7 +78,7 @@ def fuse(fusion: Fusion, beacon: Floats, range_m: float, bearing: float, thresho
     fusion.x, fusion.y = x, y
 
 
-@kernel
+@part
 def note_reliable(fusion: Fusion) -> None:
     """At a guidance: the present place becomes the last reliable one if ultrasound has confirmed or corrected it."""
     if fusion.confirmed:

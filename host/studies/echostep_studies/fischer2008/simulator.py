@@ -15,7 +15,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.guidance.contact import CONTACT, Contact, start_contact
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.localization.beacons.model import BeaconSettings
 from echostep.plan.polyline import along, way_m
 from echostep.simulation.world.beacon_ground import BeaconGround
@@ -138,7 +138,7 @@ def _walk_back(
     return n, end_m, arrived
 
 
-@kernel
+@part
 def _measure(
     world: BeaconGround, rules: _Rules, state: _ReturnState, tick: int, order: Ints, rng: np.random.Generator
 ) -> None:
@@ -150,7 +150,7 @@ def _measure(
         fuse_nearest(world, state.walker, state.fusion, rng)
 
 
-@kernel
+@part
 def _advise(trail: Floats, rules: _Rules, state: _ReturnState, tick: int) -> Advice:
     """One guidance event."""
     if rules.system == OURS:

@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from echostep.arrays import Bools, record_dtype
-from echostep.jit import kernel
+from echostep.jit import part
 from echostep.simulation.world.beacon_ground import BeaconGround, disturbance
 
 TICK_S = 0.01  # between inertial events [Fischer 2008, 4.2]
@@ -50,7 +50,7 @@ class GuidedWalker(Protocol):
 WALKER = record_dtype(GuidedWalker)
 
 
-@kernel
+@part
 def walk(world: BeaconGround, inside: Bools, walker: GuidedWalker) -> tuple[float, float]:
     """One inertial event: a step in the true heading, and its dead reckoning."""
     walker.x += STEP_M * math.cos(walker.heading)
@@ -58,7 +58,7 @@ def walk(world: BeaconGround, inside: Bools, walker: GuidedWalker) -> tuple[floa
     return dead_reckon(world, inside, walker)
 
 
-@kernel
+@part
 def dead_reckon(world: BeaconGround, inside: Bools, walker: GuidedWalker) -> tuple[float, float]:
     """One step of dead reckoning in the measured heading, which the sources disturb; returns it (m, walk frame).
 
@@ -74,7 +74,7 @@ def dead_reckon(world: BeaconGround, inside: Bools, walker: GuidedWalker) -> tup
     return dx, dy
 
 
-@kernel
+@part
 def obey(walker: GuidedWalker, turn: float, obedience: Obedience, tick: int, rng: np.random.Generator) -> None:
     """Decide on the turn (rad) of a cue, as well as the person obeys, and when it is made."""
     walker.turn = turn + math.radians(obedience.heading_sd_deg) * rng.standard_normal()

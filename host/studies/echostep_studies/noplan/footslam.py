@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.jit import inline_kernel, kernel
+from echostep.jit import inline_part, kernel
 from echostep.mapping.graph.nodes import Nodes
 
 RADIUS_M = 0.5  # of a hexagon [section III]
@@ -78,7 +78,7 @@ def _walk(at: Floats, move: Floats, pieces: int, history: Ints, filled: Ints, we
             q, r = q1, r1
 
 
-@inline_kernel
+@inline_part
 def _key(q: int, r: int, edge: int) -> int:
     """A hexagon and one of its edges as one number."""
     return ((q + HALF) * 2 * HALF + r + HALF) * EDGES + edge

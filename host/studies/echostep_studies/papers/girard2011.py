@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats, Int32s, Ints
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex, crosses_wall
 from echostep_studies.papers.girard2011_rays import lambda_ray_ranges
@@ -162,7 +162,7 @@ def merge(x: Floats, y: Floats, weight: Floats, tau_m: float) -> tuple[Floats, F
     return kept_x[:count], kept_y[:count], total[:count]
 
 
-@kernel
+@part
 def _host(px: float, py: float, column: int, row: int, side: int, places: Floats, holder: Int32s, tau2: float) -> int:
     """A kept particle closer than tau in the 21 cells about (column, row); -1 without one. The inner nine come first: most are found there."""
     host = -1

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Int32s
-from echostep.jit import allocating_kernel, inline_kernel, kernel, lean_kernel
+from echostep.jit import allocating_part, inline_part, kernel, lean_part, part
 from echostep.walls.echo_sources import Receiver, bearing, hidden
 from echostep.walls.index import (
     BEARINGS,
@@ -79,7 +79,7 @@ class WallEnds(NamedTuple):
     by: float
 
 
-@lean_kernel
+@lean_part
 def sort_by_tile(poses: Poses, index: WallIndex, which: Int32s, begin: Int32s, order: Int32s) -> int:
     """Numbers of the poses into `order` (n,), tile by tile in the order of the tables; where each begins into `begin` (tabulated + 2,), zeros before.
 
@@ -111,7 +111,7 @@ def sort_by_tile(poses: Poses, index: WallIndex, which: Int32s, begin: Int32s, o
     return sorted_
 
 
-@lean_kernel
+@lean_part
 def read_cones(
     poses: Poses, index: WallIndex, order: Int32s, begin: Int32s, fan: Fan, maximum_m: float, columns: Floats, ranges: Floats
 ) -> None:  # fmt: skip
@@ -134,7 +134,7 @@ def read_cones(
                 ranges[chosen[i], 0], ranges[chosen[i], 1] = left[i], right[i]
 
 
-@lean_kernel
+@lean_part
 def _meet(face: int, index: WallIndex, fan: Fan, maximum_m: float, columns: Floats, m: int) -> None:
     """Shorten the readings of m poses by the rays that meet one wall first."""
     px, py, ax, ay, left, right = (
@@ -154,7 +154,7 @@ def _meet(face: int, index: WallIndex, fan: Fan, maximum_m: float, columns: Floa
     _keep(c, e, left, right)
 
 
-@lean_kernel
+@lean_part
 def _place(px: Floats, py: Floats, x: float, y: float, tx: float, ty: float, along: Floats, aside: Floats) -> None:
     """Places (or directions, from 0, 0) along and to the left of a line from x, y with tangent t."""
     for i in range(len(px)):
@@ -162,7 +162,7 @@ def _place(px: Floats, py: Floats, x: float, y: float, tx: float, ty: float, alo
         along[i], aside[i] = dx * tx + dy * ty, dy * tx - dx * ty
 
 
-@lean_kernel
+@lean_part
 def _end(c: Floats, e: Floats, h: Floats, s: Floats, width_m: float, fan: Fan, maximum_m: float) -> int:
     """Where the ray nearest to the wall's normal ends; returns how many rays count.
 
@@ -203,7 +203,7 @@ def _end(c: Floats, e: Floats, h: Floats, s: Floats, width_m: float, fan: Fan, m
     return count
 
 
-@lean_kernel
+@lean_part
 def _hide(
     length: Floats, px: Floats, py: Floats, s: Floats, line: WallLine, screen: WallEnds, maximum_m: float
 ) -> None:
@@ -221,7 +221,7 @@ def _hide(
         length[i] = maximum_m if met else length[i]
 
 
-@lean_kernel
+@lean_part
 def _keep(length: Floats, side: Floats, left: Floats, right: Floats) -> None:
     """Keep the shorter reading, of the ranger that the ray belongs to."""
     for i in range(len(length)):
@@ -260,7 +260,7 @@ def lambda_ray_ranges(
     return ranges
 
 
-@kernel
+@part
 def _eight(values: Floats, count: int, beyond: float) -> Eight:
     """The first ones of `values`, at most MOST_RAYS, and the rest of them `beyond`."""
     row = np.full(MOST_RAYS, beyond)
@@ -268,7 +268,7 @@ def _eight(values: Floats, count: int, beyond: float) -> Eight:
     return row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7]
 
 
-@lean_kernel
+@lean_part
 def _cone_ranges(chosen: Int32s, poses: Poses, index: WallIndex, cone: Cone, tables_hold: bool, ranges: Floats) -> None:
     """Fill `ranges` of the chosen poses, one by one; `tables_hold`: whether the index was made for at least this slant."""
     x, y, heading = poses
@@ -291,7 +291,7 @@ def _cone_ranges(chosen: Int32s, poses: Poses, index: WallIndex, cone: Cone, tab
         ranges[i, 1] = _cone_range(to_right, index.walls, index.faces, right, cone)
 
 
-@allocating_kernel
+@allocating_part
 def _cone_range_without_tables(receiver: Receiver, tile: int, index: WallIndex, cone: Cone) -> float:
     """`_cone_range` where the index has no tables for the tile or for this slant."""
     faces, _ = tile_sources(tile, index, cone.slant)
@@ -301,7 +301,7 @@ def _cone_range_without_tables(receiver: Receiver, tile: int, index: WallIndex, 
     return shortest
 
 
-@inline_kernel
+@inline_part
 def _cone_range(receiver: Receiver, walls: Floats, faces: SourceTable, u: int, cone: Cone) -> float:
     """The shortest ray that counts of a ranger, among the walls of unit u."""
     px, py, ax, ay = receiver

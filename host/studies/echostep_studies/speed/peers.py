@@ -17,7 +17,7 @@ import shapely
 from numpy.typing import NDArray
 
 from echostep.arrays import Floats
-from echostep.jit import kernel
+from echostep.jit import kernel, part
 from echostep.walls.index import TILE_M, WallIndex, tile_at
 
 Reader = Callable[[Floats, Floats, Floats], Floats]  # poses -> what each ranger reads (n, 2)
@@ -113,7 +113,7 @@ def plain_rays(
     return out
 
 
-@kernel
+@part
 def _first_hit(px: float, py: float, ux: float, uy: float, index: WallIndex, limit: float) -> tuple[float, float]:
     """Distance of the first wall on a ray, and the cosine between the ray and its normal (-1: none within `limit`)."""
     walls, start, ids = index.walls, index.start, index.ids
