@@ -5,11 +5,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
 DEMO_READY := $(if $(wildcard $(READY)),$(READY),$(VENV)/demo-ready)
-LISTS := tools/setup.py host/tested-versions.txt host/pyproject.toml host/studies/pyproject.toml
+LISTS := tools/install.py host/tested-versions.txt host/pyproject.toml host/studies/pyproject.toml
 ELF := firmware/build/echostep.elf
 SHIPPED := host/echostep/firmware/echostep.hex
 TOOL := env PYTHONPATH=tools:tests $(BIN)/python -m
 TWIN := tools/twin/build/echostep-twin
+SUITE := $(BIN)/python -m pytest -q -n auto --dist worksteal --durations 25 --durations-min 1
 APT_PACKAGES := gcc make gcc-avr avr-libc binutils-avr libsimavr-dev libelf-dev cppcheck python3-venv
 TEST_PACKAGES := mosquitto chromium clang libclang-rt-14-dev openscad
 
@@ -23,11 +24,12 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(READY): $(LISTS) | $(BIN)/python
-	@$(BIN)/python tools/setup.py tests
+	@$(BIN)/python tools/install.py tests
+	@PYTHONPATH=tests $(BIN)/python tests/compile_kernels.py
 	@touch $@
 
 $(VENV)/demo-ready: $(LISTS) | $(BIN)/python
-	@$(BIN)/python tools/setup.py demo
+	@$(BIN)/python tools/install.py demo
 	@touch $@
 
 firmware: ## build the firmware (firmware/build/echostep.elf and .hex) and put it into the host package
@@ -53,15 +55,20 @@ real: $(READY) ## a real recorded foot on a plan drawn around its surveyed path,
 	$(BIN)/python -m echostep_studies.figures.real_walk --out out/real
 
 quick: $(READY) ## run the tests that need no twin, browser, process, study or more than half a second
-	$(BIN)/python -m pytest -q -n auto --dist worksteal -m "not (twin or browser or process or study or long or speed)"
+	$(BIN)/python -m pytest -q -n auto --dist worksteal -m "not (twin or browser or process or study or slow or long or speed)"
 
-test: $(READY) ## run every test
-	@tools/apt.sh $(APT_PACKAGES) $(TEST_PACKAGES) || echo "Tests that need them are skipped and named."
-	@if command -v avr-gcc >/dev/null && [ -e /usr/include/simavr/sim_avr.h ]; then $(MAKE) --quiet -C firmware && $(MAKE) --quiet -C tools/twin; fi
+test: board ## run the tests that a contributor waits for, and the checks
 	$(MAKE) --quiet --jobs 2 check suite
 
+long: board ## run the other tests: whole campaigns, tours, soaks, studies
+	$(SUITE) -m "long and not speed"
+
+board: $(READY)
+	@tools/apt.sh $(APT_PACKAGES) $(TEST_PACKAGES) || echo "Tests that need them are skipped and named."
+	@if command -v avr-gcc >/dev/null && [ -e /usr/include/simavr/sim_avr.h ]; then $(MAKE) --quiet -C firmware && $(MAKE) --quiet -C tools/twin; fi
+
 suite: $(READY) ## the tests of make test, which runs the checks beside them
-	$(BIN)/python -m pytest -q -n auto --dist loadfile --durations 25 --durations-min 1
+	$(SUITE)
 
 check: $(READY) ## types, style, layers, generated files, C checks
 	$(BIN)/ruff check .
@@ -110,6 +117,9 @@ site: $(READY) ## the manual as a site with search in out/site (open out/site/in
 lock: $(READY) ## write the installed versions and their hashes to host/tested-versions.txt, after the tests have passed (needs the network)
 	@[ -x $(VENV)/lock/bin/uv ] || { $(PYTHON) -m venv $(VENV)/lock && $(VENV)/lock/bin/pip install --quiet --disable-pip-version-check uv; }
 	$(TOOL) release.tested_versions --uv $(VENV)/lock/bin/uv
+
+elsewhere: ## README's two commands on Debian testing, in a chroot (root; the network): times, failures, versions
+	@tools/elsewhere.sh
 
 audit: $(READY) ## known faults of the tested versions (pip-audit; needs the network)
 	@[ -x $(VENV)/audit/bin/pip-audit ] || { $(PYTHON) -m venv $(VENV)/audit && $(VENV)/audit/bin/pip install --quiet --disable-pip-version-check pip-audit; }
@@ -163,4 +173,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: operation help setup firmware twin demo real quick test suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak calls kill flips hardware docs site licences lock audit flash clean
+.PHONY: operation elsewhere help setup firmware twin demo real quick test long board suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak calls kill flips hardware docs site licences lock audit flash clean

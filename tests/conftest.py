@@ -25,28 +25,13 @@ settings.load_profile("repeatable")
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 COMPILER = Path(__file__).with_name("compile_kernels.py")
-HOST = Path(__file__).parent.with_name("host")
-COMPILED = "echostep/compiled"  # in pytest's cache: by which Python, and the newest source
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Compile the kernels before the workers of a parallel run start, not in each of them; a failure is left to the tests.
-
-    Nothing is done where this Python has compiled them since the sources changed.
-    """
-    if not config.getoption("numprocesses", None) or hasattr(config, "workerinput"):
-        return
-    state = [sys.version, max(path.stat().st_mtime_ns for path in HOST.rglob("*.py"))]
-    if config.cache is None or config.cache.get(COMPILED, None) == state:
-        return
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    parts = [
-        subprocess.Popen([sys.executable, COMPILER, part], env=environment)
-        for part in ("front-end", "filter", "heights")
-    ]
-    ends = [part.wait() for part in parts]
-    if not any(ends):
-        config.cache.set(COMPILED, state)
+    """Compile the kernels before the workers of a parallel run start, not in each of them; what fails is left to the tests."""
+    if config.getoption("numprocesses", None) and not hasattr(config, "workerinput"):
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+        subprocess.run([sys.executable, COMPILER], env=environment, check=False)
 
 
 @pytest.fixture(autouse=True)

@@ -78,7 +78,7 @@ class _Part:
         raise TypeError(f"{self.py_func.__qualname__} is a part of kernels: Python cannot call it")
 
 
-class _PartType(types.Dispatcher):  # type: ignore[misc]
+class _PartType(types.Dispatcher):
     """The type of a part: a constant among its arguments is a number like any other."""
 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:

@@ -105,7 +105,7 @@ def test_without_storeys_a_rise_in_a_silence_is_seen() -> None:
     assert heights.height_m[np.searchsorted(samples.t_s, 110.0)] == pytest.approx(7.0, abs=0.7)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("rate_hz", "noise_pa"), [(1.0, 6.0), (5.0, 2.0), (25.0, 10.0)])
 def test_unequal_storeys_are_found(rate_hz: float, noise_pa: float) -> None:
     legs = [
@@ -146,7 +146,7 @@ def test_one_way_without_a_stay_has_two_ends() -> None:
     assert found == pytest.approx([0.0, 20.0], abs=1.5)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_weather_lifts_no_storey() -> None:
     """Half an hour on each floor while the pressure falls by 2 hPa an hour."""
     legs = [(0.0, 1800.0), (3.5, 14.0), (3.5, 1800.0), (0.0, 12.0), (0.0, 900.0)]

@@ -105,7 +105,7 @@ def test_spikes_are_no_heights() -> None:
     assert found.floor[-1] == 1
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(cuts=st.lists(st.integers(0, 400), max_size=6))
 def test_portions_change_nothing(cuts: list[int]) -> None:
@@ -216,7 +216,7 @@ def test_a_change_forgets_what_both_ends_share() -> None:
     assert two.change(0, 1) == pytest.approx((0.0, 0.01))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("ways", ["stairs", "lift"])
 def test_a_simulated_quarter_of_an_hour(ways: str) -> None:
     rng = np.random.default_rng(900)
@@ -290,7 +290,7 @@ def test_the_command_tells_floors_and_stays(tmp_path: Path) -> None:
     assert f"floors: {out}, picture: {picture}" in result.output
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_storeys_are_found() -> None:
     way = np.concatenate([stairs_up(), 3.5 + stairs_up()[540:], 7.0 - stairs_up()[540:], 3.5 - stairs_up()[540:]])
     found = find_storeys(record(way), BarometerSettings())

@@ -76,7 +76,7 @@ def assert_is_that_of_its_twin(state: State, heights_m: Floats, free: bool, seen
         assert found[-1, s] == pytest.approx([twin.weights[s], *mean[: model.GUST], cov[0, 0]], rel=1e-7, abs=1e-7)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 3), st.booleans())
 def test_one_sample_from_any_state_is_that_of_the_twin(seed: int, count: int, free: bool) -> None:
@@ -85,7 +85,7 @@ def test_one_sample_from_any_state_is_that_of_the_twin(seed: int, count: int, fr
     assert_is_that_of_its_twin(any_state(rng, heights), heights, free, any_rows(rng, heights, 1))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(st.integers(0, 2**32 - 1), st.booleans())
 def test_a_record_from_its_start_is_that_of_the_twin(seed: int, free: bool) -> None:
@@ -124,7 +124,7 @@ def test_smoothing_is_the_sum_over_all_paths(seed: int, n: int) -> None:
     assert smooth_backward(joint, last) == pytest.approx(smoothed(joint, last))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_blocks_of_a_record_are_smoothed_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """Joint weights of five samples at once, against those of the whole record."""
     monkeypatch.setattr(vertical_filter, "BLOCK", 5)

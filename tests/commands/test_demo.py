@@ -47,7 +47,7 @@ def short_walk(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(demo, "DEMO_WAYPOINTS", DEMO_WAYPOINTS[:2])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.usefixtures("short_walk")
 def test_the_pace_changes_no_bit_and_the_summary_has_lines_of_its_own(tmp_path: Path) -> None:
     """With a page at 30 times real time, and as fast as it can: not on a terminal, it waits for no one."""
@@ -91,7 +91,7 @@ def frame(socket: ClientConnection) -> dict[str, Any]:
     return message(socket, "frame")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_at_the_end_the_page_says_so_and_plays_the_run_again() -> None:
     tracker = Tracker(PLAN, seed=1)
     with LivePage(tracker, "demo", LOCAL, keeps=True) as page:
@@ -153,7 +153,7 @@ def with_rooms(plan: Plan) -> Plan:
     return replace(plan, levels=tuple(levels))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_demo_on_another_plan_walks_through_its_rooms(tmp_path: Path) -> None:
     tree = json.loads((ROOT / "host/echostep/plans/demo.json").read_text())
     tree["levels"][0]["rooms"] = [r for r in tree["levels"][0]["rooms"] if r["name"] in ("Office 1", "Store")]

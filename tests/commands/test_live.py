@@ -82,7 +82,7 @@ def test_a_live_run_replays_to_identical_estimates(
     assert (tmp_path / "again/track.csv").read_bytes() == (tmp_path / "live/track.csv").read_bytes()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_two_runs_of_one_seed_are_identical(tmp_path: Path) -> None:
     runs = [
         echostep("demo", "--headless", "--seed", seed, "--out", tmp_path / str(k)) for k, seed in enumerate((3, 3, 4))
@@ -229,7 +229,7 @@ def test_record_keeps_the_bytes_of_both_ports(tmp_path: Path) -> None:
     assert "bytes from the board" in out
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_port_that_goes_away_is_opened_again(tmp_path: Path) -> None:
     link = tmp_path / "port"
     first, theirs = os.openpty()

@@ -210,7 +210,7 @@ WITH_BROKER = ("the broker refuses the reports", "a certificate is for another n
 WITH_PROCESS = (*WITH_BROKER, "the plan has a format that cannot be read")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.filterwarnings(
     "ignore::pytest.PytestUnraisableExceptionWarning"
 )  # paho leaves a socket that failed to shake hands to the collector

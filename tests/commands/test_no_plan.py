@@ -24,7 +24,7 @@ from echostep.simulation.scenario import Scenario
 from page.frames import PLAN, told
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_walk_without_a_plan_is_tracked_and_led_back(tmp_path: Path) -> None:
     """Twenty metres along the corridor and back: the walk ends where it began, and the way back is said."""
     scenario = Scenario(PLAN, ((2.0, 7.5), (22.0, 7.5), (2.4, 7.5)), 4, PythonBoard(4))

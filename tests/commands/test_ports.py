@@ -48,7 +48,7 @@ def test_swapped_ports_are_named_as_swapped_and_their_bytes_are_kept(tmp_path: P
     assert sum(len(chunk.data) for chunk in open_recording(tmp_path / "walk.mcap").chunks()) > 100
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_an_mtx_alone_at_the_boards_port_is_named() -> None:
     with on_a_terminal(MtxDevice(PROJECT)) as mtx:
         report = examine(mtx, None, 1.0)
@@ -94,7 +94,7 @@ def test_the_second_program_on_a_port_is_told_who_has_it(tmp_path: Path) -> None
     assert third.returncode == 0, third.stderr
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_live_finds_both_ports_by_what_they_say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The board's identifiers are another program's, the adapter of the MTx is unknown, a third device talks nonsense."""
     with board_and_mtx() as (board, mtx), babbling_port(b"$GPGGA,123519,4807.038,N\r\n") as other:
@@ -114,7 +114,7 @@ def test_live_finds_both_ports_by_what_they_say(tmp_path: Path, monkeypatch: pyt
     assert {chunk.port for chunk in open_recording(tmp_path / "a.mcap").chunks()} == {"board", "mtx"}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_search_without_a_board_says_what_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(port_search, "list_seen", list)
     assert "no USB serial port is plugged in" in echostep("live", "--plan", PLAN).stderr

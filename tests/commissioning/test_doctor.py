@@ -30,7 +30,7 @@ def doctor(*arguments: object) -> subprocess.CompletedProcess[str]:
     return echostep("doctor", *arguments)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_board_that_is_well_gets_status_0() -> None:
     with python_board() as port:
         done = doctor("--board", port, "--seconds", 4)
@@ -126,7 +126,7 @@ def test_a_port_that_is_none_is_named(port: str, words: str) -> None:
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sent", "words"),
     [
@@ -142,7 +142,7 @@ def test_a_port_that_is_not_the_board_says_so(sent: bytes, words: str) -> None:
     assert not report.fine
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_an_mtx_that_is_silent_is_a_finding() -> None:
     with pseudo_terminal() as (_, port):
         report = examine(None, port, 2.5)

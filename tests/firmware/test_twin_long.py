@@ -86,7 +86,7 @@ def outcomes(found: list[m.Message]) -> set[int]:
     return {p.outcome for p in pings(found, m.Ranger.LEFT)}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_one_stray_edge_does_not_stop_the_left_ranger_later(left_ranger: Bench) -> None:
     """A glitch on the echo line while no ping owns it counts as a SyncOut edge; 17.9 minutes later it must not look like a recent one."""
     left_ranger.fault("glitch=left")
@@ -96,7 +96,7 @@ def test_one_stray_edge_does_not_stop_the_left_ranger_later(left_ranger: Bench) 
     assert outcomes(found) == {m.Outcome.ECHO}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_stray_edge_a_minute_costs_only_what_it_covers(left_ranger: Bench) -> None:
     """Over more than one wrap of the clock."""
     disturbed, others, counted = 0, set(), 0

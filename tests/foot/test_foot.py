@@ -82,7 +82,7 @@ def errors_between(a: ins.Nav, b: ins.Nav) -> Floats:
     return np.concatenate(parts)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_strapdown_follows_a_turning_and_accelerating_body_exactly() -> None:
     """A constant turn about a skew axis and a constant acceleration in the walk frame, integrated in closed form."""
     rate, accel, dt, n = np.array([0.7, -1.1, 2.0]), np.array([0.4, -0.2, 0.3]), 0.002, 1000

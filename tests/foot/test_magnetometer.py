@@ -40,7 +40,7 @@ def end_error(manner: str, t: Floats, accel: Floats, gyro: Floats, mag: Floats |
     return float(abs(np.angle(np.exp(1j * turned)))), track.compass
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("manner", "unit"), [("walking", 1.0), ("turning", 100.0), ("turning", 1e-4)])  # gauss, uT, T
 def test_a_clean_field_holds_the_heading_in_any_unit(manner: str, unit: float) -> None:
     t, accel, gyro, mag = walked(manner, EARTH, 1)
@@ -51,7 +51,7 @@ def test_a_clean_field_holds_the_heading_in_any_unit(manner: str, unit: float) -
     assert 0.5 * read < trusted <= read
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_field_that_changes_from_step_to_step_changes_nothing() -> None:
     rng = np.random.default_rng(2)
     t = walked("walking", EARTH, 3)[0]
@@ -63,7 +63,7 @@ def test_a_field_that_changes_from_step_to_step_changes_nothing() -> None:
     assert np.array_equal(plain.heading_rad, fused.heading_rad)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_trust_ends_where_the_field_is_another() -> None:
     """Half the walk in a clean field, half beside a machine that turns it by a radian and makes it stronger: it is not followed there."""
     t = walked("walking", EARTH, 4)[0]
@@ -76,7 +76,7 @@ def test_trust_ends_where_the_field_is_another() -> None:
     assert abs(track.heading_rad[-1] - track.heading_rad[k]) < 1.3 * drift + 0.05
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_any_portions_give_the_same_bits_and_broken_fields_are_passed_over() -> None:
     t, accel, gyro, mag = walked("walking", EARTH, 5)
     mag[::7] = np.nan
@@ -92,7 +92,7 @@ def test_any_portions_give_the_same_bits_and_broken_fields_are_passed_over() -> 
         foot.feed(t, accel, gyro, mag[1:])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @needs_data()
 def test_on_the_hallways_headings_are_never_worse_than_without() -> None:
     """Stride headings against the survey's, with and without."""

@@ -47,7 +47,7 @@ def off_rad(a: Floats | float, b: Floats | float) -> float:
     return float(np.abs(np.angle(np.exp(1j * (np.asarray(a) - np.asarray(b))))).max())
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_every_axis_mounting_and_random_ones_give_the_toes_direction() -> None:
     mountings = [*axis_mountings(), *(fw.any_rotation(np.random.default_rng(k)) for k in range(10))]
     assert len(mountings) == 34
@@ -59,7 +59,7 @@ def test_every_axis_mounting_and_random_ones_give_the_toes_direction() -> None:
         assert [step.move_m[1] for step in track.steps] == pytest.approx([0.0] * 10, abs=0.05)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "manner", ["backward", "sideways", "running", "upstairs", "downstairs", "turning", "strolling"]
 )
@@ -95,7 +95,7 @@ def live() -> tuple[Plan, Scenario, list[Chunk]]:
     return plan, scenario, list(scenario.chunks())
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("which", [0, 5, 11, 18, 22])
 def test_live_the_mtx_may_sit_in_any_way(live: tuple[Plan, Scenario, list[Chunk]], which: int) -> None:
     """The same bytes with the sensor's axes turned: as good a track."""
@@ -139,7 +139,7 @@ def test_nobody_who_stops_after_one_step_is_kept_waiting() -> None:
     assert alignment.feed([], 6.0) == [step]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @needs_data()
 def test_on_real_feet_the_toe_looks_where_they_walk() -> None:
     """Thirty feet, mounted as their owners liked, turned once more: long steps go within a toe-out angle of the toe's direction."""

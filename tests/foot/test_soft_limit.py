@@ -52,7 +52,7 @@ def outbound_m(recording: FootRecording) -> float:
     return recording.judge(track_of(recording))[0].value
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @needs_data()
 def test_real_walks_with_a_lower_limit_keep_their_length() -> None:
     """MTw gyros reach 1200 deg/s. Bent off at 480 deg/s, the way out changes by 0.12 m on average; by 0.39 m without the correction."""

@@ -81,7 +81,7 @@ def test_a_run_is_said_to_be_one(stood_s: float, said: str) -> None:
     assert said in describe_track(track)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @needs_data()
 def test_feet_in_a_hurry_are_no_further_off_than_they_say() -> None:
     """Four trials with motion capture: 2D within 0.2 m, heights within 0.05 m, lengths of strides within their deviation."""

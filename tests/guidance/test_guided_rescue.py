@@ -120,7 +120,7 @@ def test_a_rescue_needs_a_name_and_a_plan() -> None:
         guidance_of(Tracker(DEMO), "wearer:")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_replay_gives_the_same_cues() -> None:
     scenario = Scenario(DEMO, ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8)), 5, PythonBoard(seed=5))
     chunks = list(scenario.chunks())

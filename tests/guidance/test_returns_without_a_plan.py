@@ -89,6 +89,6 @@ def comes_back(seed: int) -> bool:
     return False
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_nearly_all_come_back_to_the_door() -> None:
     assert sum(comes_back(seed) for seed in range(RETURNS)) >= 0.97 * RETURNS

@@ -61,7 +61,7 @@ def test_five_metres_by_many_people_whose_feet_are_placed() -> None:
     assert np.abs(errors).max() < 0.05
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("manner", "seconds", "mean", "flag"),
     [(SLOW, 6.0, 0.04, Flag.SLOW), (NATURAL, 4.0, 0.04, Flag.NONE), (FAST, 3.0, 0.04, Flag.FAST)],

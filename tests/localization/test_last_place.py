@@ -68,7 +68,7 @@ def test_without_it_all_storeys_stay() -> None:
     assert max(levels) < 0.5
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("storey", [0, 1, 2])
 def test_after_a_change_of_the_storey_meanwhile_the_last_one_is_not_claimed(storey: int) -> None:
     """The search beside the last place is on the storey of the pressure; the last place is believed only there."""

@@ -28,7 +28,7 @@ from echostep_studies.bench import sites
 from echostep_studies.bench.walks import SimulatedWalk, simulate
 from echostep_studies.simulation.tower import STOREY_M, tower
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow
 
 STOREYS, TRUE, WRONG = 3, 1, 2
 SEED = 5

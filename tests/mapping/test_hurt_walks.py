@@ -25,7 +25,7 @@ from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import demo_scenario
 from echostep_studies.bench.tours import clearance_m
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 HEADING_RAD = 0.5 * math.pi

@@ -31,7 +31,7 @@ from echostep_studies.bench.tours import clearance_m
 from echostep_studies.bench.walks import SimulatedWalk, simulate
 from echostep_studies.noplan.judgement import known_start, path_columns
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 

@@ -46,7 +46,7 @@ def errors(walker: Walker, segments: list[MeasuredSegment]) -> Floats:
     return np.unwrap(np.array([m.segment.heading1_rad for m in segments]) - walker.heading)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_in_hindsight_the_drift_over_a_minute_is_half_from_the_beginning_on() -> None:
     foot = live = hindsight = stated = 0.0
     for seed in range(8):

@@ -26,7 +26,7 @@ from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario
 from echostep.simulation.stimulus import BoardSensors
 from echostep.tracker import Tracker
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow
 
 BEGIN_NS = 1_000_000_000
 PLAN = load_plan(Path(str(files("echostep"))) / "plans" / "demo.json")

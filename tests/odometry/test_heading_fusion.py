@@ -128,7 +128,7 @@ def told(events: Iterable[Step | Stance]) -> list[tuple[object, ...]]:
     ]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_drift_over_a_minute_is_much_less_and_no_more_than_particles_allow() -> None:
     foot, fused, stated = 0.0, 0.0, 0.0
     for seed in range(WALKS):
@@ -247,7 +247,7 @@ def test_what_was_left_unstated_is_stated_when_the_belt_fails() -> None:
     assert max(of_failure) > 1.2 * DRIFT_RAD
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_foots_own_heading_returns_in_the_long_run() -> None:
     """With a known bias alone the fused heading would drift by the root of two of the foot's."""
     end = [(walker.drift[-1], errors(walker, walked(walker)[1])[-1]) for walker in map(Walker, range(WALKS))]
@@ -302,7 +302,7 @@ def test_a_foot_that_lost_its_heading_is_not_turned_back() -> None:
     assert np.ptp(corrections[596:700]) < 20.0 * DRIFT_RAD
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @given(
     st.integers(0, 2**32 - 1),
     st.lists(st.integers(0, 30_000), max_size=6),

@@ -144,7 +144,7 @@ def test_a_file_cut_off_anywhere_shows_what_came_before(tmp_path: Path) -> None:
         assert player.file.own_damage.truncated
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_damaged_bytes_end_in_no_other_error(tmp_path: Path) -> None:
     team = Team()
     made = Recording(tmp_path, team)

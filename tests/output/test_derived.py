@@ -71,7 +71,7 @@ def closed(schema: Any) -> Any:
     return schema
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_every_message_is_what_its_schema_says(recorded: tuple[Path, list[Estimate]]) -> None:
     checks: dict[str, Any] = {}
     for channel, schema, _, body in derived_of(recorded[0]):
@@ -83,7 +83,7 @@ def test_every_message_is_what_its_schema_says(recorded: tuple[Path, list[Estima
     assert checks.keys() == {t.name for t in (*TOPICS, POSE, FRAME, SCENE, LOCATION)}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_estimates_and_poses_are_the_trackers(recorded: tuple[Path, list[Estimate]]) -> None:
     path, estimates = recorded
     found = derived_of(path)
@@ -97,7 +97,7 @@ def test_estimates_and_poses_are_the_trackers(recorded: tuple[Path, list[Estimat
         assert 2.0 * math.atan2(pose["orientation"]["z"], pose["orientation"]["w"]) == pytest.approx(e.heading_rad)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_messages_stand_at_their_own_time(recorded: tuple[Path, list[Estimate]]) -> None:
     path, estimates = recorded
     chunks = list(open_recording(path).chunks())
@@ -123,7 +123,7 @@ def test_steps_echoes_and_pressure_are_plausible(recorded: tuple[Path, list[Esti
     assert sum(name.startswith("plan") for name in names) == 1
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_recording_with_derived_messages_replays_to_the_same_estimates(recorded: tuple[Path, list[Estimate]]) -> None:
     path, estimates = recorded
     assert tuple(open_recording(path).chunks()) == walk_chunks()

@@ -125,7 +125,7 @@ def test_every_topic_is_advertised_with_the_recording_s_schema() -> None:
             assert json.loads(channel["schema"]) == json.loads(topic.schema)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_messages_arrive_as_they_are_recorded(derived: list[DerivedMessage]) -> None:
     """Every message of a walk, with its time; all by their schemas."""
     topics = {"/estimate", "/echo/left", "/location"}

@@ -63,7 +63,7 @@ def export(folder: Path, name: str, plan: Path | None = None) -> Path:
     return out
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_csv_and_parquet_hold_every_bit(folder: Path, estimates: list[Estimate]) -> None:
     with export(folder, "track.csv").open() as file:
         written = list(csv.DictReader(file))
@@ -76,7 +76,7 @@ def test_csv_and_parquet_hold_every_bit(folder: Path, estimates: list[Estimate])
     assert {f.name for f in dataclasses.fields(Estimate)} < columns.keys()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_places_on_earth_are_the_same_in_all_formats(folder: Path, estimates: list[Estimate]) -> None:
     georeference = load_plan(folder / "plan.json").georeference
     assert georeference is not None

@@ -58,7 +58,7 @@ kinds = st.sampled_from(
 )
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @given(kinds, st.dictionaries(fields, json_like, max_size=6))
 def test_no_request_breaks_the_parser(kind: str, rest: dict[str, object]) -> None:
     requests.parse_request(json.dumps({"kind": kind, **rest}))
@@ -142,7 +142,7 @@ def with_check_ins(chunks: list[Chunk]) -> list[Chunk]:
     return mixed
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_check_ins_give_the_same_estimates_in_whatever_portions(chunks: list[Chunk]) -> None:
     mixed = with_check_ins(chunks[: len(chunks) // 2])
     one, many, start = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1), Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1), 0
@@ -203,7 +203,7 @@ def test_a_wrong_tap_that_is_undone_leaves_no_trace(chunks: list[Chunk], start: 
     assert math.hypot(shown[-1].x_m - 9.5, shown[-1].y_m - 10.8) < 0.5
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("heading_rad", [0.0, None])
 def test_a_tap_starts_the_walk_from_an_unknown_place(chunks: list[Chunk], heading_rad: float | None) -> None:
     nowhere = replace(PLAN, start=None)
@@ -217,7 +217,7 @@ def test_a_tap_starts_the_walk_from_an_unknown_place(chunks: list[Chunk], headin
     assert math.hypot(late[-1].x_m - 9.5, late[-1].y_m - 10.8) < 1.0
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_who_watches_changes_nothing(chunks: list[Chunk]) -> None:
     alone, watched = (Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1) for _ in range(2))
     expected = alone.take(portion_of(chunks))
@@ -239,7 +239,7 @@ def test_who_watches_changes_nothing(chunks: list[Chunk]) -> None:
     assert health["lost"] == 0
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_without_bytes_the_page_says_lost(chunks: list[Chunk]) -> None:
     tracker = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1)
     with LivePage(tracker, "test", LOCAL) as page, opened_url(page.url) as looking:

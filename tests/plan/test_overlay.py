@@ -44,7 +44,7 @@ def image(overlay: Overlay) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]
     return np.asarray(matplotlib.image.imread(io.BytesIO(overlay.png)))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, -140.0])
 def test_walls_are_where_the_box_says(degrees: float) -> None:
     """Dark within two pixels of the middle of each outer wall; white in a room; clear outside of the building."""

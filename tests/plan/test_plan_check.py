@@ -211,7 +211,7 @@ def test_walls_of_a_rectangle() -> None:
     assert not len(within(walls, (100, 100, 101, 101)))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_pictures(tmp_path: Path) -> None:
     plan = load_plan(DEMO)
     draw_plan(plan, tmp_path / "plan.png", [0])
@@ -237,7 +237,7 @@ def test_pictures(tmp_path: Path) -> None:
         draw_plan(plan, tmp_path / "none" / "plan.png", [0])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["$x^$", "$\\frac{1}", "a\tb\nc", "x" * 5000, "\U0001f600", "$$", "&<>"])
 def test_any_name_is_drawn(tmp_path: Path, name: str) -> None:
     plan = house(
@@ -251,7 +251,7 @@ def test_any_name_is_drawn(tmp_path: Path, name: str) -> None:
     ET.parse(tmp_path / "plan.svg")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_many_walls_become_pixels(tmp_path: Path) -> None:
     at = np.arange(30_000) * 0.01
     walls = np.column_stack((at, at, at + 0.01, at + 0.01))
@@ -281,7 +281,7 @@ def test_commands(tmp_path: Path) -> None:
         assert isinstance(failed.exception, EchostepError)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_no_label_covers_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Rooms too close for their names, findings on one spot: what is drawn is apart, and the title counts the names left out."""
     rooms = [{"name": f"a long name of a room {k}", "at": [4 + 0.3 * (k % 5), 4 + 0.2 * (k // 5)]} for k in range(40)]

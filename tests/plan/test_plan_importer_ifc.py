@@ -297,7 +297,7 @@ def concrete_kinds(kind: str) -> list[str]:
     return [one.name() for one in below(declared) if not one.is_abstract()]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_every_class_of_elements_is_used_or_counted(tmp_path: Path) -> None:
     """One element of each class of IFC4, all far above the storeys; those that are no bodies of a building, as openings, are not counted."""
     model = Model()

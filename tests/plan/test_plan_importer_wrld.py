@@ -24,7 +24,7 @@ def westport() -> Plan:
     return import_plan(data_or_skip("maps/westport-house"))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_westport_has_seven_floors(westport: Plan) -> None:
     assert [level.height_m for level in westport.levels] == [0, 3.5, 7, 10.5, 14, 17.5, 21]
     assert westport.levels[2].name == "Second Floor"
@@ -33,7 +33,7 @@ def test_westport_has_seven_floors(westport: Plan) -> None:
     assert {room.name for room in westport.levels[2].rooms} >= {"Kitchen", "Unit 3", "Balcony"}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_westport_is_as_large_as_it_is(westport: Plan) -> None:
     """A degree is 111.32 km on a sphere; the ellipsoid differs by a third of a per cent."""
     x, y = westport.levels[0].walls.reshape(-1, 2).T

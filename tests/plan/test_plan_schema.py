@@ -38,7 +38,7 @@ def test_good_plans() -> None:
     VALID.validate(FULL)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @given(PLANS)
 @settings(max_examples=50, deadline=None)
 def test_what_is_saved_is_valid(plan: Plan) -> None:

@@ -39,7 +39,7 @@ def test_a_new_file_is_private_and_one_that_exists_keeps_its_mode(tmp_path: Path
     assert shared.read_text() == "old"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("option", "expected"), [([], 0o600), (["--share"], 0o644)])
 def test_every_file_of_a_replay_and_of_an_export_has_the_mode(tmp_path: Path, option: list[str], expected: int) -> None:
     walk, out = tmp_path / "walk.mcap", tmp_path / "out"

@@ -38,15 +38,24 @@ def test_the_oldest_and_the_newest_are_tested(tmp_path: Path) -> None:
         "make setup PYTHON=python3.13 VENV=.venv/newest",
         "make quick PYTHON=python3.13 VENV=.venv/newest",
         "make test PYTHON=python3.11",
+        "make long PYTHON=python3.11",
     ]
 
 
 def test_a_name_that_does_not_run_is_no_python(tmp_path: Path) -> None:
     """As pyenv's, for versions that it has and does not use."""
     pythons = {"python3.11": PYTHON.format("3.11.7"), "python3.13": "exit 127"}
-    assert run(tmp_path / "one", pythons) == ["One Python is tested: Python 3.11.7.", "make test PYTHON=python3.11"]
+    assert run(tmp_path / "one", pythons) == [
+        "One Python is tested: Python 3.11.7.",
+        "make test PYTHON=python3.11",
+        "make long PYTHON=python3.11",
+    ]
     pythons[".pyenv/versions/3.13.0/bin/python"] = PYTHON.format("3.13.0")
     assert f"make setup PYTHON={tmp_path}/two/.pyenv/versions/3.13.0/bin/python VENV=.venv/newest" in run(
         tmp_path / "two", pythons
     )
-    assert run(tmp_path / "none", {}) == ["One Python is tested: Python 3.9.2.", "make test PYTHON=python3"]
+    assert run(tmp_path / "none", {}) == [
+        "One Python is tested: Python 3.9.2.",
+        "make test PYTHON=python3",
+        "make long PYTHON=python3",
+    ]

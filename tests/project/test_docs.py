@@ -236,7 +236,7 @@ def test_the_plans_of_the_manual_load(tmp_path: Path, page: str, walls: int) -> 
     assert len(plan.levels[0].walls) == walls
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_tutorials_commands_run_in_their_order(tmp_path: Path) -> None:
     tutorial = ROOT / "host/docs/tutorial.md"
     (tmp_path / "host").symlink_to(ROOT / "host")

@@ -72,7 +72,7 @@ def test_the_readme_names_every_extra() -> None:
     assert [extra for extra in OPTIONAL if extra not in FOR_DEVELOPERS and f"`{extra}`" not in rows] == []
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_every_import_is_required_or_has_an_extra() -> None:
     required = imports(PROJECT["dependencies"])
     assert {"numpy", "serial", "lz4"} <= required
@@ -81,7 +81,7 @@ def test_every_import_is_required_or_has_an_extra() -> None:
     assert required <= set(found), "required, but nothing imports it"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_no_kernel_multiplies_matrices_without_saying_so() -> None:
     """A product in a kernel needs the BLAS of scipy."""
     for path in PACKAGE.rglob("*.py"):

@@ -16,7 +16,7 @@ from walks import DEMO
 WITH_EXAMPLE = ("Chunk", "Estimate", "Settings", "Start", "Walk", "replay")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WITH_EXAMPLE)
 def test_an_example_gives_what_it_says(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copy(DEMO, tmp_path / "demo.json")

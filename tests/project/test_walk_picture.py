@@ -19,7 +19,7 @@ from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep_studies.figures import walk_picture
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow
 
 PLAN = load_plan(walk_picture.PLAN)
 

@@ -143,7 +143,7 @@ def test_a_file_cut_off_anywhere_keeps_all_before(tmp_path: Path, draw: st.DataO
         assert chunks_of(tmp_path / "cut.mcap") == found
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @given(st.data())
 @FIXTURE
 def test_damage_in_the_middle_costs_what_is_damaged_and_little_more(tmp_path: Path, draw: st.DataObject) -> None:
@@ -188,7 +188,7 @@ def test_a_lost_beginning_is_made_up_for_by_the_summary(tmp_path: Path) -> None:
     assert len(found) > 280
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @given(st.data())
 @FIXTURE
 def test_a_damaged_byte_in_a_compressed_file_costs_a_chunk_at_most(tmp_path: Path, draw: st.DataObject) -> None:

@@ -54,7 +54,7 @@ def nth(port: str, n: int) -> int:
     return [k for k, chunk in enumerate(walk_chunks(SECONDS)) if chunk.port == port][n]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("port", "n", "bit"),
     [("board", 0, 41), ("mtx", 5, 41), ("board", 1500, 31), ("board", 1500, 41), ("mtx", 305, 42), ("board", 1500, 55)],
@@ -124,7 +124,7 @@ def test_a_whole_recording_says_nothing(tmp_path: Path) -> None:
     assert skipped(recording, Tracker(load_plan(DEMO)).streams) == []
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_no_flip_ends_a_track_early_without_a_word(tmp_path: Path) -> None:
     """The small version of `make flips`."""
     with Recorder(tmp_path / "walk.mcap", {"seed": "1"}) as recorder:
@@ -139,7 +139,7 @@ def test_no_flip_ends_a_track_early_without_a_word(tmp_path: Path) -> None:
         assert flip.said
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_no_damaged_block_is_tracked_over_and_each_is_told(tmp_path: Path) -> None:
     """The small version of the second half of `make flips`: each kind of damage once."""
     record_walk(tmp_path / "walk.mcap", SECONDS)

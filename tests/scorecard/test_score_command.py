@@ -75,7 +75,7 @@ def test_a_fault_is_one_line_and_status_2(folder: Path, tmp_path: Path) -> None:
     assert missing.stderr == f"echostep: {tmp_path}/none.csv: cannot read it: No such file or directory\n"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_page_needs_nothing_else_and_escapes_names(folder: Path, tmp_path: Path) -> None:
     html = tmp_path / "new/score.html"
     tracks = [folder / "ours.csv", folder / "<b>[red]theirs.csv"]

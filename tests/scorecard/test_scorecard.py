@@ -169,7 +169,7 @@ def test_a_lift_is_one_zone_on_each_floor() -> None:
     assert a == b != c
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_same_figures_as_a_replay_prints(tmp_path: Path) -> None:
     """`echostep replay --truth` and `echostep score` agree to the last bit on our own track.csv."""
     scenario = demo_scenario(DEMO, 3, PythonBoard(3))

@@ -142,7 +142,7 @@ def test_a_replay_has_no_last_run() -> None:
         parse_start("last", None, PLAN)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_tracker_of_a_last_place_searches_the_building() -> None:
     start, _ = start_last(KEPT, PLAN, BOARD, ClimbSettings(), NOW)
     assert isinstance(start, Start)

@@ -82,7 +82,7 @@ def replayed(recording: Path, out: Path, *more: str) -> tuple[int, str]:
     return done.exit_code, done.output + str(done.exception or "")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_replay_says_how_it_went_and_where_it_ended(recording: Path, tmp_path: Path) -> None:
     code, said = replayed(recording, tmp_path)
     assert code == 0, said

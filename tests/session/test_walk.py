@@ -21,7 +21,7 @@ from echostep.plan.model import NO_PLAN, Pose, load_plan
 from echostep.printing.picture_files import ENDINGS
 from walks import DEMO
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow
 WALK = ROOT / "tests/captures/walk.mcap"
 
 

@@ -25,7 +25,7 @@ def plan() -> Plan:
         return load_plan(path)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_equal_seeds_give_equal_chunks_in_order(plan: Plan) -> None:
     def run(seed: int) -> list[Chunk]:
         return list(Scenario(plan, ((2.0, 7.5), (9.0, 7.5)), seed, PythonBoard(seed)).chunks())

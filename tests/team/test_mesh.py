@@ -142,7 +142,7 @@ class Channel:
             self.heard.append((self.free_s, payload))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_twenty_wearers_for_ten_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
     """On one channel, a packet in ten lost: the position at the commander is at most 20 s old but when two in a row are lost."""
     clock = Clock()
@@ -219,7 +219,7 @@ def air() -> Iterator[Air]:
         yield air
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_report_goes_from_node_to_node(air: Air) -> None:
     """By the package's serial API: outbox, two pseudo terminals, and into the commander's inbox. Positions are Meshtastic's own too."""
     mine, theirs = air.node(), air.node()
@@ -250,7 +250,7 @@ def test_a_report_goes_from_node_to_node(air: Air) -> None:
     assert POSITION_EVERY > 1
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_node_that_answers_late_is_connected_and_gets_the_report(air: Air, monkeypatch: pytest.MonkeyPatch) -> None:
     """It boots: its port is there, it answers only after the first attempt to connect has been given up."""
     monkeypatch.setattr(mesh, "ANSWER_S", 1)
@@ -274,7 +274,7 @@ def test_a_node_that_answers_late_is_connected_and_gets_the_report(air: Air, mon
     assert any("connected again" in line for line in words)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_twenty_wearers_on_pseudo_terminals(air: Air) -> None:
     """Twenty nodes and the commander's: three reports of each; never more than 20 s between two of one wearer."""
     inbox, words = Inbox(), list[str]()
@@ -321,7 +321,7 @@ def test_a_node_that_is_unplugged_is_an_os_error(air: Air) -> None:
         transport.open()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_port_that_the_package_closes_under_a_write_is_an_os_error(air: Air) -> None:
     node = MeshNode(air.node().port)
     interface = node._interface

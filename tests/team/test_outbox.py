@@ -67,7 +67,7 @@ def test_every_report_goes_out_when_the_line_is_quick(monkeypatch: pytest.Monkey
     assert [r.sequence for r in line.sent] == list(range(1, 501))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_slow_line_sends_the_newest_and_counts_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outbox, "FRESH_S", 0.05)
     line = Recorded()

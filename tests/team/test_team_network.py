@@ -252,7 +252,7 @@ def test_a_commander_survives_garbage_floods_and_a_restart_of_the_broker(tmp_pat
     assert feed.words[-1] == "connected again"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "nonsense",
     [

@@ -143,7 +143,7 @@ def undisturbed() -> list[Estimate]:
     return track(list(walk_chunks(15.0)))[0]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("counted", [True, False])
 def test_a_computer_that_slept_in_mid_walk_claims_no_position(counted: bool) -> None:
     """Four seconds of the walk are missing: the track is not sure until it has found its place."""

@@ -68,7 +68,7 @@ def test_gaps_are_judged() -> None:
     assert "| `x=y` | 0 | all 30.0 s | never |" in table([outcome])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_computer_that_sleeps_leaves_a_gap_and_no_false_claim() -> None:
     asleep = faults.TwinFault((), (), 10.0, (BOARD, MTX), "the computer sleeps")
     outcome = faults.run(asleep, PythonBoard(1))

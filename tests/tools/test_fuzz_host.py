@@ -31,7 +31,7 @@ def limited() -> Iterator[None]:
     signal.signal(signal.SIGALRM, before)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(TARGETS))
 def test_mutated_inputs_are_no_fault(name: str) -> None:
     count, data, text = fuzz_host.run_shard(name, 0, 60.0, SLOW.get(name, 20))

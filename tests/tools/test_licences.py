@@ -42,7 +42,7 @@ def test_each_source_file_names_its_licence() -> None:
         assert f"SPDX-License-Identifier: {licence}" in first_lines, path
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_module_keeps_its_docstring_below_the_licence() -> None:
     for path in (path for path in all_sources() if path.suffix == ".py"):
         assert ast.get_docstring(ast.parse(path.read_text())), path
@@ -59,7 +59,7 @@ def test_the_licence_of_every_dependency_is_listed() -> None:
         assert "GPL" not in licences.licence(package).replace("LGPL", ""), f"{name} would bind a program that is MIT"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_make_licences_prints_a_row_for_each(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

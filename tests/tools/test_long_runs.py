@@ -15,7 +15,7 @@ from reliability import demo_loops, viewers
 from team.team_broker import needs_broker
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_two_demos_in_one_process(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(demo, "DEMO_WAYPOINTS", DEMO_WAYPOINTS[:2])
     monkeypatch.setattr("sys.argv", ["demo_loops", "--minutes", "0"])

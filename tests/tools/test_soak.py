@@ -67,7 +67,7 @@ def test_seconds_around_the_wrap_of_the_boards_clock(tmp_path: Path) -> None:
     check(soak.run(8.0, tmp_path, LateBoard(began_ms), 1e-3 * began_ms), tmp_path, 1)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_rounds_of_the_tour_have_no_seam() -> None:
     tour = long_tour.LongTour(load_plan(ROOT / "host/echostep/plans/demo.json"), 1, LateBoard(), ROUND)
     edges = np.flatnonzero(tour._rows["sync_us"] != NO_SYNC)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""The list of tested versions has all dependencies, in versions that the package allows, each with its hashes; setup installs nothing else."""
+"""The list of tested versions has all dependencies, in versions that the package allows, each with its hashes; set-up installs nothing else."""
 
 from __future__ import annotations
 
+import re
 import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -11,51 +13,110 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+import install
 from board_runs import ROOT
+from release.tested_versions import entries
 
-LISTED = dict(
-    line.removesuffix(" \\").split("==")
-    for line in (ROOT / "host/tested-versions.txt").read_text().splitlines()
-    if not line.startswith(("#", "    --hash=sha256:"))
-)
+TEXT = (ROOT / "host/tested-versions.txt").read_text()
+LISTED = [Requirement(entry.partition(" \\")[0]) for entry in entries(TEXT)]
+PROJECT = tomllib.loads((ROOT / "host/pyproject.toml").read_text())["project"]
+EXTRAS = PROJECT["optional-dependencies"]
+
+
+def wanted(*extras: str) -> list[Requirement]:
+    """What the package with these extras requires of others."""
+    texts = [*PROJECT["dependencies"], *(text for extra in extras for text in EXTRAS[extra])]
+    return [one for one in map(Requirement, texts) if one.name != "echostep"]
+
+
+def versions_of(part: str) -> dict[str, str]:
+    """Version by name of what a part installs here."""
+    requirements = [Requirement(entry.partition(" \\")[0]) for entry in entries(install.requirements(part))]
+    here = [one for one in requirements if one.marker is None or one.marker.evaluate()]
+    assert len({one.name for one in here}) == len(here)
+    return {one.name: str(one.specifier).removeprefix("==") for one in here}
 
 
 def test_every_dependency_has_a_tested_version_that_is_allowed() -> None:
-    project = tomllib.loads((ROOT / "host/pyproject.toml").read_text())["project"]
-    extras = (text for extra, texts in project["optional-dependencies"].items() if extra != "studies" for text in texts)
-    requirements = [Requirement(text) for text in (*project["dependencies"], *extras)]
-    requirements = [one for one in requirements if one.name != "echostep"]
-    assert len(requirements) > 35
-    for requirement in requirements:
-        assert requirement.specifier.contains(LISTED[canonicalize_name(requirement.name)]), requirement
+    for part, extras in (("demo", ("page", "plots")), ("tests", tuple(set(EXTRAS) - {"studies"}))):
+        versions = versions_of(part)
+        for requirement in wanted(*extras):
+            assert requirement.specifier.contains(versions[canonicalize_name(requirement.name)]), requirement
 
 
-HASHED, NEWEST = "--require-hashes -r host/tested-versions.txt", "-e host[dev] -e host/studies[cluster]"
+def test_the_demo_installs_a_third_of_what_the_tests_do() -> None:
+    demo, tests = versions_of("demo"), versions_of("tests")
+    assert demo.items() <= tests.items()
+    assert 30 < len(demo) < 50
+    assert len(tests) > 100
 
 
 def test_every_version_has_hashes() -> None:
-    packages = (ROOT / "host/tested-versions.txt").read_text().split("\n", 1)[1].replace(" \\\n", "").splitlines()
-    assert len(packages) == len(LISTED) > 100
-    assert all(" --hash=sha256:" in package for package in packages)
+    assert len(LISTED) > 100
+    assert all(" --hash=sha256:" in entry.replace("\\\n", "") for entry in entries(TEXT))
+
+
+HASHED, OWN = "--require-hashes -r", "--no-deps --no-build-isolation -e host -e host/studies"
+NEWEST = "-e host[dev] -e host/studies[cluster]"
 
 
 @pytest.mark.process
 @pytest.mark.parametrize(
     ("said", "status", "installs"),
     [
-        ("", 0, [HASHED, "--no-deps --no-build-isolation -e host -e host/studies"]),
+        ("", 0, [HASHED, OWN]),
         ("ERROR: THESE PACKAGES DO NOT MATCH THE HASHES", 1, [HASHED]),
         ("ERROR: No matching distribution found for x==1", 0, [HASHED, NEWEST]),
     ],
 )  # fmt: skip
-def test_setup_takes_no_file_with_another_hash(tmp_path: Path, said: str, status: int, installs: list[str]) -> None:
+def test_set_up_takes_no_file_with_another_hash(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], said: str, status: int,
+    installs: list[str],
+) -> None:  # fmt: skip
     """With a pip that only notes what it is asked for."""
     fails = f'case "$*" in *require-hashes*) echo "{said}" >&2; exit 1;; esac' if said else ""
     pip = tmp_path / "pip"
     pip.write_text(f'#!/bin/sh\necho "$@" >> {tmp_path}/asked\n{fails}\n')
     pip.chmod(0o755)
-    done = subprocess.run([ROOT / "tools/setup.sh", tmp_path], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == status
+    monkeypatch.setattr(install, "PIP", [str(pip)])
+    assert install.set_up("tests") == status
     asked = (tmp_path / "asked").read_text().splitlines()
-    assert asked == [f"install --quiet --disable-pip-version-check {words}" for words in installs]
-    assert ("DO NOT MATCH" in done.stderr) == bool(status)
+    assert [re.sub(r"(-r) .*", r"\1", words) for words in asked] == installs
+    assert ("DO NOT MATCH" in capsys.readouterr().err) == bool(status)
+
+
+def test_a_python_that_is_too_new_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert not install.newer_python()
+    monkeypatch.setattr(sys, "version_info", (3, 99, 0))
+    assert install.newer_python().startswith("Python 3.99 is newer than 3.")
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
+    ("user", "apt", "words"),
+    [
+        ("0", "", "Installing: x"),
+        ("1000", "", "this user has no right to"),
+        (
+            "0",
+            "echo 'E: Release file for http://x/InRelease is expired' >&2; exit 100",
+            "apt's package list has expired",
+        ),
+        ("0", "echo 'E: Unable to locate package x' >&2; exit 100", "apt says: Unable to locate package x"),
+    ],
+)
+def test_apts_own_reason_is_told(tmp_path: Path, user: str, apt: str, words: str) -> None:
+    """With an apt that fails so."""
+    stubs = {"dpkg-query": "exit 1", "apt-get": apt, "id": f"echo {user}", "sudo": "exit 1"}
+    for name, body in stubs.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{body}\n")
+        (tmp_path / name).chmod(0o755)
+    done = subprocess.run(
+        [ROOT / "tools/apt.sh", "x"],
+        env={"PATH": f"{tmp_path}:/usr/bin:/bin"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert words in done.stdout
+    assert done.returncode == int("Installing" not in words)

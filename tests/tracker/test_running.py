@@ -60,7 +60,7 @@ def test_who_stands_runs_no_more() -> None:
     assert not [segment for segment in segments if segment.dx_m < 0.1 and segment.t0_s > 2.0 and segment.running]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @needs_data()
 def test_runs_and_walks_of_real_feet() -> None:
     """The three trials of runs with motion capture, and six walks on stairs and level ground (real)."""

@@ -61,7 +61,7 @@ def test_the_same_chunks_give_the_same_bits_and_other_seeds_others() -> None:
     assert digest(track(CHUNKS)[1]) != digest(track(CHUNKS, seed=1)[1])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_chunks_may_be_cut_anywhere() -> None:
     rng = random.Random(1)
     cut, beginning = [], CHUNKS[: len(CHUNKS) // 3]
@@ -110,7 +110,7 @@ def long_walk() -> tuple[list[Chunk], Truth, Scenario]:
     return list(scenario.chunks()), Truth(scenario.walk.t_s, scenario.walk.trunk_m), scenario
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("start_s", "gap_s"), [(12, 1.5), (12, 4), (20, 6), (30, 4), (30, 8)])
 def test_after_a_silent_foot_no_wrong_place_is_shown_as_sure(
     long_walk: tuple[list[Chunk], Truth, Scenario], start_s: float, gap_s: float
@@ -123,7 +123,7 @@ def test_after_a_silent_foot_no_wrong_place_is_shown_as_sure(
     assert found[-1].t_s > 55.0
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("dx", "dy", "degrees"), [(0.0, 3.5, 0.0), (6.0, -4.0, 90.0), (0.0, 0.0, 180.0)])
 def test_a_wrong_start_is_noticed(
     long_walk: tuple[list[Chunk], Truth, Scenario], dx: float, dy: float, degrees: float

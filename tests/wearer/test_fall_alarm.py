@@ -81,7 +81,7 @@ def test_a_fall_before_the_first_steps_or_during_a_mayday_changes_nothing() -> N
     assert alarm.alarm.reason is AlarmReason.HELP
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("belt", [True, False])
 def test_from_the_bytes_of_the_sensors_and_the_same_in_portions_of_any_size(belt: bool) -> None:
     samples = walk_then(sideways, MTX, np.random.default_rng(3), walk_s=14.0)

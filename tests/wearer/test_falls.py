@@ -32,7 +32,7 @@ def falls(signs: list[Sign]) -> list[Fall]:
     return [sign for sign in signs if isinstance(sign, Fall)]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("manner", FALLS)
 def test_the_belt_tells_every_fall_once_within_7_s(manner: str) -> None:
     for seed in range(4):
@@ -41,7 +41,7 @@ def test_the_belt_tells_every_fall_once_within_7_s(manner: str) -> None:
         assert samples.event_s < fall.t_s < fall.known_s < samples.event_s + 7.0
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("manner", NO_FALLS)
 def test_what_is_no_fall_is_not_told(manner: str) -> None:
     for seed in range(4):
@@ -53,7 +53,7 @@ def test_the_foot_alone_tells_falls_that_leave_it_on_its_side() -> None:
     assert sum(told) >= 4
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_all_fours_are_told_from_lying_by_the_thigh_alone() -> None:
     taken = 0
     for seed in range(8):

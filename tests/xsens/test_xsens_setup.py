@@ -57,7 +57,7 @@ def test_a_device_that_wakes_up_later_is_set_up_again() -> None:
     assert made.output == PROJECT
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000))
 def test_lost_messages_are_asked_again(seed: int) -> None:

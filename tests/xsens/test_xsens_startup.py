@@ -59,7 +59,7 @@ def test_record_sets_the_device_up_and_keeps_every_byte(
     assert bytes.fromhex("faff3100d0") in stream  # the acknowledgements are in the recording, too
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_live_stops_at_a_device_that_is_set_wrongly_and_does_not_listen(tmp_path: Path) -> None:
     with on_a_terminal(MtxDevice(FACTORY, deaf=True)) as mtx, mute_port() as board:
         done = echostep(
@@ -83,7 +83,7 @@ def test_live_stops_at_a_device_that_is_set_wrongly_and_does_not_listen(tmp_path
     assert (tmp_path / "walk.mcap").stat().st_size > 1_000
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("output", [PROJECT, None])
 def test_record_goes_on_with_a_device_that_is_right_or_silent(
     tmp_path: Path, output: OutputFormat | None, monkeypatch: pytest.MonkeyPatch

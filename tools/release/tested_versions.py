@@ -2,7 +2,7 @@
 """The versions of all packages with which the tests have passed (`make lock`), with the hashes of their files, as requirements for pip.
 
 In: the installed packages; the package index, which uv asks for what other systems and Pythons need, and for the hashes. Out:
-host/tested-versions.txt, in two parts: what `make demo` installs, and what `make test` needs besides. Owns that file. `tools/setup.py` installs
+host/tested-versions.txt, in two parts: what `make demo` installs, and what `make test` needs besides. Owns that file. `tools/install.py` installs
 from it; `make audit` looks for known faults of these versions.
 """
 
@@ -53,7 +53,7 @@ def resolved(wanted: tuple[str, ...], preferred: str, uv: str) -> str:
 
 def entries(lines: str) -> list[str]:
     """Each package with its hashes."""
-    return re.findall(r"^\S.*\n(?: .*\n)*", lines, re.MULTILINE)
+    return re.findall(r"^\w.*\n(?: .*\n)*", lines, re.MULTILINE)
 
 
 def main() -> int:

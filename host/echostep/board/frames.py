@@ -205,7 +205,8 @@ def _find_frames(
                 ids[count] = identifier
                 sequences[count] = payload[1] | payload[2] << 8
                 ends[count] = end + 1
-                bodies[count, :size] = payload[HEAD : HEAD + size]
+                for k in range(size):
+                    bodies[count, k] = payload[HEAD + k]
                 _count_sequence(payload[1] | payload[2] << 8, identifier, _uint32(payload, HEAD), schema, tally)
                 count += 1
             else:

@@ -225,8 +225,9 @@ def _push(s: _State, waiting: Records, ping: _Measurement) -> None:
     waiting[k] = ping
     s.pings += 1
     if s.pings > MAX_WAITING:
-        waiting[:-1] = waiting[1:].copy()
         s.pings -= 1
+        for k in range(s.pings):
+            waiting[k] = waiting[k + 1]
         s.dropped += 1
 
 

@@ -21,14 +21,14 @@ Item = TypeVar("Item")
 
 
 @contextmanager
-def progress_line(text: str) -> Iterator[None]:
-    """Show what is being done while the block runs, and how many kernels it has compiled."""
+def progress_line(text: str) -> Iterator[Callable[[float], None]]:
+    """Show what is being done while the block runs, and how many kernels it has compiled; the block is given a function that shows a share."""
     if not console.is_terminal:
         timer = Timer(SHOWN_AFTER_S, console.print, [f"{text} ..."])
         timer.daemon = True
         timer.start()
         try:
-            yield
+            yield lambda _share: None
         finally:
             timer.cancel()
         return
@@ -37,7 +37,7 @@ def progress_line(text: str) -> Iterator[None]:
     ) as bars:
         task = bars.add_task(text, total=None)
         with counting_compiled(lambda count: bars.update(task, description=f"{text}: {count} compiled")):
-            yield
+            yield lambda share: bars.update(task, description=f"{text}: {share:.0%}")
 
 
 def with_bar(items: Iterable[Item], text: str, fraction: Callable[[], float | None]) -> Iterator[Item]:

@@ -54,6 +54,7 @@ from echostep.session.sinks import (
     TerminalSink,
 )
 from echostep.tracker import Tracker
+from echostep.tracker.kernels import LATER, TRACKING, Part, compile_parts, compiling_later
 
 if TYPE_CHECKING:
     from echostep.page.live import LivePage
@@ -162,12 +163,13 @@ class Session:
         if self.output.browser and open_browser(page.url):
             page.wait_for_page()
 
-    def prepare(self) -> None:
-        """Compile what is not compiled yet, before the first bytes come."""
-        text = "Preparing; the first time on a computer its kernels are compiled, which takes about a minute"
+    def prepare(self, *more: Part) -> None:
+        """Compile what is not compiled yet, before the first bytes come: what tracks, and more."""
+        text = "Preparing; the first time on a computer its kernels are compiled, which takes half a minute"
         if self.page:
             self.page.announce(f"{text[0].lower()}{text[1:]}")
-        with progress_line(text):
+        with progress_line(text) as show:
+            compile_parts([*TRACKING, *more], show)
             self.tracker.warm_up()
 
     def show_truth(self, truth: TruePath) -> None:
@@ -250,7 +252,7 @@ class Session:
         shown = self.output.terminal and console.is_terminal
         view = TerminalView(self.tracker, self.title, progress, console) if shown else None
         sinks = self._sinks + self._local_sinks(view, recorder)
-        with view or nullcontext(), holding_signals():
+        with compiling_later(LATER), view or nullcontext(), holding_signals():
             try:
                 for portion in portions:
                     for sink in sinks:

@@ -77,9 +77,9 @@ def update(clock: ArrivalClock, device_s: float, t_arrival_ns: int) -> None:
             return
     if last < 0 or bucket > clock.bucket[last]:
         if clock.kept == KEPT_BUCKETS:
-            clock.bucket[:-1] = clock.bucket[1:].copy()
-            clock.device_s[:-1] = clock.device_s[1:].copy()
-            clock.lag_s[:-1] = clock.lag_s[1:].copy()
+            for k in range(last):
+                clock.bucket[k], clock.device_s[k] = clock.bucket[k + 1], clock.device_s[k + 1]
+                clock.lag_s[k] = clock.lag_s[k + 1]
         else:
             clock.kept += 1
             last += 1

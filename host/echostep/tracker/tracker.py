@@ -25,7 +25,6 @@ from echostep.localization.drawn_places import DrawnPlaces
 from echostep.localization.echoes.rangers import echo_of
 from echostep.localization.estimate import Estimate, TrackStatus, unobserved
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles.kernels import systematic
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import FilterSettings
 from echostep.localization.team.meeting import TimedMeeting, carries_position, on_the_way, start_at
@@ -200,15 +199,11 @@ class Tracker:
         return estimates
 
     def warm_up(self) -> None:
-        """Compile the kernels (seconds, the first time on a machine), so that no chunk waits for it later; leaves the tracker as it was."""
+        """Call each kernel that tracks from this start, so that no chunk waits for its compilation; leaves the tracker as it was."""
         self.front_end.warm_up()
         segment = PathSegment(0.0, 1.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0)
         measured = MeasuredSegment(segment, np.array([0.5]), np.array([0]), np.array([1.0]))
-        for start in (Start(Pose(0.0, 0.0, 0.0)), Start()):
-            other = self._new_filter(start, 0.0, np.random.default_rng(0))
-            other.update(measured, [BeaconReading(t_s, 0, 0.5, 0.0) for t_s in (0.4, 0.6)])
-            other.beacon_map.places(other.cloud, 1.0)
-        systematic(np.ones(2), 0.5, 2)
+        self._new_filter(self.start or Start(), 0.0, np.random.default_rng(0)).update(measured)
 
     def _track(self, portion: Portion) -> list[Estimate]:
         """Estimates from a portion in which only the last chunk may be the gateway's: its readings are used from the next portion on."""

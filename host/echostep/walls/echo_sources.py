@@ -142,13 +142,13 @@ def _appended(table: SourceTable, tile: int, more: SourceTable) -> SourceTable:
     all_rows, hiding = table.rows, _room(table.screens, used + screens)
     if len(all_rows) < rows + added:
         all_rows = np.empty((2 * (rows + added), more.rows.shape[1]))
-        all_rows[:rows] = table.rows[:rows]
-    all_rows[rows : rows + added] = more.rows
-    hiding[used : used + screens] = more.screens
-    screen_start[rows : rows + added + 1] = more.screen_start + used
+        _copy_rows(table.rows, rows, all_rows, 0)
+    _copy_rows(more.rows, added, all_rows, rows)
+    _copy(more.screens, screens, hiding, used, 0)
+    _copy(more.screen_start, added + 1, screen_start, rows, used)
     tile_start[tile + 1] = rows + added
-    order[ordered : ordered + len(more.order)] = more.order + rows
-    start[unit : unit + BEARINGS + 1] = more.start + ordered
+    _copy(more.order, len(more.order), order, ordered, rows)
+    _copy(more.start, BEARINGS + 1, start, unit, ordered)
     return SourceTable(tile_start, start, order, all_rows, screen_start, hiding)
 
 
@@ -158,8 +158,23 @@ def _room(numbers: Int32s, size: int) -> Int32s:
     if len(numbers) >= size:
         return numbers
     larger = np.zeros(2 * size, np.int32)
-    larger[: len(numbers)] = numbers
+    _copy(numbers, len(numbers), larger, 0, 0)
     return larger
+
+
+@part
+def _copy(numbers: Int32s, count: int, into: Int32s, at: int, plus: int) -> None:
+    """Write the first `count` numbers, each with `plus` added, into an array from `at` on; a slice would compile an error message, too."""
+    for k in range(count):
+        into[at + k] = numbers[k] + plus
+
+
+@part
+def _copy_rows(rows: Floats, count: int, into: Floats, at: int) -> None:
+    """Write the first `count` rows into a table from `at` on."""
+    for k in range(count):
+        for column in range(rows.shape[1]):
+            into[at + k, column] = rows[k, column]
 
 
 @lean_kernel

@@ -66,7 +66,8 @@ def tile_points(corners: Floats, near: Int32s, index: WallIndex) -> SourceTable:
                 points[count, POINT], points[count, POINT + 1] = centre, spread
                 points[count, POINT - 1] = dx * dx + dy * dy
                 if k > 0:
-                    screens[used : used + more] = screens[used - more : used]
+                    for j in range(used, used + more):
+                        screens[j] = screens[j - more]
                 used += more
                 count += 1
                 starts[count] = used

@@ -60,7 +60,7 @@ def walk() -> Walk:
     return Walk()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_live_and_replay_agree_bit_for_bit_and_beacons_are_found(walk: Walk) -> None:
     live, replayed = walk.tracker(), walk.tracker()
     one = [e for chunk in walk.chunks for e in live.feed(chunk)]
@@ -81,7 +81,7 @@ def test_live_and_replay_agree_bit_for_bit_and_beacons_are_found(walk: Walk) -> 
     assert np.hypot(one[-1].x_m - end[0], one[-1].y_m - end[1]) < 0.3
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_another_cloud_that_is_tracked_from_now_on_locates_the_beacons_anew(walk: Walk) -> None:
     """A search that is followed has placed no beacon, and those of the wrong cloud are not where it put them."""
     tracker = walk.tracker()
@@ -124,7 +124,7 @@ def states_at_the_end(path: tuple[Waypoint, ...], dies_s: float) -> dict[int, st
     return {tracker.gateway.numbers[p.slot]: p.state.value for p in found}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_beacon_that_dies_is_noticed_and_one_behind_a_wall_is_not_blamed() -> None:
     there_and_back = ((2.0, 7.5), (9.5, 7.5), (9.5, 10.6), (9.5, 7.5), (4.0, 7.5), (9.0, 7.5), (4.0, 7.5), (6.0, 7.5))
     assert states_at_the_end(there_and_back, 19.0) == {1: "well", 2: "silent", 3: "well"}
@@ -145,7 +145,7 @@ def test_moments_are_those_of_the_mixture() -> None:
         assert axis == pytest.approx(math.atan2(weight @ np.sin(m[:, 2]), weight @ np.cos(m[:, 2])))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_nonsense_at_the_gateways_port_changes_no_estimate(walk: Walk) -> None:
     rng = random.Random(SEED)
     noise = [Chunk(GATEWAY, c.t_arrival_ns, rng.randbytes(200) + b"\0") for c in walk.alone[::200]]
@@ -155,7 +155,7 @@ def test_nonsense_at_the_gateways_port_changes_no_estimate(walk: Walk) -> None:
     assert disturbed.gateway.counts.broken >= len(noise)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_guided_walk_gives_cues_and_writes_them(walk: Walk, tmp_path: Path) -> None:
     tracker = walk.tracker()
     guided = GuidedRun(tracker, RoutePlace(*walk.truth[-1, 1:3].tolist()))
@@ -168,7 +168,7 @@ def test_guided_walk_gives_cues_and_writes_them(walk: Walk, tmp_path: Path) -> N
     assert not guided.news()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_cues_of_a_run_and_of_its_replay_are_the_same(walk: Walk) -> None:
     """The gateway is silent in the middle: who waits for the end of a portion does not see that."""
     first_ns = walk.chunks[0].t_arrival_ns

@@ -114,7 +114,7 @@ def test_place_and_axis_are_learnt_from_a_walk_around() -> None:
     assert beliefs.cov[:, 0, 5].max() < 0.02
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_moved_beacon_is_noticed_while_others_vouch_for_the_cloud() -> None:
     rng = np.random.default_rng(2)
     n = 100

@@ -158,7 +158,7 @@ def any_readings(rng: np.random.Generator) -> Floats:
     return np.column_stack([at, range_m, bearing])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_place_is_that_of_the_twin() -> None:
     rng = np.random.default_rng(6)
     verdicts = []
@@ -226,7 +226,7 @@ def walk(rng: np.random.Generator) -> list[tuple[float, int, float, float]]:
     return rows
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "lost_from", "recoveries"), [(1, 240, 0), (2, 150, 2), (3, 60, 4)])
 def test_a_walk_is_that_of_the_twin(seed: int, lost_from: int, recoveries: int) -> None:
     """Every beacon is placed, one is found moved and placed anew; a cloud that is led astray recovers."""

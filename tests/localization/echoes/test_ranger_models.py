@@ -57,7 +57,7 @@ def test_settings_of_a_run_override_the_parts_field_by_field() -> None:
     assert echo_of(200, EchoSettings()) == EchoSettings()  # a part of the future
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_model_is_that_of_the_named_part_in_any_portions() -> None:
     chunks = told({1.0: m.Part.PULSE})
     whole = echoes(chunks, len(chunks))

@@ -51,7 +51,7 @@ def test_a_bias_is_learnt_by_the_walls() -> None:
     assert np.abs(headings_deg(2.0)).mean() < 2.0
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_without_a_prior_of_one_the_heading_lags() -> None:
     assert np.abs(headings_deg(0.0)).mean() > 3.0
 

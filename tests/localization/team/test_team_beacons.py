@@ -235,7 +235,7 @@ def test_placed_beacons_are_told_with_a_covariance_that_holds_their_errors(two: 
     assert Tracker(PLAN, two.start, seed=1).own_beacons() is None  # before the first estimate
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_run_with_a_teammates_beacons_is_the_same_in_any_portions(two: Two) -> None:
     """They weigh the cloud, and a replay has them as the live run had."""
     message = told(*two.beacons)
@@ -247,7 +247,7 @@ def test_a_run_with_a_teammates_beacons_is_the_same_in_any_portions(two: Two) ->
     assert tracker.state.team_beacons == {"kim": two.beacons}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_page_shows_the_teammates_beacons_that_are_not_its_own(two: Two) -> None:
     far = SharedBeacon(99, 20.0, 2.0, 0, 0.04, 0.0, 0.01)
     tracker, estimates = two.run(told(*two.beacons, far))

@@ -28,7 +28,7 @@ from echostep_studies.bench.tours import clearance_m
 from echostep_studies.bench.walks import SimulatedWalk, simulate
 from echostep_studies.simulation.tower import CORRIDOR_Y, STOREY_M, stairs_from, tower
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow
 
 NO_PINGS = (np.zeros(0), np.zeros(0, np.int64), np.zeros(0))
 

@@ -53,7 +53,7 @@ def test_the_page_the_plan_and_nothing_else(served: EditServer) -> None:
     assert asked(served, "plan", origin="http://evil.example")[0] == 404
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "status", "names"),
     [

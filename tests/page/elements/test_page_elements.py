@@ -92,7 +92,7 @@ def test_an_errand_finds_its_way_around_walls() -> None:
     assert destination.needs_route(told(9.0, 7.5, t_s=10.0))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_step_leads_ahead_of_its_echoes(chunks: list[Chunk]) -> None:
     tracker = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1)
     off_m, last, then = [], None, None
@@ -165,7 +165,7 @@ def crosses_a_wall(plan: Plan, level: int, line_m: Sequence[Sequence[float]]) ->
     return bool(len(walls.query(shapely.LineString(line_m), predicate="intersects")))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("plan", [PLAN, seven_floors()], ids=["demo", "seven floors"])
 def test_no_way_leads_through_a_wall_wherever_it_begins(plan: Plan) -> None:
     """Places are drawn anywhere, in walls and close behind them too; a place without a way is an error, not a line."""

@@ -130,7 +130,7 @@ def test_all_pages_are_guided_by_the_run_until_one_of_them_chooses_a_destination
             assert until(late, lambda frame: bool(frame["goal"]))["guidance"]["own"]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_replay_shows_the_cue_and_the_beacons_of_its_moment(chunks: list[Chunk]) -> None:
     tracker, guided = guided_tracker()
     with LivePage(tracker, "A replay", LOCAL, guided, replay=True) as replay_page:
@@ -176,7 +176,7 @@ def test_without_bytes_a_guided_page_says_stop(chunks: list[Chunk]) -> None:
     assert not any(b["heard"] for b in frame["beacons"])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_step_that_is_shown_before_its_echoes_turns_the_arrow(chunks: list[Chunk]) -> None:
     tracker, guided = guided_tracker()
     scenes: list[PageScene] = []

@@ -42,7 +42,7 @@ def is_closed(one: socket.socket) -> bool:
         return True
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("sent", [b"", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX-a: "])
 def test_idle_connections_block_no_other(sent: bytes) -> None:
     with served() as (server, mailbox):
@@ -56,7 +56,7 @@ def test_idle_connections_block_no_other(sent: bytes) -> None:
             assert until(lambda: any(is_closed(one) for one in sockets))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_connection_without_a_request_is_closed_and_a_page_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     with served() as (server, mailbox), opened(server) as page:
         mailbox.publish(scene())

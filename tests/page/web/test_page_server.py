@@ -238,7 +238,7 @@ def test_so_many_pages_and_no_more() -> None:
         assert server.pages == MOST_PAGES
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_too_many_check_ins_are_refused() -> None:
     said = '{"kind":"check_in","x_m":2,"y_m":7.5,"heading_rad":null,"sd_m":0.5}'
     with served() as (server, mailbox), opened(server) as page:

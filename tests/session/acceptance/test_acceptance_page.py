@@ -23,7 +23,7 @@ from echostep.session.acceptance.protocol import FIELD
 from echostep.session.acceptance.walked import Walked, walk_again
 from session.acceptance.simulated_walk import record, walk
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")

@@ -155,7 +155,7 @@ def test_events_go_out_on_a_stream_through_a_restart_of_the_server(monkeypatch: 
     assert names[-20:] == [f"echostep-red-n{k}" for k in range(20)]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_stream_server_that_stops_reading_does_not_hold_old_positions() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)

@@ -38,12 +38,14 @@ from echostep.simulation.people.tours import room_tour
 from echostep.simulation.people.walker import Person, Waypoint
 from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario, start_of
 from echostep.tracker import Tracker
+from echostep.tracker.kernels import Part
 
 WATCHED_SPEED = 4.0  # times real time, on a terminal: a walk of 90 s is seen in 22 s
 # Chunks that are tracked together in a run that is watched: 20 ms of the walk: no step is shown later
 WATCHED_PORTION = 16
 UNSEEN_PORTION = 1000  # chunks that are tracked together when nothing shows the run: fewer calls
 FOOT_BOARD = 2  # seed of its simulator: another board than the belt's
+SIMULATION = Part("echostep.simulation.kernels:simulation", 100)
 _DEMO_PLAN = files("echostep") / "plans" / "demo.json"
 TOUR_CORNER_M = 0.3  # how far corners are cut on a tour: doors of any plan are passed without touching them
 
@@ -114,7 +116,7 @@ def _track(
     title = "echostep demo (simulated" + (f", {speed:g} x real time)" if speed else ")")
     end = _place_text(plan, waypoints) if options.guide else None
     with Session(tracker, title, "simulated", output, end) as session:
-        session.prepare()
+        session.prepare(SIMULATION)
         with progress_line("Simulating the walk"):
             person = Person() if options.plan_path is None else Person(corner_m=TOUR_CORNER_M)
             scenario = Scenario(plan, waypoints, options.seed, boards[0], person, kit=options.kit, foot_board=boards[1])

@@ -43,6 +43,7 @@ from echostep.session.session import Session
 from echostep.settings import Settings, parse_settings, read_settings
 from echostep.timing.timeline import MtxTiming
 from echostep.tracker import Tracker
+from echostep.tracker.kernels import SEARCH
 from echostep.xsens.configuration.startup import MtxStart
 from echostep.xsens.reader import warm_up
 
@@ -79,7 +80,7 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions, g
     tracker = Tracker(plan, start, settings, seed)
     check_start(plan, tracker.start, given=tracking.start is not None and not is_last, recorded=is_last)
     session = Session(tracker, "echostep live", "live", output, tracking.guide_to)
-    session.prepare()
+    session.prepare(SEARCH)  # a search may begin with the first steps
     folder = output_folder(output.folder)
     tracker.watchers.append(PlaceKeeper(folder, tracker, number).note)
     with closing(_open_ports(ports, output.outlet)) as opened:

@@ -121,14 +121,14 @@ def filter_samples(state: State, heights_m: Floats, free: bool, seen: Floats, st
     for i in range(len(seen)):
         gap = seen[i, DT] > GAP_S
         steps = 1 if gap else max(1, math.ceil(seen[i, DT] / LONGEST_STEP_S - 1e-9))
-        for part in range(steps):
+        for piece in range(steps):
             now = seen[i].copy()
             now[DT] /= steps
-            if part < steps - 1:
+            if piece < steps - 1:
                 now[CLAIMED] = np.nan
             _step(state, heights_m, free, gap, now[DT], now, merged)
             if len(joint):
-                chain = merged[3].copy() if part == 0 else _chain_joint(merged[3], chain)
+                chain = merged[3].copy() if piece == 0 else _chain_joint(merged[3], chain)
         for s in range(size):
             states[i, s, RESULT_WEIGHT] = state[0][s]
             states[i, s, RESULT_HEIGHT:RESULT_VARIANCE] = state[1][s, :GUST]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Install echostep into an environment: `.venv/bin/python tools/setup.py demo`, or `tests` for its tests and tools too.
+"""Install echostep into an environment: `.venv/bin/python tools/install.py demo`, or `tests` for its tests and tools too.
 
 In: host/tested-versions.txt, each of whose packages is checked against its hashes. Out: the packages, in the environment of the Python that runs
 this; on a terminal a line with the share that is done. Owns nothing. Where the package index lacks a tested version, the newest ones are
@@ -82,7 +82,7 @@ def newer_python() -> str:
     )
 
 
-def main(part: str) -> int:
+def set_up(part: str) -> int:
     """Install the tested versions, or the newest; the exit status."""
     with tempfile.TemporaryDirectory() as folder:
         wanted = Path(folder, "requirements.txt")
@@ -103,4 +103,4 @@ def main(part: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    sys.exit(set_up(sys.argv[1]))
