@@ -13,7 +13,7 @@ fail() {
 [ -e "$port" ] || fail "$port: there is no such port; plug the board in; see ls /dev/serial/by-id"
 [ -c "$port" ] || fail "$port is no serial port; name one such as /dev/ttyACM0"
 [ -r "$port" ] && [ -w "$port" ] || fail "$port: this user may not open it: sudo usermod -aG dialout \$USER, then log out and in"
-command -v avrdude >/dev/null || tools/apt.sh avrdude || fail "avrdude is missing: sudo apt install avrdude"
+command -v avrdude >/dev/null || tools/apt.sh avrdude || fail "avrdude is not installed: sudo apt install avrdude"
 if [ -z "$hex" ]; then
 	hex=host/echostep/firmware/echostep.hex
 	if command -v avr-gcc >/dev/null || tools/apt.sh gcc-avr avr-libc binutils-avr; then

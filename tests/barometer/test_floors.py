@@ -58,6 +58,7 @@ def known(floor: int, count: int = 3) -> Floats:
     return np.asarray(np.eye(count)[floor])
 
 
+@pytest.mark.long
 def test_standing_keeps_the_height_under_the_weather() -> None:
     t = np.arange(10_800) / 9.0
     heights = Altitude().feed(record(np.zeros(10_800), extra_pa=100.0 / 3600.0 * t))  # 2.8 m of weather

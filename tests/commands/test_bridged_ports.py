@@ -23,6 +23,7 @@ LEAST_BYTES = 12  # of a chunk on average: a message or two; single bytes took 1
 pytestmark = [pytest.mark.twin, needs_twin]
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # in pyserial
 @pytest.mark.parametrize("scheme", ["socket", "rfc2217"])
 def test_a_run_over_the_network_is_read_in_blocks_and_tracked(
@@ -45,6 +46,7 @@ def test_a_run_over_the_network_is_read_in_blocks_and_tracked(
     assert sum(len(chunk.data) for chunk in chunks) / len(chunks) > LEAST_BYTES
 
 
+@pytest.mark.long
 def test_a_wearer_who_stands_where_many_places_fit_is_named_in_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -47,7 +47,7 @@ def short_walk(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(demo, "DEMO_WAYPOINTS", DEMO_WAYPOINTS[:2])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.usefixtures("short_walk")
 def test_the_pace_changes_no_bit_and_the_summary_has_lines_of_its_own(tmp_path: Path) -> None:
     """With a page at 30 times real time, and as fast as it can: not on a terminal, it waits for no one."""
@@ -91,7 +91,7 @@ def frame(socket: ClientConnection) -> dict[str, Any]:
     return message(socket, "frame")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_at_the_end_the_page_says_so_and_plays_the_run_again() -> None:
     tracker = Tracker(PLAN, seed=1)
     with LivePage(tracker, "demo", LOCAL, keeps=True) as page:
@@ -177,6 +177,7 @@ def test_a_demo_on_another_plan_walks_through_its_rooms(tmp_path: Path) -> None:
 KIT_2026 = ("--kit", "2026", "--board-command", f"{TWIN} --elf {ELF}")
 
 
+@pytest.mark.long
 @needs_twin
 def test_the_kit_of_2026_ends_within_the_figures_of_the_papers_kit(tmp_path: Path) -> None:
     """Through the real firmware: mean error at most 0.10 m, the ellipse holds the truth 93 to 100 % of the time; its recording is replayed alike."""

@@ -36,6 +36,7 @@ def sha_of(text: str) -> str:
     return found[1]
 
 
+@pytest.mark.long
 @needs_twin
 @pytest.mark.parametrize("wears_mtx", [True, False])
 def test_a_live_run_replays_to_identical_estimates(
@@ -82,7 +83,7 @@ def test_a_live_run_replays_to_identical_estimates(
     assert (tmp_path / "again/track.csv").read_bytes() == (tmp_path / "live/track.csv").read_bytes()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_runs_of_one_seed_are_identical(tmp_path: Path) -> None:
     runs = [
         echostep("demo", "--headless", "--seed", seed, "--out", tmp_path / str(k)) for k, seed in enumerate((3, 3, 4))
@@ -107,6 +108,7 @@ def records(path: Path) -> bool:
     return True
 
 
+@pytest.mark.long
 @pytest.mark.process
 def test_ctrl_c_ends_a_live_run_with_its_files(tmp_path: Path) -> None:
     ours, theirs = os.openpty()
@@ -190,6 +192,7 @@ def test_help_lists_the_commands() -> None:
     assert all(name in done.stdout for name in ("demo", "live", "record", "replay", "decode"))
 
 
+@pytest.mark.long
 @pytest.mark.process
 def test_record_keeps_the_bytes_of_both_ports(tmp_path: Path) -> None:
     pairs = [os.openpty() for _ in range(2)]

@@ -66,6 +66,7 @@ def log_lines(path: Path) -> list[str]:
         return [json.loads(m.data)["message"] for _, _, m in make_reader(file).iter_messages(topics=["/log"])]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", ["live", "record"])
 @pytest.mark.parametrize("kind", ["full", "gone", "stopped", "closed"])
 def test_a_run_outlasts_its_output(tmp_path: Path, kind: str, command: str) -> None:

@@ -94,7 +94,7 @@ def test_the_second_program_on_a_port_is_told_who_has_it(tmp_path: Path) -> None
     assert third.returncode == 0, third.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_live_finds_both_ports_by_what_they_say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The board's identifiers are another program's, the adapter of the MTx is unknown, a third device talks nonsense."""
     with board_and_mtx() as (board, mtx), babbling_port(b"$GPGGA,123519,4807.038,N\r\n") as other:
@@ -127,6 +127,7 @@ def test_a_search_without_a_board_says_what_is_there(monkeypatch: pytest.MonkeyP
         assert words in done.stderr
 
 
+@pytest.mark.long
 @needs_twin
 def test_two_boards_are_found_told_apart_tracked_and_replayed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     track = tmp_path / "live/track.csv"

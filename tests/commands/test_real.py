@@ -18,6 +18,7 @@ from waiting import PATIENCE_S
 pytestmark = needs_data("gx5_gcp")
 
 
+@pytest.mark.long
 @pytest.mark.process
 def test_the_real_walk_is_tracked_within_its_target(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "echostep_studies.figures.real_walk", "--out", str(tmp_path), "--seed", "3"]

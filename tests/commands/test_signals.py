@@ -83,6 +83,7 @@ def terminal_read(terminal: int) -> Iterator[Callable[[], None]]:
         close()
 
 
+@pytest.mark.long
 @pytest.mark.process
 @pytest.mark.parametrize("end", ["SIGTERM", "SIGQUIT", "closed"])
 def test_a_live_run_ends_with_a_whole_recording(tmp_path: Path, end: str) -> None:
@@ -96,6 +97,7 @@ def test_a_live_run_ends_with_a_whole_recording(tmp_path: Path, end: str) -> Non
         check_files(tmp_path, live)
 
 
+@pytest.mark.long
 @pytest.mark.process
 def test_a_run_that_ignores_sighup_records_on_without_its_terminal(tmp_path: Path) -> None:
     """As nohup asks; a loop that spins on the closed terminal would cost a whole core beside the run's own work. SIGTERM ends it."""

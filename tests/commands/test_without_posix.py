@@ -120,6 +120,7 @@ def board_over_tcp() -> Iterator[str]:
     thread.join(PATIENCE_S)
 
 
+@pytest.mark.long
 def test_a_port_is_recorded_and_the_recording_handled(tmp_path: Path) -> None:
     with board_over_tcp() as url:
         said = echostep("record", "--board", url, "--seconds", 1.5, "--out", tmp_path / "walk.mcap")
@@ -131,6 +132,7 @@ def test_a_port_is_recorded_and_the_recording_handled(tmp_path: Path) -> None:
     assert '"Ping"' in echostep("decode", CAPTURE)
 
 
+@pytest.mark.long
 def test_a_walk_is_replayed_and_exported(tmp_path: Path, plan: Path) -> None:
     said = echostep(
         "replay", WALK, "--plan", plan, "--start", "2,7.5,0", "--guide", "start", "--headless", "--out", tmp_path
@@ -143,6 +145,7 @@ def test_a_walk_is_replayed_and_exported(tmp_path: Path, plan: Path) -> None:
     echostep("export", WALK, "--plan", plan, "--start", "2,7.5,0", "-o", tmp_path / "derived.mcap")
 
 
+@pytest.mark.long
 def test_plans_and_settings_are_read_as_utf_8(tmp_path: Path, plan: Path) -> None:
     assert "nothing wrong" in echostep("plan", "check", plan)
     assert "the rooms are: Büro ??" in echostep("replay", WALK, "--plan", plan, "--start", "x", "--headless", status=2)
@@ -152,6 +155,7 @@ def test_plans_and_settings_are_read_as_utf_8(tmp_path: Path, plan: Path) -> Non
     assert "the rooms are" in said  # the settings were read
 
 
+@pytest.mark.long
 def test_a_board_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
     said = echostep("live", "--board", "COM99", "--headless", "--out", tmp_path, status=2)
     assert "COM99" in said

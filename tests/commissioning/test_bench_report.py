@@ -20,6 +20,7 @@ def test_the_measurements_are_those_of_the_page() -> None:
     assert [int(n) for n in re.findall(r"^\| .* \| (\d+) \|$", page, flags=re.M)] == list(range(1, 16))
 
 
+@pytest.mark.long
 @needs_twin
 @pytest.mark.process
 def test_the_report_of_a_board(tmp_path: Path) -> None:

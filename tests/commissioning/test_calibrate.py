@@ -71,7 +71,7 @@ def usual(rows: NDArray[Any], start_ms: int) -> None:
         rows[name] += count - quiet_rows(1)[name][0]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_biases_go_into_a_file_that_the_tracker_reads(tmp_path: Path) -> None:
     out = tmp_path / "me.toml"
     out.write_text("[foot]\nheight_m = 1.8\n\n[gyro]\nbelt_reversed = true\n")
@@ -260,7 +260,7 @@ def test_mistakes_end_with_one_line(tmp_path: Path) -> None:
     assert not (tmp_path / "x.toml").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_rehearsal_of_the_twin_calibrates_everything() -> None:
     """What the wearer of `make twin STILL=1` does, as the Python board reports it, without waiting for it."""
     board = PythonBoard()

@@ -30,7 +30,7 @@ def doctor(*arguments: object) -> subprocess.CompletedProcess[str]:
     return echostep("doctor", *arguments)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_board_that_is_well_gets_status_0() -> None:
     with python_board() as port:
         done = doctor("--board", port, "--seconds", 4)
@@ -44,6 +44,7 @@ def test_a_board_that_is_well_gets_status_0() -> None:
     assert "ppm" in done.stdout
 
 
+@pytest.mark.long
 @needs_twin
 def test_what_is_wrong_is_said_in_words() -> None:
     with twin_board("scp1000=no_eeprom", "compass=absent", "calf=no_self_test", "belt=absent") as port:
@@ -265,6 +266,7 @@ def test_a_clock_that_was_set_has_no_drift() -> None:
     assert drift_of(heard) is None
 
 
+@pytest.mark.long
 @needs_twin
 def test_the_parts_of_2026_are_named_and_so_is_the_one_that_fails() -> None:
     with twin_board("kit=2026", "imu_calf=no_self_test") as port:

@@ -132,7 +132,7 @@ def test_what_avrdude_says_is_passed_on(tmp_path: Path, body: str, words: str) -
     assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_board_that_does_not_react_is_told_after_ten_seconds(tmp_path: Path) -> None:
     path, log = fake_avrdude(tmp_path, GOOD)
     with board(tmp_path / "port", log, obeys=False):

@@ -71,7 +71,7 @@ def test_it_is_off_by_default_and_a_run_without_bytes_ends_as_ever(tmp_path: Pat
     assert files(Path(recorder.path)) == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_walk_leaves_what_calibrate_rangers_finds_in_it(walk: Path) -> None:
     words = said(walk)
     (out,) = files(walk)

@@ -220,6 +220,7 @@ def foot_on_a_pseudo_terminal() -> Iterator[Any]:
         made.board.close()
 
 
+@pytest.mark.long
 @needs_twin
 def test_the_command_writes_settings_that_the_tracker_reads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "me.toml"

@@ -216,7 +216,7 @@ def calibrated(walk: Path) -> str:
     return out.read_text()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_biases_come_out_of_a_recorded_walk_into_the_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The tracker has used the same pings: between two walls only half of what both rangers have in common would be left otherwise."""
     monkeypatch.setattr("echostep.simulation.stimulus.ranger_bias_m", lambda *_: np.array([0.06, 0.02]))
@@ -225,7 +225,7 @@ def test_biases_come_out_of_a_recorded_walk_into_the_settings(tmp_path: Path, mo
     assert settings.ranger.right_bias_m == pytest.approx(0.02, abs=0.025)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_swapped_rangers_of_a_recorded_walk_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def swapped(*given: Any) -> Echoes:
         found = echoes(*given)
@@ -244,7 +244,7 @@ def test_a_plan_is_asked_for(tmp_path: Path) -> None:
 
 
 @pytest.mark.twin
-@pytest.mark.slow
+@pytest.mark.long
 @needs_twin
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # in pyserial
 def test_a_wearer_who_walks_now_is_guided_recorded_and_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

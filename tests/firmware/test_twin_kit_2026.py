@@ -93,6 +93,7 @@ def test_a_bmp390_that_fails_is_named_and_comes_back(barometer: Bench, kind: str
     assert barometer.status.healthy & m.Healthy.PRESSURE
 
 
+@pytest.mark.long
 def test_wrong_bits_from_a_bmp390_are_counted_and_named(barometer: Bench) -> None:
     """Its identity is read again with each sample; what was measured beside them is sent."""
     barometer.fault("spi_errors=30")

@@ -31,6 +31,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 # Seconds from the start to the wrap: while parts are sought, during the self-test, and while all are read.
+@pytest.mark.long
 @pytest.mark.parametrize("before_s", [0.06, 0.6, 4.0])
 @pytest.mark.parametrize("wrap", [HALF_WRAP, WRAP])
 def test_nothing_happens_when_the_clock_wraps(folder: Path, wrap: int, before_s: float) -> None:
@@ -86,7 +87,7 @@ def outcomes(found: list[m.Message]) -> set[int]:
     return {p.outcome for p in pings(found, m.Ranger.LEFT)}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_one_stray_edge_does_not_stop_the_left_ranger_later(left_ranger: Bench) -> None:
     """A glitch on the echo line while no ping owns it counts as a SyncOut edge; 17.9 minutes later it must not look like a recent one."""
     left_ranger.fault("glitch=left")
@@ -96,7 +97,7 @@ def test_one_stray_edge_does_not_stop_the_left_ranger_later(left_ranger: Bench) 
     assert outcomes(found) == {m.Outcome.ECHO}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_stray_edge_a_minute_costs_only_what_it_covers(left_ranger: Bench) -> None:
     """Over more than one wrap of the clock."""
     disturbed, others, counted = 0, set(), 0

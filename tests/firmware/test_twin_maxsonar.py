@@ -155,6 +155,7 @@ def test_a_maxsonar_beside_another_kind_is_used_alone_and_named(bench: Bench, ot
     assert bench.parts.wiring == m.Wiring.OK
 
 
+@pytest.mark.long
 def test_maxsonars_survive_a_reset_in_the_middle_of_a_ping(rangers: Bench) -> None:
     rangers.fault("reset=watchdog")
     rangers.run(2_000)

@@ -57,6 +57,7 @@ def test_an_echo_of_the_other_ping_is_heard(bench: Bench) -> None:
     assert len(set(heard)) > len(heard) // 2  # it moves with the jitter, an own echo would stay
 
 
+@pytest.mark.long
 def test_equal_input_gives_equal_bytes() -> None:
     def run(seed: int) -> str:
         bench = Bench(BoardProcess([str(TWIN), "--elf", str(ELF), "--seed", str(seed)]))

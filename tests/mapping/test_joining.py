@@ -84,6 +84,7 @@ def turned(segments: tuple[MeasuredSegment, ...], by_rad: float) -> list[Measure
     return found
 
 
+@pytest.mark.long
 def test_the_second_walk_finds_its_place_on_the_first(
     walks: tuple[SimulatedWalk, ...], solved: tuple[Mapped, Mapped]
 ) -> None:
@@ -135,6 +136,7 @@ def test_the_study_judges_two_walks(walks: tuple[SimulatedWalk, ...]) -> None:
     assert (row.joined, row.misplaced, row.wrong) == (1, 0, 0)
 
 
+@pytest.mark.long
 def test_two_recordings_become_one_plan(walks: tuple[SimulatedWalk, ...], folder: Path) -> None:
     """`echostep map A B`: the place and its odds are printed; a walk given twice is refused."""
     assert walks

@@ -9,6 +9,7 @@ from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -75,6 +76,7 @@ def error_m(e: Estimate, truth: np.ndarray[tuple[int, int], np.dtype[np.float64]
     return math.hypot(e.x_m - truth[k, 1], e.y_m - truth[k, 2])
 
 
+@pytest.mark.long
 def test_the_foots_samples_are_on_the_belt_boards_time() -> None:
     """The crystals differ by 30 ppm, the boards did not start together."""
     seen: list[float] = []
@@ -112,6 +114,7 @@ def test_any_portions_give_the_same_estimates(cuts: list[int]) -> None:
     assert estimates(walk().chunks, cuts) == estimates(walk().chunks, [])
 
 
+@pytest.mark.long
 def test_a_foot_board_that_is_unplugged_and_plugged_in_again_goes_on() -> None:
     """For two seconds the legs measure the way; the ticks begin anew."""
     faults = ((9.0, "usb=unplug"), (11.0, "usb=plug"), (11.4, "ask"))

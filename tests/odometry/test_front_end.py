@@ -116,12 +116,12 @@ def test_any_portions_tell_the_same(cuts: list[int]) -> None:
     assert taken(recorded(), cuts) == whole()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_chunk_by_chunk_tells_the_same() -> None:
     assert taken(recorded(), list(range(len(recorded())))) == whole()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @given(st.integers(0, 1 << 32), st.lists(st.integers(0, 1 << 20), max_size=10))
 @settings(max_examples=25, deadline=None)
 def test_bytes_that_arrived_together_may_be_cut_anywhere(seed: int, cuts: list[int]) -> None:
@@ -271,7 +271,7 @@ def headings(chunks: Iterable[Chunk], portion: int, ours: FrontEnd | None = None
     return [(p.segment.t1_s, p.segment.heading1_rad) for p in pieces if isinstance(p, MeasuredSegment)]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_belts_gyro_takes_drift_out_of_the_foot() -> None:
     """By the headings of a foot without drift. With a belt gyro upside down the foot is alone."""
     foot_alone = FrontEnd(
@@ -301,7 +301,7 @@ def corrected() -> list[tuple[float, float]]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("portion", [1, 37, 20_000])
 def test_corrected_headings_do_not_depend_on_portions(portion: int) -> None:
     assert headings(drifting(1.0)[:CORRECTED], portion) == corrected()

@@ -158,6 +158,7 @@ def served_crew() -> tuple[Team, ServedTeam]:
     return team, served
 
 
+@pytest.mark.long
 def test_a_commander_with_crews(browser: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """A whole visit: two crews enter, one answers, the other is asked too late and leaves; the table says so."""
     team, table_of = served_crew()

@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
+import pytest
+
 from echostep.operation.command import restore
 from echostep.operation.operation import Operation
 from echostep.operation.page import TablePage
@@ -120,6 +122,7 @@ def test_two_commanders_and_a_wearer_have_one_state(browser: Any, tmp_path: Path
         subscription.close()
 
 
+@pytest.mark.long
 @needs_broker
 def test_a_broker_that_dies_and_has_lost_its_memory_gets_it_back(tmp_path: Path) -> None:
     with Broker(tmp_path) as broker, Commander(broker.url) as ann, Commander(broker.url) as ben:

@@ -48,6 +48,7 @@ def header_colour(page: Any) -> str:
     return str(page.evaluate("getComputedStyle(document.querySelector('header')).backgroundColor"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", SIZES)
 def test_a_mayday_is_heard_and_seen_and_leads_to_its_place_and_back(
     browser: Any, size: tuple[int, int], tmp_path: Path

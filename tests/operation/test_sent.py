@@ -29,6 +29,7 @@ MEETING_M = (20.0, 4.5)
 WORDS = "Ben sends you to anna, in distress: Ground floor, in Meeting"
 
 
+@pytest.mark.long
 @needs_broker
 def test_who_is_sent_gets_the_way(browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mark_feed, "LOOK_S", 0.0)

@@ -31,6 +31,7 @@ def shot(page: Any, name: str, tmp_path: Path) -> None:
     page.screenshot(path=kept(f"table-{name}.png", tmp_path))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("look", LOOKS)
 def test_nothing_keeps_a_commander_out(browser: Any, look: str, tmp_path: Path) -> None:
     from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]

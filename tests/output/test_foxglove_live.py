@@ -241,6 +241,7 @@ def test_without_the_package_there_is_a_sentence(monkeypatch: pytest.MonkeyPatch
         FoxgloveServer(FoxgloveAddress("127.0.0.1", 0), "a test")
 
 
+@pytest.mark.long
 @pytest.mark.process
 def test_a_replay_is_seen_by_a_viewer(tmp_path: Path) -> None:
     """`replay --foxglove` sends the walk at the pace at which it was walked, with the times of day of the recording."""

@@ -131,6 +131,7 @@ def frames(url: str) -> Generator[dict[str, Any], None, None]:
             yield frame
 
 
+@pytest.mark.long
 @pytest.mark.process
 def test_a_guided_walk_among_beacons_is_seen_on_the_page(live: subprocess.Popen[str], tmp_path: Path) -> None:
     assert live.stdout

@@ -210,6 +210,7 @@ def wearers_moments() -> list[PageScene]:
     return [*before, *statuses, *cues, alarm]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lang", LOCALES)
 def test_nothing_is_cut_off_on_the_commanders_page(browser: Any, lang: str, tmp_path: Path) -> None:
     team = whole_team()
@@ -250,6 +251,7 @@ def test_nothing_is_cut_off_on_the_commanders_page(browser: Any, lang: str, tmp_
         page.context.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lang", LOCALES)
 def test_nothing_is_cut_off_in_the_editor(browser: Any, lang: str, tmp_path: Path) -> None:
     doubtful = with_questions(import_plan(doubtful_house(tmp_path / "house.dxf")))

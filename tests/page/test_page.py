@@ -142,7 +142,7 @@ def with_check_ins(chunks: list[Chunk]) -> list[Chunk]:
     return mixed
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_check_ins_give_the_same_estimates_in_whatever_portions(chunks: list[Chunk]) -> None:
     mixed = with_check_ins(chunks[: len(chunks) // 2])
     one, many, start = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1), Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1), 0
@@ -217,7 +217,7 @@ def test_a_tap_starts_the_walk_from_an_unknown_place(chunks: list[Chunk], headin
     assert math.hypot(late[-1].x_m - 9.5, late[-1].y_m - 10.8) < 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_who_watches_changes_nothing(chunks: list[Chunk]) -> None:
     alone, watched = (Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1) for _ in range(2))
     expected = alone.take(portion_of(chunks))

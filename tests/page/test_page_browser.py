@@ -24,6 +24,7 @@ from page.frames import scene
 from waiting import until
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("look", LOOKS)
 def test_nothing_keeps_anybody_out(browser: Any, look: str, tmp_path: Path) -> None:
     from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
@@ -126,6 +127,7 @@ def test_two_fingers_zoom_and_rotate(browser: Any) -> None:
         page.context.close()
 
 
+@pytest.mark.long
 def test_a_replay_plays_stops_and_seeks(browser: Any, tmp_path: Path) -> None:
     start, chunks = demo_walk(beacons=False)
     tracker = Tracker(PLAN, start, seed=1)
@@ -274,6 +276,7 @@ def test_the_arrow_turns_the_short_way_and_is_gone_when_the_heading_is_unknown(b
         page.context.close()
 
 
+@pytest.mark.long
 def test_ten_pages_at_once_and_one_that_comes_back(browser: Any) -> None:
     with Walk(10.0, 2.0, stands=True) as walk:
         pages = [looking(browser, walk.page.url, "bright") for _ in range(10)]

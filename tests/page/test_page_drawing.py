@@ -60,6 +60,7 @@ def step(t_s: float, length_m: float) -> MeasuredSegment:
     return MeasuredSegment(PathSegment(t_s, t_s + 0.6, length_m, 0.0, 0.0, 0.0, 0.02, 0.001, 1), *NO_PINGS)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("size", "how"), [("desk", {**DESK, "color_scheme": "dark"}), ("phone", PHONE)])
 def test_the_walls_grow_on_the_page(browser: Any, tmp_path: Path, size: str, how: dict[str, Any]) -> None:
     """Half of the walk draws walls, the rest more of them; they stand beside the path, which meets the track."""
@@ -102,6 +103,7 @@ def test_a_page_that_draws_leaves_the_estimates_as_they_are() -> None:
     assert found == expected
 
 
+@pytest.mark.long
 @pytest.mark.process
 def test_a_replay_shows_what_was_drawn_by_then_and_draws_the_same_again() -> None:
     start, chunks = demo_walk(beacons=False)

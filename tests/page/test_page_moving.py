@@ -79,7 +79,7 @@ def write(path: Path, frames: list[Image.Image]) -> None:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_moving_picture_is_the_page_while_a_walk_goes_on(browser: Any, tmp_path: Path) -> None:
     with replayed(1e3 if PICTURES else SMALL_S) as served:
         size = {"width": SIZE[0], "height": SIZE[1]}

@@ -127,6 +127,7 @@ def test_charts_show_the_walk_and_what_happened(browser: Any, url: str, tmp_path
     page.context.close()
 
 
+@pytest.mark.long
 def test_a_link_leads_to_its_view_and_moment(browser: Any, url: str) -> None:
     page = looking(browser, url)
     page.locator("#time").fill("77.5")

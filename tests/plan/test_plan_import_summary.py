@@ -33,6 +33,7 @@ def test_an_import_shows_what_came_in(tmp_path: Path) -> None:
     assert load_plan(tmp_path / "plan.json").levels[0].name == "house"
 
 
+@pytest.mark.long
 @pytest.mark.process
 def test_the_picture_beside_the_plan(tmp_path: Path) -> None:
     """It replaces one that an import drew, and no other; --no-picture draws none."""

@@ -228,6 +228,7 @@ def test_room_numbers_of_blocks(tmp_path: Path) -> None:
     assert [(room.name, room.at_m) for room in imported(doc, tmp_path).levels[0].rooms] == [("2.14", (2, 2))]
 
 
+@pytest.mark.long
 @pytest.mark.process
 def test_commands(tmp_path: Path) -> None:
     doc, _ = with_gap()

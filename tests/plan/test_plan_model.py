@@ -232,7 +232,7 @@ def test_any_plan_is_read_back(plan: Plan) -> None:
     same(plan, parse_plan(plan_json(plan).encode()))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @given(
     st.recursive(
         st.none() | st.booleans() | st.floats() | TEXTS,
@@ -255,7 +255,7 @@ def test_any_tree_is_refused_in_words(tree: Any) -> None:
             assert "\n" not in str(error)  # noqa: PT017
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_million_walls_open(tmp_path: Path) -> None:
     rows = ",\n".join(str(row) for row in np.random.default_rng(1).uniform(0, 1000, (1000, 4)).round(3).tolist())
     text = '{"echostep_plan": 1, "levels": [{"walls": [' + ",".join([rows] * 1000) + "]}]}"

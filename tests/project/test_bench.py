@@ -13,6 +13,7 @@ import pytest
 from waiting import PATIENCE_S
 
 
+@pytest.mark.long
 @pytest.mark.process
 def test_a_tiny_benchmark(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "echostep_studies.speed.bench", "--tiny", "--out", str(tmp_path)]

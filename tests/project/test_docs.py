@@ -236,7 +236,7 @@ def test_the_plans_of_the_manual_load(tmp_path: Path, page: str, walls: int) -> 
     assert len(plan.levels[0].walls) == walls
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_tutorials_commands_run_in_their_order(tmp_path: Path) -> None:
     tutorial = ROOT / "host/docs/tutorial.md"
     (tmp_path / "host").symlink_to(ROOT / "host")
@@ -257,6 +257,7 @@ def test_the_tutorials_commands_run_in_their_order(tmp_path: Path) -> None:
         assert (tmp_path / "out" / name).stat().st_size > 1000
 
 
+@pytest.mark.long
 @needs_broker
 def test_the_commands_for_a_team_run(tmp_path: Path) -> None:
     (block,) = blocks(ROOT / "host/docs/teams.md", "sh")

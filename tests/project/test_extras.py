@@ -126,6 +126,7 @@ print(json.dumps([before, list(sys.modules), len(frames)]))
     assert frames > 1000
 
 
+@pytest.mark.long
 def test_the_core_decodes_and_tells(core: dict[str, str], tmp_path: Path) -> None:
     assert "Indoor pedestrian tracking" in run(core, tmp_path, "--help").stdout
     decoded = run(core, tmp_path, "decode", CAPTURES / "board.bin")
@@ -133,6 +134,7 @@ def test_the_core_decodes_and_tells(core: dict[str, str], tmp_path: Path) -> Non
     assert run(core, tmp_path, "info", CAPTURES / "walk.mcap").stdout.rstrip().endswith("whole")
 
 
+@pytest.mark.long
 def test_the_core_tracks_a_walk_and_says_what_it_leaves_out(core: dict[str, str], tmp_path: Path) -> None:
     words = ("replay", CAPTURES / "walk.mcap", "--plan", DEMO)
     done = run(core, tmp_path, *words, "--out", "core")
@@ -147,6 +149,7 @@ def test_the_core_tracks_a_walk_and_says_what_it_leaves_out(core: dict[str, str]
     assert (tmp_path / "core/track.csv").read_bytes() == (tmp_path / "whole/track.csv").read_bytes()
 
 
+@pytest.mark.long
 def test_the_core_navigates_a_foot(core: dict[str, str], tmp_path: Path) -> None:
     t_s, accel, gyro = samples(course(MANNERS["walking"], steps=6), 100, rng=np.random.default_rng(1))
     rows = np.column_stack([t_s, accel, gyro])
@@ -207,6 +210,7 @@ def test_an_importer_that_lacks_its_library_says_which(
     )
 
 
+@pytest.mark.long
 def test_a_walk_without_a_plan_is_tracked_where_nothing_draws(core: dict[str, str], tmp_path: Path) -> None:
     done = run(core, tmp_path, "replay", WALK, "--headless", "--out", "out")
     assert done.returncode == 0, done.stderr

@@ -41,10 +41,10 @@ print(twice(shapes.{name}(3.0)))
 """
 
 PROBE = """
-from numpy import uint8, zeros
-from echostep.recording.mcap_records import read_uint
-assert not read_uint(zeros(8, uint8), 0, 8)
-print(read_uint._cache.cache_path)
+from numpy import zeros
+from echostep.plan.polyline import along
+assert along(zeros((2, 2)), 0.0) == (0.0, 0.0, 0.0)
+print(along._cache.cache_path)
 """
 
 
@@ -60,6 +60,7 @@ def run(package: Path, name: str, unit: float) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 @pytest.mark.process
 def test_an_update_in_place_is_compiled_anew_and_the_old_kernels_go(tmp_path: Path) -> None:
     package = tmp_path / "echostep"

@@ -40,6 +40,7 @@ def metadata(wheel: Path) -> Message:
         return message_from_string(archive.read(name).decode())
 
 
+@pytest.mark.long
 def test_pypi_takes_the_wheel_without_a_warning(built: Path) -> None:
     pytest.importorskip("twine")
     done = subprocess.run(

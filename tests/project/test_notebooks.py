@@ -67,7 +67,7 @@ def test_the_page_lists_them() -> None:
 
 
 @pytest.mark.process
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_first_track(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     names, shown = run("first_track", monkeypatch, tmp_path)
     (walk,) = [value for value in shown if isinstance(value, echostep.Walk)]
@@ -82,7 +82,7 @@ def test_a_first_track(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: 
 
 
 @pytest.mark.process
-@pytest.mark.slow
+@pytest.mark.long
 def test_settings_and_pings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     names, shown = run("inside", monkeypatch, tmp_path)
     assert repr(shown[0]) == "Settings(cloud=CloudSettings(size=100))"
@@ -93,7 +93,7 @@ def test_settings_and_pings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
 
 
 @pytest.mark.process
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_foot_with_its_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("ECHOSTEP_DATA", str(data_or_skip("vicon_pyshoe").parent))
     names, shown = run("foot_error", monkeypatch, tmp_path)

@@ -100,7 +100,7 @@ exec unshare --user --map-user=1000 --map-group=1000 env -i {environment} sh -c 
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.process
 @pytest.mark.skipif(
     os.geteuid() != 0 or shutil.which("unshare") is None, reason="only root makes a file system read-only"
@@ -152,7 +152,7 @@ def folder() -> Iterator[Path]:
 
 @needs_twin
 @needs_another_user
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.process
 @pytest.mark.twin
 def test_another_user_tracks_replays_and_looks_with_an_installation_that_only_root_can_write(folder: Path) -> None:

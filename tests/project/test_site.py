@@ -49,6 +49,7 @@ def test_make_site_builds_as_this_test_does() -> None:
     assert " out/site" in recipe
 
 
+@pytest.mark.long
 def test_each_page_of_the_manual_is_in_the_contents(site: Path) -> None:
     contents = (site / "index.html").read_text()
     listed = re.findall(r"^\| \[[^]]+\]\(([^)]+)\.md\)", (ROOT / "host/docs/README.md").read_text(), flags=re.M)
@@ -58,6 +59,7 @@ def test_each_page_of_the_manual_is_in_the_contents(site: Path) -> None:
         assert re.search(rf'toctree-l1(?: has-children)?"><a class="reference internal" href="{page}"', contents), name
 
 
+@pytest.mark.long
 def test_links_lead_to_a_file_and_to_an_anchor_of_it(site: Path) -> None:
     anchors = {page: set(re.findall(r'\bid="([^"]+)"', page.read_text())) for page in pages(site)}
     checked = 0
@@ -87,6 +89,7 @@ def test_the_python_api_is_in_the_site(site: Path) -> None:
         assert re.search(rf"<h3>{name}<", api), name
 
 
+@pytest.mark.long
 def test_a_dead_link_fails(tmp_path: Path) -> None:
     pytest.importorskip("furo", reason="sphinx is not installed: no site is built")
     (tmp_path / "in").mkdir()

@@ -71,6 +71,7 @@ def made(folder: Path, kind: str) -> bytes:
     return out.read_bytes()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["cut", "repair"])
 def test_a_flipped_bit_of_what_we_write_costs_less_than_a_second(tmp_path: Path, kind: str) -> None:
     whole, rng = made(tmp_path, kind), random.Random(1)

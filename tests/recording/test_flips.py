@@ -139,7 +139,7 @@ def test_no_flip_ends_a_track_early_without_a_word(tmp_path: Path) -> None:
         assert flip.said
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_no_damaged_block_is_tracked_over_and_each_is_told(tmp_path: Path) -> None:
     """The small version of the second half of `make flips`: each kind of damage once."""
     record_walk(tmp_path / "walk.mcap", SECONDS)

@@ -76,6 +76,7 @@ def draw(broker: Broker, folder: Path, page: Address | None) -> None:
     kept.receiver.close()
 
 
+@pytest.mark.long
 @needs_broker
 def test_what_one_walk_has_drawn_tracks_a_teammate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bo walks the demo's way too, by other feet, on what anna has drawn; the file replays it."""

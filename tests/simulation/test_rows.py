@@ -94,7 +94,7 @@ def test_bearings_are_clockwise_from_north() -> None:
     assert np.abs(off).max() < 150
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_worn_gyro_has_the_errors_it_states() -> None:
     """Each alone, over many wearers: scale and jitter in walking, the bias's wander at all times."""
     n, rate_hz = 60_000, 1000.0

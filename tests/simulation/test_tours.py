@@ -108,6 +108,7 @@ WESTPORT_TOURS = {
 }  # 605, 606, 801, 802 and both of `through` use the winding stair, or the one with a corner
 
 
+@pytest.mark.long
 @pytest.mark.study
 @pytest.mark.parametrize("name", TOURS)
 def test_no_tour_meets_a_wall(name: str) -> None:
@@ -116,6 +117,7 @@ def test_no_tour_meets_a_wall(name: str) -> None:
         assert not in_walls(plan, walked(way, seed)), seed
 
 
+@pytest.mark.long
 @pytest.mark.study
 @needs_data("maps/westport-house")
 @pytest.mark.parametrize(

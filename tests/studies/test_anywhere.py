@@ -287,6 +287,7 @@ def test_walks_are_long_and_keep_clear_of_walls(site: sites.Site) -> None:
 # ---- the peer ----
 
 
+@pytest.mark.long
 def test_augmented_mcl_tracks_and_adds_random_poses_when_the_likelihood_falls(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(amcl, "SIZE", 2000)
     site = sites.hall(1)
@@ -306,6 +307,7 @@ def test_augmented_mcl_tracks_and_adds_random_poses_when_the_likelihood_falls(mo
 # ---- the command ----
 
 
+@pytest.mark.long
 def test_the_command_writes_its_table_and_the_diagrams(tmp_path: Path) -> None:
     found = echostep(
         "evaluate", "anywhere", "--runs", "1", "--rows", "hall", "--json", "a.json", "--out", "out", cwd=tmp_path

@@ -218,6 +218,7 @@ def test_odometry_states_its_own_errors(
 # ---- the command ----
 
 
+@pytest.mark.long
 def test_the_command_tracks_every_log_of_a_folder(log_file: Path, tmp_path: Path) -> None:
     found = echostep(
         "evaluate", "clutter", "--data", str(log_file.parent), "--starts", "0", "--json", "c.json", cwd=tmp_path

@@ -55,6 +55,7 @@ def values(rows: list[Row], group: str, metric: str) -> list[float]:
     return found
 
 
+@pytest.mark.long
 @needs_recordings
 def test_rows_have_the_promised_form(rows: list[Row]) -> None:
     for row in rows:

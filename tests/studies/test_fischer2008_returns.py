@@ -60,6 +60,7 @@ def test_wilson_interval_against_the_published_example() -> None:
     assert wilson95(20, 20)[1] == 1.0
 
 
+@pytest.mark.long
 def test_dead_reckoning_without_iron_is_exact_and_with_iron_fails() -> None:
     clean = replace(NOMINAL, sources=0)
     assert all(one_return(Case("", PDR, clean), seed) for seed in range(5))
@@ -73,6 +74,7 @@ def test_the_particle_filter_reaches_the_exit_where_the_paper_does_not_always() 
     assert 30 < paper < 60
 
 
+@pytest.mark.long
 def test_nearly_all_return_by_a_map_that_was_learnt_on_the_way_in() -> None:
     assert sum(one_return(Case("", OURS, deployed=True), seed) for seed in range(12)) >= 11
 
@@ -101,6 +103,7 @@ def test_every_row_has_its_share_of_returns() -> None:
     assert all(row.runs == 1 for row in rows)
 
 
+@pytest.mark.long
 def test_command_writes_rows_and_pictures(tmp_path: Path) -> None:
     arguments = [
         "evaluate",

@@ -144,6 +144,7 @@ def test_the_loop_has_its_rooms_and_its_furniture() -> None:
     assert not [finding for finding in check_plan(plan) if finding.kind == "overlap"]
 
 
+@pytest.mark.long
 def test_one_walk_gives_its_rows(tmp_path: Path) -> None:
     """The demo's walk, drawn: better than the foot alone; a second person is tracked on the drawing."""
     site = Site(load_plan(ROOT / "host/echostep/plans/demo.json"), DEMO_WAYPOINTS)

@@ -51,6 +51,7 @@ def test_the_battery_is_changed_at_a_stop() -> None:
     assert all(len(w) == 4 for w in way)
 
 
+@pytest.mark.long
 def test_a_short_operation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Both trackers give estimates, none during the change; the rows are complete and the parts add up."""
     walked = operation(5, 12.0)

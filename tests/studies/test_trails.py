@@ -185,6 +185,7 @@ def test_the_figures_have_the_printed_magnitudes() -> None:
     assert np.mean(means) == pytest.approx((2.0 - 8.0 - 7.0) / 3.0, abs=0.5)
 
 
+@pytest.mark.long
 def test_the_command_writes_rows_for_every_trail_method_and_rate_and_draws(tmp_path: Path) -> None:
     options = ["--runs", "1", "--seed", "4", "--out", str(tmp_path), "--json", str(tmp_path / "r.json")]
     found = CliRunner().invoke(app, ["evaluate", "trails", *options])

@@ -250,7 +250,7 @@ def test_a_report_goes_from_node_to_node(air: Air) -> None:
     assert POSITION_EVERY > 1
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_node_that_answers_late_is_connected_and_gets_the_report(air: Air, monkeypatch: pytest.MonkeyPatch) -> None:
     """It boots: its port is there, it answers only after the first attempt to connect has been given up."""
     monkeypatch.setattr(mesh, "ANSWER_S", 1)
@@ -274,7 +274,7 @@ def test_a_node_that_answers_late_is_connected_and_gets_the_report(air: Air, mon
     assert any("connected again" in line for line in words)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_twenty_wearers_on_pseudo_terminals(air: Air) -> None:
     """Twenty nodes and the commander's: three reports of each; never more than 20 s between two of one wearer."""
     inbox, words = Inbox(), list[str]()

@@ -22,6 +22,7 @@ SOUND = Outcome(0, 9, "", "", {"track.csv": "digest"}, truncated=False)
 CASE = Case("replay", (), ("files",), repeats=True)
 
 
+@pytest.mark.long
 @pytest.mark.process
 @pytest.mark.skipif(shutil.which("cc") is None or sys.platform != "linux", reason="no C compiler, or no LD_PRELOAD")
 @pytest.mark.parametrize(

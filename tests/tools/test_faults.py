@@ -68,7 +68,7 @@ def test_gaps_are_judged() -> None:
     assert "| `x=y` | 0 | all 30.0 s | never |" in table([outcome])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_computer_that_sleeps_leaves_a_gap_and_no_false_claim() -> None:
     asleep = faults.TwinFault((), (), 10.0, (BOARD, MTX), "the computer sleeps")
     outcome = faults.run(asleep, PythonBoard(1))
@@ -79,6 +79,7 @@ def test_a_computer_that_sleeps_leaves_a_gap_and_no_false_claim() -> None:
     assert outcome.wrongly_sure == 0
 
 
+@pytest.mark.long
 @needs_twin
 def test_a_killed_run_is_started_again_while_the_mtx_is_unplugged(tmp_path: Path) -> None:
     """In real time, through two live runs: each has its recording, and the ports are found again."""

@@ -202,6 +202,7 @@ LEGS = ("imu_thigh=absent", "imu_calf=absent")
 RANGERS = ("pulse_left=absent", "pulse_right=absent")
 
 
+@pytest.mark.long
 @needs_twin
 @pytest.mark.parametrize(
     ("step", "faults"),
@@ -228,6 +229,7 @@ def test_a_step_of_the_guide_shows_what_the_doctor_prints(step: int, faults: tup
     assert guide_step(step)
 
 
+@pytest.mark.long
 @needs_twin
 def test_the_step_of_the_foot_board_shows_what_the_doctor_prints() -> None:
     with twin_board("kit=2026") as board_port, twin_board("kit=foot", rows=standing_foot) as port:

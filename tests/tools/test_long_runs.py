@@ -34,6 +34,7 @@ def test_growth_from_run_to_run_is_judged() -> None:
     assert [f.measured for f in demo_loops.figures(grows)][-1] == "+1080 MB/h"
 
 
+@pytest.mark.long
 @needs_broker
 @pytest.mark.browser
 @pytest.mark.process

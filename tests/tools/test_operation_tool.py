@@ -54,7 +54,7 @@ def test_what_did_not_happen_is_named(
 
 @needs_broker
 @pytest.mark.process
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_small_operation_has_a_page_with_crews_at_the_address_that_it_prints(browser: Any, tmp_path: Path) -> None:
     port = free_port()
     options = ("--wearers", "4", "--firmware", "0", "--speed", "6", "--port", str(port), "--out", str(tmp_path))

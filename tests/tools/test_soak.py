@@ -50,17 +50,20 @@ def check(measured: soak.Measured, folder: Path, wraps: int) -> None:
     assert measured.tracking == 1.0
 
 
+@pytest.mark.long
 @needs_twin
 def test_seconds_of_the_real_firmware(tmp_path: Path) -> None:
     check(soak.run(5.0, tmp_path), tmp_path, 0)
 
 
+@pytest.mark.long
 @needs_twin
 @pytest.mark.parametrize(("wrap", "wraps"), [(HALF_WRAP, 0), (WRAP, 1)])
 def test_seconds_of_the_real_firmware_around_a_wrap_of_its_clock(tmp_path: Path, wrap: int, wraps: int) -> None:
     check(soak.run_before_wrap(8.0, tmp_path, wrap, 4.0), tmp_path, wraps)
 
 
+@pytest.mark.long
 @pytest.mark.process
 def test_seconds_around_the_wrap_of_the_boards_clock(tmp_path: Path) -> None:
     began_ms = int(1e3 * WRAP_S) - 4000

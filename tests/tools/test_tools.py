@@ -121,6 +121,7 @@ def test_the_versions_are_written(tmp_path: Path, start: Start, monkeypatch: pyt
     assert re.search(r"^numpy==[\d.]+$", (tmp_path / "versions.txt").read_text(), flags=re.M)
 
 
+@pytest.mark.long
 @pytest.mark.process
 def test_same_bits_are_digests(
     start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
@@ -200,6 +201,7 @@ def test_measured_seconds_of_the_firmware(start: Start, capsys: pytest.CaptureFi
     assert "FAIL" not in said
 
 
+@pytest.mark.long
 @needs_broker
 def test_a_small_team_loads_the_broker(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     start("reliability.team_load", "--trackers", 2, "--seconds", 1.0)

@@ -29,6 +29,7 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str
     return programs, wheels.environment_variables(programs, folder)
 
 
+@pytest.mark.long
 def test_an_installed_wheel_decodes_and_looks_into_recordings(
     fresh: tuple[Path, dict[str, str]], tmp_path: Path
 ) -> None:

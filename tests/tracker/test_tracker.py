@@ -61,7 +61,7 @@ def test_the_same_chunks_give_the_same_bits_and_other_seeds_others() -> None:
     assert digest(track(CHUNKS)[1]) != digest(track(CHUNKS, seed=1)[1])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_chunks_may_be_cut_anywhere() -> None:
     rng = random.Random(1)
     cut, beginning = [], CHUNKS[: len(CHUNKS) // 3]
@@ -181,6 +181,7 @@ def test_strange_ports_and_pure_noise_are_counted() -> None:
     assert tracker.front_end.board.counts.rejected > 100
 
 
+@pytest.mark.long
 @needs_twin
 @pytest.mark.parametrize("fault", ["reset=watchdog", "usb=reset", "srf_left=absent", "sda=stuck", "thigh=absent"])
 def test_faults_of_the_real_board_in_mid_walk(fault: str) -> None:
@@ -201,6 +202,7 @@ def test_faults_of_the_real_board_in_mid_walk(fault: str) -> None:
     assert tracker.front_end.timeline.board_restarts == (1 if fault == "reset=watchdog" else 0)
 
 
+@pytest.mark.long
 @needs_twin
 def test_the_demo_runs_through_the_real_firmware() -> None:
     scenario = demo_scenario(PLAN, 1, BoardProcess([str(TWIN), "--elf", str(ELF)]))

@@ -222,7 +222,7 @@ def test_a_lift_carries_those_who_are_in_it() -> None:
     assert np.ptp(riding.map_x_m[order][np.searchsorted(share, [0.05, 0.95])]) < 2.0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_unknown_level_becomes_known_on_the_stairs() -> None:
     """He starts on one of three levels, and climbs twice: only the lowest allows it."""
     way = [w for w in tour(3) if len(w) < 4 or w[3] <= 2 * STOREY_M][:-3]
@@ -251,7 +251,7 @@ def test_a_walker_climbs_the_height_of_his_stairs() -> None:
     assert rising.min() == pytest.approx(-1.0, abs=0.05), "m/s, the lift"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_walk_by_stairs_and_lift_is_followed() -> None:
     scenario, estimates = up_and_down()
     error, z = off(scenario, estimates)
@@ -265,7 +265,7 @@ def test_a_walk_by_stairs_and_lift_is_followed() -> None:
     assert all(sum(e.levels) == pytest.approx(1.0) for e in estimates)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("wears_gyros", [False, True])
 def test_without_the_foot_the_pressure_still_tells_the_level(wears_gyros: bool) -> None:
     """The MTx falls silent before the stairs: leg gyros carry the track on; without them it is lost, and the level comes back with the foot."""
@@ -300,7 +300,7 @@ def test_kinds_have_the_kernels_numbers() -> None:
 # A real lay_out_levels's plan
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @needs_data("maps/westport-house")
 def test_all_seven_floors_of_a_real_plan_are_walked() -> None:
     """By stairs and lift; the walk is simulated."""

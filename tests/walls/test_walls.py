@@ -76,7 +76,7 @@ def test_sources_agree_with_the_slow_twin(
         assert sorted(s[1] for s in found) == pytest.approx(sorted(s[1] for s in expected), abs=1e-7)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @settings(max_examples=150, deadline=None)
 @given(plans(), st.sampled_from([7, 7, 7, 1, 3, 20]), st.sampled_from([0.0, 0.5, 1.0, 2.0]))
 def test_cone_readings_agree_with_plain_rays(

@@ -136,7 +136,7 @@ def still_walk() -> tuple[Scenario, list[Chunk]]:
     return scenario, list(scenario.chunks())
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_from_the_bytes_of_the_sensors_to_the_mayday_within_35_s() -> None:
     scenario, chunks = still_walk()
     moving = np.flatnonzero(np.abs(np.diff(scenario.walk.foot_m, axis=0)).sum(axis=1) > 1e-9)
@@ -153,7 +153,7 @@ def test_from_the_bytes_of_the_sensors_to_the_mayday_within_35_s() -> None:
     assert end_s < tracker.alarm.changes[-1][0] < end_s + 6.0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_taps_are_chunks_and_a_replay_has_the_same_alarms() -> None:
     scenario, chunks = still_walk()
     third = len(chunks) // 3

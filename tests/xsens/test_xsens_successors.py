@@ -62,7 +62,7 @@ def test_product_codes() -> None:
     ]  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_doctor_configures_and_names_an_mti_on_a_port() -> None:
     device = MtiDevice(MTI_630)
     with on_a_terminal(device) as mtx, python_board() as board:

@@ -72,12 +72,12 @@ class Part(NamedTuple):
         return self.mark is not None and self.mark.exists()
 
 
-WALLS = Part(f"{__name__}:walls", 100)
-FOOT = Part(f"{__name__}:foot", 100)
-BOARD_AND_CLOCKS = Part(f"{__name__}:board_and_clocks", 100)
-CLOUD = Part(f"{__name__}:cloud", 50)
-SEARCH = Part(f"{__name__}:search", 50)
-BEACONS = Part(f"{__name__}:beacons", 50)
+WALLS = Part(f"{__name__}:walls", 112)
+FOOT = Part(f"{__name__}:foot", 91)
+BOARD_AND_CLOCKS = Part(f"{__name__}:board_and_clocks", 60)
+CLOUD = Part(f"{__name__}:cloud", 27)
+SEARCH = Part(f"{__name__}:search", 40)
+BEACONS = Part(f"{__name__}:beacons", 75)
 TRACKING = (WALLS, FOOT, BOARD_AND_CLOCKS, CLOUD)  # the longest first
 LATER = (SEARCH, BEACONS)  # what a walk from a known start may come to need
 
@@ -138,25 +138,32 @@ def _plan() -> Plan:
 
 
 def compile_parts(parts: Sequence[Part], show: Show = lambda _share: None) -> None:
-    """Compile those of the parts that are not compiled yet, the first ones first. What fails is left to the run: it compiles what it misses."""
-    waiting = [part for part in parts if not part.is_compiled]
-    count, total = itertools.count(1), sum(part.kernels for part in waiting)
+    """Compile those of the parts that are not compiled yet, in a process for each core. What fails is left to the run: it compiles what it misses."""
+    shares = _shared_out([part for part in parts if not part.is_compiled], os.cpu_count() or 1)
+    count, total = itertools.count(1), sum(part.kernels for share in shares for part in share)
     children = list[subprocess.Popen[bytes]]()
 
-    def compile_one(part: Part) -> None:
-        with suppress(OSError), start_compiling([part]) as child:
+    def compile_share(share: Sequence[Part]) -> None:
+        with suppress(OSError), start_compiling(share) as child:
             children.append(child)
             while child.stdout is not None and child.stdout.read(1):
                 show(min(next(count) / total, 1.0))
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(max(len(shares), 1)) as pool:
         try:
-            list(pool.map(compile_one, waiting))
+            list(pool.map(compile_share, shares))
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
             for child in children:
                 child.kill()
             raise
+
+
+def _shared_out(parts: Sequence[Part], count: int) -> list[list[Part]]:
+    """The parts for each of at most `count` processes: each to the one that has least to do so far. What two parts share is then compiled once."""
+    shares: list[list[Part]] = [[] for _ in range(min(count, len(parts)))]
+    for part in sorted(parts, key=lambda part: -part.kernels):
+        min(shares, key=lambda share: sum(one.kernels for one in share)).append(part)
+    return shares
 
 
 @contextmanager

@@ -62,7 +62,9 @@ def tile_points(corners: Floats, near: Int32s, index: WallIndex) -> SourceTable:
                     points, starts = np.concatenate((points, points)), np.concatenate((starts, starts))
                 if len(screens) < used + more:
                     screens = np.concatenate((screens, screens))
-                points[count, 0], points[count, 1], points[count, 2 : POINT - 1] = x, y, sectors[k]
+                points[count, 0], points[count, 1] = x, y
+                for j in range(POINT - 3):
+                    points[count, 2 + j] = sectors[k, j]
                 points[count, POINT], points[count, POINT + 1] = centre, spread
                 points[count, POINT - 1] = dx * dx + dy * dy
                 if k > 0:
@@ -138,9 +140,9 @@ def _kinds(x: float, y: float, rays: Floats, corners: Floats, sectors: Floats) -
         if width < math.pi and not _sector_meets(x, y, rays[a], rays[b], corners):
             continue
         sectors[count, 0] = CORNER if abs(width - 0.5 * math.pi) <= CORNER_RAD else EDGE
-        sectors[count, 1:3], sectors[count, 3:5] = rays[a], rays[b]
-        if len(order) == 1:
-            sectors[count, 1:5] = 0.0
+        for j in range(2):
+            sectors[count, 1 + j] = rays[a, j] if len(order) > 1 else 0.0
+            sectors[count, 3 + j] = rays[b, j] if len(order) > 1 else 0.0
         count += 1
     return count
 

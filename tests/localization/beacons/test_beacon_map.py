@@ -60,7 +60,7 @@ def walk() -> Walk:
     return Walk()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_live_and_replay_agree_bit_for_bit_and_beacons_are_found(walk: Walk) -> None:
     live, replayed = walk.tracker(), walk.tracker()
     one = [e for chunk in walk.chunks for e in live.feed(chunk)]
@@ -168,7 +168,7 @@ def test_guided_walk_gives_cues_and_writes_them(walk: Walk, tmp_path: Path) -> N
     assert not guided.news()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_cues_of_a_run_and_of_its_replay_are_the_same(walk: Walk) -> None:
     """The gateway is silent in the middle: who waits for the end of a portion does not see that."""
     first_ns = walk.chunks[0].t_arrival_ns

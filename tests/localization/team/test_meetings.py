@@ -279,7 +279,7 @@ def test_where_no_start_is_known_a_meeting_is_one() -> None:
     assert math.hypot(estimates[0].x_m - 20.0, estimates[0].y_m - 2.0) < 2.0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_replay_has_the_same_meetings_in_any_portions() -> None:
     chunks = list(walk_chunks())
     at = 2 * len(chunks) // 3

@@ -235,7 +235,7 @@ def test_placed_beacons_are_told_with_a_covariance_that_holds_their_errors(two: 
     assert Tracker(PLAN, two.start, seed=1).own_beacons() is None  # before the first estimate
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_run_with_a_teammates_beacons_is_the_same_in_any_portions(two: Two) -> None:
     """They weigh the cloud, and a replay has them as the live run had."""
     message = told(*two.beacons)

@@ -59,6 +59,7 @@ def drawn(walk: SimulatedWalk, mapped: Mapped) -> tuple[Plan, Walked]:
     return plan_of(mapped, walk.pose_at(walk.segments[0].segment.t0_s), "tower")
 
 
+@pytest.mark.long
 def test_each_level_has_its_walls(drawn: tuple[Plan, Walked]) -> None:
     plan, _ = drawn
     assert [level.name for level in plan.levels] == ["0", "1"]

@@ -70,6 +70,7 @@ def test_without_a_connection_nothing_stays_green(browser: Any) -> None:
         page.context.close()
 
 
+@pytest.mark.long
 def test_a_fault_of_the_server_is_said_and_goes_when_it_is_gone(browser: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object, **__: object) -> None:
         raise TypeError("ndarray")

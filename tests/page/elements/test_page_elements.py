@@ -92,7 +92,7 @@ def test_an_errand_finds_its_way_around_walls() -> None:
     assert destination.needs_route(told(9.0, 7.5, t_s=10.0))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_step_leads_ahead_of_its_echoes(chunks: list[Chunk]) -> None:
     tracker = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1)
     off_m, last, then = [], None, None

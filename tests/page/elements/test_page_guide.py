@@ -176,7 +176,7 @@ def test_without_bytes_a_guided_page_says_stop(chunks: list[Chunk]) -> None:
     assert not any(b["heard"] for b in frame["beacons"])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_step_that_is_shown_before_its_echoes_turns_the_arrow(chunks: list[Chunk]) -> None:
     tracker, guided = guided_tracker()
     scenes: list[PageScene] = []

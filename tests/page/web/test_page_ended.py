@@ -55,6 +55,7 @@ def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any, tmp
         page.context.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("size", "error"),
     [

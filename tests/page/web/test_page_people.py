@@ -51,6 +51,7 @@ def legend(page: Any) -> None:
     wait_for(page, "!document.querySelector('dialog[open]')")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", PLACES)
 def test_a_newcomer_looks_around(browser: Any, name: str, tmp_path: Path) -> None:
     """Reads where the wearer is, turns and zooms the map, tries legend, tap, other floors and colours: nothing of that moves the estimate."""
@@ -104,6 +105,7 @@ def other_floor(page: Any, plan: Plan) -> None:
     wait_for(page, f"echostep.scene.level === {last}")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", PLACES)
 def test_a_responder_is_guided_and_calls(browser: Any, name: str, tmp_path: Path) -> None:
     """Goes to a room; is sent to one in distress by a commander; calls for help, and is all right again: on every window."""
@@ -154,6 +156,7 @@ def team_on(spot: Place) -> Team:
     return team
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", PLACES)
 def test_a_commander_answers_a_mayday(browser: Any, name: str, tmp_path: Path) -> None:
     """Sees it come, opens its details, sends the nearest one, acknowledges it, and goes back: each on another window, seen on all."""

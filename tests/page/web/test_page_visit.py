@@ -186,6 +186,7 @@ def replay(browser: Any, visit: Visit, place: Place, acting: str, tmp_path: Path
             page.screenshot(path=tmp_path / f"{acting}-4-replay.png")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("acting", SIZES)
 @pytest.mark.parametrize("name", PLACES)
 def test_a_whole_visit(browser: Any, name: str, acting: str, tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ TAPS = 17  # of two rounds by five points, and the first
 
 
 @needs_twin
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_twin_walks_the_protocol(tmp_path: Path) -> None:
     twin = subprocess.Popen([*tool("twin.acceptance_walk"), "8x2", "--rounds", "2"], stdout=subprocess.PIPE, text=True)
     live = None

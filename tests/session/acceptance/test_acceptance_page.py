@@ -99,6 +99,7 @@ def test_the_page_is_made_again_from_a_copy_of_the_recording(recording: Path, tm
     assert not [part for part in (str(recording.parent), "walk.mcap", str(Path.home()), ' src="http') if part in text]
 
 
+@pytest.mark.long
 @needs_twin
 def test_the_page_of_the_real_firmware(tmp_path: Path) -> None:
     """The firmware in the twin, whose wearer walks the protocol; the taps come at the moments when the trunk is at the points."""

@@ -55,6 +55,7 @@ def ran(folder: Path) -> int:
     return len(list(folder.glob("ran-*")))
 
 
+@pytest.mark.long
 def test_a_killed_study_goes_on_where_it_was(tmp_path: Path) -> None:
     one = CountingRun(tmp_path)
     first = SeededRuns("s", 3, 10, one, tmp_path, KINDS).rows()
@@ -121,6 +122,7 @@ def test_an_interrupted_study_waits_for_no_run(
     assert not (tmp_path / "finished").exists()
 
 
+@pytest.mark.long
 def test_the_same_numbers_from_a_cluster(tmp_path: Path) -> None:
     distributed = pytest.importorskip(
         "distributed", reason="skipped: no Dask (pip install 'echostep-studies[cluster]')"

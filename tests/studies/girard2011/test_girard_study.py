@@ -35,6 +35,7 @@ def test_routes_go_through_doors_and_not_through_walls(site: sites.SimulatedSite
     assert way.distance(built) > 0.3
 
 
+@pytest.mark.long
 def test_the_imu_row_is_calibrated_to_the_papers() -> None:
     """Means over walks: mean, deviation and maximum within 15 % of 0.59, 0.35 and 1.47 m; the end, the paper's maximum as well, within 20 %."""
     site = sites.otb()
@@ -61,6 +62,7 @@ def test_a_fifth_of_the_pings_meet_somebody_first() -> None:
     assert np.mean(among.range_m < 0.95 * np.nan_to_num(alone.range_m, nan=9.0)) == pytest.approx(0.2, abs=0.08)
 
 
+@pytest.mark.long
 def test_the_command_writes_rows_json_parquet_and_the_picture(tmp_path: Path) -> None:
     found = echostep("evaluate", "girard2011", "--runs", "1", "--json", "g.json", "--out", "out", cwd=tmp_path)
     assert found.returncode == 0, found.stderr
@@ -76,6 +78,7 @@ def test_the_command_writes_rows_json_parquet_and_the_picture(tmp_path: Path) ->
     assert "imu, the paper" in found.stdout
 
 
+@pytest.mark.long
 def test_what_rangers_hear(tmp_path: Path) -> None:
     run_study(echoes_study(fit=False), StudyRequest(1, 1, tmp_path / "e.json", tmp_path))
     rows = {row["name"]: row for row in json.loads((tmp_path / "e.json").read_text())["rows"]}

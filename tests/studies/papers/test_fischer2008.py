@@ -187,6 +187,7 @@ def test_a_clock_that_is_set_back_and_samples_that_are_none() -> None:
 # ---- the filter on board ----
 
 
+@pytest.mark.long
 def test_the_filter_finds_north_and_the_vertical_of_a_sensor_at_rest() -> None:
     rng = np.random.default_rng(5)
     r = any_rotation(rng)

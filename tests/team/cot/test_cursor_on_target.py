@@ -196,6 +196,7 @@ def test_events_go_out_by_tls_with_a_client_certificate(certificates: Certificat
     assert "an authority that this computer does not know" in words[0]
 
 
+@pytest.mark.long
 @needs_broker
 def test_a_demo_is_published_and_commanded(tmp_path: Path) -> None:
     with Broker(tmp_path) as broker:

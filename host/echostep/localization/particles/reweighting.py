@@ -99,7 +99,8 @@ def propagate_and_reweight(
         else:
             size = effective_size(arrays.weight)
         if top < LEAST_TOP:
-            arrays.weight[:] /= top
+            for i in range(len(arrays.weight)):
+                arrays.weight[i] /= top
             top = 1.0
         if size < model.resample_below * len(particles.x_m):
             break

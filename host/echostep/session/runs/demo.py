@@ -45,7 +45,7 @@ WATCHED_SPEED = 4.0  # times real time, on a terminal: a walk of 90 s is seen in
 WATCHED_PORTION = 16
 UNSEEN_PORTION = 1000  # chunks that are tracked together when nothing shows the run: fewer calls
 FOOT_BOARD = 2  # seed of its simulator: another board than the belt's
-SIMULATION = Part("echostep.simulation.kernels:simulation", 100)
+SIMULATION = Part("echostep.simulation.kernels:simulation", 85)
 _DEMO_PLAN = files("echostep") / "plans" / "demo.json"
 TOUR_CORNER_M = 0.3  # how far corners are cut on a tour: doors of any plan are passed without touching them
 
