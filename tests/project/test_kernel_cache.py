@@ -167,7 +167,7 @@ def test_a_user_who_cannot_write_the_folder_for_kernels_has_them_elsewhere(open_
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
         kept = open_path / f"temporary/echostep-kernels-{ANOTHER_USER}"
-        assert done.stdout.startswith(str(kept / "echostep/recording"))
+        assert done.stdout.startswith(str(kept / "echostep/plan"))
         assert done.stderr.count("kernels are kept in") == (not run_number) + (given == "/chosen")
         assert done.stderr.count(f"NUMBA_CACHE_DIR: {open_path}/chosen cannot be written") == (given == "/chosen")
 

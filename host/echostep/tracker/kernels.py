@@ -141,7 +141,7 @@ def compile_parts(parts: Sequence[Part], show: Show = lambda _share: None) -> No
     """Compile those of the parts that are not compiled yet, in a process for each core. What fails is left to the run: it compiles what it misses."""
     shares = _shared_out([part for part in parts if not part.is_compiled], os.cpu_count() or 1)
     count, total = itertools.count(1), sum(part.kernels for share in shares for part in share)
-    children = list[subprocess.Popen[bytes]]()
+    children: list[subprocess.Popen[bytes]] = []
 
     def compile_share(share: Sequence[Part]) -> None:
         with suppress(OSError), start_compiling(share) as child:
