@@ -33,7 +33,7 @@ from echostep_studies.noplan.joined import JoinedRun, again, joined_row
 from echostep_studies.noplan.judgement import known_start, path_columns, true_path
 from echostep_studies.noplan.sites import corridors, office
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 LENGTH_M = 280.0  # of a walk
 SEEDS = {"a": 901, "b": 1901}

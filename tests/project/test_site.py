@@ -16,7 +16,7 @@ import pytest
 from board_runs import ROOT
 from waiting import PATIENCE_S
 
-pytestmark = pytest.mark.process
+pytestmark = [pytest.mark.process, pytest.mark.long]
 
 LOADED = re.compile(r"<(?:script|img|source|iframe|link(?! rel=\"canonical\"))\b[^>]*?\b(?:src|href)=\"([^\"]+)\"")
 

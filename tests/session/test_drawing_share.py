@@ -110,6 +110,7 @@ def test_what_one_walk_has_drawn_tracks_a_teammate(tmp_path: Path, monkeypatch: 
     assert float(rows[-1]["x_m"]) == pytest.approx(estimates[-1].x_m, abs=1e-3)
 
 
+@pytest.mark.long
 @needs_broker
 def test_what_a_page_draws_is_shared_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(teammate_feed, "SHARE_S", 0.0)

@@ -67,6 +67,7 @@ def test_dead_reckoning_without_iron_is_exact_and_with_iron_fails() -> None:
     assert sum(one_return(Case("", PDR), seed) for seed in range(40)) < 10
 
 
+@pytest.mark.long
 def test_the_particle_filter_reaches_the_exit_where_the_paper_does_not_always() -> None:
     assert all(one_return(Case("", OURS), seed) for seed in range(20))
     assert sum(one_return(Case("", OURS, UNCERTAIN), seed) for seed in range(20)) >= 19

@@ -333,6 +333,13 @@ def test_a_port_that_the_package_closes_under_a_write_is_an_os_error(air: Air) -
         def write(self, _: bytes) -> None:
             interface.stream = None
 
+        def read(self, _: int) -> bytes:
+            """For the package's own thread, which may look at it meanwhile."""
+            return b""
+
+        def close(self) -> None:
+            """Likewise."""
+
     interface.stream = Closing()
     with pytest.raises(ConnectionError, match="broke"):
         node.send(b"report")

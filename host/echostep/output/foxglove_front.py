@@ -46,14 +46,18 @@ class SubprotocolFront:
 
     def _run(self) -> None:
         with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
-            runner.run(self._serve())  # cancels what is still connected
+            runner.run(self._serve())
 
     async def _serve(self) -> None:
         server = await asyncio.start_server(self._relay, sock=self._socket, limit=HEAD_BYTES)
         await self._closed.wait()
         server.close()
         if relays := asyncio.all_tasks() - {asyncio.current_task()}:
-            await asyncio.wait(relays, timeout=END_S)
+            _, late = await asyncio.wait(relays, timeout=END_S)
+            for relay in late:
+                relay.cancel()
+            await asyncio.gather(*late, return_exceptions=True)
+            await asyncio.sleep(0)  # the loop closes their sockets in its next turn
 
     async def _relay(self, viewer: asyncio.StreamReader, to_viewer: asyncio.StreamWriter) -> None:
         """One viewer, from its handshake to its end."""

@@ -11,6 +11,7 @@ from echostep_studies.girard2011 import kit_feet, kits
 from echostep_studies.simulation.sites import otb
 
 
+@pytest.mark.long
 def test_both_kinds_of_rangers_hold_the_papers_figure_on_the_same_steps() -> None:
     rows = kits.one_run(3)
     names = [row.name for row in rows]

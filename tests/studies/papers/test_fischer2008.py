@@ -201,6 +201,7 @@ def test_the_filter_finds_north_and_the_vertical_of_a_sensor_at_rest() -> None:
     assert found == pytest.approx(np.tile(r, (10, 1, 1)), abs=1e-9)
 
 
+@pytest.mark.long
 def test_the_filter_follows_the_gyros_through_any_turn() -> None:
     t, accel, gyro, matrices, _ = walked("turning", every=1)
     found = onboard.orientations(t, accel, gyro, None, onboard.OnBoardFilter(level_s=1e9))
