@@ -65,19 +65,18 @@ static bool is_adis16100(enum chip chip, uint8_t *fault)
 static void seek(uint8_t gyro)
 {
 	enum chip chip = devices[gyro].chip;
-	uint8_t place = (uint8_t)devices[gyro].device;
 	gyros[gyro].misses = 0;
 	gyros[gyro].kind = UNKNOWN;
 	gyros[gyro].fault = FAULT_NO_ANSWER;
 	if (lsm6dso_answers(chip)) {
 		gyros[gyro].kind = LSM6DSO;
-		parts_found(place, PART_LSM6DSO, LSM6DSO_IDENTITY);
+		parts_found((uint8_t)devices[gyro].device, PART_LSM6DSO, LSM6DSO_IDENTITY);
 		lsm6dso_start(chip);
 		warming = WARM_UP_SAMPLES;
 	} else if (!icm20649_answers(chip) && is_adis16100(chip, &gyros[gyro].fault)) {
 		gyros[gyro].kind = ADIS16100;
-		parts_found(place, PART_ADIS16100, 0);
-	} else if (parts_in(place) != PART_ADIS16100) {
+		parts_found((uint8_t)devices[gyro].device, PART_ADIS16100, 0);
+	} else if (parts_in((uint8_t)devices[gyro].device) != PART_ADIS16100) {
 		gyros[gyro].fault = FAULT_NO_ANSWER; /* what was read is an idle line's */
 	}
 }

@@ -123,10 +123,9 @@ static bool acknowledge(void)
 static bool send_descriptor(const struct setup *s)
 {
 	uint8_t length = usb_descriptor_length(s->value);
-	if (!length)
-		return false;
 	reply.descriptor = s->value;
-	return send(DESCRIBING, length, s->length);
+	// cppcheck-suppress knownConditionTrueFalse ; every kind of reply returns whether there is one
+	return length && send(DESCRIBING, length, s->length);
 }
 
 /* A host may set the same configuration again: the endpoints start anew, and an open port stays open. */
