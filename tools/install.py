@@ -19,7 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 VERSIONS = ROOT / "host/tested-versions.txt"
 PROJECTS = {"demo": ("-e", "host"), "tests": ("-e", "host", "-e", "host/studies")}
-NEWEST = {"demo": ("-e", "host[page,plots]"), "tests": ("-e", "host[dev]", "-e", "host/studies[cluster]")}
+NEWEST = {"demo": ("-e", "host[page,plots]", "pyproj"), "tests": ("-e", "host[dev]", "-e", "host/studies[cluster]")}
 PIP = [
     sys.executable,
     "-m",

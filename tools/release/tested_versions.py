@@ -22,7 +22,11 @@ from release.licences import for_developers
 
 FILE = ROOT / "host/tested-versions.txt"
 OLDEST = "3.11.2"  # Debian 12's
-DEMO = ("./host[page,plots]", "hatchling")  # hatchling installs the checkout itself
+DEMO = (
+    "./host[page,plots]",
+    "pyproj",
+    "hatchling",
+)  # pyproj: longitude and latitude of the demo; hatchling installs the checkout
 ALL = ("./host[dev]", "./host/studies[cluster]", "hatchling")
 HEAD = (
     "# Versions with which the tests have passed, and the hashes of their files, for every system and Python: "
