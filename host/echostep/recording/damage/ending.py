@@ -80,7 +80,7 @@ def checksum_matches(file: Octets, data_end: int) -> bool | None:
         return None
     crc = 0
     for begin in range(0, data_end, CHECKSUM_BYTES):
-        crc = zlib.crc32(file[begin : min(begin + CHECKSUM_BYTES, data_end)], crc)  # type: ignore[arg-type]
+        crc = zlib.crc32(file[begin : min(begin + CHECKSUM_BYTES, data_end)].data, crc)
     return (crc ^ expected).bit_count() <= 1
 
 

@@ -119,7 +119,7 @@ class Recovery:
 
     def _scan(self, file: Octets, begin: int) -> Iterator[tuple[int, int, RecordedMessage | bytes | None]]:
         """Begin, end and content from offset `begin` on: a message, the body of a chunk record, or None for a range without valid records."""
-        view = memoryview(file)  # type: ignore[arg-type]
+        view = file.data
         size = len(file)
         while begin < size:
             end = record_end(file, begin, self._is_channel)
