@@ -32,6 +32,7 @@ from echostep.session.options import TrackingOptions
 from echostep.session.results import summary_words
 from echostep.session.runs.replay import plan_note, tracker_of
 from echostep.tracker import Tracker
+from echostep.tracker.kernels import LATER, TRACKING, compile_parts
 
 DEMO_PLAN = Path(__file__).parents[2] / "plans" / "demo.json"
 WAITING = "drop a recording and its plan here"
@@ -110,6 +111,7 @@ def serve_drops(address: Address, *, browser: bool) -> None:
         drop = _next(files, server)
         while True:
             server.show(_waiting(PREPARING))
+            compile_parts([*TRACKING, *LATER])
             drop.tracker.warm_up()
             drop = _play(drop, files, server)
 
