@@ -12,7 +12,7 @@ TOOL := env PYTHONPATH=tools:tests $(BIN)/python -m
 TWIN := tools/twin/build/echostep-twin
 SUITE := $(BIN)/python -m pytest -q -n auto --dist worksteal --durations 25 --durations-min 1
 APT_PACKAGES := gcc make gcc-avr avr-libc binutils-avr libsimavr-dev libelf-dev cppcheck python3-venv
-TEST_PACKAGES := mosquitto chromium clang libclang-rt-14-dev openscad
+TEST_PACKAGES := mosquitto chromium clang libclang-rt-dev openscad
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 12
@@ -133,7 +133,7 @@ docs: $(READY) ## make the pages anew that come from the code
 	$(TOOL) docs.generate
 
 fuzz: $(READY) ## fuzz the firmware's codec for a minute from its kept corpus, on from where the last minute stopped
-	@tools/apt.sh clang libclang-rt-14-dev
+	@tools/apt.sh clang libclang-rt-dev
 	$(TOOL) reliability.fuzz.codec
 
 fuzz-host: $(READY) ## mutated inputs on every way into the host for a minute, on from where the last minute stopped

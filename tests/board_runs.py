@@ -15,9 +15,9 @@ import pytest
 from numpy.typing import NDArray
 
 from echostep.board import messages as m
-from echostep.board.faults.findings import BoardReports
 from echostep.board.faults.health import board_findings
 from echostep.board.frames import BoardReader, encode
+from echostep.board.reports import BoardReports
 from echostep.simulation.devices.board import BoardProcess
 from echostep.simulation.stimulus import NO_SYNC, ROW
 

@@ -19,10 +19,10 @@ from echostep.recording.parts.joining import open_parts
 from echostep.recording.recorder import Recorder
 from echostep.scorecard.track_columns import load_path
 from echostep.scorecard.truth import load_truth
-from echostep.session.metadata import recorded_start
 from echostep.session.options import TrackingOptions
 from echostep.session.runs.replay import tracker_of
 from echostep.settings import parse_settings
+from echostep.walk.recorded import recorded_start
 from walks import DEMO, walk_chunks
 
 DEEP = "a=" + "[" * 5000

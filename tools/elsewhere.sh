@@ -34,7 +34,7 @@ there 'update-ca-certificates && apt-get update && apt-get dist-upgrade -y' >"ou
 rm -rf "$root/root/echostep" "$root/root/.cache"
 git clone --quiet . "$root/root/echostep"
 
-versions='for program in python3 avr-gcc cc clang cppcheck chromium; do printf "  %s: " $program; { $program --version 2>&1 || echo missing; } | head -n 1; done'
+versions='for program in python3 avr-gcc cc clang cppcheck chromium; do printf "  %s: " $program; { $program --version 2>/dev/null || echo missing; } | head -n 1; done'
 timed() {
 	began=$(date +%s)
 	there "cd /root/echostep && $1" >"out/elsewhere/$suite-$2.log" 2>&1

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from echostep.localization.particles.start import Start
     from echostep.ports.chunks import Chunk
     from echostep.recording.capture import read_capture
-    from echostep.session.runs.walk import Walk, replay
     from echostep.settings import Settings
     from echostep.tracker import Tracker
+    from echostep.walk.walk import Walk, replay
 
 __all__ = [
     "Chunk",
@@ -44,9 +44,9 @@ _HOMES = {
     "Settings": "echostep.settings",
     "Start": "echostep.localization.particles.start",
     "Tracker": "echostep.tracker",
-    "Walk": "echostep.session.runs.walk",
+    "Walk": "echostep.walk.walk",
     "read_capture": "echostep.recording.capture",
-    "replay": "echostep.session.runs.walk",
+    "replay": "echostep.walk.walk",
 }
 
 

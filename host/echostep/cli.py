@@ -19,9 +19,9 @@ from echostep.commands import acceptance, beacons, commander, files, hardware, p
 from echostep.commands.studies import add_studies
 from echostep.errors import EchostepError, IncompleteError, words_of
 from echostep.extras import EXTRAS, lacks
+from echostep.file_mode import share_files
 from echostep.interruption import end_by_signals, is_asked
 from echostep.printing.compiling import tell_of_compiling
-from echostep.printing.file_mode import share_files
 from echostep.printing.lines import complain, say
 from echostep.printing.people import lost_result, to_people
 

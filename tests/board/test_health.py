@@ -9,15 +9,9 @@ from hypothesis import strategies as st
 
 from board_runs import ROOT, Bench, needs_twin
 from echostep.board import messages as m
-from echostep.board.faults.health import (
-    BoardReports,
-    Severity,
-    board_findings,
-    expected_rates,
-    gyro_celsius,
-    rate_findings,
-)
+from echostep.board.faults.health import Severity, board_findings, expected_rates, gyro_celsius, rate_findings
 from echostep.board.frames import encode
+from echostep.board.reports import BoardReports
 from echostep.output.terminal import findings
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import BOARD, Chunk

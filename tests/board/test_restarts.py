@@ -7,9 +7,9 @@ import pytest
 
 from board_runs import Bench, needs_twin
 from echostep.board import messages as m
-from echostep.board.faults.findings import BoardReports
 from echostep.board.faults.health import board_findings
 from echostep.board.frames import encode
+from echostep.board.reports import BoardReports
 from echostep.board.subscription import SUBSCRIBE, BoardSubscription
 from echostep.commissioning.diagnosis import Diagnosis, judge_board
 from echostep.commissioning.probe import ProbeResult

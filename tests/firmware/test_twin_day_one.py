@@ -9,8 +9,8 @@ import pytest
 from board_runs import ROOT, Bench, needs_twin
 from echostep.board import messages as m
 from echostep.board.faults.electrical import electrical_findings, level_line
-from echostep.board.faults.findings import BoardReports
 from echostep.board.faults.health import Finding, board_findings
+from echostep.board.reports import BoardReports
 from echostep.board.subscription import SUBSCRIBE_ELECTRICAL
 from echostep.commissioning.diagnosis import _echo_findings
 from echostep.commissioning.probe import ProbeResult

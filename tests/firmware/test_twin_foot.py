@@ -8,8 +8,8 @@ import pytest
 
 from board_runs import Bench, kinds, needs_twin
 from echostep.board import messages as m
-from echostep.board.faults.findings import BoardReports
 from echostep.board.faults.health import board_findings
+from echostep.board.reports import BoardReports
 from echostep.board.subscription import SUBSCRIBE
 from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC
 

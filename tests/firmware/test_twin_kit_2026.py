@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from board_runs import ELF, TWIN, Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
-from echostep.board.faults.findings import BoardReports, part_text_of
+from echostep.board.faults.findings import part_text_of
 from echostep.board.faults.health import board_findings, gyro_celsius
+from echostep.board.reports import BoardReports
 from echostep.board.subscription import SUBSCRIBE
 from echostep.simulation.devices.board import BoardProcess
 from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC
@@ -352,7 +353,8 @@ def test_all_axes_of_three_lsm6dso_come_at_200_hz(imus: Bench) -> None:
     gyros = [x for x in found if isinstance(x, m.Gyros)]
     assert 399 <= len(motions) <= 401
     assert [x.ticks for x in motions] == [x.ticks for x in gyros]
-    assert np.ptp(np.diff([x.ticks for x in motions])) <= 2_000  # a millisecond
+    grid = motions[0].ticks + 10_000 * np.arange(len(motions))  # 5 ms
+    assert np.ptp([x.ticks for x in motions] - grid) <= 1_200  # 0.6 ms [firmware/README.md]; 0.48 by avr-gcc 5.4, 0.57 by 16.2
     values = np.array(motions[-1][1:]).reshape(3, 2, 3)
     assert (values[:, 0] == np.arange(9).reshape(3, 3) * 100 - 300).all()
     assert (values[:, 1] == np.arange(9).reshape(3, 3) * 1_000 - 4_000).all()

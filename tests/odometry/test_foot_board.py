@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from board_runs import ELF, ROOT, TWIN, needs_twin
+from echostep.board.faults.health import all_findings
 from echostep.board.frames import encode
 from echostep.board.subscription import SUBSCRIBE
 from echostep.localization.estimate import Estimate
@@ -26,6 +27,7 @@ from echostep.simulation.devices.foot_board import HEAD_START_MS
 from echostep.simulation.kits import Kit
 from echostep.simulation.scenario import DEMO_WAYPOINTS, START_NS, Scenario
 from echostep.tracker import Tracker
+from echostep.wearer.watch import watch_of
 
 pytestmark = needs_twin
 
@@ -133,16 +135,17 @@ def test_the_first_device_on_the_foot_is_used_and_named() -> None:
         tracker.feed(chunk)
     assert tracker.streams.foot_name == "foot board"
     assert tracker.streams.mtx.good > 100
-    assert tracker.streams.findings == []
+    assert all_findings(tracker.streams.reports, tracker.streams.foot_reports) == []
 
 
 def test_the_belt_of_the_real_firmware_tells_an_upright_trunk_and_no_fall() -> None:
     tracker, tilts_deg = Tracker(PLAN, seed=1), []
+    watch = watch_of(tracker)
     chunks = walk().chunks
     for k in range(0, len(chunks), 500):
         tracker.take(portion_of(chunks[k : k + 500]))
-        tilts_deg.append(math.degrees(tracker.front_end.signs.falls.trunk_tilt_rad(tracker.front_end.newest_s)))
+        tilts_deg.append(math.degrees(watch.trunk_tilt_rad(tracker.front_end.newest_s)))
     known = [tilt for tilt in tilts_deg if not math.isnan(tilt)]
     assert len(known) > 0.5 * len(tilts_deg)
     assert max(known) < 20.0
-    assert not tracker.alarm.changes
+    assert not watch.wearer_alarm.changes

@@ -31,6 +31,7 @@ from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.devices.mtx import MtxModel
 from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario
 from echostep.timing.timeline import MtxTiming
+from echostep.wearer.watch import AlarmWatch
 
 Told = list[tuple[object, ...]]
 CORRECTED = 25_000  # chunks
@@ -73,7 +74,8 @@ def told(pieces: list[MeasuredSegment | Dropout]) -> Told:
 
 def taken(chunks: list[Chunk], cuts: list[int]) -> tuple[Told, tuple[object, ...]]:
     """What a front end tells of the chunks, in portions cut there, and what it counted."""
-    ours, found = front_end(), []
+    ours, watch, found = front_end(), AlarmWatch(), []
+    ours.watch = watch
     edges = sorted({0, len(chunks), *(c % (len(chunks) + 1) for c in cuts)})
     for a, b in zip(edges, edges[1:], strict=False):
         found += told(ours.process(portion_of(chunks[a:b])))
@@ -84,7 +86,7 @@ def taken(chunks: list[Chunk], cuts: list[int]) -> tuple[Told, tuple[object, ...
         ours.status,
         ours.identity,
         ours.timeline.synchronised,
-        ours.signs.pop(),
+        watch.signs.pop(),
     )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from echostep.localization.estimate import TrackStatus
 from echostep.localization.particles.places import LikelyPlace
-from echostep.output.track_plot import write_track
+from echostep.walk.table import write_track
 from page.frames import told
 
 

@@ -11,8 +11,8 @@ import pytest
 
 from board_runs import ROOT
 from command_line import echostep
+from echostep.file_mode import claim, share_files
 from echostep.ports.chunks import Chunk
-from echostep.printing.file_mode import claim, share_files
 from echostep.recording.recorder import Recorder
 from walks import walk_chunks
 

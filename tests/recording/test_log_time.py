@@ -11,11 +11,12 @@ from mcap.reader import make_reader
 
 from echostep.ports.chunks import Chunk
 from echostep.recording.clock import utc_offset_ns
+from echostep.recording.mcap_records import METADATA_NAME
 from echostep.recording.numbered import numbered_recorder
 from echostep.recording.parts.joining import open_parts
 from echostep.recording.parts.splitting import SplitLimit
 from echostep.recording.reading import open_recording
-from echostep.recording.recorder import METADATA_NAME, Recorder, begin_file
+from echostep.recording.recorder import Recorder, begin_file
 from echostep.recording.repair.contents import info
 from echostep.recording.repair.edit import cut, repair
 

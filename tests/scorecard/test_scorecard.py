@@ -13,7 +13,6 @@ import pytest
 from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.output.track_plot import write_track
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import portion_of
 from echostep.scorecard import csv_columns
@@ -27,6 +26,7 @@ from echostep.scorecard.zones import NO_ZONE, Zones
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import demo_scenario
 from echostep.tracker import Tracker
+from echostep.walk.table import write_track
 from echostep_studies.simulation.tower import LENGTH_M, LIFT_AT, STOREY_M, tower
 from walks import walk_chunks
 

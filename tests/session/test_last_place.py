@@ -17,9 +17,10 @@ from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.height.levels import ClimbSettings
 from echostep.localization.particles.start import Air, Start
 from echostep.session.last_place import FILE, KEPT_S, Kept, PlaceKeeper, read_kept, start_last
-from echostep.session.metadata import parse_start, recorded_start, run_metadata
+from echostep.session.metadata import parse_start, run_metadata
 from echostep.tracker import Tracker
 from echostep.tracker.last_place import LastPlace, last_place
+from echostep.walk.recorded import recorded_start
 from echostep_studies.simulation.tower import tower
 
 PLAN = tower(3)

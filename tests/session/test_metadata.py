@@ -13,7 +13,8 @@ import pytest
 from echostep.errors import EchostepError
 from echostep.localization.particles.start import Air, Start
 from echostep.plan.model import NO_PLAN, Pose
-from echostep.session.metadata import recorded_start, run_metadata
+from echostep.session.metadata import run_metadata
+from echostep.walk.recorded import recorded_start
 
 PATH = Path("walk.mcap")
 AFTER_PAUSE = Start(Pose(1.0, 2.0, 0.5, 1), 0.3, math.pi, air=Air(12.0, 0.4), after_pause=True)

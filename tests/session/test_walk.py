@@ -16,9 +16,9 @@ import echostep
 from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.foot.steps import FootCounts, Step, Track
-from echostep.output.track_plot import write_track
 from echostep.plan.model import NO_PLAN, Pose, load_plan
 from echostep.printing.picture_files import ENDINGS
+from echostep.walk.table import write_track
 from walks import DEMO
 
 pytestmark = pytest.mark.slow

@@ -13,7 +13,7 @@ from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.particles.places import LikelyPlace
 from echostep.operation.words import shown_wearer
 from echostep.output.terminal import describe
-from echostep.output.track_files import TrackOnPlan, columns_of, stretches
+from echostep.output.track_files import TrackOnPlan, stretches
 from echostep.page.elements.taps import Taps
 from echostep.plan.model import Plan, load_plan
 from echostep.session.console import console
@@ -26,6 +26,7 @@ from echostep.team.outbox import stamped
 from echostep.team.publish import Publishing
 from echostep.team.roster import Roster
 from echostep.tracker import Tracker
+from echostep.walk.table import columns_of
 from page.frames import told
 from team.team_reports import PLAN, report
 

@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 
 from board_runs import ROOT
+from echostep.odometry.wearer import Alarm, AlarmKind, AlarmReason
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import PERSON, Call, CheckIn
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker
-from echostep.wearer.alarm import ASK_S, MAYDAY_S, OVER_S, Alarm, AlarmKind, AlarmReason, WearerAlarm
+from echostep.wearer.alarm import ASK_S, MAYDAY_S, OVER_S, WearerAlarm
 from echostep.wearer.stillness import Window
+from echostep.wearer.watch import watch_of
 from echostep.wearer.wearer_signs import StepTaken
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
@@ -143,14 +145,15 @@ def test_from_the_bytes_of_the_sensors_to_the_mayday_within_35_s() -> None:
     pause = int(np.argmax(np.diff(moving)))
     begin_s, end_s = (scenario.walk.t_s[moving[pause + k]] for k in (0, 1))
     tracker, told_s = Tracker(PLAN, scenario.start, seed=1), math.nan
+    alarm = watch_of(tracker).wearer_alarm
     for k in range(0, len(chunks), 20):
         tracker.take(portion_of(chunks[k : k + 20]))
-        if math.isnan(told_s) and tracker.alarm.alarm and tracker.alarm.alarm.kind is MAYDAY:
+        if math.isnan(told_s) and alarm.alarm and alarm.alarm.kind is MAYDAY:
             told_s = tracker.front_end.newest_s
-    kinds = [change.kind if change else None for _, change in tracker.alarm.changes]
+    kinds = [change.kind if change else None for _, change in alarm.changes]
     assert kinds == [ASKING, MAYDAY, OVER]  # over: walked on
     assert MAYDAY_S <= told_s - begin_s <= 32.0
-    assert end_s < tracker.alarm.changes[-1][0] < end_s + 6.0
+    assert end_s < alarm.changes[-1][0] < end_s + 6.0
 
 
 @pytest.mark.long
@@ -162,13 +165,14 @@ def test_taps_are_chunks_and_a_replay_has_the_same_alarms() -> None:
     for k, tap in enumerate(taps):
         chunks.insert(third + 500 * k, Chunk(PERSON, at_ns, tap.encode()))
     live, replayed = (Tracker(PLAN, scenario.start, seed=1) for _ in range(2))
+    alarm, again = watch_of(live).wearer_alarm, watch_of(replayed).wearer_alarm
     for k in range(0, len(chunks), 50):
         live.take(portion_of(chunks[k : k + 50]))
     for k in range(0, len(chunks), 5000):
         replayed.take(portion_of(chunks[k : k + 5000]))
-    begun = [(change.kind, change.reason) for _, change in live.alarm.changes if change and change.kind is not OVER]
+    begun = [(change.kind, change.reason) for _, change in alarm.changes if change and change.kind is not OVER]
     assert begun[0] == (MAYDAY, HELP)
     assert live.state.bad_check_ins == 0
-    assert [change for _, change in live.alarm.changes if change and change.kind is MAYDAY] == [
-        change for _, change in replayed.alarm.changes if change and change.kind is MAYDAY
+    assert [change for _, change in alarm.changes if change and change.kind is MAYDAY] == [
+        change for _, change in again.changes if change and change.kind is MAYDAY
     ]

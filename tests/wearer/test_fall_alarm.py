@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 
 from board_runs import ROOT
+from echostep.odometry.wearer import Alarm, AlarmKind, AlarmReason
 from echostep.plan.model import Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import PERSON, Call
 from echostep.tracker import Tracker
-from echostep.wearer.alarm import ANSWER_S, Alarm, AlarmKind, AlarmReason, WearerAlarm
+from echostep.wearer.alarm import ANSWER_S, WearerAlarm
 from echostep.wearer.falls import Fall
 from echostep.wearer.stillness import Window
+from echostep.wearer.watch import watch_of
 from echostep.wearer.wearer_signs import StepTaken
 from echostep_studies.simulation.body_motion import MTX
 from echostep_studies.simulation.falling import sideways, walk_then
@@ -92,9 +94,10 @@ def test_from_the_bytes_of_the_sensors_and_the_same_in_portions_of_any_size(belt
     changes = []
     for size in (37, 100_000):
         tracker = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1)
+        alarm = watch_of(tracker).wearer_alarm
         for k in range(0, len(chunks), size):
             tracker.take(portion_of(chunks[k : k + size]))
-        changes.append(list(tracker.alarm.changes))
+        changes.append(list(alarm.changes))
     assert changes[0] == changes[1]
     told = [(change.kind, change.reason) for _, change in changes[0] if change]
     assert told[:3] == [(ASKING, FALL), (MAYDAY, FALL), (OVER, FALL)]

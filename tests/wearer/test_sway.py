@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.wearer.alarm import ASK_S, SWAY_S, AlarmKind, WearerAlarm
+from echostep.odometry.wearer import AlarmKind
+from echostep.wearer.alarm import ASK_S, SWAY_S, WearerAlarm
 from echostep.wearer.stillness import MotionWindows, Window
 from echostep.wearer.wearer_signs import StepTaken
 

@@ -32,13 +32,14 @@ from echostep.plan.model import load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.ports.serial_ports import SerialPorts
 from echostep.session.chunk_streams import portions_of
-from echostep.session.metadata import SIMULATED, clock_metadata, run_metadata
+from echostep.session.metadata import clock_metadata, run_metadata
 from echostep.session.options import OutputOptions
 from echostep.session.runs.live import _recorded_chunks
 from echostep.session.runs.recording import start_recording
 from echostep.session.session import Session
 from echostep.simulation.devices.board import BoardProcess
 from echostep.tracker import Tracker
+from echostep.walk.recorded import SIMULATED
 from places import OUT, PLAN, TWIN
 from reliability.campaign import options, report
 from reliability.long_tour import LongTour, TracedBoard

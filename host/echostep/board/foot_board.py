@@ -12,9 +12,9 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.board.calibration import ImuSettings, foot_axes
-from echostep.board.faults.findings import BoardReports
 from echostep.board.frames import BoardReader
 from echostep.board.messages import BoardHealth, Configuration, Foot, FootHealth, Identity, Parts, Status
+from echostep.board.reports import BoardReports
 
 _REPORTS = (Identity, Configuration, Status, BoardHealth, Parts, FootHealth)
 

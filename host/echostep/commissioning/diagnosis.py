@@ -14,7 +14,6 @@ from echostep.board.faults.findings import part_in, part_text_of
 from echostep.board.faults.health import (
     NAMES,
     SELECTS,
-    BoardReports,
     Finding,
     Severity,
     board_findings,
@@ -24,6 +23,7 @@ from echostep.board.faults.health import (
     rate_findings,
 )
 from echostep.board.messages import GYROS_INVALID, SCHEMA_HASH, Gyro, Healthy, Identity, Outcome, Part, Ranger, SelfTest
+from echostep.board.reports import BoardReports
 from echostep.board.subscription import knows_subscriptions
 from echostep.commissioning.probe import Drift, ProbeResult, drift_of
 from echostep.ports.chunks import BOARD, MTX

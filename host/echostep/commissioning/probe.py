@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from echostep.board.faults.health import BoardReports
 from echostep.board.frames import BoardReader, StaleFirmwareError, encode
 from echostep.board.messages import (
     CheckGyros,
@@ -30,6 +29,7 @@ from echostep.board.messages import (
     SelfTest,
     Sync,
 )
+from echostep.board.reports import BoardReports
 from echostep.board.subscription import SUBSCRIBE_ELECTRICAL, BoardSubscription
 from echostep.errors import EchostepError
 from echostep.ports.arrival_clock import now_s as clock_s

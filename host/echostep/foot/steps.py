@@ -12,11 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from echostep.additions import svg_of
 from echostep.arrays import Bools, Floats, Ints
-from echostep.extras import lacks
 from echostep.foot import ins, stance, zupt_ins, zupt_state
 from echostep.foot.magnetometer import MEASURED, TRUSTED, new_compass
-from echostep.foot.picture import foot_figure
 from echostep.foot.zupt_state import (
     COVARIANCE,
     END_S,
@@ -32,7 +31,6 @@ from echostep.foot.zupt_state import (
     START_S,
     TOE,
 )
-from echostep.printing.picture_files import svg_text
 
 NO_MAG: Floats = np.empty((0, 3))  # in the place of magnetometer samples
 
@@ -114,7 +112,7 @@ class Track:
 
     def _repr_svg_(self) -> str | None:
         """The track as a picture; None, so that the repr is shown, without matplotlib."""
-        return None if lacks("a picture", "matplotlib") else svg_text(foot_figure(self, "foot"))
+        return svg_of(self)
 
     @property
     def steps(self) -> list[Step]:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
+from echostep.file_mode import claim
 from echostep.guidance.cues import Cue
 from echostep.plan.routing import Route
-from echostep.printing.file_mode import claim
 
 CUE_COLUMNS = ("t_s", "kind", "arrow_rad", "left_m", "text", "spoken")
 

@@ -20,7 +20,6 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.board.calibration import GyroSettings, Imus, RangerSettings, heights, ranges, six_axes
-from echostep.board.faults.health import BoardReports
 from echostep.board.frames import BoardReader, Frames, encode
 from echostep.board.messages import (
     BoardHealth,
@@ -36,6 +35,7 @@ from echostep.board.messages import (
     Status,
     Sync,
 )
+from echostep.board.reports import BoardReports
 from echostep.foot.alignment import Alignment
 from echostep.foot.steps import Foot, FootEvents, FootSettings, Step
 from echostep.foot.trunk_path import GaitSettings, TrunkPath
@@ -47,6 +47,7 @@ from echostep.odometry.foot_source import ICM20649_NOISE, FootSamples, FootSourc
 from echostep.odometry.gyro_blocks import GyroBlocks
 from echostep.odometry.heading_fusion import HeadingFusion
 from echostep.odometry.synchronizer import BAROMETER, MEASUREMENT, Synchronizer
+from echostep.odometry.wearer import WearerWatch
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk, Portion, portion_of
 from echostep.ports.people.check_in import PERSON
@@ -55,7 +56,6 @@ from echostep.ports.people.tap import POINT
 from echostep.ports.people.team_beacons import TEAM_BEACONS
 from echostep.ports.people.teammate import TEAM
 from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
-from echostep.wearer.wearer_signs import WearerSigns
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
 
 _REPORTS = (Identity, Configuration, Status, GyroHealth, BoardHealth, Parts)
@@ -81,9 +81,9 @@ class FrontEnd:
     def __init__(
         self, mtx: MtxTiming, ranger: RangerSettings, foot: FootSettings, gait: GaitSettings,
         wearer: WearerSettings | None = None, gyro: GyroSettings | None = None, iron: CompassErrors | None = None,
-        imus: Imus | None = None,
+        imus: Imus | None = None, watch: WearerWatch | None = None,
     ) -> None:  # fmt: skip
-        """`iron`: errors of the compass, when it was calibrated; `imus`: those of the six-axis parts."""
+        """`iron`: errors of the compass, when it was calibrated; `imus`: those of the six-axis parts; `watch`: is told what the wearer does."""
         errors = imus or Imus()
         self.board = BoardReader()
         self.foot_source = FootSource(errors.foot)
@@ -98,7 +98,7 @@ class FrontEnd:
         self.identity: Identity | None = None
         self.reports = BoardReports()
         self.pings = 0
-        self.signs = WearerSigns()
+        self.watch = watch or WearerWatch()
         self.newest_s = math.nan  # newest time of either port
         self._ranger = ranger
         self._ranger_parts = np.zeros((1, 2), np.int64)  # left, right, by the newest report
@@ -147,13 +147,13 @@ class FrontEnd:
         self._collect_pings(frames, times)
         leg_blocks = self._gyro_blocks.cut(frames, times)
         for message_index, block in leg_blocks:
-            self.signs.add_legs(message_index, block)
+            self.watch.add_legs(message_index, block)
         self._watch_belt(frames, times)
         # Foot: its samples -> segments of the trunk's path.
         foot_segments = self._track_foot(samples, leg_blocks, times)
         # Handover: segments of foot and legs -> segments of one path.
         observed_s = self._merge_paths(foot_segments, leg_blocks, times)
-        self.signs.settle()
+        self.watch.settle()
         # Synchronize: segments and pings -> segments with their pings.
         return self._synchronizer.pop_ready(times.board_newest_s, times.mtx_newest_s, observed_s)
 
@@ -223,14 +223,14 @@ class FrontEnd:
         self._synchronizer.add_pings(times.board_message_index[frame_row[order]], measurements)
 
     def _watch_belt(self, frames: Frames, times: Times) -> None:
-        """Hand samples of the belt's six axes, with the thigh's forces, to the signs of the wearer."""
+        """Hand samples of the belt's six axes, with the thigh's forces, to the watch of the wearer."""
         row, samples = frames.rows(Motion)
         timed = ~np.isnan(times.board_s[row])
         row, samples = row[timed], samples[timed]
         if len(row):
             gyro, accel = six_axes(samples, "belt")
             thigh = six_axes(samples, "thigh")[1]
-            self.signs.add_belt(times.board_s[row], gyro, accel, thigh, times.board_message_index[row])
+            self.watch.add_belt(times.board_s[row], gyro, accel, thigh, times.board_message_index[row])
 
     def _parts_of(self, frames: Frames, ping_row: Ints, ranger: Ints) -> Ints:
         """The part (n,) that the board's newest report before each ping names in its ranger's place; 0 before the first."""
@@ -252,7 +252,7 @@ class FrontEnd:
             self._add_belt(blocks)
             return completed
         t_s, message_index = times.mtx_s[timed], times.mtx_message_index[timed]
-        self.signs.add_foot(t_s, samples.gyro[timed], samples.accel[timed], message_index)
+        self.watch.add_foot(t_s, samples.gyro[timed], samples.accel[timed], message_index)
         foot = self.foot.track(t_s, samples.accel[timed], samples.gyro[timed], samples.mag[timed])
         begin = 0
         for event, sample_index in zip(foot.events, foot.sample_index.tolist(), strict=True):
@@ -311,9 +311,9 @@ class FrontEnd:
         return np.fmax(times.mtx_newest_s, np.repeat(legs_s[:-1], np.diff(block_index)))
 
     def _pass_on(self, message_index: int, segments: list[PathSegment]) -> None:
-        """Hand segments of the one path to the synchronizer and to the signs of the wearer."""
+        """Hand segments of the one path to the synchronizer and to the watch of the wearer."""
         self._synchronizer.add_segments(message_index, segments)
-        self.signs.add_segments(message_index, segments)
+        self.watch.add_segments(message_index, segments)
 
 
 def _board_arrivals(frames: Frames, chunk_row: Ints, t_arrival_ns: Ints) -> Arrivals:

@@ -19,13 +19,13 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.file_mode import claim
 from echostep.foot.steps import Stance, Step, Track
 from echostep.foot.trunk_path import RUN_STANCE_S
 from echostep.offline.bursts import spread
 from echostep.offline.csv_table import CsvLimits, column_of, lines_of, number_of, open_samples, read_rows
 from echostep.offline.foreign_columns import ADVICE, OWN, Naming, read_header
 from echostep.offline.imu_checks import complaint, contradiction, end_sd_m, notes, sorted_by_time, whole_rows
-from echostep.printing.file_mode import claim
 
 COLUMNS = ("t_s", "ax", "ay", "az", "gx", "gy", "gz")
 MAG_COLUMNS = ("mx", "my", "mz")

@@ -10,9 +10,9 @@ import csv
 from pathlib import Path
 
 from echostep.errors import EchostepError
+from echostep.file_mode import claim
 from echostep.legs.stride import Flag, distance_sd_m
 from echostep.offline.leg_track import LegTrack
-from echostep.printing.file_mode import claim
 
 TRACK_COLUMNS = ("t_s", "distance_m", "speed_m_s", "heading_rad", "x", "y")
 PARTIAL = Flag.EDGE | Flag.STANDING | Flag.UNSEEN | Flag.BACKWARD | Flag.GAP  # not a whole stride of known length

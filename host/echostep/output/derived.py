@@ -23,7 +23,6 @@ from echostep.board.messages import (
     Ranger,
     Status,
 )
-from echostep.errors import EchostepError
 from echostep.extras import lacks
 from echostep.localization.estimate import Estimate, claims_place
 from echostep.output.foxglove import (
@@ -47,8 +46,7 @@ from echostep.output.foxglove import (
     walls,
 )  # fmt: skip
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.georeference import EarthTransform
-from echostep.plan.model import Plan
+from echostep.plan.georeference import earth_of
 from echostep.ports.chunks import BOARD, Portion
 from echostep.recording.recorder import DerivedMessage, Topic
 from echostep.tracker import Tracker
@@ -231,14 +229,6 @@ class Derived:
             self._walls_sent = True
             drawn |= {f"plan {k} {level.name}": walls(level) for k, level in enumerate(self._tracker.plan.levels)}
         return scene(t_ns, **drawn)
-
-
-def earth_of(plan: Plan) -> EarthTransform | None:
-    """The transform of a plan to longitude and latitude, None without a georeference; raises EchostepError when it is not valid."""
-    try:
-        return None if plan.georeference is None else EarthTransform(plan.georeference)
-    except ValueError as error:
-        raise EchostepError(f"plan {plan.name}: {error}") from error
 
 
 def east_north(rotation_rad: float, xx_m2: float, xy_m2: float, yy_m2: float) -> tuple[float, float, float]:

@@ -15,7 +15,7 @@ from pathlib import Path
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from echostep.printing.file_mode import claim
+from echostep.file_mode import claim
 
 APPLICATION_ID, USER_VERSION = 0x47504B47, 10400  # "GPKG", 1.4 [table 1]
 WGS84 = 4326

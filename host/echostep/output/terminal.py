@@ -22,7 +22,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from echostep.arrays import Octets
-from echostep.board.faults.health import Finding, Severity
+from echostep.board.faults.health import Finding, Severity, all_findings
 from echostep.localization.estimate import Estimate, claims_place
 from echostep.plan.model import Level, Plan
 from echostep.plan.places.bearing import heading_words
@@ -187,5 +187,6 @@ def health(tracker: Tracker) -> str:
 
 def findings(tracker: Tracker) -> list[Finding]:
     """The most severe findings on the board, at most MAX_FINDINGS."""
-    all_findings = tracker.streams.findings
-    return [finding for finding in all_findings if finding.severity > Severity.NOTE][:MAX_FINDINGS]
+    streams = tracker.streams
+    found = all_findings(streams.reports, streams.foot_reports)
+    return [finding for finding in found if finding.severity > Severity.NOTE][:MAX_FINDINGS]

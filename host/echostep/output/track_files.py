@@ -12,10 +12,9 @@ import math
 import sqlite3
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.progress import Progress
@@ -23,21 +22,20 @@ from rich.progress import Progress
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.extras import require
+from echostep.file_mode import claim
 from echostep.localization.estimate import Estimate, claims_place
-from echostep.output.derived import Derived, earth_of
-from echostep.plan.georeference import EarthTransform
+from echostep.output.derived import Derived
+from echostep.plan.georeference import EarthTransform, earth_of
 from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import Plan
 from echostep.ports.chunks import Portion
 from echostep.printing.console import console_for_people
-from echostep.printing.file_mode import claim
 from echostep.recording.clock import clock_of
 from echostep.recording.parts.joining import open_parts
 from echostep.recording.reading import Recording
 from echostep.recording.recorder import Recorder
 from echostep.tracker import Tracker
-
-Columns = dict[str, list[Any]]
+from echostep.walk.table import Columns, columns_of, refuse_none
 
 ELLIPSE_POINTS = 33
 GAP_S = 5.0  # without an estimate, after which a new stretch of a track begins; assumed
@@ -77,12 +75,6 @@ def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recordi
     return f"{out}: {len(estimates)} estimates, {estimates[-1].t_s - estimates[0].t_s if estimates else 0.0:.1f} s"
 
 
-def refuse_none(estimates: list[Estimate], path: Path) -> None:
-    """Raises EchostepError for a recording without estimates."""
-    if not estimates:
-        raise EchostepError(f"{path}: no estimate: the foot never stood still, or no bytes of its sensor came")
-
-
 @dataclass(frozen=True, slots=True)
 class TrackOnPlan:
     """What is exported; `moments`: time of day of each estimate, empty where it was not recorded."""
@@ -115,17 +107,6 @@ def with_progress(recording: Recording, title: str) -> Iterator[Portion]:
         for portion in recording.portions():
             yield portion
             progress.update(task, completed=recording.fraction)
-
-
-def columns_of(estimates: list[Estimate], plan: Plan) -> Columns:
-    """The estimates' fields by name, and longitude and latitude where the plan has a georeference and the estimate claims a place."""
-    columns: Columns = {f.name: [getattr(e, f.name) for e in estimates] for f in fields(Estimate)}
-    columns["status"] = [e.status.value for e in estimates]
-    columns["hypotheses"] = [" ".join(map(str, e.hypotheses)) for e in estimates]
-    if earth := earth_of(plan):
-        for name, degrees in zip(("longitude_deg", "latitude_deg"), _degrees(estimates, earth).T.tolist(), strict=True):
-            columns[name] = [v if claims_place(e.status) else None for v, e in zip(degrees, estimates, strict=True)]
-    return columns
 
 
 def _degrees(estimates: list[Estimate], earth: EarthTransform) -> Floats:

@@ -6,7 +6,6 @@ In: a plan, estimates, the true path where it is known. Out: CSV files and pictu
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +18,6 @@ from echostep.localization.beacon_map import BeaconPlace, BeaconState
 from echostep.localization.estimate import Estimate
 from echostep.plan.model import Level, Plan
 from echostep.plan.routing import Route
-from echostep.printing.file_mode import claim
 from echostep.printing.picture_files import save_picture
 from echostep.scorecard.truth import Truth
 
@@ -28,40 +26,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-COLUMNS = (
-    "t_s",
-    "x_m",
-    "y_m",
-    "heading_rad",
-    "xx_m2",
-    "xy_m2",
-    "yy_m2",
-    "heading_sd_rad",
-    "step",
-    "status",
-    "level",
-    "z_m",
-    "z_sd_m",
-    "protection_m",
-    "right",
-    "outside",
-    "plan_fits",
-)
-HYPOTHESES = "hypotheses"  # the last column: probability:x,y,level of each place that fits
 MAX_HEIGHT_INCHES = 40.0  # of the picture
 GAP_S = 5.0  # the line of the track is broken after so long on another level
 MAX_ELLIPSES = 60  # drawn per level
 ROUTE_COLOUR, BEACON_COLOUR = "#cc79a7", "#d55e00"
 TRUTH_COLOUR, TRACK_COLOUR = "#009e73", "#0072b2"  # distinguishable with colour blindness [Okabe and Ito 2008]
-
-
-def write_track(path: Path, estimates: Sequence[Estimate]) -> None:
-    """Write estimates as CSV; numbers read back to the same bits."""
-    with claim(path).open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow([*COLUMNS, HYPOTHESES])
-        for e in estimates:
-            writer.writerow([*(getattr(e, name) for name in COLUMNS), " ".join(map(str, e.hypotheses))])
 
 
 def draw_track(

@@ -40,6 +40,7 @@ from echostep.ports.arrival_clock import now_ns
 from echostep.ports.chunks import BOARD, FOOT, MTX, Portion
 from echostep.tracker import Tracker
 from echostep.tracker.running import running_note
+from echostep.wearer.watch import watch_of
 
 # Assumed, all of them:
 TRAIL_STEP_M = 0.02  # the trail gets a point when x or y has changed by this much
@@ -72,7 +73,7 @@ class LivePage:
         `address`: or a server that shows this page while it is entered, and goes on after it.
         `keeps`: keep the scenes of a live run, so that it can be played again after `end`. `shared` gets the plan of what a walk without one draws.
         """
-        self._tracker = tracker
+        self._tracker, self._watched = tracker, watch_of(tracker)
         self._guided = guided
         self._replay = replay
         self._shared = shared
@@ -226,7 +227,12 @@ class LivePage:
             "streams": self._rate_meter.measure(self._tracker, self._arrived_ns, fault),
             "undo": None if self._replay else self._undo_clock.offer(state, time.monotonic_ns()),
             "echoes_fit": echoes_fit(state),
-            "alarm": shown_alarm(self._tracker, receipt_of=self.receipt_of, acknowledged_by=self.acknowledged_by),
+            "alarm": shown_alarm(
+                self._watched,
+                self._tracker.front_end.newest_s,
+                receipt_of=self.receipt_of,
+                acknowledged_by=self.acknowledged_by,
+            ),
             "met": shown_meeting(state),
         }
 

@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.errors import EchostepError
 from echostep.extras import require
-from echostep.plan.model import Georeference
+from echostep.plan.model import Georeference, Plan
 
 
 class EarthTransform:
@@ -51,3 +52,11 @@ class EarthTransform:
         """(n, 2) map metres -> (n, 2) longitude, latitude in degrees."""
         east, north = self._rotation @ xy_m.T
         return np.column_stack(self._to_degrees.transform(east, north))
+
+
+def earth_of(plan: Plan) -> EarthTransform | None:
+    """The transform of a plan to longitude and latitude, None without a georeference; raises EchostepError when it is not valid."""
+    try:
+        return None if plan.georeference is None else EarthTransform(plan.georeference)
+    except ValueError as error:
+        raise EchostepError(f"plan {plan.name}: {error}") from error

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from msgspec import UNSET
 
+from echostep.additions import svg_of
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.extras import lacks
 from echostep.fields import checked, short
 from echostep.plan import plan_file
 from echostep.plan.plan_file import ConnectorFields, DoorFields, LevelFields, PlanFields, QuestionFields, RoomFields
@@ -184,11 +184,7 @@ class Plan:
 
     def _repr_svg_(self) -> str | None:
         """All levels as a picture, for a notebook; None, so that the repr is shown, without matplotlib."""
-        if lacks("a picture", "matplotlib"):
-            return None
-        from echostep.plan.pictures.drawing import plan_svg
-
-        return plan_svg(self)
+        return svg_of(self)
 
     @property
     def is_drawn(self) -> bool:

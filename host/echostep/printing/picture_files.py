@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from echostep.errors import EchostepError
-from echostep.printing.file_mode import claim
+from echostep.file_mode import claim
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -33,6 +33,13 @@ SEQUENCE_OFFSET = 2  # in the body of a message
 LOG_TIME_OFFSET = 6  # in the body of a message
 CHANNEL_IDS = 1 << 16  # a channel number has 16 bits
 
+METADATA_NAME = "echostep"  # of the metadata record
+DAMAGE_NAME = (
+    "echostep.damage"  # of a second one, at the end: what was wrong with the recording of which this one was made
+)
+PART_NAME = "echostep.part"  # of a record at the end of a part: which file goes on, as the value of `NEXT`
+RUN, PART, NEXT = "run", "part", "next"  # metadata keys of a recording in parts: its first file, the number of the part
+LIBRARY = "echostep"  # in the header: it numbers the messages of all channels together
 RAW_ENCODING = "application/octet-stream"  # message encoding of the ports' channels
 # Assumed: bounds the memory that a damaged file can ask for.
 RECORD_LIMIT = 1 << 28  # bytes of one record, and of one decompressed chunk

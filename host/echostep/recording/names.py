@@ -15,14 +15,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from echostep.errors import EchostepError
-from echostep.printing.file_mode import file_mode
+from echostep.file_mode import file_mode
+from echostep.recording.being_written import SUFFIX, is_being_written
 
 try:
     import fcntl
 except ImportError:  # Windows: there an open file cannot be removed
     fcntl = None  # type: ignore[assignment]
 
-SUFFIX = ".mcap"
 PART_SIGN = "-part"  # between the name of a run's first file and the number of a later one
 LEAST_KEPT = 2  # of `remove_older`: the run's own recording and the one before
 
@@ -112,17 +112,3 @@ def _numbered(wanted: Path) -> list[tuple[int, Path]]:
     except OSError:
         return []
     return [(int(match[1]), path) for path in paths if (match := pattern.fullmatch(path.name))]
-
-
-def is_being_written(path: Path) -> bool:
-    """Whether a process has locked the file."""
-    if fcntl is None:
-        return False
-    with path.open("rb") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-        except OSError:  # a file system without locks
-            return False
-    return False

@@ -20,15 +20,25 @@ from mcap.records import Header, Metadata
 from echostep.arrays import Octets
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk, Portion
+from echostep.recording.being_written import is_being_written
 from echostep.recording.clock import log_offset_ns
 from echostep.recording.damage.ending import Ending, begins_as_mcap, checksum_matches, read_ending
 from echostep.recording.damage.notes import FileDamage, made_of
 from echostep.recording.damage.placing import Placement
 from echostep.recording.damage.scan import map_file, next_valid_run, record_end
-from echostep.recording.mcap_records import HEAD_SIZE, MCAP_MAGIC, MESSAGE, decompress_chunk, parse_record
+from echostep.recording.mcap_records import (
+    DAMAGE_NAME,
+    HEAD_SIZE,
+    LIBRARY,
+    MCAP_MAGIC,
+    MESSAGE,
+    METADATA_NAME,
+    NEXT,
+    PART_NAME,
+    decompress_chunk,
+    parse_record,
+)
 from echostep.recording.message_runs import MessageRun, PortChannels, read_messages
-from echostep.recording.names import is_being_written
-from echostep.recording.recorder import DAMAGE_NAME, LIBRARY, METADATA_NAME, NEXT, PART_NAME
 
 
 @dataclass

@@ -22,15 +22,8 @@ from echostep.errors import IncompleteError
 from echostep.ports.chunks import Chunk
 from echostep.recording.background_writer import BackgroundWriter
 from echostep.recording.clock import log_offset_ns, with_log_time
-from echostep.recording.mcap_records import RAW_ENCODING
+from echostep.recording.mcap_records import DAMAGE_NAME, LIBRARY, METADATA_NAME, RAW_ENCODING
 
-METADATA_NAME = "echostep"  # of the metadata record
-DAMAGE_NAME = (
-    "echostep.damage"  # of a second one, at the end: what was wrong with the recording of which this one was made
-)
-PART_NAME = "echostep.part"  # of a record at the end of a part: which file goes on, as the value of `NEXT`
-RUN, PART, NEXT = "run", "part", "next"  # metadata keys of a recording in parts: its first file, the number of the part
-LIBRARY = "echostep"  # in the header: it numbers the messages of all channels together
 # Assumed, all of them.
 WAIT_NS = 500_000_000  # arrival time between two waits of `wait_for_disk`
 RAW_LIMIT = 1 << 26  # bytes of chunks that may wait for a full disk: an hour and a half

@@ -16,15 +16,16 @@ from pathlib import Path
 import msgspec
 
 from echostep.errors import EchostepError
+from echostep.file_mode import claim
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.height.levels import ClimbSettings
 from echostep.localization.particles.start import Start
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan
-from echostep.printing.file_mode import claim
-from echostep.session.metadata import LAST, bounded, possible
+from echostep.session.metadata import LAST
 from echostep.tracker import Tracker
 from echostep.tracker.last_place import LastPlace, start_after
+from echostep.walk.recorded import bounded, possible
 
 FILE = "last.json"
 KEPT_S = 5.0  # between two writes: a few strides

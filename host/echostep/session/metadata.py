@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The text fields that a recording holds beside the bytes: what a replay needs, and what its reader may want to know.
 
-In: plan, start, seed, settings; a recording's fields. Out: fields by name; start and seed read from them. Owns nothing. The names of the fields
-are part of the file format.
+In: plan, start, seed, settings; what the command line gave. Out: fields by name; a start. Owns nothing. `walk.recorded` reads the fields.
 """
 
 from __future__ import annotations
@@ -11,45 +10,23 @@ import importlib.metadata
 import json
 import math
 import platform
-from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
-from pathlib import Path
-from typing import Annotated
 
-import msgspec
 import numpy as np
-from msgspec import Meta
 
 from echostep.board.messages import SCHEMA_HASH
 from echostep.errors import EchostepError
-from echostep.localization.particles.start import ANY_LEVEL, Air, Start
+from echostep.localization.particles.start import ANY_LEVEL, Start
 from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.ports.arrival_clock import now_ns
 from echostep.ports.people.check_in import MOST_SD_M
 from echostep.session.options import TrackingOptions
+from echostep.walk.recorded import ANYWHERE, CHECK_IN_START, START_LIMIT_M
 
-ANYWHERE = "anywhere"  # value of the field `start`: the walk begins anywhere in the building, or in a room
 ROOM_M = 2.0  # standard deviation of a start in a room without an outline: half a large room
-CHECK_IN_START = "tapped"  # value of the field `start`: the walk begins at a check-in
 LAST = "last"  # value of `--start`: where the last live run ended
-SIMULATED = "simulated"  # value of the field `source`
-START_LIMIT_M = 1e6  # of a start's x and y: no plan is larger
-Coordinate = Annotated[float, Meta(ge=-START_LIMIT_M, lt=START_LIMIT_M)]
-
-
-class RecordedRoom(msgspec.Struct):
-    """The field `start_room`: the walk begins in this outline, None: anywhere, on this level."""
-
-    outline_m: list[tuple[Coordinate, Coordinate]] | None = None
-    level: int = ANY_LEVEL
-
-
-class RecordedPause(msgspec.Struct):
-    """The field `start_after_pause`: the heights by the barometer of the run before, None where there are none."""
-
-    air: Air | None
 
 
 def run_metadata(
@@ -67,16 +44,6 @@ def run_metadata(
         "note": note,
         "source": source,
     }
-
-
-def is_simulated(metadata: Mapping[str, str]) -> bool:
-    """Whether a recording is of a simulation."""
-    return metadata.get("source") == SIMULATED
-
-
-def shown_name(path: Path, metadata: Mapping[str, str]) -> str:
-    """The name of a recording, which says so where it is simulated."""
-    return f"{path.name}{' (simulated)' if is_simulated(metadata) else ''}"
 
 
 def _start_fields(start: Pose | Start) -> dict[str, str]:
@@ -112,37 +79,6 @@ def clock_metadata() -> dict[str, str]:
     return {"started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"), "started_ns": str(now_ns())}
 
 
-def recorded_start(metadata: Mapping[str, str], path: Path) -> Pose | Start | None:
-    """The start of a recorded run, None when there is none; raises EchostepError when it is damaged."""
-    try:
-        if metadata.get("start") == ANYWHERE:
-            room = msgspec.json.decode(metadata.get("start_room", "{}"), type=RecordedRoom)
-            outline = None if room.outline_m is None else np.array(room.outline_m).reshape(-1, 2)
-            return Start(room_m=outline, level=room.level)
-        text = metadata.get("start_x_y_rad")
-        if text is None:
-            return None
-        x, y, heading, *level = bounded(float(part) for part in text.split(","))
-        pose = Pose(x, y, heading, int(level[0]) if level else 0)
-        if "start_sd_m_rad" not in metadata:
-            return pose
-        sd_m, sd_rad = bounded((float(part) for part in metadata["start_sd_m_rad"].split(",")), least=0.0)
-        if "start_after_pause" not in metadata:
-            return Start(pose, sd_m, sd_rad)
-        pause = msgspec.json.decode(metadata["start_after_pause"], type=RecordedPause)
-        return Start(pose, sd_m, sd_rad, air=possible(pause.air), after_pause=True)
-    except (ValueError, OverflowError, RecursionError, msgspec.MsgspecError) as error:
-        raise EchostepError(f"{path}: its recorded start is damaged: give one with --start X,Y,DEG") from error
-
-
-def recorded_seed(metadata: Mapping[str, str], path: Path) -> int:
-    """The seed of a recorded run, 0 when there is none; raises EchostepError when it is damaged."""
-    try:
-        return int(metadata.get("seed", "0"))
-    except ValueError as error:
-        raise EchostepError(f"{path}: its recorded seed is damaged: give one with --seed N") from error
-
-
 def plan_of(tracking: TrackingOptions) -> Plan:
     """The plan of the command's options; NO_PLAN where none was given."""
     return NO_PLAN if tracking.plan_path is None else open_limited(tracking.plan_path)
@@ -158,22 +94,6 @@ def start_given(tracking: TrackingOptions, plan: Plan) -> Pose | Start | None:
         raise EchostepError("--start-sd: the plan has no start: give one with --start X,Y,DEG")
     sd_m, sd_deg = _parse_spread(tracking.start_sd)
     return Start(plan.start, sd_m, math.radians(sd_deg))
-
-
-def possible(air: Air | None) -> Air | None:
-    """The heights by pressure; raises ValueError where they are out of bounds."""
-    if air is not None:
-        bounded([air.zero_m])
-        bounded([air.sd_m], least=0.0)
-    return air
-
-
-def bounded(values: Iterable[float], least: float = -START_LIMIT_M) -> list[float]:
-    """The values (m or rad); raises ValueError for one that is not finite, or out of bounds."""
-    numbers = list(values)
-    if not all(least <= value < START_LIMIT_M for value in numbers):
-        raise ValueError
-    return numbers
 
 
 def parse_start(text: str, spread: str | None, plan: Plan) -> Pose | Start:

@@ -14,12 +14,13 @@ from echostep.errors import EchostepError
 from echostep.extras import lacks
 from echostep.guidance.cue_list import CueList
 from echostep.localization.estimate import Estimate, claims_place, digest
-from echostep.output.track_plot import draw_track, write_track
+from echostep.output.track_plot import draw_track
 from echostep.plan.model import Plan
 from echostep.plan.places.whereabouts import Whereabouts
 from echostep.scorecard.truth import Errors, Truth, errors
 from echostep.session.console import console
 from echostep.tracker import Tracker
+from echostep.walk.table import write_track
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,8 +18,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self
 
+from echostep.board.faults.health import all_findings
 from echostep.errors import EchostepError
 from echostep.localization.estimate import CHI2_95, Estimate, TrackStatus, claims_place
+from echostep.odometry.wearer import WearerWatch
 from echostep.path import Odometer
 from echostep.plan.model import Level, Plan
 from echostep.plan.places.bearing import KNOWN_HEADING_RAD
@@ -39,6 +41,7 @@ from echostep.team.messages.report import (
 )
 from echostep.team.outbox import HEARTBEAT_S, Delivery, Outbox, Transport, without_place
 from echostep.tracker import Tracker
+from echostep.wearer.watch import AlarmWatch, watch_of
 
 Source = Literal["live", "replay", "simulated"]
 AVERAGING_S = 3.0  # of speed and rates
@@ -61,6 +64,7 @@ class Publishing:
         """`recorded`: arrival time in ns -> Unix time of a recording that is replayed."""
         self._recorded = recorded
         self._tracker, self._print_line = tracker, print_line
+        self._watch = watch_of(tracker)
         self._history, self._levels = ReportHistory(), tracker.plan.levels
         self._history_before_estimate, self._offered_s = ReportHistory(), time.monotonic()
         self.run = run = secrets.token_hex(4)
@@ -75,7 +79,7 @@ class Publishing:
 
     def publish(self, estimates: Sequence[Estimate]) -> None:
         """Offer a report of each estimate to the outboxes; never blocks. Without estimates, heartbeats before the first one."""
-        alarm = reported_alarm(self._tracker)
+        alarm = reported_alarm(self._watch, self._tracker.front_end.newest_s)
         if not estimates:
             self._offer_alarm(alarm)
             self._offer_heartbeat(time.monotonic())
@@ -92,7 +96,10 @@ class Publishing:
                 self._known = report.position
             else:
                 report = without_place(report, self._last_place(estimate.t_s))
-            recorded, tilt_deg = self._recorded_at(estimate.t_s), reported_tilt_deg(self._tracker)
+            recorded, tilt_deg = (
+                self._recorded_at(estimate.t_s),
+                reported_tilt_deg(self._watch, self._tracker.front_end.newest_s),
+            )
             self._offer(replace(report, recorded=recorded, alarm=alarm, trunk_tilt_deg=tilt_deg))
 
     def _last_place(self, t_s: float) -> Position | None:
@@ -199,24 +206,26 @@ class ReportHistory:
             lost=board.lost + mtx.lost,
             dropped=0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_")),
             synchronised=state.synchronised,
-            findings=tuple(printable(f"{f.subject} {f.what}", 100) for f in state.findings[:4]),
+            findings=tuple(
+                printable(f"{f.subject} {f.what}", 100) for f in all_findings(state.reports, state.foot_reports)[:4]
+            ),
         )
 
 
-def reported_alarm(tracker: Tracker) -> ReportedAlarm | None:
-    """The tracker's alarm as it is reported."""
-    alarm = tracker.alarm.alarm
+def reported_alarm(watch: WearerWatch, now_s: float) -> ReportedAlarm | None:
+    """The wearer's alarm as it is reported."""
+    alarm = watch.alarm
     if alarm is None:
         return None
-    age_s = tracker.front_end.newest_s - alarm.since_s
+    age_s = now_s - alarm.since_s
     return ReportedAlarm(
         alarm.kind.value, alarm.reason.value, alarm.number, min(age_s, 1e9) if age_s > 0.0 else 0.0
     )  # NaN before the first samples
 
 
-def reported_tilt_deg(tracker: Tracker) -> float | None:
+def reported_tilt_deg(watch: AlarmWatch, now_s: float) -> float | None:
     """The trunk's tilt in whole degrees; None where the belt does not tell."""
-    tilt_rad = tracker.front_end.signs.falls.trunk_tilt_rad(tracker.front_end.newest_s)
+    tilt_rad = watch.trunk_tilt_rad(now_s)
     return None if math.isnan(tilt_rad) else float(round(math.degrees(tilt_rad)))
 
 

@@ -15,9 +15,9 @@ from contextlib import suppress
 from pathlib import Path
 
 from echostep.errors import EchostepError
+from echostep.file_mode import claim
 from echostep.plan.model import Plan
 from echostep.plan.places.refusals import refusals
-from echostep.printing.file_mode import claim
 from echostep.team.endpoint import Endpoint
 from echostep.team.inbox import ListenerThread
 from echostep.team.messages.report import checked_name

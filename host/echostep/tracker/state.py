@@ -9,17 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from echostep.arrays import Floats, Ints
-from echostep.board.faults.findings import BoardReports, Finding
-from echostep.board.faults.health import board_findings
 from echostep.board.frames import FrameCounts
 from echostep.board.gateway import GatewayCounts
 from echostep.board.messages import Identity, Status
+from echostep.board.reports import BoardReports
 from echostep.localization.estimate import Estimate
 from echostep.localization.team.meeting_memory import MeetingNews
 from echostep.odometry.front_end import FrontEndCounts
+from echostep.odometry.wearer import Alarm
 from echostep.path import PathSegment
 from echostep.ports.people.team_beacons import SharedBeacon
-from echostep.wearer.alarm import Alarm
 from echostep.xsens.reader import MtxCounts
 
 
@@ -74,12 +73,6 @@ class StreamState:
     identity: Identity | None
     reports: BoardReports
     foot_reports: BoardReports | None
-
-    @property
-    def findings(self) -> list[Finding]:
-        """Findings on the boards, the most severe first."""
-        of_foot = board_findings(self.foot_reports) if self.foot_reports else []
-        return sorted([*board_findings(self.reports), *of_foot], key=lambda finding: -finding.severity)
 
     @property
     def foot_name(self) -> str:

@@ -31,6 +31,7 @@ from echostep.localization.team.meeting import TimedMeeting, carries_position, o
 from echostep.localization.team.meeting_memory import MeetingEffect, MeetingQueue
 from echostep.localization.team.shared_beacons import TeamBeaconMap, shared_beacons
 from echostep.odometry.front_end import FrontEnd
+from echostep.odometry.wearer import WearerWatch
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.ports.chunks import FOOT, GATEWAY, Chunk, Portion, portion_of
@@ -43,7 +44,6 @@ from echostep.tracker.before_check_in import BeforeCheckIn
 from echostep.tracker.last_place import LastPlace, last_place
 from echostep.tracker.state import ParticleSnapshot, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
-from echostep.wearer.alarm import WearerAlarm
 
 MAX_READINGS = 4096  # of beacons, that wait for their segment; beyond it the oldest are dropped, assumed
 LATE_S = 0.5  # behind a published time: an older estimate is outdated: half a stride, a third of the claimed 1 m
@@ -78,7 +78,6 @@ class Tracker:
         self._building = Building(self.laid_out.walls, self.laid_out.sheet, DrawnPlaces(plan.levels))
         self.filter: MapFilter | None = None  # from the first segment on
         self.gateway = Gateway()
-        self.alarm = WearerAlarm()
         self.watchers: list[Watch] = []  # called in this order
         self.team_watchers: list[Callable[[bytes], None]] = []  # called with each chunk of the port TEAM
         self._readings: list[BeaconReading] = []  # that wait for their segment
@@ -93,6 +92,15 @@ class Tracker:
         self._estimate: Estimate | None = None  # the newest
         self._published_s = -math.inf  # time of the newest published estimate
         self._rng = np.random.default_rng(seed)
+
+    @property
+    def watch(self) -> WearerWatch:
+        """Is told what the wearer does; may be replaced before the first chunk."""
+        return self.front_end.watch
+
+    @watch.setter
+    def watch(self, watch: WearerWatch) -> None:
+        self.front_end.watch = watch
 
     @property
     def state(self) -> TrackerState:
@@ -112,7 +120,7 @@ class Tracker:
             and (self.filter.belief.search is not None or self.filter.cloud.is_searching),
             beacon_numbers=tuple(self.gateway.numbers),
             beacon_heard_s=None if self.filter is None else self.filter.beacon_map.heard_s,
-            alarm=self.alarm.alarm,
+            alarm=self.watch.alarm,
             met=self._meetings.news,
             meetings=dict(self._meetings.counts),
             team_beacons={name: tuple(beacons.values()) for name, beacons in self._team_beacons.reported.items()},
@@ -188,7 +196,7 @@ class Tracker:
             estimates += self._track(piece)
             if len(piece.of(TEAM_BEACONS).row):
                 self._team_beacons.receive(piece.of(TEAM_BEACONS).received, len(self.plan.levels))
-            self.alarm.add(self.front_end.signs.pop())
+            self.watch.advance()
             if from_team := piece.of(TEAM).received:
                 for receive in self.team_watchers:
                     receive(from_team)
@@ -285,7 +293,7 @@ class Tracker:
         if meeting is None:
             return []
         if meeting.range_m is None:
-            self.alarm.answer(now_s, ends_help=False)
+            self.watch.answer(now_s, ends_help=False)
         if self.start is not None or self._check_in is not None or not carries_position(meeting):
             self._meetings.add(meeting, now_s)
             return []
@@ -296,11 +304,11 @@ class Tracker:
         """Apply a check-in, its undoing or a call; other bytes are counted. A tap is a sign of life."""
         message, now_s = parse_person(received), self.front_end.newest_s
         if message is not None and message != Call(help=True):
-            self.alarm.answer(now_s, ends_help=isinstance(message, Call))
+            self.watch.answer(now_s, ends_help=isinstance(message, Call))
         match message:
             case Call(wanted):
                 if wanted:
-                    self.alarm.call_for_help(now_s)
+                    self.watch.call_for_help(now_s)
                 return []
             case CheckIn() as check_in if check_in.level < len(self.plan.levels):
                 return self._apply_check_in(check_in)

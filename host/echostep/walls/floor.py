@@ -15,7 +15,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
 from echostep.jit import kernel, part
-from echostep.plan.routing import mark_near_walls
+from echostep.walls.near_walls import mark_near_walls
 
 # Assumed, not measured.
 CELL_M = 0.25  # side of a cell

@@ -15,9 +15,8 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
-from enum import StrEnum
 
+from echostep.odometry.wearer import Alarm, AlarmKind, AlarmReason
 from echostep.wearer.falls import Fall
 from echostep.wearer.stillness import WINDOW_S, Window
 from echostep.wearer.wearer_signs import Sign, StepTaken
@@ -30,36 +29,6 @@ SWAY_S = 120.0  # after the last movement, for which sway alone suppresses the q
 GAP_S = 2.0  # a longer time without samples is no time without motion
 MARGIN_S = WINDOW_S  # how late windows of the other sensor may come
 MOST_CHANGES = 1000  # that are kept
-
-
-class AlarmKind(StrEnum):
-    """Kind of an alarm."""
-
-    ASKING = "asking"
-    MAYDAY = "mayday"
-    OVER = "over"
-
-
-class AlarmReason(StrEnum):
-    """Cause of an alarm."""
-
-    STILL = "no motion"
-    FALL = "fall"
-    HELP = "help"
-
-
-@dataclass(frozen=True, slots=True)
-class Alarm:
-    """An alarm: `number` of this run; `since_s`: time of the last motion, of the fall, of the call for help, or of its end.
-
-    `mayday_s`: of a question, when it becomes a mayday.
-    """
-
-    kind: AlarmKind
-    reason: AlarmReason
-    number: int
-    since_s: float
-    mayday_s: float | None = None
 
 
 class WearerAlarm:

@@ -10,13 +10,12 @@ from typing import Any
 
 import pytest
 
+from echostep.odometry.wearer import Alarm, AlarmKind, AlarmReason, WearerWatch
 from echostep.page.elements.alarm import ShownAlarm, shown_alarm
 from echostep.page.mailbox import Mailbox
 from echostep.page.requests import parse_request
 from echostep.page.server import PageServer
 from echostep.ports.people.check_in import Call
-from echostep.tracker import Tracker
-from echostep.wearer.alarm import Alarm, AlarmKind, AlarmReason
 from page.browser import LOCAL, PLAN, Walk, looking, picture, wait_for
 from page.frames import scene
 from waiting import until
@@ -42,22 +41,20 @@ TEXT = "document.querySelector('#alarm-text').textContent"
     ],
 )
 def test_an_alarm_in_words(kind: AlarmKind, reason: AlarmReason, age_s: float, has_team: bool, words: str) -> None:
-    tracker = Tracker(PLAN)
+    watch = WearerWatch()
     receipt_of = (lambda _: "It is being sent.") if has_team else None
-    assert shown_alarm(tracker, receipt_of=receipt_of) is None
-    tracker.front_end.newest_s = 100.0
-    tracker.alarm.alarm = Alarm(kind, reason, 1, 100.0 - age_s, 130.0 - age_s)
-    shown = shown_alarm(tracker, receipt_of=receipt_of)
+    assert shown_alarm(watch, 100.0, receipt_of=receipt_of) is None
+    watch.alarm = Alarm(kind, reason, 1, 100.0 - age_s, 130.0 - age_s)
+    shown = shown_alarm(watch, 100.0, receipt_of=receipt_of)
     assert shown
     assert words in shown.text
     assert shown.spoken
 
 
 def test_who_is_in_distress_is_told_who_knows_of_it() -> None:
-    tracker = Tracker(PLAN)
-    tracker.front_end.newest_s = 100.0
-    tracker.alarm.alarm = Alarm(AlarmKind.MAYDAY, AlarmReason.HELP, 2, 90.0)
-    shown = shown_alarm(tracker, receipt_of=lambda _: "It is being sent.", acknowledged_by={2: "Ann"}.get)
+    watch = WearerWatch()
+    watch.alarm = Alarm(AlarmKind.MAYDAY, AlarmReason.HELP, 2, 90.0)
+    shown = shown_alarm(watch, 100.0, receipt_of=lambda _: "It is being sent.", acknowledged_by={2: "Ann"}.get)
     assert shown
     assert shown.text == "Mayday: you asked for help. Ann has acknowledged it."
     assert "Ann has acknowledged it." in shown.spoken

@@ -143,7 +143,7 @@ def test_a_responder_is_guided_and_calls(browser: Any, name: str, tmp_path: Path
 
 def called(visit: Visit, kind: str) -> bool:
     visit.hear(undone=0, check_ins=0)
-    alarm = visit.tracker.alarm.alarm
+    alarm = visit.tracker.watch.alarm
     return alarm is not None and alarm.kind == kind
 
 

@@ -15,9 +15,10 @@ from echostep.ports.people.tap import POINT, Tap
 from echostep.recording.recorder import Recorder
 from echostep.session.acceptance.protocol import Protocol
 from echostep.session.acceptance.survey import corridor
-from echostep.session.metadata import SIMULATED, run_metadata
+from echostep.session.metadata import run_metadata
 from echostep.simulation.devices.board import BoardProcess, PythonBoard
 from echostep.simulation.scenario import START_NS, Scenario
+from echostep.walk.recorded import SIMULATED
 from twin.acceptance_walk import WEARER, times_s, waypoints
 
 CORRIDOR, ROUNDS = "8x2", 2

@@ -15,7 +15,6 @@ from echostep.board.faults.findings import (
     NAMES,
     ON_I2C,
     SELECTS,
-    BoardReports,
     Finding,
     Severity,
     has_failed,
@@ -45,6 +44,7 @@ from echostep.board.messages import (
     Status,
     Wiring,
 )
+from echostep.board.reports import BoardReports
 
 TEMPERATURE_C = (-20.0, 60.0)  # degC, range of a gyro on a person; assumed
 UNMOVED_COUNTS = 12  # largest response to a self-test that is taken for none; assumed

@@ -6,8 +6,9 @@ In: `BoardReports` with an `Electrical`. Out: text, and `Finding`s. Owns the tex
 
 from __future__ import annotations
 
-from echostep.board.faults.findings import BoardReports, Finding, Severity, part_in
+from echostep.board.faults.findings import Finding, Severity, part_in
 from echostep.board.messages import Electrical, Healthy, Part
+from echostep.board.reports import BoardReports
 
 ON_SPI = (Healthy.THIGH, Healthy.CALF, Healthy.BELT, Healthy.PRESSURE)
 PULLED_DOWN = "the breakout boards pull it down: the firmware allows for that"

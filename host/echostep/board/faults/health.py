@@ -22,7 +22,6 @@ from echostep.board.faults.findings import (
     GYROS,
     NAMES,
     SELECTS,
-    BoardReports,
     Finding,
     Severity,
     field_suffix,
@@ -45,6 +44,7 @@ from echostep.board.messages import (
     Sensors,
     Status,
 )
+from echostep.board.reports import BoardReports
 
 LEAST_MV = 4100  # a measurement below it is below the 4.5 V that 16 MHz need, although the reference is off by up to 9 % [data sheet]
 SAG = 0.08  # of the usual voltage: 0.4 V, more than the drop on a good cable
@@ -120,6 +120,12 @@ def board_findings(reports: BoardReports) -> list[Finding]:
     if reports.foot is not None:
         findings = [replace(f, subject="foot board") if f.subject == "board" else f for f in findings]
     return sorted(findings, key=lambda finding: -finding.severity)
+
+
+def all_findings(board: BoardReports, foot: BoardReports | None) -> list[Finding]:
+    """Findings on a sensor board and on a foot board, where one is worn, the most severe first."""
+    of_foot = board_findings(foot) if foot else []
+    return sorted([*board_findings(board), *of_foot], key=lambda finding: -finding.severity)
 
 
 def _intermittent_findings(reports: BoardReports) -> list[Finding]:

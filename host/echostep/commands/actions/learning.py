@@ -16,8 +16,8 @@ from echostep.commands.actions.rangers import SURELY, merged, report_of, tracked
 from echostep.commissioning.calibrate import Sections, write_sections
 from echostep.commissioning.rangers.report import RangerReport
 from echostep.errors import EchostepError
+from echostep.file_mode import claim
 from echostep.localization.echoes.rangers import echo_of
-from echostep.printing.file_mode import claim
 from echostep.recording.names import files_of
 from echostep.recording.reading import open_recording
 from echostep.session.metadata import plan_of

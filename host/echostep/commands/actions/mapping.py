@@ -31,10 +31,10 @@ from echostep.plan.writer import save_plan
 from echostep.recording.reading import Recording, open_recording
 from echostep.session.console import console
 from echostep.session.losses import skipped
-from echostep.session.metadata import recorded_start
 from echostep.session.options import TrackingOptions
 from echostep.session.progress import bar, with_bar
 from echostep.session.runs.replay import tracker_of
+from echostep.walk.recorded import recorded_start
 
 PLAN_SD_M = 0.05  # of the walls of a plan that does not state it
 LEAST_WAY_M = 3.0  # of path that shows a wall

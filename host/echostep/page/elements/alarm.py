@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The wearer's alarm as a page shows and speaks it.
 
-In: the tracker. Out: `ShownAlarm`: plain data. Owns nothing.
+In: the watch over the wearer, and its time. Out: `ShownAlarm`: plain data. Owns nothing.
 """
 
 from __future__ import annotations
@@ -10,8 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from echostep.tracker import Tracker
-from echostep.wearer.alarm import AlarmKind, AlarmReason
+from echostep.odometry.wearer import AlarmKind, AlarmReason, WearerWatch
 
 REPEAT_S = 5.0  # between two times that a sentence is spoken; assumed
 
@@ -27,7 +26,8 @@ class ShownAlarm:
 
 
 def shown_alarm(
-    tracker: Tracker,
+    watch: WearerWatch,
+    now_s: float,
     *,
     receipt_of: Callable[[int], str] | None = None,
     acknowledged_by: Callable[[int], str | None] | None = None,
@@ -36,10 +36,10 @@ def shown_alarm(
 
     `acknowledged_by`: name of the commander that acknowledged the alarm with a given number.
     """
-    alarm = tracker.alarm.alarm
+    alarm = watch.alarm
     if alarm is None:
         return None
-    age_s = tracker.front_end.newest_s - alarm.since_s
+    age_s = now_s - alarm.since_s
     age_s = 0.0 if math.isnan(age_s) else max(age_s, 0.0)
     times = 1000 * alarm.number + int(age_s / REPEAT_S)
     receipt = receipt_of(alarm.number) if receipt_of else "No team is connected: only this page says so."

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, fields
 
-from echostep.board.faults.health import Severity
+from echostep.board.faults.health import Severity, all_findings
 from echostep.tracker import Tracker
 from echostep.tracker.state import StreamState
 from echostep.xsens.reader import MtxCounts
@@ -90,7 +90,9 @@ def _advice(streams: StreamState, mtx_hz: float | None, pings_hz: float | None, 
         return f"the {streams.foot_name} sends no usable samples{incomplete}: look at its settings, its port and its RX line: echostep doctor"
     if mtx_hz == 0.0:
         return f"the {streams.foot_name} is silent: look at its plug and its power"
-    findings = [finding for finding in streams.findings if finding.severity > Severity.NOTE]
+    findings = [
+        finding for finding in all_findings(streams.reports, streams.foot_reports) if finding.severity > Severity.NOTE
+    ]
     if not findings and pings_hz == 0.0:
         return "no pings: look at the board's plug and at the rangers"
     return str(findings[0]) if findings else ""

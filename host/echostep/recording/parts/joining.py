@@ -13,9 +13,9 @@ from pathlib import Path
 
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Portion
-from echostep.recording.names import SUFFIX
+from echostep.recording.being_written import SUFFIX
+from echostep.recording.mcap_records import PART, RUN
 from echostep.recording.reading import Recording, open_recording
-from echostep.recording.recorder import PART, RUN
 
 START = ("start_x_y_rad", "start")  # metadata keys of the place where the run began
 

@@ -17,8 +17,9 @@ from threading import Thread
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
 from echostep.recording.background_writer import BackgroundWriter
+from echostep.recording.mcap_records import NEXT, PART, PART_NAME, RUN
 from echostep.recording.names import part_name
-from echostep.recording.recorder import NEXT, PART, PART_NAME, RUN, Recorder
+from echostep.recording.recorder import Recorder
 
 UNITS = {"MB": 1e6, "GB": 1e9, "min": 60e9, "h": 3600e9}  # bytes, or nanoseconds
 LEAST = {"MB": 1e6, "GB": 1e6, "min": 60e9, "h": 60e9}  # smaller parts are thousands of files a day; assumed

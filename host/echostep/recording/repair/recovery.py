@@ -22,22 +22,24 @@ from mcap.records import Channel, Header, Metadata, Schema
 
 from echostep.arrays import Bools, Octets
 from echostep.errors import EchostepError
+from echostep.recording.being_written import is_being_written
 from echostep.recording.damage.ending import begins_as_mcap, checksum_matches, read_ending
 from echostep.recording.damage.notes import FileDamage
 from echostep.recording.damage.placing import Placement
 from echostep.recording.damage.scan import CHUNK, map_file, next_valid_run, record_end
 from echostep.recording.mcap_records import (
     CHANNEL_IDS,
+    DAMAGE_NAME,
     HEAD_SIZE,
+    LIBRARY,
     MCAP_MAGIC,
     MESSAGE,
     MESSAGE_SIZE,
+    METADATA_NAME,
     decompress_chunk,
     is_misnamed,
     parse_record,
 )
-from echostep.recording.names import is_being_written
-from echostep.recording.recorder import DAMAGE_NAME, LIBRARY, METADATA_NAME
 
 PLACED_AT_ONCE = 8192  # messages whose places are decided together: some seconds of a walk; assumed
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time

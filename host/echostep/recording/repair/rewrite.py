@@ -14,8 +14,9 @@ from pathlib import Path
 from mcap.records import Channel, Schema
 
 from echostep.errors import EchostepError
+from echostep.recording.mcap_records import DAMAGE_NAME, METADATA_NAME
 from echostep.recording.names import create
-from echostep.recording.recorder import DAMAGE_NAME, METADATA_NAME, begin_file, numbered
+from echostep.recording.recorder import begin_file, numbered
 from echostep.recording.repair.recovery import RecordedMessage
 
 

@@ -11,6 +11,7 @@ import math
 from importlib.metadata import version
 
 from echostep.board.faults.findings import PART_NAMES
+from echostep.board.faults.health import all_findings
 from echostep.board.messages import SCHEMA_HASH, Part
 from echostep.recording.capture_summary import refusals
 from echostep.session.acceptance.walked import Walked
@@ -50,7 +51,7 @@ def loss_rows(walked: Walked) -> list[Row]:
         ("chunks of unknown ports", str(front_end.unknown_ports)),
         ("taps", f"{len(taps.kept)}, {taps.taken_back} taken back, {taps.bad} unusable"),
         ("counters of the board", _counters(walked)),
-        ("findings", "; ".join(map(str, streams.findings)) or "none"),
+        ("findings", "; ".join(map(str, all_findings(streams.reports, streams.foot_reports))) or "none"),
         ("ports", "; ".join(walked.arrivals.silent()) or "all sent to the end"),
         ("recording", "; ".join(walked.recording.damage()) or "whole"),
     ]

@@ -21,7 +21,7 @@ from echostep.session.acceptance.errors import by_point, score_taps
 from echostep.session.acceptance.facts import clock_rows, loss_rows, version_rows
 from echostep.session.acceptance.heard import AGREES_M, REACH_M, heard_shares
 from echostep.session.acceptance.walked import Walked, walk_again
-from echostep.session.metadata import is_simulated
+from echostep.walk.recorded import is_simulated
 
 SIMULATED = "Simulated: no board was worn. The figures show that the protocol works, not how well the tracker does."
 MEASURED = "Measured: recorded from a board's ports."

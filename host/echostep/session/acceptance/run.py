@@ -18,10 +18,10 @@ from echostep.session.acceptance.guide import Guide
 from echostep.session.acceptance.page import write_page
 from echostep.session.acceptance.protocol import Protocol
 from echostep.session.console import console
-from echostep.session.metadata import SIMULATED
 from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
 from echostep.session.results import output_folder
 from echostep.session.runs.live import live
+from echostep.walk.recorded import SIMULATED
 
 PLAN_NAME = "acceptance-plan.json"
 PSEUDO_TERMINALS = "/dev/pts/"  # of Linux [pts(4)]: no board has one

@@ -15,17 +15,17 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from echostep.errors import EchostepError
+from echostep.file_mode import claim
 from echostep.interruption import until_asked
 from echostep.page.elements.true_position import TruePath
 from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import Plan
 from echostep.ports.chunks import Chunk, Portion
-from echostep.printing.file_mode import claim
 from echostep.recording.recorder import Recorder
 from echostep.scorecard.truth import load_truth
 from echostep.session.chunk_streams import paced, portions_of, recorded, with_messages
 from echostep.session.console import console, print_notices
-from echostep.session.metadata import SIMULATED, run_metadata
+from echostep.session.metadata import run_metadata
 from echostep.session.options import OutputOptions
 from echostep.session.progress import progress_line
 from echostep.session.results import output_folder
@@ -39,6 +39,7 @@ from echostep.simulation.people.walker import Person, Waypoint
 from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario, start_of
 from echostep.tracker import Tracker
 from echostep.tracker.kernels import Part
+from echostep.walk.recorded import SIMULATED
 
 WATCHED_SPEED = 4.0  # times real time, on a terminal: a walk of 90 s is seen in 22 s
 # Chunks that are tracked together in a run that is watched: 20 ms of the walk: no step is shown later

@@ -27,12 +27,12 @@ from echostep.recording.mcap_records import MCAP_MAGIC
 from echostep.recording.parts.joining import open_parts
 from echostep.session.browser import open_browser
 from echostep.session.console import console, print_notices
-from echostep.session.metadata import shown_name
 from echostep.session.options import TrackingOptions
 from echostep.session.results import summary_words
 from echostep.session.runs.replay import plan_note, tracker_of
 from echostep.tracker import Tracker
 from echostep.tracker.kernels import LATER, TRACKING, compile_parts
+from echostep.walk.recorded import shown_name
 
 DEMO_PLAN = Path(__file__).parents[2] / "plans" / "demo.json"
 WAITING = "drop a recording and its plan here"

@@ -11,30 +11,22 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from echostep.interruption import until_asked
-from echostep.localization.particles.start import Start
-from echostep.plan.model import Plan, Pose
+from echostep.plan.model import Plan
 from echostep.recording.parts.joining import open_parts
 from echostep.recording.reading import Recording
 from echostep.scorecard.truth import load_truth
 from echostep.session.chunk_streams import paced, portions_of
 from echostep.session.console import console
 from echostep.session.losses import skipped
-from echostep.session.metadata import (
-    CHECK_IN_START,
-    is_simulated,
-    plan_of,
-    recorded_seed,
-    recorded_start,
-    shown_name,
-    start_given,
-)
+from echostep.session.metadata import plan_of, start_given
 from echostep.session.options import OutputOptions, TrackingOptions
 from echostep.session.progress import with_bar
 from echostep.session.results import output_folder
 from echostep.session.runs.starts import check_start
 from echostep.session.session import Session
-from echostep.settings import Settings, parse_settings, read_settings
 from echostep.tracker import Tracker
+from echostep.walk import recorded
+from echostep.walk.recorded import is_simulated, shown_name
 
 VIEWED_PORTION = 8  # chunks tracked at once while a viewer looks on: about 10 ms
 
@@ -82,21 +74,6 @@ def plan_note(plan: Plan, recording: Recording) -> str:
     return f"Note: {plan.name} is not the plan that {recording.path.name} was tracked on."
 
 
-def tracker_of(
-    recording: Recording,
-    plan: Plan,
-    tracking: TrackingOptions,
-    start: Pose | Start | None = None,
-    settings: Settings | None = None,
-) -> Tracker:
-    """A tracker with the recorded start, settings and seed unless they are given, as text by `tracking` or as objects.
-
-    Raises EchostepError when one of them is missing or damaged.
-    """
-    metadata, path = recording.metadata, recording.path
-    settings_path = tracking.settings_path
-    text = read_settings(settings_path) if settings_path else metadata.get("settings_toml", "")
-    settings = settings or parse_settings(text, str(settings_path or path))
-    start = start or start_given(tracking, plan) or recorded_start(metadata, path)
-    seed = recorded_seed(metadata, path) if tracking.seed is None else tracking.seed
-    return Tracker(plan, start, settings, seed, waits=metadata.get("start") == CHECK_IN_START)
+def tracker_of(recording: Recording, plan: Plan, tracking: TrackingOptions) -> Tracker:
+    """A tracker with the recorded start, settings and seed unless `tracking` gives others; raises EchostepError."""
+    return recorded.tracker_of(recording, plan, start_given(tracking, plan), tracking.settings_path, tracking.seed)

@@ -14,9 +14,10 @@ import numpy as np
 from msgspec import UNSET, UnsetType
 
 from echostep.arrays import Floats, Ints
+from echostep.odometry.wearer import AlarmKind, AlarmReason
 from echostep.output.table import Table
 from echostep.path import PathSegment
-from echostep.wearer.alarm import AlarmKind, AlarmReason, WearerAlarm
+from echostep.wearer.alarm import WearerAlarm
 from echostep.wearer.falls import Fall
 from echostep.wearer.wearer_signs import Sign, WearerSigns
 from echostep_studies.frame.report import as_dicts, rows_by_name

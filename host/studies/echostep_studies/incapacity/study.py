@@ -17,7 +17,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.legs.trunk_path import GyroBlock
-from echostep.wearer.alarm import AlarmKind, WearerAlarm
+from echostep.odometry.wearer import AlarmKind
+from echostep.wearer.alarm import WearerAlarm
 from echostep.wearer.stillness import WINDOW_S, Stillness, Window
 from echostep.wearer.wearer_signs import StepTaken
 from echostep_studies.bench.recordings.feet import SETS as FEET

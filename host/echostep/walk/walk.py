@@ -15,25 +15,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.extras import lacks, require
+from echostep.additions import added, needed, svg_of
+from echostep.extras import require
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.particles.start import Start
-from echostep.output.track_files import columns_of, refuse_none
-from echostep.output.track_plot import COLUMNS, track_figure
-from echostep.plan.importers.limited import open_limited
-from echostep.plan.model import NO_PLAN, Plan, Pose
-from echostep.printing.picture_files import save_picture, svg_text
+from echostep.plan.model import NO_PLAN, Plan, Pose, load_plan
 from echostep.recording.parts.joining import open_parts
-from echostep.session.metadata import shown_name
-from echostep.session.options import TrackingOptions
-from echostep.session.runs.replay import tracker_of
 from echostep.settings import Settings
+from echostep.walk.recorded import shown_name, tracker_of
+from echostep.walk.table import COLUMNS, PLACE, columns_of, refuse_none
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from pandas import DataFrame
-
-PLACE = ("longitude_deg", "latitude_deg")  # columns beside those of track.csv, where the plan has a georeference
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -76,8 +69,7 @@ class Walk:
 
     def draw(self, path: Path | str) -> None:
         """Write the picture of track.png as PNG, SVG or PDF, by the ending of the name."""
-        require("a picture", "matplotlib")
-        save_picture(self._figure(), Path(path))
+        needed("pictures", "a picture").save(self, Path(path))
 
     def __repr__(self) -> str:
         """Name, number and duration of the estimates, share of them that is `tracking`."""
@@ -87,10 +79,7 @@ class Walk:
 
     def _repr_svg_(self) -> str | None:
         """The picture for a notebook; None, so that the repr is shown, without matplotlib."""
-        return None if lacks("a picture", "matplotlib") else svg_text(self._figure())
-
-    def _figure(self) -> Figure:
-        return track_figure(self.plan, self.estimates, None, self.name)
+        return svg_of(self)
 
 
 def replay(
@@ -112,12 +101,14 @@ def replay(
     """
     paths = [recording] if isinstance(recording, Path | str) else recording
     opened = open_parts([Path(path) for path in paths])
-    on = NO_PLAN if plan is None else plan if isinstance(plan, Plan) else open_limited(Path(plan))
-    given = settings if isinstance(settings, Settings) else None
-    options = TrackingOptions(
-        None, settings_path=Path(settings) if isinstance(settings, Path | str) else None, seed=seed
-    )
-    tracker = tracker_of(opened, on, options, start, given)
+    on = NO_PLAN if plan is None else plan if isinstance(plan, Plan) else open_plan(Path(plan))
+    tracker = tracker_of(opened, on, start, settings, seed)
     estimates = [e for portion in opened.portions() for e in tracker.take(portion)]
     refuse_none(estimates, opened.path)
     return Walk(shown_name(opened.path, opened.metadata), on, tuple(estimates))
+
+
+def open_plan(path: Path) -> Plan:
+    """A plan.json; a plan of another format where a distribution adds importers. Raises EchostepError."""
+    importer = added("plans")
+    return importer(path) if importer else load_plan(path)

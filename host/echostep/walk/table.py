@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""The estimates of a walk as columns, and as track.csv.
+
+In: estimates, a plan. Out: columns by name; a CSV file. Owns the names of the columns.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from echostep.errors import EchostepError
+from echostep.file_mode import claim
+from echostep.localization.estimate import Estimate, claims_place
+from echostep.plan.georeference import earth_of
+from echostep.plan.model import Plan
+
+Columns = dict[str, list[Any]]
+COLUMNS = (
+    "t_s",
+    "x_m",
+    "y_m",
+    "heading_rad",
+    "xx_m2",
+    "xy_m2",
+    "yy_m2",
+    "heading_sd_rad",
+    "step",
+    "status",
+    "level",
+    "z_m",
+    "z_sd_m",
+    "protection_m",
+    "right",
+    "outside",
+    "plan_fits",
+)
+HYPOTHESES = "hypotheses"  # the last column: probability:x,y,level of each place that fits
+PLACE = ("longitude_deg", "latitude_deg")  # columns beside those of track.csv, where the plan has a georeference
+
+
+def columns_of(estimates: list[Estimate], plan: Plan) -> Columns:
+    """The estimates' fields by name, and longitude and latitude where the plan has a georeference and the estimate claims a place."""
+    columns: Columns = {f.name: [getattr(e, f.name) for e in estimates] for f in fields(Estimate)}
+    columns["status"] = [e.status.value for e in estimates]
+    columns["hypotheses"] = [" ".join(map(str, e.hypotheses)) for e in estimates]
+    if earth := earth_of(plan):
+        degrees = earth.degrees(np.array([(e.x_m, e.y_m) for e in estimates]))
+        for name, column in zip(PLACE, degrees.T.tolist(), strict=True):
+            columns[name] = [v if claims_place(e.status) else None for v, e in zip(column, estimates, strict=True)]
+    return columns
+
+
+def refuse_none(estimates: list[Estimate], path: Path) -> None:
+    """Raises EchostepError for a recording without estimates."""
+    if not estimates:
+        raise EchostepError(f"{path}: no estimate: the foot never stood still, or no bytes of its sensor came")
+
+
+def write_track(path: Path, estimates: Sequence[Estimate]) -> None:
+    """Write estimates as CSV; numbers read back to the same bits."""
+    with claim(path).open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow([*COLUMNS, HYPOTHESES])
+        for e in estimates:
+            writer.writerow([*(getattr(e, name) for name in COLUMNS), " ".join(map(str, e.hypotheses))])
