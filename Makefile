@@ -5,11 +5,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
 DEMO_READY := $(if $(wildcard $(READY)),$(READY),$(VENV)/demo-ready)
-LISTS := tools/install.py host/tested-versions.txt host/pyproject.toml host/studies/pyproject.toml
+LISTS := tools/install.py host/tested-versions.txt host/core/pyproject.toml host/app/pyproject.toml host/studies/pyproject.toml
 ELF := firmware/build/echostep.elf
-SHIPPED := host/echostep/firmware/echostep.hex
-TOOL := env PYTHONPATH=tools:tests $(BIN)/python -m
+SHIPPED := host/app/echostep_app/firmware/echostep.hex
+TOOL := env PYTHONPATH=tools:tests:tests/app $(BIN)/python -m
 TWIN := tools/twin/build/echostep-twin
+RINGS := $(RING:%=tests/%)
 SUITE := $(BIN)/python -m pytest -q -n auto --dist worksteal --durations 25 --durations-min 1
 APT_PACKAGES := gcc make gcc-avr avr-libc binutils-avr libsimavr-dev libelf-dev cppcheck python3-venv
 TEST_PACKAGES := mosquitto chromium clang libclang-rt-dev openscad
@@ -55,28 +56,29 @@ real: $(READY) ## a real recorded foot on a plan drawn around its surveyed path,
 	$(BIN)/python -m echostep_studies.figures.real_walk --out out/real
 
 quick: $(READY) ## run the tests that need no twin, browser, process, study or more than half a second
-	$(BIN)/python -m pytest -q -n auto --dist worksteal -m "not (twin or browser or process or study or slow or long or speed)"
+	$(BIN)/python -m pytest -q -n auto --dist worksteal $(RINGS) -m "not (twin or browser or process or study or slow or long or speed)"
 
-test: board ## run the tests that a contributor waits for, and the checks
+test: board ## run the tests that a contributor waits for, and the checks; RING=core, app or studies: the tests of that ring alone
 	$(MAKE) --quiet --jobs 2 check suite
 
 long: board ## run the other tests: whole campaigns, tours, soaks, studies
-	$(SUITE) -m "long and not speed"
+	$(SUITE) $(RINGS) -m "long and not speed"
 
 board: $(READY)
 	@tools/apt.sh $(APT_PACKAGES) $(TEST_PACKAGES) || echo "Tests that need them are skipped and named."
 	@if command -v avr-gcc >/dev/null && [ -e /usr/include/simavr/sim_avr.h ]; then $(MAKE) --quiet -C firmware && $(MAKE) --quiet -C tools/twin; fi
 
 suite: $(READY) ## the tests of make test, which runs the checks beside them
-	$(SUITE)
+	$(SUITE) $(RINGS)
 
-check: $(READY) ## types, style, layers, generated files, C checks
+check: $(READY) ## types, style, layers, generated files, sizes, C checks
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python protocol/generate.py --check
 	$(TOOL) docs.generate --check
+	$(TOOL) release.sizes
 	$(MAKE) --quiet check-c
 
 check-c: ## the C checks of make check, where cppcheck is installed
@@ -95,7 +97,7 @@ bench: $(VENV)/peers ## speed of the host as ratios against others, in the same 
 
 page-speed: $(READY) ## latency and frame rate of the live page and of the commander's page in Chromium
 	@tools/apt.sh chromium || true
-	$(BIN)/python -m pytest -q -s -m speed tests/page/web/test_page_speed.py tests/operation/test_table_speed.py
+	$(BIN)/python -m pytest -q -s -m speed tests/app/page/web/test_page_speed.py tests/app/operation/test_table_speed.py
 
 operation: $(READY) ## 20 wearers, crews and a commander, whose page is at http://127.0.0.1:8420/ meanwhile (simulated); PORT=9000: there
 	@tools/apt.sh $(APT_PACKAGES) mosquitto

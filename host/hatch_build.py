@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The part of the package's metadata that depends on where the project is published: links, and the page that PyPI shows.
 
-In: the environment variable ECHOSTEP_URL, the public address of the repository (`make wheel URL=...`), and README.md. Out: `urls` and `readme` of
-the metadata. Without an address there are no links, and README.md is taken as it is. Owns nothing.
+In: the environment variable ECHOSTEP_URL, the public address of the repository (`make wheel URL=...`), and README.md beside this file. Out: `urls`
+and `readme` of the metadata. Without an address there are no links, and README.md is taken as it is. Owns nothing.
 """
 
 from __future__ import annotations
@@ -46,6 +46,6 @@ class PublishedMetadata(MetadataHookInterface):
     def update(self, metadata: dict[str, Any]) -> None:
         """Set `urls` and `readme`."""
         url = os.environ.get("ECHOSTEP_URL", "").rstrip("/")
-        text = (Path(self.root) / "README.md").read_text(encoding="utf-8")
+        text = Path(self.root, "../README.md").read_text(encoding="utf-8")
         metadata["urls"] = links(url) if url else {}
         metadata["readme"] = {"content-type": "text/markdown", "text": absolute(text, url) if url else text}

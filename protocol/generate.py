@@ -26,7 +26,7 @@ def outputs(messages: list[Message]) -> dict[Path, str]:
     return {
         ROOT / "firmware/messages.h": c_header(board_messages(messages)),
         ROOT / "firmware/messages.c": c_code(board_messages(messages)),
-        ROOT / "host/echostep/board/messages.py": python_code(messages),
+        ROOT / "host/core/echostep/board/messages.py": python_code(messages),
         page: readme(messages, page.read_text()),
         HERE / "vectors.jsonl": vectors(messages),
     }

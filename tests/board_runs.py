@@ -15,11 +15,11 @@ import pytest
 from numpy.typing import NDArray
 
 from echostep.board import messages as m
-from echostep.board.faults.health import board_findings
 from echostep.board.frames import BoardReader, encode
 from echostep.board.reports import BoardReports
-from echostep.simulation.devices.board import BoardProcess
-from echostep.simulation.stimulus import NO_SYNC, ROW
+from echostep_app.board.faults.health import board_findings
+from echostep_app.simulation.devices.board import BoardProcess
+from echostep_app.simulation.stimulus import NO_SYNC, ROW
 
 ROOT = Path(__file__).resolve().parent.parent
 TWIN = ROOT / "tools/twin/build/echostep-twin"
@@ -35,7 +35,7 @@ needs_twin = pytest.mark.skipif(
 
 def tool(name: str) -> list[str]:
     """The command that starts a tool of tools/, as the Makefile does; it becomes the tool's own process."""
-    return ["env", f"PYTHONPATH={ROOT / 'tools'}:{ROOT / 'tests'}", sys.executable, "-m", name]
+    return ["env", f"PYTHONPATH={ROOT / 'tools'}:{ROOT / 'tests'}:{ROOT / 'tests/app'}", sys.executable, "-m", name]
 
 
 def quiet_rows(milliseconds: int) -> NDArray[Any]:

@@ -17,10 +17,10 @@ from unittest import mock
 
 import pytest
 
-from echostep.cli import main
 from echostep.ports.chunks import Chunk
-from echostep.recording.recorder import Recorder
-from echostep.session.last_place import PlaceKeeper
+from echostep_app.cli import main
+from echostep_app.recording.recorder import Recorder
+from echostep_app.session.last_place import PlaceKeeper
 
 PROGRAM = [sys.executable, "-m", "echostep"]  # for tests that need a process: signals, kills, pipes
 

@@ -18,7 +18,7 @@ import pytest
 from hypothesis import settings
 
 import layers
-from echostep.interruption import ENDS
+from echostep_app.interruption import ENDS
 
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
@@ -37,7 +37,7 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.fixture(autouse=True)
 def _computer_of_one_user(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever accounts this computer has: they would put a token into the addresses of pages."""
-    monkeypatch.setattr("echostep.page.web.users.has_other_users", lambda: False)
+    monkeypatch.setattr("echostep_app.page.web.users.has_other_users", lambda: False)
 
 
 @pytest.fixture(autouse=True)

@@ -9,10 +9,10 @@ from itertools import takewhile
 from board_runs import ROOT
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import Chunk
-from echostep.simulation.devices.board import PythonBoard
-from echostep.simulation.scenario import demo_scenario
+from echostep_app.simulation.devices.board import PythonBoard
+from echostep_app.simulation.scenario import demo_scenario
 
-DEMO = ROOT / "host/echostep/plans/demo.json"
+DEMO = ROOT / "host/core/echostep/plans/demo.json"
 
 
 @cache

@@ -15,7 +15,7 @@ fail() {
 [ -r "$port" ] && [ -w "$port" ] || fail "$port: this user may not open it: sudo usermod -aG dialout \$USER, then log out and in"
 command -v avrdude >/dev/null || tools/apt.sh avrdude || fail "avrdude is not installed: sudo apt install avrdude"
 if [ -z "$hex" ]; then
-	hex=host/echostep/firmware/echostep.hex
+	hex=host/app/echostep_app/firmware/echostep.hex
 	if command -v avr-gcc >/dev/null || tools/apt.sh gcc-avr avr-libc binutils-avr; then
 		make -C firmware || exit 2
 		hex=firmware/build/echostep.hex

@@ -18,8 +18,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 VERSIONS = ROOT / "host/tested-versions.txt"
-PROJECTS = {"demo": ("-e", "host"), "tests": ("-e", "host", "-e", "host/studies")}
-NEWEST = {"demo": ("-e", "host[page,plots]", "pyproj"), "tests": ("-e", "host[dev]", "-e", "host/studies[cluster]")}
+DEMO = ("-e", "host/core", "-e", "host/app")
+PROJECTS = {"demo": DEMO, "tests": (*DEMO, "-e", "host/studies")}
+NEWEST = {
+    "demo": ("-e", "host/core", "-e", "host/app[page,plots]", "pyproj"),
+    "tests": ("-e", "host/core", "-e", "host/app[dev]", "-e", "host/studies[cluster]"),
+}
 PIP = [
     sys.executable,
     "-m",
@@ -65,7 +69,7 @@ def install(*words: str, count: int = 0) -> tuple[bool, str]:
 def tested_pythons() -> list[tuple[int, int]]:
     """The versions of Python that the package is tested on, oldest first."""
     classifiers = re.findall(
-        r'"Programming Language :: Python :: 3\.(\d+)"', (ROOT / "host/pyproject.toml").read_text()
+        r'"Programming Language :: Python :: 3\.(\d+)"', (ROOT / "host/core/pyproject.toml").read_text()
     )
     return [(3, int(minor)) for minor in classifiers]
 

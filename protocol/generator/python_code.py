@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""host/echostep/board/messages.py: one named tuple per message, its codec, and the bodies as numpy dtypes.
+"""host/core/echostep/board/messages.py: one named tuple per message, its codec, and the bodies as numpy dtypes.
 
 In: the messages. Out: Python source, formatted as ruff does it. Owns nothing.
 """

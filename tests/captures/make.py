@@ -21,9 +21,9 @@ from board_runs import ELF, ROOT, TWIN  # noqa: E402
 from echostep.plan.model import load_plan  # noqa: E402
 from echostep.ports.chunks import BOARD, Chunk  # noqa: E402
 from echostep.recording.capture import as_json, read_capture  # noqa: E402
-from echostep.recording.recorder import Recorder  # noqa: E402
-from echostep.simulation.devices.board import BoardProcess  # noqa: E402
-from echostep.simulation.scenario import demo_scenario  # noqa: E402
+from echostep_app.recording.recorder import Recorder  # noqa: E402
+from echostep_app.simulation.devices.board import BoardProcess  # noqa: E402
+from echostep_app.simulation.scenario import demo_scenario  # noqa: E402
 
 SECONDS = 4.0
 NAMES = ("board.bin", "mtx.bin", "walk.mcap")
@@ -32,7 +32,7 @@ NAMES = ("board.bin", "mtx.bin", "walk.mcap")
 def chunks() -> list[Chunk]:
     """The first seconds of the demo walk; the right ranger refuses to answer in the third."""
     board = BoardProcess([str(TWIN), "--elf", str(ELF)])
-    scenario = demo_scenario(load_plan(ROOT / "host/echostep/plans/demo.json"), 1, board)
+    scenario = demo_scenario(load_plan(ROOT / "host/core/echostep/plans/demo.json"), 1, board)
     found = []
     faults = {2.0: "srf_right=nack", 3.0: "srf_right=ok"}
     for chunk in takewhile(lambda c: c.t_arrival_ns < (1.0 + SECONDS) * 1e9, scenario.chunks()):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from board_runs import ROOT, TWIN, Bench, kinds, needs_twin, pings
 from echostep.board import messages as m
-from echostep.simulation.devices.board import BoardProcess
+from echostep_app.simulation.devices.board import BoardProcess
 
 pytestmark = needs_twin
 
@@ -50,7 +50,7 @@ def test_the_shipped_firmware_works_with_this_host(bench: Bench, tmp_path: Path)
     """The bytes that are flashed, whichever compiler made them, beside those that this machine's compiler has made."""
     shipped = tmp_path / "shipped.elf"
     to_elf = ["avr-objcopy", "-I", "ihex", "-O", "elf32-avr", "--rename-section", ".sec1=.text"]
-    subprocess.run([*to_elf, ROOT / "host/echostep/firmware/echostep.hex", shipped], check=True)
+    subprocess.run([*to_elf, ROOT / "host/app/echostep_app/firmware/echostep.hex", shipped], check=True)
     other = Bench(BoardProcess([str(TWIN), "--elf", str(shipped)]))
     with closing(other.board):
         found, expected = other.run(3_000), bench.run(3_000)

@@ -11,9 +11,9 @@ import pytest
 
 from board_runs import TWIN, Bench, kinds, needs_twin, pings
 from echostep.board import messages as m
-from echostep.board.subscription import SUBSCRIBE
-from echostep.simulation.devices.board import BoardProcess
-from echostep.simulation.stimulus import NO_SYNC, ROW
+from echostep_app.board.subscription import SUBSCRIBE
+from echostep_app.simulation.devices.board import BoardProcess
+from echostep_app.simulation.stimulus import NO_SYNC, ROW
 from twin.late_clock import HALF_WRAP, TICKS_S, TIMER_WRAP, WRAP, late_firmware
 
 pytestmark = needs_twin

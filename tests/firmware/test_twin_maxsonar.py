@@ -8,7 +8,7 @@ import pytest
 
 from board_runs import Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
-from echostep.board.subscription import SUBSCRIBE
+from echostep_app.board.subscription import SUBSCRIBE
 
 pytestmark = needs_twin
 

@@ -10,8 +10,8 @@ import pytest
 
 from board_runs import ELF, ROOT, TWIN, Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
-from echostep.board.subscription import SUBSCRIBE
-from echostep.simulation.devices.board import BoardProcess
+from echostep_app.board.subscription import SUBSCRIBE
+from echostep_app.simulation.devices.board import BoardProcess
 
 pytestmark = needs_twin
 

@@ -11,10 +11,10 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.mapping.graph import matching
-from echostep.mapping.graph.matching import Pieces
-from echostep.mapping.walls import evidence
-from echostep.mapping.walls.lines import Lines
+from echostep_app.mapping.graph import matching
+from echostep_app.mapping.graph.matching import Pieces
+from echostep_app.mapping.walls import evidence
+from echostep_app.mapping.walls.lines import Lines
 
 
 def match(new: Pieces, old: Pieces, pivot: Floats, shifts_m: Floats, turns_rad: Floats) -> Floats:

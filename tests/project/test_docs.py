@@ -17,8 +17,8 @@ from board_runs import ROOT
 from command_line import echostep
 from docs import generate
 from docs.pages import commands, python, teams
-from echostep.cli import app
 from echostep.plan.model import load_plan
+from echostep_app.cli import app
 from team.team_broker import Broker, needs_broker
 
 MANUAL = sorted((ROOT / "host/docs").glob("*.md"))
@@ -69,10 +69,13 @@ FILE_NAMES = {path.name for folder in ("host", "tools", "tests", "protocol") for
 
 SOURCE = "\n".join(
     path.read_text()
-    for folder in ("host/echostep", "host/studies", "protocol", "firmware")
+    for folder in ("host/core", "host/app", "host/studies", "protocol", "firmware")
     for path in sorted((ROOT / folder).rglob("*"))
     if path.suffix in {".py", ".toml", ".c", ".h", ".js"}
 )
+
+
+RINGS = (ROOT / "host/core/echostep", ROOT / "host/app/echostep_app")
 
 
 def name_of(page: Path) -> str:
@@ -152,7 +155,7 @@ def test_a_name_in_the_design_stands_in_the_code(page: Path) -> None:
 @pytest.mark.parametrize("page", [page for page in PAGES if page.parent != ROOT / "protocol"], ids=name_of)
 def test_a_named_file_of_the_project_exists(page: Path) -> None:
     """`foot/ins.py` and the like in the text."""
-    roots = (ROOT, ROOT / "host/echostep", page.parent)
+    roots = (ROOT, *RINGS, page.parent)
     for path in re.findall(r"`((?:[\w.-]+/)+[\w-]+\.(?:py|c|h|toml|js|md))`", page.read_text()):
         assert "NAME" in path or any((root / path).exists() for root in roots), path
 
@@ -171,8 +174,7 @@ def test_a_code_flow_names_what_its_files_hold(flow: str) -> None:
     text = page.partition(f"## Code flow of one {flow}\n")[2].partition("\n## ")[0].partition("\n|")[0]
     files = re.findall(r"`([\w/]+\.(?:py|c|js))`", text)
     assert len(files) > 3
-    roots = {path: ROOT if path.startswith("firmware/") else ROOT / "host/echostep" for path in files}
-    source = "".join((root / path).read_text() for path, root in roots.items())
+    source = "".join(next(p for root in (ROOT, *RINGS) if (p := root / path).exists()).read_text() for path in files)
     for name in re.findall(r"`(?:[A-Z]\w+\.)?(\w+)`", text):
         assert re.search(rf"\b{name}\b", source), name
 
@@ -296,7 +298,7 @@ def test_what_needs_hardware_can_be_typed_as_it_stands(page: Path) -> None:
 
 def test_the_readme_says_what_it_is_before_its_commands() -> None:
     first = (ROOT / "README.md").read_text().partition("## Two commands")[0]
-    project = tomllib.loads((ROOT / "host/pyproject.toml").read_text())["project"]
+    project = tomllib.loads((ROOT / "host/core/pyproject.toml").read_text())["project"]
     for words in (
         f"`version {project['version']}`",
         f"Python {project['requires-python'].removeprefix('>=')} or newer",
@@ -327,7 +329,7 @@ def test_a_question_about_the_code_is_answered_in_two_hops() -> None:
     assert len(rows) > 10
     for question, answer in rows:
         files = re.findall(r"`([\w/]+\.(?:py|toml))`", answer)
-        roots = [root / path for path in files for root in (ROOT, ROOT / "host/echostep") if (root / path).exists()]
+        roots = [root / path for path in files for root in (ROOT, *RINGS) if (root / path).exists()]
         assert len(roots) == len(files) > 0, question
         source = "".join(path.read_text() for path in roots)
         for name in re.findall(r"`(?:[A-Z]\w+\.)?(\w+)`", answer):

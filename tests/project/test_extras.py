@@ -21,15 +21,16 @@ from packaging.utils import canonicalize_name
 
 from board_runs import ROOT
 from command_line import PROGRAM, echostep
-from echostep import cli
 from echostep.extras import EXTRAS
+from echostep_app import cli
 from foot.foot_walks import MANNERS, course, samples
 from walks import DEMO
 
 pytestmark = pytest.mark.process
-PACKAGE = ROOT / "host/echostep"
-PROJECT = tomllib.loads((ROOT / "host/pyproject.toml").read_text())["project"]
-OPTIONAL = PROJECT["optional-dependencies"]
+RINGS = {"core": ROOT / "host/core/echostep", "app": ROOT / "host/app/echostep_app"}
+PROJECTS = {ring: tomllib.loads((ROOT / f"host/{ring}/pyproject.toml").read_text())["project"] for ring in RINGS}
+REQUIRED = {ring: project["dependencies"] for ring, project in PROJECTS.items()}
+OPTIONAL = PROJECTS["app"]["optional-dependencies"]
 FOR_DEVELOPERS = {"dev", "bench", "cluster"}
 BROUGHT = {"pubsub"}  # by meshtastic
 OWNERS = packages_distributions()
@@ -49,22 +50,33 @@ def third_party(path: Path) -> Iterator[str]:
     for node in ast.walk(ast.parse(path.read_text())):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
         names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-        yield from {name.partition(".")[0] for name in names} - sys.stdlib_module_names - {"echostep", "__future__"}
+        yield from (
+            {name.partition(".")[0] for name in names}
+            - sys.stdlib_module_names
+            - {"echostep", "echostep_app", "__future__"}
+        )
 
 
 def test_the_table_is_that_of_pyproject() -> None:
-    parts = {extra: texts for extra, texts in OPTIONAL.items() if extra not in {*FOR_DEVELOPERS, "all", "studies"}}
+    parts = {extra: texts for extra, texts in OPTIONAL.items() if extra not in {*FOR_DEVELOPERS, "all"}}
     for package, extra in EXTRAS.items():
         assert package in imports(parts[extra]), package
     assert {r.name for texts in parts.values() for r in map(Requirement, texts)} == {
         name for package in EXTRAS for name in OWNERS[package]
     }
-    assert not imports(PROJECT["dependencies"]) & set(EXTRAS)
+    assert not imports([*REQUIRED["core"], *REQUIRED["app"]]) & set(EXTRAS)
 
 
 def test_all_is_every_extra_but_the_gpl_and_the_studies() -> None:
     (everything,) = map(Requirement, OPTIONAL["all"])
-    assert everything.extras == set(OPTIONAL) - FOR_DEVELOPERS - {"all", "mesh", "studies"}
+    assert everything.extras == set(OPTIONAL) - FOR_DEVELOPERS - {"all", "mesh"}
+
+
+def test_each_extra_of_the_app_is_one_of_the_core_under_its_name() -> None:
+    """So that one name is installed: pip install 'echostep[page]'."""
+    extras = {extra: texts for extra, texts in PROJECTS["core"]["optional-dependencies"].items() if extra != "studies"}
+    assert extras.pop("app") == ["echostep-app[all]"]
+    assert extras == {extra: [f"echostep-app[{extra}]"] for extra in OPTIONAL if extra not in FOR_DEVELOPERS}
 
 
 def test_the_readme_names_every_extra() -> None:
@@ -74,17 +86,23 @@ def test_the_readme_names_every_extra() -> None:
 
 @pytest.mark.slow
 def test_every_import_is_required_or_has_an_extra() -> None:
-    required = imports(PROJECT["dependencies"])
-    assert {"numpy", "serial", "lz4"} <= required
-    found = {package: path for path in PACKAGE.rglob("*.py") for package in third_party(path)}
-    assert {name: path for name, path in found.items() if name not in required | set(EXTRAS) | BROUGHT} == {}
-    assert required <= set(found), "required, but nothing imports it"
+    core, app = (imports(REQUIRED[ring]) for ring in RINGS)
+    assert {"numpy", "lz4"} <= core
+    assert "serial" in app
+    for ring, required in (("core", core), ("app", core | app)):
+        found = {package: path for path in RINGS[ring].rglob("*.py") for package in third_party(path)}
+        assert {name: path for name, path in found.items() if name not in required | set(EXTRAS) | BROUGHT} == {}
+        assert imports(REQUIRED[ring]) <= set(found) | {"echostep"}, "required, but nothing imports it"
+
+
+def test_the_core_requires_at_most_ten_packages() -> None:
+    assert len(REQUIRED["core"]) <= 10
 
 
 @pytest.mark.slow
 def test_no_kernel_multiplies_matrices_without_saying_so() -> None:
     """A product in a kernel needs the BLAS of scipy."""
-    for path in PACKAGE.rglob("*.py"):
+    for path in (path for package in RINGS.values() for path in package.rglob("*.py")):
         for function in ast.walk(ast.parse(text := path.read_text())):
             if isinstance(function, ast.FunctionDef) and any(
                 "kernel" in ast.unparse(d) for d in function.decorator_list
@@ -120,8 +138,8 @@ print(json.dumps([before, list(sys.modules), len(frames)]))
     done = subprocess.run([sys.executable, "-c", code], env=core, capture_output=True, text=True, check=True)
     before, after, frames = json.loads(done.stdout)
     own = {name.partition(".")[0] for name in before} - set(EXTRAS)
-    assert not own & imports(PROJECT["dependencies"])
-    loaded = {name.partition(".")[0] for name in after} & imports(PROJECT["dependencies"])
+    assert not own & imports(REQUIRED["core"])
+    loaded = {name.partition(".")[0] for name in after} & imports(REQUIRED["core"])
     assert loaded == {"cobs", "lz4", "mcap", "numba", "numpy", "zstandard"}
     assert frames > 1000
 

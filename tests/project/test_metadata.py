@@ -22,7 +22,7 @@ from release import wheel as wheels
 pytestmark = pytest.mark.process
 
 PUBLIC = "https://example.org/owner/echostep"
-PROJECT = tomllib.loads((ROOT / "host/pyproject.toml").read_text())["project"]
+PROJECT = tomllib.loads((ROOT / "host/core/pyproject.toml").read_text())["project"]
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("hatchling")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ECHOSTEP_URL", PUBLIC)
-        return wheels.build(tmp_path_factory.mktemp("published"))
+        return wheels.build(tmp_path_factory.mktemp("published"), "core")
 
 
 def metadata(wheel: Path) -> Message:
@@ -77,8 +77,9 @@ def test_links_and_pictures_of_the_page_on_pypi_are_absolute_and_lead_somewhere(
 
 def test_the_licence_that_the_package_takes_along_is_the_projects(built: Path) -> None:
     """A copy, because an archive of the sources cannot hold a link that leads out of it."""
-    assert not (ROOT / "host/LICENSE").is_symlink()
-    assert (ROOT / "host/LICENSE").read_text() == (ROOT / "LICENSE").read_text()
+    for ring in ("core", "app"):
+        assert not (ROOT / f"host/{ring}/LICENSE").is_symlink()
+        assert (ROOT / f"host/{ring}/LICENSE").read_text() == (ROOT / "LICENSE").read_text()
     with zipfile.ZipFile(built) as archive:
         name = next(name for name in archive.namelist() if name.endswith("licenses/LICENSE"))
         assert archive.read(name) == (ROOT / "LICENSE").read_bytes()
@@ -87,7 +88,7 @@ def test_the_licence_that_the_package_takes_along_is_the_projects(built: Path) -
 def test_without_a_public_address_none_is_invented(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("hatchling")
     monkeypatch.delenv("ECHOSTEP_URL", raising=False)
-    about = metadata(wheels.build(tmp_path))
+    about = metadata(wheels.build(tmp_path, "app"))
     assert about.get_all("Project-URL") is None
     assert about.get_payload() == (ROOT / "host/README.md").read_text()
 

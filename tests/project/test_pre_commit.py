@@ -17,7 +17,7 @@ def recipe(target: str) -> list[str]:
     found = re.search(rf"^{target}:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.MULTILINE)
     assert found, target
     lines = [line.strip().removeprefix("@") for line in found[1].splitlines()]
-    lines = [line.replace("$(TOOL)", "env PYTHONPATH=tools:tests $(BIN)/python -m") for line in lines]
+    lines = [line.replace("$(TOOL)", "env PYTHONPATH=tools:tests:tests/app $(BIN)/python -m") for line in lines]
     return [line.replace("$(BIN)", ".venv/bin").replace("$(MAKE)", "make") for line in lines]
 
 

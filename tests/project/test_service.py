@@ -58,7 +58,7 @@ def test_it_runs_without_a_home_in_a_narrow_terminal_of_locale_c(tmp_path: Path,
         "TMPDIR": str(tmp_path),
     }
     environment |= {} if home is None else {"HOME": home}
-    plan = ROOT / "host/echostep/plans/demo.json"
+    plan = ROOT / "host/core/echostep/plans/demo.json"
     command = [sys.executable, "-m", "echostep", "plan", "check", str(plan)]
     done = subprocess.run(command, env=environment, cwd="/", capture_output=True, timeout=PATIENCE_S, check=False)
     assert done.returncode == 0, done.stderr
@@ -158,7 +158,7 @@ def folder() -> Iterator[Path]:
 def test_another_user_tracks_replays_and_looks_with_an_installation_that_only_root_can_write(folder: Path) -> None:
     environment = {"PATH": os.environ["PATH"], "PYTHONPATH": os.pathsep.join(sys.path), "HOME": "/nonexistent"}
     environment |= {"TMPDIR": str(folder / "temporary"), "NUMBA_CACHE_DIR": "/proc"}
-    plan, out, log = ROOT / "host/echostep/plans/demo.json", folder / "out", folder / "log"
+    plan, out, log = ROOT / "host/core/echostep/plans/demo.json", folder / "out", folder / "log"
     program = [*AS_ANOTHER_USER, *PYTHON]
     with twin_board() as port, log.open("w") as printed:
         os.chmod(port, 0o666)  # noqa: PTH101 (a port, not a file)

@@ -13,10 +13,10 @@ from PIL import Image
 
 from echostep.arrays import Ints
 from echostep.localization.estimate import TrackStatus
-from echostep.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
 from echostep.plan.model import load_plan
-from echostep.simulation.devices.board import PythonBoard
-from echostep.simulation.scenario import Scenario
+from echostep_app.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
+from echostep_app.simulation.devices.board import PythonBoard
+from echostep_app.simulation.scenario import Scenario
 from echostep_studies.figures import walk_picture
 
 pytestmark = pytest.mark.slow

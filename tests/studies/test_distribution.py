@@ -14,10 +14,10 @@ import typer
 from typer.testing import CliRunner
 
 from board_runs import ROOT
-from echostep.cli import app
-from echostep.commands import studies
 from echostep.errors import EchostepError
-from echostep.offline import profiles
+from echostep_app.cli import app
+from echostep_app.commands import studies
+from echostep_app.offline import profiles
 from echostep_studies.commands import OURS, PAPERS, REAL, STUDIES, StudyCommand
 
 PACKAGE = ROOT / "host/studies/echostep_studies"

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from command_line import echostep
-from echostep.simulation.world.beacon_ground import OUTLIER_M, disturbance, ground, is_in_reach, measure
+from echostep_app.simulation.world.beacon_ground import OUTLIER_M, disturbance, ground, is_in_reach, measure
 from echostep_studies.fischer2008.paper_fusion import FUSION, fuse
 from echostep_studies.fischer2008.simulator import OURS, PAPER, PDR, guided_return
 from echostep_studies.fischer2008.study import NOMINAL, UNCERTAIN, Case, cases, one_batch, one_return, wilson95
@@ -80,6 +80,7 @@ def test_nearly_all_return_by_a_map_that_was_learnt_on_the_way_in() -> None:
     assert sum(one_return(Case("", OURS, deployed=True), seed) for seed in range(12)) >= 11
 
 
+@pytest.mark.long
 def test_three_dead_beacons_in_a_row_are_a_gap_that_is_crossed() -> None:
     """20 m without a beacon leave 4 m out of reach; after each return the allowed time without a measurement doubles."""
     for seed in range(3):

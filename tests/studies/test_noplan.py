@@ -13,12 +13,12 @@ import pytest
 from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.localization.estimate import TrackStatus
-from echostep.mapping.graph.graph import Closure
-from echostep.mapping.graph.nodes import Nodes
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.check import check_plan
 from echostep.plan.model import Level, load_plan
-from echostep.simulation.scenario import DEMO_WAYPOINTS
+from echostep_app.mapping.graph.graph import Closure
+from echostep_app.mapping.graph.nodes import Nodes
+from echostep_app.plan.check import check_plan
+from echostep_app.simulation.scenario import DEMO_WAYPOINTS
 from echostep_studies.bench.filtering import Claim
 from echostep_studies.bench.sites import Site, plan_of
 from echostep_studies.bench.walks import SimulatedWalk
@@ -147,7 +147,7 @@ def test_the_loop_has_its_rooms_and_its_furniture() -> None:
 @pytest.mark.long
 def test_one_walk_gives_its_rows(tmp_path: Path) -> None:
     """The demo's walk, drawn: better than the foot alone; a second person is tracked on the drawing."""
-    site = Site(load_plan(ROOT / "host/echostep/plans/demo.json"), DEMO_WAYPOINTS)
+    site = Site(load_plan(ROOT / "host/core/echostep/plans/demo.json"), DEMO_WAYPOINTS)
     row, second = drawn_rows("office/demo", site, 2, tmp_path / "office.png")
     assert row.rmse_m < 0.5
     assert row.wrong == 0

@@ -16,13 +16,13 @@ from echostep.arrays import Floats
 from echostep.board.gateway import Gateway
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.plan.model import load_plan
-from echostep.simulation.scenario import START_NS
+from echostep_app.simulation.scenario import START_NS
 from echostep_studies.frame.study import StudyRequest, run_study
 from echostep_studies.team import study, tracking, walks
 from echostep_studies.team.beacons import MOST_EACH, dropped_on, with_dropped_beacons
 from echostep_studies.team.walks import AGAIN_S, TeamWalks, encounters
 
-PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
+PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 T_S = np.arange(0.0, 100.0, 0.02)
 
 

@@ -12,12 +12,12 @@ import pytest
 from typer.testing import CliRunner
 
 from echostep.arrays import Floats
-from echostep.cli import app
 from echostep.foot.steps import FootCounts, Track
-from echostep.simulation.devices.mtx import MtxModel, measure
-from echostep.simulation.devices.onboard_filter import OnBoardFilter
-from echostep.simulation.people.walker import Walk
-from echostep.simulation.world.magnetic_field import EARTH_T, MagneticDipole, MagneticField, dipole
+from echostep_app.cli import app
+from echostep_app.simulation.devices.mtx import MtxModel, measure
+from echostep_app.simulation.devices.onboard_filter import OnBoardFilter
+from echostep_app.simulation.people.walker import Walk
+from echostep_app.simulation.world.magnetic_field import EARTH_T, MagneticDipole, MagneticField, dipole
 from echostep_studies.papers import fischer2008
 from echostep_studies.simulation.fischer_trails import TRAILS, Trail, measure_trail, walk_trail
 from echostep_studies.trails.study import TrailRun, summaries

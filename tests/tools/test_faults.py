@@ -11,7 +11,7 @@ import pytest
 from board_runs import ROOT, Bench, needs_twin
 from echostep.ports.chunks import BOARD, MTX
 from echostep.recording.reading import open_recording
-from echostep.simulation.devices.board import PythonBoard
+from echostep_app.simulation.devices.board import PythonBoard
 from reliability import faults
 from reliability.fault_outcomes import NORMAL_S, FaultOutcome, judge_streams, table
 from twin.host_faults import kill, plug_mtx, unplug_mtx

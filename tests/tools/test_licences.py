@@ -50,9 +50,9 @@ def test_a_module_keeps_its_docstring_below_the_licence() -> None:
 
 def test_the_licence_of_every_dependency_is_listed() -> None:
     """Those of pyproject.toml and of its extras, and what they need in turn."""
-    listed = licences.needed("echostep", ("all",))
+    listed = licences.needed("echostep-app", ("all",))
     assert {"numpy", "numba", "llvmlite", "starlette", "anyio"} <= set(listed)
-    assert {"starlette", "scipy", "meshtastic"}.isdisjoint(licences.needed("echostep"))
+    assert {"starlette", "scipy", "meshtastic"}.isdisjoint(licences.needed("echostep-app"))
     assert "pytest" not in listed
     for name, package in listed.items():
         assert licences.licence(package) != licences.UNKNOWN, name
@@ -66,7 +66,7 @@ def test_make_licences_prints_a_row_for_each(
     monkeypatch.setattr("sys.argv", ["licences.py"])
     assert licences.main() == 0
     rows = capsys.readouterr().out.splitlines()[2:]
-    assert len(rows) > len(licences.needed("echostep"))
+    assert len(rows) > len(licences.needed("echostep-app"))
     for name, use in (("numpy", "to run"), ("scipy", "by an extra"), ("distributed", "to develop, or by the studies")):
         row = next(row for row in rows if row.startswith(f"| {name} "))
         assert re.fullmatch(rf"\| {name} \| [\d.]+ \| .*BSD.* \| {use} \|", row)

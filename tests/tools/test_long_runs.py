@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from echostep.session.runs import demo
-from echostep.simulation.scenario import DEMO_WAYPOINTS
+from echostep_app.session.runs import demo
+from echostep_app.simulation.scenario import DEMO_WAYPOINTS
 from reliability import demo_loops, viewers
 from team.team_broker import needs_broker
 

@@ -15,9 +15,9 @@ from echostep.board.frames import encode
 from echostep.board.messages import Configure, PressureMode, Schedule
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import MTX
-from echostep.simulation.devices.board import PythonBoard, Sent
-from echostep.simulation.stimulus import NO_SYNC
 from echostep.xsens import MtxReader
+from echostep_app.simulation.devices.board import PythonBoard, Sent
+from echostep_app.simulation.stimulus import NO_SYNC
 from reliability import long_tour, soak
 from twin.late_clock import HALF_WRAP, TICKS_S, WRAP
 
@@ -72,7 +72,7 @@ def test_seconds_around_the_wrap_of_the_boards_clock(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_rounds_of_the_tour_have_no_seam() -> None:
-    tour = long_tour.LongTour(load_plan(ROOT / "host/echostep/plans/demo.json"), 1, LateBoard(), ROUND)
+    tour = long_tour.LongTour(load_plan(ROOT / "host/core/echostep/plans/demo.json"), 1, LateBoard(), ROUND)
     edges = np.flatnonzero(tour._rows["sync_us"] != NO_SYNC)
     edges_us = 1000 * edges + tour._rows["sync_us"][edges]
     apart_us = np.diff([*edges_us, edges_us[0] + 1000 * tour._length_ms])

@@ -15,7 +15,7 @@ import pytest
 
 from board_runs import ROOT, needs_twin
 from command_line import echostep
-from echostep.recording.recorder import Recorder
+from echostep_app.recording.recorder import Recorder
 from echostep_studies.speed import stages
 from release import same_bits, tested_versions
 from reliability import campaign, faults
@@ -31,9 +31,10 @@ STARTED_BY = {
     "hardware.nets": HERE,
     "release.licences": "tools/test_licences.py",
     "release.same_bits": HERE,
+    "release.sizes": "tools/test_sizes.py",
     "release.tested_versions": HERE,
     "release.wheel": "tools/test_wheel.py",
-    "reliability.damaged_blocks": "recording/test_flips.py",
+    "reliability.damaged_blocks": "app/recording/test_flips.py",
     "reliability.demo_loops": "tools/test_long_runs.py",
     "reliability.faults": HERE,
     "reliability.flip_recording": HERE,
@@ -46,9 +47,9 @@ STARTED_BY = {
     "reliability.team_load": HERE,
     "reliability.team_operation": "tools/test_operation_tool.py",
     "reliability.viewers": "tools/test_long_runs.py",
-    "twin.acceptance_walk": "session/acceptance/test_acceptance_command.py",
+    "twin.acceptance_walk": "app/session/acceptance/test_acceptance_command.py",
     "twin.measure": HERE,
-    "twin.run": "commands/test_live.py",
+    "twin.run": "app/commands/test_live.py",
 }
 Start = Callable[..., int | None]
 

@@ -20,7 +20,7 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str
     """`bin` of an environment with the wheel in it, and surroundings without compilers."""
     folder = tmp_path_factory.mktemp("wheel")
     try:
-        built = wheels.build(folder)
+        built = [wheels.build(folder, ring) for ring in ("core", "app")]
     except subprocess.CalledProcessError as error:
         if "hatchling" in error.stderr:
             pytest.skip("hatchling is not installed in this environment")
@@ -48,7 +48,7 @@ def test_an_installed_wheel_has_what_the_demo_needs(fresh: tuple[Path, dict[str,
     code = (
         "from importlib.resources import files, as_file\n"
         "from echostep.plan.model import load_plan\n"
-        "from echostep.simulation.scenario import demo_scenario\n"
+        "from echostep_app.simulation.scenario import demo_scenario\n"
         "with as_file(files('echostep') / 'plans' / 'demo.json') as path: print(len(load_plan(path).levels[0].walls))"
     )
     assert int(wheels.run([programs / "python", "-c", code], env, tmp_path)) > 10
@@ -57,8 +57,9 @@ def test_an_installed_wheel_has_what_the_demo_needs(fresh: tuple[Path, dict[str,
 
 def test_an_installed_wheel_holds_its_data_and_nothing_else(fresh: tuple[Path, dict[str, str]]) -> None:
     programs, _ = fresh
-    (package,) = programs.parent.glob("lib/python*/site-packages/echostep")
-    for name in ("plans/demo.json", "firmware/echostep.hex", "firmware/99-echostep.rules", "page/static/index.html"):
-        assert (package / name).stat().st_size > 100, name
-    record = next(package.parent.glob("echostep-*.dist-info/RECORD")).read_text()
-    assert "tests/" not in record
+    (packages,) = programs.parent.glob("lib/python*/site-packages")
+    names = ("firmware/echostep.hex", "firmware/99-echostep.rules", "page/static/index.html")
+    for name in ("echostep/plans/demo.json", *(f"echostep_app/{name}" for name in names)):
+        assert (packages / name).stat().st_size > 100, name
+    for record in packages.glob("echostep*.dist-info/RECORD"):
+        assert "tests/" not in record.read_text()

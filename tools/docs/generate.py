@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 from docs.pages import DOCS, commands, hardware, plan, python, recordings, settings, teams
-from echostep.team.messages.report import schema
+from echostep_app.team.messages.report import schema
 
 
 def pages() -> dict[Path, str]:

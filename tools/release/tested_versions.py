@@ -23,11 +23,12 @@ from release.licences import for_developers
 FILE = ROOT / "host/tested-versions.txt"
 OLDEST = "3.11.2"  # Debian 12's
 DEMO = (
-    "./host[page,plots]",
+    "./host/core",
+    "./host/app[page,plots]",
     "pyproj",
     "hatchling",
 )  # pyproj: longitude and latitude of the demo; hatchling installs the checkout
-ALL = ("./host[dev]", "./host/studies[cluster]", "hatchling")
+ALL = ("./host/core", "./host/app[dev]", "./host/studies[cluster]", "hatchling")
 HEAD = (
     "# Versions with which the tests have passed, and the hashes of their files, for every system and Python: "
     "written by make lock, installed by make setup, checked by make audit.\n"
@@ -46,7 +47,14 @@ def resolved(wanted: tuple[str, ...], preferred: str, uv: str) -> str:
     with tempfile.TemporaryDirectory() as folder:
         lines = Path(folder, "versions.txt")
         lines.write_text(preferred)
-        own = ("--no-emit-package", "echostep", "--no-emit-package", "echostep-studies")
+        own = (
+            "--no-emit-package",
+            "echostep",
+            "--no-emit-package",
+            "echostep-app",
+            "--no-emit-package",
+            "echostep-studies",
+        )
         layout = ("--quiet", "--no-header", "--no-annotate", "--generate-hashes", "--output-file", str(lines))
         command = [uv, "pip", "compile", "--universal", "--python-version", OLDEST, *own, *layout, "-"]
         subprocess.run(command, input="\n".join(wanted), cwd=ROOT, stdout=subprocess.DEVNULL, text=True, check=True)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Builds the wheel, installs it in a fresh environment and runs a demo there, without clone, compiler or apt.
+"""Builds the wheels of core and app, installs them in a fresh environment and runs a demo there, without clone, compiler or apt.
 
-In: the host package. Out: one line per stage with its time; exit status 1 when a stage fails. Owns a temporary folder.
+In: the two distributions. Out: one line per stage with its time; exit status 1 when a stage fails. Owns a temporary folder.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from pathlib import Path
 from places import ROOT
 
 
-def build(folder: Path) -> Path:
-    """Build the wheel in a folder; raises subprocess.CalledProcessError with the output of pip."""
+def build(folder: Path, ring: str) -> Path:
+    """Build the wheel of `core` or `app` in a folder; raises subprocess.CalledProcessError with the output of pip."""
     run(
         [
             sys.executable,
@@ -34,15 +34,15 @@ def build(folder: Path) -> Path:
             "--no-build-isolation",
             "-w",
             folder,
-            ROOT / "host",
+            ROOT / "host" / ring,
         ]
     )
-    (wheel,) = folder.glob("echostep-*.whl")
+    (wheel,) = folder.glob("echostep-*.whl" if ring == "core" else "echostep_app-*.whl")
     return wheel
 
 
-def environment(folder: Path, wheel: Path, *, borrow: bool) -> Path:
-    """A fresh virtual environment with the wheel in it; `borrow`: dependencies are links to this environment; else pip fetches wheels.
+def environment(folder: Path, wheels: list[Path], *, borrow: bool) -> Path:
+    """A fresh virtual environment with the wheels in it; `borrow`: dependencies are links to this environment; else pip fetches wheels.
 
     Returns the environment's `bin`.
     """
@@ -51,7 +51,7 @@ def environment(folder: Path, wheel: Path, *, borrow: bool) -> Path:
     if borrow:
         _link_packages(folder)
     offline = ["--no-deps", "--no-index"] if borrow else ["--only-binary", ":all:"]
-    run([sys.executable, "-m", "pip", "--python", python, "install", "--quiet", *offline, wheel])
+    run([sys.executable, "-m", "pip", "--python", python, "install", "--quiet", *offline, *wheels])
     return folder / "bin"
 
 
@@ -87,10 +87,11 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         try:
-            wheel = build(folder)
-            print_stage(f"{wheel.name}, {wheel.stat().st_size / 1024:.0f} KB")
-            print_stage(f"SHA-256 {hashlib.sha256(wheel.read_bytes()).hexdigest()}")
-            programs = environment(folder / "fresh", wheel, borrow=False)
+            built = [build(folder, ring) for ring in ("core", "app")]
+            for wheel in built:
+                print_stage(f"{wheel.name}, {wheel.stat().st_size / 1024:.0f} KB")
+                print_stage(f"SHA-256 {hashlib.sha256(wheel.read_bytes()).hexdigest()}")
+            programs = environment(folder / "fresh", built, borrow=False)
             size = sum(f.stat().st_size for f in (folder / "fresh").rglob("*") if f.is_file())
             print_stage(f"installed without compiler; {size / 1e6:.0f} MB with all dependencies")
             output = run(
@@ -104,7 +105,7 @@ def main() -> int:
                 **environment_variables(programs, folder),
                 "PIP_CONFIG_FILE": os.environ.get("PIP_CONFIG_FILE", "/etc/pip.conf"),
             }
-            output = run([programs / "pipx", "run", "--spec", wheel, "echostep", "--help"], env, folder)
+            output = run([programs / "pipx", "run", "--spec", built[0], "echostep", "--help"], env, folder)
             print_stage(f"pipx run echostep --help: {len(output.splitlines())} lines")
         except subprocess.CalledProcessError as error:
             print(f"{error.cmd}\n{error.stdout}{error.stderr}", file=sys.stderr)

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.cli import main as echostep
+from echostep_app.cli import main as echostep
 from reliability.campaign import Figure, options, report
 from reliability.soak import resident_mb
 

@@ -24,11 +24,11 @@ from echostep.localization.estimate import Estimate
 from echostep.plan.model import Plan, load_plan
 from echostep.recording.mcap_records import HEAD_SIZE, LOG_TIME_OFFSET, MCAP_MAGIC, MESSAGE
 from echostep.recording.reading import open_recording
-from echostep.recording.recorder import Recorder
-from echostep.recording.repair.edit import repair
-from echostep.session.losses import skipped
-from echostep.session.options import TrackingOptions
-from echostep.session.runs.replay import tracker_of
+from echostep_app.recording.recorder import Recorder
+from echostep_app.recording.repair.edit import repair
+from echostep_app.session.losses import skipped
+from echostep_app.session.options import TrackingOptions
+from echostep_app.session.runs.replay import tracker_of
 from places import PLAN
 from reliability.campaign import Figure, none, options, report, track
 from walks import walk_chunks

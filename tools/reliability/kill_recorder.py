@@ -29,7 +29,7 @@ from pathlib import Path
 from echostep.errors import EchostepError
 from echostep.recording.mcap_records import MCAP_MAGIC
 from echostep.recording.reading import open_recording
-from echostep.recording.repair.edit import repair
+from echostep_app.recording.repair.edit import repair
 from reliability.campaign import Figure, none, options, report, track
 
 CHUNK_NS = 1_200_000  # between two chunks: 850 a second, as both ports deliver them
@@ -39,10 +39,10 @@ LIMIT_MS = 1000.0
 WRITER = """
 import os, struct, sys, time
 from pathlib import Path
-from echostep.recording.recorder import DerivedMessage
+from echostep_app.recording.recorder import DerivedMessage
 from echostep.ports.chunks import Chunk
-from echostep.session.runs.recording import start_recording
-from echostep.output.foxglove import pose
+from echostep_app.session.runs.recording import start_recording
+from echostep_app.output.foxglove import pose
 path, pipe = sys.argv[1], int(sys.argv[2])
 number, busy = 0, [(k * 7919) % 100_003 for k in range(100_003)]
 with start_recording(Path(path), {"note": "to be killed"}) as recorder:

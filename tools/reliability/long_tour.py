@@ -18,11 +18,11 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.plan.model import Plan
 from echostep.ports.chunks import BOARD, MTX, Chunk
-from echostep.simulation.devices.board import Board
-from echostep.simulation.devices.mtx import FIRST_S, MtxModel
-from echostep.simulation.people.walker import Person, Waypoint
-from echostep.simulation.scenario import BLOCK_MS, START_NS, USB_LATENCY_NS, Scenario
 from echostep.xsens import MTDATA, MtSample, MtxReader, encode_frame, pack_mtdata
+from echostep_app.simulation.devices.board import Board
+from echostep_app.simulation.devices.mtx import FIRST_S, MtxModel
+from echostep_app.simulation.people.walker import Person, Waypoint
+from echostep_app.simulation.scenario import BLOCK_MS, START_NS, USB_LATENCY_NS, Scenario
 
 MODEL = MtxModel(drift_ppm=50.0)
 SAMPLES, SPAN_MS = 2000, 20_001  # so many samples of MODEL's crystal are a whole number of milliseconds

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from echostep.team.messages.crews import Crew, Does
+from echostep_app.team.messages.crews import Crew, Does
 
 BY = "simulated"  # the commander who signs
 MINUTE_S = 60.0

@@ -27,19 +27,19 @@ from echostep.arrays import Floats
 from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep.localization.estimate import TrackStatus
-from echostep.page.server import Address
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import BOARD, Chunk
-from echostep.ports.serial_ports import SerialPorts
-from echostep.session.chunk_streams import portions_of
-from echostep.session.metadata import clock_metadata, run_metadata
-from echostep.session.options import OutputOptions
-from echostep.session.runs.live import _recorded_chunks
-from echostep.session.runs.recording import start_recording
-from echostep.session.session import Session
-from echostep.simulation.devices.board import BoardProcess
 from echostep.tracker import Tracker
 from echostep.walk.recorded import SIMULATED
+from echostep_app.page.server import Address
+from echostep_app.ports.serial_ports import SerialPorts
+from echostep_app.session.chunk_streams import portions_of
+from echostep_app.session.metadata import clock_metadata, run_metadata
+from echostep_app.session.options import OutputOptions
+from echostep_app.session.runs.live import _recorded_chunks
+from echostep_app.session.runs.recording import start_recording
+from echostep_app.session.session import Session
+from echostep_app.simulation.devices.board import BoardProcess
 from places import OUT, PLAN, TWIN
 from reliability.campaign import options, report
 from reliability.long_tour import LongTour, TracedBoard

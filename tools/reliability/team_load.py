@@ -24,11 +24,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from echostep.plan.model import Plan, load_plan
-from echostep.team.endpoint import parse_endpoint
-from echostep.team.messages.report import Motion, Position, Report, StreamReport
-from echostep.team.mqtt.publisher import MqttTransport
-from echostep.team.outbox import Outbox
-from echostep.team.publish import empty_report
+from echostep_app.team.endpoint import parse_endpoint
+from echostep_app.team.messages.report import Motion, Position, Report, StreamReport
+from echostep_app.team.mqtt.publisher import MqttTransport
+from echostep_app.team.outbox import Outbox
+from echostep_app.team.publish import empty_report
 from places import PLAN
 from reliability.broker import broker
 from reliability.campaign import options

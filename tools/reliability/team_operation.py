@@ -22,24 +22,24 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-from echostep.guidance.cues import CueKind
-from echostep.interruption import wait_for
 from echostep.plan.model import Plan, load_plan
 from echostep.ports.chunks import Chunk
-from echostep.session.chunk_streams import paced, portions_of, with_messages
-from echostep.session.options import OutputOptions
-from echostep.session.session import Session
-from echostep.simulation.devices.board import PythonBoard
-from echostep.simulation.people.walker import Waypoint
-from echostep.simulation.scenario import Scenario
-from echostep.team.commander import update_roster
-from echostep.team.endpoint import parse_endpoint, parse_outlet
-from echostep.team.inbox import Inbox, ListenerThread
-from echostep.team.mqtt.publisher import Listener, MqttTransport
-from echostep.team.outbox import Outbox
-from echostep.team.publish import empty_report
-from echostep.team.roster import Member, MemberState, Roster
 from echostep.tracker import Tracker
+from echostep_app.guidance.cues import CueKind
+from echostep_app.interruption import wait_for
+from echostep_app.session.chunk_streams import paced, portions_of, with_messages
+from echostep_app.session.options import OutputOptions
+from echostep_app.session.session import Session
+from echostep_app.simulation.devices.board import PythonBoard
+from echostep_app.simulation.people.walker import Waypoint
+from echostep_app.simulation.scenario import Scenario
+from echostep_app.team.commander import update_roster
+from echostep_app.team.endpoint import parse_endpoint, parse_outlet
+from echostep_app.team.inbox import Inbox, ListenerThread
+from echostep_app.team.mqtt.publisher import Listener, MqttTransport
+from echostep_app.team.outbox import Outbox
+from echostep_app.team.publish import empty_report
+from echostep_app.team.roster import Member, MemberState, Roster
 from places import PLAN, TWIN
 from reliability.broker import broker
 from reliability.campaign import options

@@ -16,10 +16,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from echostep.plan.model import Plan
-from echostep.session.acceptance.protocol import Point, Visit
-from echostep.session.acceptance.survey import corridor
-from echostep.simulation.people.walker import Person, Walk, Waypoint
-from echostep.simulation.scenario import Scenario
+from echostep_app.session.acceptance.protocol import Point, Visit
+from echostep_app.session.acceptance.survey import corridor
+from echostep_app.simulation.people.walker import Person, Walk, Waypoint
+from echostep_app.simulation.scenario import Scenario
 from twin.run import PtyBoard, PtyMtx, playing, wait_for_opening
 
 STOP_S = 1.5  # on a point that is visited standing; assumed

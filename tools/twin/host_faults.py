@@ -28,8 +28,8 @@ UDP_PORT, PAGE_PORT = 9471, 9472
 SLOW_DISK = f"""
 import sys, time
 from pathlib import Path
-from echostep.cli import main
-from echostep.recording.background_writer import BackgroundWriter
+from echostep_app.cli import main
+from echostep_app.recording.background_writer import BackgroundWriter
 slow, write = Path(sys.argv[sys.argv.index("--out") + 1]).parent / "slow", BackgroundWriter._write_to_file
 def write_slowly(self, data):
     if slow.exists():
@@ -41,7 +41,7 @@ main()
 DATAGRAMS = """
 import socket, sys, time
 from echostep.board.frames import encode
-from echostep.simulation.devices.beacon_gateway import message
+from echostep_app.simulation.devices.beacon_gateway import message
 flood, k = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), 0
 while True:
     for _ in range(50):

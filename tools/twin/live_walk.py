@@ -27,8 +27,8 @@ from echostep.board.frames import BoardReader
 from echostep.plan.model import load_plan
 from echostep.ports.arrival_clock import now_ns
 from echostep.recording.reading import open_recording
-from echostep.simulation.scenario import demo_scenario
-from echostep.simulation.stimulus import BoardSensors
+from echostep_app.simulation.scenario import demo_scenario
+from echostep_app.simulation.stimulus import BoardSensors
 from places import PLAN
 from reliability.fault_outcomes import NORMAL_S, FaultOutcome, heard, judge_estimates, judge_streams
 from twin.run import PtyBoard, PtyMtx, playing, wait_for_opening

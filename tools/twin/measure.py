@@ -19,10 +19,10 @@ from rich.progress import track
 
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader, encode
-from echostep.board.subscription import SUBSCRIBE
-from echostep.simulation.devices.board import BoardProcess
-from echostep.simulation.kits import Kit
-from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
+from echostep_app.board.subscription import SUBSCRIBE
+from echostep_app.simulation.devices.board import BoardProcess
+from echostep_app.simulation.kits import Kit
+from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 from places import TWIN
 from reliability.campaign import options, report
 

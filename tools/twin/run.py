@@ -27,16 +27,16 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.commands.actions.beacon_player import simulate_gateway
 from echostep.plan.model import Plan, load_plan
-from echostep.simulation.devices.beacon_gateway import SPACING_M
-from echostep.simulation.devices.board import Sent
-from echostep.simulation.devices.foot_board import FootBoardPort
-from echostep.simulation.kits import Kit
-from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario, demo_scenario
-from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 from echostep.xsens import MtxReader
 from echostep.xsens.reader import warm_up
+from echostep_app.commands.actions.beacon_player import simulate_gateway
+from echostep_app.simulation.devices.beacon_gateway import SPACING_M
+from echostep_app.simulation.devices.board import Sent
+from echostep_app.simulation.devices.foot_board import FootBoardPort
+from echostep_app.simulation.kits import Kit
+from echostep_app.simulation.scenario import DEMO_WAYPOINTS, Scenario, demo_scenario
+from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 from echostep_studies.simulation.devices.mtx_setup import MtxDevice
 from echostep_studies.simulation.devices.poses import LyingParts
 from echostep_studies.simulation.devices.rehearsal import Act, Rehearsal

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from echostep.arrays import Floats
-from echostep.cli import app
-from echostep.commands.actions.offline import foot as run_foot
 from echostep.errors import EchostepError
 from echostep.foot import steps as foot
-from echostep.simulation.devices import onboard_filter as onboard
+from echostep_app.cli import app
+from echostep_app.commands.actions.offline import foot as run_foot
+from echostep_app.simulation.devices import onboard_filter as onboard
 from echostep_studies.frame.recordings import DATA
 from echostep_studies.papers import fischer2008
 from echostep_studies.papers.fischer2008 import Fischer2008
@@ -208,6 +208,7 @@ def test_the_filter_follows_the_gyros_through_any_turn() -> None:
     assert np.linalg.norm(found - matrices, axis=(1, 2)).max() < 0.02
 
 
+@pytest.mark.long
 def test_the_filter_takes_an_acceleration_for_a_lean_and_a_turned_field_for_north() -> None:
     t = np.arange(1000) / 100.0
     at_rest, none = np.array([0.0, 0.0, 9.81]), np.zeros((1000, 3))
@@ -315,7 +316,7 @@ def test_a_real_walk_with_its_sensor_s_own_matrix_comes_out_short_as_in_the_pape
     """The GX5's own filter is another maker's black box: it falls short of the surveyed way, too, and so does our model of the MTx's."""
     from scipy.io import loadmat
 
-    from echostep.simulation.people.attitude import rotations
+    from echostep_app.simulation.people.attitude import rotations
 
     table = np.genfromtxt(DATA / "gx5_gcp" / f"SensorConnectData_{name}.csv", delimiter=",", skip_header=1)
     survey = loadmat(DATA / "gx5_gcp" / f"SensorConnectData_{name}_LLIO.mat")

@@ -79,6 +79,7 @@ def test_equation_2() -> None:
     assert average(np.array([0.0, 4.0]), np.array([2.0, 2.0]), np.array([3.0, 1.0])) == (1.0, 2.0)
 
 
+@pytest.mark.long
 @given(st.floats(0.1, 4.9), st.floats(0.1, 2.9), st.floats(-math.pi, math.pi))
 @settings(max_examples=50)
 def test_equation_3_by_plain_rays(x: float, y: float, heading: float) -> None:

@@ -22,7 +22,7 @@ SERIES = (
 )  # folders whose README lists the other pages
 
 project = "echostep"
-version = release = tomllib.loads((ROOT / "host/pyproject.toml").read_text())["project"]["version"]
+version = release = tomllib.loads((ROOT / "host/core/pyproject.toml").read_text())["project"]["version"]
 copyright = "the echostep authors"  # noqa: A001 (Sphinx' name)
 extensions = ["myst_parser"]
 highlight_language = "none"  # of blocks that name no language
@@ -30,6 +30,7 @@ root_doc = "README"
 include_patterns = [
     "README.md",
     "host/*.md",
+    "host/core/*.md",
     "host/docs/*.md",
     "host/docs/*/*.md",
     "host/studies/*.md",
@@ -39,13 +40,13 @@ include_patterns = [
     "protocol/*.md",
     "tools/twin/*.md",
 ]
-exclude_patterns = [".?*", "out", "tests", "host/echostep", "**/build", "**/__pycache__"]
+exclude_patterns = [".?*", "out", "tests", "host/core/echostep", "host/app", "**/build", "**/__pycache__"]
 myst_heading_anchors = 4
 suppress_warnings = ["myst.header"]  # a page may begin below its title's level
 
 html_theme = "furo"
 html_title = f"echostep {version}"
-html_favicon = str(ROOT / "host/echostep/page/static/icon.svg")
+html_favicon = str(ROOT / "host/app/echostep_app/page/static/icon.svg")
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_copy_source = html_show_sphinx = False

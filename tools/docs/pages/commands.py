@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """host/docs/commands.md: every command with its arguments and options, from typer.
 
-In: `echostep.cli`. Out: the page. Owns nothing.
+In: `echostep_app.cli`. Out: the page. Owns nothing.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import typer
 import typer.models
 
 from docs.pages import MADE
-from echostep.cli import app
+from echostep_app.cli import app
 
 
 def page() -> str:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """host/docs/plan.md: its table of every field of plan.json, from the schema.
 
-In: host/echostep/plans/plan.schema.json. Out: the page with its tables made anew. Owns nothing.
+In: host/core/echostep/plans/plan.schema.json. Out: the page with its tables made anew. Owns nothing.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 
 from docs.pages import DOCS, HOST, between_marks
 
-SCHEMA = HOST / "echostep/plans/plan.schema.json"
+SCHEMA = HOST / "core/echostep/plans/plan.schema.json"
 FIELDS = "| field | type | needed | meaning |\n|---|---|---|---|\n"
 TYPES = "\n| type | meaning |\n|---|---|\n"
 

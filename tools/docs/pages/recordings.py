@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """host/docs/recordings.md: its table of derived messages, from their schemas.
 
-In: `echostep.output`. Out: the page with its table made anew. Owns nothing.
+In: `echostep_app.output`. Out: the page with its table made anew. Owns nothing.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from __future__ import annotations
 import json
 
 from docs.pages import DOCS, between_marks
-from echostep.output.derived import TOPICS
-from echostep.output.foxglove import FRAME, LOCATION, LOG, POSE, SCENE
-from echostep.recording.recorder import Topic
+from echostep_app.output.derived import TOPICS
+from echostep_app.output.foxglove import FRAME, LOCATION, LOG, POSE, SCENE
+from echostep_app.recording.recorder import Topic
 
 SHOWN_BY = {
     POSE.name: "where the trunk is; 3D panel",

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """host/docs/teams.md: its tables of every field of a report, and the report's JSON Schema, from the dataclasses that the host checks with.
 
-In: `echostep.team.messages.report`. Out: the page with its tables made anew, and the text of report.schema.json. Owns nothing.
+In: `echostep_app.team.messages.report`. Out: the page with its tables made anew, and the text of report.schema.json. Owns nothing.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import json
 from typing import Any
 
 from docs.pages import DOCS, HOST, between_marks
-from echostep.team.messages.report import schema
+from echostep_app.team.messages.report import schema
 
-SCHEMA = HOST / "echostep/team/report.schema.json"
+SCHEMA = HOST / "app/echostep_app/team/report.schema.json"
 
 
 def tables(tree: dict[str, Any]) -> str:

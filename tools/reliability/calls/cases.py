@@ -11,9 +11,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from echostep.operation.recorded.record import OperationRecorder
 from echostep.plan.model import load_plan
-from echostep.recording.recorder import Recorder
+from echostep_app.operation.recorded.record import OperationRecorder
+from echostep_app.recording.recorder import Recorder
 from free_ports import free_port
 from places import PLAN
 from players import python_board

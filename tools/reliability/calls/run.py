@@ -21,9 +21,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from unittest import mock
 
-from echostep.cli import main
 from echostep.errors import EchostepError
 from echostep.recording.reading import open_recording
+from echostep_app.cli import main
 from reliability.calls.cases import Case
 from reliability.calls.shim import Failure, calls_made
 

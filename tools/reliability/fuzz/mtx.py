@@ -14,10 +14,10 @@ from collections import Counter
 import numpy as np
 
 from echostep.xsens import MTDATA, MTDATA2, PROJECT, MtBatch, MtSample, MtxLimits, MtxReader, OutputFormat, encode_frame
-from echostep.xsens.configuration.requests import project_requests
-from echostep.xsens.configuration.setup import MtxSetup
 from echostep.xsens.frames import MAX_LENGTH
 from echostep.xsens.packets import read_packets
+from echostep_app.xsens.requests import project_requests
+from echostep_app.xsens.setup import MtxSetup
 from echostep_studies.simulation.devices.mtx_setup import pack
 from reliability.campaign import Figure, options, report
 

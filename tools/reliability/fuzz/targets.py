@@ -16,24 +16,24 @@ from tempfile import TemporaryDirectory
 from echostep.board.frames import encode
 from echostep.board.gateway import Gateway
 from echostep.offline.imu_csv import load_imu
-from echostep.offline.leg_csv import load_legs
-from echostep.page.requests import parse_request
-from echostep.plan.importers.formats import import_plan
 from echostep.plan.model import load_plan, parse_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
-from echostep.ports.datagram_key import Opener, seal
 from echostep.ports.people.check_in import parse_person
 from echostep.ports.people.tap import Tap, parse_tap
 from echostep.recording.reading import open_recording
-from echostep.recording.recorder import Recorder
-from echostep.recording.repair.recovery import Recovery
 from echostep.settings import parse_settings
-from echostep.simulation.devices.beacon_gateway import message
-from echostep.team.messages.report import decode
-from echostep.team.messages.report import encode as report_bytes
-from echostep.team.messages.shared_drawings import checked_drawing
 from echostep.tracker import Tracker
 from echostep.xsens.message import MessageReader
+from echostep_app.offline.leg_csv import load_legs
+from echostep_app.page.requests import parse_request
+from echostep_app.plan.importers.formats import import_plan
+from echostep_app.ports.datagram_key import Opener, seal
+from echostep_app.recording.recorder import Recorder
+from echostep_app.recording.repair.recovery import Recovery
+from echostep_app.simulation.devices.beacon_gateway import message
+from echostep_app.team.messages.report import decode
+from echostep_app.team.messages.report import encode as report_bytes
+from echostep_app.team.messages.shared_drawings import checked_drawing
 from echostep_studies.barometer.pressure_csv import load_pressures
 from plan.imported_plans import write_seven_floors
 from team.team_reports import report

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from echostep.errors import EchostepError
-from echostep.output.table import Table
+from echostep_app.output.table import Table
 from echostep_studies.anywhere.amcl import track_by_amcl
 from echostep_studies.anywhere.trials import NEEDS_DATA, PEERED, TRIALS, Trial, Walks
 from echostep_studies.bench.columns import ClaimsRow, ClaimsSummary, JudgedRow, run_row, summaries, tables

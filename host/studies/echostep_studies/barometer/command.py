@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from echostep.commands.options import Columns, Units, picture_file
+from echostep_app.commands.options import Columns, Units, picture_file
 
 
 def floors(

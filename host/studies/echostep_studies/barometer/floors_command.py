@@ -14,7 +14,7 @@ from rich.console import Console
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.offline.foreign_columns import OWN, Naming
-from echostep.printing.picture_files import save_picture
+from echostep_app.printing.picture_files import save_picture
 from echostep_studies.barometer.altitude import BarometerSettings, Pressures
 from echostep_studies.barometer.floor_filter import FloorFilter, Floors, checked_heights
 from echostep_studies.barometer.floor_record import describe, find_storeys, noise_of_record, thinned

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.output.table import Table
+from echostep_app.output.table import Table
 from echostep_studies.bench.filtering import FilterRun
 from echostep_studies.bench.judgement import JudgedRun
 from echostep_studies.frame.report import LOST_END_M, as_dict, as_dicts, rows_by_name

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from echostep.output.score_plots import stanford_axes
+from echostep_app.output.score_plots import stanford_axes
 from echostep_studies.bench.columns import ClaimsRow, JudgedRow
 from echostep_studies.frame.pictures import ORANGE, axes_of, save
 from echostep_studies.frame.report import rows_by_name

@@ -15,7 +15,7 @@ import numpy as np
 
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import CloudSettings
-from echostep.output.table import Table
+from echostep_app.output.table import Table
 from echostep_studies.bench.columns import JudgedRow, JudgedSummary, run_row, summaries, tables
 from echostep_studies.bench.filtering import FilterRun, track
 from echostep_studies.bench.judgement import JudgedRun, TruePlaces, judge

@@ -13,8 +13,8 @@ from functools import cache
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.simulation.world.acoustics import PIPE_RADIUS_M, SRF02, rod_db
-from echostep.simulation.world.echoes import echoes
+from echostep_app.simulation.world.acoustics import PIPE_RADIUS_M, SRF02, rod_db
+from echostep_app.simulation.world.echoes import echoes
 
 TRIES = 200  # pings at each place
 WIDTH_M = 2.4  # of the corridor of Figure 5

@@ -13,8 +13,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.localization.echoes.likelihood import EchoModel, EchoSettings, echo_model, log_echo
-from echostep.output.table import console
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep_app.output.table import console
 from echostep_studies.simulation.marker_walk import lay_markers, walk_markers
 from echostep_studies.simulation.sites import angled, otb, thousand
 

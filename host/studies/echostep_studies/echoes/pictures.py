@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echostep.localization.echoes.likelihood import EchoSettings, echo_model
-from echostep.simulation.world.acoustics import SRF02, directivity_db
 from echostep.walls.echo_sources import Walls
+from echostep_app.simulation.world.acoustics import SRF02, directivity_db
 from echostep_studies.echoes.effects import Effect, pipe_range_m
 from echostep_studies.echoes.likelihood import log_p
 from echostep_studies.frame.pictures import BLUE, GREEN, ORANGE, RED, axes_of, save

@@ -13,9 +13,9 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
-from echostep.commissioning.rangers.known_pings import KnownPings, known_pings, log_densities
 from echostep.localization.echoes.likelihood import EchoModel
 from echostep.walls.echo_sources import Walls
+from echostep_app.commissioning.rangers.known_pings import KnownPings, known_pings, log_densities
 from echostep_studies.echoes.sweeps import Sweep
 
 GRID_M, HEADINGS = 0.04, 120  # 4 cm, 3 degrees: those of the figures that this is compared with

@@ -17,9 +17,9 @@ import numpy as np
 from msgspec import UNSET, UnsetType
 
 from echostep.localization.echoes.likelihood import EchoSettings, echo_model
-from echostep.output.table import Table
-from echostep.simulation.world.acoustics import SRF02, directivity_db
 from echostep.walls.echo_sources import Walls
+from echostep_app.output.table import Table
+from echostep_app.simulation.world.acoustics import SRF02, directivity_db
 from echostep_studies.echoes.effects import Effect, pipe_range_m, simulated_effects
 from echostep_studies.echoes.findings import FINDINGS
 from echostep_studies.echoes.likelihood import SettingRow, fitted, log_p

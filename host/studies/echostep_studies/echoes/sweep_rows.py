@@ -14,10 +14,10 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Floats
-from echostep.commissioning.rangers.fit import BIAS, FITTED, MISSED, fit_ranger, score
-from echostep.commissioning.rangers.known_pings import KnownPings, known_pings
 from echostep.localization.echoes.likelihood import EchoSettings, echo_model
 from echostep.walls.echo_sources import Walls
+from echostep_app.commissioning.rangers.fit import BIAS, FITTED, MISSED, fit_ranger, score
+from echostep_app.commissioning.rangers.known_pings import KnownPings, known_pings
 from echostep_studies.echoes.placing import grid_table, place
 from echostep_studies.echoes.sweeps import Sweep, SweepSet
 

@@ -17,7 +17,7 @@ from rich.progress import track as progress
 
 from echostep.foot.ins import Noise
 from echostep.foot.steps import Track
-from echostep.output.table import console
+from echostep_app.output.table import console
 from echostep_studies.bench.recordings.feet import FootRecording
 from echostep_studies.feet.rows import FigureRow
 

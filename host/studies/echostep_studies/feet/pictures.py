@@ -20,7 +20,7 @@ def draw_tracks(path: Path, recordings: list[FootRecording], tracks: list[Track]
     from matplotlib.figure import Figure as Sheet
     from matplotlib.lines import Line2D
 
-    from echostep.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
+    from echostep_app.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
 
     across = 6
     down = -(-len(recordings) // across)

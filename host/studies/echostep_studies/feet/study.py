@@ -15,7 +15,7 @@ from msgspec import UNSET
 
 from echostep.foot.ins import Noise
 from echostep.foot.steps import Track, walk_track
-from echostep.output.table import Table, console
+from echostep_app.output.table import Table, console
 from echostep_studies.bench.recordings.feet import SETS, FootRecording
 from echostep_studies.bench.recordings.foot_metrics import FootFigure, way
 from echostep_studies.feet.latency import LIVE, pace_rows

@@ -22,14 +22,14 @@ from rich.console import Console
 from echostep.arrays import Floats
 from echostep.foot.steps import Step, walk_track
 from echostep.localization.estimate import Estimate, digest
-from echostep.output.track_plot import draw_track
 from echostep.plan.model import Pose, load_plan
 from echostep.recording.reading import open_recording
-from echostep.scorecard.truth import load_truth
-from echostep.session.runs.recording import start_recording
 from echostep.settings import parse_settings
 from echostep.tracker import Tracker
 from echostep.walk.table import write_track
+from echostep_app.output.track_plot import draw_track
+from echostep_app.scorecard.truth import load_truth
+from echostep_app.session.runs.recording import start_recording
 from echostep_studies.bench.recordings.foot_metrics import align, rmse
 from echostep_studies.bench.recordings.hallways import (
     LONG_STEP_M,

@@ -20,21 +20,21 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.localization.estimate import Estimate, claims_place
-from echostep.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan, load_plan
 from echostep.ports.chunks import portion_of
-from echostep.scorecard.truth import Truth
-from echostep.simulation.devices.board import Board, BoardProcess, PythonBoard
-from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario, demo_scenario
 from echostep.tracker import Tracker
+from echostep_app.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
+from echostep_app.scorecard.truth import Truth
+from echostep_app.simulation.devices.board import Board, BoardProcess, PythonBoard
+from echostep_app.simulation.scenario import DEMO_WAYPOINTS, Scenario, demo_scenario
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from PIL.Image import Image
 
 ROOT = Path(__file__).resolve().parents[4]
-PLAN = ROOT / "host/echostep/plans/demo.json"
+PLAN = ROOT / "host/core/echostep/plans/demo.json"
 PICTURE = ROOT / "host/pictures/walk.webp"
 TWIN, ELF = ROOT / "tools/twin/build/echostep-twin", ROOT / "firmware/build/echostep.elf"
 SEED = 1

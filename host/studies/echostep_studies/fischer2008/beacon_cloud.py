@@ -23,9 +23,9 @@ from echostep.localization.beacons.step import Beacons, no_waiting, update_by_re
 from echostep.localization.particle_arrays import Move, ParticleArrays
 from echostep.localization.particles.kernels import systematic
 from echostep.localization.settings import CloudSettings
-from echostep.simulation.world.beacon_ground import BeaconGround, is_in_reach, measure
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex
+from echostep_app.simulation.world.beacon_ground import BeaconGround, is_in_reach, measure
 from echostep_studies.fischer2008.walker import GuidedWalker
 
 CLOUD = CloudSettings()

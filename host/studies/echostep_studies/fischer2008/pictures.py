@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from echostep.simulation.world.beacon_ground import BeaconGround
+from echostep_app.simulation.world.beacon_ground import BeaconGround
 from echostep_studies.fischer2008.simulator import Return
 from echostep_studies.frame.pictures import BLACK, BLUE, GREEN, ORANGE, RED, axes_of, save
 

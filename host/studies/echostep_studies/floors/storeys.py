@@ -21,17 +21,17 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.particles.start import ANY_LEVEL
-from echostep.output.table import Table
-from echostep.plan.importers.formats import open_plan
 from echostep.plan.model import Connector, Plan, Pose
-from echostep.plan.routing import RoutePlace, Routes
 from echostep.ports.chunks import MTX, portion_of
-from echostep.scorecard.error_statistics import error_statistics
-from echostep.simulation.devices.board import PythonBoard
-from echostep.simulation.people.tours import tour as tour_of
-from echostep.simulation.people.walker import Person, Waypoint
-from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker
+from echostep_app.output.table import Table
+from echostep_app.plan.importers.formats import open_plan
+from echostep_app.plan.routing import RoutePlace, Routes
+from echostep_app.scorecard.error_statistics import error_statistics
+from echostep_app.simulation.devices.board import PythonBoard
+from echostep_app.simulation.people.tours import tour as tour_of
+from echostep_app.simulation.people.walker import Person, Waypoint
+from echostep_app.simulation.scenario import Scenario
 from echostep_studies.frame.report import LOST_END_M, as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.tower import tour, tower

@@ -18,8 +18,8 @@ from typing import Literal
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints, spans
-from echostep.output.table import Table
-from echostep.simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
+from echostep_app.output.table import Table
+from echostep_app.simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
 from echostep_studies.barometer import vertical_model as vertical
 from echostep_studies.barometer.altitude import BarometerSettings, Pressures
 from echostep_studies.barometer.floor_filter import FloorFilter, Floors

@@ -14,8 +14,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.output.table import console
-from echostep.printing.picture_files import save_picture
+from echostep_app.output.table import console
+from echostep_app.printing.picture_files import save_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from echostep.errors import EchostepError
-from echostep.output.table import console
+from echostep_app.output.table import console
 
 # The public recordings, found from the root of a checkout
 DATA = Path(os.environ.get("ECHOSTEP_DATA", "../shared/data")).resolve()

@@ -16,7 +16,7 @@ from typing import Any, Protocol, TypeVar
 from msgspec import UNSET
 
 from echostep.errors import EchostepError
-from echostep.scorecard.error_statistics import error_statistics
+from echostep_app.scorecard.error_statistics import error_statistics
 
 Row = dict[str, Any]  # the columns of a row by name
 

@@ -22,7 +22,7 @@ import msgspec
 from rich.progress import track
 
 from echostep.errors import EchostepError
-from echostep.output.table import console
+from echostep_app.output.table import console
 from echostep_studies.frame.report import as_dict
 
 RunRow = TypeVar("RunRow")

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Generic, Literal, TypeVar
 
-from echostep.output.table import Table
+from echostep_app.output.table import Table
 from echostep_studies.frame.report import as_dicts, write_json, write_parquet
 from echostep_studies.frame.runs import SeededRuns
 

@@ -17,7 +17,7 @@ from echostep.arrays import Floats
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import Flag, Stride, StrideSettings, distance_sd_m
 from echostep.legs.strides import StrideEstimator
-from echostep.simulation.people.leg_angles import LegDimensions, stair_angles
+from echostep_app.simulation.people.leg_angles import LegDimensions, stair_angles
 
 CYCLES, RATE_HZ, STAND_S, EASE_S = 15, 100.0, 2.0, 0.8
 AMPLITUDE_SD, TIME_SD = 0.08, 0.05  # of a person against the curves

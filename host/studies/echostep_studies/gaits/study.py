@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 from statistics import fmean
 from typing import Any
 
-from echostep.output.table import Table
+from echostep_app.output.table import Table
 from echostep_studies.frame.report import as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.gaits.foot import STEPS, FootRun, foot_rows

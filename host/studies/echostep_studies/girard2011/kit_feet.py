@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.board.imu_errors import fit_errors, pose_of
 from echostep.foot.ins import GRAVITY_M_S2, Noise
 from echostep.foot.steps import walk_track
 from echostep.odometry.foot_source import ICM20649_NOISE
-from echostep.simulation.devices.foot_board import measure_foot
-from echostep.simulation.devices.mtx import MtxModel, measure
-from echostep.simulation.people.walker import RATE_HZ, Person, Walk, walk
+from echostep_app.commissioning.imu_errors import fit_errors, pose_of
+from echostep_app.simulation.devices.foot_board import measure_foot
+from echostep_app.simulation.devices.mtx import MtxModel, measure
+from echostep_app.simulation.people.walker import RATE_HZ, Person, Walk, walk
 from echostep_studies.simulation.sites import otb
 
 PACES = {"walking": Person(), "hurried": Person(stride_m=1.9, stride_s=0.8)}  # 1.2 and 2.4 m/s; assumed

@@ -21,10 +21,10 @@ from echostep.localization.echoes.likelihood import EchoSettings
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import FilterSettings
-from echostep.output.table import Table
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
 from echostep.walls.echo_sources import Walls
+from echostep_app.output.table import Table
 from echostep_studies.frame.report import ErrorSummary, as_dict, as_dicts, rows_by_name, summary
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.papers.girard2011 import Girard, GirardSettings

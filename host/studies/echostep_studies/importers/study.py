@@ -17,14 +17,14 @@ from pathlib import Path
 import numpy as np
 
 from echostep.errors import EchostepError
-from echostep.output.table import Table
-from echostep.plan.importers.formats import is_foreign
-from echostep.plan.importers.limited import import_reported
-from echostep.plan.importers.report import ImportReport
-from echostep.plan.importers.summary import doors_in_gaps, size_m
 from echostep.plan.model import Plan
-from echostep.plan.places.faces import OUTSIDE
-from echostep.plan.places.spaces import find_spaces
+from echostep_app.output.table import Table
+from echostep_app.plan.importers.formats import is_foreign
+from echostep_app.plan.importers.limited import import_reported
+from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.summary import doors_in_gaps, size_m
+from echostep_app.plan.places.faces import OUTSIDE
+from echostep_app.plan.places.spaces import find_spaces
 from echostep_studies.frame.report import as_dict
 from echostep_studies.frame.study import Study, StudyRequest
 

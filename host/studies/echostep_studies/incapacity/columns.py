@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.output.table import Table
+from echostep_app.output.table import Table
 from echostep_studies.frame.report import as_dicts, rows_by_name
 from echostep_studies.frame.study import StudyRequest
 from echostep_studies.incapacity import falls

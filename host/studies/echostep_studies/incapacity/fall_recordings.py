@@ -16,8 +16,8 @@ from echostep.arrays import Floats
 from echostep.foot.steps import Foot, Step
 from echostep.foot.trunk_path import GaitSettings, TrunkPath
 from echostep.path import PathSegment
-from echostep.wearer.falls import STRIDE_M, Fall
-from echostep.wearer.wearer_signs import WearerSigns
+from echostep_app.wearer.falls import STRIDE_M, Fall
+from echostep_app.wearer.wearer_signs import WearerSigns
 from echostep_studies.bench.recordings.feet import SETS as FEET
 from echostep_studies.frame.recordings import Sets, read_sets
 from echostep_studies.incapacity.falls import MESSAGES_HZ, NoFallRun, message_index

@@ -15,11 +15,11 @@ from msgspec import UNSET, UnsetType
 
 from echostep.arrays import Floats, Ints
 from echostep.odometry.wearer import AlarmKind, AlarmReason
-from echostep.output.table import Table
 from echostep.path import PathSegment
-from echostep.wearer.alarm import WearerAlarm
-from echostep.wearer.falls import Fall
-from echostep.wearer.wearer_signs import Sign, WearerSigns
+from echostep_app.output.table import Table
+from echostep_app.wearer.alarm import WearerAlarm
+from echostep_app.wearer.falls import Fall
+from echostep_app.wearer.wearer_signs import Sign, WearerSigns
 from echostep_studies.frame.report import as_dicts, rows_by_name
 from echostep_studies.simulation.body_motion import ICM20649, MTX, SensorPart
 from echostep_studies.simulation.falling import FALLS, NO_FALLS, STRIDE_M, BodySamples, walk_then

@@ -18,9 +18,9 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.legs.trunk_path import GyroBlock
 from echostep.odometry.wearer import AlarmKind
-from echostep.wearer.alarm import WearerAlarm
-from echostep.wearer.stillness import WINDOW_S, Stillness, Window
-from echostep.wearer.wearer_signs import StepTaken
+from echostep_app.wearer.alarm import WearerAlarm
+from echostep_app.wearer.stillness import WINDOW_S, Stillness, Window
+from echostep_app.wearer.wearer_signs import StepTaken
 from echostep_studies.bench.recordings.feet import SETS as FEET
 from echostep_studies.bench.recordings.legs import SETS as LEGS
 from echostep_studies.frame.recordings import DATA, read_sets

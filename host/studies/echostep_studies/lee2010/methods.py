@@ -15,12 +15,12 @@ from echostep.arrays import Floats
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import StrideSettings
 from echostep.legs.trunk_path import WearerSettings
-from echostep.offline.leg_track import track_default
 from echostep.plan.model import Plan, Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.settings import Settings
-from echostep.simulation.people.walker import walk
 from echostep.tracker import Tracker
+from echostep_app.offline.leg_track import track_default
+from echostep_app.simulation.people.walker import walk
 from echostep_studies.lee2010.walks import STOREY_M, STOREYS, MeasuredWalk, chunks_of, measure, person_of, storeys
 from echostep_studies.papers import lee2010
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.simulation.people.walker import Walk
+from echostep_app.simulation.people.walker import Walk
 from echostep_studies.frame.pictures import save
 from echostep_studies.lee2010.methods import METHODS, MethodTrack, floors_of, with_plan
 from echostep_studies.lee2010.walks import (

@@ -17,7 +17,7 @@ from echostep.legs.clipping import repair_clipping
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import StrideSettings
 from echostep.legs.strides import StrideEstimator
-from echostep.output.table import Table
+from echostep_app.output.table import Table
 from echostep_studies.frame.report import as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.joint_gait import (

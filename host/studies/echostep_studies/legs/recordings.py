@@ -16,12 +16,12 @@ from statistics import fmean
 import numpy as np
 
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.mounting import walking_axis
 from echostep.legs.stride import Flag, Stride, StrideSettings, distance_sd_m
-from echostep.offline.leg_csv import LegSamples
-from echostep.offline.leg_pair import track_pair
-from echostep.offline.leg_track import track_default
-from echostep.output.table import Table
+from echostep_app.offline.leg_csv import LegSamples
+from echostep_app.offline.leg_pair import track_pair
+from echostep_app.offline.leg_track import track_default
+from echostep_app.offline.mounting import walking_axis
+from echostep_app.output.table import Table
 from echostep_studies.bench.recordings.legs import SETS, LegRecording
 from echostep_studies.frame.recordings import recordings_in
 from echostep_studies.frame.report import as_dicts

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec import UNSET, UnsetType
 
-from echostep.output.table import Table
+from echostep_app.output.table import Table
 from echostep_studies.frame.report import LOST_END_M, as_dicts, rows_by_name
 from echostep_studies.frame.study import StudyRequest
 from echostep_studies.noplan.joined import PairRun, PairSummary, joined_summary

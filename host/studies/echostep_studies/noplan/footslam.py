@@ -13,7 +13,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.jit import inline_part, kernel
-from echostep.mapping.graph.nodes import Nodes
+from echostep_app.mapping.graph.nodes import Nodes
 
 RADIUS_M = 0.5  # of a hexagon [section III]
 PRIOR = 0.8  # count of every edge before the first transition [section IV]

@@ -13,9 +13,9 @@ import numpy as np
 from msgspec import UNSET, UnsetType
 
 from echostep.errors import EchostepError
-from echostep.mapping.joining import join_walks
-from echostep.mapping.mapper import solve_walk
-from echostep.plan.routing import RoutePlace
+from echostep_app.mapping.joining import join_walks
+from echostep_app.mapping.mapper import solve_walk
+from echostep_app.plan.routing import RoutePlace
 from echostep_studies.bench.sites import Site
 from echostep_studies.bench.tours import random_tour
 from echostep_studies.bench.walks import SimulatedWalk

@@ -16,9 +16,9 @@ import shapely
 from msgspec import UNSET, UnsetType
 
 from echostep.arrays import Bools, Floats
-from echostep.mapping.graph.graph import Closure
-from echostep.mapping.graph.levels import BETWEEN
-from echostep.mapping.mapper import Mapped
+from echostep_app.mapping.graph.graph import Closure
+from echostep_app.mapping.graph.levels import BETWEEN
+from echostep_app.mapping.mapper import Mapped
 from echostep_studies.bench.walks import SimulatedWalk, T, X, Y, Z
 
 COURSE_M = 15.0  # the trunk's place over the foot errs by 4 cm, 0.2 degrees of it

@@ -17,8 +17,8 @@ import numpy as np
 from echostep.angles import wrap
 from echostep.arrays import Floats
 from echostep.path import MeasuredSegment
-from echostep.simulation.world.acoustics import SRF02
-from echostep.simulation.world.echoes import ranger_bias_m
+from echostep_app.simulation.world.acoustics import SRF02
+from echostep_app.simulation.world.echoes import ranger_bias_m
 from echostep_studies.bench.laser.building import building_of, walk_from
 from echostep_studies.bench.laser.carmen_log import CarmenLog, logs_in, name_of
 from echostep_studies.bench.laser.scan_pings import HALF_CONE_RAD, nearest_return

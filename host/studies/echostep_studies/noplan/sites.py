@@ -14,10 +14,10 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Floats
-from echostep.plan.importers.formats import open_plan
 from echostep.plan.model import Level, Plan, load_plan
-from echostep.plan.places.gaps import door_gaps
-from echostep.plan.routing import RoutePlace
+from echostep_app.plan.importers.formats import open_plan
+from echostep_app.plan.places.gaps import door_gaps
+from echostep_app.plan.routing import RoutePlace
 from echostep_studies.bench.sites import OFFICE_DOOR, OFFICE_PLAN, Site, level_alone, plan_of
 from echostep_studies.bench.tours import random_tour
 

@@ -19,11 +19,11 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization.particles.start import Start
-from echostep.mapping.graph.nodes import nodes_of
-from echostep.mapping.mapper import map_walk
-from echostep.mapping.picture import draw_picture
-from echostep.mapping.plan import plan_in
 from echostep.plan.model import Plan
+from echostep_app.mapping.graph.nodes import nodes_of
+from echostep_app.mapping.mapper import map_walk
+from echostep_app.mapping.picture import draw_picture
+from echostep_app.mapping.plan import plan_in
 from echostep_studies.bench.filtering import Claim, track
 from echostep_studies.bench.judgement import TRACKING, TruePlaces, judge, true_levels
 from echostep_studies.bench.recordings import hallways

@@ -21,10 +21,10 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.output.table import Table
-from echostep.scorecard.card import FLOOR_PENALTY_M, score
-from echostep.scorecard.error_statistics import error_statistics, quantile
-from echostep.scorecard.own_track import track_of
+from echostep_app.output.table import Table
+from echostep_app.scorecard.card import FLOOR_PENALTY_M, score
+from echostep_app.scorecard.error_statistics import error_statistics, quantile
+from echostep_app.scorecard.own_track import track_of
 from echostep_studies.bench.judgement import true_levels
 from echostep_studies.frame.report import as_dict, as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest

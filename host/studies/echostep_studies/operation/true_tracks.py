@@ -12,7 +12,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.plan.model import Plan
-from echostep.scorecard.track_columns import ScoredPath
+from echostep_app.scorecard.track_columns import ScoredPath
 
 
 def truth_of(truth: Floats, plan: Plan) -> ScoredPath:

@@ -20,13 +20,13 @@ from echostep.arrays import Floats, spans
 from echostep.localization.estimate import Estimate
 from echostep.localization.particles.start import Start
 from echostep.plan.model import Plan
-from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import Chunk, portion_of
-from echostep.simulation.devices.board import PythonBoard
-from echostep.simulation.people.walker import Manner, Person, Waypoint
-from echostep.simulation.scenario import START_NS, Scenario
 from echostep.tracker import Tracker
 from echostep.tracker.last_place import start_after
+from echostep_app.plan.routing import RoutePlace
+from echostep_app.simulation.devices.board import PythonBoard
+from echostep_app.simulation.people.walker import Manner, Person, Waypoint
+from echostep_app.simulation.scenario import START_NS, Scenario
 from echostep_studies.bench.sites import LOBBY
 from echostep_studies.bench.tours import random_tour
 from echostep_studies.simulation.tower import STOREY_M, tower

@@ -14,10 +14,10 @@ from echostep.foot.steps import Track
 from echostep.legs import swing_detection as leg_swings
 from echostep.legs.stride import StrideSettings
 from echostep.offline.imu_csv import Imu
-from echostep.offline.leg_csv import LegSamples
-from echostep.offline.leg_track import LegTrack, belt_sign, source_of
-from echostep.session.console import console
-from echostep.simulation.devices.onboard_filter import orientations
+from echostep_app.offline.leg_csv import LegSamples
+from echostep_app.offline.leg_track import LegTrack, belt_sign, source_of
+from echostep_app.session.console import console
+from echostep_app.simulation.devices.onboard_filter import orientations
 from echostep_studies.papers import fischer2008, lee2010
 
 

@@ -56,10 +56,10 @@ REPLAY = """
 import sys
 import time
 from unittest import mock
-from echostep.cli import app
-from echostep.session import results
-from echostep.session.runs import replay
-from echostep.session.session import Session
+from echostep_app.cli import app
+from echostep_app.session import results
+from echostep_app.session.runs import replay
+from echostep_app.session.session import Session
 def timed(owner, name):
     work = getattr(owner, name)
     def run(*given):

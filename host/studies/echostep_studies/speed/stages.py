@@ -64,7 +64,7 @@ def reading_time(path: Path) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("recording", type=Path)
-    parser.add_argument("--plan", type=Path, default=Path("host/echostep/plans/demo.json"))
+    parser.add_argument("--plan", type=Path, default=Path("host/core/echostep/plans/demo.json"))
     parser.add_argument("--rounds", type=int, default=5)
     options = parser.parse_args()
     runs = [replay(options.recording, options.plan) for _ in range(options.rounds)]

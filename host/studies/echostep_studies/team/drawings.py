@@ -8,15 +8,15 @@ nothing. The drawing grows by stretches, as a live run's does, and is complete w
 from __future__ import annotations
 
 from echostep.localization.estimate import Estimate
-from echostep.mapping.growing import GrowingMap
-from echostep.mapping.plan import plan_of
-from echostep.page.drawing_process import Stretches
 from echostep.path import MeasuredSegment
 from echostep.plan.model import NO_PLAN, Plan, Pose
-from echostep.plan.writer import plan_json
 from echostep.ports.chunks import portion_of
-from echostep.team.messages.shared_drawings import checked_drawing
 from echostep.tracker import Tracker
+from echostep_app.mapping.growing import GrowingMap
+from echostep_app.mapping.plan import plan_of
+from echostep_app.page.drawing_process import Stretches
+from echostep_app.plan.writer import plan_json
+from echostep_app.team.messages.shared_drawings import checked_drawing
 from echostep_studies.team.tracking import PORTION
 from echostep_studies.team.walks import TeamWalks
 

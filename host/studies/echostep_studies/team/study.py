@@ -25,9 +25,9 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.particles.start import Start
-from echostep.output.table import Table
 from echostep.plan.model import NO_PLAN, Plan, Pose, load_plan
-from echostep.plan.routing import RoutePlace
+from echostep_app.output.table import Table
+from echostep_app.plan.routing import RoutePlace
 from echostep_studies.bench import judgement, sites
 from echostep_studies.bench.judgement import FALSE_TRACKING_M, TruePlaces, true_levels
 from echostep_studies.bench.tours import random_tour

@@ -21,10 +21,10 @@ from echostep.plan.model import Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.meeting import MEETING, MeetingMessage, meeting_with
 from echostep.ports.people.team_beacons import SHARE_S, TEAM_BEACONS, TeamBeacons
-from echostep.simulation.scenario import START_NS
-from echostep.team.outbox import aged
-from echostep.team.publish import position_of
 from echostep.tracker import Tracker
+from echostep_app.simulation.scenario import START_NS
+from echostep_app.team.outbox import aged
+from echostep_app.team.publish import position_of
 from echostep_studies.bench.walks import T
 from echostep_studies.team.walks import Encounter, TeamWalks
 

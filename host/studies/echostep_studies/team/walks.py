@@ -17,11 +17,11 @@ import shapely
 
 from echostep.arrays import Bools, Floats, spans
 from echostep.plan.model import Plan, Pose
-from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import Chunk
-from echostep.simulation.devices.board import PythonBoard
-from echostep.simulation.people.walker import Person, Waypoint
-from echostep.simulation.scenario import Scenario
+from echostep_app.plan.routing import RoutePlace
+from echostep_app.simulation.devices.board import PythonBoard
+from echostep_app.simulation.people.walker import Person, Waypoint
+from echostep_app.simulation.scenario import Scenario
 from echostep_studies.bench.tours import random_tour
 from echostep_studies.bench.walks import T, X, Y, Z
 

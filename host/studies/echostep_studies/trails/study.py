@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from echostep.output.table import Table
+from echostep_app.output.table import Table
 from echostep_studies.frame.report import ErrorSummary, as_dict, as_dicts, rows_by_name, summary
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.fischer_trails import TRAILS, Trail, measure_trail, walk_trail

@@ -14,8 +14,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.foot.steps import Track, walk_track
-from echostep.simulation.devices.mtx import MtxSamples
-from echostep.simulation.people.walker import RATE_HZ, Walk
+from echostep_app.simulation.devices.mtx import MtxSamples
+from echostep_app.simulation.people.walker import RATE_HZ, Walk
 from echostep_studies.papers import fischer2008
 
 RATES_HZ = (100, 50)  # of the MTx: the first is that of all pictures

@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.simulation.world.acoustics import SRF02, Acoustics, wall_db
-from echostep.simulation.world.echoes import ranger_bias_m
+from echostep_app.simulation.world.acoustics import SRF02, Acoustics, wall_db
+from echostep_app.simulation.world.echoes import ranger_bias_m
 from echostep_studies.bench.laser.carmen_log import CarmenLog
 
 HALF_CONE_RAD = math.radians(27.5)  # half of the 55 degree cone [Robot Electronics, sonar FAQ]

@@ -21,10 +21,10 @@ from echostep.foot.steps import Step, walk_track
 from echostep.plan.model import Plan
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep.settings import parse_settings
-from echostep.simulation.devices.board import PythonBoard
-from echostep.simulation.people.walker import RATE_HZ, Walk
-from echostep.simulation.stimulus import BoardSensors
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
+from echostep_app.simulation.devices.board import PythonBoard
+from echostep_app.simulation.people.walker import RATE_HZ, Walk
+from echostep_app.simulation.stimulus import BoardSensors
 from echostep_studies.bench.recordings.feet import FootRecording, hallway
 from echostep_studies.bench.sites import plan_of
 from echostep_studies.bench.walks import SimulatedWalk, walk_of

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Floats
-from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC
+from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC
 
 GRAVITY_M_S2 = 9.81
 SIDES = np.array(

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.plan.model import Plan
-from echostep.simulation.devices.board import Board
-from echostep.simulation.people.walker import Person
-from echostep.simulation.scenario import Scenario
+from echostep_app.simulation.devices.board import Board
+from echostep_app.simulation.people.walker import Person
+from echostep_app.simulation.scenario import Scenario
 
 WALK = ((2.0, 7.5), (12.0, 7.5))  # 10 m along the demo's corridor
 TURN_DEG_S, TURN_BEGIN_MS, TURN_END_MS = 22.0, 1000, 18_500  # 385 degrees within the 20 s of the measurement

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: MIT
+"""`echostep foot`, `legs` and `decode`: recorded files of single sensors, without a plan.
+
+In: CSV files of a foot IMU or of leg gyros, captured bytes. Out: track files and a summary; JSON lines. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from echostep.errors import EchostepError
+from echostep.legs.stride import StrideSettings
+from echostep.offline.foreign_columns import OWN, Naming
+from echostep.offline.imu_csv import describe_track, load_imu, own_track, write_foot_track
+from echostep.recording.capture import Decoder, as_json, read_capture
+from echostep.recording.capture_summary import summary
+from echostep.xsens.message import MessageReader
+from echostep.xsens.output_formats import OutputFormats
+from echostep_app.offline.leg_csv import load_pair
+from echostep_app.offline.leg_lengths import calibrated_scale, checked_lengths
+from echostep_app.offline.leg_pair import track_pair
+from echostep_app.offline.leg_summary import describe_legs, describe_strides, write_leg_track
+from echostep_app.offline.leg_track import track_default
+from echostep_app.offline.profiles import DEFAULT, method
+from echostep_app.output.foot_plot import draw_foot
+from echostep_app.output.leg_plot import draw_legs
+from echostep_app.printing.lines import complain
+from echostep_app.printing.people import is_unread
+from echostep_app.session.console import console
+
+SCALE_RANGE = (0.5, 2.0)  # of --scale: beyond it the lengths of the leg are wrong
+
+
+def foot(path: Path, out: Path, profile: str, picture: Path | None, naming: Naming = OWN) -> None:
+    """Track a recorded foot IMU with this project's method or that of a paper."""
+    track_recording = method("foot", profile, own_track)
+    imu = load_imu(path, naming)
+    for note in imu.notes:
+        console.print(f"{path.name}: {note}")
+    track = track_recording(imu, path.name)
+    write_foot_track(out, track)
+    console.print(f"{path.name}: {describe_track(track)}")
+    if picture is not None:
+        draw_foot(picture, track, path.name)
+    _tell_files(out, picture)
+
+
+def _tell_files(out: Path, picture: Path | None) -> None:
+    """Where the results went."""
+    console.print(f"track: {out}" + (f", picture: {picture}" if picture else ""), markup=False)
+
+
+@dataclass(frozen=True, slots=True)
+class LegOptions:
+    """Lengths of the leg (hip to knee, knee to ankle or floor), the wearer's stride scale, and the true length of the walk; None if not known."""
+
+    thigh_m: float | None
+    shank_m: float | None
+    profile: str = DEFAULT
+    scale: float | None = None
+    walked_m: float | None = None
+
+
+def legs(paths: list[Path], out: Path, options: LegOptions, picture: Path | None = None, naming: Naming = OWN) -> None:
+    """Track a recorded leg, or both of one person, with this project's method or that of a paper."""
+    profile, scale = options.profile, options.scale
+    track_leg = method("legs", profile, track_default)
+    if scale is not None and not SCALE_RANGE[0] < scale < SCALE_RANGE[1]:
+        raise EchostepError(f"--scale {scale:g}: expected about 1, as --walked prints it")
+    lengths = checked_lengths(options.thigh_m, options.shank_m, scale or 1.0)
+    path, pair = paths[0], load_pair(paths, naming)
+    for note in (note for leg in pair for note in leg.notes):
+        console.print(f"{path.name}: {note}")
+    if lengths.measured_to_floor and profile == DEFAULT:
+        ankle = f"{lengths.to_ankle_m:.3f} m to the ankle"
+        console.print(f"--shank {lengths.shank_m:g} is taken as knee to floor: {ankle}")
+    settings = StrideSettings(lengths, calibrated=scale is not None)
+    if len(pair) == 2 and profile != DEFAULT:
+        raise EchostepError(f"--profile {profile} is a method for one leg: give one file, without columns other_...")
+    track = track_pair(*pair, settings) if len(pair) == 2 else track_leg(pair[0], settings)
+    write_leg_track(out, track)
+    for line in describe_strides(track):
+        console.print(line)
+    console.print(f"{path.name}: {describe_legs(track)}")
+    if picture is not None:
+        draw_legs(picture, track.rows, track.strides, path.name)
+    _tell_files(out, picture)
+    if options.walked_m is not None:
+        factor = calibrated_scale(track.distance_m, options.walked_m)
+        console.print(f"--scale {(scale or 1.0) * factor:.4f} makes this walk {options.walked_m:g} m long")
+
+
+def decode(path: Path, mode: str | None = None, settings: str | None = None) -> None:
+    """Print a capture as JSON lines; tell on stderr, in sentences, what it held. `mode`, `settings`: of legacy data, where they are known."""
+    formats = OutputFormats(_bits("--output-mode", mode, 0xFFFF), _bits("--output-settings", settings, 0xFFFF_FFFF))
+    decoder = Decoder(mt=MessageReader(formats))
+    for message in read_capture(path, decoder):
+        sys.stdout.write(json.dumps(as_json(message), allow_nan=False) + "\n")
+        if is_unread():
+            return
+    for line in summary(decoder):
+        complain(line)
+
+
+def _bits(option: str, text: str | None, most: int) -> int | None:
+    """The number of an option, as 6 or 0x0006; None without it."""
+    if text is None:
+        return None
+    try:
+        value = int(text, 0)
+    except ValueError:
+        value = -1
+    if not 0 <= value <= most:
+        raise EchostepError(f"{option} {text}: a number up to 0x{most:X} is expected, as 0x0006")
+    return value

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: MIT
+"""`echostep calibrate rangers`: the wearer's own two rangers from a walk on a plan, recorded before or now.
+
+In: a recording or ports, a plan, a settings file. Out: findings and figures, settings. Owns the instructions and the order: track, judge, write.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+
+from echostep.errors import EchostepError
+from echostep.localization.echoes.rangers import echo_of
+from echostep.recording.joining import open_parts
+from echostep.tracker import Tracker
+from echostep_app.commissioning.calibrate import Sections, read_sections, write_sections
+from echostep_app.commissioning.rangers.faults import SWAPPED
+from echostep_app.commissioning.rangers.poses import PosedPings, SwappedTracker, posed_pings
+from echostep_app.commissioning.rangers.report import RangerReport, report
+from echostep_app.session.metadata import plan_of
+from echostep_app.session.options import PortOptions, TrackingOptions
+from echostep_app.session.runs.live import record
+from echostep_app.session.runs.replay import tracker_of
+
+SURELY = 0.9  # share of the pings sent while `tracking`: of rangers that are swapped a search may find a place that looks alike; assumed
+NOTHING = "Nothing was written: mend it, and walk again."
+GUIDED_S = 60.0  # 400 pings of each ranger
+GUIDE = (
+    "Rangers: begin at the start that is marked on the plan and walk for a minute: along a wall, once round on the spot in a corner, "
+    "stand for five seconds at an open door, and back along the other wall."
+)
+PLAN_NEEDED = "calibrate rangers: --plan is needed, that of the building where the wearer walks, with a marked start"
+
+
+def walk_now(ports: PortOptions, folder: Path, console: Console) -> Path:
+    """Record a minute during which the wearer walks as asked."""
+    console.print(GUIDE)
+    return record(ports, folder / "rangers.mcap")
+
+
+def calibrate_rangers(paths: list[Path], tracking: TrackingOptions, out: Path, console: Console) -> None:
+    """Judge and fit the rangers of a walk; raises EchostepError where the walk cannot be used, or a ranger has a fault."""
+    tracker, pings = tracked(paths, tracking)
+    if pings.believed < SURELY <= _swapped(paths, tracker).believed:
+        raise EchostepError(f"{SWAPPED} {NOTHING}")
+    found = report_of(tracker, pings)
+    for line in found.lines:
+        console.print(line)
+    if found.faults:
+        raise EchostepError("\n".join([*found.faults, NOTHING]))
+    if not found.values:
+        return
+    write_sections(out, merged(read_sections(out), found))
+    console.print(f"{out}: use it with --settings {out}")
+
+
+def tracked(paths: list[Path], tracking: TrackingOptions) -> tuple[Tracker, PosedPings]:
+    """A tracker that has taken a walk, and the walk's pings at the places where it believed them to be sent."""
+    recording = open_parts(paths)
+    tracker = tracker_of(recording, plan_of(tracking), tracking)
+    return tracker, posed_pings(tracker, recording.portions())
+
+
+def report_of(tracker: Tracker, pings: PosedPings) -> RangerReport:
+    """Faults, or fitted settings, beside those of the walk."""
+    usual = echo_of(pings.part, tracker.settings.echo)
+    return report(pings, tracker.laid_out.walls, usual, tracker.settings.ranger)
+
+
+def merged(sections: Sections, found: RangerReport) -> Sections:
+    """Settings with what was fitted."""
+    return sections | {name: sections.get(name, {}) | values for name, values in found.values.items()}
+
+
+def _swapped(paths: list[Path], tracker: Tracker) -> PosedPings:
+    """The same pings if each ranger's are the other one's."""
+    other = SwappedTracker(tracker.plan, tracker.start, tracker.settings)
+    return posed_pings(other, open_parts(paths).portions())

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: MIT
+"""`echostep map`, `foot`, `legs`, `score` and `decode`: commands that read files and write others.
+
+In: the command's arguments and options. Out: files, text. Slow imports wait until a command runs.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from echostep.extras import require
+from echostep_app.commands.options import Columns, Shank, Thigh, Units, needs, picture_file
+
+app = typer.Typer()
+
+
+@app.command("map")
+def map_command(
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="WALK...", help="Recorded walks (.mcap) through one building.")
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="PLAN", help="The plan to write (JSON).")],
+    plan: Annotated[
+        Path | None,
+        typer.Option("--plan", metavar="PARTIAL", help="A partial or old plan, which the walks complete and correct."),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            "--picture", metavar="FILE", callback=picture_file, help="Draw plan and path there (PNG, SVG, PDF)."
+        ),
+    ] = None,
+) -> None:
+    """Draw the plan of a building from recorded walks."""
+    require("a drawing of walks", "scipy")
+    from echostep_app.commands.actions import mapping
+
+    mapping.map_recordings(recordings, plan, out, picture)
+
+
+@app.command()
+def foot(
+    imu: Annotated[Path, typer.Argument(help="CSV: t_s,ax,ay,az,gx,gy,gz[,mx,my,mz] in s, m/s2, rad/s.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV).")] = Path("track.csv"),
+    profile: Annotated[
+        str,
+        typer.Option(
+            "--profile", metavar="NAME", help="default, or fischer2008: that paper's dead reckoning (echostep-studies)."
+        ),
+    ] = "default",
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", metavar="FILE", callback=picture_file, help="Draw the track there (PNG, SVG, PDF)."),
+    ] = None,
+    columns: Columns = None,
+    units: Units = None,
+) -> None:
+    """Zero-velocity navigation of a recorded foot IMU."""
+    from echostep.offline.foreign_columns import parse_naming
+    from echostep_app.commands.actions import offline
+
+    offline.foot(imu, out, profile, picture, parse_naming(columns, units))
+
+
+@app.command()
+def legs(
+    samples: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="SAMPLES...",
+            help="CSV: t_s,thigh_rad_s,shank_rad_s[,belt_rad_s,compass_rad]; 50 to 500 Hz, either sign. "
+            "Gyros of three axes: thigh_x,thigh_y,thigh_z, shank_x,shank_y,shank_z in rad/s, mounted anyhow. "
+            "Both legs: the other one in columns other_thigh_rad_s... of the same file, or in a second file.",
+        ),
+    ],
+    thigh: Thigh = None,
+    shank: Shank = None,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV).")] = Path("track.csv"),
+    profile: Annotated[
+        str,
+        typer.Option("--profile", metavar="NAME", help="default, or lee2010: that paper's method (echostep-studies)."),
+    ] = "default",
+    scale: Annotated[
+        float | None, typer.Option("--scale", help="The wearer's stride scale, as --walked printed it.")
+    ] = None,
+    walked: Annotated[
+        float | None,
+        typer.Option("--walked", metavar="M", help="The true length of this walk: print the wearer's scale."),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            "--picture", metavar="FILE", callback=picture_file, help="Draw track and strides there (PNG, SVG, PDF)."
+        ),
+    ] = None,
+    columns: Columns = None,
+    units: Units = None,
+) -> None:
+    """Distance, strides and track from recorded leg gyros: on thigh and shank, and on the belt if there is one."""
+    from echostep.offline.foreign_columns import parse_naming
+    from echostep_app.commands.actions import offline
+
+    naming = parse_naming(columns, units)
+    offline.legs(samples, out, offline.LegOptions(thigh, shank, profile, scale, walked), picture, naming)
+
+
+@app.command()
+def score(
+    tracks: Annotated[
+        list[Path],
+        typer.Argument(metavar="TRACK...", help="CSV of any tracker: columns t_s, x_m, y_m, and more by their names."),
+    ],
+    truth: Annotated[
+        Path, typer.Option("--truth", metavar="FILE", help="True path, or surveyed points (CSV), on the same clock.")
+    ],
+    plan: Annotated[
+        Path | None, typer.Option("--plan", help="The building's plan, for floors by height, zones and the picture.")
+    ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            "--html", metavar="FILE", callback=needs("matplotlib"), help="Write a page with the table and the pictures."
+        ),
+    ] = None,
+    setup: Annotated[
+        float | None, typer.Option("--setup", metavar="S", help="Set-up time of the system, to be listed.", min=0.0)
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+) -> None:
+    """Score tracks against the truth by ISO/IEC 18305 and EvAAL."""
+    from echostep_app.commands.actions import score as scoring
+
+    scoring.score(tracks, truth, plan, html, setup, as_json=as_json)
+
+
+@app.command()
+def decode(
+    file: Annotated[Path, typer.Argument(help="Captured bytes of the board or of an Xsens MT, or a recording.")],
+    output_mode: Annotated[
+        str | None,
+        typer.Option(
+            "--output-mode", metavar="BITS", help="Output mode of legacy MTData, as 0x0006, instead of the one found."
+        ),
+    ] = None,
+    output_settings: Annotated[
+        str | None,
+        typer.Option(
+            "--output-settings",
+            metavar="BITS",
+            help="Output settings of legacy MTData, as 0x00000001, instead of those found.",
+        ),
+    ] = None,
+) -> None:
+    """Print captured bytes as JSON, one message a line; on stderr, what was found and rejected."""
+    from echostep_app.commands.actions import offline
+
+    offline.decode(file, output_mode, output_settings)

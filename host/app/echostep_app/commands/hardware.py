@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: MIT
+"""`echostep doctor`, `bench-report`, `flash` and `calibrate`: commands about boards and sensors.
+
+In: the command's arguments and options. Out: findings, a flashed board, settings. Slow imports wait until a command runs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from echostep.errors import EchostepError
+from echostep_app.commands.groups import Ports
+from echostep_app.commands.options import Shank, Thigh
+from echostep_app.printing.lines import say
+
+app = typer.Typer()
+
+
+@app.command()
+def doctor(
+    board: Annotated[str | None, typer.Option("--board", metavar="PORT", help="Port of the board.")] = None,
+    mtx: Annotated[str | None, typer.Option("--mtx", metavar="PORT", help="Port of the MTx.")] = None,
+    foot: Annotated[str | None, typer.Option("--foot", metavar="PORT", help="Port of a foot board.")] = None,
+    seconds: Annotated[float, typer.Option(help="Seconds to listen.", min=3.0, max=3600.0)] = 6.0,
+    electrical: Annotated[
+        bool, typer.Option("--electrical", help="Also the levels of the boards' inputs: for wiring a new board.")
+    ] = False,
+    udev: Annotated[bool, typer.Option("--udev", help="Only print the udev rules.")] = False,
+) -> None:
+    """Check ports, boards and MTx, and say what to do about each fault. Exit status 1 when there is a fault."""
+    from echostep_app.commissioning import doctor as examination
+
+    if udev:
+        say(examination.rules_text().removesuffix("\n"))
+    elif not examination.run(board, mtx, seconds, foot, electrical=electrical):
+        raise typer.Exit(1)
+
+
+@app.command()
+def bench_report(
+    board: Annotated[str | None, typer.Option("--board", metavar="PORT", help="Port of the board.")] = None,
+    foot: Annotated[str | None, typer.Option("--foot", metavar="PORT", help="Port of a foot board.")] = None,
+    seconds: Annotated[float, typer.Option(help="Seconds to listen.", min=3.0, max=3600.0)] = 30.0,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The report.")] = Path("bench-report.txt"),
+) -> None:
+    """Collect what a new board tells of itself into one text file, to be sent in with measurements (firmware/bench.md)."""
+    from echostep_app.commissioning import bench_report as bench
+
+    say(bench.write(board, foot, seconds, out))
+
+
+@app.command()
+def flash(
+    port: Annotated[
+        str | None, typer.Option("--port", metavar="PORT", help="Port of the board; without it, it is searched for.")
+    ] = None,
+    hex_file: Annotated[
+        Path | None,
+        typer.Option("--hex", metavar="FILE", help="Firmware (Intel HEX); without it, the one of this package."),
+    ] = None,
+) -> None:
+    """Write the firmware to a board (needs avrdude)."""
+    from echostep_app.commissioning import flash as flashing
+    from echostep_app.printing.console import console_for_people
+
+    flashing.flash(port, hex_file, console_for_people(highlight=False))
+
+
+@app.command()
+def calibrate(
+    parts: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="gyros, mounting, compass, legs; without any, these four. accelerometers: of the parts on six sides. "
+            "rangers: from a walk of a minute on --plan, or rangers RECORDING: from a recorded one."
+        ),
+    ] = None,
+    board: Annotated[
+        str | None, typer.Option("--board", metavar="PORT", help="Port of the board; without it, it is searched for.")
+    ] = None,
+    foot: Annotated[
+        str | None,
+        typer.Option(
+            "--foot",
+            metavar="PORT",
+            help="Port of a foot board, for accelerometers and rangers; without it, it is searched for.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="Settings file to write; its other sections are kept.")
+    ] = Path("calibration.toml"),
+    thigh: Thigh = None,
+    shank: Shank = None,
+    walked: Annotated[
+        float, typer.Option("--walked", metavar="M", help="Length of the walk that calibrates the legs, metres.")
+    ] = 10.0,
+    plan: Annotated[
+        Path | None, typer.Option("--plan", metavar="PLAN", help="Plan of the walk that calibrates the rangers.")
+    ] = None,
+    mtx: Annotated[
+        str | None,
+        typer.Option("--mtx", metavar="PORT", help="Port of an MTx, for rangers; without it, it is searched for."),
+    ] = None,
+) -> None:
+    """Calibrate gyros, mounting, compass and legs, the accelerometers, or the rangers. Writes the results as settings."""
+    if parts and parts[0] == "rangers":
+        _calibrate_rangers([Path(p) for p in parts[1:]], Ports(board, mtx, foot), plan, out)
+        return
+    from echostep_app.commissioning import calibrate as calibration
+    from echostep_app.printing.console import console_for_people
+
+    wearer = calibration.Wearer(thigh, shank, walked)
+    calibration.calibrate(calibration.Ports(board, foot), parts or [], wearer, out, console_for_people(highlight=False))
+
+
+def _calibrate_rangers(recordings: list[Path], ports: Ports, plan: Path | None, out: Path) -> None:
+    """From recordings, or from a walk now, which is tracked with the settings that earlier calibrations wrote."""
+    from echostep_app.commands.actions import rangers
+    from echostep_app.printing.console import console_for_people
+    from echostep_app.session.options import TrackingOptions
+
+    if plan is None:
+        raise EchostepError(rangers.PLAN_NEEDED)
+    console, settings = console_for_people(highlight=False), None
+    if not recordings:
+        settings = out if out.exists() else None
+        recordings = [rangers.walk_now(replace(ports, seconds=rangers.GUIDED_S).options(), out.parent, console)]
+    rangers.calibrate_rangers(recordings, TrackingOptions(plan, settings_path=settings), out, console)

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: MIT
+"""Options that several commands share: their names, help and types.
+
+In: nothing. Out: annotated types for the parameters of commands; what several of them mean. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeVar
+
+import typer
+
+from echostep.extras import PAGE, lacks, require
+from echostep_app.printing.lines import complain
+from echostep_app.printing.picture_files import check_picture
+
+if TYPE_CHECKING:
+    from echostep_app.page.server import Address
+
+Value = TypeVar("Value")
+
+
+class Language(StrEnum):
+    """Languages of the pages (`page/static/language.js`)."""
+
+    EN = "en"
+    DE = "de"
+
+
+def needs(package: str) -> Callable[[typer.CallbackParam, Value], Value]:
+    """A callback of an option that needs a package when it is given."""
+
+    def checked(option: typer.CallbackParam, value: Value) -> Value:
+        if value:
+            require(option.opts[0], package)
+        return value
+
+    return checked
+
+
+def picture_file(option: typer.CallbackParam, path: Path | None) -> Path | None:
+    """A callback of an option that names a picture: its kind can be drawn, before anything else is done."""
+    if path is not None:
+        require(option.opts[0], "matplotlib")
+        check_picture(path)
+    return path
+
+
+def page_address(page: bool | None, host: str, port: int | None, lang: Language | None = None) -> Address | None:
+    """Where to serve the page; None: no page. An address that cannot be served is an error if given, a notice if it is the default."""
+    if page:
+        require("--page", *PAGE)
+    if page is False:
+        return None
+    if words := lacks("the page", *PAGE):
+        complain(f"No page is served: {words}")
+        return None
+    from echostep_app.page.server import Address
+
+    return Address(host, port, lang.value if lang else None)
+
+
+Columns = Annotated[
+    str | None,
+    typer.Option(
+        "--columns",
+        metavar="OURS=THEIRS,...",
+        help="Names of the file's columns, as t_s=time,gx=gyro_x; those of common loggers are known without.",
+    ),
+]
+Units = Annotated[
+    str | None,
+    typer.Option("--units", metavar="UNIT,...", help="Units of the file: ms, us, ns; g, mg; deg/s, deg; hPa, kPa."),
+]
+LOCAL = "127.0.0.1"
+Thigh = Annotated[
+    float | None, typer.Option("--thigh", metavar="M", help="Hip to knee, metres; without it, a usual adult's.")
+]
+Shank = Annotated[
+    float | None, typer.Option("--shank", metavar="M", help="Knee to ankle or to the floor, metres; likewise.")
+]
+Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
+TeamPlan = Annotated[
+    Path,
+    typer.Option(
+        "--plan",
+        metavar="FILE|wearer:NAME",
+        help="The building's plan (JSON, metres), or wearer:NAME: what that wearer has drawn by now.",
+    ),
+]
+OptionalPlan = Annotated[
+    Path | None,
+    typer.Option(
+        "--plan",
+        metavar="FILE|wearer:NAME",
+        help="The building's plan (JSON, metres), or wearer:NAME: what that wearer of the team has drawn by now (live only). "
+        "Without it the map begins where the walk begins, and nothing is drawn on it.",
+    ),
+]
+Start = Annotated[
+    str | None,
+    typer.Option(
+        "--start",
+        metavar="X,Y,DEG[,LEVEL]|ROOM|?|last",
+        help="Position and heading of the wearer at the start (level 0 is the plan's first, ? any), a room, ? for anywhere, or last: "
+        "where the last live run of this folder ended (live only).",
+    ),
+]
+StartSd = Annotated[
+    str | None,
+    typer.Option("--start-sd", metavar="M,DEG", help="Standard deviations of the start: metres per axis, degrees."),
+]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for track.csv, track.png and the recording.")]
+SettingsFile = Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")]
+Seed = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.", min=0)]
+RecordedSeed = Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)]
+Seconds = Annotated[float | None, typer.Option(help="Stop after this many seconds.", min=0.0)]
+Headless = Annotated[bool, typer.Option("--headless", help="Neither terminal view nor page.")]
+Page = Annotated[
+    bool | None,
+    typer.Option(
+        "--page/--no-page",
+        help="Serve the live page (the default; --page keeps it after the end of a replay), or do not.",
+        show_default=False,
+    ),
+]
+Host = Annotated[
+    str,
+    typer.Option(
+        "--host", metavar="ADDRESS", help="Serve the page to other computers too; its URL then holds a token."
+    ),
+]
+Port = Annotated[
+    int | None, typer.Option("--port", help="TCP port of the page [8420, or a free one].", min=0, max=65535)
+]
+Lang = Annotated[
+    Language | None,
+    typer.Option("--lang", help="Language of the page; otherwise that of each browser.", show_default=False),
+]
+BoardCommand = Annotated[
+    str | None,
+    typer.Option(
+        "--board-command",
+        metavar="COMMAND",
+        help="Program that simulates the sensor board; without it the board is simulated in Python.",
+    ),
+]
+BoardPort = Annotated[
+    str | None,
+    typer.Option("--board", metavar="PORT", help="Serial port of the sensor board; without it, both are searched for."),
+]
+MtxPort = Annotated[
+    str | None,
+    typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx; without one the board's leg gyros are used."),
+]
+FootPort = Annotated[
+    str | None,
+    typer.Option("--foot", metavar="PORT", help="Serial port of a foot board, in the place of an MTx."),
+]
+Foxglove = Annotated[
+    str | None,
+    typer.Option(
+        "--foxglove",
+        metavar="[HOST:]PORT",
+        callback=needs("foxglove"),
+        help="Serve estimates, echoes and the scene to Foxglove, as 8765; on this computer alone unless a host is given.",
+    ),
+]
+Keep = Annotated[
+    int | None,
+    typer.Option(
+        "--keep",
+        metavar="N",
+        help="Remove the oldest recordings of the folder until N are left; all are kept without it.",
+        min=2,
+    ),
+]
+Split = Annotated[
+    str | None,
+    typer.Option(
+        "--split",
+        metavar="SIZE|TIME",
+        help="Begin a new file of the recording after so much, as 500MB, 2GB, 30min or 1h; replay takes them as one.",
+    ),
+]
+Publish = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--publish",
+        metavar="URL",
+        help="Send estimates to a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls:// mesh://; may be given several times.",
+    ),
+]
+Name = Annotated[str, typer.Option("--name", help="The wearer's name, for --publish.")]
+Team = Annotated[str, typer.Option("--team", help="The team's name, for --publish.")]
+BeaconsPort = Annotated[
+    str | None,
+    typer.Option("--beacons", metavar="PORT", help="Port of a beacon gateway: serial, or udp://127.0.0.1:9000."),
+]
+GuideTo = Annotated[
+    str | None,
+    typer.Option(
+        "--guide", metavar="TO", help="Guide the wearer to a room, X,Y[,LEVEL], start, or wearer:NAME of the team."
+    ),
+]

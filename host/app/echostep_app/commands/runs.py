@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: MIT
+"""`echostep demo`, `live`, `record`, `replay` and `page`: runs that track or record a wearer.
+
+In: the command's arguments and options. Out: files, views. Slow imports wait until a command runs.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from echostep.errors import EchostepError
+from echostep_app.commands.groups import Output, Ports, Tracking, with_groups
+from echostep_app.commands.options import LOCAL, BoardCommand, Host, Lang, Out, Port, RecordedSeed, Seed, page_address
+from echostep_app.printing.lines import say
+from echostep_app.simulation.kits import Kit
+
+if TYPE_CHECKING:
+    from echostep_app.team.endpoint import Outlet
+
+app = typer.Typer()
+
+
+@app.command()
+@with_groups
+def demo(
+    output: Output,
+    out: Out = Path("out/demo"),
+    seed: Seed = 1,
+    board_command: BoardCommand = None,
+    guide: Annotated[bool, typer.Option("--guide", help="Simulate beacons, and guide to the end of the walk.")] = False,
+    plan: Annotated[
+        Path | None,
+        typer.Option(
+            "--plan",
+            metavar="FILE|wearer:NAME",
+            help="Walk through the rooms of this plan instead of the demo's, or of what that wearer of the team has drawn by now.",
+        ),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            "--speed",
+            metavar="TIMES",
+            help="Times real time, for instance 1; 4 on a terminal, else as fast as it can.",
+            min=0.1,
+            max=100.0,
+        ),
+    ] = None,
+    kit: Annotated[
+        Kit,
+        typer.Option(help="Parts on the board: of the papers, or of 2026 (not built yet; with --board-command only)."),
+    ] = Kit.PAPERS,
+    browser: Annotated[
+        bool,
+        typer.Option("--open/--no-open", help="Open the page in a browser where there is one.", show_default=False),
+    ] = True,
+) -> None:
+    """Track a simulated walk through a simulated building."""
+    from echostep_app.session.runs import demo as demo_run
+
+    outputs = output.options(out, browser=browser)
+    plan = _plan_file(plan, outputs.outlet, out)
+    demo_run.demo(demo_run.DemoOptions(seed, board_command, guide, plan, speed, kit), outputs)
+
+
+@app.command()
+@with_groups
+def live(
+    tracking: Tracking,
+    ports: Ports,
+    output: Output,
+    out: Out = Path("out/live"),
+    seed: Seed = 0,
+) -> None:
+    """Track a wearer live and record everything. With nothing on the foot the board's leg gyros are used."""
+    from echostep_app.session.runs import live as live_run
+
+    outputs = output.options(out)
+    plan = _plan_file(tracking.plan, outputs.outlet, out)
+    options = tracking.options(plan, seed)
+    recording = live_run.live(options, ports.options(), outputs)
+    if options.settings_path is not None:
+        from echostep_app.commands.actions.learning import learn_rangers
+        from echostep_app.session.console import console
+
+        learn_rangers(recording, options, console)
+
+
+@app.command()
+@with_groups
+def record(
+    ports: Ports,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The recording to write.")] = Path(
+        "out/recording.mcap"
+    ),
+) -> None:
+    """Record the ports without tracking."""
+    from echostep_app.session.runs import live as live_run
+
+    live_run.record(ports.options(), out)
+
+
+@app.command()
+@with_groups
+def replay(
+    recording: Annotated[
+        list[Path],
+        typer.Argument(metavar="RECORDING...", help="A recording (.mcap), or all parts of one, or their folder."),
+    ],
+    tracking: Tracking,
+    output: Output,
+    out: Out = Path("out/replay"),
+    seed: RecordedSeed = None,
+    truth: Annotated[
+        Path | None, typer.Option("--truth", metavar="FILE", help="True path to compare with (CSV).")
+    ] = None,
+) -> None:
+    """Track a recorded walk again, as it was tracked live."""
+    from echostep_app.session.runs import replay as replay_run
+
+    outputs = output.options(out, stays_on_terminal=True)
+    replay_run.replay(recording, tracking.options(_recorded_plan(tracking.plan), seed), truth, outputs)
+
+
+@app.command()
+def page(
+    host: Host = LOCAL,
+    port: Port = None,
+    lang: Lang = None,
+    browser: Annotated[
+        bool,
+        typer.Option("--open/--no-open", help="Open the page in a browser where there is one.", show_default=False),
+    ] = True,
+) -> None:
+    """Play recordings that are dropped onto a page."""
+    address = page_address(True, host, port, lang)
+    from echostep_app.session.runs.dropped import serve_drops
+
+    assert address
+    serve_drops(address, browser=browser)
+
+
+def _plan_file(plan: Path | None, outlet: Outlet | None, folder: Path) -> Path | None:
+    """The file of `--plan`; that of wearer:NAME comes from the broker that the run publishes to, into the folder of its results."""
+    if plan is None:
+        return None
+    from echostep_app.team.wearer_plan import plan_file
+
+    return plan_file(plan, outlet.broker if outlet else None, outlet.team if outlet else "", folder, say)
+
+
+def _recorded_plan(plan: Path | None) -> Path | None:
+    """The file of a replay's `--plan`."""
+    if plan is None:
+        return None
+    from echostep_app.team.wearer_plan import drawing_wearer
+
+    if name := drawing_wearer(plan):
+        raise EchostepError(
+            f"--plan {plan}: a replay needs the drawing that the run was tracked on: the file drawing-{name}-... beside the recording"
+        )
+    return plan

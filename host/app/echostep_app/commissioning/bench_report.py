@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: MIT
+"""`echostep bench-report`: what a new board tells of itself, as one text file with lines for the measurements of firmware/bench.md.
+
+In: ports by name, or those found on this computer. Out: the file. Owns the order of its parts, and the names of the measurements.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from echostep.board.calibration import SPEED_OF_SOUND_M_S
+from echostep.board.messages import GYROS_INVALID, Outcome, Ranger
+from echostep.errors import EchostepError
+from echostep_app.commissioning.diagnosis import Diagnosis
+from echostep_app.commissioning.doctor import examine
+from echostep_app.commissioning.probe import ProbeResult
+
+MEASUREMENTS = (  # the headings of firmware/bench.md
+    "Serial number",
+    "D13 after the bootloader",
+    "Supply and brown-out",
+    "Current",
+    "Idle MISO",
+    "Rise of the level shifters",
+    "Leg cables",
+    "Compass cable",
+    "Pulse ranger",
+    "Ranges, and echoes of the other ranger",
+    "Data-ready of the foot's part",
+    "SRF02",
+    "MaxSonar",
+    "ADIS16100",
+    "Temperature of an ADIS16100",
+)
+
+
+def write(board: str | None, foot: str | None, seconds: float, out: Path) -> str:
+    """Examine the boards and write the report; returns where it is and what to do with it."""
+    report = examine(board, None, seconds, foot, electrical=True)
+    if not report.probed:
+        raise EchostepError(str(report.findings[0]) if report.findings else "no board has answered")
+    try:
+        out.write_text("\n".join(text(report)) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise EchostepError(f"cannot write {out}: {error.strerror}") from None
+    return f"{out}: fill in the lines of the measurements (firmware/bench.md) and send it in"
+
+
+def text(report: Diagnosis) -> Iterable[str]:
+    """The lines of the file."""
+    yield f"echostep {version('echostep')} on {sys.platform}, Python {sys.version.split()[0]}"
+    yield "\n[doctor]"
+    yield from report.lines
+    yield from (f"{finding.severity.name:8}  {finding}" for finding in report.findings)
+    for subject, probed in report.probed.items():
+        yield f"\n[{subject}]"
+        yield from _reports(probed)
+        yield from _ranges(probed)
+        yield from _noise(probed)
+    yield "\n[measurements]"
+    yield from (f"{number:2}. {name}: " for number, name in enumerate(MEASUREMENTS, 1))
+
+
+def _reports(probed: ProbeResult) -> Iterable[str]:
+    """The newest of each report of the board, field by field."""
+    r = probed.reports
+    newest = (r.identity, r.configuration, r.status, r.board_health, r.parts, r.electrical, r.foot, *r.gyros.values())
+    for message in newest:
+        if message is not None:
+            yield f"{type(message).__name__}: " + ", ".join(f"{k} {v}" for k, v in message._asdict().items())
+
+
+def _ranges(probed: ProbeResult) -> Iterable[str]:
+    for ranger in Ranger:
+        pings = [p for p in probed.pings if p.ranger == ranger]
+        flights_us = [p.time_of_flight_us for p in pings if p.outcome == Outcome.ECHO]
+        if flights_us:
+            metres = np.array(flights_us) * 0.5e-6 * SPEED_OF_SOUND_M_S
+            yield (
+                f"{ranger.name.lower()}: {len(flights_us)} echoes in {len(pings)} pings, median {np.median(metres):.3f} m "
+                f"({np.median(flights_us):.0f} us) at 20 degC, sd {metres.std():.3f} m"
+            )
+        elif pings:
+            yield f"{ranger.name.lower()}: no echo in {len(pings)} pings"
+
+
+def _noise(probed: ProbeResult) -> Iterable[str]:
+    for name in ("thigh", "calf", "belt"):
+        counts = [v for g in probed.gyros if (v := getattr(g, name)) != GYROS_INVALID]
+        if counts:
+            yield f"{name}: {len(counts)} rates, mean {np.mean(counts):.2f} counts, sd {np.std(counts):.2f}"

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: MIT
+"""`echostep doctor`: checks the ports, the boards and the MTx, and prints each fault with its remedy.
+
+In: ports by name, or those found on this computer. Out: a report as text. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.text import Text
+
+from echostep.errors import EchostepError
+from echostep.ports.chunks import BOARD, FOOT, MTX
+from echostep_app.board.faults.health import Finding, Severity
+from echostep_app.commissioning.diagnosis import Diagnosis, judge_board, judge_mtx
+from echostep_app.commissioning.foot_diagnosis import judge_foot_board
+from echostep_app.commissioning.listening_bar import listening_bar
+from echostep_app.commissioning.port_search import find_boards
+from echostep_app.commissioning.probe import probe
+from echostep_app.commissioning.serial_ports import (
+    MTX_NAME,
+    PortSeen,
+    Role,
+    access_findings,
+    find,
+    holder_findings,
+    latency_findings,
+    list_seen,
+    rules_findings,
+    rules_text,
+)
+from echostep_app.printing.console import console_for_people
+from echostep_app.recording.device import sender, wrong_device
+
+PROBE_S = 6.0
+STYLES = {Severity.NOTE: "cyan", Severity.WARNING: "yellow", Severity.FAULT: "bold red"}
+
+__all__ = ["examine", "rules_text", "run"]
+
+
+def run(
+    board: str | None, mtx: str | None, seconds: float, foot: str | None = None, *, electrical: bool = False
+) -> bool:
+    """Check everything and print the report; returns whether there is no warning and no fault."""
+    console = console_for_people(highlight=False)
+    with listening_bar("Looking at the ports and listening: stand still", seconds, console):
+        report = examine(board, mtx, seconds, foot, electrical=electrical)
+    print_report(report, console)
+    return report.fine
+
+
+def examine(
+    board: str | None, mtx: str | None, seconds: float = PROBE_S, foot: str | None = None, *, electrical: bool = False
+) -> Diagnosis:
+    """Check everything; ports that are None are searched for. `electrical`: also the levels of the boards' inputs."""
+    report = Diagnosis(electrical=electrical)
+    seen = list_seen()
+    report.lines += [f"port      {port.name}: {port.role.value} ({port.text})" for port in seen]
+    board, foot = find_boards(seen, board, foot)
+    ports = {BOARD: board, MTX: mtx or find(seen, Role.MTX, MTX_NAME), FOOT: foot}
+    usable = {name: port for name, port in ports.items() if port is not None and _usable(report, name, port)}
+    if ports[BOARD] is None:
+        report.findings.append(_no_board(seen))
+    if ports[MTX] is None and foot is None:
+        report.findings.append(_no_mtx())
+    report.findings += _several_boards(seen, board, foot)
+    at_ankle = usable.pop(FOOT, None)
+    if usable:
+        _probe_devices(report, usable, seconds)
+    if at_ankle is not None:
+        _probe_foot_board(report, at_ankle, seconds)
+    report.findings += rules_findings()
+    report.findings.sort(key=lambda finding: -finding.severity)
+    return report
+
+
+def _usable(report: Diagnosis, name: str, port: str) -> bool:
+    subject = {BOARD: "board", MTX: "MTx", FOOT: "foot board"}[name]
+    no_access = access_findings(subject, port)
+    report.findings += no_access or holder_findings(subject, port)
+    if name == MTX and not no_access:
+        report.findings += latency_findings(subject, port)
+    return not no_access
+
+
+def _no_board(seen: list[PortSeen]) -> Finding:
+    blank = next((port for port in seen if port.role in (Role.BOOTLOADER, Role.SKETCH)), None)
+    if blank is not None:
+        what = f"{blank.path} is a {blank.role.value}"
+        return Finding(Severity.FAULT, "board", what, f"write the firmware: echostep flash --port {blank.path}")
+    what = "no sensor board is plugged in" if seen else "no sensor board is plugged in, and no other serial port"
+    remedy = "plug it in with a USB cable that carries data, not only power; or name its port with --board"
+    return Finding(Severity.FAULT, "board", what, remedy)
+
+
+def _several_boards(seen: list[PortSeen], *chosen: str | None) -> list[Finding]:
+    boards = [port.name for port in seen if port.role is Role.BOARD]
+    examined = [path for path in chosen if path is not None]
+    if len(boards) <= max(len(examined), 1):
+        return []
+    what = f"{len(boards)} boards are plugged in ({'; '.join(boards)}); this report is on {' and '.join(examined)}"
+    return [Finding(Severity.NOTE, "board", what, "name the other one with --board")]
+
+
+def _no_mtx() -> Finding:
+    what = "neither an MTx nor a foot board is plugged in: only the legs can be tracked"
+    return Finding(Severity.NOTE, "MTx", what, "plug it in, or name its port with --mtx or --foot")
+
+
+def _probe_devices(report: Diagnosis, ports: dict[str, str], seconds: float) -> None:
+    try:
+        probed = probe(ports, seconds, check_gyros=True)
+    except EchostepError as error:
+        what, _, remedy = str(error).partition("; ")
+        report.findings.append(Finding(Severity.FAULT, "ports", what, remedy or "unplug it and plug it in again"))
+        return
+    for notice in probed.notices:
+        report.findings.append(Finding(Severity.WARNING, "ports", notice, "check the cable and its plugs"))
+    devices = {name: sender(probed.first_bytes.get(name, b"")) for name in ports}
+    if wrong := [(name, device) for name, device in devices.items() if device is not None and device != name]:
+        what, _, remedy = wrong_device(*wrong[0], ports).partition(": ")
+        report.findings.append(Finding(Severity.FAULT, "ports", what, remedy))
+        return
+    if BOARD in ports:
+        judge_board(report, probed, ports[BOARD])
+    if MTX in ports:
+        judge_mtx(report, probed, with_board=BOARD in ports)
+
+
+def _probe_foot_board(report: Diagnosis, port: str, seconds: float) -> None:
+    try:
+        probed = probe({BOARD: port}, seconds)
+    except EchostepError as error:
+        report.findings.append(Finding(Severity.FAULT, "foot board", str(error), "unplug it and plug it in again"))
+        return
+    for notice in probed.notices:
+        report.findings.append(Finding(Severity.WARNING, "foot board", notice, "check the cable and its plugs"))
+    judge_foot_board(report, probed, port)
+
+
+def print_report(report: Diagnosis, console: Console) -> None:
+    """Print the facts, then the findings with their remedies, the most severe first."""
+    for line in report.lines:
+        console.print(Text(line))
+    for finding in report.findings:
+        console.print(
+            Text.assemble(
+                (f"{finding.severity.name:8}", STYLES[finding.severity]), f"  {finding.subject}: {finding.what}"
+            )
+        )
+        console.print(Text(f"          {finding.remedy}", style="dim"))
+    count = sum(finding.severity > Severity.NOTE for finding in report.findings)
+    console.print("Everything is fine." if not count else f"{count} finding{'s' if count > 1 else ''} to look after.")

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: MIT
+"""The diagnosis of a foot board from a few seconds of its bytes: lines of facts, and findings.
+
+In: `ProbeResult`. Out: lines and findings in a `Diagnosis`. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echostep.board.calibration import ICM20649_M_S2, ICM20649_RAD_S
+from echostep.board.messages import FOOT_HEALTH_TEMPERATURE_INVALID, FootHealth, FootState, Part
+from echostep_app.board.faults.device_faults import foot_celsius
+from echostep_app.board.faults.findings import PART_NAMES, Finding, Severity
+from echostep_app.board.faults.health import board_findings
+from echostep_app.commissioning.diagnosis import (
+    Diagnosis,
+    board_lines,
+    clock_diagnosis,
+    electrical_diagnosis,
+    silence,
+    stale_firmware,
+)
+from echostep_app.commissioning.probe import ProbeResult
+
+RATE_HZ, RATE_ERROR = 225.0, 0.03  # 1125 Hz / 5 [firmware/icm20649.c]; its own clock is within 1 % [DS-000192, table 4]
+GRAVITY_M_S2, GRAVITY_ERROR_M_S2 = (
+    9.81,
+    1.2,
+)  # zero-g level within 65 mg on each axis, and a scale within 1.5 %; assumed
+BIAS_MAX_DEG_S = 10.0  # twice the greatest zero rate [DS-000192, table 1]
+LEAST_SAMPLES = 100
+
+
+def judge_foot_board(report: Diagnosis, probed: ProbeResult, port: str) -> None:
+    """Add facts and findings on the foot board at this port."""
+    subject, reports = "foot board", probed.reports
+    report.probed[subject] = probed
+    finding = stale_firmware(probed, port, subject) or silence(probed, port, subject)
+    if finding is not None:
+        report.findings.append(finding)
+        return
+    report.lines += board_lines(subject, probed, port)
+    electrical_diagnosis(report, probed, subject)
+    if reports.foot is None:
+        report.findings.append(_no_part(probed))
+        return
+    report.lines.append(f"{'foot':10}{_part_text(reports.foot)}{_rest_text(probed)}")
+    rate_hz = probed.rates_hz.get("Foot", 0.0)
+    report.lines.append(
+        f"{'rates':10}foot {rate_hz:.1f}/s; {probed.lost} frames lost, {reports.foot.missed} samples missed"
+    )
+    report.findings += board_findings(reports) + _sample_findings(probed, rate_hz)
+    clock_diagnosis(report, probed, subject)
+
+
+def _part_text(foot: FootHealth) -> str:
+    warm = "" if foot.temperature == FOOT_HEALTH_TEMPERATURE_INVALID else f", {foot_celsius(foot.temperature):.0f} degC"
+    return f"{PART_NAMES[Part.ICM20649]}, identity 0xE1, {FootState(foot.foot_state).name.lower()}{warm}"
+
+
+def _rest(probed: ProbeResult) -> tuple[float, float] | None:
+    """Medians of the magnitudes of force (m/s2) and rate (deg/s); None with too few samples."""
+    if len(probed.foot) < LEAST_SAMPLES:
+        return None
+    values = np.array(probed.foot, float)
+    rates, forces = (np.linalg.norm(values[:, k : k + 3], axis=1) for k in (2, 5))
+    return float(ICM20649_M_S2 * np.median(forces)), float(np.degrees(ICM20649_RAD_S * np.median(rates)))
+
+
+def _rest_text(probed: ProbeResult) -> str:
+    rest = _rest(probed)
+    return "" if rest is None else f"; at rest {rest[0]:.2f} m/s2, {rest[1]:.1f} deg/s"
+
+
+def _no_part(probed: ProbeResult) -> Finding:
+    parts = probed.reports.parts
+    identity = 0 if parts is None else parts.identity_foot
+    what = "has found no ICM-20649"
+    if identity:
+        what += f": its identity register reads 0x{identity:02X} instead of 0xE1"
+    return Finding(
+        Severity.FAULT, "foot board", what, "check its 5 V and ground, the SPI wires and its chip select (D8)"
+    )
+
+
+def _sample_findings(probed: ProbeResult, rate_hz: float) -> list[Finding]:
+    """Findings on rate, force and zero rate of a part that runs."""
+    foot, rest = probed.reports.foot, _rest(probed)
+    findings = []
+    if foot is None or foot.foot_state != FootState.RUNNING or not probed.rates_hz:
+        return []
+    if abs(rate_hz / RATE_HZ - 1.0) > RATE_ERROR:
+        what = f"{rate_hz:.1f} samples/s, expected are {RATE_HZ:g}"
+        findings.append(
+            Finding(Severity.WARNING, "foot board", what, "unplug it and plug it in again; avoid a USB hub")
+        )
+    if rest and abs(rest[0] - GRAVITY_M_S2) > GRAVITY_ERROR_M_S2:
+        what = f"measures {rest[0]:.2f} m/s2 at rest instead of {GRAVITY_M_S2}"
+        findings.append(Finding(Severity.WARNING, "foot board", what, "stand still and run echostep doctor again"))
+    if rest and rest[1] > BIAS_MAX_DEG_S:
+        what = f"measures {rest[1]:.1f} deg/s at rest"
+        findings.append(Finding(Severity.WARNING, "foot board", what, "stand still and run echostep doctor again"))
+    return findings

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""Whether the walls of a building have two directions at right angles, and the heading's error if so.
+
+In: nodes and fragments. Out: `Directions`. Owns the filter. A fragment has a direction of the building, or any; or its echoes are of a person, and
+it has that of the path. The one state is the direction of the building against the heading by odometry, modulo a right angle: at first it may be
+any, then it diffuses as the heading drifts. Its distribution is kept on a circle of cells, forward and backward along the path [Rabiner 1989], so
+that a few walls askew at the beginning do not decide. The evidence is the likelihood of all fragments against walls of any direction.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.jit import kernel, part
+from echostep_app.mapping.graph.companions import density_along_path, people_share
+from echostep_app.mapping.graph.fragments import Fragments
+from echostep_app.mapping.graph.nodes import Nodes
+
+RIGHT_RAD = 0.5 * math.pi
+ALIGNED = 0.7  # share of fragments along the building's directions, at first, assumed
+DIRECTION_SD_RAD = math.radians(0.7)  # of a wall from the building's direction (6 cm on 5 m)
+LEAST_EVIDENCE = math.log(1000.0)  # odds from which the building is thought to have such directions
+CELLS = 180  # of a right angle, half a degree each: less than DIRECTION_SD_RAD
+CELL_RAD = RIGHT_RAD / CELLS
+
+
+@dataclass(frozen=True, slots=True)
+class Directions:
+    """`base_rad`: one of the directions; `drift_rad` (n,): turn of the heading at each node by which walls get them; `evidence`: logarithm of the
+    odds that the building has them.
+    """
+
+    base_rad: float
+    drift_rad: Floats
+    evidence: float
+
+
+def find_directions(nodes: Nodes, fragments: Fragments) -> Directions:
+    """The mean direction at each fragment, given all of them; between two of them as the mean of a random walk."""
+    if not len(fragments.node):
+        return Directions(0.0, np.zeros(len(nodes)), 0.0)
+    order = np.argsort(fragments.node, kind="stable")
+    node = fragments.node[order]
+    angle = nodes.pose[node, 2] + fragments.normal_rad[order]
+    variance = np.concatenate([[0.0], np.cumsum(nodes.turn_sd_rad**2)])
+    person = people_share(nodes, fragments)
+    along_path = density_along_path(nodes, fragments)
+    seen = Seen(
+        angle,
+        fragments.sd_rad[order],
+        np.diff(variance[node], prepend=variance[node[0]]),
+        person[order],
+        along_path[order],
+    )
+    smoothed = _smoothed(seen)
+    direction = np.unwrap(smoothed.direction_rad, period=RIGHT_RAD)
+    base = float(direction[0])
+    drift = base - np.interp(variance, variance[node], direction)
+    return Directions(base, drift, smoothed.evidence)
+
+
+class Seen(NamedTuple):
+    """Fragments (f,) in order of their nodes: direction of the normal by odometry, its standard deviation, growth of the heading's variance since
+    the one before; probability that its echoes are of a person, and the density of its direction if so.
+    """
+
+    angle_rad: Floats
+    sd_rad: Floats
+    variance: Floats
+    person: Floats
+    along_path: Floats
+
+
+class Smoothed(NamedTuple):
+    """`direction_rad` (f,): the mean direction of the building by odometry, modulo a right angle, at each fragment; `evidence` of all together."""
+
+    direction_rad: Floats
+    evidence: float
+
+
+@kernel
+def _smoothed(seen: Seen) -> Smoothed:
+    """Forward and backward over the fragments."""
+    count = len(seen.angle_rad)
+    forward, likely = np.zeros((count, CELLS)), np.zeros((count, CELLS))
+    belief, evidence = np.full(CELLS, 1.0 / CELLS), 0.0
+    for f in range(count):
+        _diffuse(belief, seen.variance[f])
+        person = seen.person[f]
+        for cell in range(CELLS):
+            still = _likelihood(seen.angle_rad[f] - cell * CELL_RAD, seen.sd_rad[f])
+            likely[f, cell] = person * seen.along_path[f] + (1.0 - person) * still
+        belief *= likely[f]
+        total = belief.sum()
+        belief /= total
+        evidence += math.log(total / (person * seen.along_path[f] + (1.0 - person) / RIGHT_RAD))
+        forward[f] = belief
+    direction, back = np.zeros(count), np.ones(CELLS)
+    for f in range(count - 1, -1, -1):
+        x, y = 0.0, 0.0
+        for cell in range(CELLS):
+            p = forward[f, cell] * back[cell]
+            x += p * math.cos(4.0 * cell * CELL_RAD)
+            y += p * math.sin(4.0 * cell * CELL_RAD)
+        direction[f] = 0.25 * math.atan2(y, x)
+        back *= likely[f]
+        back /= back.sum()
+        _diffuse(back, seen.variance[f])
+    return Smoothed(direction, evidence)
+
+
+@part
+def _likelihood(off_rad: float, sd_rad: float) -> float:
+    """Density of a fragment's direction, so far from one of the building's: along it, or any."""
+    r = right_angles_off(off_rad)
+    variance = sd_rad * sd_rad + DIRECTION_SD_RAD**2
+    return (
+        ALIGNED * math.exp(-0.5 * r * r / variance) / math.sqrt(2.0 * math.pi * variance) + (1.0 - ALIGNED) / RIGHT_RAD
+    )
+
+
+@part
+def _diffuse(belief: Floats, variance: float) -> None:
+    """Spread a distribution on the circle (CELLS,) by so much variance: steps to the two neighbours, which keep it exactly."""
+    steps = math.ceil(variance / (0.5 * CELL_RAD**2))
+    share = 0.5 * variance / (max(steps, 1) * CELL_RAD**2)
+    for _ in range(min(steps, CELLS * CELLS)):
+        first, before = belief[0], belief[CELLS - 1]
+        for cell in range(CELLS):
+            here, after = belief[cell], belief[cell + 1] if cell + 1 < CELLS else first
+            belief[cell] = here + share * (before + after - 2.0 * here)
+            before = here
+
+
+@kernel
+def right_angles_off(angle_rad: float) -> float:
+    """The angle less the nearest multiple of a right angle."""
+    return (angle_rad + 0.5 * RIGHT_RAD) % RIGHT_RAD - 0.5 * RIGHT_RAD

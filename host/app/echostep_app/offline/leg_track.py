@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: MIT
+"""The track of a recorded leg, by this project's method.
+
+In: `LegSamples`, `StrideSettings`. Out: `LegTrack`. Owns nothing. The estimators are the same as live.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from echostep.arrays import Bools, Floats
+from echostep.legs.clipping import repair_clipping
+from echostep.legs.heading import Heading
+from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings, about_trunk
+from echostep.legs.strides import StrideEstimator
+from echostep_app.offline.leg_csv import LegSamples
+
+# Assumed, all of them.
+START_SD_RAD = math.radians(3.0)  # of a heading given for the start, as read from a plan
+TURNING_RAD_S = math.radians(25.0)  # mean rate of a stride that is flagged as turning: 28 degrees in 1.1 s
+SHORTEST_TURN_S = 0.3  # a shorter stride is not flagged: strides take about 1 s
+STANDING_MARGIN_S = 0.2  # left out at either end of standing: a leg may move there
+# Least turning that shows the sign of the belt's gyro: far above the compass's errors (8 degrees).
+SIGN_TURN_RAD = math.radians(30.0)
+FEWEST_READINGS = 20  # of the compass that show it: single outliers do not decide
+
+
+@dataclass(frozen=True, slots=True)
+class LegTrack:
+    """`rows` (n, 6): time s, distance m, speed m/s, heading rad, x, y m. `strides`: none by the paper's method.
+
+    `source`: sensors of the heading, in words; `heading_sd_rad`: at the end. `notes`: a line each.
+    """
+
+    rows: Floats
+    strides: tuple[Stride, ...]
+    counts: LegCounts | None
+    source: str
+    heading_sd_rad: float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def distance_m(self) -> float:
+        """Length of the whole path."""
+        return float(self.rows[-1, 1]) if len(self.rows) else 0.0
+
+
+def track_default(samples: LegSamples, settings: StrideSettings, heading_rad: float | None = None) -> LegTrack:
+    """The method of this project: strides by both gyros of the leg, heading by belt gyro and compass; `heading_rad` at the start, if known."""
+    strides, counts = leg_strides(samples, settings)
+    angles, notes = fused_heading(samples, strides, heading_rad)
+    if not np.isnan(samples.belt).all():
+        strides = about_trunk(strides, samples.t_s, angles[:, 0])
+    rows = path_rows(samples.t_s, distance_at(samples.t_s, strides), angles[:, 0])
+    notes = (*notes, *doubts(strides))
+    strides = with_turns(strides, samples.t_s, angles[:, 0])
+    return LegTrack(rows, strides, counts, source_of(samples), float(angles[-1, 1]), notes)
+
+
+def leg_strides(samples: LegSamples, settings: StrideSettings) -> tuple[tuple[Stride, ...], LegCounts]:
+    """Strides of one leg, and counts; read a second time with the signs that were found in the end, if they were revised."""
+    rates = repair_clipping(samples.t_s, np.column_stack([samples.thigh, samples.shank]))
+    legs = StrideEstimator(settings)
+    for _ in range(2):
+        strides = (*legs.feed(samples.t_s, rates[:, 0], rates[:, 1], samples.belt), *legs.finish())
+        if not legs.revised:
+            break
+        legs = StrideEstimator(settings, legs.swings.sign)
+    return strides, legs.counts
+
+
+def fused_heading(
+    samples: LegSamples, strides: tuple[Stride, ...], heading_rad: float | None
+) -> tuple[Floats, tuple[str, ...]]:
+    """Heading of the trunk and its sd (n, 2), and notes; 0 without belt and compass.
+
+    The first pass estimates the gyro's bias and the compass's deviation by iron; the second pass starts from them.
+    """
+    if not samples.has_heading:
+        return np.zeros((len(samples.t_s), 2)), ()
+    sign, notes = belt_sign(samples)
+    still = standing(strides, samples.t_s)
+    belt = np.where(np.isnan(samples.belt), 0.0, sign * samples.belt)
+    first, heading = (Heading(heading_rad=heading_rad, sd_rad=START_SD_RAD) for _ in range(2))
+    first.feed(samples.t_s, belt, samples.compass, still)
+    heading.adopt_errors(first)
+    angles = heading.feed(samples.t_s, belt, samples.compass, still)
+    accepted = heading.read - heading.refused
+    read = (f"compass accepted in {accepted} of {heading.read} readings",) if heading.read else ()
+    return angles, (*notes, *read)
+
+
+def doubts(strides: tuple[Stride, ...]) -> tuple[str, ...]:
+    """Notes on strides that contradict a walk forward."""
+    steps = [s for s in strides if not s.flags & (Flag.STANDING | Flag.GAP)]
+    if len(steps) > 2 and sum(Flag.BACKWARD in s.flags for s in steps) > 0.5 * len(steps):
+        return ("most steps go backward: are the columns of thigh and shank exchanged?",)
+    if steps and sum(bool(s.flags & (Flag.UNSEEN | Flag.BACKWARD)) for s in steps) >= 0.5 * len(steps):
+        return ("half or more of this is no walk that one leg can observe: do not trust the distance",)
+    return () if steps else ("no step was seen",)
+
+
+def with_turns(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> tuple[Stride, ...]:
+    """The strides, with `Flag.TURNING` where the trunk's heading (n,) at `t_s` (n,) turns."""
+    flagged = []
+    for stride in strides:
+        h0, h1 = np.interp([stride.t_start_s, stride.t_end_s], t_s, heading)
+        span = stride.t_end_s - stride.t_start_s
+        turns = span > SHORTEST_TURN_S and abs(h1 - h0) / span > TURNING_RAD_S
+        flagged.append(replace(stride, flags=stride.flags | Flag.TURNING) if turns else stride)
+    return tuple(flagged)
+
+
+def standing(strides: tuple[Stride, ...], t_s: Floats) -> Bools:
+    """Whether the wearer stands at each time (n,)."""
+    still = np.zeros(len(t_s), np.bool_)
+    for stride in strides:
+        if Flag.STANDING in stride.flags:
+            still |= (t_s > stride.t_start_s + STANDING_MARGIN_S) & (t_s < stride.t_end_s - STANDING_MARGIN_S)
+    return still
+
+
+def belt_sign(samples: LegSamples) -> tuple[float, tuple[str, ...]]:
+    """Sign of the belt's gyro by the compass, and a note when it is -1; without a compass a positive rate is a turn to the left.
+
+    The angles of both are compared without their linear trend, which holds the gyro's bias.
+    """
+    read = np.isfinite(samples.compass)
+    if np.isnan(samples.belt).all() or read.sum() < FEWEST_READINGS:
+        return 1.0, ()
+    turned = np.cumsum(np.nan_to_num(samples.belt) * np.diff(samples.t_s, prepend=samples.t_s[0]))[read]
+    compass, t_s = np.unwrap(samples.compass[read]), samples.t_s[read]
+    turned, compass = (column - np.polyval(np.polyfit(t_s, column, 1), t_s) for column in (turned, compass))
+    if min(np.ptp(turned), np.ptp(compass)) < SIGN_TURN_RAD or (turned * compass).sum() >= 0.0:
+        return 1.0, ()
+    return -1.0, ("belt gyro worn the other way round, by the compass",)
+
+
+def source_of(samples: LegSamples) -> str:
+    """Sensors of the heading, in words."""
+    belt, compass = (not bool(np.isnan(column).all()) for column in (samples.belt, samples.compass))
+    if belt and compass:
+        return "belt gyro and compass"
+    if belt:
+        return "belt gyro alone, from 0: its sign is taken for left positive"
+    return "compass alone" if compass else "none: a straight line is drawn"
+
+
+def distance_at(t_s: Floats, strides: tuple[Stride, ...]) -> Floats:
+    """Distance (n,) gone at times (n,): it grows evenly within each stride."""
+    knots = [(float(t_s[0]), 0.0)]
+    distance_m = 0.0
+    for stride in strides:
+        if stride.t_start_s > knots[-1][0]:
+            knots.append((stride.t_start_s, distance_m))
+        distance_m += stride.length_m
+        knots.append((max(stride.t_end_s, knots[-1][0]), distance_m))
+    return np.interp(t_s, *np.array(knots).T)
+
+
+def path_rows(t_s: Floats, distance: Floats, heading: Floats) -> Floats:
+    """Rows of `LegTrack` (n, 6): the position moves along the heading (n,) as the distance (n,) grows."""
+    move = np.diff(distance, prepend=0.0)
+    speed = np.array([0.0, *(move[1:] / np.diff(t_s))])
+    x, y = np.cumsum(move * np.cos(heading)), np.cumsum(move * np.sin(heading))
+    return np.column_stack([t_s, distance, speed, np.arctan2(np.sin(heading), np.cos(heading)), x, y])

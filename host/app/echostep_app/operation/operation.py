@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: MIT
+"""The operation: everything that a commander's page shows, from the messages of the team.
+
+In: messages as an inbox received them. Out: `TableScene`s, details of one wearer, trails. Owns the roster, the trails and each wearer's history.
+Any thread may ask; one lock guards all of it.
+"""
+
+from __future__ import annotations
+
+import math
+import secrets
+import threading
+from array import array
+from collections import Counter, deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from msgspec import structs
+
+from echostep.plan.model import Plan
+from echostep_app.operation import requests
+from echostep_app.operation.crews import CrewLog
+from echostep_app.operation.distress import ShownDistress, errand_to, shown_distress
+from echostep_app.operation.trails import Trails
+from echostep_app.operation.words import (
+    ShownDetails,
+    ShownEvent,
+    ShownWearer,
+    alarm_key,
+    level_on,
+    shown_details,
+    shown_mark,
+    shown_wearer,
+    summary_words,
+)
+from echostep_app.page.elements.marks import ShownMark
+from echostep_app.team.commander import rejected, take_messages
+from echostep_app.team.inbox import Inbox, ReceivedMessage
+from echostep_app.team.messages.crews import Crew
+from echostep_app.team.messages.marks import Mark, MarkBoard, ack_message, errand_message, is_shared
+from echostep_app.team.messages.report import BadReportError
+from echostep_app.team.roster import Member, MemberState, Roster
+
+LIST_S = 0.5  # between two versions of the list: words are read, not watched
+NEWER_S = 1e-3  # by which an errand is newer than the one that it replaces
+MOST_EVENTS = 64  # of a wearer's history
+SHOWN_STATUS = {"tracking", "uncertain"}  # of which a trail is drawn
+Key = tuple[str, str, str]  # team, name, run
+
+
+@dataclass(frozen=True, slots=True)
+class TableScene:
+    """One moment. `places`: rows of float32, one for each wearer on this plan (`Operation.scene`). `rows`: the list, the most urgent first.
+
+    `summary`: number of members in each state; `refused`: rejected messages, in words; `fault`: of connection and output, in words.
+    """
+
+    t_s: float
+    unix_s: float
+    places: bytes
+    rows: tuple[ShownWearer, ...]
+    summary: str
+    refused: str
+    connected: bool
+    fault: str
+    marks: tuple[ShownMark, ...] = ()
+    crews: tuple[Crew, ...] = ()
+
+
+@dataclass(slots=True)
+class _Followed:
+    """What is remembered of a member beside its last report."""
+
+    number: int
+    state: MemberState | None = None
+    history: deque[ShownEvent] | None = None
+
+
+class Operation:
+    """`update` takes what an inbox holds; `scene` gives the present moment."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.roster = Roster()
+        self.crew_log = CrewLog()
+        self._board = MarkBoard()
+        self._shown_marks: tuple[ShownMark, ...] = ()
+        self._crews: tuple[Crew, ...] = ()
+        self._trails = Trails()
+        self._followed: dict[Key, _Followed] = {}
+        self._next_number = 1
+        self._lock = threading.Lock()
+        self._rows: tuple[ShownWearer, ...] = ()
+        self._listed_s = -math.inf
+        self._changed = False
+
+    def copy(self) -> Operation:
+        """An independent operation with the same state; no mutable state is shared."""
+        made = Operation(self.plan)
+        with self._lock:
+            made.roster, made._board, made._trails = self.roster.copy(), self._board.copy(), self._trails.copy()
+            made._followed = {
+                key: replace(f, history=f.history.copy() if f.history is not None else None)
+                for key, f in self._followed.items()
+            }
+            made._next_number = self._next_number
+        return made
+
+    def update(self, inbox: Inbox, now_s: float, unix_s: float) -> list[ReceivedMessage]:
+        """Take all messages of an inbox, and note what has changed since the last call; returns the accepted ones."""
+        messages, dropped = inbox.take_all()
+        return self.receive(messages, dropped, now_s, unix_s)
+
+    def receive(
+        self, messages: Sequence[ReceivedMessage], dropped: Mapping[str, int], now_s: float, unix_s: float
+    ) -> list[ReceivedMessage]:
+        """Take messages, and counts of dropped ones by reason; returns the accepted messages."""
+        with self._lock:
+            believed = take_messages([m for m in messages if not is_shared(m.topic)], dropped, self.roster)
+            believed += [m for m in messages if is_shared(m.topic) and self._receive_shared(m.topic or "", m.payload)]
+            self._follow(now_s, unix_s)
+        return believed
+
+    def set_counts(self, received: int, rejected: Mapping[str, int]) -> None:
+        """Set the counts of received and rejected messages of a recorded operation, which does not hold the rejected ones."""
+        with self._lock:
+            self.roster.received, self.roster.rejected = received, Counter(rejected)
+
+    def _receive_shared(self, topic: str, payload: bytes) -> bool:
+        self.roster.received += 1
+        crews, identity = self._board.crews.known, topic.rpartition("/")[2]
+        before = crews.get(identity)
+        try:
+            self._board.receive(topic, payload)
+        except BadReportError as error:
+            self.roster.count_rejected(str(error))
+            return False
+        self.crew_log.note(before, crews.get(identity))
+        self._changed = True
+        return True
+
+    def act(self, request: requests.Action, unix_s: float, now_s: float) -> tuple[str, bytes] | str:
+        """The message that carries out a page's request, or the reason why there is none."""
+        with self._lock:
+            match request:
+                case requests.SetMark() if request.level < len(self.plan.levels):
+                    identity, at = secrets.token_hex(4), (request.x_m, request.y_m, request.level)
+                    return Mark(1, identity, request.mark, *at, request.by, unix_s, self.plan.digest).message
+                case requests.Unmark(identity) if identity in self._board.marks:
+                    return structs.replace(self._board.marks[identity], removed=True).message
+                case requests.Acknowledge(number, by):
+                    m = self._member(number, now_s)
+                    if m is not None and (key := alarm_key(m)) is not None:
+                        return ack_message(key, by, unix_s)
+                case requests.Send():
+                    return self._send(request, unix_s, now_s)
+                case requests.SetCrew() | requests.CrewDoes():
+                    return self._change_crew(request, unix_s)
+        return "There is no such alarm, mark or floor any more."
+
+    def _send(self, request: requests.Send, unix_s: float, now_s: float) -> tuple[str, bytes] | str:
+        rescuer, m = self._member(request.id, now_s), self._member(request.to, now_s)
+        known = self._board.errands.get(rescuer.key) if rescuer else None
+        newer_s = known.unix_s + NEWER_S if known else 0.0  # however this clock was set back
+        errand = errand_to(m, self.plan, now_s, request.by, max(unix_s, newer_s)) if m else None
+        if rescuer is not None and errand is not None:
+            return errand_message(rescuer.key, errand)
+        return "Not sent: the place of the one in distress is not known on this plan."
+
+    def _change_crew(self, request: requests.SetCrew | requests.CrewDoes, unix_s: float) -> tuple[str, bytes] | str:
+        if isinstance(request, requests.SetCrew):
+            name, members, air_min, by = request.name, request.members, request.air_min, request.by
+            return Crew(1, secrets.token_hex(4), name, members, air_min, by, unix_s).message
+        if (crew := self._board.crews.known.get(request.id)) is None:
+            return "There is no such crew any more."
+        after = crew.after(request.does, request.by, unix_s)
+        return after.message if after else "The crew has done that already."
+
+    @property
+    def shared(self) -> tuple[tuple[str, bytes], ...]:
+        """Messages with the whole shared state of the commanders: marks and acknowledgements."""
+        with self._lock:
+            return tuple(self._board.messages)
+
+    def take_answers(self) -> list[tuple[str, bytes]]:
+        """Messages for the broker, which keeps older ones of what the commanders share; each is given once."""
+        with self._lock:
+            answers = list(self._board.answers)
+            self._board.answers.clear()
+        return answers
+
+    def _member(self, number: int, now_s: float) -> Member | None:
+        """The member with this number."""
+        return next((m for n, m in self._numbered(now_s) if n == number), None)
+
+    def _numbered(self, now_s: float) -> list[tuple[int, Member]]:
+        """All members with their numbers, the most urgent first."""
+        members = self.roster.members(now_s)
+        return [(followed.number, m) for m in members if (followed := self._followed.get(m.key)) is not None]
+
+    def scene(self, now_s: float, unix_s: float, *, connected: bool = True, fault: str = "") -> TableScene:
+        """The scene at a time of the commander's clock.
+
+        Rows of its `places`: wearer, x, y, level, heading, 95 % radius, protection radius (NaN: not known, none).
+        """
+        with self._lock:
+            members = self.roster.members(now_s)
+            if self._changed or now_s - self._listed_s >= LIST_S:
+                self._list(members, now_s)
+            places, refused = self._places(members, now_s), rejected(self.roster)
+            words = summary_words(members, now_s)
+            return TableScene(
+                now_s, unix_s, places, self._rows, words, refused, connected, fault, self._marks(), self._shown_crews()
+            )
+
+    def trail(self, begin: int, now_s: float) -> tuple[bytes, int]:
+        """Rows of the trails from point number `begin` on, and the number of the next point."""
+        with self._lock:
+            return self._trails.rows(begin, now_s), self._trails.end
+
+    def details(self, number: int, now_s: float) -> ShownDetails | None:
+        """Everything about one wearer; None when there is none with this number."""
+        with self._lock:
+            m = self._member(number, now_s)
+            if m is None:
+                return None
+            history = tuple(reversed(self._followed[m.key].history or ()))
+            return shown_details(number, m, self.plan, now_s, history, self.roster.duplicates(now_s))
+
+    def distress(self, number: int, now_s: float) -> ShownDistress | None:
+        """What a commander needs of one in distress; None of others."""
+        with self._lock:
+            m = self._member(number, now_s)
+            return shown_distress(m, self._numbered(now_s), self.plan, now_s, self._board) if m else None
+
+    def _follow(self, now_s: float, unix_s: float) -> None:
+        """Extend trails and histories; drop those of members that the roster has removed."""
+        members = {m.key: m for m in self.roster.members(now_s)}
+        gone = [key for key in self._followed if key not in members]
+        self._trails.forget({self._followed.pop(key).number for key in gone})
+        self._changed = self._changed or bool(gone)
+        for key in self.roster.keys:
+            m, followed = members[key], self._followed.get(key)
+            if followed is None:
+                followed = self._followed[key] = _Followed(self._next_number, history=deque(maxlen=MOST_EVENTS))
+                self._next_number += 1
+            self._note(followed, m, now_s, unix_s)
+            if m.report.status in SHOWN_STATUS and m.report.position and level_on(self.plan, m) is not None:
+                self._trails.add(followed.number, m.report.position, now_s)
+
+    def _note(self, followed: _Followed, m: Member, now_s: float, unix_s: float) -> None:
+        """Add a change of state to the history."""
+        state = m.state(now_s)
+        if state is followed.state or followed.history is None:
+            return
+        p = m.report.last_known
+        where = ", ".join(filter(None, (p.floor_name, p.where))) if p else ""
+        followed.history.append(ShownEvent(unix_s, f"{state.value}{': ' if where else ''}{where}"))
+        followed.state, self._changed = state, True
+
+    def _list(self, members: list[Member], now_s: float) -> None:
+        """Make the list anew."""
+        duplicates = self.roster.duplicates(now_s)
+        self._rows = tuple(
+            shown_wearer(self._followed[m.key].number, m, self.plan, now_s, duplicates, self._board)
+            for m in members
+            if m.key in self._followed
+        )
+        self._listed_s, self._changed = now_s, False
+
+    def _marks(self) -> tuple[ShownMark, ...]:
+        """The marks on this plan; the same object while they are the same."""
+        shown = tuple(shown_mark(m) for m in self._board.marks.values() if m.plan_sha256 == self.plan.digest)
+        if shown != self._shown_marks:
+            self._shown_marks = shown
+        return self._shown_marks
+
+    def _shown_crews(self) -> tuple[Crew, ...]:
+        """All crews; the same object while they are the same."""
+        if (crews := tuple(self._board.crews.known.values())) != self._crews:
+            self._crews = crews
+        return self._crews
+
+    def _places(self, members: list[Member], now_s: float) -> bytes:
+        rows = array("f")
+        for m in members:
+            p, level, followed = m.position(now_s), level_on(self.plan, m), self._followed.get(m.key)
+            if p is None or level is None or followed is None:
+                continue
+            claimed = m.report.position is not None  # of a place that was last known nothing is claimed but the place
+            heading = p.heading_rad if claimed and p.heading_rad is not None else math.nan
+            protection = p.protection_m if claimed and p.protection_m is not None else math.nan
+            radius = p.radius95_m if claimed else math.nan
+            rows.extend((followed.number, p.x_m, p.y_m, level, heading, radius, protection))
+        return rows.tobytes()

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""`echostep command OPERATION.mcap`: a recorded operation, shown again by the code that showed it live.
+
+In: a recording, a plan. Out: the page, the final table, a picture, the roster as JSON. Owns the loop. The page can be used while the file is read.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from echostep.errors import EchostepError
+from echostep.plan.model import Plan
+from echostep.recording.reading import open_recording
+from echostep_app.operation.operation import Operation
+from echostep_app.operation.recorded.record import KIND
+from echostep_app.operation.recorded.tape import Player, Tape, load
+from echostep_app.operation.views import Views, finish, open_page
+from echostep_app.page.protocol import FRAME_S
+from echostep_app.team.commander import table
+
+if TYPE_CHECKING:
+    from echostep_app.operation.page import TablePage
+
+
+def replay(path: Path, plan: Plan, seconds: float | None, views: Views, console: Console) -> None:
+    """Show a recorded operation until Ctrl-C, or for `seconds` after it has been read; without a page, its end."""
+    metadata = open_recording(path).metadata
+    if metadata.get("kind") != KIND:
+        raise EchostepError(f"{path}: no recorded operation; echostep replay shows recorded walks")
+    if metadata.get("plan_sha256") != plan.digest:
+        console.print(
+            f"{path}: it was recorded on another plan: wearers are listed, not shown on this one", markup=False
+        )
+    operation, tape = Operation(plan), Tape(path, grows=False)
+    with ExitStack() as opened:
+        page = open_page(opened, operation, "echostep command, recorded", views, tape, console)
+        with suppress(KeyboardInterrupt):
+            player = _read(tape, operation, page)
+            if player is None:
+                raise EchostepError(f"{path}: nothing of the operation can be read")
+            _say(player, console)
+            if page:
+                _serve(player, page, math.inf if seconds is None else seconds)
+    if not views.as_json:
+        lines = table(operation.roster, plan, tape.end_s, connected=True, columns=console.width)
+        console.print(lines)
+    finish(operation, tape.end_s, views)
+
+
+def _read(tape: Tape, operation: Operation, page: TablePage | None) -> Player | None:
+    """Read the whole file; the page is shown what is read at most 30 times a second. Returns the player at the end."""
+    shown_s, player = -math.inf, None
+    for player in load(tape, operation):
+        if page and time.monotonic() - shown_s >= FRAME_S:
+            shown_s = time.monotonic()
+            page.publish(player.scene())
+    return player
+
+
+def _serve(player: Player, page: TablePage, seconds: float) -> None:
+    """Wake the pages 30 times a second: each plays on by itself."""
+    end_s, scene = time.monotonic() + seconds, player.scene()
+    while time.monotonic() < end_s:
+        page.publish(scene)
+        time.sleep(FRAME_S)
+
+
+def _say(player: Player, console: Console) -> None:
+    """What is wrong with the file."""
+    file = player.file
+    if file.own_damage.truncated:
+        console.print(f"{file.path}: it was not closed: it is shown up to its last whole record", markup=False)
+    if file.own_damage.altered or file.own_damage.places or file.own_damage.unreadable_chunks or player.unknown:
+        console.print(f"{file.path}: damaged; echostep info {file.path} says where", markup=False)

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: MIT
+"""The session of one commander's page: frames at most 30 times a second, with at most two that the page has not drawn.
+
+In: a WebSocket, the feed. Out: frames. Owns what this page has been sent, and which wearer it has chosen. A page in the background draws nothing, so
+nothing is sent to it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+
+from starlette.websockets import WebSocket
+
+from echostep_app.operation import requests, wire
+from echostep_app.operation.operation import Operation, TableScene
+from echostep_app.operation.recorded.past import PastView
+from echostep_app.operation.recorded.tape import Tape
+from echostep_app.page.guarded_socket import MOST_UNDRAWN, GuardedSocket
+from echostep_app.page.protocol import FRAME_S, Refused
+from echostep_app.page.requests import FrameDrawn, SetPlaying, SetSpeed
+from echostep_app.page.shared import PageCounts
+from echostep_app.page.web.faults import Faults
+
+BAR_S = 0.5  # between two frames of one scene: the time bar grows
+PAST = "The page shows the past: return to now first."
+
+
+class TableFeed:
+    """The newest scene; the receiver's thread publishes, the server's thread reads."""
+
+    def __init__(self, operation: Operation, title: str, tape: Tape | None = None) -> None:
+        """`tape`: of the operation's recording, by which a page can show the past."""
+        self.operation = operation
+        self.title = title
+        self.tape = tape
+        self.latest: TableScene | None = None
+        self.on_publish: Callable[[], None] | None = None
+        self.send: Callable[[str, bytes], bool] | None = None  # topic and payload, to the broker
+
+    def act(self, request: requests.Action) -> str:
+        """Send a page's request to the broker, which distributes it to all commanders; returns the reason of a refusal, or nothing."""
+        message = self.operation.act(request, time.time(), time.monotonic())
+        if isinstance(message, str):
+            return message
+        if self.send is None or not self.send(*message):
+            return "Not sent: the broker does not take it."
+        return ""
+
+    def publish(self, scene: TableScene) -> None:
+        """Replace the scene and call `on_publish`."""
+        self.latest = scene
+        if self.on_publish:
+            self.on_publish()
+
+
+class TableSession(GuardedSocket):
+    """Serves one page until it disconnects."""
+
+    def __init__(self, socket: WebSocket, feed: TableFeed, faults: Faults, counts: PageCounts) -> None:
+        super().__init__(socket, faults, counts)
+        self._feed = feed
+        self._undrawn: set[int] = set()  # numbers of frames
+        self._seq = 0
+        self._trail_end = 0  # number of the next point of the trails that the page needs
+        self._last: TableScene | None = None
+        self._chosen: int | None = None
+        self._due = True  # the page needs a frame, even of the same scene
+        self._view = PastView(feed.tape) if feed.tape else None
+        self._shown: Operation = feed.operation  # whose scene was sent last
+        self._sent_s = 0.0  # when, on the monotonic clock
+
+    async def _greet(self) -> None:
+        await self.tell(wire.encode(wire.table_hello(self._feed.operation.plan, self._feed.title)))
+
+    async def _handle(self, text: str | None) -> None:
+        request = requests.parse_request(text)
+        match request:
+            case None:
+                self._counts.unknown += 1
+            case FrameDrawn(seq):
+                self._undrawn.discard(seq)
+                self._news.set()
+            case requests.Choose(number):
+                self._chosen, self._due = number, True
+                self._news.set()
+            case requests.Seek() | SetPlaying() | SetSpeed() | requests.Now():
+                if self._view is not None:
+                    self._view.handle(request)
+                    self._due = True
+                    self._news.set()
+            case _ if self._view is not None and self._view.is_past:
+                self._counts.refused += 1
+                await self.tell(wire.encode(Refused(PAST)))
+            case _:
+                if refusal := self._feed.act(request):
+                    self._counts.refused += 1
+                    await self.tell(wire.encode(Refused(refusal)))
+
+    async def _send(self) -> None:
+        """Send a frame when there is something new, not before `FRAME_S` after the last one."""
+        due_s = 0.0
+        while True:
+            await self._news.wait()
+            if (early_s := due_s - time.monotonic()) > 0.0:
+                await asyncio.sleep(early_s)
+            self._news.clear()
+            if len(self._undrawn) >= MOST_UNDRAWN:
+                continue
+            operation, scene = await self._moment()
+            if scene is None or (scene is self._last and not self._is_due()):
+                continue
+            due_s = max(due_s, time.monotonic() - FRAME_S) + FRAME_S
+            await self.tell(self._frame(operation, scene))
+
+    async def _moment(self) -> tuple[Operation, TableScene | None]:
+        """What this page shows: the newest scene, or one of the past, which another thread makes."""
+        if self._view is not None and self._view.is_past:
+            past = await asyncio.to_thread(self._view.look, time.monotonic())
+            if past is not None:
+                return past
+        return self._feed.operation, self._feed.latest
+
+    def _is_due(self) -> bool:
+        """Whether the page gets a frame although the scene is unchanged: it requested one, or the time bar has grown."""
+        is_past = self._view is not None and self._view.is_past
+        return self._due or (is_past and time.monotonic() - self._sent_s >= BAR_S)
+
+    def _frame(self, operation: Operation, scene: TableScene) -> bytes:
+        """A frame with what this page has not been sent yet; from then on it counts as sent."""
+        self._seq += 1
+        self._undrawn.add(self._seq)
+        if operation is not self._shown:
+            self._shown, self._trail_end, self._last, self._due = operation, 0, None, True
+        begin, self._sent_s = self._trail_end, time.monotonic()
+        lists = self._due or self._last is None or scene.rows is not self._last.rows
+        trail, self._trail_end = operation.trail(begin, scene.t_s)
+        chosen = self._chosen if lists else None
+        details = operation.details(chosen, scene.t_s) if chosen is not None else None
+        distress = operation.distress(chosen, scene.t_s) if chosen is not None else None
+        marks = self._last is None or scene.marks is not self._last.marks
+        crews = self._last is None or scene.crews is not self._last.crews
+        latest = self._feed.latest or scene
+        shown = self._view.shown(scene.t_s, sum(row.open_alarm for row in latest.rows)) if self._view else None
+        self._last, self._due = scene, False
+        return wire.frame(
+            scene, wire.TableParts(self._seq, trail, begin, lists, marks, crews, details, distress, shown)
+        )

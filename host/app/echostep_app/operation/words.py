@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: MIT
+"""A member of the team in words: the row of the list, and the details behind it.
+
+In: members, the plan, a time. Out: `ShownWearer`, `ShownDetails`: plain data, whose field names are keys of the page's JSON. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from echostep.plan.model import Plan
+from echostep_app.page.elements.marks import ShownMark
+from echostep_app.team.commander import heading_on, notes
+from echostep_app.team.cot import alarm_words
+from echostep_app.team.messages.marks import AlarmKey, Mark, MarkBoard
+from echostep_app.team.messages.report import Position
+from echostep_app.team.roster import Member, MemberState
+from echostep_app.wearer.falls import LYING_RAD, UPRIGHT_RAD
+
+STATES = {
+    MemberState.MAYDAY: "mayday", MemberState.ASKED: "asked after a fall",
+    MemberState.LOST: "lost", MemberState.STALE: "silent", MemberState.UNCERTAIN: "uncertain",
+    MemberState.WAITING: "no position yet", MemberState.TRACKING: "", MemberState.ENDED: "run ended",
+}  # in words; a position that is tracked needs none  # fmt: skip
+COUNTED = {state: words or "tracked" for state, words in STATES.items()}  # in the summary
+
+
+@dataclass(frozen=True, slots=True)
+class ShownEvent:
+    """A change of a wearer's state: time of day in seconds since 1970, and what happened."""
+
+    unix_s: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class ShownWearer:
+    """A row of the list. `level` is an index into the plan's levels, None without a position on this plan.
+
+    `open_alarm`: a mayday that no commander has acknowledged.
+    """
+
+    id: int
+    team: str
+    name: str
+    state: str
+    words: str
+    level: int | None
+    notes: tuple[str, ...]
+    open_alarm: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ShownFact:
+    """One line of the details."""
+
+    name: str
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class ShownDetails:
+    """What is known of one wearer. `history`: the newest event first."""
+
+    id: int
+    facts: tuple[ShownFact, ...]
+    history: tuple[ShownEvent, ...]
+
+
+def summary_words(members: Sequence[Member], now_s: float) -> str:
+    """How many wearers there are, and how many in each state: "8 wearers: 1 lost, 7 tracked"."""
+    states = [m.state(now_s) for m in members]
+    counts = ", ".join(f"{states.count(state)} {COUNTED[state]}" for state in MemberState if state in states)
+    return f"{len(members)} wearer{'s' * (len(members) != 1)}" + (f": {counts}" if counts else "")
+
+
+def level_on(plan: Plan, m: Member) -> int | None:
+    """The plan's level that a member is on; None without a position, and when it was tracked on another plan."""
+    p = m.report.last_known
+    if p is None or m.report.plan_sha256 != plan.digest or not 0 <= p.floor < len(plan.levels):
+        return None
+    return p.floor
+
+
+def alarm_key(m: Member) -> AlarmKey | None:
+    """Of the present mayday of a member; None without one."""
+    alarm = m.report.alarm
+    if alarm is None or alarm.kind != "mayday":
+        return None
+    return m.report.team, m.report.name, f"{m.report.run}-{alarm.number}"
+
+
+def shown_mark(m: Mark) -> ShownMark:
+    """A mark for a page."""
+    return ShownMark(m.id, m.mark, m.x_m, m.y_m, m.level, m.by)
+
+
+def shown_wearer(
+    number: int, m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]], board: MarkBoard
+) -> ShownWearer:
+    """The row of a member: "2nd floor, near stairs B, within 0.4 m, heard 2 s ago"."""
+    state, p = m.state(now_s), m.position(now_s)
+    place = () if p is None else place_words(p) if m.report.position else last_place_words(p)
+    parts = [STATES[state], *place, heard_words(m.silent_s(now_s))]
+    words = ", ".join(filter(None, parts))
+    remarks, key = notes(m, plan, now_s, duplicates), alarm_key(m)
+    ack = board.acks.get(key) if key else None
+    if ack:
+        remarks.insert(0, f"acknowledged by {ack.by}")
+    if errand := board.errands.get(m.key):
+        remarks.insert(0, f"sent to {errand.to} by {errand.by}")
+    if crew := board.crews.of_member(m.report.name):
+        remarks.insert(0, f"crew {crew.name}{' inside' * crew.is_inside}")
+    is_open = key is not None and ack is None
+    return ShownWearer(
+        number, m.report.team, m.report.name, state.value, words, level_on(plan, m), tuple(remarks), is_open
+    )
+
+
+def place_words(p: Position) -> tuple[str, str, str]:
+    """Floor, place on it, and how sure that is: the protection radius where there is one, else the 95 % radius."""
+    if p.protection_m is not None:
+        return p.floor_name, p.where, f"within {metres(p.protection_m)}"
+    return p.floor_name, p.where, f"±{metres(p.radius95_m)}"
+
+
+def last_place_words(p: Position) -> tuple[str, ...]:
+    """Floor and place where a lost wearer was last known to be, and how long ago that was."""
+    return f"last known {p.age_s:.0f} s ago", p.floor_name, p.where
+
+
+def heard_words(silent_s: float) -> str:
+    """Time since a member's last report, in words."""
+    if silent_s < 1.5:
+        return "heard now"
+    return f"heard {silent_s:.0f} s ago" if silent_s < 120.0 else f"heard {silent_s / 60.0:.0f} min ago"
+
+
+def metres(m: float) -> str:
+    """A length as text: 0.4 m, 12 m."""
+    return f"{m:.1f} m" if m < 9.95 else f"{m:.0f} m"
+
+
+def shown_details(
+    number: int, m: Member, plan: Plan, now_s: float, history: tuple[ShownEvent, ...], duplicates: set[tuple[str, str]]
+) -> ShownDetails:
+    """All fields of the last report, in words."""
+    r, p = m.report, m.position(now_s)
+    rows = [("alarm", current_alarm_words(m, now_s))] if r.alarm else []
+    rows += [("state", m.state(now_s).value), ("heard", heard_words(m.silent_s(now_s)).removeprefix("heard "))]
+    if p and not r.position:
+        rows += [("place", "not known"), ("last known", ", ".join(filter(None, last_place_words(p))))]
+    elif p:
+        rows += [("floor", f"{p.floor_name} ({100.0 * p.floor_probability:.0f} %)"), ("place", p.where or "not named")]
+        rows += [("position", f"x {p.x_m:.1f}, y {p.y_m:.1f} m"), ("95 % within", metres(p.radius95_m))]
+        rows += [("safe radius", metres(p.protection_m) if p.protection_m is not None else "none")]
+        rows += [("heading", heading_on(plan, m))]
+    if r.motion:
+        rows += [("walked", f"{r.motion.walked_m:.0f} m"), ("last step", f"{r.motion.still_s:.0f} s before the report")]
+    if r.trunk_tilt_deg is not None:
+        rows += [("trunk", tilt_words(r.trunk_tilt_deg))]
+    if r.battery_percent is not None:
+        rows += [("battery", f"{r.battery_percent} %")]
+    rows += [("reports missed", str(m.missed)), ("source", r.source), ("run", r.run), ("version", r.version)]
+    rows += [("note", note) for note in notes(m, plan, now_s, duplicates)]
+    return ShownDetails(number, tuple(ShownFact(name, value) for name, value in rows), history)
+
+
+def current_alarm_words(m: Member, now_s: float) -> str:
+    """A member's alarm at a time of the commander's clock; empty without one."""
+    alarm = m.report.alarm
+    return alarm_words(replace(alarm, age_s=alarm.age_s + m.silent_s(now_s))) if alarm else ""
+
+
+def tilt_words(tilt_deg: float) -> str:
+    """The trunk's tilt: upright (4°), bent (40°), lying (85°); the limits are those of `wearer/falls.py`."""
+    tilt_rad = math.radians(tilt_deg)
+    posture = "upright" if tilt_rad < UPRIGHT_RAD else "lying" if tilt_rad > LYING_RAD else "bent"
+    return f"{posture} ({tilt_deg:.0f}°)"

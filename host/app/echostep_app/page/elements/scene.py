@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""The scene: everything that a page shows of one moment, immutable.
+
+In: a tracker, in the tracker's thread. Out: `PageScene`s that any thread may read. Owns nothing; all arrays are copies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echostep.arrays import Octets
+from echostep.localization.estimate import Estimate, TrackStatus, claims_place
+from echostep.localization.limits import PROBABLE
+from echostep.plan.model import Plan
+from echostep.tracker.state import ParticleSnapshot
+from echostep_app.page.elements.alarm import ShownAlarm
+from echostep_app.page.elements.echo_lines import EchoLine
+from echostep_app.page.elements.guidance import ShownGuidance
+from echostep_app.page.elements.marks import BeaconMark
+from echostep_app.page.elements.meetings import ShownMeeting
+from echostep_app.page.elements.stream_rates import StreamRates
+from echostep_app.page.elements.true_position import TruePosition
+from echostep_app.page.elements.undo_offer import UndoOffer
+
+MOST_SHOWN = 10_000  # particles in a frame
+
+
+SHOWN_HEIGHT_M = 1.5  # least height against the start that a page shows: half a storey
+
+
+@dataclass(frozen=True, slots=True)
+class ParticleSample:
+    """Particles to draw: `x_m`, `y_m` (n,) float32 in the map, `weight` (n,) uint8, 255 for the greatest, `level` (n,) uint8."""
+
+    x_m: NDArray[np.float32]
+    y_m: NDArray[np.float32]
+    weight: Octets
+    level: Octets
+
+    def moved(self, dx_m: float, dy_m: float) -> ParticleSample:
+        """The same particles, shifted."""
+        return replace(self, x_m=self.x_m + np.float32(dx_m), y_m=self.y_m + np.float32(dy_m))
+
+
+@dataclass(frozen=True, slots=True)
+class PageScene:
+    """What a page shows of one moment.
+
+    `arrived_ns`: host's monotonic clock when the bytes of the estimate arrived. `trail_count`: number of points of the trail up to this moment.
+    `guidance`: of the run; that to a destination chosen on a page is added by the page's session. `echoes_fit`: the plan explains the last echoes.
+    `truth`: the true position, where it is known. `gait`: that the wearer runs, in words.
+    """
+
+    arrived_ns: int
+    t_s: float
+    estimate: Estimate | None
+    particles: ParticleSample | None
+    echo_lines: tuple[EchoLine, ...]
+    streams: StreamRates | None
+    trail_count: int
+    status_text: str
+    beacons: tuple[BeaconMark, ...] = ()
+    undo: UndoOffer | None = None
+    echoes_fit: bool = False
+    guidance: ShownGuidance | None = None
+    truth: TruePosition | None = None
+    alarm: ShownAlarm | None = None
+    met: ShownMeeting | None = None
+    gait: str = ""
+
+
+def is_placed(estimate: Estimate, plan: Plan) -> bool:
+    """Whether an estimate is shown as a place; without a plan it is the end of the drawn path in any case."""
+    return claims_place(estimate.status) or not plan.is_drawn
+
+
+def sample_of(particles: ParticleSnapshot) -> ParticleSample:
+    """The tracker's published particles as they are drawn: weights relative to the greatest, positions in single precision."""
+    weight = np.exp(particles.log_weight)
+    shown = (255.0 * weight / max(float(weight.max()), 1e-300)).astype(np.uint8)
+    x_m, y_m = particles.x_m.astype(np.float32), particles.y_m.astype(np.float32)
+    return ParticleSample(x_m, y_m, shown, np.minimum(particles.level, 255).astype(np.uint8))
+
+
+def status_text(
+    estimate: Estimate | None, *, needs_start: bool = False, accepts_taps: bool = True, no_plan: bool = False
+) -> str:
+    """Status and accuracy in words.
+
+    `no_plan`: no floors; the page shows the height against the start. `needs_start`: the tracker waits for a check-in that gives the start.
+    `accepts_taps`: the page takes check-ins (not so in a replay).
+    """
+    tap = " or tap where you are" if accepts_taps else ""
+    if estimate is None:
+        return "tap where you stand to start" if needs_start else "waiting for the foot to stand still"
+    if estimate.plan_fits < PROBABLE:
+        return "this plan does not fit: is it another building or floor, or mirrored?"
+    if estimate.status != TrackStatus.TRACKING and len(estimate.hypotheses) > 1:
+        return f"{estimate.status.value}: {len(estimate.hypotheses)} places fit; walk on, turn into a room{tap}"
+    if estimate.status == TrackStatus.LOST and not no_plan:
+        return "lost: walk along a wall or tap where you are" if accepts_taps else "lost"
+    where = ", outside the building" if estimate.outside > PROBABLE else _height_words(estimate.z_m) if no_plan else ""
+    return f"{estimate.status.value}{where}, {format_metres(estimate.ellipse95.major_m)}"
+
+
+def _height_words(z_m: float) -> str:
+    """A height against the start, where it is about a storey."""
+    return "" if abs(z_m) < SHOWN_HEIGHT_M else f", {abs(z_m):.0f} m {'above' if z_m > 0.0 else 'below'} the start"
+
+
+def format_metres(distance_m: float) -> str:
+    """A length as text, rounded as people need it: 0.2 m, 3 m, 40 m."""
+    return f"{distance_m:.1f} m" if distance_m < 0.95 else f"{distance_m:.0f} m"

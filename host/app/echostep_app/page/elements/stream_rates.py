@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""Rates and losses of each input stream.
+
+In: the tracker's counters at arrival times. Out: `StreamRates`. Owns the counters of the last seconds.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, fields
+
+from echostep.tracker import Tracker
+from echostep.tracker.state import StreamState
+from echostep.xsens.reader import MtxCounts
+from echostep_app.board.faults.health import Severity, all_findings
+
+WINDOW_NS = 2_000_000_000  # over which rates are averaged
+SHORTEST_S = 0.5  # no rate is given for a shorter time
+
+
+@dataclass(frozen=True, slots=True)
+class StreamRates:
+    """Rates over the last two seconds (None: not known yet), and counts since the start. The field names are keys of the frame's JSON.
+
+    `lost`: messages that did not arrive. `rejected`: bytes or messages with wrong contents. `late_pings`: pings that came after their segment.
+    `wrong`: what is wrong with the reports, the board or a stream and what to do, as text; empty when nothing is. `foot`: what is worn on the
+    foot; its samples are counted in `mtx_hz`.
+    """
+
+    mtx_hz: float | None
+    pings_hz: float | None
+    lost: int
+    rejected: int
+    late_pings: int
+    synchronised: bool
+    check_ins: int
+    wrong: str
+    foot: str = "MTx"
+
+
+class StreamRateMeter:
+    """Turns counters into rates; call `measure` after each portion."""
+
+    def __init__(self) -> None:
+        self._counts: deque[tuple[int, int, int]] = deque()  # time (ns), MTx samples, pings
+        self._unused = 0  # messages of the MTx that are no samples, when its samples were last counted
+
+    def measure(self, tracker: Tracker, t_ns: int, fault: str = "") -> StreamRates:
+        """Rates and counts at `t_ns` of the arrival clock, which must not go back; `fault`: what is wrong with what the run writes."""
+        streams = tracker.streams
+        board, mtx, status = streams.board, streams.mtx, streams.status
+        mtx_hz, pings_hz = self._rates_hz(mtx.good, streams.pings, t_ns)
+        if mtx_hz != 0.0:
+            self._unused = _unused(mtx)
+        dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
+        return StreamRates(
+            mtx_hz=mtx_hz,
+            pings_hz=pings_hz,
+            lost=board.lost + mtx.lost + dropped,
+            rejected=board.rejected + mtx.bad_checksum + mtx.bad_length + mtx.incomplete,
+            late_pings=streams.front_end.late_pings,
+            synchronised=streams.synchronised,
+            check_ins=tracker.state.check_ins,
+            wrong=". ".join(filter(None, (fault, _advice(streams, mtx_hz, pings_hz, _unused(mtx) - self._unused)))),
+            foot=streams.foot_name,
+        )
+
+    def _rates_hz(self, samples: int, pings: int, t_ns: int) -> tuple[float | None, float | None]:
+        """Samples and pings a second over the window; adds these counts to the window."""
+        while len(self._counts) > 1 and t_ns - self._counts[1][0] >= WINDOW_NS:
+            self._counts.popleft()
+        begin_ns, first_samples, first_pings = self._counts[0] if self._counts else (t_ns, samples, pings)
+        if not self._counts or t_ns - self._counts[-1][0] >= WINDOW_NS // 20:
+            self._counts.append((t_ns, samples, pings))
+        span_s = (t_ns - begin_ns) * 1e-9
+        if span_s < SHORTEST_S:
+            return None, None
+        return (samples - first_samples) / span_s, (pings - first_pings) / span_s
+
+
+def _unused(mtx: MtxCounts) -> int:
+    """Number of messages, or of bytes outside of messages, that came from the MTx and gave no sample."""
+    return sum(getattr(mtx, field.name) for field in fields(mtx) if field.name not in ("good", "lost"))
+
+
+def _advice(streams: StreamState, mtx_hz: float | None, pings_hz: float | None, unused: int) -> str:
+    """The gravest finding and what to do about it. `unused`: what has come from the foot since its last sample, which gave none."""
+    if mtx_hz == 0.0 and unused > 0:
+        incomplete = " (without counter, acceleration or rate of turn)" if streams.mtx.incomplete else ""
+        return f"the {streams.foot_name} sends no usable samples{incomplete}: look at its settings, its port and its RX line: echostep doctor"
+    if mtx_hz == 0.0:
+        return f"the {streams.foot_name} is silent: look at its plug and its power"
+    findings = [
+        finding for finding in all_findings(streams.reports, streams.foot_reports) if finding.severity > Severity.NOTE
+    ]
+    if not findings and pings_hz == 0.0:
+        return "no pings: look at the board's plug and at the rangers"
+    return str(findings[0]) if findings else ""

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: MIT
+"""Taps: the preview of a check-in's effect; the surveyed point that an acceptance walk asks for.
+
+In: a plan; a check-in that a page considers, and the scene that it was shown. Out: `Considered`: plain data. Owns what is known of the plan's spaces.
+One thread asks at a time.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from echostep.localization.estimate import Estimate, TrackStatus, claims_place
+from echostep.plan.model import Plan
+from echostep.ports.people.check_in import CheckIn
+from echostep_app.page.elements.likely_places import places_text, shown_places
+from echostep_app.page.elements.scene import PageScene, format_metres
+from echostep_app.plan.places.bearing import KNOWN_HEADING_RAD
+from echostep_app.plan.places.spaces import PlanSpaces
+from echostep_app.plan.places.standing import StandingGround
+from echostep_app.plan.places.whereabouts import Whereabouts
+
+NO_TAP = "u"  # as a line of the terminal: the newest tap at a point was none
+DOUBTED_M = 1.0  # a check-in that is farther than this outside the ellipse of a fitting place is doubted; assumed
+
+
+@dataclass(frozen=True, slots=True)
+class Considered:
+    """What a check-in would do. The field names are keys of the JSON.
+
+    `x_m`, `y_m`: the place that it would give: the nearest possible one when the place that was asked for is impossible. `possible`: there is
+    one. `text`: what it would do, in sentences.
+    """
+
+    x_m: float
+    y_m: float
+    level: int
+    heading_rad: float | None
+    possible: bool
+    text: str
+    kind: Literal["considered"] = "considered"
+
+
+@dataclass(frozen=True, slots=True)
+class ShownPoints:
+    """What an acceptance walk asks for. The field names are keys of the frame's JSON.
+
+    `number`: of the visit that comes next, to `name`, empty when all are over; `text`: what to do there. `later`: names of all points still to come.
+    `undo`: there is a tap that can be taken back.
+    """
+
+    number: int
+    name: str
+    text: str
+    later: tuple[str, ...]
+    undo: bool
+
+
+class PointPress(NamedTuple):
+    """At `t_ns` of the host's clock a page that showed visit `number` had its button pressed; `typed`: as a line of the terminal."""
+
+    t_ns: int
+    number: int
+    typed: str
+
+
+class Taps:
+    """Judges the check-ins of all pages of a run."""
+
+    def __init__(self, plan: Plan) -> None:
+        spaces = PlanSpaces(plan)
+        self.whereabouts = Whereabouts(plan, spaces)
+        self._ground = StandingGround(plan, spaces)
+        self._plan = plan
+        self._last: tuple[Estimate | None, str, str] = (None, "", "")
+
+    def where(self, estimate: Estimate) -> str:
+        """The place of an estimate in words; cached, for all pages of a live run show the same one."""
+        return self._words(estimate)[0]
+
+    def places(self, estimate: Estimate) -> str:
+        """The places of its hypotheses as a sentence."""
+        return self._words(estimate)[1]
+
+    def _words(self, estimate: Estimate) -> tuple[str, str]:
+        """Both, kept for the next page that asks."""
+        if self._last[0] is not estimate:
+            words = self.whereabouts.words
+            shown = shown_places(estimate)
+            places = tuple(words(h.x_m, h.y_m, h.level) for h in shown)
+            where = words(estimate.x_m, estimate.y_m, estimate.level) if claims_place(estimate.status) else ""
+            self._last = estimate, where, places_text(shown, places, self._plan)
+        return self._last[1:]
+
+    def refusal(self, check_in: CheckIn) -> str:
+        """Why a check-in is refused, in words; empty when it is not."""
+        objection = self._ground.objection(check_in.x_m, check_in.y_m, check_in.level)
+        return f"Not accepted: {objection.reason}." if objection else ""
+
+    def consider(self, check_in: CheckIn, scene: PageScene | None) -> Considered:
+        """What a check-in would do after a scene."""
+        x_m, y_m, level, heading_rad = check_in.x_m, check_in.y_m, check_in.level, check_in.heading_rad
+        objection = self._ground.objection(x_m, y_m, level)
+        if objection and objection.nearest_m is None:
+            return Considered(x_m, y_m, level, heading_rad, False, f"Nobody can stand here: {objection.reason}.")
+        sentences = []
+        if objection and objection.nearest_m:
+            away_m = math.dist(objection.nearest_m, (x_m, y_m))
+            x_m, y_m = objection.nearest_m
+            sentences.append(
+                f"Nobody can stand there: {objection.reason}. The nearest possible place is {format_metres(away_m)} away."
+            )
+        words = self.whereabouts.words(x_m, y_m, level) or f"x {x_m:.1f}, y {y_m:.1f} m"
+        floor = f", {self._plan.levels[level].name}" if len(self._plan.levels) > 1 else ""
+        sentences.append(f"{words[0].upper()}{words[1:]}{floor}.")
+        sentences += self._changes(x_m, y_m, check_in, scene)
+        return Considered(x_m, y_m, level, heading_rad, True, " ".join(sentences))
+
+    def _changes(self, x_m: float, y_m: float, check_in: CheckIn, scene: PageScene | None) -> list[str]:
+        """How a check-in would change the estimate of a scene, and what speaks against it."""
+        estimate = scene.estimate if scene else None
+        if check_in.heading_rad is not None:
+            heading = "You face the arrow."
+        elif estimate and estimate.heading_sd_rad <= KNOWN_HEADING_RAD:
+            heading = "Your direction stays: drag to change it."
+        else:
+            heading = "Drag to where you look, or your direction is found while you walk."
+        if scene is None or estimate is None or not claims_place(estimate.status):
+            return [heading]
+        away_m = math.dist((x_m, y_m), (estimate.x_m, estimate.y_m))
+        moved = estimate.level != check_in.level or away_m > estimate.ellipse95.major_m + DOUBTED_M
+        changes = [f"{format_metres(away_m)} from the estimate."] if estimate.level == check_in.level else []
+        if moved and scene.echoes_fit and estimate.status is TrackStatus.TRACKING:
+            changes.append("The echoes fit the estimate: are you sure?")
+        return [*changes, heading]

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""The guarded socket of one page: what the sessions of all pages have in common.
+
+In: a WebSocket. Out: texts and frames to the page; its requests, one by one, to the session. Owns the budget of requests and what happens on a fault.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from abc import ABC, abstractmethod
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from echostep_app.page import protocol
+from echostep_app.page.shared import PageCounts
+from echostep_app.page.web.faults import Faults
+
+MOST_UNDRAWN = 2  # frames that are sent but not reported as drawn
+MOST_REQUESTS_A_SECOND = 240  # a page that sends more is disconnected
+POLICY_VIOLATION, INTERNAL_ERROR = 1008, 1011  # WebSocket close codes [RFC 6455, 7.4.1]
+SERVICE_RESTART = 1012  # [IANA]
+
+
+class GuardedSocket(ABC):
+    """A session greets, handles requests, and sends; `run` ends when one of these does."""
+
+    def __init__(self, socket: WebSocket, faults: Faults, counts: PageCounts) -> None:
+        self._socket = socket
+        self._faults = faults
+        self._counts = counts
+        self._news = asyncio.Event()
+
+    @abstractmethod
+    async def _greet(self) -> None:
+        """Send the first message."""
+
+    @abstractmethod
+    async def _handle(self, text: str | None) -> None:
+        """Handle one request; None: it was not a text."""
+
+    @abstractmethod
+    async def _send(self) -> None:
+        """Send what is new, until cancelled."""
+
+    def wake(self) -> None:
+        """Look for something new to send."""
+        self._news.set()
+
+    async def disconnect(self) -> None:
+        """End the connection; the page comes back for what is served then."""
+        with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+            await self._socket.close(SERVICE_RESTART)
+
+    async def run(self) -> None:
+        """Serve until the page disconnects or sends too many requests; a fault is logged and sent to the page."""
+        tasks: list[asyncio.Task[None]] = []
+        try:
+            await self._greet()
+            tasks = [asyncio.create_task(self._receive()), asyncio.create_task(self._send())]
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
+        except WebSocketDisconnect:
+            pass
+        except Exception as error:
+            await self._fail(error)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _fail(self, error: Exception) -> None:
+        """Log a fault, send it to the page, close the socket."""
+        text = self._faults.note(error)
+        with contextlib.suppress(WebSocketDisconnect):
+            await self.tell(protocol.encode(protocol.Failed(text)))
+            await self._socket.close(INTERNAL_ERROR)
+
+    async def tell(self, message: str | bytes) -> None:
+        """Send a text or a frame; raises WebSocketDisconnect when the page has disconnected."""
+        try:
+            await (self._socket.send_text(message) if isinstance(message, str) else self._socket.send_bytes(message))
+        except RuntimeError as error:  # of Starlette: the socket is closed
+            raise WebSocketDisconnect(INTERNAL_ERROR) from error
+
+    async def _receive(self) -> None:
+        """Handle requests; returns when the page disconnects or floods."""
+        second_began, count = time.monotonic(), 0
+        while True:
+            event = await self._socket.receive()
+            if event["type"] != "websocket.receive":
+                return
+            if time.monotonic() - second_began > 1.0:
+                second_began, count = time.monotonic(), 0
+            count += 1
+            if count > MOST_REQUESTS_A_SECOND:
+                self._counts.flooding += 1
+                await self._socket.close(POLICY_VIOLATION)
+                return
+            await self._handle(event.get("text"))

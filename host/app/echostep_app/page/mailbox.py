@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: MIT
+"""The mailbox between the tracker's thread and the server's thread; neither waits for the other.
+
+In: scenes from the tracker's thread, check-ins from the server's thread. Out: the latest scene (in a replay: the history of all scenes), the trail,
+and the check-ins for the tracker. Owns these.
+"""
+
+from __future__ import annotations
+
+import queue
+from array import array
+from bisect import bisect_right
+from collections.abc import Callable, Iterator
+from operator import attrgetter
+from typing import TypeVar
+
+from echostep.plan.model import Plan
+from echostep.ports.people.check_in import Call, CheckIn, Undo
+from echostep_app.page.elements.drawn_walls import ShownDrawing
+from echostep_app.page.elements.marks import ShownMark
+from echostep_app.page.elements.scene import PageScene
+from echostep_app.page.elements.taps import PointPress, ShownPoints
+from echostep_app.page.over_time import OverTime
+from echostep_app.plan.routing import RoutePlace
+
+MOST_CHECK_INS = 16  # in the queue to the tracker; further ones are refused: a person makes a few in a minute
+
+T = TypeVar("T")
+
+
+class PageTrail:
+    """The walked path as points. Points are only appended, so any thread may read the points up to a length that it has read before."""
+
+    def __init__(self) -> None:
+        self._rows = array("f")
+
+    def __len__(self) -> int:
+        return len(self._rows) // 3
+
+    def add(self, x_m: float, y_m: float, level: int) -> None:
+        """Append a point in map metres; NaN coordinates break the line."""
+        self._rows.extend((x_m, y_m, level))
+
+    def part(self, begin: int, end: int) -> bytes:
+        """Points [begin, end) as rows of float32 x, y, level."""
+        return self._rows[3 * begin : 3 * end].tobytes()
+
+
+class SceneHistory:
+    """All scenes of a replay, in order of `t_s`."""
+
+    def __init__(self) -> None:
+        self._scenes: list[PageScene] = []
+        self._t_s: list[float] = []
+
+    def __len__(self) -> int:
+        return len(self._t_s)
+
+    def __getitem__(self, index: int) -> PageScene:
+        return self._scenes[index]
+
+    def add(self, scene: PageScene) -> None:
+        """Append a scene; one that is earlier than the last scene gets the last scene's time."""
+        self._scenes.append(scene)
+        self._t_s.append(max(scene.t_s, self._t_s[-1]) if self._t_s else scene.t_s)
+
+    def index_at(self, t_s: float) -> int:
+        """Index of the last scene at or before `t_s`; 0 when all scenes are later."""
+        return max(bisect_right(self._t_s, t_s) - 1, 0)
+
+    def t_s(self, index: int) -> float:
+        """Time of a scene."""
+        return self._t_s[index]
+
+
+class Mailbox:
+    """State shared by the tracker's thread and the server's thread. `goal`: the destination chosen on a page, the same for all pages."""
+
+    def __init__(self, plan: Plan, title: str, *, replay: bool, keeps: bool = False) -> None:
+        """`replay`: pages play the scenes, and check-ins are refused. `keeps`: the same from `end` on."""
+        self.plan = plan
+        self.title = title
+        self.trail = PageTrail()
+        self.history = SceneHistory()
+        self.over_time = OverTime(tuple(level.name for level in plan.levels))
+        self.replay = replay
+        self.summary: str | None = None  # how well the run went, once it is over
+        self.failure = ""  # the error that ends the run, in words
+        self._keeps = keeps
+        self.latest: PageScene | None = None
+        self.goal: RoutePlace | None = None
+        self.errand = ""  # who sent the wearer to the destination, in words
+        self.marks: tuple[ShownMark, ...] = ()  # of the commanders; replaced, never changed
+        self._drawings: tuple[
+            ShownDrawing, ...
+        ] = ()  # in order of `t_s`; a live run has the newest only; replaced, never changed
+        self.team: tuple[str, ...] = ()  # names of the teammates who can be met; replaced, never changed
+        self.points: ShownPoints | None = None  # of an acceptance walk; replaced, never changed
+        self.on_press: Callable[[PointPress], bool] | None = (
+            None  # takes taps at points at once, in the server's thread
+        )
+        self.on_publish: Callable[[], None] | None = None
+        self._check_ins: queue.Queue[CheckIn | Undo | Call] = queue.Queue(MOST_CHECK_INS)
+        self._met: queue.Queue[str] = queue.Queue(MOST_CHECK_INS)
+
+    def publish(self, scene: PageScene) -> None:
+        """Store a new scene and call `on_publish`; called in the tracker's thread."""
+        if self.replay:
+            self.history.add(scene)
+        self.latest = scene
+        self._announce()
+
+    def set_goal(self, goal: RoutePlace | None, errand: str = "") -> None:
+        """Set the destination of all pages and call `on_publish`; None ends the guidance to it. `errand`: who sent the wearer there, in words."""
+        self.goal, self.errand = goal, errand
+        self._announce()
+
+    def set_marks(self, marks: tuple[ShownMark, ...]) -> None:
+        """Replace the commanders' marks and call `on_publish`."""
+        self.marks = marks
+        self._announce()
+
+    def add_drawing(self, drawing: ShownDrawing) -> None:
+        """Show a new drawing from its time on and call `on_publish`; called in the drawing's thread."""
+        before = self._drawings if self.replay or self._keeps else ()
+        self._drawings = (*before, drawing)
+        self._announce()
+
+    def drawing_at(self, t_s: float) -> ShownDrawing | None:
+        """The newest drawing at a time; None before the first."""
+        drawings = self._drawings
+        count = bisect_right(drawings, t_s, key=attrgetter("t_s"))
+        return drawings[count - 1] if count else None
+
+    def set_team(self, names: tuple[str, ...]) -> None:
+        """Replace the list of teammates for meetings and call `on_publish`."""
+        self.team = names
+        self._announce()
+
+    def set_points(self, points: ShownPoints) -> None:
+        """Show which surveyed point comes next and call `on_publish`."""
+        self.points = points
+        self._announce()
+
+    def keep(self, scene: PageScene) -> None:
+        """Add the scene of an estimate to what is shown over time, and to the history that is played after `end`, if the run keeps one."""
+        self.over_time.add(scene)
+        if self._keeps and not self.replay:
+            self.history.add(scene)
+
+    def end(self, summary: str) -> None:
+        """The run is over; a history that was kept is played from now on."""
+        self.summary = summary
+        self.replay = self.replay or (self._keeps and len(self.history) > 0)
+        self._announce()
+
+    def fail(self, words: str) -> None:
+        """An error ends the run."""
+        self.failure = words
+        self._announce()
+
+    def add_check_in(self, check_in: CheckIn | Undo | Call) -> bool:
+        """Queue a check-in, its undoing or a call for the tracker; False when it is refused: in a replay, or with a full queue."""
+        return self._put(self._check_ins, check_in)
+
+    def pop_check_ins(self) -> Iterator[CheckIn | Undo | Call]:
+        """Remove and yield the queued check-ins; never waits."""
+        return _popped(self._check_ins)
+
+    def add_meeting(self, name: str) -> bool:
+        """Queue a meeting with a teammate; False when it is refused: in a replay, or with a full queue."""
+        return self._put(self._met, name)
+
+    def pop_meetings(self) -> Iterator[str]:
+        """Remove and yield the names of teammates reported as met; never blocks."""
+        return _popped(self._met)
+
+    def add_press(self, press: PointPress) -> bool:
+        """Hand on a tap at a surveyed point; False when it is refused: in a replay, or by the guide of the walk."""
+        return not self.replay and self.on_press is not None and self.on_press(press)
+
+    def _put(self, waiting: queue.Queue[T], item: T) -> bool:
+        if self.replay:
+            return False
+        try:
+            waiting.put_nowait(item)
+        except queue.Full:
+            return False
+        return True
+
+    def _announce(self) -> None:
+        if self.on_publish:
+            self.on_publish()
+
+
+def _popped(waiting: queue.Queue[T]) -> Iterator[T]:
+    while True:
+        try:
+            yield waiting.get_nowait()
+        except queue.Empty:
+            return

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""What a run was like over time: ranges, rates and heading at each estimate, and what happened.
+
+In: the scenes of new estimates, in the tracker's thread. Out: `OverTime`, which any thread may read up to a length that it has read before. Owns the
+rows and the events; their number is bounded.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from echostep.localization.estimate import claims_place
+from echostep_app.page.elements.scene import PageScene
+
+COLUMNS = 6  # time (s), range to the left and to the right (m), samples of the foot and pings a second, heading (deg); NaN: none
+MOST_ROWS = 1 << 18  # 18 hours at four estimates a second, 6 MB; later ones are left out
+MOST_EVENTS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened, in words. The field names are keys of the answer's JSON."""
+
+    t_s: float
+    text: str
+
+
+class OverTime:
+    """Rows of float32, and events in order of time."""
+
+    def __init__(self, levels: tuple[str, ...]) -> None:
+        """`levels`: their names."""
+        self._levels = levels
+        self._rows = array("f")
+        self.events: tuple[Event, ...] = ()  # replaced, never changed
+        self._last: PageScene | None = None
+
+    def __len__(self) -> int:
+        return len(self._rows) // COLUMNS
+
+    def part(self, begin: int, end: int) -> bytes:
+        """Rows [begin, end)."""
+        return self._rows[COLUMNS * begin : COLUMNS * end].tobytes()
+
+    def add(self, scene: PageScene) -> None:
+        """Add the scene of a new estimate."""
+        if scene.estimate is None or len(self) >= MOST_ROWS:
+            return
+        ranges = [math.nan, math.nan]
+        for line in scene.echo_lines:
+            if line.t_s > (self._last.t_s if self._last else -math.inf) and line.measured_m is not None:
+                ranges[line.ranger] = line.measured_m
+        rates = (scene.streams.mtx_hz, scene.streams.pings_hz) if scene.streams else (None, None)
+        known = [math.nan if rate is None else rate for rate in rates]
+        heading = math.degrees(scene.estimate.heading_rad) if claims_place(scene.estimate.status) else math.nan
+        self._rows.extend((scene.t_s, *ranges, *known, heading))
+        if self._last is not None and (new := list(self._news(self._last, scene))):
+            self.events = (*self.events, *new)[:MOST_EVENTS]
+        self._last = scene
+
+    def _news(self, before: PageScene, now: PageScene) -> Iterator[Event]:
+        """What has changed between the scenes of two estimates."""
+        old, new = before.estimate, now.estimate
+        if old is None or new is None:
+            return
+        if old.status != new.status:
+            yield Event(now.t_s, new.status.value)
+        if old.level != new.level:
+            yield Event(now.t_s, self._levels[new.level])
+        if before.streams and now.streams and now.streams.check_ins > before.streams.check_ins:
+            yield Event(now.t_s, "position set by hand")
+        if now.alarm and (before.alarm is None or before.alarm.kind != now.alarm.kind):
+            yield Event(
+                now.t_s, {"over": "alarm over", "asked": "asked after a fall"}.get(now.alarm.kind, now.alarm.kind)
+            )
+        if now.met and (before.met is None or before.met.number != now.met.number):
+            yield Event(now.t_s, now.met.text)

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""Requests of a page: texts from its WebSocket -> checked objects.
+
+In: texts, which may be damaged or hostile. Out: requests; None for a text that is none. Owns the limits.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from echostep.plan.plan_file import Metres
+from echostep.ports.people.check_in import Call, CheckIn, EnteredPlace, Undo
+from echostep.ports.people.payloads import Level, decoded
+from echostep_app.plan.routing import RoutePlace
+
+MOST_REQUEST = 2048  # characters
+MOST_NAME = 32  # characters of a wearer's name, as in reports
+FASTEST = 32.0  # times as fast as it was recorded
+Integer = Annotated[int, Meta(gt=-(1 << 53), lt=1 << 53)]  # that JavaScript represents exactly
+Count = Annotated[int, Meta(ge=0, lt=1 << 31)]
+
+
+class Entered(EnteredPlace, frozen=True, tag_field="kind", tag="check_in"):
+    """The wearer is at this place: `parse_request` returns its `CheckIn`."""
+
+
+class Consider(EnteredPlace, frozen=True, tag_field="kind", tag="consider"):
+    """Say what a check-in would do, without making it."""
+
+
+class Met(msgspec.Struct, frozen=True, tag_field="kind", tag="met"):
+    """The wearer stands beside a teammate of this name."""
+
+    name: Annotated[str, Meta(min_length=1, max_length=MOST_NAME)]
+
+
+class AtPoint(msgspec.Struct, frozen=True, tag_field="kind", tag="at_point"):
+    """In an acceptance walk, while the page shows visit `number`: the wearer is at the point that it names, or at another one by its name."""
+
+    number: Count
+    name: Annotated[str, Meta(max_length=MOST_NAME)] = ""
+
+
+class NoTap(msgspec.Struct, frozen=True, tag_field="kind", tag="no_tap"):
+    """The newest tap at a surveyed point was none."""
+
+    number: Count
+
+
+class GoTo(msgspec.Struct, frozen=True, tag_field="kind", tag="go_to"):
+    """Guide the wearer to a place."""
+
+    x_m: Metres
+    y_m: Metres
+    level: Level = 0
+
+    @property
+    def goal(self) -> RoutePlace:
+        """The place."""
+        return RoutePlace(self.x_m, self.y_m, self.level)
+
+
+class EndGuidance(msgspec.Struct, frozen=True, tag_field="kind", tag="go_nowhere"):
+    """End the guidance to the destination that was chosen on a page."""
+
+
+class FrameDrawn(msgspec.Struct, frozen=True, tag_field="kind", tag="drawn"):
+    """The page has drawn frame number `seq`."""
+
+    seq: Integer
+
+
+class SetPlaying(msgspec.Struct, frozen=True, tag_field="kind", tag="play"):
+    """Run or pause the replay."""
+
+    playing: bool
+
+
+class SetSpeed(msgspec.Struct, frozen=True, tag_field="kind", tag="speed"):
+    """Replay `times` as fast as it was recorded."""
+
+    times: Annotated[float, Meta(gt=0.0, le=FASTEST)]
+
+
+class Seek(msgspec.Struct, frozen=True, tag_field="kind", tag="seek"):
+    """Show the moment `t_s` of the replay."""
+
+    t_s: Annotated[float, Meta(ge=-1e9, le=1e9)]
+
+
+class StepBy(msgspec.Struct, frozen=True, tag_field="kind", tag="skip"):
+    """Move the replay by a number of estimates; negative: back."""
+
+    by: Integer
+
+
+_OwnRequest = (
+    Undo | Call | Consider | Met | AtPoint | NoTap | GoTo | EndGuidance | FrameDrawn | SetPlaying | SetSpeed | Seek | StepBy
+)  # fmt: skip
+Request = CheckIn | _OwnRequest
+_REQUESTS = msgspec.json.Decoder(Entered | _OwnRequest)
+
+
+def parse_request(text: str) -> Request | None:
+    """The request in a text from a page; None when the text is not a valid request."""
+    request = decoded(text, _REQUESTS, MOST_REQUEST)
+    return request.check_in if isinstance(request, Entered) else request

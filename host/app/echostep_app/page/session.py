@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: MIT
+"""The session of one page: sends scenes at most 30 times a second, with at most two frames not yet drawn; takes requests.
+
+In: a WebSocket, the mailbox. Out: frames. Owns what this page has been sent and its position in a replay. A page in the background
+draws nothing, so nothing is sent to it; when it is visible again it gets the newest scene and the rest of the trail.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections import deque
+
+from starlette.websockets import WebSocket
+
+from echostep.errors import EchostepError
+from echostep.localization.estimate import Estimate
+from echostep.ports.arrival_clock import now_ns
+from echostep.ports.people.check_in import Call, CheckIn, Undo
+from echostep_app.page import protocol, requests
+from echostep_app.page.elements.drawn_walls import NO_DRAWING, ShownDrawing
+from echostep_app.page.elements.guidance import Destination, ShownGuidance
+from echostep_app.page.elements.marks import ShownMark
+from echostep_app.page.elements.scene import PageScene, ParticleSample, is_placed
+from echostep_app.page.elements.taps import NO_TAP, PointPress, ShownPoints
+from echostep_app.page.guarded_socket import MOST_UNDRAWN, GuardedSocket
+from echostep_app.page.mailbox import Mailbox
+from echostep_app.page.protocol import FRAME_S
+from echostep_app.page.replay_cursor import ReplayCursor
+from echostep_app.page.shared import Shared
+from echostep_app.plan.places.bearing import heading_words
+
+TOO_BUSY = "Not accepted: this is a replay, or the tracker is too busy."
+
+
+class PageSession(GuardedSocket):
+    """Serves one page until it disconnects."""
+
+    def __init__(self, socket: WebSocket, mailbox: Mailbox, shared: Shared) -> None:
+        self.latency_s: deque[float] = deque(
+            maxlen=512
+        )  # from the arrival of an estimate's bytes to its frame being drawn
+        super().__init__(socket, shared.faults, shared.counts)
+        self._mailbox = mailbox
+        self._shared = shared
+        self._cursor = ReplayCursor(mailbox.history) if mailbox.replay else None
+        self._destination: Destination | None = None
+        self._searches: set[asyncio.Task[None]] = set()
+        self._undrawn: dict[
+            int, int | None
+        ] = {}  # number of a sent frame: `arrived_ns` of the estimate that is new in it
+        self._seq = 0
+        self._last: PageScene | None = None
+        self._particles: ParticleSample | None = None
+        self._marks: tuple[ShownMark, ...] | None = None  # that the page has
+        self._drawing: ShownDrawing | None = None  # that the page has
+        self._team: tuple[str, ...] | None = None  # that the page has
+        self._points: ShownPoints | None = None  # that the page has
+        self._trail_count = 0  # points of the trail that the page has
+        self._told_end = False
+        self._frame_due = True  # the page needs a frame, even of the same scene
+
+    async def _greet(self) -> None:
+        mailbox, shared = self._mailbox, self._shared
+        replay = self._cursor is not None
+        hello = protocol.hello(mailbox.plan, mailbox.title, replay=replay, takes_files=shared.takes_files)
+        await self.tell(protocol.encode(hello))
+
+    async def _begin_replay(self) -> None:
+        """The live run is over: from now on the page plays its scenes, beginning with the last one, at rest."""
+        self._cursor = ReplayCursor(self._mailbox.history, at_end=True)
+        self._trail_count, self._particles, self._drawing, self._frame_due = 0, None, None, True
+        await self._greet()
+
+    async def _handle(self, text: str | None) -> None:
+        request = None if text is None else requests.parse_request(text)
+        levels = len(self._mailbox.plan.levels)
+        match request:
+            case None:
+                self._counts.unknown += 1
+                return
+            case requests.FrameDrawn(seq):
+                if (arrived_ns := self._undrawn.pop(seq, None)) is not None:
+                    self.latency_s.append((time.monotonic_ns() - arrived_ns) * 1e-9)
+            case requests.Consider() if request.level < levels:
+                answer = self._shared.taps.consider(request.check_in, self._mailbox.latest)
+                await self.tell(protocol.encode(answer))
+            case CheckIn() if request.level < levels:
+                await self._take(request, self._shared.taps.refusal(request))
+            case Undo():
+                offer = self._mailbox.latest.undo if self._mailbox.latest else None
+                is_late = offer is None or offer.undo != request.undo
+                await self._take(request, "It is too late to undo this." if is_late else "")
+            case Call():
+                await self._take(request, "")
+            case requests.Met() | requests.AtPoint() | requests.NoTap():
+                await self._pass_on(request)
+            case requests.GoTo() if request.level < levels:
+                self._mailbox.set_goal(request.goal)
+            case requests.EndGuidance():
+                self._mailbox.set_goal(None)
+            case _ if self._cursor is not None:
+                self._cursor.handle(request)
+                self._frame_due = True
+            case _:
+                self._counts.refused += 1
+        self._news.set()
+
+    async def _take(self, request: CheckIn | Undo | Call, refusal: str) -> None:
+        """Pass a check-in, its undoing or a call on to the tracker, or send the page the reason of a refusal."""
+        if not refusal and not self._mailbox.add_check_in(request):
+            refusal = TOO_BUSY
+        if refusal:
+            self._counts.refused += 1
+            await self.tell(protocol.encode(protocol.Refused(refusal)))
+
+    async def _pass_on(self, request: requests.Met | requests.AtPoint | requests.NoTap) -> None:
+        """Pass a meeting with a teammate or a tap at a surveyed point on, or send the page the reason of a refusal."""
+        if refusal := self._meet(request.name) if isinstance(request, requests.Met) else self._press(request):
+            self._counts.refused += 1
+            await self.tell(protocol.encode(protocol.Refused(refusal)))
+
+    def _meet(self, name: str) -> str:
+        """Queue a meeting; the reason of a refusal, else empty."""
+        if name not in self._mailbox.team:
+            return f"{name} is not heard."
+        return "" if self._mailbox.add_meeting(name) else TOO_BUSY
+
+    def _press(self, request: requests.AtPoint | requests.NoTap) -> str:
+        """Queue a tap at a surveyed point for the guide of the walk; the reason of a refusal, else empty."""
+        points, number = self._mailbox.points, request.number
+        if points is None:
+            return "Not accepted: no points are measured in this run."
+        if points.number != number:
+            return "Not accepted: the walk is at another point by now."
+        typed = request.name if isinstance(request, requests.AtPoint) else NO_TAP
+        return "" if self._mailbox.add_press(PointPress(now_ns(), number, typed)) else TOO_BUSY
+
+    async def _send(self) -> None:
+        """Send a frame when there is something new, not before `FRAME_S` after the last one."""
+        due_s = 0.0
+        while True:
+            playing = self._cursor is not None and self._cursor.playing
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._news.wait(), FRAME_S if playing else None)
+            if (early_s := due_s - time.monotonic()) > 0.0:
+                await asyncio.sleep(early_s)
+            self._news.clear()
+            if self._mailbox.failure:
+                await self.tell(protocol.encode(protocol.Failed(self._mailbox.failure, ended=True)))
+                return
+            if self._cursor is None and self._mailbox.replay:
+                await self._begin_replay()
+            if self._mailbox.summary is not None and not self._told_end:
+                self._told_end = self._frame_due = True
+            if len(self._undrawn) >= MOST_UNDRAWN:
+                continue
+            self._follow_goal()
+            self._frame_due = self._frame_due or self._marks is not self._mailbox.marks
+            self._frame_due = self._frame_due or self._team is not self._mailbox.team
+            self._frame_due = self._frame_due or self._points is not self._mailbox.points
+            scene = self._cursor.scene(time.monotonic()) if self._cursor else self._mailbox.latest
+            if scene is None:
+                continue
+            self._frame_due = self._frame_due or self._mailbox.drawing_at(scene.t_s) is not self._drawing
+            if scene is self._last and not self._frame_due and not playing:
+                continue
+            due_s = max(due_s, time.monotonic() - FRAME_S) + FRAME_S
+            await self.tell(self._frame(scene))
+
+    def _follow_goal(self) -> None:
+        """Guide to the run's goal, which any page may have changed."""
+        goal = self._mailbox.goal
+        if goal is not (self._destination.goal if self._destination else None):
+            self._destination, self._frame_due = None if goal is None else Destination(goal), True
+
+    def _frame(self, scene: PageScene) -> bytes:
+        """A frame with what this page has not been sent yet; from then on it counts as sent."""
+        self._frame_due = False
+        self._seq += 1
+        new_estimate = self._cursor is None and (self._last is None or scene.estimate is not self._last.estimate)
+        self._undrawn[self._seq] = scene.arrived_ns if new_estimate else None
+        begin = min(self._trail_count, scene.trail_count)  # a replay may go back
+        drawing, points = self._mailbox.drawing_at(scene.t_s), self._mailbox.points
+        parts = protocol.FrameParts(
+            seq=self._seq,
+            where=self._shared.taps.where(scene.estimate) if scene.estimate else "",
+            heading=self._heading(scene.estimate) if scene.estimate else "",
+            placed=scene.estimate is not None and is_placed(scene.estimate, self._mailbox.plan),
+            places=self._shared.taps.places(scene.estimate) if scene.estimate else "",
+            trail=self._mailbox.trail.part(begin, scene.trail_count),
+            trail_from=begin,
+            particles=scene.particles if scene.particles is not self._particles else None,
+            guidance=self._guidance(scene),
+            goal=self._mailbox.goal,
+            errand=self._mailbox.errand,
+            play=self._cursor.state() if self._cursor else None,
+            marks=self._mailbox.marks if self._marks is not self._mailbox.marks else None,
+            drawing=(drawing or NO_DRAWING) if drawing is not self._drawing else None,
+            team=self._mailbox.team if self._team is not self._mailbox.team else None,
+            points=points if points is not self._points else None,
+            ended=self._mailbox.summary if self._cursor is None or self._cursor.at_end else None,
+        )
+        self._marks, self._team, self._drawing, self._points = self._mailbox.marks, self._mailbox.team, drawing, points
+        self._last, self._trail_count, self._particles = scene, scene.trail_count, scene.particles
+        return protocol.frame(scene, parts)
+
+    def _heading(self, estimate: Estimate) -> str:
+        """The heading in words."""
+        return f"heading {heading_words(self._mailbox.plan, estimate.heading_rad, estimate.heading_sd_rad)}"
+
+    def _guidance(self, scene: PageScene) -> ShownGuidance | None:
+        """Guidance to the destination chosen on a page, else the run's; starts a search for a route when one is due."""
+        if not (scene.estimate and self._destination):
+            return scene.guidance
+        guidance = self._destination.guidance_at(scene.estimate)
+        if self._destination.needs_route(scene.estimate):
+            self._destination.searching = True
+            task = asyncio.create_task(self._search(self._destination, scene.estimate))
+            self._searches.add(task)
+            task.add_done_callback(self._searches.discard)
+        return guidance
+
+    async def _search(self, destination: Destination, estimate: Estimate) -> None:
+        """Search for the route to a destination in a thread; frames are sent meanwhile."""
+        try:
+            route = await asyncio.to_thread(self._shared.route_finder.find, estimate, destination.goal)
+            destination.set_route(route, "", estimate)
+        except EchostepError as error:
+            destination.set_route(None, str(error), estimate)
+        except Exception as error:  # a search that fails must not seem to go on for ever
+            destination.set_route(None, self._shared.faults.note(error), estimate)
+        self._frame_due = True
+        self._news.set()

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of plans, tracks and walks, as the core asks for them.
+
+In: a `Plan`, a foot's `Track` or a `Walk`. Out: SVG for a notebook; a file. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from echostep.extras import lacks, require
+from echostep.foot.steps import Track
+from echostep.plan.model import Plan
+from echostep.walk.walk import Walk
+from echostep_app.output.foot_plot import foot_figure
+from echostep_app.output.track_plot import track_figure
+from echostep_app.plan.pictures.drawing import plan_svg
+from echostep_app.printing.picture_files import save_picture, svg_text
+
+
+def svg(shown: Plan | Track | Walk) -> str | None:
+    """The picture as SVG; None without matplotlib."""
+    if lacks("a picture", "matplotlib"):
+        return None
+    if isinstance(shown, Plan):
+        return plan_svg(shown)
+    if isinstance(shown, Track):
+        return svg_text(foot_figure(shown, "foot"))
+    return svg_text(track_figure(shown.plan, shown.estimates, None, shown.name))
+
+
+def save(walk: Walk, path: Path) -> None:
+    """The picture of a walk as PNG, SVG or PDF, by the ending of the name; raises EchostepError."""
+    require("a picture", "matplotlib")
+    save_picture(track_figure(walk.plan, walk.estimates, None, walk.name), path)

@@ -1,0 +1,5 @@
+# SPDX-License-Identifier: MIT
+"""Plans beyond plan.json: importers of other formats, checks, pictures, routes, and what is where on a plan.
+
+In: plan files of any format, a `Plan`. Out: `Plan`s, findings, drawings, routes. Owns nothing.
+"""

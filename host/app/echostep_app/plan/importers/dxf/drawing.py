@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: MIT
+"""Drawings (DXF, one file or one window of a file per level) -> `Plan`.
+
+In: files, hints. Out: `Plan`, and the report. Owns nothing. Lines, polylines, arcs, circles, ellipses, splines, multilines and narrow hatches on a
+layer of walls become walls, also inside blocks; the meaning of a layer is recognised by its name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import shapely
+from shapely.affinity import translate
+from shapely.geometry import LineString, MultiLineString, Point, box
+from shapely.geometry.base import BaseGeometry
+
+from echostep.errors import EchostepError
+from echostep.plan.model import ConnectorKind, Plan, Question
+from echostep_app.plan.importers.connector_shapes import join_connectors
+from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas
+from echostep_app.plan.importers.dxf.doors import PlacedDoors
+from echostep_app.plan.importers.dxf.entities import parts
+from echostep_app.plan.importers.dxf.frame import DrawingFrame
+from echostep_app.plan.importers.dxf.gaps import WallBands
+from echostep_app.plan.importers.dxf.layers import pieces_of
+from echostep_app.plan.importers.dxf.rooms import rooms_of
+from echostep_app.plan.importers.dxf.sheet import Sheet, read_sheet
+from echostep_app.plan.importers.dxf.storeys import alignment, bounds_of, lies_over, storey_boxes, window_words
+from echostep_app.plan.importers.dxf.symbols import (
+    LEAF_M,
+    Swing,
+    Symbol,
+    draws_open_leaf,
+    is_swing,
+    paired,
+    symbol_of,
+    symbols_of,
+)
+from echostep_app.plan.importers.hints import Hints
+from echostep_app.plan.importers.report import ImportReport
+
+HALF_TREAD_M = 0.3  # half the greatest distance between neighbouring lines of one staircase: a tread
+CURVES = ("ARC", "ELLIPSE", "SPLINE", "LWPOLYLINE", "POLYLINE")  # entities that a swing may be drawn with
+DEEPEST_SYMBOL = 4  # blocks in blocks of one door
+SHOWN_STRAYS = 3
+MOST_PIECES = 2000  # of walls in a question
+
+
+@dataclass(slots=True)
+class _Storey:
+    """One level to be drawn: a sheet, the window of it (map metres) that holds the level, and the frame."""
+
+    sheet: Sheet
+    frame: DrawingFrame
+    window: BaseGeometry | None = None
+    swings: set[int] = field(default_factory=set)  # ids of entities on other layers that turned out to be doors
+    _lines: dict[int, list[LineString]] = field(default_factory=dict)  # by id of the entities, which the sheet keeps
+
+    def lines(self, *kinds: str) -> list[LineString]:
+        """The lines of kinds of entities, in map metres, inside the window."""
+        return [line for kind in kinds for entity, _ in self.sheet.kinds[kind] for line in self.of(entity)]
+
+    def of(self, entity: Any) -> list[LineString]:
+        """The lines of an entity inside the window; none of one that is a door's swing."""
+        if id(entity) in self.swings:
+            return []
+        if id(entity) not in self._lines:
+            self._lines[id(entity)] = self.of_part(entity)
+        return self._lines[id(entity)]
+
+    def of_part(self, part: Any) -> list[LineString]:
+        """The lines of a block's part inside the window: it lives for a moment, so its lines are not kept."""
+        return [line for line in self.frame.lines(part, self.sheet.file) if self.holds(line)]
+
+    def holds(self, shape: BaseGeometry) -> bool:
+        """Whether a shape is of this level."""
+        return self.window is None or bool(self.window.intersects(shape.centroid))
+
+
+def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Plan:
+    """Import a building from drawings, the lowest level first; raises EchostepError that names the file and the layer."""
+    if hints.windows and len(files) > 1:
+        raise EchostepError(f"{files[1]}: --window is for one drawing with several storeys: give one file")
+    sheets = [read_sheet(file, hints, report) for file in files]
+    report.units = "; ".join(dict.fromkeys(sheet.words for sheet in sheets))
+    frame = DrawingFrame.about(sheets[0].walls, sheets[0].scale_m)
+    storeys = [_Storey(sheet, replace(frame, scale_m=sheet.scale_m)) for sheet in sheets]
+    if hints.windows:
+        storeys = [_in_window(storeys[0], window) for window in hints.windows]
+    _lay_over(storeys, hints, report)
+    names = [*hints.level_names, *(_names(files, len(storeys))[len(hints.level_names) :])]
+    drawn_levels = [
+        _drawn_level(storey, DrawnLevel(name, round(i * hints.storey_height_m, 6)), report)
+        for i, (storey, name) in enumerate(zip(storeys, names, strict=False))
+    ]
+    return Plan(
+        files[0].stem, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels, report)
+    )
+
+
+def _names(files: Sequence[Path], levels: int) -> list[str]:
+    return [file.stem for file in files] if levels == len(files) else [f"level {i}" for i in range(levels)]
+
+
+def _in_window(storey: _Storey, window: Sequence[float]) -> _Storey:
+    """The part of a drawing inside a window of drawing units."""
+    s, x0, y0 = storey.frame.scale_m, storey.frame.x0_m, storey.frame.y0_m
+    area = box(window[0] * s - x0, window[1] * s - y0, window[2] * s - x0, window[3] * s - y0)
+    found = _Storey(storey.sheet, storey.frame, area)
+    if not found.lines("walls", "columns"):
+        raise EchostepError(
+            f"{storey.sheet.file}: --window {','.join(f'{v:g}' for v in window)}: no walls in it; it is in the drawing's units"
+        )
+    return found
+
+
+def _lay_over(storeys: list[_Storey], hints: Hints, report: ImportReport) -> None:
+    """Align levels where asked or drawn side by side; else report those that lie elsewhere, and refuse units that contradict each other."""
+    walls = [storey.lines("walls", "columns") for storey in storeys]
+    first = storeys[0].sheet
+    for storey, lines in zip(storeys, walls, strict=True):
+        if not lines:
+            raise EchostepError(
+                f"{storey.sheet.file}: the layers of walls have no lines: give the right ones with --layer walls=NAME"
+            )
+        if storey.window is None and len(boxes := storey_boxes(lines)) > 1:
+            moved = [
+                (x0 + storey.frame.x0_m, y0 + storey.frame.y0_m, x1 + storey.frame.x0_m, y1 + storey.frame.y0_m)
+                for x0, y0, x1, y1 in boxes
+            ]
+            report.doubt(
+                f"{storey.sheet.file.name} looks like {len(boxes)} storeys beside each other: import them as levels with "
+                + window_words(moved, storey.frame.scale_m)
+            )
+    for k in range(1, len(storeys)):
+        storey = storeys[k]
+        over = lies_over(bounds_of(walls[k]), bounds_of(walls[0]))
+        if storey.sheet.unit != first.unit and not (over and _as_large(walls[k], walls[0])) and not hints.align:
+            raise EchostepError(
+                f"{storey.sheet.file}: its units ({storey.sheet.unit}) are not those of {first.file.name} ({first.unit}), and the storeys "
+                "do not lie over each other: give --units, or --align when both are right"
+            )
+        if hints.align or storey.window is not None:
+            dx, dy = alignment(walls[k], walls[0])
+            storeys[k] = _moved(storey, dx, dy)
+        elif not over:
+            report.doubt(
+                f"{storey.sheet.file.name} does not lie over {first.file.name}: --align lays the storeys over each other"
+            )
+
+
+def _as_large(one: list[LineString], other: list[LineString]) -> bool:
+    """Whether two levels are of about the same size: within a factor of 2."""
+    sizes = [max(b[2] - b[0], b[3] - b[1]) for b in (bounds_of(one), bounds_of(other))]
+    return max(sizes) < 2 * min(sizes)
+
+
+def _moved(storey: _Storey, dx: float, dy: float) -> _Storey:
+    frame = replace(storey.frame, x0_m=storey.frame.x0_m - dx, y0_m=storey.frame.y0_m - dy)
+    window = None if storey.window is None else translate(storey.window, dx, dy)
+    return _Storey(storey.sheet, frame, window)
+
+
+def _drawn_level(storey: _Storey, drawn: DrawnLevel, report: ImportReport) -> DrawnLevel:
+    sheet = storey.sheet
+    _without_lines(storey, report)
+    doors = _doors(storey, report)
+    drawn.doors, drawn.cuts = doors.doors, doors.cuts
+    drawn.questions = [*doors.questions(), *_left_out_walls(storey)]
+    drawn.walls, drawn.windows = [*storey.lines("walls", "columns"), *doors.jambs], list(storey.lines("windows"))
+    drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(_noded(storey.lines("obstacles")))))
+    rooms = rooms_of(sheet.kinds["rooms"], storey.frame, sheet.file, report)
+    drawn.rooms = [room for room in rooms if storey.holds(Point(room.at_m))]
+    for kind, layer in (("stairs", "stairs"), ("lift", "lifts")):
+        blots = shapely.union_all([line.buffer(HALF_TREAD_M) for line in storey.lines(layer)])
+        hulls = [blot.convex_hull.buffer(-HALF_TREAD_M) for blot in shapely.get_parts(blots)]
+        drawn.connectors += [ConnectorShape(cast(ConnectorKind, kind), "", area) for area in areas(hulls)]
+    return drawn
+
+
+def _without_lines(storey: _Storey, report: ImportReport) -> None:
+    """Report entities on the layers used that have no line: texts, pictures, bodies, unknown objects."""
+    for kind in ("walls", "columns", "windows", "stairs", "lifts", "obstacles"):
+        for entity, layer in storey.sheet.kinds[kind]:
+            if storey.window is None and not storey.of(entity):
+                report.leave_out(f"{entity.dxftype()} on {layer[:40]}")
+
+
+def _doors(storey: _Storey, report: ImportReport) -> PlacedDoors:
+    """Doors on their layers, then swings on others, or among the walls, that fit a gap exactly."""
+    placed = PlacedDoors()
+    kinds = storey.sheet.kinds
+    curves = [p for p in (*storey.sheet.others, *kinds["walls"], *kinds["windows"]) if p[0].dxftype() in CURVES]
+    swings = [(*pair, symbol) for pair in curves if is_swing(symbol := symbol_of(storey.of(pair[0])))]
+    storey.swings.update(id(entity) for entity, *_ in swings)  # no walls while the doors are looked for
+    walls = WallBands(storey.lines("walls", "columns", "windows"))
+    for symbol in _symbols(storey):
+        placed.add(symbol, walls)
+    _swings_elsewhere(storey, swings, placed, walls, report)
+    _tell_doors(placed, report)
+    return placed
+
+
+def _left_out_walls(storey: _Storey) -> Iterator[Question]:
+    """A question about each layer that looks like walls and was left out."""
+    for layer in storey.sheet.alike:
+        lines = [line for entity, own in storey.sheet.others if own == layer for line in storey.of(entity)]
+        pieces = np.round(pieces_of(lines), 3)
+        pieces = pieces[(pieces[:, :2] != pieces[:, 2:]).any(axis=1)]
+        if 0 < len(pieces) <= MOST_PIECES:
+            x0, y0, x1, y1 = pieces[np.hypot(*(pieces[:, 2:] - pieces[:, :2]).T).argmax()]
+            text = f"layer {layer[:40]} looks like walls and was left out: take it in?"
+            at = round(float(x0 + x1) / 2, 3), round(float(y0 + y1) / 2, 3)
+            yield Question(text, "wall", at, tuple((a, b, c, d) for a, b, c, d in pieces.tolist()), is_proposed=True)
+
+
+def _swings_elsewhere(
+    storey: _Storey, swings: list[tuple[Any, str, Symbol]], placed: PlacedDoors, walls: WallBands, report: ImportReport
+) -> None:
+    """Place swings on layers that are not of doors, single or in pairs; those that fit no gap are what their layer says."""
+    doors: list[tuple[Any, str, Swing, tuple[float, float]]] = []
+    left: dict[int, tuple[Any, str, Swing]] = {}  # by id of the line, which the symbols of pairs keep
+    for entity, layer, symbol in swings:
+        gap = placed.add_swing(symbol.swings[0], walls)
+        if gap is None:
+            left |= {id(line): (entity, layer, symbol.swings[0]) for line in symbol.lines}
+        else:
+            doors.append((entity, layer, symbol.swings[0], gap[2:]))
+    for pair in symbols_of([line for _, _, symbol in swings for line in symbol.lines if id(line) in left]):
+        if len(pair.swings) == 2 and placed.add_pair(pair, walls) is not None:
+            for entity, layer, swing in (left.pop(id(line)) for line in pair.lines):
+                other = next((one.hinge for one in pair.swings if one.hinge != swing.hinge), swing.hinge)
+                doors.append((entity, layer, swing, other))
+    storey.swings.difference_update(id(entity) for entity, _, _ in left.values())
+    for entity, layer, _, _ in doors:
+        report.use("doors", layer)
+        report.take_back(f"{entity.dxftype()} on {layer[:40]}")
+    _take_leaves(storey, [(swing, closed) for _, _, swing, closed in doors])
+
+
+def _take_leaves(storey: _Storey, leaves: list[tuple[Swing, tuple[float, float]]]) -> None:
+    """Leaves that are drawn open among the walls or windows, beside a swing that is a door, are neither."""
+    kinds = storey.sheet.kinds
+    drawn = [(entity, lines) for entity, _ in (*kinds["walls"], *kinds["windows"]) if (lines := storey.of(entity))]
+    tree = shapely.STRtree([lines[0] for _, lines in drawn]) if leaves else shapely.STRtree([])
+    for swing, closed in leaves:
+        for k in tree.query(Point(swing.hinge), predicate="dwithin", distance=LEAF_M):
+            entity, lines = drawn[k]
+            if draws_open_leaf(lines, swing, closed):
+                storey.swings.add(id(entity))
+
+
+def _tell_doors(placed: PlacedDoors, report: ImportReport) -> None:
+    """Report doors that walls are drawn through, and symbols in no wall."""
+    if placed.marks:
+        report.leave_out("mark on a layer of doors", placed.marks)
+    if placed.cuts:
+        one = len(placed.cuts) == 1
+        report.doubt(
+            f"{len(placed.cuts)} door{' lies' if one else 's lie'} where a wall is drawn through: the wall was cut there"
+        )
+    if placed.strays:
+        places = ", ".join(f"x {x:g} y {y:g}" for (x, y), _ in placed.strays[:SHOWN_STRAYS])
+        one = len(placed.strays) == 1
+        report.leave_out("door in no wall", len(placed.strays))
+        report.doubt(
+            f"{len(placed.strays)} door{' stands' if one else 's stand'} in no wall and {'was' if one else 'were'} left out ({places}"
+            f"{'' if len(placed.strays) <= SHOWN_STRAYS else ', ...'}): are all layers of walls used?"
+        )
+
+
+def _symbols(storey: _Storey) -> list[Symbol]:
+    """The door symbols of a level: blocks, and loose lines that touch."""
+    loose: list[LineString] = []
+    symbols: list[Symbol] = []
+    for entity, _ in storey.sheet.kinds["doors"]:
+        if entity.dxftype() == "INSERT":
+            lines = [line for part in _parts(entity, storey.sheet.file) for line in storey.of_part(part)]
+            symbols += [symbol_of(lines)] if lines else []
+        else:
+            loose += storey.of(entity)
+    return paired([*symbols, *symbols_of(loose)])
+
+
+def _parts(block: Any, file: Path, depth: int = DEEPEST_SYMBOL) -> list[Any]:
+    """All entities of a block and of the blocks inside it."""
+    inner = parts(block, file)
+    deeper = [part for part in inner if part.dxftype() == "INSERT"] if depth else []
+    own = [part for part in inner if part.dxftype() != "INSERT"]
+    return own + [found for part in deeper for found in _parts(part, file, depth - 1)]
+
+
+def _noded(lines: list[LineString]) -> list[Any]:
+    return list(shapely.get_parts(shapely.node(MultiLineString(lines)))) if lines else []

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: MIT
+"""Entities of a DXF drawing with blocks expanded, and the layers that they lie on.
+
+In: a file. Out: visible entities with their effective layers. Owns the limits for untrusted drawings. What is not shown on the drawing (layers that
+are frozen or off), and what is not in the file (external references), is reported.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from echostep.errors import EchostepError
+from echostep.extras import require
+from echostep_app.plan.importers.parsing import read_bytes
+from echostep_app.plan.importers.report import ImportReport
+
+MOST_PARTS = 300_000  # entities in blocks
+DEEPEST_BLOCK = 16
+REMOVED = re.compile(r"Removed invalid DXF entity (\w+)\(")  # of ezdxf about entities of a kind that it does not know
+DELETED = re.compile(r"Deleted entity (\w+)\(")  # of ezdxf about entities that refer to nothing
+
+
+def read_drawing(file: Path, report: ImportReport) -> Any:
+    """Read a drawing, repaired where ezdxf can; raises EchostepError when the file is not a drawing."""
+    require(f"{file}: DXF", "ezdxf")
+    from ezdxf import recover
+    from ezdxf.lldxf.const import DXFError
+
+    raw = read_bytes(file)
+    logging.getLogger("ezdxf").setLevel(logging.CRITICAL)  # no messages about single values; the audit counts them
+    try:
+        drawing, auditor = recover.read(io.BytesIO(raw))
+    except Exception as error:  # a damaged drawing breaks ezdxf in many ways
+        reason = " ".join(str(error).split())[:200] if isinstance(error, DXFError | OSError) else type(error).__name__
+        raise EchostepError(f"{file}: not a DXF drawing: {reason}") from error
+    if not len(drawing.modelspace()) and auditor.has_errors:
+        raise EchostepError(f"{file}: the drawing is damaged: {auditor.errors[0].message[:200]}")
+    for fix in auditor.fixes:
+        if deleted := DELETED.search(fix.message):
+            report.leave_out(f"{deleted[1][:40]} (damaged)")
+        if removed := REMOVED.search(fix.message):
+            report.leave_out(f"{removed[1][:40]} (object of another program)")
+            report.doubt(
+                f"{removed[1][:40]} and its like cannot be read: save as plain DXF (AutoCAD: -EXPORTTOAUTOCAD)"
+            )
+    return drawing
+
+
+class VisibleEntities:
+    """The entities of a drawing's model space that are shown; iterating once reports the others.
+
+    `references`: files that the drawing refers to and that are not in it.
+    """
+
+    def __init__(self, drawing: Any, file: Path, report: ImportReport) -> None:
+        self._space, self._file, self._report = drawing.modelspace(), file, report
+        self._hidden = {}
+        for layer in drawing.layers:
+            if layer.is_frozen() or layer.is_off():
+                self._hidden[str(layer.dxf.name).casefold()] = "frozen" if layer.is_frozen() else "off"
+        self.references: list[str] = []
+
+    def __call__(self, whole: Callable[[str], bool]) -> Iterator[tuple[Any, str]]:
+        """Each entity with its layer; layer "0" inside a block means the block's layer. Blocks are expanded unless `whole(layer)`."""
+        stack = [(entity, "0", 0) for entity in reversed(list(self._space))]
+        count = 0
+        while stack:
+            entity, outer, depth = stack.pop()
+            count += depth > 0
+            if count > MOST_PARTS:
+                raise EchostepError(f"{self._file}: its blocks have more than {MOST_PARTS} parts")
+            own = _layer_of(entity)
+            layer = outer if own == "0" else own
+            is_block = entity.dxftype() == "INSERT"
+            hidden = self._hidden.get(layer.casefold()) or ("invisible" if _is_invisible(entity) else None)
+            if hidden and not (is_block and hidden == "off"):
+                self._report.leave_out(f"{entity.dxftype()} on {layer[:40]} ({hidden})")
+                continue
+            if is_block:
+                stack += [(attribute, layer, depth + 1) for attribute in entity.attribs]
+                if self._is_reference(entity):
+                    continue
+            yield entity, layer
+            if is_block and not whole(layer):
+                inner = parts(entity, self._file) if depth < DEEPEST_BLOCK else []
+                stack += [(part, layer, depth + 1) for part in inner]
+                if not inner and not entity.attribs:
+                    self._report.leave_out(f"INSERT without contents on {layer[:40]}")
+
+    def _is_reference(self, insert: Any) -> bool:
+        """Whether a block is a file of its own; notes the file."""
+        block = insert.block()
+        path = "" if block is None else str(block.block.dxf.get("xref_path") or "")
+        if not path and not (block is not None and block.block.is_xref):
+            return False
+        name = path.replace("\\", "/").rsplit("/", 1)[-1] or str(insert.dxf.name)
+        if name not in self.references:
+            self.references.append(name[:60])
+        return True
+
+
+def _layer_of(entity: Any) -> str:
+    """The layer of an entity; "0" for one of an unknown kind, which ezdxf keeps without attributes."""
+    from ezdxf.lldxf.const import DXFError
+
+    try:
+        return str(entity.dxf.layer)
+    except (AttributeError, DXFError):
+        return "0"
+
+
+def _is_invisible(entity: Any) -> bool:
+    """Whether an entity is hidden by itself; not one of an unknown kind."""
+    from ezdxf.lldxf.const import DXFError
+
+    try:
+        return bool(entity.dxf.get("invisible", 0))
+    except (AttributeError, DXFError):
+        return False
+
+
+def parts(insert: Any, file: Path) -> list[Any]:
+    """The entities of a block reference, one level deep; empty for a damaged one."""
+    if insert.mcount > MOST_PARTS // 10:
+        raise EchostepError(
+            f"{file}: layer {insert.dxf.layer!r}: block {insert.dxf.name!r} is repeated {insert.mcount} times"
+        )
+    try:
+        return [
+            part
+            for one in (insert.multi_insert() if insert.mcount > 1 else [insert])
+            for part in one.virtual_entities()
+        ]
+    except Exception:  # a block that refers to nothing, or to itself
+        return []

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""Rooms of a drawing: names where their texts are written, and closed outlines.
+
+In: entities on the layers of rooms. Out: `Room`s. Owns the least area of an outline.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from shapely.geometry import Point, Polygon
+
+from echostep.plan.model import Room
+from echostep.plan.plan_file import LIMIT_M
+from echostep_app.plan.importers.drawn_level import areas, room
+from echostep_app.plan.importers.dxf.frame import DrawingFrame
+from echostep_app.plan.importers.report import ImportReport
+
+LEAST_M2 = 1.0  # smaller closed lines are frames of texts, symbols, furniture; assumed
+TEXTS = ("TEXT", "MTEXT", "ATTRIB")
+
+
+def rooms_of(entities: Sequence[tuple[Any, str]], frame: DrawingFrame, file: Path, report: ImportReport) -> list[Room]:
+    """A room for each text, with the smallest outline around it, and for each outline without a text."""
+    names: list[Room] = []
+    outlines: list[Polygon] = []
+    for entity, layer in entities:
+        named = _named(entity, frame)
+        closed = [
+            area for line in frame.lines(entity, file) if line.is_closed for area in areas([Polygon(line.coords)])
+        ]
+        large = [area for area in closed if area.area >= LEAST_M2]
+        names += [named] if named else []
+        outlines += large
+        if not named and not large:
+            report.leave_out(f"{entity.dxftype()} on {layer[:40]}")
+        else:
+            report.use("rooms", layer)
+    return _matched(names, outlines)
+
+
+def _matched(names: list[Room], outlines: list[Polygon]) -> list[Room]:
+    """Each outline gets the texts inside it that no smaller one has; one without a text is numbered."""
+    left, rooms = list(names), []
+    for outline in sorted(outlines, key=lambda area: area.area):
+        inside = [name for name in left if outline.intersects(Point(name.at_m))]
+        left = [name for name in left if name not in inside]
+        rooms.append(room(" ".join(name.name for name in inside)[:80], outline))
+    numbered = [one if one.name else Room(f"room {k}", one.at_m, one.outline_m) for k, one in enumerate(rooms, 1)]
+    return [*left, *numbered]
+
+
+def _named(entity: Any, frame: DrawingFrame) -> Room | None:
+    """A text entity as a room; None when it is empty, far away, or not a text."""
+    if entity.dxftype() not in TEXTS:
+        return None
+    words = " ".join((entity.plain_text() if entity.dxftype() == "MTEXT" else entity.dxf.text).split())[:80]
+    x, y = frame.metres(entity.dxf.insert if entity.dxftype() == "MTEXT" else entity.ocs().to_wcs(entity.dxf.insert))
+    return Room(words, (round(x, 3), round(y, 3))) if words and max(abs(x), abs(y)) < LIMIT_M else None

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: MIT
+"""Storeys of drawings: several side by side in one drawing, and storeys that do not lie over each other.
+
+In: walls of levels. Out: windows of a drawing, the move that lays one level over another, doubts. Owns what counts as a storey beside another.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString
+
+from echostep.arrays import Floats
+from echostep_app.plan.importers.dxf.layers import pieces_of
+
+APART = 0.05  # share of the drawing's size by which storeys beside each other are apart at least; assumed
+LEAST_APART_M = 2.0
+LEAST_SHARE = 0.1  # of the longest group of walls: smaller groups are details; assumed
+ALIKE = 0.4  # two storeys of one building differ by less than this share of their size; assumed
+OVER = 0.3  # share of the smaller level's rectangle that lies over the other one's, in one building; assumed
+GRID_M = 0.02  # step of the search for the move that aligns two levels
+MOST_CELLS = 200_000
+Box = tuple[float, float, float, float]
+
+
+def storey_boxes(walls: Sequence[LineString]) -> list[Box]:
+    """Rectangles (m) of groups of walls that look like storeys drawn beside each other; one rectangle when there is one group."""
+    boxes = shapely.bounds(np.array(list(walls), dtype=object))
+    low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+    margin = max(LEAST_APART_M, APART * float((high - low).max())) / 2
+    blots = shapely.union_all(shapely.box(*(boxes + (-margin, -margin, margin, margin)).T))
+    groups = shapely.get_parts(blots)
+    lengths = np.zeros(len(groups))
+    which, group = shapely.STRtree(groups).query(np.array(list(walls), dtype=object), predicate="intersects")
+    np.add.at(lengths, group, shapely.length(np.array(list(walls), dtype=object))[which])
+    large = groups[lengths >= LEAST_SHARE * lengths.max()]
+    first = large[np.argmax(shapely.area(large))] if len(large) else None
+    storeys = [g.bounds for g in large if first is not None and _alike(g.bounds, first.bounds)]
+    return sorted((x0, y0, x1, y1) for x0, y0, x1, y1 in storeys)
+
+
+def _alike(one: Box, other: Box) -> bool:
+    sizes = [(one[k + 2] - one[k], other[k + 2] - other[k]) for k in (0, 1)]
+    return all(abs(a - b) < ALIKE * max(a, b) for a, b in sizes)
+
+
+def lies_over(one: Box, other: Box) -> bool:
+    """Whether two levels' rectangles cover each other as those of one building do."""
+    a, b = shapely.box(*one), shapely.box(*other)
+    return bool(a.intersection(b).area >= OVER * min(a.area, b.area))
+
+
+def bounds_of(walls: Sequence[LineString]) -> Box:
+    """The rectangle around lines."""
+    x0, y0, x1, y1 = shapely.union_all(shapely.box(*shapely.bounds(np.array(list(walls), dtype=object)).T)).bounds
+    return float(x0), float(y0), float(x1), float(y1)
+
+
+def alignment(walls: Sequence[LineString], below: Sequence[LineString]) -> tuple[float, float]:
+    """The move (m) that lays walls best over those of the level below: in x and in y by themselves, where their lengths pile up alike."""
+    return _shift(walls, below, 0), _shift(walls, below, 1)
+
+
+def _shift(walls: Sequence[LineString], below: Sequence[LineString], axis: int) -> float:
+    """The move along one axis: the peak of the correlation of both profiles."""
+    (a, u), (b, v) = _profile_of(walls, axis), _profile_of(below, axis)
+    origin_a, origin_b = float(a.min()), float(b.min())
+    step = max(GRID_M, (np.ptp(a) + np.ptp(b)) / MOST_CELLS)
+    first, second = (np.bincount(((p - p.min()) / step).astype(int), w) for p, w in ((a, u), (b, v)))
+    blur = np.array([0.25, 0.5, 1.0, 0.5, 0.25])
+    first, second = np.convolve(first, blur), np.convolve(second, blur)
+    size = 1 << (len(first) + len(second)).bit_length()
+    peaks = np.fft.irfft(np.conj(np.fft.rfft(first, size)) * np.fft.rfft(second, size), size)
+    best = int(np.argmax(peaks))
+    lag = best - size if best > size // 2 else best
+    return round(origin_b - origin_a + lag * step, 3)
+
+
+def _profile_of(walls: Sequence[LineString], axis: int) -> tuple[Floats, Floats]:
+    """Positions (n,) along an axis of the pieces that run across it, and their lengths; of all pieces where none does."""
+    pieces = pieces_of(walls)
+    step = pieces[:, 2:] - pieces[:, :2]
+    across = np.abs(step[:, axis]) < 0.02 * np.hypot(*step.T)
+    chosen = pieces[across] if across.any() else pieces
+    weights = np.hypot(*(chosen[:, 2:] - chosen[:, :2]).T)
+    return (chosen[:, axis] + chosen[:, axis + 2]) / 2, weights
+
+
+def window_words(boxes: Sequence[Box], scale_m: float) -> str:
+    """Options --window for rectangles in metres, in drawing units."""
+    windows = [[value / scale_m for value in box] for box in boxes]
+    digits = max(0, 2 - math.floor(math.log10(max(abs(value) for window in windows for value in window) or 1.0)))
+    return " ".join("--window " + ",".join(f"{value:.{digits}f}" for value in window) for window in windows)

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: MIT
+"""Building models (IFC; needs `pip install echostep[ifc]`) -> `Plan`.
+
+In: an .ifc or .ifczip file. Out: `Plan`. Owns nothing. Each level is cut by a horizontal plane one metre above its floor: the sections of walls,
+columns and curtain walls become walls, so that doors are gaps. Windows, stairs and lifts are rectangles, seen from above; doors lie in their
+openings.
+"""
+
+from __future__ import annotations
+
+import math
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from echostep.errors import EchostepError
+from echostep.plan.model import ConnectorKind, Door, Georeference, Plan
+from echostep_app.plan.importers.connector_shapes import join_connectors
+from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, room
+from echostep_app.plan.importers.ifc.bodies import Shapes, SolidBody
+from echostep_app.plan.importers.ifc.doors import placed_door
+from echostep_app.plan.importers.ifc.model import open_model, storeys_of
+from echostep_app.plan.importers.report import ImportReport
+
+NO_STOREY = "at the height of no storey"
+CUT_M = 1.0  # height of the cut above the floor: about that of the rangers
+WALLS = ("IfcWall", "IfcColumn", "IfcCurtainWall", "IfcPlate", "IfcMember")
+CONNECTOR_KINDS: dict[str, ConnectorKind] = {
+    "IfcStair": "stairs", "IfcStairFlight": "stairs", "IfcRamp": "ramp", "IfcRampFlight": "ramp", "IfcTransportElement": "lift",
+}  # fmt: skip
+SEEN = (*WALLS, *CONNECTOR_KINDS, "IfcWindow", "IfcSpace")
+
+
+def import_ifc(path: Path, report: ImportReport) -> Plan:
+    """Import the building of a model; raises EchostepError that names the file and the element."""
+    model = open_model(path)
+    storeys = storeys_of(model, path, report)
+    drawn_levels = [DrawnLevel(storey.name, storey.height_m) for storey in storeys]
+    shapes = Shapes(path)
+    elements = [element for kind in SEEN for element in model.by_type(kind)]
+    count = 0
+    for body in shapes.bodies(elements, report):
+        count += 1
+        if why := _place(drawn_levels, body):
+            report.leave_out(f"{body.element.is_a()} {why}")
+    _doors(model, drawn_levels, shapes, report)
+    _tell(model, report)
+    if not any(drawn.walls for drawn in drawn_levels):
+        raise EchostepError(
+            f"{path}: no walls one metre above any of its {len(drawn_levels)} storeys ({count} elements with a shape): "
+            "export the model with the geometry of its walls"
+        )
+    projects = model.by_type("IfcProject")
+    name = str((projects[0].LongName or projects[0].Name) if projects else "") or path.stem
+    return Plan(
+        name[:80],
+        tuple(s.level() for s in drawn_levels),
+        None,
+        "",
+        join_connectors(drawn_levels, report),
+        _georeference(model),
+    )
+
+
+def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: ImportReport) -> None:
+    """Add each door to the levels that it is open to at the height of the cut."""
+    scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
+    for element in model.by_type("IfcDoor"):
+        door = placed_door(element, shapes, scale_m)
+        if door is None:
+            report.leave_out(f"{element.is_a()} without a shape, an opening or a width")
+            report.doubt("doors without a shape were left out: export the model with the geometry of its doors")
+            continue
+        levels = [drawn for drawn in drawn_levels if door.z_m[0] <= drawn.height_m + CUT_M <= door.z_m[1]]
+        if not levels:
+            report.leave_out(f"{element.is_a()} {NO_STOREY}")
+        for drawn in levels:
+            drawn.doors.append(Door(door.line, name=str(element.Name or "")[:80]))
+
+
+def _tell(model: Any, report: ImportReport) -> None:
+    """Report the unit, and elements of kinds that plans do not have."""
+    units = list(import_module("ifcopenshell.util.unit").get_project_unit(model, "LENGTHUNIT") or ())
+    report.units = " ".join(str(part).lower() for part in units[2:] if isinstance(part, str)) or "metre"
+    seen = (*SEEN, "IfcDoor", "IfcFeatureElement", "IfcPort", "IfcVirtualElement", "IfcElementComponent")
+    for element in model.by_type("IfcElement"):
+        if not any(element.is_a(kind) for kind in seen):
+            report.leave_out(element.is_a())
+
+
+def _place(drawn_levels: list[DrawnLevel], body: SolidBody) -> str:
+    """Add an element to the levels that it is on; returns why it is on none, empty when it is on one."""
+    kind = next(kind for kind in SEEN if body.element.is_a(kind))
+    low, high = body.z_m
+    name = str(getattr(body.element, "LongName", None) or getattr(body.element, "Name", None) or "")[:80]
+    if kind in CONNECTOR_KINDS:
+        return _place_way(drawn_levels, body, CONNECTOR_KINDS[kind], name)
+    placed = False
+    for drawn in drawn_levels:
+        z = drawn.height_m + CUT_M
+        if not low <= z <= high:
+            continue
+        placed = True
+        if kind in WALLS:
+            drawn.walls += body.cut(z)
+        elif kind == "IfcWindow":
+            drawn.windows.append(body.above())
+        else:
+            drawn.rooms += [room(name or "room", area) for area in body.cut(z)]
+    return "" if placed else NO_STOREY
+
+
+def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorKind, name: str) -> str:
+    """As `_place`, for stairs, a ramp or a lift: on all levels between its lowest and its highest corner."""
+    if kind == "lift" and str(getattr(body.element, "PredefinedType", "ELEVATOR")) not in (
+        "ELEVATOR",
+        "None",
+        "NOTDEFINED",
+    ):
+        return "that is no lift"
+    low, high = body.z_m
+    passed = [i for i, drawn in enumerate(drawn_levels) if low - 0.5 <= drawn.height_m <= high + 0.5]
+    for i in passed:
+        drawn_levels[i].connectors.append(ConnectorShape(kind, name, body.above(), tuple(passed)))
+    return "" if passed else NO_STOREY
+
+
+def _georeference(model: Any) -> Georeference | None:
+    """Longitude, latitude and true north of the model's site; None where the model does not state them."""
+    sites = [site for site in model.by_type("IfcSite") if site.RefLatitude and site.RefLongitude]
+    if not sites:
+        return None
+    lat, lon = (_degrees(parts) for parts in (sites[0].RefLatitude, sites[0].RefLongitude))
+    if not (abs(lat) <= 90.0 and abs(lon) <= 180.0) or (lat, lon) == (0.0, 0.0):
+        return None
+    norths = [
+        c.TrueNorth.DirectionRatios
+        for c in model.by_type("IfcGeometricRepresentationContext", include_subtypes=False)
+        if c.TrueNorth
+    ]
+    x, y = norths[0][:2] if norths else (0.0, 1.0)
+    return Georeference(lon, lat, math.pi / 2 - math.atan2(y, x))
+
+
+def _degrees(parts: Any) -> float:
+    """Degrees from degrees, minutes, seconds and millionths of a second."""
+    return float(sum(part / unit for part, unit in zip(parts, (1, 60, 3600, 3600e6), strict=False)))

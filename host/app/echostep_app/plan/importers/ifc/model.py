@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+"""The file of a building model, and its storeys.
+
+In: an .ifc file, or one packed as .ifczip. Out: the model, names and heights of its storeys. Owns which storeys are reference levels.
+"""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from echostep.errors import EchostepError
+from echostep.extras import require
+from echostep.plan.plan_file import LIMIT_M
+from echostep_app.plan.importers.parsing import LARGEST_BYTES, read_bytes
+from echostep_app.plan.importers.report import ImportReport
+
+REFERENCE_M = (
+    1.0  # a storey without walls, doors and rooms nearer than this to another one is a reference level of it; assumed
+)
+HALF_STOREY_M = 1.5  # storeys that are nearer are told; assumed
+CONTENTS = ("IfcWall", "IfcDoor", "IfcWindow", "IfcSpace", "IfcCurtainWall")
+
+
+class Storey(NamedTuple):
+    """A storey: its name, its height (m), how many walls, doors and rooms it contains."""
+
+    name: str
+    height_m: float
+    contents: int
+
+
+def open_model(path: Path) -> Any:
+    """The model; raises EchostepError when the file is none."""
+    require(f"{path}: IFC", "ifcopenshell")
+    ifcopenshell: Any = import_module("ifcopenshell")
+    packed = path.suffix.casefold() == ".ifczip"
+    raw = _unpacked(path) if packed else read_bytes(path)
+    if b"ISO-10303-21" not in raw[:2000]:
+        raise EchostepError(f"{path}: not an IFC file (no ISO-10303-21 at its beginning): export it as IFC (STEP)")
+    try:
+        return ifcopenshell.file.from_string(raw.decode("utf-8", "replace")) if packed else ifcopenshell.open(str(path))
+    except Exception as error:  # a damaged model breaks its reader in many ways
+        raise EchostepError(f"{path}: not an IFC file: {' '.join(str(error).split())[:200]}") from error
+
+
+def _unpacked(path: Path) -> bytes:
+    """The first .ifc file in an .ifczip, which is a zip file."""
+    try:
+        with zipfile.ZipFile(path) as packed:
+            names = [name for name in packed.namelist() if name.casefold().endswith(".ifc")]
+            if not names:
+                raise EchostepError(f"{path}: no .ifc file in it")
+            with packed.open(names[0]) as file:
+                raw = file.read(LARGEST_BYTES + 1)
+    except (OSError, zipfile.BadZipFile, zlib.error, ValueError, RuntimeError, NotImplementedError, EOFError) as error:
+        raise EchostepError(f"{path}: not a zip file with a model: {error}") from error
+    if len(raw) > LARGEST_BYTES:
+        raise EchostepError(f"{path}: unpacks to more than {LARGEST_BYTES // 2**20} MiB: export one building only")
+    return raw
+
+
+def storeys_of(model: Any, path: Path, report: ImportReport) -> list[Storey]:
+    """The model's storeys from the lowest, without reference levels, which are reported."""
+    elevation: Any = import_module("ifcopenshell.util.placement").get_storey_elevation
+    try:
+        scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
+        storeys = [
+            Storey(str(s.Name or s.LongName or "storey")[:80], round(float(elevation(s)) * scale_m, 6), _contents(s))
+            for s in model.by_type("IfcBuildingStorey")
+        ]
+    except Exception as error:
+        raise EchostepError(f"{path}: its storeys cannot be read: {' '.join(str(error).split())[:200]}") from error
+    if not storeys or not all(abs(storey.height_m) <= LIMIT_M for storey in storeys):
+        raise EchostepError(
+            f"{path}: {'a storey has no sane height' if storeys else 'no IfcBuildingStorey'}: export the model with its storeys"
+        )
+    return _without_references(sorted(storeys, key=lambda storey: storey.height_m), report)
+
+
+def _without_references(storeys: list[Storey], report: ImportReport) -> list[Storey]:
+    """Of storeys close to each other those with contents; of several without any, the highest, which is the finished floor."""
+    kept: list[Storey] = []
+    dropped: list[Storey] = []
+    for storey in storeys:
+        near = bool(kept) and storey.height_m - kept[-1].height_m < REFERENCE_M
+        if near and not storey.contents and kept[-1].contents:
+            dropped.append(storey)
+        elif near and not kept[-1].contents:
+            dropped.append(kept.pop())
+            kept.append(storey)
+        else:
+            kept.append(storey)
+    if dropped:
+        names = ", ".join(f"{storey.name} ({storey.height_m:g} m)" for storey in dropped[:5])
+        report.leave_out("storey without walls, doors and rooms beside another one", len(dropped))
+        report.doubt(f"reference levels, not storeys: {names}{', ...' if len(dropped) > 5 else ''}")
+    for low, high in zip(kept, kept[1:], strict=False):
+        if high.height_m - low.height_m < HALF_STOREY_M:
+            apart = f"{high.height_m - low.height_m:.2f} m apart"
+            report.doubt(f"levels {low.name} and {high.name} are {apart}: half storeys, or reference levels?")
+    return kept
+
+
+def _contents(storey: Any) -> int:
+    """How many elements of a building a storey contains."""
+    contained = [e for relation in storey.ContainsElements for e in relation.RelatedElements]
+    spaces = [e for relation in storey.IsDecomposedBy for e in relation.RelatedObjects]
+    return sum(any(element.is_a(kind) for kind in CONTENTS) for element in (*contained, *spaces))

@@ -1,0 +1,316 @@
+# SPDX-License-Identifier: MIT
+"""Indoor Mapping Data Format (zip or folder) -> `Plan`.
+
+In: an archive [OGC 20-094]. Out: `Plan`. Owns nothing. IMDF has no walls: the boundaries of enclosed units become walls, with gaps at the `opening`s;
+units of brick, concrete or glass become walls with a thickness. Walkways and unenclosed areas get no walls, nor do stairs, lifts and ramps without an
+opening. Levels are `storey_height_m` apart, by their ordinals. Files end in .geojson or .json. With `doors_m`, openings drawn as points and rooms
+without an opening get doors of this width.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from echostep.errors import EchostepError
+from echostep.plan.georeference import EarthTransform
+from echostep.plan.model import ConnectorKind, Door, DoorState, Georeference, Plan
+from echostep_app.plan.importers.connector_shapes import join_connectors
+from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, pieces, room
+from echostep_app.plan.importers.geojson import features, label, properties, shape
+from echostep_app.plan.importers.imdf.archive import Archive
+from echostep_app.plan.importers.imdf.assumed_doors import ASSUMED, doors_at, doors_of_rooms
+from echostep_app.plan.importers.parsing import number, parse_json, text, typed
+from echostep_app.plan.importers.report import ImportReport
+
+OPEN = {
+    "walkway",
+    "walkway.island",
+    "unenclosedarea",
+    "platform",
+    "road",
+    "footbridge",
+    "movingwalkway",
+    "lobby",
+    "waitingroom",
+    "terrace",
+}
+FILLED = {"structure", "column", "opentobelow", "brick", "concrete", "drywall", "wood", "glass"}
+CONNECTOR_KINDS: dict[str, ConnectorKind] = {
+    "stairs": "stairs",
+    "steps": "stairs",
+    "escalator": "stairs",
+    "elevator": "lift",
+    "ramp": "ramp",
+}
+SOLID_FIXTURES = {
+    "wall",
+    "obstruction",
+    "equipment",
+    "desk",
+    "furniture",
+    "baggagecarousel",
+    "waterfeature",
+    "vegetation",
+}
+UNUSED = ("address", "amenity", "anchor", "building", "detail", "footprint", "geofence", "occupant", "section")
+ON_M = 0.2  # greatest distance of an opening from the boundary that it opens; assumed
+
+
+@dataclass(frozen=True, slots=True)
+class Feature:
+    """A feature with its path in the archive (`where`), its id (`key`), its properties and its shape."""
+
+    where: str
+    key: str
+    about: dict[str, Any]
+    shape: BaseGeometry
+
+    @property
+    def category(self) -> str:
+        """Its category; "" without one."""
+        return text(self.about.get("category") or "", f"{self.where}.properties.category")
+
+    @property
+    def level(self) -> str:
+        """The id of its level."""
+        return text(self.about.get("level_id"), f"{self.where}.properties.level_id")
+
+    @property
+    def name(self) -> str:
+        """Its name, else its other name."""
+        return (
+            label(self.about.get("name"), f"{self.where}.properties.name")
+            or label(self.about.get("alt_name"), self.where)
+        )[:80]
+
+
+def import_imdf(path: Path, storey_height_m: float, doors_m: float | None, report: ImportReport) -> Plan:
+    """Import the venue of an archive; raises EchostepError that names the file in it and the feature."""
+    with Archive(path) as archive:
+        if not archive.has(_file(archive, "level")):
+            raise EchostepError(
+                f"{path}: no level.geojson in it: IMDF is a folder or zip file with level.geojson and unit.geojson"
+            )
+        if not archive.has("manifest.json"):
+            report.doubt("no manifest.json: read as IMDF by the names of its files")
+        plan = _venue(archive, path, storey_height_m, doors_m, report)
+        _tell(archive, plan, report)
+        return plan
+
+
+def _tell(archive: Archive, plan: Plan, report: ImportReport) -> None:
+    """Report kinds of features that plans do not have, doors that were assumed, and the remedy for rooms without doors."""
+    report.doors_remedy = "--doors 0.9 assumes doors 0.9 m wide, echostep plan edit draws them"
+    for kind in UNUSED:
+        if archive.has(name := _file(archive, kind)):
+            report.leave_out(kind, archive.text(name).count('"Feature"'))
+    assumed = sum(door.name == ASSUMED for level in plan.levels for door in level.doors)
+    if assumed:
+        report.doubt(f"{assumed} doors are assumed, named {ASSUMED!r}: compare them with the building")
+
+
+def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float | None, report: ImportReport) -> Plan:
+    georeference = _origin(archive)
+    earth = EarthTransform(georeference)
+    levels = sorted(_features(archive, "level", earth), key=_ordinal)
+    if not levels:
+        raise EchostepError(
+            f"{path}: {_file(archive, 'level')}: it has no levels: export the archive again with its levels"
+        )
+    drawn_levels = {
+        level.key: DrawnLevel(level.name or f"level {_ordinal(level):g}", round(_ordinal(level) * storey_height_m, 6))
+        for level in levels
+    }
+    openings = _by_level(_features(archive, "opening", earth), drawn_levels)
+    units = _by_level(_features(archive, "unit", earth), drawn_levels)
+    order = list(drawn_levels)
+    for key, drawn in drawn_levels.items():
+        drawn.doors = [door for one in openings[key] for door in _doors(one)]
+        if doors_m is None:
+            report.leave_out(
+                "opening without a width (--doors 0.9 gives one)", sum(not _doors(one) for one in openings[key])
+            )
+        _outline(drawn, next(level for level in levels if level.key == key))
+        for unit in units[key]:
+            _unit(drawn, unit, [one.shape for one in openings[key]])
+        report.leave_out("unit without an area", sum(not areas([unit.shape]) for unit in units[key]))
+        if doors_m is not None:
+            _assume_doors(drawn, units[key], openings[key], doors_m)
+    fixtures = _by_level(_features(archive, "fixture", earth) + _features(archive, "kiosk", earth), drawn_levels)
+    for key, drawn in drawn_levels.items():
+        for fixture in fixtures[key]:
+            if "kiosk" in fixture.where or fixture.category in SOLID_FIXTURES:
+                drawn.obstacles += areas([fixture.shape])
+                report.leave_out("fixture or kiosk without an area", not areas([fixture.shape]))
+            else:
+                report.leave_out(f"fixture {fixture.category}")
+    numbered = {unit.key: (order.index(key), unit) for key in order for unit in units[key]}
+    _relationships(archive, earth, numbered, list(drawn_levels.values()), report)
+    name = next((venue.name for venue in _features(archive, "venue", earth)), "") or path.stem
+    return Plan(
+        name,
+        tuple(s.level() for s in drawn_levels.values()),
+        None,
+        "",
+        join_connectors(list(drawn_levels.values()), report),
+        georeference,
+    )
+
+
+def _file(archive: Archive, kind: str) -> str:
+    """The file of a kind of feature: .geojson as the standard names it, or .json."""
+    return f"{kind}.json" if archive.has(f"{kind}.json") and not archive.has(f"{kind}.geojson") else f"{kind}.geojson"
+
+
+def _origin(archive: Archive) -> Georeference:
+    """The plan's origin: the first corner of the first level, rounded to 1e-5 degrees (about 1 m)."""
+    name = _file(archive, "level")
+    tree = parse_json(archive.text(name), archive.label(name))
+    node: Any = tree
+    try:
+        for where, feature in features(tree):
+            node = typed(feature.get("geometry"), f"{where}.geometry", dict).get("coordinates")
+            while isinstance(node, list) and node and isinstance(node[0], list):
+                node = node[0]
+            if not isinstance(node, list) or len(node) < 2:
+                raise ValueError(f"{where}.geometry: no coordinates")
+            lon, lat = number(node[0], where, 180.0, "degrees"), number(node[1], where, 90.0, "degrees")
+            return Georeference(round(lon, 5), round(lat, 5))
+    except ValueError as error:
+        raise EchostepError(f"{archive.label(name)}: {error}") from error
+    raise EchostepError(f"{archive.label(name)}: it has no levels: export the archive again with its levels")
+
+
+def _features(archive: Archive, kind: str, earth: EarthTransform) -> list[Feature]:
+    """All features of a kind; an empty list when the archive has no file of this kind."""
+    name = _file(archive, kind)
+    if not archive.has(name):
+        return []
+    read = []
+    try:
+        for where, feature in features(parse_json(archive.text(name), archive.label(name))):
+            place = f"{kind} {where}"
+            read.append(
+                Feature(
+                    place,
+                    text(feature.get("id"), f"{where}.id"),
+                    properties(feature, where),
+                    shape(feature, where, earth),
+                )
+            )
+            _ = read[-1].category, read[-1].name
+    except ValueError as error:
+        raise EchostepError(f"{archive.label(name)}: {error}") from error
+    return read
+
+
+def _ordinal(level: Feature) -> float:
+    try:
+        return number(level.about.get("ordinal"), f"{level.where}.properties.ordinal", 500.0, "storeys")
+    except ValueError as error:
+        raise EchostepError(f"level.geojson: {error}") from error
+
+
+def _by_level(features: list[Feature], drawn_levels: dict[str, DrawnLevel]) -> dict[str, list[Feature]]:
+    """Features by the id of their level; raises EchostepError for an unknown level."""
+    sorted_: dict[str, list[Feature]] = {key: [] for key in drawn_levels}
+    for feature in features:
+        try:
+            sorted_[feature.level].append(feature)
+        except KeyError as error:
+            raise EchostepError(
+                f"{feature.where}: there is no level {feature.level[:50]!r} in level.geojson"
+            ) from error
+        except ValueError as error:
+            raise EchostepError(str(error)) from error
+    return sorted_
+
+
+def _doors(one: Feature) -> list[Door]:
+    """An opening as a door from its first to its last point; without a door leaf its state is open."""
+    about = one.about.get("door")
+    state: DoorState = "unknown" if isinstance(about, dict) and about.get("type") not in (None, "open") else "open"
+    doors = []
+    for line in pieces([one.shape]):
+        if isinstance(line, LineString) and line.length > 0.1:
+            (x0, y0), (x1, y1) = line.coords[0][:2], line.coords[-1][:2]
+            if (round(x0, 3), round(y0, 3)) != (round(x1, 3), round(y1, 3)):
+                doors.append(Door((round(x0, 3), round(y0, 3), round(x1, 3), round(y1, 3)), state, one.name))
+    return doors
+
+
+def _outline(drawn: DrawnLevel, level: Feature) -> None:
+    """The outline of a level becomes a wall, unless the level is outdoors."""
+    if level.about.get("outdoor") is not True:
+        drawn.walls += [area.boundary for area in areas([level.shape])]
+
+
+def _unit(drawn: DrawnLevel, unit: Feature, openings: list[BaseGeometry]) -> None:
+    kind = unit.category
+    for area in areas([unit.shape]):
+        if kind in FILLED:
+            (drawn.windows if kind == "glass" else drawn.filled).append(area)
+            continue
+        way = next((CONNECTOR_KINDS[word] for word in (kind, kind.split(".")[0]) if word in CONNECTOR_KINDS), None)
+        opened = any(_opens(area, one) for one in openings)
+        if kind not in OPEN and (way is None or opened):
+            drawn.walls.append(area.boundary)
+        if way is not None:
+            drawn.connectors.append(ConnectorShape(way, unit.name, area))
+        elif unit.name or (kind not in OPEN and kind != "unspecified"):
+            drawn.rooms.append(room(unit.name or kind, area))
+
+
+def _assume_doors(drawn: DrawnLevel, units: list[Feature], openings: list[Feature], width_m: float) -> None:
+    """Doors of openings without a width, and of enclosed units without an opening."""
+    enclosed: list[Polygon] = []
+    ways: list[Polygon] = []
+    for unit in units:
+        if unit.category not in FILLED:
+            lift_or_stairs = unit.category.split(".")[0] in CONNECTOR_KINDS
+            (ways if unit.category in OPEN or lift_or_stairs else enclosed).extend(areas([unit.shape]))
+    walls = [area.exterior for area in enclosed]
+    for one in openings:
+        points = [part for part in pieces([one.shape]) if isinstance(part, Point)]
+        drawn.doors += [door for point in points for door in doors_at(point, walls, width_m, ON_M)]
+    opened = [area for area in enclosed if any(_opens(area, one.shape) for one in openings)]
+    closed = [area for area in enclosed if all(area is not other for other in opened)]
+    drawn.doors += doors_of_rooms(closed, ways, opened, width_m)
+
+
+def _opens(area: Polygon, one: BaseGeometry) -> bool:
+    if one.is_empty:
+        return False
+    middle = Point(np.asarray(shapely.get_coordinates(one)).mean(axis=0))
+    return bool(area.boundary.distance(middle) < ON_M)
+
+
+def _relationships(
+    archive: Archive,
+    earth: EarthTransform,
+    units: dict[str, tuple[int, Feature]],
+    drawn_levels: list[DrawnLevel],
+    report: ImportReport,
+) -> None:
+    """Levels of stairs and lifts whose units do not lie above each other: from the archive's relationships."""
+    for one in _features(archive, "relationship", earth):
+        if one.category not in CONNECTOR_KINDS:
+            report.leave_out(f"relationship {one.category[:40]}")
+            continue
+        between = one.about.get("intermediary")
+        ends = [one.about.get("origin"), one.about.get("destination"), *(between if isinstance(between, list) else [])]
+        keys = [str(end.get("id")) for end in ends if isinstance(end, dict)]
+        levels = sorted({units[key][0] for key in keys if key in units})
+        for key in keys:
+            if key in units and len(levels) > 1:
+                i, unit = units[key]
+                for way in drawn_levels[i].connectors:
+                    if any(way.area.equals(area) for area in areas([unit.shape])):
+                        way.levels = tuple(levels)

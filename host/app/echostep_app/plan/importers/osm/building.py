@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: MIT
+"""OpenStreetMap Simple Indoor Tagging (XML, JSON of Overpass, GeoJSON of overpass-turbo) -> `Plan`.
+
+In: an .osm, .xml, .json or .geojson file. Out: `Plan`. Owns nothing. Rooms have walls, corridors and areas have none, `indoor=wall` is a wall, a
+building's outline is a wall on each of its levels; a door is a node on a wall. Levels are `storey_height_m` apart, level 0 at 0 m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from echostep.errors import EchostepError
+from echostep.plan.georeference import EarthTransform
+from echostep.plan.model import ConnectorKind, Door, DoorState, Georeference, Plan
+from echostep.plan.plan_file import LIMIT_M
+from echostep_app.plan.importers.connector_shapes import join_connectors
+from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, room
+from echostep_app.plan.importers.osm.elements import Elements, Tags, levels_of, read_osm
+from echostep_app.plan.importers.report import ImportReport
+
+DOOR_M, STAIRS_M, LIFT_M = 0.9, 1.5, 1.8  # widths where the map states none: usual sizes
+MOST_LEVELS = 200
+
+
+@dataclass(slots=True)
+class OsmSite:
+    """Levels by their OSM level numbers, these numbers in order, and the walls that each node lies on."""
+
+    drawn_levels: dict[float, DrawnLevel]
+    order: list[float]
+    walls_at: dict[tuple[float, int], list[LineString]] = field(default_factory=dict)
+
+    def on(self, levels: list[float]) -> Iterator[DrawnLevel]:
+        """The levels with these OSM numbers."""
+        return (self.drawn_levels[level] for level in levels if level in self.drawn_levels)
+
+
+def import_osm(path: Path, storey_height_m: float, report: ImportReport) -> Plan:
+    """Import the building in a file; raises EchostepError that names the file and the element."""
+    elements = read_osm(path)
+    levels = sorted({level for tags in elements.indoor_tags() for level in levels_of(tags)})
+    if not levels:
+        raise EchostepError(f"{path}: nothing is tagged indoor=* with a level: choose an area that is mapped indoors")
+    if len(levels) > MOST_LEVELS:
+        raise EchostepError(f"{path}: {len(levels)} levels; a plan has {MOST_LEVELS} at most: cut out one building")
+    georeference = _origin(elements, path)
+    elements.project(EarthTransform(georeference).metres)
+    if np.abs(np.array(list(elements.at_m.values()))).max() > LIMIT_M:
+        raise EchostepError(f"{path}: nodes are further than {LIMIT_M / 1000:.0f} km apart: cut out one building")
+    site = OsmSite(
+        {level: DrawnLevel(f"level {level:g}", round(level * storey_height_m, 6)) for level in levels}, levels
+    )
+    _without_level(elements, report)
+    _outlines(site, elements)
+    _spaces(site, elements)
+    _doors(site, elements, report)
+    _lifts(site, elements)
+    _other(elements, report)
+    drawn_levels = [site.drawn_levels[level] for level in levels]
+    name = next((tags["name"] for *_, tags in elements.lines() if "building" in tags and "name" in tags), path.stem)
+    return Plan(
+        name,
+        tuple(drawn.level() for drawn in drawn_levels),
+        None,
+        "",
+        join_connectors(drawn_levels, report),
+        georeference,
+    )
+
+
+def _without_level(elements: Elements, report: ImportReport) -> None:
+    """Report indoor elements that no level tag places."""
+    lost: dict[str, list[str]] = {}
+    for where, _, tags in elements.lines():
+        kind = "room" if tags.get("indoor") == "room" else f"indoor={tags['indoor'][:20]}" if "indoor" in tags else ""
+        if (kind or _way(tags)) and not levels_of(tags, where) and tags.get("building", "no") == "no":
+            lost.setdefault(kind or str(_way(tags)), []).append(where)
+    for kind, names in lost.items():
+        report.leave_out(f"{kind} without level", len(names))
+        one = len(names) == 1
+        report.doubt(
+            f"{len(names)} {kind}{'' if one or kind == 'stairs' else 's'} {'has' if one else 'have'} no level and "
+            f"{'was' if one else 'were'} left out ({', '.join(names[:5])}): tag level=* and download it again"
+        )
+
+
+def _other(elements: Elements, report: ImportReport) -> None:
+    """Report elements with tags that plans do not have: shops, furniture, footpaths, groups."""
+    walls = ("room", "wall", "column", "pillar", "area", "corridor", "level")
+    for _, _, tags in elements.lines():
+        if tags and _way(tags) is None and tags.get("building", "no") == "no" and tags.get("indoor") not in walls:
+            report.leave_out("way that is no wall, room, corridor or stairs")
+    for _, tags in elements.nodes():
+        if _way(tags) is None and not _is_door(tags):
+            report.leave_out("node that is no door, stairs or lift")
+    report.leave_out("relation that is no multipolygon", elements.other_relations)
+
+
+def _is_door(tags: Tags) -> bool:
+    return "door" in tags or "entrance" in tags or tags.get("indoor") == "door"
+
+
+def _origin(elements: Elements, path: Path) -> Georeference:
+    """The plan's origin: the mean position of the nodes of indoor elements and buildings, rounded to 1e-5 degrees (about 1 m)."""
+    used = [node for _, nodes, tags in elements.lines() if "indoor" in tags or "building" in tags for node in nodes]
+    if not used:
+        raise EchostepError(f"{path}: no way is tagged indoor=*: choose an area that is mapped indoors")
+    lon, lat = np.array([elements.degrees[node] for node in used]).mean(axis=0).round(5)
+    return Georeference(float(lon), float(lat))
+
+
+def _outlines(site: OsmSite, elements: Elements) -> None:
+    """Add the outlines of buildings as walls, on each of their levels."""
+    for where, nodes, tags in elements.lines():
+        if tags.get("building", "no") != "no":
+            own = levels_of(tags, where) or [
+                level
+                for level in site.order
+                if _within(level, tags.get("building:min_level") or tags.get("min_level"), tags.get("max_level"))
+            ]
+            _wall(site, elements, nodes, own, tags)
+
+
+def _within(level: float, least: str | None, most: str | None) -> bool:
+    try:
+        return float(least or -math.inf) <= level <= float(most or math.inf)
+    except ValueError:
+        return True
+
+
+def _spaces(site: OsmSite, elements: Elements) -> None:
+    """Add rooms, areas, corridors, walls, stairs and lifts that are mapped as lines or areas."""
+    for where, nodes, tags in elements.lines():
+        levels, kind = levels_of(tags, where), tags.get("indoor", "no")
+        line = elements.line(nodes)
+        closed = nodes[0] == nodes[-1] and len(nodes) > 3
+        area = Polygon(line) if closed and line is not None else None
+        way = _way(tags)
+        if kind in ("room", "wall"):
+            _wall(site, elements, nodes, levels, tags)
+        if kind in ("column", "pillar") and area is not None:
+            for drawn in site.on(levels):
+                drawn.filled += areas([area])
+        if way is not None and line is not None:
+            where_to = area or line.buffer(_metres(tags, STAIRS_M) / 2, cap_style="flat")
+            _ways(site, way, tags, where_to, levels)
+        name = tags.get("name") or tags.get("ref") or ""
+        if name and area is not None and kind in ("room", "area", "corridor") and way is None:
+            for drawn in site.on(levels):
+                drawn.rooms += [room(name[:80], part) for part in areas([area])]
+
+
+def _wall(site: OsmSite, elements: Elements, nodes: list[int], levels: list[float], tags: Tags) -> None:
+    """Add a line as a wall, or as a window when it is of glass, on each of its levels."""
+    line = elements.line(nodes)
+    if line is None:
+        return
+    glass = "glass" in (tags.get("material"), tags.get("wall"))
+    for level in levels:
+        if level in site.drawn_levels:
+            (site.drawn_levels[level].windows if glass else site.drawn_levels[level].walls).append(line)
+            for node in set(nodes):
+                site.walls_at.setdefault((level, node), []).append(line)
+
+
+def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
+    """Add a door for each node with a door tag, on each level where the node lies on a wall."""
+    for node, tags in elements.nodes():
+        if not _is_door(tags):
+            continue
+        own = levels_of(tags, f"node {node}") or site.order
+        if not any((level, node) in site.walls_at for level in own):
+            report.leave_out("door on no wall")
+        for level in own:
+            for line in site.walls_at.get((level, node), [])[:1]:
+                gap = _gap(line, Point(elements.at_m[node]), _metres(tags, DOOR_M))
+                site.drawn_levels[level].doors.append(
+                    Door(gap, _state(tags), (tags.get("name") or tags.get("ref") or "")[:80])
+                )
+
+
+def _gap(line: LineString, at: Point, wide_m: float) -> tuple[float, float, float, float]:
+    """A door's line along the longer side of the wall at its node; moved along the side when it would extend beyond the corner."""
+    corners = list(line.coords)
+    sides = [LineString(pair) for pair in zip(corners, corners[1:], strict=False) if pair[0] != pair[1]]
+    near = [side for side in sides if side.distance(at) < 0.01]
+    side = max(near or sides, key=lambda side: side.length)
+    middle = min(max(side.project(at), wide_m / 2), max(side.length - wide_m / 2, side.length / 2))
+    first, last = (side.interpolate(middle + sign * min(wide_m, side.length) / 2) for sign in (-1, 1))
+    return round(first.x, 3), round(first.y, 3), round(last.x, 3), round(last.y, 3)
+
+
+def _state(tags: Tags) -> DoorState:
+    if tags.get("door") == "no":
+        return "open"
+    return "closed" if tags.get("locked") == "yes" or tags.get("access") == "no" else "unknown"
+
+
+def _lifts(site: OsmSite, elements: Elements) -> None:
+    """Add lifts and stairs that are mapped as one node, as squares."""
+    for node, tags in elements.nodes():
+        way = _way(tags)
+        if way is not None:
+            _ways(
+                site,
+                way,
+                tags,
+                Point(elements.at_m[node]).buffer(LIFT_M / 2, cap_style="square"),
+                levels_of(tags, f"node {node}"),
+            )
+
+
+def _way(tags: Tags) -> ConnectorKind | None:
+    """The kind of connector that the tags state; None for other elements."""
+    values = {tags.get("highway"), tags.get("room"), tags.get("indoor"), tags.get("buildingpart:verticalpassage")}
+    if "elevator" in values or tags.get("elevator") == "yes":
+        return "lift"
+    if values & {"steps", "stairs", "stairway", "escalator"} or tags.get("stairs") == "yes":
+        return "stairs"
+    return "ramp" if "ramp" in values or tags.get("ramp") == "yes" else None
+
+
+def _ways(site: OsmSite, kind: ConnectorKind, tags: Tags, area: BaseGeometry, levels: list[float]) -> None:
+    """Add a connector's shape to each of its levels."""
+    known = tuple(site.order.index(level) for level in levels if level in site.drawn_levels)
+    for drawn in site.on(levels):
+        drawn.connectors += [ConnectorShape(kind, tags.get("name", "")[:80], part, known) for part in areas([area])]
+
+
+def _metres(tags: Tags, otherwise: float) -> float:
+    """The tagged width in metres; `otherwise` when it is absent or not between 0.3 m and 20 m."""
+    try:
+        width = float(tags.get("width", "").removesuffix("m").strip())
+    except ValueError:
+        return otherwise
+    return width if 0.3 <= width <= 20.0 else otherwise

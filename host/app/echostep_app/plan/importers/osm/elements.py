@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: MIT
+"""Nodes, ways and multipolygons of an OpenStreetMap file, and the numbers of its level tags.
+
+In: XML, the JSON of Overpass (`out body; >; out skel;` or `out geom;`), or GeoJSON of overpass-turbo; tags (`level=0;1`, `level=-1-2`,
+`repeat_on=3-5`). Out: `Elements`; level numbers, ascending. Owns nothing. XML with an entity or a DTD is refused.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from shapely.geometry import LineString
+
+from echostep.arrays import Floats
+from echostep.errors import EchostepError
+from echostep_app.plan.importers.osm.geojson_rows import geojson_rows, without_names
+from echostep_app.plan.importers.parsing import FORMATS, number, parse_json, read_text, typed
+
+RANGE = re.compile(r"^(-?\d+(?:\.\d+)?)\s*-\s*(-?\d+(?:\.\d+)?)$")
+MOST = 300  # greatest level number, and most levels in a range
+Tags = dict[str, str]
+
+
+def levels_of(tags: Mapping[str, str], where: str = "") -> list[float]:
+    """The level numbers of an element; empty when no tag can be read. Raises EchostepError for an impossible range."""
+    texts = f"{tags.get('level', '')};{tags.get('repeat_on', '')}".split(";")
+    levels: set[float] = set()
+    for text in (text.strip() for text in texts):
+        if match := RANGE.match(text):
+            low, high = float(match[1]), float(match[2])
+            if not 0 <= high - low <= MOST:
+                raise EchostepError(f"{where}: level {text[:40]!r} is no range of levels: expected LOW-HIGH, as 0-5")
+            levels |= {low + step for step in range(int(high - low) + 1)}
+        else:
+            try:
+                level = float(text)
+            except ValueError:
+                continue
+            if math.isfinite(level) and abs(level) <= MOST:
+                levels.add(level)
+    return sorted(levels)
+
+
+@dataclass(slots=True)
+class Elements:
+    """The elements of a file by id. `degrees`: longitude and latitude of nodes; `at_m`: their map positions, filled by `project`."""
+
+    degrees: dict[int, tuple[float, float]] = field(default_factory=dict)
+    node_tags: dict[int, Tags] = field(default_factory=dict)
+    ways: dict[int, list[int]] = field(default_factory=dict)
+    way_tags: dict[int, Tags] = field(default_factory=dict)
+    relations: list[tuple[int, list[tuple[int, str]], Tags]] = field(default_factory=list)
+    at_m: dict[int, tuple[float, float]] = field(default_factory=dict)
+    other_relations: int = 0
+
+    def lines(self) -> Iterator[tuple[str, list[int], Tags]]:
+        """Name, nodes and tags of ways, and of the rings of multipolygons; only lines of two nodes or more. Inner rings have no name."""
+        for key, nodes in self.ways.items():
+            if len(nodes) > 1:
+                yield f"way {key}", nodes, self.way_tags[key]
+        for key, members, tags in self.relations:
+            for inner in (False, True):
+                ways = [self.ways.get(ref, []) for ref, role in members if (role == "inner") == inner]
+                for nodes in rings([way for way in ways if len(way) > 1]):
+                    yield f"relation {key}", nodes, without_names(tags) if inner else tags
+
+    def nodes(self) -> Iterator[tuple[int, Tags]]:
+        """Nodes with tags."""
+        return ((key, tags) for key, tags in self.node_tags.items() if tags)
+
+    def indoor_tags(self) -> Iterator[Tags]:
+        """Tags of all lines with an indoor tag."""
+        return (tags for _, _, tags in self.lines() if "indoor" in tags)
+
+    def project(self, metres: Callable[[Floats], Floats]) -> None:
+        """Fill `at_m` by the projection `metres`: (n, 2) degrees -> (n, 2) map metres."""
+        positions = metres(np.array(list(self.degrees.values())).reshape(-1, 2))
+        self.at_m = {key: (float(x), float(y)) for key, (x, y) in zip(self.degrees, positions, strict=True)}
+
+    def line(self, nodes: list[int]) -> LineString | None:
+        """The line through nodes in map metres; None when all are at one position."""
+        positions = [self.at_m[node] for node in nodes]
+        return LineString(positions) if len(set(positions)) > 1 else None
+
+
+def rings(ways: list[list[int]]) -> list[list[int]]:
+    """Ways joined where they share an end, until they are closed: the parts of a multipolygon's outline may be drawn in any direction."""
+    left, joined = [list(way) for way in ways], []
+    while left:
+        line = left.pop()
+        while line[0] != line[-1]:
+            following = next((way for way in left if line[-1] in (way[0], way[-1])), None)
+            if following is None:
+                break
+            left.remove(following)
+            line += following[1:] if following[0] == line[-1] else following[-2::-1]
+        joined.append(line)
+    return joined[::-1]
+
+
+def read_osm(path: Path) -> Elements:
+    """Read the elements of a file; raises EchostepError that names the file and the element."""
+    text = read_text(path)
+    try:
+        rows = _json_rows(text, path) if text.lstrip()[:1] == "{" else _xml_rows(text)
+        elements = Elements()
+        for row in rows:
+            _add(elements, row)
+        _resolve(elements)
+    except ValueError as error:
+        raise EchostepError(f"{path}: {error}") from error
+    return elements
+
+
+def _json_rows(text: str, path: Path) -> list[Any]:
+    tree = typed(parse_json(text, str(path)), "the file", dict)
+    if tree.get("type") == "FeatureCollection":
+        return list(geojson_rows(tree))
+    return list(typed(tree.get("elements"), "elements", list))
+
+
+def _xml_rows(text: str) -> list[dict[str, Any]]:
+    """The elements of XML, in the form of Overpass JSON."""
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise ValueError("it has a DTD or entities, which OSM files do not have: download it again")
+    try:
+        root = ET.fromstring(text)
+    except ET.ParseError as error:
+        raise ValueError(f"not XML: {error}") from error
+    if root.tag != "osm":
+        raise ValueError(f"this XML is <{root.tag[-40:]}>, not <osm>: plans are read as {FORMATS}")
+    return [_xml_row(element) for element in root if element.tag in ("node", "way", "relation")]
+
+
+def _xml_row(element: ET.Element) -> dict[str, Any]:
+    row: dict[str, Any] = {"type": element.tag, "id": _json_number(element.get("id"))}
+    row["tags"] = {tag.get("k", ""): tag.get("v", "") for tag in element.iterfind("tag")}
+    row["lon"], row["lat"] = _json_number(element.get("lon")), _json_number(element.get("lat"))
+    row["nodes"] = [_json_number(nd.get("ref")) for nd in element.iterfind("nd")]
+    row["members"] = [
+        {"type": member.get("type"), "ref": _json_number(member.get("ref")), "role": member.get("role")}
+        for member in element.iterfind("member")
+    ]
+    return row
+
+
+def _json_number(text: str | None) -> Any:
+    """An attribute as the JSON value that its text stands for; the text itself when it is not JSON."""
+    try:
+        return None if text is None else json.loads(text, parse_constant=str)
+    except (ValueError, RecursionError):
+        return text
+
+
+def _add(elements: Elements, row: Any) -> None:
+    """Check an element (as in Overpass JSON) and add it; relations other than multipolygons are counted."""
+    row = typed(row, "elements", dict)
+    kind, key = row.get("type"), row.get("id")
+    if isinstance(key, bool) or not isinstance(key, int):
+        raise ValueError(f"{str(kind)[:20]} {str(key)[:20]!r}: its id is not a whole number")
+    where = f"{str(kind)[:20]} {key}"
+    tags = _tags(row.get("tags") or {}, where)
+    if kind == "node":
+        elements.degrees[key] = _degrees(row, where)
+        elements.node_tags[key] = tags
+    elif kind == "way":
+        nodes = [_ref(ref, where) for ref in typed(row.get("nodes") or [], f"{where}: nodes", list)]
+        for node, place in zip(nodes, typed(row.get("geometry") or [], f"{where}: geometry", list), strict=False):
+            elements.degrees.setdefault(node, _degrees(typed(place, f"{where}: geometry", dict), where))
+        elements.ways[key], elements.way_tags[key] = nodes, tags
+    elif kind == "relation" and tags.get("type") == "multipolygon":
+        members = [
+            typed(member, f"{where}: members", dict)
+            for member in typed(row.get("members") or [], f"{where}: members", list)
+        ]
+        ways = [(_ref(m.get("ref"), where), str(m.get("role"))) for m in members if m.get("type") == "way"]
+        elements.relations.append((key, ways, tags))
+    elif kind == "relation":
+        elements.other_relations += 1
+
+
+def _degrees(row: dict[str, Any], where: str) -> tuple[float, float]:
+    return number(row.get("lon"), f"{where}: lon", 180.0, "degrees"), number(
+        row.get("lat"), f"{where}: lat", 90.0, "degrees"
+    )
+
+
+def _ref(value: Any, where: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise ValueError(f"{where}: {str(value)[:20]!r} is not the id of an element")
+    return value
+
+
+def _tags(value: Any, where: str) -> Tags:
+    return {str(key): str(text)[:500] for key, text in typed(value, f"{where}: tags", dict).items()}
+
+
+def _resolve(elements: Elements) -> None:
+    """Remove nodes that the file does not contain from ways: an extract cuts ways at its edge."""
+    for key, nodes in elements.ways.items():
+        elements.ways[key] = [node for node in nodes if node in elements.degrees]

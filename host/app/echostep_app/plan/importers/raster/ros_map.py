@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: MIT
+"""Maps of ROS navigation (map.yaml and a picture, as map_server and nav2 save them) -> `Plan`.
+
+In: map.yaml. Out: `Plan` of one level. Owns nothing. Occupied pixels become walls by their outlines [nav2_map_server, map_io: p = (255 - value) /
+255, or value / 255 with negate]; the origin is the pose of the lower left corner. What the robot saw besides walls is in the picture too, and stays.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from shapely.affinity import affine_transform
+
+from echostep.errors import EchostepError
+from echostep.plan.model import Plan
+from echostep.plan.plan_file import LIMIT_M
+from echostep_app.plan.importers.drawn_level import DrawnLevel
+from echostep_app.plan.importers.parsing import read_text
+from echostep_app.plan.importers.raster.tracing import grey, trace
+from echostep_app.plan.importers.report import ImportReport
+
+OCCUPIED = 0.65  # default of map_server
+LARGEST_PIXEL_M = 10.0
+
+
+def import_ros_map(path: Path, report: ImportReport) -> Plan:
+    """Import the map of a map.yaml; raises EchostepError that names the file and the field."""
+    fields = _fields(path)
+    if not fields.get("image"):
+        raise EchostepError(f"{path}: no field image: is this a map.yaml of ROS?")
+    pixel_m = _number(path, fields, "resolution", LARGEST_PIXEL_M)
+    if pixel_m <= 0.0:
+        raise EchostepError(f"{path}: resolution: expected metres a pixel, more than 0")
+    x, y, yaw = _origin(path, fields)
+    picture = path.parent / fields["image"]
+    probability = 1.0 - grey(picture) / 255.0
+    if _number(path, fields, "negate", 1.0, 0.0):
+        probability = 1.0 - probability
+    try:
+        outlines, noise = trace(probability > _number(path, fields, "occupied_thresh", 1.0, OCCUPIED))
+    except ValueError as error:
+        raise EchostepError(f"{picture}: {error}") from error
+    if not outlines:
+        raise EchostepError(f"{picture}: no pixel is occupied (occupied_thresh, negate): is this the map?")
+    c, s = pixel_m * math.cos(yaw), pixel_m * math.sin(yaw)
+    drawn = DrawnLevel(path.stem, 0.0, walls=[affine_transform(area, (c, -s, s, c, x, y)) for area in outlines])
+    report.units = f"{pixel_m:g} m a pixel (resolution)"
+    if noise:
+        report.leave_out("specks of less than 4 pixels", noise)
+    report.doubt(
+        "traced from what a robot saw: furniture and people are walls too, and doors that stood open are gaps; echostep plan edit corrects it"
+    )
+    return Plan(path.stem, (drawn.level(),), None, "")
+
+
+def _fields(path: Path) -> dict[str, str]:
+    """The fields of a flat YAML file; a list below a field in block style is joined as in flow style."""
+    fields: dict[str, str] = {}
+    last = ""
+    for line in read_text(path).splitlines():
+        text = line.split(" #")[0].rstrip()
+        if text.lstrip().startswith("- ") and last:
+            fields[last] = f"{fields[last].removesuffix(']').removeprefix('[')},{text.lstrip()[2:]}".strip(",")
+        elif ":" in text and not text.startswith((" ", "#", "\t")):
+            last, _, value = text.partition(":")
+            fields[last] = value.strip().strip("\"'")
+    return fields
+
+
+def _origin(path: Path, fields: dict[str, str]) -> tuple[float, float, float]:
+    """Position (m) and direction (rad) of the picture's lower left corner."""
+    parts = fields.get("origin", "0,0,0").strip("[] ").split(",")
+    numbers = [_number(path, {"origin": part}, "origin", LIMIT_M) for part in parts]
+    if len(numbers) not in (2, 3):
+        raise EchostepError(f"{path}: origin: expected [x, y, yaw]")
+    return numbers[0], numbers[1], numbers[2] if len(numbers) == 3 else 0.0
+
+
+def _number(path: Path, fields: dict[str, str], name: str, most: float, otherwise: float | None = None) -> float:
+    """A number between -`most` and `most`; `otherwise` when the file has none."""
+    text = fields.get(name)
+    if text is None and otherwise is not None:
+        return otherwise
+    try:
+        value = float(text or "")
+    except ValueError as error:
+        raise EchostepError(f"{path}: {name}: {str(text)[:40]!r} is not a number") from error
+    if not abs(value) <= most:
+        raise EchostepError(f"{path}: {name}: {value:g} is not between {-most:g} and {most:g}")
+    return value

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""A picture's grey values; pixels that are walls -> outlines.
+
+In: a file; a boolean picture. Out: grey values; polygons in pixels, x right, y up, the origin at the lower left corner. Owns what counts as noise.
+"""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+
+from echostep.arrays import Bools, Floats
+from echostep.errors import EchostepError
+from echostep.extras import require
+from echostep_app.plan.importers.parsing import read_bytes
+
+MOST_PIXELS = 100_000_000
+
+STAIR = 1.0  # pixels by which an outline may leave the pixels' edges: a slanting wall is a stair of pixels
+LEAST_PIXELS = 4.0  # smaller groups are noise of the sensor; assumed
+MOST_RUNS = 2_000_000
+
+
+def grey(path: Path) -> Floats:
+    """The picture's grey values (rows from the top, columns), 0 black to 255 white; transparent pixels are unknown, as grey."""
+    require(f"{path}: a picture", "PIL")
+    from PIL import Image
+
+    content = read_bytes(path)
+    Image.MAX_IMAGE_PIXELS = MOST_PIXELS
+    try:
+        with Image.open(BytesIO(content)) as image:
+            if image.width * image.height > MOST_PIXELS:
+                raise EchostepError(f"{path}: more than {MOST_PIXELS // 10**6} million pixels: cut it to the building")
+            return np.asarray(image.convert("L"), dtype=np.float64)
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise EchostepError(f"{path}: not a picture that can be read: {str(error)[:200]}") from error
+
+
+def trace(walls: Bools) -> tuple[list[Polygon], int]:
+    """Outlines of the groups of pixels (rows from the top, columns), and how many groups are left out as noise.
+
+    Raises ValueError for too many pixels.
+    """
+    rows, first, last = _runs(walls)
+    if len(rows) > MOST_RUNS:
+        raise ValueError("too many pixels of walls: cut the picture to the building")
+    height = len(walls)
+    boxes = shapely.box(first, height - rows - 1, last, height - rows)
+    groups = [part for part in shapely.get_parts(shapely.union_all(boxes)) if isinstance(part, Polygon)]
+    large = [group for group in groups if group.area >= LEAST_PIXELS]
+    smooth = [
+        group.normalize().simplify(STAIR) for group in large
+    ]  # normalised, a ring begins at a corner: its begin stays
+    return [s if isinstance(s, Polygon) and s.area > 0.0 else g for s, g in zip(smooth, large, strict=True)], len(
+        groups
+    ) - len(large)
+
+
+def _runs(walls: Bools) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Row, first column and column after the last of each run of set pixels."""
+    padded = np.pad(walls.astype(np.int8), ((0, 0), (1, 1)))
+    step = np.diff(padded, axis=1)
+    rows, first = np.nonzero(step == 1)
+    _, last = np.nonzero(step == -1)
+    return rows, first, last

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""What is doubtful in an imported plan, as questions for a person: the editor shows them, and takes an answer by one click.
+
+In: a `Plan` with the questions of its importer. Out: the plan with those that follow from its check, its doors and its gaps. Owns which findings a
+person can answer, and how many are asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from echostep.plan.model import Level, Plan, Question
+from echostep_app.plan.check import check_plan
+from echostep_app.plan.places.findings import PlanFinding
+from echostep_app.plan.places.spaces import find_spaces
+
+DOORS_M = (0.6, 3.0)  # widths between which nobody asks; assumed: DIN 18040 has 0.8 m and more, closets less
+MOST_WALLS = 50_000  # of a plan that is checked at an import: a few seconds
+MOST_QUESTIONS = 60  # of a level: more are no work of two minutes
+
+
+def with_questions(plan: Plan) -> Plan:
+    """The plan whose levels carry their questions, those of the importer first; each element is asked about once."""
+    found: list[list[Question]] = [[*level.questions] for level in plan.levels]
+    if sum(len(level.solid) for level in plan.levels) <= MOST_WALLS:
+        for finding in check_plan(plan):
+            found[finding.level] += _of_finding(finding, plan.levels[finding.level])
+        for i, level in enumerate(plan.levels):
+            found[i] += [*_of_widths(level), *_of_gaps(plan, i)]
+    levels = zip(plan.levels, found, strict=True)
+    return replace(plan, levels=tuple(replace(level, questions=_once(questions)) for level, questions in levels))
+
+
+def _once(questions: list[Question]) -> tuple[Question, ...]:
+    """The first question about each element."""
+    by_element = {(question.about, question.lines_m or question.at_m): question for question in reversed(questions)}
+    return tuple(reversed(by_element.values()))[:MOST_QUESTIONS]
+
+
+def _of_finding(finding: PlanFinding, level: Level) -> Iterator[Question]:
+    """The question that a finding of the check is, where the editor can answer it: not about stairs, and not about walls that overlap."""
+    at, lines = finding.position_m, finding.lines_m
+    if finding.kind == "gap":
+        wall = next(line for line in lines if at not in (line[:2], line[2:]))
+        to = shapely.get_coordinates(
+            shapely.shortest_line(shapely.Point(at), shapely.LineString((wall[:2], wall[2:])))
+        )[1]
+        piece = (*at, round(float(to[0]), 4), round(float(to[1]), 4))
+        yield Question(f"{finding.text}: close the gap?", "wall", at, (piece,), is_proposed=True)
+    elif finding.kind == "door":
+        yield Question(f"{finding.text}: is it right?", "door", at, lines)
+    elif finding.kind in ("open room", "unreachable"):
+        room = min(level.rooms, key=lambda one: _apart_m(one.at_m, lines[0][:2] if lines else at))
+        yield Question(f"{finding.text}: is it right?", "room", room.at_m)
+    elif finding.kind == "no door":
+        yield Question(f"{finding.text}: is it right?", "room", at)
+
+
+def _apart_m(one: tuple[float, float], other: tuple[float, float]) -> float:
+    return float(np.hypot(one[0] - other[0], one[1] - other[1]))
+
+
+def _of_widths(level: Level) -> Iterator[Question]:
+    """Doors that are narrower or wider than doors are."""
+    for door in level.doors:
+        if not DOORS_M[0] <= door.width_m <= DOORS_M[1]:
+            x0, y0, x1, y1 = door.line
+            text = f"door {door.width_m:.2f} m wide: is it a door?"
+            yield Question(text, "door", ((x0 + x1) / 2, (y0 + y1) / 2), (door.line,))
+
+
+def _of_gaps(plan: Plan, level_index: int) -> Iterator[Question]:
+    """Rooms without a listed door: each gap that leads to one may be a door."""
+    level, spaces = plan.levels[level_index], find_spaces(plan, level_index)
+    if spaces is None:
+        return
+    listed = {face for _, a, b in spaces.doors[: len(level.doors)] for face in (a, b)}
+    outlined = {spaces.face_at(*room.at_m): room for room in spaces.outlined}
+    names = {face: room.name for face, room in outlined.items()} | {f: r[0].name for f, r in spaces.names.items()}
+    for gap, a, b in spaces.doors[len(level.doors) :]:
+        name = next((names[face] for face in (a, b) if face in names and face not in listed), None)
+        if name is not None:
+            x0, y0, x1, y1 = (round(value, 3) for value in gap.line)
+            text = f"room {name!r} has no door, but a gap of {gap.width_m:.2f} m: is it a door?"
+            yield Question(text, "door", ((x0 + x1) / 2, (y0 + y1) / 2), ((x0, y0, x1, y1),), is_proposed=True)

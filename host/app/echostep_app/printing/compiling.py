@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: MIT
+"""What is shown while kernels are compiled: once on a computer, at the first start, for a minute or two.
+
+In: each kernel that no cache has (`jit`). Out: one line on standard error, on a terminal; or a count for the progress that is shown already. Owns
+what is called then.
+"""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from echostep.kernel_cache import on_compiling
+from echostep_app.printing.lines import complain
+
+COMPILING = "echostep: kernels are compiled, once on this computer: it takes a minute or two"
+
+
+def tell_of_compiling() -> None:
+    """From now on the first kernel that is compiled is told of."""
+    numbers = itertools.count()
+    on_compiling[:] = [lambda: _tell(next(numbers))]
+
+
+def _tell(before: int) -> None:
+    if not before and sys.stderr is not None and sys.stderr.isatty():
+        complain(COMPILING)
+
+
+@contextmanager
+def counting_compiled(show: Callable[[int], None]) -> Iterator[None]:
+    """Give the number of kernels that were compiled in the block, instead of the line."""
+    numbers = itertools.count(1)
+    on_compiling.append(lambda: show(next(numbers)))
+    try:
+        yield
+    finally:
+        on_compiling.pop()

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: MIT
+"""The scorecard of one track: every metric that its columns, the truth and the plan allow.
+
+In: a track, the truth, a plan. Out: `Scorecard`. Owns the definitions; `definitions.py` has their names and sources.
+
+The numbers in brackets are clauses of [ISO/IEC 18305:2016]. Its coverage and availability are shares of places and of time for which the system gives
+a position; here a position is at most GAP_S old and not marked lost by the track itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from echostep.arrays import Bools, Floats
+from echostep.localization.estimate import in_ellipse95
+from echostep.plan.model import Plan
+from echostep_app.scorecard.error_statistics import ErrorStatistics, error_statistics, quantile
+from echostep_app.scorecard.matching import Matched, is_surveyed, known, match
+from echostep_app.scorecard.track_columns import ScoredPath
+from echostep_app.scorecard.zones import NO_ZONE, Zones
+
+FLOOR_PENALTY_M = 15.0  # per floor [Potorti et al. 2017]
+CELL_M = 1.0  # side of the squares of which coverage is the share: a person's room
+TICK_S = 0.1  # of the moments of which availability is the share, assumed
+
+
+@dataclass(frozen=True, slots=True)
+class Scorecard:
+    """The metrics of a track; None where its files do not state what a metric needs. Shares are from 0 to 1."""
+
+    track: str
+    points: int
+    span_s: float
+    horizontal: ErrorStatistics
+    vertical: ErrorStatistics | None
+    spherical: ErrorStatistics | None
+    bias_m: float
+    covariance_m2: tuple[float, float, float]
+    ce50_m: float
+    ce95_m: float
+    ve95_m: float | None
+    se95_m: float | None
+    floor_probability: float | None
+    zone_probability: float | None
+    coverage: float
+    availability: float
+    latency_mean_s: float | None
+    latency_p95_s: float | None
+    setup_s: float | None
+    evaal_m: float
+    evaal_knows_floors: bool
+    ellipse95_holds: float | None
+    radius95_holds: float | None
+    protection_holds: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Scored:
+    """A scorecard, and what it was computed from: the points, and the radius stated at each, (n,), `radius_name`."""
+
+    card: Scorecard
+    matched: Matched
+    radius_m: Floats | None
+    radius_name: str
+
+
+def score(track: ScoredPath, truth: ScoredPath, plan: Plan | None = None, setup_s: float | None = None) -> Scored:
+    """Compare a track with the truth; raises EchostepError where they have no moment in common."""
+    at = match(track, truth)
+    error = at.xy_m - at.true_xy_m
+    horizontal = at.error_m
+    height = None if at.height_m is None or at.true_height_m is None else at.height_m - at.true_height_m
+    vertical = None if height is None else np.abs(height)[np.isfinite(height)]
+    spherical = None if height is None else np.hypot(horizontal, height)[np.isfinite(height)]
+    xx, xy, _, yy = np.cov(error.T, bias=True).ravel().tolist()
+    floors = _floors_off(at)
+    latency = None if track.latency_s is None else track.latency_s[at.row]
+    radius, protection = (None if r is None else r[at.row] for r in (track.radius95_m, track.protection_m))
+    covered, available = _coverage(track, truth)
+    card = Scorecard(
+        track=str(track.path), points=len(horizontal), span_s=float(at.t_s[-1] - at.t_s[0]),
+        horizontal=error_statistics(horizontal), vertical=_statistics(vertical), spherical=_statistics(spherical),
+        bias_m=float(np.hypot(*error.mean(0))), covariance_m2=(xx, xy, yy),
+        ce50_m=quantile(horizontal, 0.5), ce95_m=quantile(horizontal, 0.95),
+        ve95_m=_quantile(vertical, 0.95), se95_m=_quantile(spherical, 0.95),
+        floor_probability=None if floors is None else _share(floors == 0.0, np.isfinite(floors)),
+        zone_probability=None if plan is None else _zone_probability(at, plan),
+        coverage=covered, availability=available,
+        latency_mean_s=_mean(latency), latency_p95_s=_quantile(latency, 0.95), setup_s=setup_s,
+        evaal_m=quantile(horizontal + FLOOR_PENALTY_M * (0.0 if floors is None else np.nan_to_num(floors)), 0.75),
+        evaal_knows_floors=floors is not None,
+        ellipse95_holds=_ellipse_holds(track, at, error), radius95_holds=_holds(radius, horizontal),
+        protection_holds=_holds(protection, horizontal),
+    )  # fmt: skip
+    if protection is not None:
+        return Scored(card, at, protection, "protection radius")
+    return Scored(card, at, radius, "95 % radius")
+
+
+def _floors_off(at: Matched) -> Floats | None:
+    """By how many floors each point is off; NaN where one of both does not state it."""
+    if at.level is None or at.true_level is None:
+        return None
+    off = np.abs(at.level - at.true_level)
+    return off if np.isfinite(off).any() else None
+
+
+def _zone_probability(at: Matched, plan: Plan) -> float | None:
+    """Share of the points in the right zone, of those where the truth is in one."""
+    if at.level is None or at.true_level is None:
+        return None
+    zones = Zones(plan)
+    true, by_track = zones.of(at.true_xy_m, at.true_level), zones.of(at.xy_m, at.level)
+    return _share(by_track == true, true != NO_ZONE)
+
+
+def _coverage(track: ScoredPath, truth: ScoredPath) -> tuple[float, float]:
+    """Share of the places of the truth, and of its time, for which the track gives a position."""
+    if is_surveyed(truth):
+        t_s, xy_m = truth.t_s, truth.xy_m
+    else:
+        t_s = np.arange(truth.t_s[0], truth.t_s[-1] + 0.5 * TICK_S, TICK_S)
+        xy_m = np.column_stack([np.interp(t_s, truth.t_s, truth.xy_m[:, k]) for k in (0, 1)])
+    has = known(track, t_s)
+    row = np.maximum(np.searchsorted(truth.t_s, t_s, side="right") - 1, 0)
+    level = np.zeros(len(t_s)) if truth.level is None else np.nan_to_num(truth.level[row], nan=-1.0)
+    cells = np.column_stack([np.floor(xy_m / CELL_M), level])
+    visited, cell = np.unique(cells, axis=0, return_inverse=True)
+    reached = np.bincount(cell.ravel(), has, len(visited)) > 0.0
+    return float(reached.mean()), float(has.mean())
+
+
+def _ellipse_holds(track: ScoredPath, at: Matched, error_m: Floats) -> float | None:
+    """Share of the points whose 95 % ellipse holds the truth."""
+    if track.covariance_m2 is None:
+        return None
+    covariance_m2 = track.covariance_m2[at.row]
+    return _share(in_ellipse95(error_m, covariance_m2), np.isfinite(covariance_m2.sum(1)))
+
+
+def _holds(radius_m: Floats | None, error_m: Floats) -> float | None:
+    return None if radius_m is None else _share(error_m <= radius_m, ~np.isnan(radius_m))
+
+
+def _share(right: Bools, of: Bools) -> float | None:
+    return float(right[of].mean()) if of.any() else None
+
+
+def _statistics(error_m: Floats | None) -> ErrorStatistics | None:
+    return None if error_m is None or not len(error_m) else error_statistics(error_m)
+
+
+def _mean(values: Floats | None) -> float | None:
+    finite = values[np.isfinite(values)] if values is not None else np.zeros(0)
+    return float(finite.mean()) if len(finite) else None
+
+
+def _quantile(values: Floats | None, share: float) -> float | None:
+    finite = values[np.isfinite(values)] if values is not None else np.zeros(0)
+    return quantile(finite, share) if len(finite) else None

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""An acceptance walk tracked again from its recording, with the taps in between.
+
+In: a recording. Out: `Walked`: estimates, taps and pings with their times. Owns nothing. Live and replayed pages are made of this alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.localization.estimate import Estimate
+from echostep.plan.model import Plan
+from echostep.ports.chunks import LATEST_NS
+from echostep.ports.people.tap import POINT, Tap, parse_tap
+from echostep.recording.reading import Recording, open_recording
+from echostep.tracker import Tracker
+from echostep_app.session.acceptance.heard import SeenPings
+from echostep_app.session.acceptance.protocol import Protocol, recorded_protocol
+from echostep_app.session.arrivals import Arrivals
+from echostep_app.session.losses import Losses
+from echostep_app.session.options import TrackingOptions
+from echostep_app.session.progress import with_bar
+from echostep_app.session.runs.replay import tracker_of
+
+
+class TimedTap(NamedTuple):
+    """A tap at `t_s`: of which point (its index), and whether the wearer stood on it."""
+
+    t_s: float
+    point: int
+    standing: bool
+
+
+@dataclass(slots=True)
+class Taps:
+    """Taps that were not taken back; `bad`: chunks that are none, or name no point."""
+
+    points: int
+    kept: list[Tap] = field(default_factory=list)
+    taken_back: int = 0
+    bad: int = 0
+
+    def receive(self, payload: bytes) -> None:
+        """Add the tap of a chunk, or take back the newest one."""
+        tap = parse_tap(payload)
+        if tap is not None and tap.point is None and self.kept:
+            self.kept.pop()
+            self.taken_back += 1
+        elif tap is None or tap.point is None or tap.point >= self.points:
+            self.bad += 1
+        else:
+            self.kept.append(tap)
+
+
+@dataclass(frozen=True, slots=True)
+class Walked:
+    """A walk that was tracked to its end."""
+
+    recording: Recording
+    protocol: Protocol
+    plan: Plan
+    tracker: Tracker
+    estimates: list[Estimate]
+    taps: Taps
+    timed: list[TimedTap]
+    pings: SeenPings
+    losses: Losses
+    arrivals: Arrivals
+
+
+def walk_again(path: Path) -> Walked:
+    """Track a recording with its own plan, start, settings and seed; raises EchostepError."""
+    recording = open_recording(path)
+    protocol, plan = recorded_protocol(recording.metadata, path)
+    tracker, taps = tracker_of(recording, plan, TrackingOptions(None)), Taps(len(protocol.points))
+    for portion in recording.portions():
+        if POINT in portion.ports:
+            for chunk in portion.where(portion.port == portion.ports.index(POINT)).chunks():
+                taps.receive(chunk.data)
+    walked = Walked(recording, protocol, plan, tracker, [], taps, [], SeenPings(), Losses(tracker), Arrivals())
+    tracker.watchers.append(walked.pings.note)
+    _track(walked, deque(sorted(taps.kept, key=lambda tap: tap.t_ns)))
+    return walked
+
+
+def _track(walked: Walked, due: deque[Tap]) -> None:
+    """Track all portions; a tap's time is that of the newest message which had arrived by then, and the time since. One before any has no time."""
+    recording, tracker, last_ns = walked.recording, walked.tracker, 0
+
+    def time_next() -> None:
+        tap = due.popleft()
+        t_s = tracker.front_end.newest_s + 1e-9 * (tap.t_ns - last_ns)
+        if not math.isnan(t_s) and tap.point is not None:
+            walked.timed.append(TimedTap(t_s, tap.point, tap.standing))
+
+    for portion in with_bar(recording.portions(), f"tracking {recording.path.name} again", lambda: recording.fraction):
+        walked.arrivals.note(portion)
+        arrival_ns, begin = np.maximum.accumulate(portion.t_arrival_ns), 0
+        while begin < len(arrival_ns):
+            end = int(np.searchsorted(arrival_ns, due[0].t_ns if due else LATEST_NS, side="right"))
+            if end > begin:
+                walked.estimates.extend(tracker.take(portion.rows(begin, end)))
+                begin, last_ns = end, int(arrival_ns[end - 1])
+            if begin < len(arrival_ns):
+                time_next()
+    while due:
+        time_next()

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+"""`echostep demo`: track a simulated walk through the demo plan, or through the rooms of another one.
+
+In: a seed, a plan, and a program that plays the sensor board, or the Python board. Out: recording, true path, track, summary. Owns the simulated
+board. A demo on a terminal is slowed down to be watched; elsewhere it runs as fast as it can. Its estimates are the same at any speed.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
+from dataclasses import dataclass, replace
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from echostep.errors import EchostepError
+from echostep.file_mode import claim
+from echostep.plan.model import Plan
+from echostep.ports.chunks import Chunk, Portion
+from echostep.tracker import Tracker
+from echostep.tracker.kernels import Part
+from echostep.walk.recorded import SIMULATED
+from echostep_app.interruption import until_asked
+from echostep_app.page.elements.true_position import TruePath
+from echostep_app.plan.importers.limited import open_limited
+from echostep_app.recording.recorder import Recorder
+from echostep_app.scorecard.truth import load_truth
+from echostep_app.session.chunk_streams import paced, portions_of, recorded, with_messages
+from echostep_app.session.console import console, print_notices
+from echostep_app.session.metadata import run_metadata
+from echostep_app.session.options import OutputOptions
+from echostep_app.session.progress import progress_line
+from echostep_app.session.results import output_folder
+from echostep_app.session.runs.recording import start_recording
+from echostep_app.session.session import Session
+from echostep_app.simulation.devices.beacon_gateway import with_beacons
+from echostep_app.simulation.devices.board import Board, BoardProcess, PythonBoard
+from echostep_app.simulation.kits import Kit
+from echostep_app.simulation.people.tours import room_tour
+from echostep_app.simulation.people.walker import Person, Waypoint
+from echostep_app.simulation.scenario import DEMO_WAYPOINTS, Scenario, start_of
+
+WATCHED_SPEED = 4.0  # times real time, on a terminal: a walk of 90 s is seen in 22 s
+# Chunks that are tracked together in a run that is watched: 20 ms of the walk: no step is shown later
+WATCHED_PORTION = 16
+UNSEEN_PORTION = 1000  # chunks that are tracked together when nothing shows the run: fewer calls
+FOOT_BOARD = 2  # seed of its simulator: another board than the belt's
+SIMULATION = Part("echostep_app.simulation.kernels:simulation", 85)
+_DEMO_PLAN = files("echostep") / "plans" / "demo.json"
+TOUR_CORNER_M = 0.3  # how far corners are cut on a tour: doors of any plan are passed without touching them
+
+
+@dataclass(frozen=True, slots=True)
+class DemoOptions:
+    """`board_command` starts the program that plays the board; `guide` adds beacons and guidance to the end of the walk.
+
+    `plan_path` None: the demo's plan. `speed`: times real time; None: `WATCHED_SPEED` on a terminal, else as fast as it can.
+    `kit`: the parts on the board; those of 2026 need the real firmware in the simulator.
+    """
+
+    seed: int
+    board_command: str | None = None
+    guide: bool = False
+    plan_path: Path | None = None
+    speed: float | None = None
+    kit: Kit = Kit.PAPERS
+
+
+def demo(options: DemoOptions, output: OutputOptions) -> None:
+    """Simulate a walk, track and record it."""
+    with _plan_file(options) as plan_path:
+        plan = open_limited(plan_path)
+    waypoints = DEMO_WAYPOINTS if options.plan_path is None else room_tour(plan)
+    if options.kit is Kit.OF_2026 and options.board_command is None:
+        raise EchostepError("the kit of 2026 needs the real firmware in the simulator: make demo KIT=2026")
+    with ExitStack() as stack:
+        board = stack.enter_context(closing(_board(options)))
+        foot_board = stack.enter_context(closing(_foot_board(options))) if options.kit is Kit.OF_2026 else None
+        output = replace(output, folder=output_folder(output.folder))
+        _track((board, foot_board), plan, waypoints, options, output)
+
+
+def _plan_file(options: DemoOptions) -> AbstractContextManager[Path]:
+    """The plan's file; that of the demo may be inside an archive."""
+    path = options.plan_path
+    return as_file(_DEMO_PLAN) if path is None else nullcontext(path)
+
+
+def _board(options: DemoOptions) -> Board:
+    command = options.board_command
+    player = "the real firmware in the simulator" if command else "the Python board, not the real firmware"
+    board = BoardProcess(shlex.split(command)) if command else PythonBoard(seed=options.seed)
+    parts = (
+        "of 2026, not built yet, and a second one is on the foot"
+        if options.kit is Kit.OF_2026
+        else "of the papers, the default"
+    )
+    console.print(f"A simulated walk in a simulated building; the sensor board is {player}, with the parts {parts}.")
+    return board
+
+
+def _foot_board(options: DemoOptions) -> Board:
+    return BoardProcess([*shlex.split(options.board_command or ""), "--seed", str(FOOT_BOARD)])
+
+
+def _track(
+    boards: tuple[Board, Board | None],
+    plan: Plan,
+    waypoints: Sequence[Waypoint],
+    options: DemoOptions,
+    output: OutputOptions,
+) -> None:
+    start = start_of(plan, waypoints)
+    tracker = Tracker(plan, start, seed=options.seed)
+    speed = options.speed or (WATCHED_SPEED if console.is_terminal and output.watched else None)
+    title = "echostep demo (simulated" + (f", {speed:g} x real time)" if speed else ")")
+    end = _place_text(plan, waypoints) if options.guide else None
+    with Session(tracker, title, "simulated", output, end) as session:
+        session.prepare(SIMULATION)
+        with progress_line("Simulating the walk"):
+            person = Person() if options.plan_path is None else Person(corner_m=TOUR_CORNER_M)
+            scenario = Scenario(plan, waypoints, options.seed, boards[0], person, kit=options.kit, foot_board=boards[1])
+        scenario.write_truth(claim(output.folder / "truth.csv"))
+        session.show_truth(TruePath.of(scenario.truth, plan))
+        metadata = run_metadata(plan, start, options.seed, "simulated walk, simulated sensors", source=SIMULATED)
+        with start_recording(output.folder / "walk.mcap", metadata) as recorder:
+            chunks = with_beacons(scenario, plan, options.seed) if options.guide else scenario.chunks()
+            portions = _portions(chunks, session, recorder, speed)
+            session.track(until_asked(portions), lambda: scenario.fraction, recorder)
+        print_notices(recorder.notices)
+        session.finish("simulated walk", load_truth(output.folder / "truth.csv"))
+        session.keep_page_open(_again(recorder.path, options))
+    recorder.check_whole()
+
+
+def _again(recording: Path, options: DemoOptions) -> str:
+    """The command that plays a demo's recording on the page."""
+    plan = options.plan_path or Path(str(_DEMO_PLAN))
+    here = Path.cwd()
+    paths = [str(p.resolve().relative_to(here) if p.resolve().is_relative_to(here) else p) for p in (recording, plan)]
+    return shlex.join(["echostep", "replay", paths[0], "--plan", paths[1], "--page"])
+
+
+def _place_text(plan: Plan, waypoints: Sequence[Waypoint]) -> str:
+    """X,Y,LEVEL of the end of the walk."""
+    return f"{waypoints[-1][0]!r},{waypoints[-1][1]!r},{start_of(plan, waypoints[::-1]).level}"
+
+
+def _portions(chunks: Iterator[Chunk], session: Session, recorder: Recorder, speed: float | None) -> Iterator[Portion]:
+    """The simulated chunks, recorded; a run that is watched is slowed down and tracked in small portions."""
+    source = paced(chunks, speed) if speed else chunks
+    with_people = with_messages(source, session.message_sources, _arrival_ns)
+    return portions_of(
+        recorded(with_people, recorder, wait_for_disk=True), WATCHED_PORTION if speed else UNSEEN_PORTION
+    )
+
+
+def _arrival_ns(chunk: Chunk | None) -> int:
+    """Arrival time of a check-in on the simulated clock: that of the chunk before it."""
+    return chunk.t_arrival_ns if chunk else 0

@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: MIT
+"""One tracked run: the tracker, and everything that shows, publishes, guides or records what it estimates.
+
+In: a tracker, portions of chunks. Out: estimates to the views, the page, the commander and the recording; result files at the end.
+Owns the estimates, the page and the connection to the commander while the run lasts.
+
+`demo`, `live` and `replay` differ only in where their portions come from: all of them pass through `Session.track`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack, nullcontext
+from functools import partial
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from echostep.errors import EchostepError, words_of
+from echostep.extras import lacks
+from echostep.localization.estimate import Estimate
+from echostep.ports.chunks import Portion
+from echostep.ports.people.check_in import PERSON
+from echostep.ports.people.meeting import MEETING
+from echostep.ports.people.team_beacons import TEAM_BEACONS
+from echostep.ports.people.teammate import TEAM
+from echostep.recording.clock import clock_of, utc_offset_ns
+from echostep.recording.reading import Recording
+from echostep.tracker import Tracker
+from echostep.tracker.kernels import LATER, TRACKING, Part, compile_parts, compiling_later
+from echostep_app.guidance.guided_rescue import GuidedRescue
+from echostep_app.guidance.guided_run import guidance_of
+from echostep_app.interruption import holding_signals, is_asked
+from echostep_app.output.terminal import TerminalView
+from echostep_app.page.elements.true_position import TruePath
+from echostep_app.plan.places.refusals import refusals
+from echostep_app.printing.people import FaultNews, outlast_output
+from echostep_app.recording.recorder import DerivedMessage, Recorder
+from echostep_app.scorecard.truth import Truth
+from echostep_app.session.arrivals import Arrivals
+from echostep_app.session.browser import open_browser
+from echostep_app.session.chunk_streams import MessageSource
+from echostep_app.session.console import console, print_notices
+from echostep_app.session.losses import Losses
+from echostep_app.session.options import OutputOptions
+from echostep_app.session.progress import progress_line
+from echostep_app.session.results import Result, summary_words, write_results
+from echostep_app.session.sinks import (
+    DerivedSink,
+    MarkSink,
+    PageSink,
+    ReportSink,
+    Sink,
+    SpokenCueSink,
+    TeammateSink,
+    TerminalSink,
+)
+
+if TYPE_CHECKING:
+    from echostep_app.page.live import LivePage
+    from echostep_app.page.shared_drawing import SharedDrawing
+    from echostep_app.session.team.subscription import TeamSubscription
+    from echostep_app.team.endpoint import Endpoint, Outlet
+    from echostep_app.team.publish import Publishing, Source
+
+PAGE_POLL_S = 0.2
+_print_line = partial(console.print, markup=False, highlight=False)
+
+
+class Session:
+    """Serves the page and publishes estimates while it is entered; `track` feeds the tracker, `finish` writes the results."""
+
+    def __init__(
+        self,
+        tracker: Tracker,
+        title: str,
+        source: Source,
+        output: OutputOptions,
+        guide_to: str | None = None,
+        recorded: Recording | None = None,
+    ) -> None:
+        """`source`: origin of the estimates, as stated in reports to commanders; `recorded`: the recording that is replayed.
+
+        `guide_to`: the destination as given. Raises EchostepError for one that there is not.
+        """
+        outlast_output()
+        self.tracker = tracker
+        self.title = title
+        self.source = source
+        self.recorded = recorded
+        self.output = output
+        self.guided = guidance_of(tracker, guide_to)
+        self.losses = Losses(tracker)
+        self.arrivals = Arrivals()
+        self.page: LivePage | None = None
+        self.estimates: list[Estimate] = []
+        self.message_sources: list[MessageSource] = []  # what people and team send during the run
+        self._publishing: Publishing | None = None
+        self._drawing: SharedDrawing | None = None  # of a walk without a plan, for the team
+        self._sinks: list[Sink] = []
+        self._writers: list[Callable[[list[DerivedMessage]], None]] = []  # of what is derived from estimates
+        self._opened = ExitStack()
+        self._interrupted = False
+
+    def __enter__(self) -> Self:
+        for sentence in refusals(self.tracker.plan):
+            _print_line(sentence)
+        with ExitStack() as opened:  # closes what is open already when a later part cannot be opened
+            self._open_drawing(opened)
+            self._open_page(opened)
+            self._open_publishing(opened)
+            self._open_team(opened)
+            self._open_foxglove(opened)
+            self._opened = opened.pop_all()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        if self.page and error is not None and not isinstance(error, KeyboardInterrupt):
+            self.page.fail(words_of(error))
+        self._opened.__exit__(kind, error, at)
+
+    def _open_drawing(self, opened: ExitStack) -> None:
+        """A live walk without a plan is drawn for the team, by the page or, without one, unseen."""
+        if self.recorded is not None or self.tracker.plan.is_drawn or self._broker is None:
+            return
+        from echostep_app.session.team.drawing_share import UnseenDrawing, shared_drawing
+
+        assert self.output.outlet
+        name = self.output.outlet.name
+        self._drawing = shared_drawing(self.tracker, name)
+        _print_line(
+            f"Once the walk has drawn walls, they are offered to {self._broker}: teammates take them by --plan wearer:{name}"
+        )
+        if self.output.page is None:
+            opened.callback(UnseenDrawing(self.tracker, self._drawing, _print_line).close)
+
+    @property
+    def _broker(self) -> Endpoint | None:
+        """The first broker that the run publishes to."""
+        return self.output.outlet.broker if self.output.outlet else None
+
+    def _open_page(self, opened: ExitStack) -> None:
+        address = self.output.page
+        if address is None:
+            return
+        from echostep_app.page.live import LivePage
+        from echostep_app.page.web.addresses import print_page
+
+        page = LivePage(
+            self.tracker,
+            self.title,
+            address,
+            self.guided,
+            replay=self.recorded is not None,
+            keeps=self.source == "simulated",
+            shared=self._drawing,
+        )
+        print_page(console, page.server.urls)
+        page.fault_sources.append(FaultNews().words)
+        self.page = opened.enter_context(page)
+        self._sinks.append(PageSink(page))
+        self.message_sources.append((PERSON, page.pop_check_ins))
+        if self.output.browser and open_browser(page.url):
+            page.wait_for_page()
+
+    def prepare(self, *more: Part) -> None:
+        """Compile what is not compiled yet, before the first bytes come: what tracks, and more."""
+        text = "Preparing; the first time on a computer its kernels are compiled, which takes half a minute"
+        if self.page:
+            self.page.announce(f"{text[0].lower()}{text[1:]}")
+        with progress_line(text) as show:
+            compile_parts([*TRACKING, *more], show)
+            self.tracker.warm_up()
+
+    def show_truth(self, truth: TruePath) -> None:
+        """Show the true position beside the estimate, on the page."""
+        if self.page:
+            self.page.truth = truth
+
+    def _open_publishing(self, opened: ExitStack) -> None:
+        if self.output.outlet is None:
+            return
+        from echostep_app.team.publish import Publishing
+
+        clock = clock_of(self.recorded.metadata) if self.recorded else None
+        publishing = Publishing(self.output.outlet, self.tracker, self.source, _print_line, clock)
+        self._publishing = opened.enter_context(publishing)
+        self._sinks.append(ReportSink(publishing))
+        if self.page:
+            self.page.receipt_of = publishing.receipt
+            self.page.fault_sources.append(lambda: publishing.fault)
+
+    def _open_foxglove(self, opened: ExitStack) -> None:
+        if self.output.foxglove is None:
+            return
+        from echostep_app.output.foxglove_live import FoxgloveServer
+
+        foxglove = opened.enter_context(FoxgloveServer(self.output.foxglove, self.title))
+        self._writers.append(foxglove.write)
+        console.print(f"Foxglove: open connection, Foxglove WebSocket, {foxglove.url}", highlight=False)
+
+    def _open_team(self, opened: ExitStack) -> None:
+        """A live run subscribes to its team at its first broker; in a replay what was received is in the recording."""
+        outlet, publishing, broker = self.output.outlet, self._publishing, self._broker
+        if self.recorded is not None:
+            return
+        if isinstance(self.guided, GuidedRescue) and broker is None:
+            raise EchostepError(
+                f"--guide wearer:{self.guided.name} needs the team's broker: --publish mqtt://HOST --name YOURS"
+            )
+        if outlet is None or publishing is None or broker is None:
+            return
+        from echostep_app.session.team.subscription import TeamSubscription
+
+        subscription = TeamSubscription(broker, _print_line)
+        self._read_team(subscription, outlet, publishing.run)
+        opened.callback(subscription.close)
+        subscription.open()
+        if self.page:  # a broker that is not there is told once
+            self.page.fault_sources.append(lambda: "" if publishing.fault else subscription.fault)
+
+    def _read_team(self, subscription: TeamSubscription, outlet: Outlet, run: str) -> None:
+        """Read teammates and beacons; the place of the wearer whom a rescuer is guided to; and for a page the commanders' marks."""
+        from echostep_app.session.team.mark_feed import MarkFeed
+        from echostep_app.session.team.team_feed import TeamFeed
+        from echostep_app.session.team.teammate_feed import TeammateFeed
+
+        page, plan = self.page, self.tracker.plan
+        if isinstance(self.guided, GuidedRescue):
+            feed = TeamFeed(subscription, outlet.team, self.guided.name, plan, _print_line)
+            self.message_sources.append((TEAM, feed.pop))
+        teammates = TeammateFeed(subscription, outlet, run, plan)
+        self._sinks.append(TeammateSink(teammates, self.tracker, page, self._drawing))
+        self.message_sources.append((TEAM_BEACONS, teammates.beacons))
+        if page is None:
+            return
+        self.message_sources.append((MEETING, lambda: teammates.meetings(page.pop_meetings())))
+        marks = MarkFeed(subscription, outlet, run, plan.digest)
+        page.acknowledged_by = marks.acknowledged_by
+        self._sinks.append(MarkSink(marks, page))
+
+    def track(
+        self,
+        portions: Iterable[Portion],
+        progress: Callable[[], float] | None = None,
+        recorder: Recorder | None = None,
+    ) -> None:
+        """Feed all portions, until Ctrl-C ends their source; the second one ends the run at once.
+
+        `progress` gives the finished fraction, 0 to 1. `recorder` gets the derived messages of each portion, after the portion was shown.
+        """
+        shown = self.output.terminal and console.is_terminal
+        view = TerminalView(self.tracker, self.title, progress, console) if shown else None
+        sinks = self._sinks + self._local_sinks(view, recorder)
+        with compiling_later(LATER), view or nullcontext(), holding_signals():
+            try:
+                for portion in portions:
+                    for sink in sinks:
+                        sink.arrive()
+                    self.arrivals.note(portion)
+                    estimates = self.tracker.take(portion)
+                    self.estimates += estimates
+                    for sink in sinks:
+                        sink.take(portion, estimates)
+            except KeyboardInterrupt:
+                self._interrupted = True
+        self._interrupted = self._interrupted or is_asked()
+
+    def _local_sinks(self, view: TerminalView | None, recorder: Recorder | None) -> list[Sink]:
+        """The terminal, and what is derived from estimates, for the recording and for viewers."""
+        sinks: list[Sink] = []
+        if view:
+            sinks.append(TerminalSink(view, self.guided))
+        elif self.guided:
+            sinks.append(SpokenCueSink(self.guided))
+        if writers := [*([recorder.write_derived] if recorder else []), *self._writers]:
+            known_ns = utc_offset_ns(self.recorded.metadata) if self.recorded else None
+            offset_ns = recorder.log_offset_ns if recorder else known_ns or 0
+            sinks.append(DerivedSink(self.tracker, writers, offset_ns))
+            if self.tracker.plan.georeference and (words := lacks("/location", "pyproj")):
+                console.print(f"Longitude and latitude are left out: {words}", markup=False, highlight=False)
+        return sinks
+
+    def finish(self, title: str, truth: Truth | None = None, elapsed_s: float | None = None) -> None:
+        """Write track.csv, track.png and cues.csv and print a summary; raises EchostepError when a file cannot be written.
+
+        The page shows the end of the run, and its summary.
+        """
+        summary = summary_words(self.estimates, truth)
+        for sink in self._sinks:
+            sink.end(summary)
+        losses, silent = self.losses.describe(self.arrivals.worn_s), self.arrivals.silent()
+        result = Result(title, self.estimates, truth, elapsed_s, losses, silent)
+        write_results(self.output.folder, self.tracker, self.guided, result)
+
+    def keep_page_open(self, again: str = "") -> None:
+        """Serve the page after the run: while a browser shows it, or until Ctrl-C if that was asked for.
+
+        `again`: the command that shows the run again; it is printed where no browser shows the page.
+        """
+        page, stays = self.page, self.output.page_stays
+        if page is None or self._interrupted:
+            return
+        if not (stays or page.pages):
+            if again:
+                console.print(
+                    f"No browser shows the page. To see the walk again: {again}", highlight=False, markup=False
+                )
+            return
+        end = "until" if stays else "while it is open, or until"
+        console.print(f"The page stays at {page.url} {end} Ctrl-C.", highlight=False)
+        try:
+            while stays or page.pages:
+                time.sleep(PAGE_POLL_S)
+                print_notices(page.notices)
+        except KeyboardInterrupt:
+            pass

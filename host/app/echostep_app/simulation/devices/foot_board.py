@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: MIT
+"""A foot board: the ICM-20649 on the foot, its inputs as rows for a board of its own; it was not built yet.
+
+In: a walk, a seeded generator, a board. Out: extended rows whose first place is the foot, in counts of the ICM-20649; the chunks of the board's port.
+Owns the part's constant errors, and the board.
+
+Figures of the data sheet DS-000192, tables 1 and 2, as remembered; biases are spread so that its limits are three standard deviations.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echostep.arrays import Floats
+from echostep.board.calibration import ICM20649_M_S2, ICM20649_RAD_S
+from echostep.board.frames import encode
+from echostep.ports.chunks import FOOT, Chunk
+from echostep_app.board.subscription import SUBSCRIBE
+from echostep_app.simulation.devices.board import Board
+from echostep_app.simulation.devices.mtx import means, specific_force_and_rate
+from echostep_app.simulation.people.attitude import rotations
+from echostep_app.simulation.people.walker import RATE_HZ, Walk
+from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC
+
+HEAD_START_MS = 1700  # for which the foot board has power before the belt board: two boards do not start together
+BLOCK_MS = 50
+USB_LATENCY_NS = 1_000_000
+INTERPOLATED = math.sqrt(
+    1.5
+)  # the twin takes values between two rows, which leaves two thirds of a white noise' variance
+CELSIUS = 24.0
+
+
+@dataclass(frozen=True, slots=True)
+class FootBoardModel:
+    """Errors of an ICM-20649 behind its 120 Hz filter, and its mounting: `mounting_rpy_rad`, sensor -> foot."""
+
+    gyro_noise_rad_s: float = math.radians(0.0175 * math.sqrt(154.3))
+    gyro_bias_rad_s: float = math.radians(5.0 / 3.0)
+    accel_noise_m_s2: float = 285e-6 * 9.80665 * math.sqrt(136.0)
+    accel_bias_m_s2: float = 0.065 * 9.80665 / 3.0
+    force_limit_counts: int = 30 * 1024
+    rate_limit_counts: int = 32_767
+    period_s: float = 5.0 / 1125.0
+    mounting_rpy_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class FootBoardSensors:
+    """Makes the rows of any stretch of a walk, asked for in order; before its beginning the first posture is held."""
+
+    def __init__(self, walk: Walk, rng: np.random.Generator, model: FootBoardModel | None = None) -> None:
+        self._model = m = model or FootBoardModel()
+        self._rng = rng
+        mounting = rotations(np.array([m.mounting_rpy_rad]))[0]
+        t_s = (np.arange(len(walk.t_s)) + 1.0) / RATE_HZ  # a row is reached at the end of its millisecond
+        force, rate = (means(v, t_s, m.period_s) for v in specific_force_and_rate(walk, mounting))
+        self._force = force + m.accel_bias_m_s2 * rng.standard_normal(3)
+        self._rate = rate + m.gyro_bias_rad_s * rng.standard_normal(3)
+
+    def rows(self, start: int, stop: int) -> NDArray[np.void]:
+        """Rows of the milliseconds start..stop-1 of the walk."""
+        m = self._model
+        at = np.clip(np.arange(start, stop), int(1e3 * m.period_s) + 2, len(self._rate) - 3)
+        rows = np.zeros(len(at), EXTENDED_ROW)
+        rows["row"]["sync_us"], rows["row"]["temperature"] = NO_SYNC, round(20.0 * CELSIUS)
+        for name, values, noise, unit, limit in (
+            ("rate", self._rate, m.gyro_noise_rad_s, ICM20649_RAD_S, m.rate_limit_counts),
+            ("force", self._force, m.accel_noise_m_s2, ICM20649_M_S2, m.force_limit_counts),
+        ):
+            noisy = values[at] + INTERPOLATED * noise * self._rng.standard_normal((len(at), 3))
+            rows["motion"][name][:, 0] = np.clip(np.rint(noisy / unit), -limit, limit)
+        return rows
+
+
+def measure_foot(
+    walk: Walk, rng: np.random.Generator, model: FootBoardModel | None = None
+) -> tuple[Floats, Floats, Floats]:
+    """Samples of a whole walk without a board: t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s. Equal generators draw equal biases."""
+    m = model or FootBoardModel()
+    biases = [m.accel_bias_m_s2 * rng.standard_normal(3), m.gyro_bias_rad_s * rng.standard_normal(3)]
+    t_s: Floats = np.arange(10.0 * m.period_s, walk.t_s[-1] - 0.05, m.period_s)
+    mounting = rotations(np.array([m.mounting_rpy_rad]))[0]
+    force, rate = (means(v, t_s, m.period_s) for v in specific_force_and_rate(walk, mounting))
+    measured = []
+    for true, bias, noise, unit, limit in (
+        (force, biases[0], m.accel_noise_m_s2, ICM20649_M_S2, m.force_limit_counts),
+        (rate, biases[1], m.gyro_noise_rad_s, ICM20649_RAD_S, m.rate_limit_counts),
+    ):
+        noisy = true + bias + noise * rng.standard_normal(true.shape)
+        measured.append(unit * np.clip(np.rint(noisy / unit), -limit, limit))
+    return t_s, measured[0], measured[1]
+
+
+class FootBoardPort:
+    """The port of a foot board that lives through a walk beside the belt's; both are driven block by block."""
+
+    def __init__(self, walk: Walk, rng: np.random.Generator, board: Board, model: FootBoardModel | None = None) -> None:
+        self.sensors = FootBoardSensors(walk, rng, model)
+        self.board = board
+        board.fault("kit=foot")
+        board.fault("crystal=drift")
+        board.send(encode(SUBSCRIBE, 0))
+        for start in range(-HEAD_START_MS, 0, BLOCK_MS):
+            board.advance(
+                self.sensors.rows(start, start + BLOCK_MS)
+            )  # the host listens from the beginning of the walk on
+
+    def chunks(self, start: int, stop: int, origin_ns: int) -> list[Chunk]:
+        """What the host gets of these milliseconds; `origin_ns`: the host's clock at the walk's beginning."""
+        gathered: dict[int, bytes] = {}
+        for t_ns, part in self.board.advance(self.sensors.rows(start, stop)):
+            arrival = origin_ns + t_ns - HEAD_START_MS * 1_000_000 + USB_LATENCY_NS
+            gathered[arrival] = gathered.get(arrival, b"") + part
+        return [Chunk(FOOT, t_ns, part) for t_ns, part in gathered.items()]
+
+
+def foot_rng(seed: int) -> np.random.Generator:
+    """A generator of its own, so that the belt's sensors do not change with what is on the foot."""
+    return np.random.default_rng([seed, 7])

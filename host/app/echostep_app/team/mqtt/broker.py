@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: MIT
+"""A connection to a broker, run by the thread that uses it.
+
+In: an endpoint. Out: a connected paho client. Owns nothing. Every fault is raised as an OSError, malformed packets of the broker included.
+"""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+import paho.mqtt.client as paho
+from paho.mqtt.enums import CallbackAPIVersion
+from paho.mqtt.packettypes import PacketTypes
+from paho.mqtt.properties import Properties
+
+from echostep_app.team.endpoint import Endpoint
+from echostep_app.team.faults import CLIENT_REFUSAL, ENDED, PLAIN_ENDED, opening_words
+
+ANSWER_S = 5.0  # longest wait for an answer of the broker
+KEEPALIVE_S = 6  # the broker sends the last will after 1.5 times as long [MQTT 3.1.1, 3.1.2.10]
+LOOP_S = 0.05  # longest wait for a packet in one call of `run_once`
+MAX_PACKET = 65_536  # bytes; a broker of MQTT 5 sends no longer packet than this, unless it was asked for
+CLIENT_ERRORS = (  # what paho raises on broken connections and malformed packets
+    OSError,
+    ValueError,
+    RuntimeError,
+    struct.error,
+    IndexError,
+    AttributeError,
+    TypeError,
+    KeyError,
+)
+
+
+class RefusedError(ConnectionError):
+    """The host answers, but it is no broker of this MQTT version, or it refuses the connection."""
+
+
+class UnwantedError(PermissionError):
+    """The broker does not accept a message under this topic."""
+
+
+def make_client(endpoint: Endpoint, tls: Any, identity: str, *, newest: bool = False) -> paho.Client:
+    """A client that is not connected yet: for MQTT 5 if `newest`, else for MQTT 3.1.1."""
+    protocol = paho.MQTTv5 if newest else paho.MQTTv311
+    client = paho.Client(CallbackAPIVersion.VERSION2, identity, protocol=protocol, reconnect_on_failure=False)
+    client.connect_timeout = ANSWER_S
+    if endpoint.user is not None:
+        client.username_pw_set(endpoint.user, endpoint.password)
+    if tls is not None:
+        client.tls_set_context(tls)
+    return client
+
+
+def connect(client: paho.Client, endpoint: Endpoint, most_bytes: int = MAX_PACKET) -> None:
+    """Connect and wait for the broker's acceptance; raises OSError, which is a RefusedError when the host answers.
+
+    `most_bytes`: of a packet that a broker of MQTT 5 sends.
+    """
+    refused: list[str] = []
+
+    def answered(_client: paho.Client, _user: Any, _flags: Any, code: Any, _properties: Any) -> None:
+        if code.is_failure:
+            refused.append(str(code))
+
+    client.on_connect = answered
+    properties = None
+    if client.protocol == paho.MQTTv5:
+        properties = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
+        properties.MaximumPacketSize = most_bytes
+    try:
+        client.connect(endpoint.host, endpoint.port, keepalive=KEEPALIVE_S, properties=properties)
+    except (OSError, ValueError) as error:
+        raise ConnectionError(opening_words(error, secure=endpoint.secure)) from error
+    try:
+        run_until(client, lambda: client.is_connected() or bool(refused), "the broker does not answer")
+    except OSError as error:
+        if not refused:
+            ended = CLIENT_REFUSAL if endpoint.secure else PLAIN_ENDED
+            raise RefusedError(ended if isinstance(error, ENDED) else str(error)) from error
+    if refused:
+        raise RefusedError(_refusal(endpoint, refused[0]))
+
+
+def _refusal(endpoint: Endpoint, reason: str) -> str:
+    """A refusal of the broker, in its words, and for the usual ones what to do."""
+    words = f"the broker refuses {user_words(endpoint)} ({reason})"
+    is_of_user = any(part in reason.lower() for part in ("authori", "user name"))
+    return f"{words}: check user and password, {endpoint.scheme}://USER:PASSWORD@HOST" if is_of_user else words
+
+
+def user_words(endpoint: Endpoint) -> str:
+    """As whom a client connects."""
+    return f"user {endpoint.user}" if endpoint.user else "a client without a user name"
+
+
+def run_until(client: paho.Client, done: Callable[[], bool], timeout_message: str) -> None:
+    """Run the connection until `done`; raises OSError when it breaks or when that takes longer than ANSWER_S."""
+    end_s = time.monotonic() + ANSWER_S
+    while not done():
+        run_once(client, LOOP_S)
+        if time.monotonic() > end_s:
+            raise TimeoutError(timeout_message)
+
+
+def run_once(client: paho.Client, timeout_s: float) -> None:
+    """Wait for one packet, for at most `timeout_s`, and process it; raises OSError when the connection is broken."""
+    try:
+        code = client.loop(timeout_s)
+    except OSError:
+        raise
+    except CLIENT_ERRORS as error:
+        raise ConnectionError(f"the broker sends a malformed packet: {error}") from error
+    if code != paho.MQTT_ERR_SUCCESS:
+        raise ConnectionResetError(f"the connection broke: {paho.error_string(code)}")
+
+
+def publish(client: paho.Client, topic: str, payload: bytes) -> bool:
+    """Publish a message that the broker keeps, and wait for its answer; returns whether the answer says that the message was accepted.
+
+    A broker of MQTT 3.1.1 cannot say so [MQTT 3.1.1, 3.3.5]. Raises OSError, which is an UnwantedError when the broker refuses the message.
+    """
+    answers: dict[int, Any] = {}
+    client.on_publish = lambda _client, _user, number, code, _properties: answers.update({number: code})
+    try:
+        info = client.publish(topic, payload, qos=1, retain=True)
+        run_until(client, info.is_published, "the broker does not acknowledge")
+    except (ValueError, RuntimeError) as error:
+        raise ConnectionError(f"cannot publish: {error}") from error
+    answer = answers.get(info.mid)
+    if answer is not None and answer.is_failure:
+        raise UnwantedError(f"{answer}")
+    return client.protocol == paho.MQTTv5
+
+
+def close_socket(client: paho.Client) -> None:
+    """Close the socket without a disconnect packet, in any state."""
+    with suppress(*CLIENT_ERRORS):
+        sock = client.socket()
+        if sock is not None:
+            sock.close()

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: MIT
+"""MQTT: sends reports to a broker, and receives the reports of a team from it.
+
+In: reports; or an endpoint to subscribe at. Out: messages on `echostep/<team>/<wearer>/estimate` (retained, QoS 1: a commander that
+connects late gets the last report) and `.../presence` (retained, with a last will); or the messages of the broker. Owns one connection,
+used by one thread. The thread and the queue of paho are not used, because that queue would keep outdated reports.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any
+
+import paho.mqtt.client as paho
+
+from echostep_app.team.endpoint import Endpoint
+from echostep_app.team.messages.report import Presence, Report, encode
+from echostep_app.team.mqtt.broker import (
+    CLIENT_ERRORS,
+    LOOP_S,
+    MAX_PACKET,
+    RefusedError,
+    UnwantedError,
+    close_socket,
+    connect,
+    make_client,
+    publish,
+    run_once,
+    run_until,
+    user_words,
+)
+from echostep_app.team.outbox import Delivery
+from echostep_app.team.tls import tls_context
+
+
+class MqttTransport:
+    """A `Transport` to a broker; when the connection breaks, the broker publishes the presence `broken`."""
+
+    def __init__(self, endpoint: Endpoint, team: str, name: str, run: str) -> None:
+        self._endpoint, self._run, self._team, self._name = endpoint, run, team, name
+        self._topic = f"echostep/{team}/{name}"
+        self._use_mqtt5 = True
+        self._tls = tls_context(endpoint) if endpoint.secure else None
+        self._client: paho.Client | None = None
+
+    def open(self) -> None:
+        """Connect; raises OSError with the broker's reason. After a refusal the next call uses the other version of MQTT (5 or 3.1.1)."""
+        identity = f"echostep-{self._run}-{time.monotonic_ns() & 0xFFFFFF:06x}"
+        client = make_client(self._endpoint, self._tls, identity, newest=self._use_mqtt5)
+        client.will_set(f"{self._topic}/presence", self._presence("broken"), qos=1, retain=True)
+        self._client = client
+        try:
+            connect(client, self._endpoint)
+        except RefusedError:
+            self._use_mqtt5 = not self._use_mqtt5
+            raise
+        self._publish("presence", self._presence("online"))
+
+    def send(self, report: Report) -> Delivery:
+        """Publish and wait for the broker's answer."""
+        return Delivery.ACKNOWLEDGED if self._publish("estimate", encode(report)) else Delivery.SENT
+
+    def close(self, *, ended: bool) -> None:
+        """Disconnect; unless the run has `ended`, the broker publishes the last will."""
+        client, self._client = self._client, None
+        if client is None:
+            return
+        try:
+            if ended and client.is_connected():
+                self._client = client
+                self._publish("presence", self._presence("ended"))
+                client.disconnect()
+                client.loop(LOOP_S)
+        except CLIENT_ERRORS:
+            pass
+        finally:
+            self._client = None
+            close_socket(client)
+
+    def _presence(self, presence: Any) -> bytes:
+        return encode(Presence(1, self._run, presence))
+
+    def _publish(self, leaf: str, payload: bytes) -> bool:
+        """Publish below this wearer's topic; returns whether the broker says that it accepted the message."""
+        if self._client is None:
+            raise ConnectionError("not connected")
+        try:
+            return publish(self._client, f"{self._topic}/{leaf}", payload)
+        except UnwantedError as error:
+            raise UnwantedError(
+                f"the broker does not let {user_words(self._endpoint)} publish as {self._team}/{self._name} ({error}): "
+                "check --team, --name and the broker's access rules"
+            ) from error
+
+
+class Listener:
+    """A subscription: `run_once` runs the connection and passes each message to `put(topic, payload, retained)`."""
+
+    def __init__(
+        self,
+        endpoint: Endpoint,
+        topics: Sequence[str],
+        put: Callable[[str | None, bytes, bool], None],
+        most_bytes: int = MAX_PACKET,
+    ) -> None:
+        """`most_bytes`: of a packet; a broker of MQTT 5 sends no longer one."""
+        self._endpoint, self._topics, self._put, self._most_bytes = endpoint, topics, put, most_bytes
+        self._tls = tls_context(endpoint) if endpoint.secure else None
+        self._client: paho.Client | None = None
+        self._use_mqtt5 = True
+
+    def open(self) -> str:
+        """Connect and subscribe; returns which topics the broker refuses, in words; raises OSError, also when it refuses all.
+
+        After a refusal of the connection the next call uses the other version of MQTT (5 or 3.1.1).
+        """
+        client = make_client(self._endpoint, self._tls, "", newest=self._use_mqtt5)
+        client.on_message = self._message
+        self._client = client
+        try:
+            connect(client, self._endpoint, self._most_bytes)
+        except RefusedError:
+            self._use_mqtt5 = not self._use_mqtt5
+            raise
+        answers: list[list[bool]] = []  # whether each topic is refused
+        client.on_subscribe = lambda _c, _u, _m, codes, _p: answers.append([code.is_failure for code in codes])
+        client.subscribe([(topic, 0) for topic in self._topics])
+        run_until(client, lambda: bool(answers), "the broker does not answer")
+        refused = [topic for topic, is_refused in zip(self._topics, answers[0], strict=False) if is_refused]
+        if not refused:
+            return ""
+        words = f"the broker refuses {user_words(self._endpoint)} the subscription to {', '.join(refused)}: check its access rules, and the user"
+        if len(refused) == len(self._topics):
+            raise ConnectionError(words)
+        return words
+
+    def run_once(self, timeout_s: float) -> None:
+        """Wait for one packet and process it; raises OSError when the connection is broken."""
+        if self._client is None:
+            raise ConnectionError("not connected")
+        run_once(self._client, timeout_s)
+
+    def publish(self, topic: str, payload: bytes) -> None:
+        """Publish a message that the broker keeps, and wait for its answer; raises OSError."""
+        if self._client is None:
+            raise ConnectionError("not connected")
+        publish(self._client, topic, payload)
+
+    def close(self) -> None:
+        """Disconnect; raises nothing."""
+        client, self._client = self._client, None
+        if client is not None:
+            with suppress(*CLIENT_ERRORS):
+                client.disconnect()
+            close_socket(client)
+
+    def _message(self, _client: paho.Client, _user: Any, message: paho.MQTTMessage) -> None:
+        try:
+            topic: str | None = message.topic
+        except UnicodeDecodeError:
+            topic = None
+        self._put(topic, bytes(message.payload), bool(message.retain))

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: MIT
+"""The board's words in plain words: every fault of the twin, and what a host that listens may conclude."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from board_runs import ROOT, Bench, needs_twin
+from echostep.board import messages as m
+from echostep.board.frames import encode
+from echostep.board.reports import BoardReports
+from echostep.plan.model import load_plan
+from echostep.ports.chunks import BOARD, Chunk
+from echostep.tracker import Tracker
+from echostep_app.board.faults.health import Severity, board_findings, expected_rates, gyro_celsius, rate_findings
+from echostep_app.output.terminal import findings
+
+CONFIGURATION = m.Configuration(0, 0xFF, m.Schedule.CONCURRENT, 200, 10, m.PressureMode.HIGH_SPEED)
+
+
+def status(**changed: int) -> m.Status:
+    return m.Status(**dict.fromkeys(m.Status._fields, 0) | {"healthy": 0x7F} | changed)
+
+
+def words(*said: m.Message) -> BoardReports:
+    heard = BoardReports()
+    for message in (CONFIGURATION, *said):
+        heard.add(message)
+    return heard
+
+
+def texts(heard: BoardReports) -> list[str]:
+    return [str(finding) for finding in board_findings(heard)]
+
+
+def test_a_healthy_board_is_no_finding() -> None:
+    fine = [m.GyroHealth(0, gyro, -34, m.SelfTest.PASSED, -221, 221) for gyro in m.Gyro]
+    assert texts(words(m.Identity(0, 0, 1, 1, 0, m.ResetCause.POWER_ON), status(), *fine)) == []
+    assert texts(BoardReports()) == []
+
+
+def test_a_failed_eeprom_is_said_with_what_to_do() -> None:
+    heard = words(status(healthy=0x3F, errors_pressure=4, fault_pressure=m.Fault.EEPROM))
+    (text,) = texts(heard)
+    assert text.startswith("barometer: EEPROM check failed; power-cycle the board, check 3.3 V and the level shifter")
+
+
+def test_a_device_that_is_switched_off_is_no_finding() -> None:
+    heard = words(status(healthy=0x3F, errors_pressure=4, fault_pressure=m.Fault.EEPROM))
+    heard.add(CONFIGURATION._replace(sensors=0x3F))
+    assert texts(heard) == []
+
+
+def test_one_cause_for_many_is_said_once() -> None:
+    nobody = {"errors_ranger_left": 1, "errors_ranger_right": 1, "errors_compass": 1}
+    nobody |= {"fault_ranger_left": 1, "fault_ranger_right": 1, "fault_compass": 1}
+    (text,) = texts(words(status(healthy=0x78, **nobody)))
+    assert text.startswith("I2C bus: no device answers")
+    (text,) = texts(words(status(healthy=0x7F & ~0x38, errors_thigh=1, errors_calf=1, errors_belt=1,
+                                 fault_thigh=1, fault_calf=1, fault_belt=1)))  # fmt: skip
+    assert text.startswith("SPI bus: no device answers")
+
+
+def test_old_failures_are_forgotten_and_new_ones_are_not() -> None:
+    old = {"errors_compass": 9, "fault_compass": m.Fault.NO_ANSWER, "bus_recoveries": 3, "dropped_ping": 65_530}
+    heard = words(status(**old), status(**old | {"ticks": 2_000_000}))
+    assert texts(heard) == []
+    heard.add(status(**old | {"ticks": 4_000_000, "errors_compass": 12, "dropped_ping": 4}))
+    assert [text.split(";")[0] for text in texts(heard)] == [
+        "compass: failed 3 times in the last 1 s (no answer), and answers again",
+        "board: dropped 10 messages in the last 1 s",
+    ]
+    heard.add(status(ticks=5))  # it has restarted
+    assert texts(heard) == []
+
+
+@pytest.mark.parametrize(
+    ("said", "part", "severity"),
+    [
+        (m.GyroHealth(0, 1, 0, m.SelfTest.FAILED, -20, 20), "calf gyro: failed its self-test (responses -20 and 20", 2),
+        (m.GyroHealth(0, 1, 0, m.SelfTest.MOVED, -221, 0), "calf gyro: turned", 0),
+        (m.GyroHealth(0, 1, 0, m.SelfTest.NOT_RUN, -32768, -32768), "calf gyro: was not tested", 0),
+        (m.GyroHealth(0, 1, -32768, m.SelfTest.PASSED, -221, 221), "calf gyro: answers, but not with its temp", 2),
+        (m.GyroHealth(0, 1, 600, m.SelfTest.PASSED, -221, 221), "calf gyro: reports 112 degrees", 1),
+    ],
+)
+def test_what_a_gyro_says_of_itself(said: m.GyroHealth, part: str, severity: int) -> None:
+    (finding,) = board_findings(words(status(), said))
+    assert part in str(finding)
+    assert finding.severity == severity
+    absent = status(healthy=0x7F & ~0x10, errors_calf=7, fault_calf=m.Fault.NO_ANSWER)
+    assert [f.what for f in board_findings(words(absent, said))] == ["does not answer"]  # nothing is said twice
+
+
+def test_self_test_inputs_that_are_not_wired_are_said_once() -> None:
+    tests = [m.GyroHealth(0, gyro, 0, m.SelfTest.FAILED, 1, -2) for gyro in m.Gyro]
+    (finding,) = board_findings(words(status(), *tests))
+    assert "none of them responds" in finding.what
+    assert "A0 to ST1" in finding.remedy
+    assert finding.severity is Severity.WARNING
+    passed = m.GyroHealth(0, m.Gyro.BELT, 0, m.SelfTest.PASSED, -200, 200)
+    assert [f.subject for f in board_findings(words(status(), *tests, passed))] == ["thigh gyro", "calf gyro"]
+
+
+def test_rates_below_what_is_configured_are_said() -> None:
+    heard = words(status())
+    rates = expected_rates(heard)
+    assert rates == {"Ping": 28.0, "Gyros": 200.0, "Compass": 10.0, "Pressure": 9.0}
+    assert rate_findings(heard, rates) == []
+    slow, silent = rate_findings(heard, rates | {"Gyros": 150.0, "Compass": 0.0})
+    assert (slow.severity, silent.severity) == (Severity.WARNING, Severity.FAULT)
+    assert "150.0 samples/s, expected are 200.0" in str(slow)
+    heard.add(status(healthy=0x7B, errors_compass=1, fault_compass=1))
+    assert rate_findings(heard, rates | {"Compass": 0.0}) == []  # the status says why
+
+
+def test_maxsonars_are_expected_to_ping_less_often() -> None:
+    heard = words(status(), m.Parts(**dict.fromkeys(m.Parts._fields, 0) | {"part_ranger_right": m.Part.MAXSONAR}))
+    assert expected_rates(heard)["Ping"] == 19.0
+    assert rate_findings(heard, expected_rates(heard) | {"Ping": 20.0}) == []
+    assert [f.severity for f in rate_findings(heard, expected_rates(heard) | {"Ping": 9.0})] == [Severity.FAULT]
+
+
+@pytest.mark.parametrize(
+    ("identity", "what"),
+    [(0xE1, "an ICM-20649 answers at its chip select"), (0xEA, "an ICM-20948 answers"), (0x5A, "does not answer")],
+)
+def test_a_foots_part_at_the_thigh_that_was_not_accepted_is_named(identity: int, what: str) -> None:
+    parts = m.Parts(**dict.fromkeys(m.Parts._fields, 0) | {"identity_foot": identity})
+    mute = status(healthy=0x7F & ~m.Healthy.THIGH, errors_thigh=9, fault_thigh=m.Fault.NO_ANSWER)
+    (finding,) = board_findings(words(mute, parts))
+    assert str(finding).startswith(f"thigh gyro: {what}")
+
+
+def test_temperature_of_a_gyro() -> None:
+    assert gyro_celsius(m.GyroHealth(0, 0, -34, 2, 0, 0)) == pytest.approx(20.06, abs=0.01)
+
+
+def test_the_live_view_says_it_too() -> None:
+    plan = load_plan(ROOT / "host/core/echostep/plans/demo.json")
+    tracker = Tracker(plan)
+    said: list[m.Message] = [CONFIGURATION, status(healthy=0x3F, errors_pressure=4, fault_pressure=m.Fault.EEPROM)]
+    for k, message in enumerate(said):
+        tracker.feed(Chunk(BOARD, k, encode(message, k)))
+    shown = [str(finding) for finding in findings(tracker)]
+    assert len(shown) == 1
+    assert shown[0].startswith("barometer: EEPROM check failed")
+
+
+u16 = st.integers(0, 65_535)
+
+
+@given(st.lists(st.builds(m.Status, st.integers(0, 2**32 - 1), *[u16] * 15, *[st.integers(0, 9)] * 7, st.integers(0, 255), u16), max_size=3),
+       st.integers(0, 255), st.integers(0, 255))  # fmt: skip
+def test_any_words_have_a_meaning(said: list[m.Status], sensors: int, cause: int) -> None:
+    heard = words(CONFIGURATION._replace(sensors=sensors), m.Identity(0, 0, 0, 0, 0, cause), *said)
+    for finding in [*board_findings(heard), *rate_findings(heard, {})]:
+        assert finding.what
+        assert finding.remedy
+        assert "\n" not in str(finding)
+
+
+TWIN_FAULTS = [
+    ("srf_left=absent", "left ranger: does not answer at I2C address 0x70"),
+    ("srf_right=mute", "right ranger: does not answer at I2C address 0x71"),
+    ("compass=absent", "compass: does not answer at I2C address 0x60"),
+    ("compass=bad_value", "compass: gives bearings above"),
+    ("sda=stuck_forever", "I2C bus: stuck, a line is held low (left ranger, right ranger, compass"),
+    ("thigh=absent", "thigh gyro: does not answer; check its SPI cable, 5 V and its chip select (D8)"),
+    ("calf=wrong_channel", "calf gyro: answers with another channel"),
+    ("belt=zeros", "belt gyro: does not answer"),
+    ("scp1000=absent", "barometer: does not answer"),
+    ("scp1000=drdy_stuck", "barometer: DRDY stays high"),
+    ("scp1000=drdy_low", "barometer: has had no sample for 2 s"),
+]
+
+
+@needs_twin
+def test_every_fault_of_the_twin_is_named() -> None:
+    bench, heard, said = Bench(), BoardReports(), 0
+    bench.run(2_000)
+    try:
+        for fault, text in TWIN_FAULTS:
+            bench.fault(fault)
+            bench.run(4_500 if "scp1000" in fault else 2_100)
+            for message in bench.messages[said:]:
+                heard.add(message)
+            assert any(found.startswith(text) for found in texts(heard)), (fault, texts(heard))
+            assert len(texts(heard)) <= 3, (fault, texts(heard))
+            bench.fault(fault.split("=")[0] + "=ok")
+            bench.run(4_000 if "scp1000" in fault else 2_100)
+            for message in bench.messages[said:]:
+                heard.add(message)
+            said = len(bench.messages)
+            assert texts(heard) == [], (fault, texts(heard))
+    finally:
+        bench.board.close()

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: MIT
+"""`echostep demo`: watched at a pace with the truth beside the estimate, ended in words, played again; fast where nobody watches; on any plan."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from websockets.sync.client import ClientConnection
+
+from board_runs import ELF, ROOT, TWIN, needs_twin
+from command_line import echostep
+from echostep.plan.model import Door, Plan, Room, load_plan
+from echostep.ports.chunks import portion_of
+from echostep.recording.reading import open_recording
+from echostep.tracker import Tracker
+from echostep_app.page.elements.true_position import TruePath
+from echostep_app.page.live import LivePage
+from echostep_app.scorecard.truth import load_truth
+from echostep_app.session.browser import open_browser
+from echostep_app.session.runs import demo
+from echostep_app.simulation.people.tours import room_tour
+from echostep_app.simulation.scenario import DEMO_WAYPOINTS, start_of
+from echostep_studies.simulation.tower import tower
+from page.browser import LOCAL
+from page.frames import header, opened_url
+from waiting import PATIENCE_S
+from walks import walk_chunks
+
+PLAN_FILE = ROOT / "host/core/echostep/plans/demo.json"
+PLAN = load_plan(PLAN_FILE)
+
+
+def sha_of(text: str) -> str:
+    found = re.search(r"sha256 ([0-9a-f]{16})", text)
+    assert found, text
+    return found[1]
+
+
+@pytest.fixture
+def short_walk(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(demo, "DEMO_WAYPOINTS", DEMO_WAYPOINTS[:2])
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("short_walk")
+def test_the_pace_changes_no_bit_and_the_summary_has_lines_of_its_own(tmp_path: Path) -> None:
+    """With a page at 30 times real time, and as fast as it can: not on a terminal, it waits for no one."""
+    fast = echostep("demo", "--headless", "--out", tmp_path / "a")
+    paced = echostep("demo", "--speed", 30, "--port", 0, "--out", tmp_path / "b")
+    assert (fast.returncode, paced.returncode) == (0, 0), fast.stderr + paced.stderr
+    assert sha_of(fast.stdout) == sha_of(paced.stdout)
+    for name in ("track.csv", "truth.csv"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+    chunks = [list(open_recording(tmp_path / run / "walk.mcap").chunks()) for run in ("a", "b")]
+    assert chunks[0] == chunks[1]
+    lines = paced.stdout.splitlines()
+    assert next(k for k, line in enumerate(lines) if "The page: http" in line) == 1, "the address comes first"
+    again = re.fullmatch(
+        r"No browser shows the page. To see the walk again: echostep (replay (\S+) --plan (\S+) --page)", lines[-1]
+    )
+    assert again, lines[-1]
+    assert Path(again[2]).samefile(tmp_path / "b/walk.mcap")
+    assert Path(again[3]).samefile(PLAN_FILE)
+    assert "To see the walk again" not in fast.stdout  # nothing was to be seen
+    for word in ("error: mean", "95 % ellipse:", "estimates: ", "files: "):
+        assert [line for line in lines if line.startswith(word)], word
+
+
+def message(socket: ClientConnection, kind: str) -> dict[str, Any]:
+    """The next message of a kind; frames on the way are reported as drawn."""
+    while True:
+        received = socket.recv(timeout=PATIENCE_S)
+        tree = header(received) if isinstance(received, bytes) else json.loads(received)
+        if tree["kind"] == "frame":
+            socket.send(json.dumps({"kind": "drawn", "seq": tree["seq"]}))
+        if tree["kind"] == kind:
+            return dict(tree)
+
+
+def hello(socket: ClientConnection) -> dict[str, Any]:
+    return message(socket, "hello")
+
+
+def frame(socket: ClientConnection) -> dict[str, Any]:
+    return message(socket, "frame")
+
+
+@pytest.mark.long
+def test_at_the_end_the_page_says_so_and_plays_the_run_again() -> None:
+    tracker = Tracker(PLAN, seed=1)
+    with LivePage(tracker, "demo", LOCAL, keeps=True) as page:
+        truth = some_truth()
+        page.truth = truth
+        page.announce("preparing")
+        with opened_url(page.url) as socket:
+            assert hello(socket)["replay"] is False
+            assert frame(socket)["words"] == "preparing"
+            for chunk in walk_chunks():
+                tracker.take(portion_of([chunk]))
+                page.publish(portion_of([chunk]))
+            page.end("mean error 0.05 m")
+            assert hello(socket)["replay"] is True
+            last = frame(socket)
+            play = last["play"]
+            assert last["ended"] == "mean error 0.05 m"
+            assert (play["playing"], play["t_s"]) == (False, play["end_s"])
+            at = truth.at(play["end_s"])
+            assert last["truth"] == {"x_m": at.x_m, "y_m": at.y_m, "level": 0}
+            socket.send(json.dumps({"kind": "seek", "t_s": play["begin_s"]}))
+            first = frame(socket)
+            while first["t_s"] != play["begin_s"]:
+                first = frame(socket)
+            assert first["ended"] is None
+
+
+def some_truth() -> TruePath:
+    t_s = np.arange(0.0, 20.0, 0.1)
+    return TruePath(np.column_stack([t_s, 2.0 + 0.5 * t_s, 7.5 + 0.0 * t_s, 0.0 * t_s]), np.array([0.0]))
+
+
+def test_a_browser_is_opened_only_where_there_is_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", lambda url: opened.append(url) is None)  # type: ignore[func-returns-value]
+    monkeypatch.setattr("sys.platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SSH_CONNECTION"):
+        monkeypatch.delenv(name, raising=False)
+    assert not open_browser("http://here/")
+    monkeypatch.setenv("DISPLAY", ":0")
+    assert open_browser("http://here/")
+    monkeypatch.setenv("SSH_CONNECTION", "x")
+    assert not open_browser("http://here/")
+    assert opened == ["http://here/"]
+
+
+def test_a_tour_visits_rooms_on_all_levels_that_stairs_reach() -> None:
+    plan = with_rooms(tower(3))
+    way = room_tour(plan)
+    heights = {w[3] for w in way if len(w) > 3}
+    assert {level.height_m for level in plan.levels} <= heights
+    assert start_of(plan, way).level == 0
+
+
+def with_rooms(plan: Plan) -> Plan:
+    """Two rooms on each level, but for the middle one, which has only a door."""
+    levels = [replace(level, rooms=(Room("a", (2.0, 1.5)), Room("b", (8.0, 1.5)))) for level in plan.levels]
+    levels[1] = replace(levels[1], rooms=(), doors=(Door((8.0, 1.0, 8.0, 2.0)),))
+    return replace(plan, levels=tuple(levels))
+
+
+@pytest.mark.slow
+def test_a_demo_on_another_plan_walks_through_its_rooms(tmp_path: Path) -> None:
+    tree = json.loads((ROOT / "host/core/echostep/plans/demo.json").read_text())
+    tree["levels"][0]["rooms"] = [r for r in tree["levels"][0]["rooms"] if r["name"] in ("Office 1", "Store")]
+    (tmp_path / "plan.json").write_text(json.dumps(tree))
+    done = echostep("demo", "--headless", "--plan", tmp_path / "plan.json", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    mean = re.search(r"error: mean ([\d.]+) m", done.stdout)
+    assert mean
+    assert float(mean[1]) < 0.5
+    truth = load_truth(tmp_path / "out/truth.csv").xy_m
+    for x, y in ((3.6, 11.2), (6.3, 4.9)):
+        assert min(abs(truth - [x, y]).sum(axis=1)) < 1.0
+    assert open_recording(tmp_path / "out/walk.mcap").metadata["source"] == "simulated"
+    tree["levels"][0]["rooms"] = []
+    (tmp_path / "plan.json").write_text(json.dumps(tree))
+    empty = echostep("demo", "--headless", "--plan", tmp_path / "plan.json", "--out", tmp_path / "out")
+    assert (empty.returncode, empty.stderr.count("\n")) == (2, 1)
+    assert "name some rooms" in empty.stderr
+
+
+KIT_2026 = ("--kit", "2026", "--board-command", f"{TWIN} --elf {ELF}")
+
+
+@pytest.mark.long
+@needs_twin
+def test_the_kit_of_2026_ends_within_the_figures_of_the_papers_kit(tmp_path: Path) -> None:
+    """Through the real firmware: mean error at most 0.10 m, the ellipse holds the truth 93 to 100 % of the time; its recording is replayed alike."""
+    done = echostep("demo", "--headless", *KIT_2026, "--out", tmp_path / "a")
+    assert done.returncode == 0, done.stderr
+    assert "parts of 2026, not built yet" in done.stdout
+    mean = re.search(r"error: mean ([0-9.]+) m", done.stdout)
+    share = re.search(r"holds the truth ([0-9]+) % of the time", done.stdout)
+    assert mean, done.stdout
+    assert share, done.stdout
+    assert float(mean[1]) <= 0.10
+    assert int(share[1]) >= 93
+    again = echostep("replay", tmp_path / "a" / "walk.mcap", "--plan", PLAN_FILE, "--headless", "--out", tmp_path / "b")
+    assert sha_of(again.stdout) == sha_of(done.stdout)
+
+
+def test_the_python_board_does_not_play_the_kit_of_2026(tmp_path: Path) -> None:
+    done = echostep("demo", "--headless", "--kit", "2026", "--out", tmp_path)
+    assert done.returncode == 2
+    assert "needs the real firmware in the simulator: make demo KIT=2026" in done.stderr

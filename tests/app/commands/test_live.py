@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: MIT
+"""Live from two ports, recorded, replayed: the same estimates, bit for bit."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import re
+import signal
+import subprocess
+import time
+import tty
+from collections import Counter
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from board_runs import ROOT, needs_twin, tool
+from command_line import PROGRAM, echostep, interrupt_after
+from echostep.errors import EchostepError
+from echostep.plan.model import load_plan
+from echostep.recording.reading import open_recording
+from echostep_app.ports.serial_ports import SerialPorts
+from echostep_app.session.last_place import read_kept
+from waiting import PATIENCE_S, until
+
+PLAN = ROOT / "host/core/echostep/plans/demo.json"
+
+
+def sha_of(text: str) -> str:
+    found = re.search(r"sha256\s+([0-9a-f]{16})", text)
+    assert found, text
+    return found[1]
+
+
+@pytest.mark.long
+@needs_twin
+@pytest.mark.parametrize("wears_mtx", [True, False])
+def test_a_live_run_replays_to_identical_estimates(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wears_mtx: bool
+) -> None:
+    """With foot and board from the plan's start, and with the board alone from where the last run ended."""
+    (tmp_path / "live").mkdir()
+    place = {"x_m": 2.0, "y_m": 7.5, "sd_m": 0.1, "level": 0, "air": None}
+    kept = {"utc": datetime.now(UTC).isoformat(), "plan_sha256": load_plan(PLAN).digest, "board": "", "place": place}
+    (tmp_path / "live/last.json").write_text(json.dumps(kept))
+    twin = subprocess.Popen([*tool("twin.run"), "--out", tmp_path], stdout=subprocess.PIPE, text=True)
+    try:
+        assert twin.stdout is not None
+        board, mtx = (twin.stdout.readline().split()[1] for _ in range(2))
+        interrupt_after(10, monkeypatch)
+        live = echostep(
+            "live",
+            "--plan",
+            PLAN,
+            "--board",
+            board,
+            *(("--mtx", mtx) if wears_mtx else ("--start", "last")),
+            "--out",
+            tmp_path / "live",
+            "--headless",
+            "--seconds",
+            PATIENCE_S,
+        )
+    finally:
+        twin.send_signal(signal.SIGINT)
+        twin.wait(timeout=PATIENCE_S)
+        assert twin.stdout is not None
+        twin.stdout.close()
+    assert live.returncode == 0, live.stderr
+    rows = list(csv.DictReader((tmp_path / "live/track.csv").read_text().splitlines()))
+    assert len(rows) >= 10
+    assert ("Start: where the last run ended, " in live.stdout) is not wears_mtx
+    assert math.dist((float(rows[0]["x_m"]), float(rows[0]["y_m"])), (2.0, 7.5)) < 0.5
+    assert read_kept(tmp_path / "live").place.air is None
+    assert not wears_mtx or read_kept(tmp_path / "live").place.x_m != 2.0
+    again = echostep("replay", tmp_path / "live/walk.mcap", "--plan", PLAN, "--out", tmp_path / "again", "--headless")
+    assert again.returncode == 0, again.stderr
+    assert sha_of(again.stdout) == sha_of(live.stdout)
+    assert (tmp_path / "again/track.csv").read_bytes() == (tmp_path / "live/track.csv").read_bytes()
+
+
+@pytest.mark.long
+def test_two_runs_of_one_seed_are_identical(tmp_path: Path) -> None:
+    runs = [
+        echostep("demo", "--headless", "--seed", seed, "--out", tmp_path / str(k)) for k, seed in enumerate((3, 3, 4))
+    ]
+    assert all(run.returncode == 0 for run in runs), runs[0].stderr
+    first, second, other = (sha_of(run.stdout) for run in runs)
+    assert first == second != other
+    tracks = [
+        (tmp_path / str(k) / name).read_bytes() for k in (0, 1) for name in ("track.csv", "walk.mcap", "truth.csv")
+    ]
+    assert tracks[:3] == tracks[3:]
+    replay = echostep("replay", tmp_path / "0/walk.mcap", "--plan", PLAN, "--headless", "--out", tmp_path / "r")
+    assert sha_of(replay.stdout) == first
+
+
+def records(path: Path) -> bool:
+    """Whether bytes of a port are in a recording: its run is under way."""
+    try:
+        open_recording(path)
+    except EchostepError:
+        return False
+    return True
+
+
+@pytest.mark.long
+@pytest.mark.process
+def test_ctrl_c_ends_a_live_run_with_its_files(tmp_path: Path) -> None:
+    ours, theirs = os.openpty()
+    port = os.ttyname(theirs)
+    live = subprocess.Popen(
+        [*PROGRAM, "live", "--plan", PLAN, "--board", port, "--out", tmp_path, "--headless"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        assert until(lambda: os.write(ours, b"\0") and records(tmp_path / "walk.mcap"))
+        live.send_signal(signal.SIGINT)
+        out, err = live.communicate(timeout=PATIENCE_S)
+    finally:
+        live.kill()
+        live.communicate()
+        os.close(ours)
+        os.close(theirs)
+    assert live.returncode == 0, err
+    assert "Traceback" not in err
+    assert "No estimate" in out
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["replay", "none.mcap", "--plan", PLAN], "none.mcap"),
+        (["replay", __file__, "--plan", PLAN], "test_live.py"),
+        (["live", "--plan", "none.json", "--board", "x", "--mtx", "y"], "none.json"),
+        (["live", "--plan", PLAN, "--board", "/dev/no-such-port", "--mtx", "y"], "/dev/no-such-port"),
+        (["live", "--plan", PLAN, "--board", "nonsense://x", "--mtx", "y"], "nonsense"),
+        (["live", "--plan", PLAN, "--board", "x", "--mtx", "y", "--start", "1,2"], "--start"),
+        (["live", "--plan", PLAN, "--board", "x", "--mtx", "y", "--start", "1,2,nan"], "--start"),
+        (["live", "--plan", PLAN, "--board", "x", "--mtx", "y", "--settings", "none.toml"], "none.toml"),
+        (["record", "--board", "/dev/no-such-port", "--mtx", "y"], "/dev/no-such-port"),
+        (["decode", "none.bin"], "none.bin"),
+        (["decode", __file__], "test_live.py"),
+        (["demo", "--headless", "--board-command", "/no/such/twin"], "/no/such/twin"),
+        (["demo", "--headless", "--board-command", "/bin/true"], "/bin/true"),
+        (["demo", "--headless", "--board-command", "/bin/echo hello"], "/bin/echo"),
+    ],
+)
+def test_a_mistake_ends_with_one_line_that_names_it(tmp_path: Path, arguments: list[object], named: str) -> None:
+    done = echostep(*arguments, *(["--out", tmp_path / "out"] if arguments[0] != "decode" else []))
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert named in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("[clud]\nsize = 3", "clud"),
+        ("[cloud]\nsizee = 3", "sizee"),
+        ("[cloud]\nsize = 'many'", "size"),
+        ("[cloud]\nsize = 1.5", "size"),
+        ("[cloud]\nsize = -4", "size"),
+        ("[cloud]\nstart_sd_m = nan", "start_sd_m"),
+        ("[cloud]\nsize = 1" + 400 * "0", "size: a huge number"),
+        ("[echo]\nsd_m = 0", "sd_m"),
+        ("[mtx]\nrate_hz = 0", "rate_hz"),
+        ("cloud = 3", "cloud"),
+        ("[cloud", "settings.toml"),
+    ],
+)
+def test_a_wrong_setting_is_named(tmp_path: Path, text: str, named: str) -> None:
+    settings = tmp_path / "settings.toml"
+    settings.write_text(text)
+    done = echostep(
+        "live", "--plan", PLAN, "--board", "x", "--mtx", "y", "--settings", settings, "--out", tmp_path / "out"
+    )
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert named in done.stderr
+    assert "settings.toml" in done.stderr
+
+
+def test_help_lists_the_commands() -> None:
+    done = echostep("--help")
+    assert done.returncode == 0
+    assert all(name in done.stdout for name in ("demo", "live", "record", "replay", "decode"))
+
+
+@pytest.mark.long
+@pytest.mark.process
+def test_record_keeps_the_bytes_of_both_ports(tmp_path: Path) -> None:
+    pairs = [os.openpty() for _ in range(2)]
+    for _, theirs in pairs:
+        tty.setraw(theirs)
+    names = [os.ttyname(theirs) for _, theirs in pairs]
+    path = tmp_path / "x.mcap"
+    recorder = subprocess.Popen(
+        [*PROGRAM, "record", "--board", names[0], "--mtx", names[1], "--out", path],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    sent = [b"", b""]
+
+    def enough_is_recorded() -> bool:
+        for k, (ours, _) in enumerate(pairs):
+            part = bytes([k + 1, len(sent[k]) % 256]) * 20
+            sent[k] += part
+            os.write(ours, part)
+        kept = Counter[str]()
+        for chunk in open_recording(path).chunks() if records(path) else ():
+            kept[chunk.port] += len(chunk.data)
+        return min(kept["board"], kept["mtx"]) > 500
+
+    assert until(enough_is_recorded)
+    recorder.send_signal(signal.SIGINT)
+    out, err = recorder.communicate(timeout=PATIENCE_S)
+    for pair in pairs:
+        for end in pair:
+            os.close(end)
+    assert recorder.returncode == 0, err
+    chunks = list(open_recording(path).chunks())
+    for k, port in enumerate(("board", "mtx")):
+        kept = b"".join(c.data for c in chunks if c.port == port)
+        assert len(kept) > 500
+        assert kept in sent[k]
+    assert all(b.t_arrival_ns >= a.t_arrival_ns for a, b in zip(chunks, chunks[1:], strict=False))
+    assert "bytes from the board" in out
+
+
+@pytest.mark.slow
+def test_a_port_that_goes_away_is_opened_again(tmp_path: Path) -> None:
+    link = tmp_path / "port"
+    first, theirs = os.openpty()
+    tty.setraw(theirs)
+    name = Path(os.ttyname(theirs))
+    link.symlink_to(name)
+    ports = SerialPorts({"board": str(link)}, {"board": 115200})
+    found = b""
+    try:
+        os.write(first, b"before")
+        second, new = os.openpty()
+        tty.setraw(new)
+        deadline = time.monotonic() + PATIENCE_S
+        for chunk in ports.chunks():
+            found += chunk.data if chunk else b""
+            if found == b"before" and link.is_symlink() and link.readlink() == name:
+                link.unlink()
+                link.symlink_to(os.ttyname(new))
+                os.close(theirs)
+                os.close(first)
+            if "is back" in " ".join(ports.notices):
+                os.write(second, b" after")
+                ports.notices.clear()
+            if found.endswith(b"after") or time.monotonic() > deadline:
+                break
+    finally:
+        ports.close()
+        os.close(second)
+        os.close(new)
+    assert found == b"before after"
+
+
+def test_bytes_that_came_together_are_one_chunk() -> None:
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    ports = SerialPorts({"board": os.ttyname(theirs)}, {"board": 115200})
+    try:
+        os.write(ours, b"0123456789")
+        chunks = (chunk for chunk in ports.chunks() if chunk is not None)
+        assert next(chunks).data == b"0123456789"
+    finally:
+        ports.close()
+        os.close(ours)
+        os.close(theirs)

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""A walk in a building without a plan: its track, its height, its way back (simulated)."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from command_line import echostep
+from echostep.localization.estimate import TrackStatus
+from echostep.localization.height.height_filter import RelativeHeight
+from echostep.localization.height.levels import HeightChange
+from echostep.plan.model import NO_PLAN
+from echostep_app.page.elements.scene import status_text
+from echostep_app.session.metadata import run_metadata
+from echostep_app.session.runs.recording import start_recording
+from echostep_app.simulation.devices.board import PythonBoard
+from echostep_app.simulation.scenario import Scenario
+from page.frames import PLAN, told
+
+
+@pytest.mark.slow
+def test_a_walk_without_a_plan_is_tracked_and_led_back(tmp_path: Path) -> None:
+    """Twenty metres along the corridor and back: the walk ends where it began, and the way back is said."""
+    scenario = Scenario(PLAN, ((2.0, 7.5), (22.0, 7.5), (2.4, 7.5)), 4, PythonBoard(4))
+    metadata = run_metadata(NO_PLAN, NO_PLAN.start, 4, "without a plan")
+    with start_recording(tmp_path / "walk.mcap", metadata) as recorder:
+        for chunk in scenario.chunks():
+            recorder.write(chunk)
+    replay = ("replay", str(recorder.path), "--headless")
+    done = echostep(*replay, "--out", "first", "--guide", "start", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((tmp_path / "first/track.csv").read_text().splitlines()))
+    x, y = (np.array([float(row[name]) for row in rows]) for name in ("x_m", "y_m"))
+    assert abs(math.hypot(x[0], y[0])) < 0.1
+    assert max(y) == pytest.approx(20.0, abs=0.5), "the first heading is up"
+    assert math.hypot(x[-1], y[-1]) < 1.5
+    cues = list(csv.DictReader((tmp_path / "first/cues.csv").read_text().splitlines()))
+    assert "arrived" in [cue["kind"] for cue in cues]
+    turned = int(np.argmax(y))
+    assert not any(cue["spoken"] for cue in cues[:turned])
+    assert (tmp_path / "first/track.png").stat().st_size > 5_000
+    again = echostep(*replay, "--out", "second", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert (tmp_path / "second/track.csv").read_bytes() == (tmp_path / "first/track.csv").read_bytes()
+    assert "nothing corrects the drift" in again.stdout
+    refused = echostep(*replay, "--guide", "Kitchen", cwd=tmp_path)
+    assert (refused.returncode, refused.stderr.strip()) == (
+        2, "echostep: --guide Kitchen: without a plan the only destination is: start",
+    )  # fmt: skip
+
+
+def test_the_height_follows_the_foot_and_the_pressure_holds_it() -> None:
+    """Twenty steps of 0.17 m with an error of 1 cm each, then standing while the weather moves the pressure by 0.5 m in ten minutes."""
+    height = RelativeHeight(0.02)
+    for k in range(20):
+        height.update(HeightChange(0.18, 0.02, 100.0 + 0.17 * (k + 1), 0.14, 0.0, 0.7))
+    assert height.height_m == pytest.approx(3.5, abs=0.15)
+    for k in range(600):
+        height.update(HeightChange(0.0, 0.005, 103.4 + 0.5 * k / 600, 0.14, 0.0, 1.0))
+    assert height.height_m == pytest.approx(3.5, abs=0.4)
+    assert 0.02 < height.sd_m < 0.6
+
+
+def test_without_a_foot_the_pressure_alone_tells_the_height() -> None:
+    height = RelativeHeight(0.02)
+    for pressure_m in (50.0, 50.0, 53.0, 56.0, 56.0, 56.0):
+        height.update(HeightChange(0.0, math.inf, pressure_m, 0.14, 0.0, 10.0))
+    assert height.height_m == pytest.approx(6.0, abs=0.3)
+    for _ in range(30):
+        height.update(HeightChange(0.0, math.inf, 0.0, math.inf, 0.0, 10.0))
+    assert height.sd_m > 3.0
+
+
+def test_the_page_says_the_height_against_the_start() -> None:
+    assert status_text(replace(told(), z_m=-3.2), no_plan=True) == "tracking, 3 m below the start, 0.2 m"
+    drifted = replace(told(), status=TrackStatus.LOST, xx_m2=16.0, yy_m2=16.0)
+    assert status_text(drifted, no_plan=True) == "lost, 10 m"
+    assert status_text(replace(told(), z_m=0.4), no_plan=True) == "tracking, 0.2 m"

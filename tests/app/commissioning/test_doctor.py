@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: MIT
+"""`echostep doctor`: against boards on pseudo terminals, ports that are none, and what the system says of ports."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from board_runs import Bench, needs_twin, quiet_rows
+from command_line import echostep
+from echostep.board import messages as m
+from echostep.board.frames import encode
+from echostep.ports.chunks import BOARD, Chunk
+from echostep_app.board.faults.health import Severity
+from echostep_app.commissioning import serial_ports as ports
+from echostep_app.commissioning.diagnosis import Diagnosis, judge_board, judge_mtx
+from echostep_app.commissioning.doctor import examine
+from echostep_app.commissioning.probe import ProbeResult, _Probe, drift_of
+from echostep_app.commissioning.serial_ports import PortSeen, Role
+from players import babbling_port, pseudo_terminal, python_board, some_noise, twin_board
+
+
+def doctor(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return echostep("doctor", *arguments)
+
+
+@pytest.mark.long
+def test_a_board_that_is_well_gets_status_0() -> None:
+    with python_board() as port:
+        done = doctor("--board", port, "--seconds", 4)
+    assert "Traceback" not in done.stderr
+    assert done.returncode == 0, done.stdout
+    assert "Everything is fine." in done.stdout
+    assert "firmware 0.0.0, schema" in done.stdout
+    assert "barometer: answers" in done.stdout
+    rates = dict(re.findall(r"(\w+) ([\d.]+)/s", done.stdout))
+    assert float(rates["gyros"]) == pytest.approx(200.0, rel=0.02)
+    assert "ppm" in done.stdout
+
+
+@pytest.mark.long
+@needs_twin
+def test_what_is_wrong_is_said_in_words() -> None:
+    with twin_board("scp1000=no_eeprom", "compass=absent", "calf=no_self_test", "belt=absent") as port:
+        done = doctor("--board", port, "--seconds", 5)
+    assert done.returncode == 1, done.stdout
+    assert "Traceback" not in done.stderr
+    for words in (
+        "barometer: EEPROM check failed",
+        "power-cycle the board, check 3.3 V and the level shifter",
+        "compass: does not answer at I2C address 0x60",
+        "calf gyro: failed its self-test",
+        "belt gyro: does not answer",
+        "firmware 1.6.0",
+        "thigh gyro: answers, 20 degC, self-test passed",
+        "belt gyro: FAILS",
+    ):
+        assert words in done.stdout, (words, done.stdout)
+
+
+@needs_twin
+def test_the_real_firmware_is_well() -> None:
+    with twin_board() as port:
+        report = examine(port, None, 3.0)
+    said = [str(finding) for finding in report.findings if finding.severity > Severity.NOTE]
+    assert not [text for text in said if "clock" not in text and "gives" not in text], said  # quiet rows have no noise
+    assert any("self-test passed" in line for line in report.lines)
+    assert any(line.startswith("supply    5.") and "1 start since it got power" in line for line in report.lines)
+
+
+@needs_twin
+@pytest.mark.parametrize("heard_ms", [300, 600, 1000, 1700, 2500])
+def test_a_board_that_has_just_started_is_not_called_faulty(heard_ms: int) -> None:
+    """From its power-up on, however little of it was heard."""
+    bench = Bench()
+    ports = SimpleNamespace(notices=[], send=lambda _, sent: bench.board.send(sent))
+    running = _Probe(ports, {BOARD: "x"}, check_gyros=True)  # type: ignore[arg-type]
+    try:
+        for begin_ms in range(0, heard_ms, 50):
+            running._query_board(begin_ms * 1e-3)
+            rows = quiet_rows(50)
+            some_noise(rows, begin_ms)
+            for t_ns, part in bench.board.advance(rows):
+                running._receive(Chunk(BOARD, t_ns, part))
+    finally:
+        bench.board.close()
+    report = Diagnosis()
+    judge_board(report, running.result, "x")
+    clock = [
+        finding for finding in report.findings if "clock" in finding.what
+    ]  # compares the simulated with this computer's
+    assert [str(f) for f in report.findings if f.severity > Severity.NOTE and f not in clock] == []
+
+
+def test_a_board_that_starts_late_is_heard_for_three_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its first message comes in the last moment of the listening."""
+    now_s = 0.0
+    first = encode(m.Identity(0, m.SCHEMA_HASH, 1, 1, 0, 0), 0)
+
+    def chunks() -> Iterator[Chunk | None]:
+        nonlocal now_s
+        while now_s < 60.0:
+            now_s += 0.1
+            yield Chunk(BOARD, int(now_s * 1e9), first) if now_s > 3.9 else None
+
+    monkeypatch.setattr("echostep_app.commissioning.probe.clock_s", lambda: now_s)
+    ports = SimpleNamespace(notices=[], send=lambda *_: None, chunks=chunks)
+    running = _Probe(ports, {BOARD: "x"}, check_gyros=True)  # type: ignore[arg-type]
+    running.run(4.0)
+    assert 6.8 < now_s < 7.2
+
+
+@pytest.mark.parametrize(
+    ("port", "words"),
+    [("/dev/no-such-port", "there is no such port"), (__file__, "is no serial port"), ("nonsense://x", "nonsense")],
+)
+def test_a_port_that_is_none_is_named(port: str, words: str) -> None:
+    done = doctor("--board", port)
+    assert done.returncode == 1
+    assert words in done.stdout
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("sent", "words"),
+    [
+        (b"", "is silent"),
+        (b"hello world\r\n" * 20, "bytes came from"),
+        (encode(m.Identity(0, 0x12345678, 1, 0, 0, 0), 0), "echostep flash"),
+    ],
+)
+def test_a_port_that_is_not_the_board_says_so(sent: bytes, words: str) -> None:
+    with babbling_port(b"\0" + sent if sent else b"") as port:
+        report = examine(port, None, 0.5)
+    assert any(words in str(finding) for finding in report.findings), report.findings
+    assert not report.fine
+
+
+@pytest.mark.slow
+def test_an_mtx_that_is_silent_is_a_finding() -> None:
+    with pseudo_terminal() as (_, port):
+        report = examine(None, port, 2.5)
+    assert any(f.subject == "MTx" and f.severity is Severity.FAULT for f in report.findings), report.findings
+
+
+@pytest.mark.parametrize(
+    ("arrived_s", "words"), [([], "no sample was received"), ([1.0, 1.01], "only 2 samples were received")]
+)
+def test_an_mtx_that_answers_but_measures_nothing_says_so(arrived_s: list[float], words: str) -> None:
+    """What was said while it was set up is no fault."""
+    probed = ProbeResult(seconds=6.0, mtx_messages=["MTx: configured: 100 Hz"], mtx_times_s=arrived_s)
+    probed.bytes_of["mtx"] = 400
+    report = Diagnosis()
+    judge_mtx(report, probed, with_board=False)
+    (finding,) = report.findings
+    assert finding.what.startswith(words)
+    assert (finding.severity, finding.subject) == (Severity.FAULT, "MTx")
+    assert "configured" not in str(finding)
+
+
+def test_nothing_plugged_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("echostep_app.commissioning.doctor.list_seen", list)
+    report = examine(None, None, 0.1)
+    assert "no sensor board is plugged in, and no other serial port" in str(report.findings[0])
+    assert not report.fine
+
+
+def test_a_board_in_its_bootloader_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = [PortSeen("/dev/ttyACM9", Role.BOOTLOADER, "Arduino Leonardo")]
+    monkeypatch.setattr("echostep_app.commissioning.doctor.list_seen", lambda: seen)
+    report = examine(None, None, 0.1)
+    assert "echostep flash --port /dev/ttyACM9" in str(report.findings[0])
+
+
+def test_two_boards_are_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = [PortSeen(f"/dev/none{k}", Role.BOARD, "sensor board", f"00{k}D") for k in range(2)]
+    monkeypatch.setattr("echostep_app.commissioning.doctor.list_seen", lambda: seen)
+    report = examine(None, None, 0.1)
+    assert any("/dev/none0, number 000D; /dev/none1, number 001D" in str(finding) for finding in report.findings)
+    assert any(line.startswith("port      /dev/none1, number 001D: sensor board") for line in report.lines)
+
+
+def test_a_port_that_may_not_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pseudo_terminal() as (_, port):
+        (finding,) = ports.access_findings("board", port)
+    assert "usermod -aG" in finding.remedy
+
+
+def test_the_latency_of_the_adapter(tmp_path: Path) -> None:
+    timer = tmp_path / "bus/usb-serial/devices/ttyUSB7/latency_timer"
+    timer.parent.mkdir(parents=True)
+    timer.write_text("16\n")
+    (finding,) = ports.latency_findings("MTx", "/dev/ttyUSB7", tmp_path)
+    assert "16 ms" in finding.what
+    timer.write_text("1\n")
+    assert ports.latency_findings("MTx", "/dev/ttyUSB7", tmp_path) == []
+    timer.write_text("x")
+    assert ports.latency_findings("MTx", "/dev/ttyUSB7", tmp_path) == []
+
+
+def test_a_program_that_holds_the_port_is_named(tmp_path: Path) -> None:
+    (tmp_path / "77/fd").mkdir(parents=True)
+    (tmp_path / "77/comm").write_text("minicom\n")
+    (tmp_path / "port").touch()
+    (tmp_path / "77/fd/3").symlink_to(tmp_path / "port")
+    (finding,) = ports.holder_findings("board", str(tmp_path / "port"), tmp_path)
+    assert "minicom (process 77)" in finding.what
+
+
+def test_the_udev_rules_are_printed_and_recognised(tmp_path: Path) -> None:
+    done = doctor("--udev")
+    assert done.returncode == 0
+    for part in ('SYMLINK+="echostep echostep-$attr{serial}"', 'SYMLINK+="echostep-mtx"', 'ATTR{latency_timer}="1"'):
+        assert part in done.stdout
+    assert len(ports.rules_findings((tmp_path,))) == 1
+    (tmp_path / ports.RULES).write_text(done.stdout)
+    assert ports.rules_findings((tmp_path,)) == []
+    (tmp_path / ports.RULES).write_text("# old")
+    assert "is of another version" in str(ports.rules_findings((tmp_path,))[0])
+
+
+def test_roles_by_usb_identifiers() -> None:
+    assert ports._role(0x1209, 1, "echostep", "sensor board") is ports._role(0x1209, 1, None, None) is Role.BOARD
+    assert ports._role(0x1209, 0xEC05, "echostep", "sensor board") is Role.BOARD  # with an identifier of its own
+    assert ports._role(0x1209, 1, "other", "a camera") is Role.OTHER
+    assert ports._role(0x2341, 0x0036, None, None) is Role.BOOTLOADER
+    assert ports._role(0x0403, 0xD388, None, None) is Role.MTX
+    assert ports._role(0x1A86, 0x7523, None, None) is Role.OTHER
+
+
+def answers_of(ppm: float, late_s: Callable[[int], float]) -> ProbeResult:
+    """Sixty answers in 12 s of a board whose clock is fast by `ppm`, read half a millisecond after the query."""
+    heard = ProbeResult()
+    for k in range(60):
+        sent_s = 0.2 * k
+        heard.replies.append((sent_s, sent_s + late_s(k), round((sent_s + 0.0005) * (1 + 1e-6 * ppm) * 2e6)))
+    return heard
+
+
+@pytest.mark.parametrize("ppm", [-300.0, 0.0, 40.0, 5000.0])
+def test_the_limits_of_the_drift_hold_through_slow_answers(ppm: float) -> None:
+    drift = drift_of(answers_of(ppm, lambda k: 0.001 + (0.03 if k % 5 == 0 else 0.0001 * (k % 3))))
+    assert drift is not None
+    assert drift.low_ppm <= ppm <= drift.high_ppm
+    assert drift.high_ppm - drift.low_ppm < 200.0
+
+
+def test_answers_of_a_busy_computer_are_no_evidence_against_the_clock() -> None:
+    drift = drift_of(answers_of(0.0, lambda k: 0.001 + 0.0001 * k))  # later and later
+    assert drift is not None
+    assert drift.least_ppm == 0.0
+    assert drift.low_ppm <= 0.0 <= drift.high_ppm
+
+
+def test_a_clock_that_was_set_has_no_drift() -> None:
+    heard = answers_of(0.0, lambda _: 0.001)
+    heard.replies[30:] = [(sent_s, arrived_s, ticks + 2_000_000) for sent_s, arrived_s, ticks in heard.replies[30:]]
+    assert drift_of(heard) is None
+
+
+@pytest.mark.long
+@needs_twin
+def test_the_parts_of_2026_are_named_and_so_is_the_one_that_fails() -> None:
+    with twin_board("kit=2026", "imu_calf=no_self_test") as port:
+        done = doctor("--board", port, "--seconds", 8)
+    assert done.returncode == 1, done.stdout
+    for words in (
+        "left ranger: answers, pulse ranger",
+        "compass: answers, LIS3MDL, identity 0x3D",
+        "thigh gyro: answers, 20 degC, self-test passed, LSM6DSO, identity 0x6C",
+        "barometer: answers, BMP390, identity 0x60",
+        "calf gyro (LSM6DSO): failed its self-test",
+        "magnetic ",
+    ):
+        assert words in done.stdout, (words, done.stdout)
+    assert "without noise" not in done.stdout  # at rest its noise is less than a count

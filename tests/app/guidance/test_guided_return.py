@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: MIT
+"""Back without a plan: along the own way, loops cut where they close, spoken only on the way back."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from echostep.arrays import Floats
+from echostep.errors import EchostepError
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.path import MeasuredSegment, PathSegment
+from echostep.plan.model import NO_PLAN
+from echostep.tracker import Tracker
+from echostep_app.guidance.cues import Cue, CueKind
+from echostep_app.guidance.guided_return import AGAIN, IN, TURN_M, GuidedReturn
+from echostep_app.guidance.guided_run import guidance_of
+from echostep_app.guidance.own_way import JOIN_M, STEP_M, OwnWay
+
+MEASURED = MeasuredSegment(PathSegment(0.0, 1.0, 0.4, 0.0, 0.0, 0.0, 0.02, 0.0, 1), *np.empty((3, 0)))
+CORNERS = np.array([(0.0, 0.0), (0.0, 20.0), (15.0, 20.0), (15.0, 35.0)])  # of a way in, m
+
+
+def along(corners: Floats, step_m: float = 0.4) -> Floats:
+    """Positions (n, 2) on a polyline."""
+    pieces = [
+        a + np.arange(0.0, np.hypot(*(b - a)), step_m)[:, None] * (b - a) / np.hypot(*(b - a))
+        for a, b in zip(corners[:-1], corners[1:], strict=True)
+    ]
+    return np.concatenate([*pieces, corners[-1:]])
+
+
+def guided(places: Floats, sd_m: float = 0.1, status: TrackStatus = TrackStatus.TRACKING) -> list[Cue]:
+    """The cues at these positions, one a second, the heading along the way."""
+    tracker = SimpleNamespace(watchers=[], state=SimpleNamespace(beacon_heard_s=None))
+    run = GuidedReturn(cast("Tracker", tracker))
+    headings = np.arctan2(*np.diff(places, axis=0, append=places[-1:]).T[::-1])
+    for k, ((x, y), heading) in enumerate(zip(places.tolist(), headings.tolist(), strict=True)):
+        e = Estimate(float(k), x, y, sd_m**2, 0.0, sd_m**2, heading, 0.05, k, status)
+        run._watch(MEASURED, e)
+    return run.cues
+
+
+def test_nothing_is_said_on_the_way_in() -> None:
+    cues = guided(along(CORNERS))
+    assert not any(cue.spoken for cue in cues)
+    assert cues[-10].arrow_rad == pytest.approx(-math.pi, abs=0.1) or cues[-10].arrow_rad == pytest.approx(
+        math.pi, abs=0.1
+    )
+    assert cues[-1].left_m == pytest.approx(50.0, abs=1.0)
+
+
+@pytest.mark.parametrize("drift_m", [0.0, 1.5])
+def test_the_way_back_is_told_from_the_turn_to_the_start(drift_m: float) -> None:
+    """The way back is seen beside the way in: the track has drifted."""
+    way_in, way_back = along(CORNERS), along(CORNERS[::-1])
+    way_back[:, 0] += np.linspace(0.0, drift_m, len(way_back))
+    cues = guided(np.concatenate([way_in, way_back]), sd_m=0.1 + 0.3 * drift_m)
+    back = cues[len(way_in) :]
+    begun = next(k for k, cue in enumerate(back) if cue.spoken or cue.text != IN)
+    assert 0.4 * begun < TURN_M + 2.0
+    assert any(cue.kind is CueKind.TURN for cue in back)
+    arrived = next(k for k, cue in enumerate(back) if cue.kind is CueKind.ARRIVED)
+    assert all(abs(cue.arrow_rad or 0.0) < math.radians(100.0) for cue in back[begun:arrived])
+    left_m = np.array([cue.left_m for cue in back[begun:arrived]])
+    assert (np.diff(left_m) < 0.5).all()
+    assert len(back) - arrived < 6
+
+
+def test_a_long_way_leads_back_although_its_drift_is_great() -> None:
+    """Ten metres of standard deviation since the start: the position is lost, the way back is not."""
+    cues = guided(np.concatenate([along(CORNERS), along(CORNERS[::-1])]), sd_m=10.0, status=TrackStatus.LOST)
+    assert any(cue.kind is CueKind.TURN for cue in cues)
+    assert any(cue.kind is CueKind.ARRIVED for cue in cues)
+
+
+def test_going_in_again_ends_the_return() -> None:
+    half = along(np.array([CORNERS[-1], CORNERS[-2], (10.0, 20.0)]))
+    again = along(np.array([(10.0, 20.0), (10.0, 40.0)]))
+    cues = guided(np.concatenate([along(CORNERS), half, again]))
+    assert [cue.spoken for cue in cues].count(f"{AGAIN}.") == 1
+    assert not any(cue.spoken for cue in cues[-10:])
+    assert cues[-1].left_m == pytest.approx(50.0, abs=2.0)
+
+
+def test_a_loop_is_cut_where_it_closes() -> None:
+    way = OwnWay()
+    for x, y in along(np.array([(0, 0), (0, 10), (10, 10), (10, 20), (0, 20), (0, 10.3), (-5, 10.3)], float)).tolist():
+        way.add(x, y)
+    assert way.back_m == pytest.approx(15.0, abs=1.5)
+
+
+def test_another_storey_is_another_place() -> None:
+    way = OwnWay()
+    for k in range(21):
+        way.add(0.5 * k, 0.0, 0.0)
+    for k in range(21):
+        way.add(10.0 - 0.5 * k, 0.1, 3.0)
+    assert way.back_m > 19.0
+
+
+@given(st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size=2, max_size=40))
+def test_the_way_back_is_the_shortest_through_the_positions(moves: list[tuple[float, float]]) -> None:
+    """Against all joins that there were, relaxed until nothing changes, each position through earlier ones only."""
+    way, kept = OwnWay(), [(0.0, 0.0)]
+    way.add(0.0, 0.0)
+    for x, y in np.cumsum(moves, axis=0).tolist():
+        if math.dist(kept[-1], (x, y)) >= STEP_M:
+            kept.append((x, y))
+        way.add(x, y)
+    back = [0.0] * len(kept)
+    for k in range(1, len(kept)):
+        joined = [j for j in range(k) if j == k - 1 or math.dist(kept[j], kept[k]) < JOIN_M]
+        back[k] = min(back[j] + math.dist(kept[j], kept[k]) for j in joined)
+    assert way.back_m == pytest.approx(back[-1])
+    line = way.line_m()
+    assert line[0] == pytest.approx(kept[-1])
+    assert line[-1] == pytest.approx(kept[0])
+    assert np.hypot(*np.diff(line, axis=0).T).sum() == pytest.approx(back[-1])
+
+
+def test_without_a_plan_the_start_is_the_only_destination() -> None:
+    tracker: Any = Tracker(NO_PLAN)
+    assert isinstance(guidance_of(tracker, "start"), GuidedReturn)
+    with pytest.raises(EchostepError, match="--guide Kitchen: without a plan the only destination is: start"):
+        guidance_of(tracker, "Kitchen")

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: MIT
+"""Files of other loggers: recognised by their headers, or named by `--columns` and `--units`; the track is that of the same samples in SI."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from command_line import echostep
+from echostep.errors import EchostepError
+from echostep.offline.foreign_columns import LOGGERS, OWN, Naming, parse_naming, read_header
+from echostep.offline.imu_csv import load_imu
+from echostep_app.cli import app
+from echostep_app.offline.leg_csv import load_legs, load_pair
+from echostep_studies.barometer.pressure_csv import load_pressures
+from foot.foot_walks import MANNERS, course, samples
+from needs_data import data_or_skip
+
+G = 9.80665
+AXES = ("x", "y", "z")
+PAIRS = Naming({"t_s": "time", **{f"a{a}": f"acc_{a}" for a in AXES}, **{f"g{a}": f"gyr_{a}" for a in AXES}})
+
+
+@pytest.fixture(scope="module")
+def table() -> np.ndarray:
+    """A simulated walk of six steps: time, force, rate (n, 7)."""
+    t_s, accel, gyro = samples(course(MANNERS["walking"], steps=6), 100, rng=np.random.default_rng(1))
+    return np.column_stack([t_s, accel, gyro])
+
+
+def write(path: Path, header: str, rows: np.ndarray, separator: str = ",", above: str = "") -> Path:
+    """The file of a logger."""
+    np.savetxt(path, rows, delimiter=separator, header=above + header, comments="", fmt="%.9g")
+    return path
+
+
+def same(path: Path, table: np.ndarray, naming: Naming = OWN) -> tuple[str, ...]:
+    """The file holds the table's samples, as far as its digits go; its notes."""
+    imu = load_imu(path, naming)
+    assert np.allclose(np.diff(imu.t_s), np.diff(table[:, 0]), atol=1e-5)
+    assert np.allclose(imu.accel, table[:, 1:4], atol=1e-5)
+    assert np.allclose(imu.gyro, table[:, 4:7], atol=1e-5)
+    return imu.notes
+
+
+def titles(accel: str, gyro: str, letters: str) -> list[str]:
+    """Titles of the columns of three axes each."""
+    return [title.format(letter) for title in (accel, gyro) for letter in letters]
+
+
+XIO_TITLES = titles("Gyroscope {} (deg/s)", "Accelerometer {} (g)", "XYZ")
+
+
+@pytest.mark.parametrize(("logger", "time", "factor"), [("NGIMU", "Time (s)", 1.0), ("x-IMU3", "Timestamp (us)", 1e6)])
+def test_files_of_xio_are_in_degrees_and_g(
+    logger: str, time: str, factor: float, table: np.ndarray, tmp_path: Path
+) -> None:
+    rows = np.column_stack([table[:, 0] * factor, np.degrees(table[:, 4:7]), table[:, 1:4] / G])
+    path = write(tmp_path / "a.csv", ",".join([time, *XIO_TITLES]), rows)
+    assert same(path, table) == (f"read as an export of {logger}",)
+
+
+@pytest.mark.parametrize("separator", [",", "\t"])
+def test_a_file_of_phyphox_is_in_si_with_its_titles_in_quotes(
+    separator: str, table: np.ndarray, tmp_path: Path
+) -> None:
+    names = ["Time (s)", *titles("Acceleration {} (m/s^2)", "Gyroscope {} (rad/s)", "xyz")]
+    header = separator.join(f'"{name}"' for name in names)
+    assert same(write(tmp_path / "a.csv", header, table, separator), table) == ("read as an export of phyphox",)
+
+
+@pytest.mark.parametrize(
+    "above", ["// Start Time: Unknown\n// Update Rate: 100.0Hz\n", "Acquisition frequency: 100 Hz\n"]
+)
+def test_an_export_of_mt_manager_counts_samples_and_the_counter_wraps(
+    above: str, table: np.ndarray, tmp_path: Path
+) -> None:
+    counter = (65_500 + np.arange(len(table))) % 65_536
+    header = "\t".join(["PacketCounter", *titles("Acc_{}", "Gyr_{}", "XYZ")])
+    path = write(tmp_path / "MT_00.txt", header, np.column_stack([counter, table[:, 1:7]]), "\t", above)
+    assert same(path, table) == ("read as an export of MT Manager",)
+    write(path, header, np.column_stack([counter, table[:, 1:7]]), "\t")
+    with pytest.raises(EchostepError, match=r"MT_00\.txt: PacketCounter counts samples, and no line .*Update Rate"):
+        load_imu(path)
+
+
+DOT_ABOVE = (
+    "sep=,\nDeviceTag:,bei\nFirmwareVersion:,1.6.0\nAppVersion:,2021.0\nStartTime: ,2021-08-30_17:05:05_000 GMT+8\n"
+    "© Xsens Technologies B. V. 2005-2021\n\n"
+)
+DOT_LIVE = (
+    "SyncStatus:,Synced,,,\nOutputRate:,60Hz,,,\nFilterProfile:,General,,,\nMeasurement Mode:,Rate quantities,,,\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("above", "more", "end"),
+    [(DOT_ABOVE, "Euler_X,Euler_Y,Euler_Z,", ""), (DOT_ABOVE.replace("StartTime", DOT_LIVE + "StartTime"), "", ",")],
+)
+def test_an_export_of_movella_dot_counts_microseconds_and_turns_in_degrees(
+    above: str, more: str, end: str, table: np.ndarray, tmp_path: Path
+) -> None:
+    """The clock wraps after 71 minutes; a recording's lines end with a comma."""
+    clock = ((1 << 32) - 500_000 + np.round(table[:, 0] * 1e6)) % (1 << 32)
+    header = f"PacketCounter,SampleTimeFine,{more}{','.join(titles('Acc_{}', 'Gyr_{}', 'XYZ'))}{end}"
+    fused = np.zeros((len(table), more.count(",")))
+    rows = np.column_stack([np.arange(len(table)), clock, fused, table[:, 1:4], np.degrees(table[:, 4:7])])
+    path = tmp_path / "bei.csv"
+    lines = [", ".join(f"{value:.12g}" for value in row) + end for row in rows]
+    path.write_text(above + "\n".join([header, *lines]), encoding="utf-8")
+    assert same(path, table) == ("read as an export of Movella DOT",)
+
+
+def test_an_export_of_movella_dot_without_gravity_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "free.csv"
+    path.write_text(DOT_ABOVE + "PacketCounter,SampleTimeFine,Euler_X,FreeAcc_X\n1,2,3,4\n", encoding="utf-8")
+    with pytest.raises(EchostepError, match=r"free\.csv: an export of Movella DOT without .*Acc_X.* custom mode 5"):
+        load_imu(path)
+
+
+def test_no_logger_is_taken_for_another_one() -> None:
+    for logger in LOGGERS:
+        theirs = [*logger.has.values(), *logger.may_have.values()]
+        more = [] if "SampleTimeFine" in theirs else ["SampleTimeFine"]  # as MT Manager has it, too
+        above = [f"{logger.above},"] if logger.above else []
+        header = read_header(iter(["// Update Rate: 100.0Hz", *above, ",".join(theirs + more)]))
+        assert header.notes == (f"read as an export of {logger.name}",)
+        assert set(logger.has) | set(logger.may_have) <= set(header.names)
+
+
+def test_names_and_units_of_any_file_are_given(table: np.ndarray, tmp_path: Path) -> None:
+    rows = np.column_stack([table[:, 0] * 1e3, table[:, 1:4] / G, np.degrees(table[:, 4:7]), table[:, :1]])
+    names = ",".join([*PAIRS.columns.values(), "t_s"])  # a column of our name that is not ours
+    path = write(tmp_path / "a.csv", names, rows)
+    naming = Naming(PAIRS.columns, {"time": "ms", "force": "g", "rate": "deg/s"})
+    assert same(path, table, naming) == ()
+    pairs = ",".join(f"{ours}={theirs}" for ours, theirs in PAIRS.columns.items())
+    assert parse_naming(pairs, "ms, g, deg/s") == naming
+
+
+@pytest.mark.parametrize(("columns", "units", "said"), [
+    ("t_s", None, "--columns t_s: pairs of names are expected, as t_s=time"),
+    (None, "furlong", "--units furlong: unknown; there are s, ms, us"),
+    (None, "g,mg", "--units g,mg: two units of one quantity"),
+    ("t_s=clock", None, "a.csv: --columns t_s=clock: no column clock; there are time, acc_x"),
+    (None, "hPa", "a.csv: --units hPa: no column has such a unit"),
+    (None, None, "other names: --columns OURS=THEIRS,...; other units: --units deg/s,g"),
+])  # fmt: skip
+def test_what_does_not_fit_is_one_line_that_names_it(
+    columns: str | None, units: str | None, said: str, tmp_path: Path
+) -> None:
+    path = write(tmp_path / "a.csv", ",".join(PAIRS.columns.values()), np.zeros((9, 7)))
+    options = [word for name, text in (("--columns", columns), ("--units", units)) if text for word in (name, text)]
+    done = echostep("foot", path, *options, cwd=tmp_path)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_line_is_named_by_its_number_in_the_file_below_a_preamble(tmp_path: Path) -> None:
+    above = "// Update Rate: 10.0Hz\n// a note\n"
+    path = write(tmp_path / "a.csv", "t_s,pressure_pa", np.array([[0.0, 9.0], [0.1, 9.0]]), above=above)
+    with pytest.raises(EchostepError, match="line 4: pressure_pa is 9"):
+        load_pressures(path)
+
+
+def test_legs_take_degrees_of_both_legs(tmp_path: Path) -> None:
+    t_s = np.arange(0.0, 4.0, 0.01)
+    legs = [np.sin(5.0 * t_s + k) for k in range(4)]
+    own = write(
+        tmp_path / "own.csv",
+        "t_s,thigh_rad_s,shank_rad_s,other_thigh_rad_s,other_shank_rad_s",
+        np.column_stack([t_s, *legs]),
+    )
+    theirs = write(tmp_path / "theirs.csv", "ms,lt,ls,rt,rs", np.column_stack([1e3 * t_s, *np.degrees(legs)]))
+    columns = "t_s=ms,thigh_rad_s=lt,shank_rad_s=ls,other_thigh_rad_s=rt,other_shank_rad_s=rs"
+    for ours, read in zip(load_pair([own]), load_pair([theirs], parse_naming(columns, "ms,deg/s")), strict=True):
+        assert np.allclose(read.thigh, ours.thigh, atol=1e-6)
+        assert np.allclose(read.shank, ours.shank, atol=1e-6)
+    assert np.allclose(load_legs(theirs, "", parse_naming(columns, "ms,deg/s")).t_s, t_s)
+
+
+@pytest.mark.parametrize(("header", "naming", "notes"), [
+    ('"Time (s)","Pressure (hPa)"', OWN, ("read as an export of phyphox",)),
+    ("seconds_elapsed,pressure", OWN, ("read as an export of Sensor Logger",)),
+    ("t,p", parse_naming("t_s=t,pressure_pa=p", "hPa"), ()),
+])  # fmt: skip
+def test_pressures_of_phones_are_in_hectopascals(
+    header: str, naming: Naming, notes: tuple[str, ...], tmp_path: Path
+) -> None:
+    t_s = np.arange(100.0)
+    path = write(tmp_path / "a.csv", header, np.column_stack([t_s, 1000.0 + 0.001 * t_s]))
+    record = load_pressures(path, naming)
+    assert np.allclose(record.samples.pressure_pa, 100_000.0 + 0.1 * t_s)
+    assert record.notes == notes
+
+
+def test_the_public_exports_are_read_without_options(tmp_path: Path) -> None:
+    for name, steps in (("xio_ngimu/short_walk.csv", 16), ("xsens_mtw_voisard/1-2_rf.txt", 17)):
+        path = data_or_skip(name.partition("/")[0]) / name.partition("/")[2]
+        shown = CliRunner().invoke(app, ["foot", str(path), "--out", str(tmp_path / "track.csv")])
+        assert f"{steps} steps" in shown.output

@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: MIT
+"""`echostep foot`: a recorded IMU in, a track out; wrong input is named, never tracked."""
+
+from __future__ import annotations
+
+import csv
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from command_line import echostep
+from echostep.errors import EchostepError
+from echostep.offline.imu_csv import load_imu
+from echostep_app import cli
+from echostep_app.simulation.devices.mtx import specific_force_and_rate
+from echostep_app.simulation.people.walker import Person, walk
+from echostep_studies.frame.recordings import DATA
+from needs_data import needs_data
+
+HEADER = "t_s,ax,ay,az,gx,gy,gz"
+Spoil = Callable[[np.ndarray, np.random.Generator], np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def table() -> np.ndarray:
+    """A simulated foot that walks 12 m out and 5 m to the side, 100 Hz."""
+    found = walk([(0.0, 0.0), (12.0, 0.0), (12.0, 5.0)], Person(), np.random.default_rng(1))
+    force, rate = specific_force_and_rate(found)
+    mean = np.column_stack([force, rate])[: len(force) // 10 * 10].reshape(-1, 10, 6).mean(1)
+    return np.column_stack([np.arange(len(mean)) / 100.0, mean])
+
+
+def write(folder: Path, table: np.ndarray, header: str = HEADER) -> Path:
+    path = folder / "imu.csv"
+    np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.13g")
+    return path
+
+
+def run(path: Path, *options: object) -> subprocess.CompletedProcess[str]:
+    """The command on a file; the track lands beside it."""
+    return echostep("foot", path, "--out", path.with_name("track.csv"), *options)
+
+
+@dataclass
+class Told:
+    """How the command ended, and what it said."""
+
+    status: int
+    out: str
+    err: str
+    track: Path
+
+    def end_m(self) -> float:
+        """How far the end is from the beginning."""
+        rows = np.genfromtxt(self.track, delimiter=",", skip_header=1)
+        return float(np.hypot(*(rows[-1, 1:3] - rows[0, 1:3])))
+
+    def known_m(self) -> float:
+        """The standard deviation that the summary states."""
+        found = re.search(r"known to ([0-9.]+) m", self.out)
+        assert found
+        return float(found[1])
+
+
+Command = Callable[[Path], Told]
+
+
+@pytest.fixture
+def foot(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Command:
+    """The command, in this process."""
+
+    def call(path: Path) -> Told:
+        track = path.with_name("track.csv")
+        monkeypatch.setattr(sys, "argv", ["echostep", "foot", str(path), "--out", str(track)])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        said = capsys.readouterr()
+        return Told(int(end.value.code or 0), said.out, said.err, track)
+
+    return call
+
+
+def test_a_walk_is_tracked_and_drawn(tmp_path: Path, table: np.ndarray) -> None:
+    done = run(write(tmp_path, table), "--picture", str(tmp_path / "track.png"))
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((tmp_path / "track.csv").read_text().splitlines()))
+    assert len(rows) == len(table)
+    assert set(rows[0]) == {"t_s", "x", "y", "z", "heading_rad", "stance"}
+    end = np.hypot(float(rows[-1]["x"]), float(rows[-1]["y"]))
+    assert end == pytest.approx(13.0, rel=0.03)
+    assert abs(float(rows[-1]["z"])) < 0.1
+    assert (tmp_path / "track.png").stat().st_size > 10_000
+    assert "steps" in done.stdout
+
+
+@pytest.mark.parametrize("mounting", [(1, 0, 2), (2, 1, 0), (0, 2, 1)])
+def test_any_mounting_gives_the_same_way(tmp_path: Path, table: np.ndarray, mounting: tuple[int, int, int]) -> None:
+    turn = np.eye(3)[list(mounting)]
+    turn[0] *= np.linalg.det(turn)
+    turned = np.column_stack([table[:, 0], table[:, 1:4] @ turn.T, table[:, 4:7] @ turn.T])
+    assert run(write(tmp_path, turned)).returncode == 0
+    rows = list(csv.DictReader((tmp_path / "track.csv").read_text().splitlines()))
+    assert np.hypot(float(rows[-1]["x"]), float(rows[-1]["y"])) == pytest.approx(13.0, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "note"),
+    [
+        (lambda t, r: t[r.random(len(t)) > 0.2], "% of the samples are missing"),
+        (lambda t, _r: t[(t[:, 0] % 5.0) > 0.5], "gaps"),
+        (lambda t, r: np.repeat(t, 1 + (r.random(len(t)) < 0.3), axis=0), "repeat the time before"),
+        (lambda t, r: r.permutation(t), "sorted by it"),
+        (
+            lambda t, r: np.where((r.random(len(t)) < 0.05)[:, None], np.array([1.0] + 6 * [np.nan]) * t, t),
+            "without a number",
+        ),
+        (lambda t, _r: np.column_stack([t[:, :4], np.clip(t[:, 4:], -4.5, 4.5)]), "is cut off at 4.5"),
+        (lambda t, _r: np.column_stack([t[:, 0], np.clip(t[:, 1:4], -25.0, 25.0), t[:, 4:]]), "is cut off at"),
+        (lambda t, _r: t * [1, 1, -1, -1, 1, -1, -1], "steps"),  # upside down
+        (lambda t, _r: t[150:], "steps"),
+        (lambda t, _r: t[:-150], "steps"),
+        (lambda t, _r: t + [1.7e9, 0, 0, 0, 0, 0, 0], "steps"),  # a clock that counts from 1970
+    ],
+)
+def test_what_can_be_mended_is_said_and_the_track_is_right_or_known_to_be_less_certain(
+    tmp_path: Path, table: np.ndarray, foot: Command, spoil: Spoil, note: str
+) -> None:
+    told = foot(write(tmp_path, spoil(table, np.random.default_rng(2))))
+    assert told.status == 0, told.err
+    assert note in told.out
+    assert abs(told.end_m() - 13.0) < max(3.0 * told.known_m(), 0.4)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "named"),
+    [
+        (lambda t, _r: np.column_stack([t[:, 0], t[:, 1:4] / 9.80665, t[:, 4:]]), "look like g"),
+        (lambda t, _r: np.column_stack([t[:, 0], t[:, 1:4] * 100, t[:, 4:]]), "gravity is 9.8"),
+        (lambda t, _r: np.column_stack([t[:, :4], np.degrees(t[:, 4:])]), "deg/s"),
+        (lambda t, _r: np.column_stack([t[:, 0] * 1000, t[:, 1:]]), "milliseconds"),
+        (lambda t, _r: np.column_stack([t[:, 0] * 1e6, t[:, 1:]]), "microseconds"),
+        (lambda t, _r: t[::4], "a foot needs 50"),
+        (lambda t, _r: np.column_stack([t[:, 0] / 20, t[:, 1:]]), "average them down"),
+        (lambda t, _r: np.column_stack([t[:, 0], t[:, 1:5], 0 * t[:, 5], t[:, 6]]), "gy is constant"),
+        (lambda t, _r: np.column_stack([t[:, :5], np.where(t[:, 0] > 6, 1.0, t[:, 5]), t[:, 6]]), "gy does not change"),
+        (lambda t, _r: np.column_stack([0 * t[:, 0], t[:, 1:]]), "does not advance"),
+        (lambda t, r: np.where(r.random(t.shape) < 0.3, np.nan, t), "no number"),
+        (lambda t, _r: np.column_stack([np.tile(t[:300, 0], 9)[: len(t)], t[:, 1:]]), "t_s"),
+        (lambda t, r: r.standard_normal(t.shape) * [0, 6, 6, 6, 3, 3, 3] + t * [1, 0, 0, 0, 0, 0, 0], "never stands"),
+        (lambda t, _r: t * [1, 1, 1, 1, 1, -1, 1], "are the units"),  # left-handed
+        (lambda t, _r: np.column_stack([t[:, :4], np.radians(t[:, 4:])]), "are the units"),  # converted twice
+        (lambda t, _r: t[:, [0, 1, 2, 3, 5, 4, 6]], "are the units"),  # gx and gy swapped
+        (lambda t, _r: t - [0, 0, 0, 9.81, 0, 0, 0], "gravity was removed"),
+        (lambda t, _r: t[:1], "no samples"),
+    ],
+)
+def test_wrong_input_is_named(tmp_path: Path, table: np.ndarray, foot: Command, spoil: Spoil, named: str) -> None:
+    told = foot(write(tmp_path, spoil(table, np.random.default_rng(4))))
+    assert (told.status, told.err.count("\n")) == (2, 1), told.err + told.out
+    assert named in told.err
+    assert "imu.csv" in told.err
+    assert not told.track.exists()
+
+
+def with_header(text: str, header: str | None) -> str:
+    lines = text.splitlines(keepends=True)
+    return "".join(([] if header is None else [header + "\n"]) + lines[1:])
+
+
+@pytest.mark.parametrize(
+    "spell",
+    [
+        lambda text: "\ufeff" + text,
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: text.replace(",", ";"),
+        lambda text: text.replace(",", ";").replace(".", ","),
+        lambda text: text.replace(",", "\t"),
+        lambda text: text.replace("\n", "\n\n"),
+        lambda text: text[:-20],
+        lambda text: with_header(text, "gz, gy,gx ,az,ay,ax,t_s,colour").replace("\n", ",7\n"),
+    ],
+)
+def test_every_spelling_of_a_table_is_read(tmp_path: Path, table: np.ndarray, spell: Callable[[str], str]) -> None:
+    plain = load_imu(write(tmp_path, table))
+    text = spell((tmp_path / "imu.csv").read_text())
+    if "colour" in text:
+        text = spell(
+            "\n".join(",".join(line.split(",")[::-1]) for line in (tmp_path / "imu.csv").read_text().splitlines())
+            + "\n"
+        )
+    (tmp_path / "imu.csv").write_bytes(text.encode())
+    read = load_imu(tmp_path / "imu.csv")
+    assert np.array_equal(read.accel[:-1], plain.accel[: len(read.accel) - 1])
+    assert np.array_equal(read.gyro[:-1], plain.gyro[: len(read.gyro) - 1])
+    assert len(read.t_s) in (len(plain.t_s), len(plain.t_s) - 1)
+
+
+def test_a_missing_header_is_named(tmp_path: Path, table: np.ndarray, foot: Command) -> None:
+    write(tmp_path, table)
+    (tmp_path / "imu.csv").write_text(with_header((tmp_path / "imu.csv").read_text(), None))
+    told = foot(tmp_path / "imu.csv")
+    assert told.status == 2
+    assert "the first line must name the columns" in told.err
+
+
+@pytest.mark.parametrize(
+    "garbage", [b"\x00" * 4096, bytes(range(256)) * 16, b"spam,eggs,ham\n" * 300, b"1,2,3,4,5,6,7\n" * 300]
+)
+def test_a_gigabyte_of_garbage_ends_at_once_and_takes_no_memory(tmp_path: Path, garbage: bytes) -> None:
+    """64 MB stand for it: what is read of them is bounded, so 1 GB takes no longer."""
+    path = tmp_path / "imu.csv"
+    for head in (b"", HEADER.encode() + b"\n"):
+        with path.open("wb") as file:
+            file.write(head)
+            for _ in range((64 << 20) // (len(garbage) * 64)):
+                file.write(garbage * 64)
+        if head and garbage.startswith(b"1,2"):
+            path.write_bytes(path.read_bytes()[: 1 << 20])  # these are rows: reading them takes what it takes
+        began = time.process_time()
+        with pytest.raises(EchostepError, match=r"imu\.csv"):
+            load_imu(path)
+        assert time.process_time() - began < 20.0
+
+
+@pytest.mark.parametrize("content", ["", "a,b,c\n1,2,3\n", "\x00\x01\x02", HEADER + "\n", HEADER + "\nx,y\n"])
+def test_what_is_no_table_is_named(tmp_path: Path, content: str) -> None:
+    (tmp_path / "x.csv").write_text(content)
+    with pytest.raises(EchostepError, match=r"x\.csv"):
+        load_imu(tmp_path / "x.csv")
+
+
+@needs_data("xio_ngimu")
+def test_a_real_walk_ends_where_it_began(tmp_path: Path) -> None:
+    raw = np.loadtxt(DATA / "xio_ngimu/short_walk.csv", delimiter=",", skiprows=1)
+    done = run(write(tmp_path, np.column_stack([raw[:, 0], raw[:, 4:7] * 9.80665, np.radians(raw[:, 1:4])])))
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((tmp_path / "track.csv").read_text().splitlines()))
+    assert np.hypot(float(rows[-1]["x"]), float(rows[-1]["y"])) < 0.10

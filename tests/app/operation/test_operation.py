@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: MIT
+"""The operation: order, words, trails, histories, and bounds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from echostep_app.operation import trails
+from echostep_app.operation.operation import MOST_EVENTS
+from echostep_app.operation.words import heard_words, place_words, tilt_words
+from echostep_app.team.messages.report import ReportedAlarm, decode, encode
+from operation.teams import TOWER, Team, place, whole_team
+from team.team_reports import POSITION, report
+
+
+def columns(raw: bytes, width: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
+    return np.frombuffer(raw, "<f4").reshape(-1, width)
+
+
+def test_the_fallen_the_lost_and_the_silent_come_first_each_in_words() -> None:
+    rows = whole_team().scene().rows
+    assert [(row.name, row.state) for row in rows[:5]] == [
+        ("Finn", "mayday"), ("Kim", "lost"), ("Bo", "stale"), ("Dana", "uncertain"), ("Chris", "waiting"),
+    ]  # fmt: skip
+    assert rows[0].words.startswith("mayday, Ground floor, ")
+    assert "mayday: no motion for 40 s" in rows[0].notes
+    kim, anna = rows[1], next(row for row in rows if row.name == "Anna")
+    assert kim.words.startswith("lost, ")
+    assert kim.words == "lost, last known 0 s ago, Ground floor, in corridor, heard 2 s ago"  # no claim of a place
+    assert anna.words.endswith("within 0.4 m, heard 2 s ago")
+    assert anna.words.startswith(f"{TOWER.levels[1].name}, ")
+    assert rows[2].words.startswith("silent, ")
+
+
+@pytest.mark.parametrize(
+    ("silent_s", "words"), [(0.2, "heard now"), (2.2, "heard 2 s ago"), (300.0, "heard 5 min ago")]
+)
+def test_how_long_ago_a_wearer_was_heard(silent_s: float, words: str) -> None:
+    assert heard_words(silent_s) == words
+
+
+def test_without_a_safe_radius_the_95_percent_radius_is_said() -> None:
+    assert place_words(replace(POSITION, protection_m=None))[2] == "±0.8 m"
+    assert place_words(replace(POSITION, protection_m=12.34))[2] == "within 12 m"
+
+
+def test_a_report_carries_the_safe_radius_and_older_ones_have_none() -> None:
+    made = report(position=replace(POSITION, protection_m=0.4))
+    assert decode(encode(made)) == made
+    old = encode(made).replace(b',"protection_m":0.4', b"")
+    assert decode(old).position == replace(POSITION, protection_m=None)
+
+
+def test_the_safe_radius_grows_while_nothing_is_heard() -> None:
+    team = Team(now_s=0.0)
+    team.hear("Kim", place(TOWER, 1.0, 1.0, 0))
+    team.pass_time(30.0)
+    ((_, _, _, _, _, radius, protection),) = columns(team.scene().places, 7).tolist()
+    assert protection > 3.7 * 1.5 * 30.0  # 1 in 1,000 of a walk of 30 s at 1.5 m/s in any direction
+    assert 2.4 * 1.5 * 30.0 < radius < protection
+
+
+def test_places_are_those_of_the_reports() -> None:
+    team = Team(now_s=0.0)
+    team.hear("Kim", place(TOWER, 1.0, 2.0, 1, heading_rad=None, protection_m=None))
+    team.hear("Anna", place(TOWER, 3.0, 4.0, 0))
+    team.hear("Bo", None)
+    rows = {row[0]: row[1:] for row in columns(team.scene().places, 7).tolist()}
+    numbers = {row.name: row.id for row in team.scene().rows}
+    assert rows[numbers["Kim"]][:3] == [1.0, 2.0, 1.0]
+    assert np.isnan(rows[numbers["Kim"]][3])
+    assert np.isnan(rows[numbers["Kim"]][5])
+    assert numbers["Bo"] not in rows
+
+
+def test_a_wearer_on_another_plan_has_no_place_on_this_one_and_it_is_said() -> None:
+    team = Team(now_s=0.0)
+    team.hear("Kim", place(TOWER, 1.0, 2.0, 1), plan_sha256="f" * 64)
+    (row,) = team.scene().rows
+    assert row.level is None
+    assert "tracked on another plan" in row.notes[0]
+    assert not team.scene().places
+
+
+def test_trails_hold_the_last_minutes_and_are_sent_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    team = Team(now_s=0.0)
+    for k in range(40):
+        team.hear("Kim", place(TOWER, 0.1 * k, 2.0, 0))
+        team.pass_time(1.0)
+    raw, end = team.operation.trail(0, team.now_s)
+    x_m = columns(raw, 5)[:, 1]
+    assert np.all(np.diff(x_m) >= trails.POINT_M - 1e-6)
+    assert team.operation.trail(end, team.now_s) == (b"", end)
+    monkeypatch.setattr(trails, "MOST_POINTS", 3)
+    team.hear("Kim", place(TOWER, 9.0, 2.0, 0))
+    raw, end = team.operation.trail(0, team.now_s)
+    assert len(columns(raw, 5)) == 3
+    team.pass_time(trails.TRAIL_S + 1.0)
+    team.hear("Kim", place(TOWER, 11.0, 2.0, 0))
+    assert len(columns(team.operation.trail(0, team.now_s)[0], 5)) == 1
+
+
+def test_a_history_says_when_a_state_changed_and_is_bounded() -> None:
+    team = Team(now_s=0.0)
+    team.hear("Kim", place(TOWER, 1.0, 2.0, 1))
+    number = team.scene().rows[0].id
+    for k in range(2 * MOST_EVENTS):
+        team.pass_time(1.0)
+        team.hear("Kim", place(TOWER, 1.0, 2.0, 1), status="lost" if k % 2 else "tracking")
+    details = team.operation.details(number, team.now_s)
+    assert details is not None
+    assert len(details.history) == MOST_EVENTS
+    assert details.history[0].text.startswith("lost: ")
+    assert details.history[0].unix_s == team.unix_s
+    facts = {fact.name: fact.value for fact in details.facts}
+    assert facts["place"] == "not known"
+    assert facts["last known"].startswith("last known 0 s ago, ")
+    assert not {"floor", "heading", "safe radius"} & set(facts)
+    assert team.operation.details(number + 1, team.now_s) is None
+
+
+def test_a_fall_and_the_trunks_tilt_are_said_in_words() -> None:
+    team = Team(now_s=0.0)
+    fall = ReportedAlarm("mayday", "fall", 1, 14.0)
+    team.hear("Kim", place(TOWER, 1.0, 2.0, 1), alarm=fall, trunk_tilt_deg=86.0)
+    (row,) = team.scene().rows
+    assert row.state == "mayday"
+    assert "mayday: fall 14 s ago" in row.notes
+    details = team.operation.details(row.id, team.now_s)
+    assert details is not None
+    facts = {fact.name: fact.value for fact in details.facts}
+    assert (facts["alarm"], facts["trunk"]) == ("mayday: fall 14 s ago", "lying (86°)")
+    assert [tilt_words(deg) for deg in (4.0, 40.0)] == ["upright (4°)", "bent (40°)"]
+
+
+def test_two_wearers_with_one_name_are_two_rows_and_it_is_said() -> None:
+    team = Team(now_s=0.0)
+    team.hear("Kim", place(TOWER, 1.0, 2.0, 1))
+    team.hear("Kim", place(TOWER, 8.0, 2.0, 1), run="deadbeef", sequence=1)
+    rows = team.scene().rows
+    assert len(rows) == 2
+    assert all("name used twice" in row.notes[0] for row in rows)
+    assert len({row.id for row in rows}) == 2
+
+
+def test_hostile_messages_are_counted_by_name_and_nothing_else_is_lost() -> None:
+    team = Team(now_s=0.0)
+    team.hear("Kim", place(TOWER, 1.0, 2.0, 1))
+    team.put_bytes("echostep/red/Kim/estimate", b"\xff\xff")
+    team.put_bytes("echostep/red/Kim/estimate", encode(report("Eve")))
+    team.put_bytes("echostep/x/y/z/w", b"{}")
+    team.hear("Kim", place(TOWER, 1.5, 2.0, 1))
+    scene = team.scene()
+    assert len(scene.rows) == 1
+    assert "name and topic contradict each other" in scene.refused
+    assert "unknown topic" in scene.refused
+    assert columns(scene.places, 7)[0, 1] == 1.5
+
+
+def test_a_clock_that_is_wrong_is_said_and_decides_nothing() -> None:
+    team = Team(now_s=0.0)
+    made = report("Kim", 1, team.unix_s + 3600.0, plan_sha256=TOWER.digest, position=place(TOWER, 1.0, 2.0, 1))
+    team.put(made)
+    (row,) = team.scene().rows
+    assert row.state == "tracking"
+    assert any("clock ahead by 3600 s" in note for note in row.notes)

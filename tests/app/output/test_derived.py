@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: MIT
+"""Derived messages: viewers can read them, and the tracker does not notice that they are written."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+from echostep.localization.estimate import Estimate, digest
+from echostep.plan.model import Georeference, Plan, load_plan
+from echostep.ports.chunks import portion_of
+from echostep.recording.reading import open_recording
+from echostep.tracker import Tracker
+from echostep_app.output.derived import TOPICS, Derived, east_north
+from echostep_app.output.foxglove import FRAME, LOCATION, POSE, SCENE
+from echostep_app.recording.recorder import Recorder
+from walks import DEMO, walk_chunks
+
+TAY = Georeference(-2.978, 56.46, math.radians(30.0))
+
+
+def tracked(out: Path | None, plan: Plan, most: int = 50) -> list[Estimate]:
+    """A simulated walk, with derived messages written if there is somewhere to write them."""
+    tracker = Tracker(plan, seed=1)
+    derived, estimates = Derived(tracker), []
+    recorder = Recorder(out, {"note": "a test"}) if out else None
+    chunks = walk_chunks()
+    for begin in range(0, len(chunks), most):
+        portion = portion_of(chunks[begin : begin + most])
+        if recorder:
+            for chunk in portion.chunks():
+                recorder.write(chunk)
+        new = tracker.take(portion)
+        estimates += new
+        if recorder:
+            recorder.write_derived(derived.take(portion, new))
+    if recorder:
+        recorder.close()
+    return estimates
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Estimate]]:
+    path = tmp_path_factory.mktemp("derived") / "walk.mcap"
+    return path, tracked(path, dataclasses.replace(load_plan(DEMO), georeference=TAY))
+
+
+def derived_of(path: Path) -> list[tuple[Any, Any, int, dict[str, Any]]]:
+    """Channel, schema, time and body of each derived message, read by the format's own library, in order of time."""
+    with path.open("rb") as file:
+        return [
+            (channel, schema, message.log_time, json.loads(message.data))
+            for schema, channel, message in make_reader(file).iter_messages()
+            if channel.message_encoding == "json"
+        ]
+
+
+def closed(schema: Any) -> Any:
+    """The schema with no other fields allowed than those that it names."""
+    if isinstance(schema, dict):
+        strict = {k: closed(v) for k, v in schema.items()}
+        return {**strict, "additionalProperties": False} if "properties" in schema else strict
+    return schema
+
+
+@pytest.mark.slow
+def test_every_message_is_what_its_schema_says(recorded: tuple[Path, list[Estimate]]) -> None:
+    checks: dict[str, Any] = {}
+    for channel, schema, _, body in derived_of(recorded[0]):
+        assert schema.encoding == "jsonschema"
+        rules = json.loads(schema.data)
+        assert schema.name == rules["title"]
+        check = checks.setdefault(channel.topic, jsonschema.Draft202012Validator(closed(rules)))
+        check.validate(body)
+    assert checks.keys() == {t.name for t in (*TOPICS, POSE, FRAME, SCENE, LOCATION)}
+
+
+@pytest.mark.slow
+def test_estimates_and_poses_are_the_trackers(recorded: tuple[Path, list[Estimate]]) -> None:
+    path, estimates = recorded
+    found = derived_of(path)
+    bodies = [body for channel, _, _, body in found if channel.topic == "/estimate"]
+    assert [(b["t_s"], b["x_m"], b["yy_m2"], b["status"]) for b in bodies] == [
+        (e.t_s, e.x_m, e.yy_m2, e.status.value) for e in estimates
+    ]
+    poses = [body["pose"] for channel, _, _, body in found if channel.topic == "/pose"]
+    for pose, e in zip(poses, estimates, strict=True):
+        assert pose["position"]["x"] == pytest.approx(e.x_m, abs=1e-4)
+        assert 2.0 * math.atan2(pose["orientation"]["z"], pose["orientation"]["w"]) == pytest.approx(e.heading_rad)
+
+
+@pytest.mark.slow
+def test_messages_stand_at_their_own_time(recorded: tuple[Path, list[Estimate]]) -> None:
+    path, estimates = recorded
+    chunks = list(open_recording(path).chunks())
+    times = [t_ns for channel, _, t_ns, _ in derived_of(path) if channel.topic == "/estimate"]
+    apart = np.diff(times) * 1e-9 - np.diff([e.t_s for e in estimates])
+    assert np.abs(apart).max() < 0.01
+    assert chunks[0].t_arrival_ns <= times[0] <= times[-1] <= chunks[-1].t_arrival_ns
+
+
+def test_steps_echoes_and_pressure_are_plausible(recorded: tuple[Path, list[Estimate]]) -> None:
+    found = derived_of(recorded[0])
+    by_topic: dict[str, list[dict[str, Any]]] = {}
+    for channel, _, _, body in found:
+        by_topic.setdefault(channel.topic, []).append(body)
+    steps = by_topic["/step"]
+    assert [s["step"] for s in steps] == sorted({e.step for e in recorded[1]} - {0})
+    assert all(0.1 < s["length_m"] < 2.0 for s in steps)
+    heard = [e["range_m"] for side in ("left", "right") for e in by_topic[f"/echo/{side}"] if e["heard"]]
+    assert heard
+    assert all(0.1 < range_m < 7.0 for range_m in heard)
+    assert all(95_000 < p["pressure_pa"] < 105_000 for p in by_topic["/pressure"])
+    names = [entity["id"] for body in by_topic["/scene"] for entity in body["entities"]]
+    assert sum(name.startswith("plan") for name in names) == 1
+
+
+@pytest.mark.slow
+def test_a_recording_with_derived_messages_replays_to_the_same_estimates(recorded: tuple[Path, list[Estimate]]) -> None:
+    path, estimates = recorded
+    assert tuple(open_recording(path).chunks()) == walk_chunks()
+    assert digest(tracked(None, load_plan(DEMO), most=7)) == digest(estimates)
+
+
+def test_covariance_on_earth_is_the_turned_one() -> None:
+    c, s = math.cos(TAY.rotation_rad), math.sin(TAY.rotation_rad)
+    turn = np.array([[c, -s], [s, c]])
+    expected = turn @ np.array([[0.5, 0.1], [0.1, 0.2]]) @ turn.T
+    east, both, north = east_north(TAY.rotation_rad, 0.5, 0.1, 0.2)
+    assert np.array([[east, both], [both, north]]) == pytest.approx(expected)

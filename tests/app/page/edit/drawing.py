@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""The plan editor in a browser: open it, click and drag in metres of the plan, save.
+
+With ECHOSTEP_PICTURES=1 the pictures of the manual are made anew.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from board_runs import ROOT
+from echostep.plan.model import load_plan
+from echostep_app.page.editor import EditServer
+from page.browser import spot, wait_for
+from waiting import PATIENCE_S, until
+
+PHONES = {"upright": (360, 740), "sideways": (740, 360)}
+PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
+
+
+def opened(browser: Any, server: EditServer, **context: Any) -> Any:
+    page = browser.new_context(**({"viewport": {"width": 1200, "height": 760}} | context)).new_page()
+    page.set_default_timeout(1e3 * PATIENCE_S)
+    page.wrong = []
+    page.on("pageerror", lambda error: page.wrong.append(str(error)))
+    page.on("console", lambda said: page.wrong.append(said.text) if said.type == "error" else None)
+    page.goto(server.url)
+    assert until(lambda: page.evaluate("Boolean(window.echostep)")), page.wrong
+    return page
+
+
+def on_phone(browser: Any, server: EditServer, held: str) -> Any:
+    """The page on a phone that is held in one of the ways of PHONES."""
+    width, height = PHONES[held]
+    return opened(browser, server, viewport={"width": width, "height": height}, has_touch=True, is_mobile=True)
+
+
+def tap(page: Any, x_m: float, y_m: float) -> None:
+    page.touchscreen.tap(*spot(page, x_m, y_m))
+
+
+def click(page: Any, x_m: float, y_m: float) -> None:
+    page.mouse.click(*spot(page, x_m, y_m))
+
+
+def saved(page: Any, server: EditServer) -> Any:
+    page.click("#save")
+    page.get_by_text("Saved new.json").wait_for()
+    return load_plan(server.file.path).levels[0]
+
+
+def answer(page: Any, text: str) -> None:
+    """Type the answer to the question in the dialog, and wait until the sheet has it."""
+    page.locator("#ask[open]").wait_for()
+    page.fill("#answer", text)
+    page.press("#answer", "Enter")
+    answered(page)
+
+
+def answered(page: Any) -> None:
+    """The last answer has arrived: a dialog closes before it gives it."""
+    wait_for(page, "!echostep.isOpen()")
+
+
+def drag(page: Any, begin: tuple[float, float], end: tuple[float, float], button: str = "left") -> None:
+    page.mouse.move(*spot(page, *begin))
+    page.mouse.down(button=button)
+    page.mouse.move(*spot(page, *end), steps=4)
+    page.mouse.up(button=button)
+
+
+def status(page: Any) -> str:
+    """What the page says."""
+    return str(page.text_content("#status"))
+
+
+def says(page: Any, words: str) -> None:
+    """The page comes to say this: an answer in a dialog arrives after the click."""
+    assert until(lambda: status(page) == words), f"{status(page)!r}, not {words!r}"

@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: MIT
+"""Elements of the page: replay cursor, status text, guidance, extrapolation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from echostep.errors import EchostepError
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization.particles.places import LikelyPlace
+from echostep.localization.particles.start import Start
+from echostep.path import PathSegment
+from echostep.plan.model import Plan, Pose
+from echostep.ports.chunks import Chunk, portion_of
+from echostep.ports.people.check_in import CheckIn
+from echostep.tracker import Tracker
+from echostep_app.page import requests
+from echostep_app.page.elements.guidance import Destination, RouteFinder
+from echostep_app.page.elements.lookahead import extrapolate, moves_as_one
+from echostep_app.page.elements.scene import status_text
+from echostep_app.page.elements.taps import Taps
+from echostep_app.page.elements.undo_offer import UndoClock, UndoOffer
+from echostep_app.page.live import LivePage
+from echostep_app.page.mailbox import SceneHistory
+from echostep_app.page.replay_cursor import ReplayCursor
+from echostep_app.plan.routing import RoutePlace
+from page.frames import LOCAL, PLAN, scene, told
+from plan.imported_plans import seven_floors
+
+
+def test_a_cursor_plays_stops_seeks_and_steps() -> None:
+    history = SceneHistory()
+    cursor = ReplayCursor(history)
+    assert cursor.scene(100.0) is None
+    for t_s in (10.0, 11.0, 12.0, 13.0):
+        history.add(scene(t_s))
+
+    def at(now_s: float) -> float:
+        shown = cursor.scene(now_s)
+        assert shown is not None
+        return shown.t_s
+
+    assert at(100.0) == 10.0
+    assert at(101.5) == 11.0
+    cursor.handle(requests.SetSpeed(4.0))
+    assert at(101.9) == 13.0
+    assert at(500.0) == 13.0
+    cursor.handle(requests.StepBy(-2))
+    assert (at(501.0), cursor.playing) == (11.0, False)
+    assert at(502.0) == 11.0
+    cursor.handle(requests.Seek(12.4))
+    assert at(503.0) == 12.0
+    cursor.handle(requests.Seek(1e9))
+    assert at(504.0) == 13.0
+    cursor.handle(requests.SetPlaying(True))  # at the end: from the beginning
+    assert at(504.0) == 10.0
+
+
+def test_status_in_words() -> None:
+    assert status_text(told()) == "tracking, 0.2 m"
+    assert status_text(told(sd_m=1.2, status=TrackStatus.UNCERTAIN)) == "uncertain, 3 m"
+    assert status_text(told(status=TrackStatus.LOST)) == "lost: walk along a wall or tap where you are"
+    assert status_text(None, needs_start=True) == "tap where you stand to start"
+
+
+def test_an_errand_finds_its_way_around_walls() -> None:
+    destination, here, goal = Destination(RoutePlace(13.0, 4.5)), told(9.0, 7.5), RoutePlace(13.0, 4.5)
+    looking = destination.guidance_at(here)
+    assert (looking.kind, looking.text, looking.arrow_rad, looking.path) == ("looking", "Looking for a way", None, ())
+    upstairs = Destination(RoutePlace(13.0, 4.5, 2)).guidance_at(here)
+    assert upstairs.text == "Looking for a way, 2 floors up"
+    assert destination.needs_route(here)
+    destination.set_route(RouteFinder(PLAN).find(here, goal), "", here)
+    way = destination.guidance_at(here)
+    assert not destination.needs_route(here)
+    assert (way.left_m or 0.0) > 5.5  # through the door at (13, 6.5)
+    assert way.path[-1] == (13.0, 4.5)
+    assert abs(way.arrow_rad or 0.0) < 0.3
+    with pytest.raises(EchostepError) as outside:
+        RouteFinder(PLAN).find(here, RoutePlace(500.0, 500.0))
+    destination.set_route(None, str(outside.value), here)
+    none = destination.guidance_at(here)
+    assert "No way was found: the destination (500.0, 500.0) is outside the plan" in none.text
+    assert (none.kind, none.arrow_rad, none.path) == ("none", None, ())
+    assert not destination.needs_route(here)
+    assert destination.needs_route(told(9.0, 7.5, t_s=10.0))
+
+
+@pytest.mark.long
+def test_a_step_leads_ahead_of_its_echoes(chunks: list[Chunk]) -> None:
+    tracker = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1)
+    off_m, last, then = [], None, None
+    for chunk in chunks:
+        new = tracker.feed(chunk)
+        if new and then:
+            off_m.append(math.hypot(new[0].x_m - then.x_m, new[0].y_m - then.y_m))
+            assert new[0].t_s == then.t_s
+        if new:
+            last, then = new[-1], None
+        if last and (since := tracker.state.pending_segments) and tracker.state.last_segment and not then:
+            then = extrapolate(last, tracker.state.last_segment, since[:1])
+            assert then.xx_m2 > last.xx_m2
+    assert len(off_m) > 5
+    assert max(off_m) < 0.3
+    assert np.median(off_m) < 0.1
+
+
+@pytest.mark.parametrize("start", [Start(), Pose(2.0, 7.5, 0.0)], ids=["in search", "tracked"])
+def test_a_cloud_in_search_waits_for_its_estimate(chunks: list[Chunk], start: Start | Pose) -> None:
+    """The step of a mean moves no particle of a search through a wall; a tracked cloud is ahead with its wearer."""
+    tracker, moved = Tracker(PLAN, start, seed=1), []
+    with LivePage(tracker, "test", LOCAL) as page:
+        for begin in range(0, len(chunks), 5):
+            portion = portion_of(chunks[begin : begin + 5])
+            tracker.take(portion)
+            page.publish(portion)
+            ahead, last = page._lookahead, page._scene
+            if isinstance(start, Start) and tracker.filter is not None and not tracker.state.searches:
+                break
+            if ahead and ahead.particles and last.particles and ahead.estimate and last.estimate:
+                stands = np.array_equal(ahead.particles.x_m, last.particles.x_m) and np.array_equal(
+                    ahead.particles.y_m, last.particles.y_m
+                )
+                assert (ahead.estimate.x_m, ahead.estimate.y_m) != (last.estimate.x_m, last.estimate.y_m)
+                moved.append(not stands)
+    assert len(moved) > 5
+    assert (not any(moved)) if isinstance(start, Start) else all(moved)
+
+
+@pytest.mark.parametrize(
+    ("last", "as_one"),
+    [
+        (told(), True), (told(status=TrackStatus.UNCERTAIN, sd_m=1.0), True), (told(status=TrackStatus.LOST), False),
+        (replace(told(status=TrackStatus.UNCERTAIN), hypotheses=(LikelyPlace(0.6, 5.0, 7.5, 0, 0.4, 0.0),)), False),
+        (replace(told(), heading_sd_rad=1.5), False),
+    ],
+)  # fmt: skip
+def test_particles_move_with_the_mean_at_one_place_with_one_heading(last: Estimate, as_one: bool) -> None:
+    assert moves_as_one(last) is as_one
+
+
+@pytest.mark.parametrize(
+    ("status", "sd_m", "step_sd_m", "then"),
+    [
+        (TrackStatus.UNCERTAIN, 4.5, 0.02, "uncertain, 11 m"), (TrackStatus.TRACKING, 0.1, 0.02, "tracking, 0.3 m"),
+        (TrackStatus.TRACKING, 0.1, 1.0, "uncertain, 2 m"), (TrackStatus.TRACKING, 0.1, 9.0, "lost: walk along a wall or tap where you are"),
+    ],
+)  # fmt: skip
+def test_a_step_ahead_changes_the_status_only_where_it_widens_the_radius(
+    status: TrackStatus, sd_m: float, step_sd_m: float, then: str
+) -> None:
+    """Half of the probability may be within 5 m of a position whose 95 % radius is 11 m: it stays `uncertain` while a foot lands."""
+    last, landed = told(sd_m=sd_m, status=status), PathSegment(1.0, 2.0, 0.7, 0.0, 0.0, 0.0, step_sd_m, 0.0, 2)
+    assert status_text(extrapolate(last, landed, [landed])) == then
+
+
+def crosses_a_wall(plan: Plan, level: int, line_m: Sequence[Sequence[float]]) -> bool:
+    walls = shapely.STRtree(shapely.linestrings(plan.levels[level].solid.reshape(-1, 2, 2)))
+    return bool(len(walls.query(shapely.LineString(line_m), predicate="intersects")))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plan", [PLAN, seven_floors()], ids=["demo", "seven floors"])
+def test_no_way_leads_through_a_wall_wherever_it_begins(plan: Plan) -> None:
+    """Places are drawn anywhere, in walls and close behind them too; a place without a way is an error, not a line."""
+    rng, finder, found = np.random.default_rng(1), RouteFinder(plan), 0
+    for _ in range(60):
+        x, y, u, v = (float(rng.uniform(0.3, most)) for most in (24.0, 13.0, 24.0, 13.0))
+        level, goal = (int(k) for k in rng.integers(0, len(plan.levels), 2))
+        try:
+            route = finder.find(replace(told(x, y), level=level), RoutePlace(u, v, goal))
+        except EchostepError:
+            continue
+        found += 1
+        for stretch in route.stretches:
+            if len(stretch.line_m) > 1:
+                assert not crosses_a_wall(plan, stretch.level, stretch.line_m.tolist()), (x, y, u, v)
+    assert found > 40
+
+
+def test_what_a_tap_would_do_is_said_before() -> None:
+    taps, there = Taps(PLAN), replace(scene(), estimate=told(2.0, 7.5, sd_m=0.1), echoes_fit=True)
+    plain = taps.consider(CheckIn(2.2, 7.5, None, 0.3), there)
+    assert plain.text == "In North corridor. 0.2 m from the estimate. Your direction stays: drag to change it."
+    aimed = taps.consider(CheckIn(2.2, 7.5, 1.0, 0.3), None)
+    assert (aimed.text, aimed.heading_rad) == ("In North corridor. You face the arrow.", 1.0)
+    far = taps.consider(CheckIn(13.0, 4.5, None, 0.3), there)
+    assert "11 m from the estimate. The echoes fit the estimate: are you sure?" in far.text
+    assert "sure" not in taps.consider(CheckIn(13.0, 4.5, None, 0.3), replace(there, echoes_fit=False)).text
+    wall = taps.consider(CheckIn(9.7, 4.0, None, 0.3), there)
+    assert wall.text.startswith(
+        "Nobody can stand there: it is inside a wall. The nearest possible place is 0.3 m away. In S"
+    )
+    assert wall.possible
+    assert abs(wall.x_m - 9.7) == pytest.approx(0.3)
+    assert taps.refusal(CheckIn(9.7, 4.0, None, 0.3)) == "Not accepted: it is inside a wall."
+    assert not taps.refusal(CheckIn(9.4, 4.0, None, 0.3))
+    upstairs = Taps(seven_floors()).consider(CheckIn(4.0, 10.0, None, 0.3, 3), None)
+    assert upstairs.text.startswith("In Office 301, Second floor.")
+
+
+def test_an_undoing_is_offered_for_ten_seconds_and_again_when_echoes_contradict() -> None:
+    clock, state = UndoClock(), replace(Tracker(PLAN).state, undoable=1, right=0.999)
+    seconds = 1_000_000_000
+    assert clock.offer(replace(state, undoable=None), 0) is None
+    assert clock.offer(state, 5 * seconds) == UndoOffer(1, 10.0, False)
+    assert clock.offer(state, 12 * seconds) == UndoOffer(1, 3.0, False)
+    assert clock.offer(state, 15 * seconds) is None
+    assert clock.offer(replace(state, right=0.2), 20 * seconds) == UndoOffer(1, 10.0, True)
+    assert clock.offer(replace(state, right=0.2), 30 * seconds) is None
+    assert clock.offer(replace(state, undoable=2), 31 * seconds) == UndoOffer(2, 10.0, False)

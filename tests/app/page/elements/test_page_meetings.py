@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+"""Meetings on the page: who can be met, what is sent, and what it is told."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from echostep.localization.team.meeting_memory import MeetingEffect
+from echostep_app.page.elements.meetings import WORDS, ShownMeeting
+from echostep_app.page.mailbox import Mailbox
+from echostep_app.page.requests import Met, parse_request
+from echostep_app.page.server import PageServer
+from page.browser import LOCAL, PLAN, looking, wait_for
+from page.frames import scene
+from waiting import until
+
+
+def test_every_effect_has_its_words() -> None:
+    assert set(WORDS) == set(MeetingEffect)
+    assert all(text.format("Kim") != text for text in WORDS.values())
+
+
+@given(st.text(max_size=40) | st.none() | st.integers() | st.lists(st.text(max_size=3), max_size=2))
+def test_a_meeting_needs_a_name(name: object) -> None:
+    request = parse_request(json.dumps({"kind": "met", "name": name}))
+    assert request == (Met(name) if isinstance(name, str) and 0 < len(name) <= 32 else None)
+
+
+def test_a_teammate_is_chosen_and_the_page_says_what_it_did(browser: Any) -> None:
+    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
+
+    mailbox = Mailbox(PLAN, "test", replay=False)
+    met: list[str] = []
+    with PageServer(mailbox, LOCAL) as server:
+        mailbox.publish(scene())
+        page = looking(browser, server.url, "bright")
+        wait_for(page, "echostep.last !== null && document.querySelector('#met').hidden")
+        mailbox.set_team(("anna", "<b>zoe"))
+        wait_for(page, "!document.querySelector('#met').hidden")
+        assert page.eval_on_selector_all("#met option", "all => all.map(({ text }) => text)") == [
+            "I met…",
+            "anna",
+            "<b>zoe",
+        ]
+        found = Axe().run(page)
+        page.select_option("#met", "<b>zoe")
+
+        def is_told() -> bool:
+            met.extend(mailbox.pop_meetings())
+            return bool(met)
+
+        assert until(is_told)
+        assert met == ["<b>zoe"]
+        assert page.input_value("#met") == ""
+        mailbox.publish(replace(scene(), met=ShownMeeting(1, "Your position is now beside <b>zoe.")))
+        wait_for(page, "document.querySelector('#hint').textContent === 'Your position is now beside <b>zoe.'")
+        page.evaluate("() => echostep.link.send('met', { name: 'nobody' })")
+        wait_for(page, "document.querySelector('#hint').textContent === 'nobody is not heard.'")
+        mailbox.set_team(())
+        wait_for(page, "document.querySelector('#met').hidden")
+        assert not page.wrong
+        page.context.close()
+    assert not list(mailbox.pop_meetings())
+    assert found.violations_count == 0, found.generate_report()

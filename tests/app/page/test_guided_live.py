@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: MIT
+"""Guidance from end to end: board, MTx and beacon gateway on real ports, `live` in a process of its own, a page that looks; then its replay."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import importlib
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Generator, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from websockets.exceptions import InvalidMessage
+from websockets.sync.client import connect
+from websockets.typing import Origin
+
+from board_runs import ROOT
+from echostep.plan.model import load_plan
+from echostep_app.commands.actions.beacon_player import simulate_gateway
+from echostep_app.simulation.devices.board import PythonBoard, Sent
+from echostep_app.simulation.scenario import Scenario
+from free_ports import free_port
+from page.frames import header
+from players import pseudo_terminal
+from walks import walk_chunks
+
+SEED = 3
+PLAN = ROOT / "host/core/echostep/plans/demo.json"
+WALK = ((2.0, 7.5), (9.0, 7.5))
+PATIENCE_S = 180.0  # on a fresh clone the kernels are compiled first
+
+
+class PortBoard:
+    """A Python board whose bytes go to a port, and whose orders come from there."""
+
+    def __init__(self, ours: int) -> None:
+        self._ours = ours
+        self._board = PythonBoard(seed=SEED)
+        self.is_open = False
+        self.t_s = 0.0  # board time
+
+    def advance(self, rows: NDArray[Any]) -> Sent:
+        """Let the milliseconds of these rows pass."""
+        self.t_s += 1e-3 * len(rows)
+        with contextlib.suppress(BlockingIOError):
+            self._board.send(os.read(self._ours, 4096))
+            self.is_open = True
+        for _, sent in self._board.advance(rows):
+            with contextlib.suppress(BlockingIOError):
+                os.write(self._ours, sent)
+        return []
+
+    def send(self, sent: bytes) -> None:
+        """Nothing: the host writes to the port itself."""
+
+    def fault(self, text: str) -> None:
+        """None."""
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+
+@contextlib.contextmanager
+def walking(beacons: str, truth: Path) -> Iterator[tuple[str, str]]:
+    """Ports of a board and an MTx whose wearer begins to walk when somebody opens them; a gateway tells what beacons hear of him."""
+    run = importlib.import_module("twin.run")
+    with pseudo_terminal() as (ours, port):
+        board, mtx = PortBoard(ours), run.PtyMtx()
+        scenario = Scenario(load_plan(PLAN), WALK, SEED, board)
+        arguments = (
+            PLAN,
+            truth,
+            beacons,
+            2.0,
+            1.0,
+            SEED,
+            lambda: board.t_s,
+        )  # in step with the board, however late that is
+        gateway = threading.Thread(target=simulate_gateway, args=arguments, daemon=True)
+        walk_chunks(1.0)  # its kernels are compiled or loaded before the wearer walks
+
+        def walk() -> None:
+            run.wait_for_opening(board, mtx)
+            scenario.write_truth(truth, board.t_s)
+            gateway.start()
+            run.play(scenario, board, mtx)
+
+        thread = threading.Thread(target=walk, daemon=True)
+        thread.start()
+        yield port, mtx.port
+        thread.join(PATIENCE_S)
+        gateway.join(PATIENCE_S)
+
+
+@pytest.fixture
+def live(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    beacons = f"udp://127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
+    with walking(beacons, tmp_path / "truth.csv") as (board, mtx):
+        command = [
+            *(sys.executable, "-m", "echostep", "live", "--plan", PLAN, "--board", board, "--mtx", mtx, "--port", "0"),
+            *("--beacons", beacons, "--guide", "9,7.5", "--out", tmp_path / "live"),
+        ]
+        running = subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        try:
+            yield running
+        finally:
+            running.kill()
+            running.communicate()
+
+
+def frames(url: str) -> Generator[dict[str, Any], None, None]:
+    """What a page gets that draws at once."""
+    ends = time.monotonic() + PATIENCE_S
+    with connect(f"ws{url[4:]}socket", origin=Origin(url.rstrip("/")), max_size=None, open_timeout=PATIENCE_S) as page:
+        assert json.loads(page.recv(timeout=PATIENCE_S))["kind"] == "hello"
+        while time.monotonic() < ends:
+            frame = header(page.recv(timeout=PATIENCE_S))
+            page.send(json.dumps({"kind": "drawn", "seq": frame["seq"]}))
+            yield frame
+
+
+@pytest.mark.long
+@pytest.mark.process
+def test_a_guided_walk_among_beacons_is_seen_on_the_page(live: subprocess.Popen[str], tmp_path: Path) -> None:
+    assert live.stdout
+    url = next(found[1] for line in live.stdout if (found := re.search(r"The page: (\S+)", line)))
+    spoken: set[str] = set()
+    marks: dict[int, dict[str, Any]] = {}
+    seen: dict[str, Any] = {}
+    with contextlib.closing(frames(url)) as pages:
+        try:
+            seen = next(pages)
+        except (OSError, InvalidMessage) as error:
+            assert live.poll() is None, live.stdout.read()
+            pytest.skip(f"this machine is too slow to walk in real time: no page yet ({error})")
+    for seen in frames(url):
+        marks |= {mark["number"]: mark for mark in seen["beacons"]}
+        spoken |= {seen["guidance"]["spoken"]} if seen["guidance"] else set()
+        if "You have arrived." in spoken:
+            break
+    assert seen
+    live.send_signal(signal.SIGINT)
+    said, _ = live.communicate(timeout=PATIENCE_S)
+    assert live.returncode == 0, said
+    assert {"Straight ahead.", "You have arrived."} <= spoken
+    assert len(marks) >= 3
+    assert all(mark["state"] == "well" for mark in marks.values())
+    assert any(mark["heard"] for mark in seen["beacons"])
+    cues = (tmp_path / "live/cues.csv").read_bytes()
+    assert {row["kind"] for row in csv.DictReader(cues.decode().splitlines())} >= {"ahead", "arrived"}
+    again = subprocess.run(
+        [sys.executable, "-m", "echostep", "replay", tmp_path / "live/walk.mcap", "--plan", PLAN, "--guide", "9,7.5",
+         "--headless", "--out", tmp_path / "again"],
+        capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+    )  # fmt: skip
+    assert again.returncode == 0, again.stderr
+    assert (tmp_path / "again/cues.csv").read_bytes() == cues
+    truth = np.genfromtxt(tmp_path / "truth.csv", delimiter=",", names=True)
+    end = list(csv.DictReader((tmp_path / "live/track.csv").read_text().splitlines()))[-1]
+    assert (
+        np.hypot(float(end["x_m"]) - truth["x"][-1], float(end["y_m"]) - truth["y"][-1]) < 1.3
+    )  # a metre before it is there

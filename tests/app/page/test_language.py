@@ -1,0 +1,318 @@
+# SPDX-License-Identifier: MIT
+"""The languages of the pages in Chromium: every text has an entry in the catalogue, none is cut off on a phone, and how a language is chosen."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from echostep.plan.model import Plan, load_plan
+from echostep_app.commands.options import Language
+from echostep_app.page.editor import EditServer
+from echostep_app.page.elements.guidance import ShownGuidance
+from echostep_app.page.elements.scene import PageScene
+from echostep_app.page.mailbox import Mailbox
+from echostep_app.page.server import LOCAL as HERE
+from echostep_app.page.server import STATIC, Address, PageServer
+from echostep_app.plan.importers.formats import import_plan
+from echostep_app.plan.questions import with_questions
+from echostep_app.plan.writer import save_plan
+from echostep_app.team.messages.crews import Crew
+from echostep_app.team.messages.report import ReportedAlarm
+from operation.teams import BASE, NAMES, TOWER, ServedTeam, place, whole_team
+from page.browser import READY, loaded_page, overflow, wait_for
+from page.edit.drawing import answer, answered, click, status
+from page.edit.test_editor_questions import doubtful_house
+from page.frames import scene, served
+from page.sentences import editor_texts, host_texts, page_texts
+from page.web.test_page_sizes import RATES, UNREACHED, moments
+from plan.imported_plans import seven_floors
+
+TABLE_READY = (
+    "window.echostep?.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
+)
+EDITOR_READY = "Boolean(window.echostep)"
+LOCALES = {"en": "en-GB", "de": "de-DE"}
+HOLE = re.compile(r"\{(\w+)\}")
+MISSING = "[...echostep.missing]"
+LANG = "document.documentElement.lang"
+CUT = """(() => {
+    const pen = document.createElement('canvas').getContext('2d'), wrong = [], ARROW = 24;
+    for (const element of document.querySelectorAll('body *')) {
+        if (!element.offsetParent || element.closest('.unseen, svg, h1, #map, #floors, #floor, #level, .name')) continue;  // names may be cut
+        const style = getComputedStyle(element), { clientWidth: width, clientHeight: height } = element;
+        const name = `${element.id || element.tagName}: ${element.innerText}`;
+        pen.font = `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`;
+        if (element.tagName === 'SELECT' && pen.measureText(element.selectedOptions[0]?.text ?? '').width > width - ARROW) wrong.push(name);
+        if (style.overflowX === 'hidden' || element.tagName === 'BUTTON') if (element.scrollWidth > width + 1) wrong.push(name);
+        if (style.overflowY === 'hidden' && element.scrollHeight > height + 1) wrong.push(name);
+        if (element.getBoundingClientRect().right > innerWidth + 1) wrong.push(name);
+    }
+    return wrong;
+})()"""  # texts that do not fit where they stand
+STATUSES = (
+    "tap where you stand to start",
+    "waiting for the foot to stand still",
+    "preparing; the first time on a computer its kernels are compiled, which takes about a minute",
+    "tracking, outside the building, 0.4 m",
+    "uncertain, 12 m above the start, 40 m",
+    "lost: nothing from the foot for 120 s",
+    "lost: 7 places fit; walk on, turn into a room or tap where you are",
+    "this plan does not fit: is it another building or floor, or mirrored?",
+)
+CUES = (
+    "Stop. Your direction is not known: turn once around, slowly",
+    "Your place is not known yet: walk slowly along the walls",
+    "No beacon hears you. Go back to the last known place",
+    "You left the way: it is 12 metres off",
+)
+
+
+def catalogue(name: str) -> dict[str, str]:
+    """All entries of a language."""
+    parts = [json.loads(path.read_text("utf-8")) for path in sorted(STATIC.glob(f"{name}-*.json"))]
+    return {key: text for part in parts for section in part.values() for key, text in section.items()}
+
+
+def names(plan: Plan) -> set[str]:
+    """The names on a plan, which are in no catalogue."""
+    return {
+        plan.name,
+        *(level.name for level in plan.levels),
+        *(room.name for level in plan.levels for room in level.rooms),
+    }
+
+
+def page_of(browser: Any, url: str, lang: str, ready: str, **how: Any) -> Any:
+    """A page on a phone whose browser speaks a language."""
+    return loaded_page(browser, url, {"viewport": {"width": 360, "height": 740}, "locale": LOCALES[lang]} | how, ready)
+
+
+def violations(page: Any) -> list[str]:
+    """What axe finds, with the first element."""
+    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
+
+    return [f"{found['id']}: {found['nodes'][0]['html']}" for found in Axe().run(page).response["violations"]]
+
+
+@pytest.fixture(scope="module")
+def url() -> Iterator[str]:
+    with served(Mailbox(seven_floors(), "A walk", replay=False)) as (server, mailbox):
+        mailbox.publish(scene())
+        yield server.url
+
+
+def test_entries_have_the_holes_of_their_texts() -> None:
+    german = catalogue("de")
+    assert {key: text for key, text in german.items() if set(HOLE.findall(key)) != set(HOLE.findall(text))} == {}
+    assert all(text.strip() for text in german.values())
+    assert not [key for key in german if key.endswith(".")]
+
+
+def test_every_text_of_the_source_has_an_entry(browser: Any, url: str) -> None:
+    page = page_of(browser, url, "de", READY)
+    texts = page_texts() | host_texts()
+    assert len(texts) > 200
+    page.evaluate("(texts) => texts.forEach((text) => echostep.tr(text))", sorted(texts))
+    assert set(page.evaluate(MISSING)) - names(seven_floors()) - {"echostep", "GeoJSON"} == set()
+    page.context.close()
+
+
+def test_every_text_of_the_editor_has_an_entry(browser: Any, tmp_path: Path) -> None:
+    with EditServer(tmp_path / "new.json", port=0) as server:
+        page = page_of(browser, server.url, "de", EDITOR_READY)
+        texts = editor_texts()
+        assert len(texts) > 90
+        page.evaluate("(texts) => texts.forEach((text) => echostep.tr(text))", sorted(texts))
+        page.evaluate(
+            "import(`${location.href}static/words.js`).then(({ KINDS }) => Object.values(KINDS).forEach(echostep.tr))"
+        )
+        assert page.evaluate(MISSING) == []
+        page.context.close()
+
+
+def test_a_text_without_entry_is_found(browser: Any, url: str) -> None:
+    page = page_of(browser, url, "de", READY)
+    assert (
+        page.evaluate("echostep.tr('lost: a new sentence. Turn left.')")
+        == "Position verloren: a new sentence. Links abbiegen."
+    )
+    assert "a new sentence" in page.evaluate(MISSING)
+    assert page.evaluate("echostep.tr('within 0.4 m · heading SE 135° ±5°')") == "auf 0,4 m genau · Kurs SO 135° ±5°"
+    assert page.evaluate("echostep.tr('2 floors up')") == "2 Geschosse höher"
+    assert page.evaluate("echostep.tr('1 floor up')") == "1 Geschoss höher"
+    page.context.close()
+
+
+def test_how_a_language_is_chosen(browser: Any, url: str) -> None:
+    """The browser's, before it that of `--lang`, before it that of the list; English where a language is unknown."""
+    page = loaded_page(browser, url, {"locale": "fr-FR"}, READY)
+    assert page.evaluate(LANG) == "en"
+    page.context.close()
+    with PageServer(Mailbox(seven_floors(), "A walk", replay=False), Address(HERE, 0, "de")) as server:
+        page = loaded_page(browser, server.url, {"locale": "en-GB"}, f"{LANG} === 'de'")
+        wait_for(page, "document.querySelector('#help').textContent === 'Notruf'")
+        page.click("#legend-button")
+        with page.expect_navigation():  # it loads itself again
+            page.select_option("#language", "en")
+        wait_for(page, f"{LANG} === 'en' && document.querySelector('#help').textContent === 'Help!'")
+        page.context.close()
+
+
+def test_the_command_knows_the_languages_of_the_pages() -> None:
+    listed = re.search(r"LANGUAGES = \{(.*?)\}", (STATIC / "language.js").read_text("utf-8"))
+    assert listed
+    assert re.findall(r"(\w+):", listed[1]) == [lang.value for lang in Language]
+
+
+@pytest.mark.parametrize("lang", LOCALES)
+def test_nothing_is_cut_off_on_the_wearers_page(browser: Any, lang: str, tmp_path: Path) -> None:
+    plan = seven_floors()
+    with served(Mailbox(plan, "A walk", replay=False)) as (server, mailbox):
+        mailbox.set_team(("Anna", "Christopher"))
+        mailbox.publish(scene())
+        page = page_of(browser, server.url, lang, READY)
+        for k, moment in enumerate(wearers_moments()):
+            mailbox.publish(moment)
+            wait_for(page, f"echostep.last.t_s === {moment.t_s}")
+            page.screenshot(path=tmp_path / f"{lang}-{k}.png")
+            assert page.evaluate(CUT) == [], moment.status_text
+            assert overflow(page) == (0, 0)
+        assert violations(page) == []
+        for button in ("#legend-button", "#tools-button"):
+            page.click(button)
+            page.screenshot(path=tmp_path / f"{lang}-{button[1:]}.png")
+            assert page.evaluate(CUT) == []
+            assert violations(page) == []
+            page.keyboard.press("Escape")
+        assert page.evaluate(UNREACHED) == []
+        assert page.evaluate(LANG) == lang
+        left = set(page.evaluate(MISSING)) - names(plan)
+        assert left <= {"echostep", "GeoJSON", "the board has no rangers", "look at its plug (docs/mistakes.md)"}
+        assert not page.wrong
+        page.context.close()
+
+
+def wearers_moments() -> list[PageScene]:
+    """A bad hour, then each status and each long cue."""
+    *before, alarm = moments()
+    known = replace(before[0], streams=replace(RATES, wrong=""))
+    statuses = [replace(known, t_s=10.0 + k, status_text=text) for k, text in enumerate(STATUSES)]
+    cues = [
+        replace(known, t_s=30.0 + k, guidance=ShownGuidance("off", text, 0.4, 27.0, ())) for k, text in enumerate(CUES)
+    ]
+    return [*before, *statuses, *cues, alarm]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("lang", LOCALES)
+def test_nothing_is_cut_off_on_the_commanders_page(browser: Any, lang: str, tmp_path: Path) -> None:
+    team = whole_team()
+    team.hear("Dana", place(TOWER, 12.0, 2.0, 2), alarm=ReportedAlarm("mayday", "fall", 1, 14.0))
+    crew = Crew(1, "c" * 8, "Attack 1", ("Anna",), 30.0, "Ann", team.unix_s, team.unix_s - 1300.0)
+    team.put_bytes(*crew.message)
+    with ServedTeam(team) as table:
+        page = page_of(browser, table.page.url, lang, TABLE_READY)
+        page.keyboard.press(
+            "Shift"
+        )  # no click on the invitation: where a script was evaluated before it was made, that counted as a gesture
+        shots = iter(range(100))
+
+        def check() -> None:
+            page.screenshot(path=tmp_path / f"table-{lang}-{next(shots)}.png")
+            assert page.evaluate(CUT) == []
+            assert overflow(page) == (0, 0)
+            assert violations(page) == []
+
+        check()
+        for name in ("Dana", "Anna", "Kim"):
+            page.click(f"#list li:has-text('{name}') button")
+            wait_for(page, "document.querySelectorAll('#facts dt').length")
+            page.evaluate("document.querySelector('#all').open = true")
+            check()
+            page.click("#close")
+        for button in ("#legend-button", "#crews-button"):
+            page.click(button)
+            check()
+            page.keyboard.press("Escape")
+        table.show(connected=False)
+        wait_for(page, "document.querySelector('#words').dataset.status === 'broken'")
+        check()
+        people = {"echostep command", "Attack 1", "Ann", BASE.run, *NAMES}
+        assert set(page.evaluate(MISSING)) - names(TOWER) - people == set()
+        assert page.evaluate(LANG) == lang
+        assert not page.wrong
+        page.context.close()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("lang", LOCALES)
+def test_nothing_is_cut_off_in_the_editor(browser: Any, lang: str, tmp_path: Path) -> None:
+    doubtful = with_questions(import_plan(doubtful_house(tmp_path / "house.dxf")))
+    save_plan(doubtful, tmp_path / "plan.json")
+    with EditServer(tmp_path / "plan.json", port=0) as server:
+        page = page_of(browser, server.url, lang, EDITOR_READY)
+        shots = iter(range(100))
+
+        def check(*, axe: bool = True) -> None:
+            page.screenshot(path=tmp_path / f"editor-{lang}-{next(shots)}.png")
+            assert page.evaluate(CUT) == [], status(page)
+            assert overflow(page) == (0, 0)
+            assert not axe or violations(page) == [], status(page)
+
+        check()
+        for tool in page.query_selector_all("[data-tool]"):
+            tool.click()
+            check(axe=False)
+        for _ in doubtful.levels[0].questions:
+            page.click("#answer-next")
+            check(axe=False)
+        page.click("#answer-yes")
+        page.click("#whole")
+        refuse_two_points(page, check)
+        page.click("#add")
+        check()
+        page.fill("#answer", "Attic")
+        page.click("#yes")
+        wait_for(page, "/\\d/.test(document.querySelector('#answer').value)")  # its height
+        page.click("#yes")
+        wait_for(page, "echostep.sheet.k === 1")
+        page.click("[data-tool='stairs']")
+        click(page, 3.0, 3.0)
+        click(page, 4.0, 3.0)
+        click(page, 4.0, 5.0)
+        page.click("#end")
+        check()
+        page.click("#ways button[value='yes']")
+        answered(page)
+        page.click("#step-back")
+        check()
+        page.click("#save")
+        wait_for(page, "!echostep.sheet.unsaved")
+        check()
+        assert ("gesichert" in status(page)) == (lang == "de")
+        people = names(load_plan(tmp_path / "plan.json"))
+        assert set(page.evaluate(MISSING)) - people == set()
+        assert page.evaluate(LANG) == lang
+        assert ["422" in text for text in page.wrong] == [True]  # the two points
+        page.context.close()
+
+
+def refuse_two_points(page: Any, check: Callable[[], None]) -> None:
+    """Type the degrees of two points that are farther apart on Earth than on the plan."""
+    page.click("[data-tool='earth']")
+    for x_m, degrees in ((1.0, "48.1, 11.5"), (9.0, "48.2, 11.5")):
+        click(page, x_m, 4.0)
+        page.fill("#answer", "?")
+        page.click("#yes")
+        check()
+        answer(page, degrees)
+        check()
+    wait_for(page, "/[.?!…] /.test(document.querySelector('#status').textContent)")
+    check()

@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: MIT
+"""The page in Chromium: what is drawn, on a desk and on a phone, by touch and by keys."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from echostep.ports.chunks import portion_of
+from echostep.tracker import Tracker
+from echostep_app.guidance.cues import Cue, CueKind
+from echostep_app.page.elements.guidance import ShownGuidance, guidance_of_cue
+from echostep_app.page.live import LivePage
+from echostep_app.page.mailbox import Mailbox
+from echostep_app.page.server import PageServer
+from echostep_app.plan.routing import RoutePlace
+from page.browser import LOCAL, LOOKS, PLAN, Walk, demo_walk, looking, opened_page, overflow, picture, spot, wait_for
+from page.frames import scene
+from waiting import until
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("look", LOOKS)
+def test_nothing_keeps_anybody_out(browser: Any, look: str, tmp_path: Path) -> None:
+    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
+
+    with Walk(24.0, 1.0) as walk:
+        page = looking(browser, walk.page.url, look)
+        page.select_option("#goal", label="Meeting")
+        wait_for(page, "echostep.scene.frame.guidance")
+        if look == "dark":
+            page.evaluate("echostep.view.zoom(4)")
+        wait_for(page, "document.querySelector('#left').textContent.includes('to go')")
+        wait_for(page, STILL)
+        found = Axe().run(
+            page, options={"runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]}
+        )
+        picture(page, look, tmp_path)
+        page.click("#here")
+        again = Axe().run(page)
+        beyond = overflow(page)
+        assert not page.wrong
+        page.context.close()
+    assert found.violations_count == 0, found.generate_report()
+    assert again.violations_count == 0, again.generate_report()
+    assert beyond == (0, 0)
+
+
+SHEET = "document.querySelector('#sheet-text').textContent"
+STILL = "!document.getAnimations().length"
+
+
+def test_a_tap_and_a_drag_check_in(browser: Any, tmp_path: Path) -> None:
+    with Walk(24.0, 0.1) as walk:  # so slow that no line of text grows while the finger is on the map
+        page = looking(browser, walk.page.url, "bright")
+        page.click("#here")
+        x_px, y_px = spot(page, 13.0, 2.0)
+        page.mouse.move(x_px, y_px)
+        page.mouse.down()
+        page.mouse.move(x_px, y_px - 50.0, steps=4)
+        page.mouse.up()
+        assert not walk.checked_in  # it is said what it would do; only then it is done
+        wait_for(page, f"{SHEET}.includes('In South corridor.') && {SHEET}.includes('You face the arrow.')")
+        picture(page, "check-in", tmp_path)
+        page.click("#sheet-here")
+        assert until(lambda: len(walk.checked_in) == 1)
+        wait_for(
+            page,
+            "echostep.last.streams.check_ins === 1 && echostep.last.undo?.undo === 1 && !document.querySelector('#undo').hidden",
+        )
+        page.context.close()
+    (estimate,) = walk.checked_in
+    assert np.hypot(estimate.x_m - 13.0, estimate.y_m - 2.0) < 0.5  # where the finger was; the walk goes on from there
+
+
+def test_keys_alone_check_in_and_choose_a_way(browser: Any) -> None:
+    with Walk(24.0, 1.0) as walk:
+        page = looking(browser, walk.page.url, "dark")
+        page.focus("#map")
+        before = page.evaluate("[echostep.view.x, echostep.view.scale, echostep.view.turn]")
+        for key in ("ArrowRight", "+", "]"):
+            page.keyboard.press(key)
+        after = page.evaluate("[echostep.view.x, echostep.view.scale, echostep.view.turn]")
+        assert after[0] > before[0]
+        assert after[1] > before[1]
+        assert after[2] < before[2]
+        page.keyboard.press("g")
+        page.keyboard.press("Enter")
+        wait_for(page, "echostep.scene.frame.guidance")
+        page.keyboard.press("h")
+        page.keyboard.press(",")
+        page.keyboard.press("Enter")
+        wait_for(page, f"{SHEET} && !document.querySelector('#sheet-here').disabled")  # what it would do is said
+        page.focus("#sheet-here")
+        page.keyboard.press("Enter")
+        assert until(lambda: len(walk.checked_in) == 1)
+        page.context.close()
+
+
+def test_two_fingers_zoom_and_rotate(browser: Any) -> None:
+    mailbox = Mailbox(PLAN, "test", replay=False)
+    with PageServer(mailbox, LOCAL) as server:
+        mailbox.publish(scene())
+        page = looking(browser, server.url, "bright")
+        before = page.evaluate("[echostep.view.scale, echostep.view.turn]")
+        fingers, box = page.context.new_cdp_session(page), page.locator("#map").bounding_box()
+        for k in range(10):
+            reach, angle = 40.0 + 6.0 * k, 0.05 * k  # clockwise on the screen
+            ends = [(side * reach * np.cos(angle), side * reach * np.sin(angle)) for side in (-1, 1)]
+            points = [{"x": box["x"] + 180 + u, "y": box["y"] + 160 + v, "id": i} for i, (u, v) in enumerate(ends)]
+            fingers.send(
+                "Input.dispatchTouchEvent", {"type": "touchMove" if k else "touchStart", "touchPoints": points}
+            )
+        fingers.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
+        def view() -> tuple[float, float]:
+            scale, turn = page.evaluate("[echostep.view.scale, echostep.view.turn]")
+            return scale / before[0], turn
+
+        wanted = pytest.approx((94.0 / 40.0, -0.45), rel=0.02, abs=0.02)
+        assert until(lambda: view() == wanted), view()
+        page.context.close()
+
+
+@pytest.mark.long
+def test_a_replay_plays_stops_and_seeks(browser: Any, tmp_path: Path) -> None:
+    start, chunks = demo_walk(beacons=False)
+    tracker = Tracker(PLAN, start, seed=1)
+    with LivePage(tracker, "A replay", LOCAL, replay=True) as replay_page:
+        for begin in range(0, len(chunks), 2000):
+            portion = portion_of(chunks[begin : begin + 2000])
+            tracker.take(portion)
+            replay_page.publish(portion)
+        page = looking(browser, replay_page.url, "bright")
+        assert page.is_hidden("#here")
+        page.select_option("#times", "2")  # so that it is paused long before the end, however late the click comes
+        wait_for(page, "echostep.scene.frame.play.t_s > 8")
+        page.click("#play")
+        wait_for(page, "!echostep.scene.frame.play.playing")
+        assert page.evaluate("echostep.scene.frame.play.times") == 2
+        trail_count = page.evaluate("echostep.scene.trail.count")
+        page.locator("#time").fill("60")
+        wait_for(page, "Math.abs(echostep.scene.frame.play.t_s - 60) < 0.1")
+        assert page.evaluate("echostep.scene.trail.count") > trail_count
+        assert page.evaluate("echostep.scene.frame.t_s") == pytest.approx(60.0, abs=2.0)
+        page.click("#back")
+        wait_for(page, "echostep.scene.frame.play.t_s < 59.9")
+        picture(page, "replay", tmp_path)
+        page.locator("#time").fill("20")
+        wait_for(page, "Math.abs(echostep.scene.frame.play.t_s - 20) < 0.1")
+        assert page.evaluate("echostep.scene.trail.count") < 30
+        assert not page.wrong
+        page.context.close()
+
+
+GUIDED = """({
+    cue: document.querySelector('#cue').textContent, left: document.querySelector('#left').textContent,
+    sign: document.querySelector('#turn').dataset.sign, end: document.querySelector('#end-guidance').offsetParent !== null,
+    sentence: document.querySelector('#sentence').textContent, beacons: document.querySelector('#beacons').textContent })"""
+SPEECH = """
+    window.said = [];
+    speechSynthesis.speak = (sentence) => window.said.push(sentence.text);
+    speechSynthesis.cancel = () => window.said.push(null);"""
+
+
+@pytest.mark.parametrize("look", LOOKS)
+def test_the_runs_guidance_and_its_beacons_are_seen(browser: Any, look: str, tmp_path: Path) -> None:
+    from axe_playwright_python.sync_playwright import Axe
+
+    with Walk(25.0, 0.1, RoutePlace(19.6, 5.4)) as walk:  # so slow that nothing is over before it was looked at
+        page = looking(browser, walk.page.url, look)
+        wait_for(page, "echostep.last.beacons.length > 5 && echostep.last.guidance.path.length > 1")
+        wait_for(page, STILL)
+        seen, path = page.evaluate(f"[{GUIDED}, echostep.last.guidance.path]")
+        colours = [ink_near(page, *place) for place in path[1:]]
+        found = Axe().run(page)
+        if look != "contrast":
+            picture(page, "guide" if look == "bright" else "guide-wide", tmp_path)
+        wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        outside = page.evaluate(
+            "[...document.querySelectorAll('#guidance > *')].filter((e) => e.offsetParent && e.getBoundingClientRect().right > innerWidth).length"
+        )
+        page.select_option("#goal", label="Store")
+        wait_for(page, "echostep.scene.frame.guidance.own")
+        wait_for(page, f"{GUIDED}.end")
+        page.click("#end-guidance")
+        wait_for(page, "!echostep.scene.frame.guidance.own")
+        assert not page.wrong
+        page.context.close()
+    assert seen["cue"] in ("Straight ahead", "Turn right", "Turn left", "Turn around")
+    assert seen["sign"] == "arrow"
+    assert seen["left"].endswith(" m to go")
+    assert seen["sentence"]
+    assert not seen["end"]
+    assert re.fullmatch(r"beacons: \d+ of \d+ heard", seen["beacons"])
+    assert all(colours)
+    assert found.violations_count == 0, found.generate_report()
+    assert (wide, outside) == (0, 0)
+
+
+def ink_near(page: Any, x_m: float, y_m: float) -> bool:
+    """Whether the canvas shows anything of the way's colour within a few pixels of a place."""
+    return bool(
+        page.evaluate(
+            """([x, y]) => {
+                const canvas = document.querySelector('#canvas'), [sx, sy] = echostep.view.toScreen(x, y).map((v) => v * devicePixelRatio);
+                const hex = getComputedStyle(document.documentElement).getPropertyValue('--goal').trim();
+                const want = [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
+                const { data } = canvas.getContext('2d').getImageData(sx - 40, sy - 40, 80, 80);
+                for (let k = 0; k < data.length; k += 4) if (want.every((v, c) => Math.abs(data[k + c] - v) < 6) && data[k + 3] > 250) return true;
+                return false;
+            }""",
+            [x_m, y_m],
+        )
+    )
+
+
+def test_the_page_says_one_sentence_at_a_time_when_it_may(browser: Any) -> None:
+    mailbox = Mailbox(PLAN, "test", replay=False)
+    told = [
+        guidance_of_cue(Cue(t, CueKind.TURN, text, 0.5, f"{text}.", 9.0, 0.5), None, 0, None) for t, text in SENTENCES
+    ]
+    with PageServer(mailbox, LOCAL) as server:
+        page = opened_page(browser, **LOOKS["bright"])
+        page.add_init_script(SPEECH)
+        page.goto(server.url)
+
+        def hears(shown: ShownGuidance) -> None:
+            mailbox.publish(replace(scene(), guidance=shown))
+            wait_for(page, f"document.querySelector('#sentence').textContent === '{shown.spoken}'")
+            wait_for(page, f"echostep.last?.guidance?.arrow_rad === {shown.arrow_rad}")
+
+        hears(told[0])
+        assert page.evaluate("said") == []  # off at first
+        assert page.get_attribute("#speech", "aria-pressed") == "false"
+        page.click("#speech")
+        assert page.evaluate("said") == [None, "Turn left."]
+        hears(told[1])
+        hears(replace(told[1], arrow_rad=0.2))
+        hears(told[2])
+        assert page.evaluate("said") == [None, "Turn left.", None, "Turn right.", None, "Turn left."]
+        page.reload()
+        wait_for(page, "window.said?.length")
+        assert page.get_attribute("#speech", "aria-pressed") == "true"  # remembered
+        page.click("#speech")
+        hears(told[1])
+        assert page.evaluate("said") == [None, "Turn left.", None]
+        page.context.close()
+
+
+SENTENCES = ((1.0, "Turn left"), (2.0, "Turn right"), (3.0, "Turn left"))
+
+
+def test_the_arrow_turns_the_short_way_and_is_gone_when_the_heading_is_unknown(browser: Any) -> None:
+    mailbox = Mailbox(PLAN, "test", replay=False)
+    turn = "document.querySelector('#arrow').style.transform"
+    with PageServer(mailbox, LOCAL) as server:
+        shown = replace(guidance_of_cue(Cue(1.0, CueKind.TURN, "Turn left", 2.0, "", 9.0, 3.0), None, 0, None))
+        mailbox.publish(replace(scene(), guidance=shown))
+        page = looking(browser, server.url, "bright")
+        wait_for(page, f"{turn} === 'rotate(-3rad)'")
+        mailbox.publish(replace(scene(), guidance=replace(shown, arrow_rad=-3.0)))
+        wait_for(page, f"Math.abs(parseFloat({turn}.slice(7)) + 2 * Math.PI - 3) < 1e-4")
+        mailbox.publish(replace(scene(), guidance=shown.stopped("There is nothing from the foot", 2.0)))
+        wait_for(page, f"{GUIDED}.sign === 'halt'")
+        assert page.is_hidden("#arrow")
+        assert page.evaluate(f"{GUIDED}.cue") == "Stop. There is nothing from the foot"
+        mailbox.publish(replace(scene(), guidance=None))
+        wait_for(page, "document.querySelector('#guidance').hidden")
+        assert page.evaluate(f"{GUIDED}.sentence") == ""
+        page.context.close()
+
+
+@pytest.mark.long
+def test_ten_pages_at_once_and_one_that_comes_back(browser: Any) -> None:
+    with Walk(10.0, 2.0, stands=True) as walk:
+        pages = [looking(browser, walk.page.url, "bright") for _ in range(10)]
+        assert until(lambda: walk.page.pages == 10)
+        pages[0].evaluate("echostep.link.wait = 1e6, echostep.link.socket.close()")  # away until it is told to return
+        assert until(lambda: walk.page.pages == 9)
+        missed = pages[0].evaluate("echostep.scene.trail.count")
+        walk.go_on()
+        wait_for(pages[1], f"echostep.scene.trail.count > {missed + 5}")
+        pages[0].evaluate("echostep.link.open()")
+        assert until(lambda: walk.page.pages == 10)
+        wait_for(pages[0], f"echostep.scene.trail.count > {missed + 5}")
+        for page in pages[1:]:
+            wait_for(page, "echostep.frames > 5")
+        for page in pages:
+            page.context.close()

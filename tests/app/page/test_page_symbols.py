@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""Stairs, lifts, doors and windows are drawn as such on both pages, in Chromium; the legend names each sign."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from echostep.plan.model import Connector, Plan
+from echostep_app.page.mailbox import Mailbox
+from operation.teams import ServedTeam, Team, place
+from page.browser import READY, loaded_page, wait_for
+from page.frames import scene, served, told
+from plan.imported_plans import seven_floors
+
+SIZES = {"desk": (1280, 800), "phone": (360, 740), "sideways": (740, 360)}
+DRAWN = "[...document.querySelectorAll('#walls path')].map((e) => e.classList[0])"
+WAYS = "[...document.querySelectorAll('#rooms .way')].filter((e) => e.getAttribute('visibility') === 'visible').map((e) => e.textContent)"
+KINDS = {
+    "wall",
+    "door",
+    "unknown",
+    "stairs",
+    "lift",
+    "ramp",
+}  # in the near view; the window is out of it in a low window
+
+
+def building() -> Plan:
+    """The seven floors, where one of a floor's doors is shut, one open, and a ramp leads from the basement to the ground floor."""
+    plan = seven_floors()
+    ramp = Connector("ramp", "", (0, 1), np.array([(8.5, 6.2), (14.5, 6.2), (14.5, 7.2), (8.5, 7.2)]))
+    levels = []
+    for level in plan.levels:
+        shut, open_, *unknown = level.doors
+        doors = (replace(shut, state="closed"), replace(open_, state="open"), *unknown)
+        levels.append(replace(level, doors=doors))
+    return replace(plan, levels=tuple(levels), connectors=(*plan.connectors, ramp))
+
+
+def looked_at(page: Any, name: str, tmp_path: Path) -> None:
+    """What both pages share: every kind of line and the ways' names are drawn, and the legend opens, fits and closes."""
+    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
+
+    wait_for(page, "echostep.scene.level === 1 && document.querySelector('#walls .stairs')")
+    page.click("#whole")
+    wait_for(page, f"['wall', 'window', 'stairs', 'lift'].every((kind) => {DRAWN}.includes(kind))")
+    page.screenshot(path=tmp_path / f"{name}.png")
+    page.evaluate("(() => { echostep.view.centre(16, 9); echostep.view.scale = 30; echostep.view.changed(); })()")
+    wait_for(page, f"{sorted(KINDS)}.every((kind) => {DRAWN}.includes(kind))")
+    wait_for(page, f"{WAYS}.includes('Stairs A ↑↓') && {WAYS}.includes('ramp ↓')")
+    page.screenshot(path=tmp_path / f"{name}-near.png")
+    page.focus("#map")
+    page.keyboard.press("l")
+    wait_for(page, "document.querySelector('#legend').open")
+    page.screenshot(path=tmp_path / f"{name}-legend.png")
+    wide, tall = page.viewport_size["width"], page.viewport_size["height"]
+    box = page.locator("#legend").bounding_box()
+    assert box["x"] >= 0
+    assert box["y"] >= 0
+    assert box["x"] + box["width"] <= wide
+    assert box["y"] + box["height"] <= tall
+    words = page.inner_text("#legend")
+    assert all(word in words for word in ("wall", "window", "door that is open", "shut", "stairs", "lift", "ramp"))
+    found = Axe().run(page)
+    assert found.violations_count == 0, found.generate_report()
+    page.keyboard.press("Escape")
+    wait_for(page, "!document.querySelector('#legend').open")
+    page.click("#legend-button")
+    page.click("#legend [aria-label=Close]")
+    wait_for(page, "!document.querySelector('#legend').open")
+    assert not page.wrong
+    page.context.close()
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_a_wearer_sees_stairs_lifts_doors_and_windows(browser: Any, size: str, tmp_path: Path) -> None:
+    plan = building()
+    width, height = SIZES[size]
+    with served(Mailbox(plan, "test", replay=False)) as (server, mailbox):
+        shares = tuple(float(k == 1) for k in range(len(plan.levels)))
+        estimate = replace(told(4.0, 7.0), level=1, levels=shares)
+        mailbox.publish(
+            replace(scene(), estimate=estimate, echo_lines=(), particles=None, status_text="tracking, 0.2 m")
+        )
+        page = loaded_page(browser, server.url, {"viewport": {"width": width, "height": height}}, READY)
+        looked_at(page, size, tmp_path)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_a_commander_sees_stairs_lifts_doors_and_windows(browser: Any, size: str, tmp_path: Path) -> None:
+    team = Team(building())
+    width, height = SIZES[size]
+    team.hear("Anna", place(team.plan, 4.0, 7.0, 1))
+    with ServedTeam(team) as team_page:
+        ready = "echostep.last && document.querySelector('#walls path')"
+        page = loaded_page(browser, team_page.page.url, {"viewport": {"width": width, "height": height}}, ready)
+        looked_at(page, size, tmp_path)

@@ -1,0 +1,326 @@
+# SPDX-License-Identifier: MIT
+"""What the page has beside the map, in Chromium: layers, charts, measuring, links, pictures, GeoJSON, units, places on the Earth, keys."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from echostep.localization.estimate import TrackStatus
+from echostep.plan.model import Georeference, Plan
+from echostep_app.page.elements.echo_lines import EchoLine
+from echostep_app.page.elements.scene import PageScene
+from echostep_app.page.elements.stream_rates import StreamRates
+from echostep_app.page.mailbox import Mailbox
+from echostep_app.page.server import PageServer
+from page.browser import LOCAL, READY, loaded_page, overflow, picture, spot, wait_for
+from page.frames import PLAN, scene, told
+from page.web.test_page_sizes import SIZES, UNREACHED
+from waiting import until
+
+DESK = {"viewport": {"width": 1280, "height": 800}}
+HINT = "document.querySelector('#hint').textContent"
+RATES = StreamRates(100.0, 30.0, 0, 0, 0, True, 0, "")
+LOOSE = replace(PLAN, georeference=None, digest="9" * 64)
+PLACED = replace(PLAN, georeference=Georeference(44.4, 33.3, 0.3), digest="8" * 64)
+DONE = "echostep.scene.frame.play?.end_s === 120"
+
+
+def moment(t_s: float) -> PageScene:
+    """A scene of a walk along the corridor: ranges that grow, lost from 60 s to 80 s."""
+    status = TrackStatus.LOST if 60.0 <= t_s < 80.0 else TrackStatus.TRACKING
+    estimate = told(2.0 + 0.1 * t_s, 7.5, t_s, status)
+    lines = tuple(EchoLine(t_s, side, estimate.x_m, 7.5, 1.6, 1.0 + 0.01 * t_s + side, 1.0) for side in (0, 1))
+    return replace(
+        scene(t_s),
+        estimate=estimate,
+        echo_lines=lines,
+        streams=RATES,
+        status_text="lost" if status is TrackStatus.LOST else "tracking, 0.2 m",
+        trail_count=int(t_s),
+    )
+
+
+def walked(plan: Plan = LOOSE) -> Mailbox:
+    """A replay of two minutes."""
+    mailbox = Mailbox(plan, "A walk", replay=True)
+    for t_s in np.arange(0.0, 121.0):
+        mailbox.trail.add(2.0 + 0.1 * t_s, 7.5, 0)
+        mailbox.publish(moment(float(t_s)))
+        mailbox.keep(moment(float(t_s)))
+    return mailbox
+
+
+@pytest.fixture(scope="module")
+def url() -> Iterator[str]:
+    with PageServer(walked(), LOCAL) as server:
+        yield server.url
+
+
+def looking(browser: Any, url: str, how: dict[str, Any] = DESK) -> Any:
+    page = loaded_page(browser, url, how, f"{READY} && {DONE}")
+    page.click("#play")
+    wait_for(page, "!echostep.last.play.playing")
+    return page
+
+
+def painted(page: Any, colour: str, x_m: float, y_m: float) -> bool:
+    """Whether the canvas has a colour of the style within 12 px of a place."""
+    return bool(
+        page.evaluate(
+            """([name, x, y]) => {
+                const canvas = document.querySelector('#canvas'), [sx, sy] = echostep.view.toScreen(x, y).map((v) => v * devicePixelRatio);
+                const hex = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+                const want = [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
+                const { data } = canvas.getContext('2d').getImageData(sx - 12, sy - 12, 24, 24);
+                for (let k = 0; k < data.length; k += 4) if (want.every((v, c) => Math.abs(data[k + c] - v) < 6) && data[k + 3] > 250) return true;
+                return false;
+            }""",
+            [colour, x_m, y_m],
+        )
+    )
+
+
+def test_layers_are_left_out_and_stay_so(browser: Any, url: str) -> None:
+    page = looking(browser, url)
+    page.locator("#time").fill("50")
+    wait_for(page, "Math.abs(echostep.last.play.t_s - 50) < 1")
+    assert until(lambda: painted(page, "trail", 4.0, 7.5))
+    page.click("#tools-button")
+    page.uncheck("#layer-trail")
+    page.uncheck("#layer-names")
+    page.keyboard.press("Escape")
+    assert until(lambda: not painted(page, "trail", 4.0, 7.5))
+    wait_for(page, "document.querySelector('#rooms').hasAttribute('hidden')")
+    page.reload()
+    wait_for(page, f"{READY} && !echostep.scene.layers.shows('trail') && echostep.scene.layers.shows('cloud')")
+    assert not page.wrong
+    page.context.close()
+
+
+def test_charts_show_the_walk_and_what_happened(browser: Any, url: str, tmp_path: Path) -> None:
+    page = looking(browser, url)
+    page.focus("#map")
+    page.keyboard.press("c")
+    wait_for(
+        page, "document.querySelector('#charts').ariaLabel.includes('left 2.2, right 3.2, foot 100.0, pings 30.0')"
+    )
+    ticks = "[...document.querySelectorAll('#ticks span')].map((e) => [e.title, parseFloat(e.style.left)])"
+    wait_for(page, f"{ticks}.length === 2")
+    assert page.evaluate(ticks) == [["lost", 50.0], ["tracking", pytest.approx(66.67, abs=0.01)]]
+    box = page.locator("#charts").bounding_box()
+    page.mouse.click(box["x"] + 34 + 0.25 * (box["width"] - 34), box["y"] + 80)
+    wait_for(page, "Math.abs(echostep.last.play.t_s - 30) < 0.5")
+    page.focus("#map")
+    page.keyboard.press("t")
+    page.screenshot(path=tmp_path / "tools.png")
+    page.click("#events button:has-text('lost')")
+    wait_for(page, "echostep.last.play.t_s === 60")
+    picture(page, "charts", tmp_path)
+    assert not page.wrong
+    page.context.close()
+
+
+@pytest.mark.long
+def test_a_link_leads_to_its_view_and_moment(browser: Any, url: str) -> None:
+    page = looking(browser, url)
+    page.locator("#time").fill("77.5")
+    wait_for(page, "Math.abs(echostep.last.play.t_s - 77.5) < 0.01")
+    page.evaluate("echostep.view.grip([300, 200], [340, 230], 1.7, 0.4)")
+    page.click("#tools-button")
+    page.click("#tool-link")
+    wait_for(page, f"{HINT}.startsWith('The link')")
+    link, view = page.url, page.evaluate("[echostep.view.x, echostep.view.y, echostep.view.scale, echostep.view.turn]")
+    other = loaded_page(
+        browser, link, DESK, f"{READY} && echostep.last.play.t_s === 77.5 && !echostep.last.play.playing"
+    )
+    seen = other.evaluate("[echostep.view.x, echostep.view.y, echostep.view.scale, echostep.view.turn]")
+    assert seen == pytest.approx(view, abs=0.01)
+    bad = loaded_page(browser, f"{url}#x=1e99&y=%00&zoom=-1&floor=zz&t=", DESK, READY)  # is no link
+    bad.evaluate("location.hash = ''")
+    far = loaded_page(browser, f"{url}#x=1&y=2&zoom=30&floor=900&t=1e8", DESK, READY)
+    assert far.evaluate("echostep.scene.level") == 0
+    for opened in (page, other, bad, far):
+        assert not opened.wrong
+        opened.context.close()
+
+
+def test_two_taps_measure(browser: Any, url: str, tmp_path: Path) -> None:
+    page = looking(browser, url)
+    page.click("#tools-button")
+    page.click("#tool-measure")
+    for place in ((2.0, 7.5), (5.0, 11.5)):
+        page.mouse.click(*spot(page, *place))
+    wait_for(page, f"/^Distance: (4.9|5.0)\\d m/.test({HINT})")
+    assert until(lambda: painted(page, "goal", 3.5, 9.5))
+    page.screenshot(path=tmp_path / "measure.png")
+    assert page.is_hidden("#sheet")  # the taps did nothing else
+    page.focus("#map")
+    page.keyboard.press("Escape")
+    assert until(lambda: not painted(page, "goal", 3.5, 9.5))
+    page.keyboard.press("d")  # by keys alone
+    page.keyboard.press("Enter")
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("Enter")
+    wait_for(page, f"{HINT}.startsWith('Distance: ')")
+    assert not page.wrong
+    page.context.close()
+
+
+def saved(page: Any, button: str, folder: Path) -> Path:
+    """The file that a button of the dialog saves."""
+    page.click("#tools-button")
+    with page.expect_download() as download:
+        page.click(button)
+    path = folder / download.value.suggested_filename
+    download.value.save_as(path)
+    return path
+
+
+def test_the_view_is_saved_as_a_picture_and_as_geojson(browser: Any, url: str, tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    page = looking(browser, url)
+    page.locator("#time").fill("50")
+    wait_for(page, "Math.abs(echostep.last.play.t_s - 50) < 1")
+    with image.open(saved(page, "#tool-picture", tmp_path)) as made:
+        assert made.size == (
+            page.evaluate("document.querySelector('#canvas').width"),
+            page.evaluate("document.querySelector('#canvas').height"),
+        )
+        colours = {colour for _, colour in made.convert("RGB").getcolors(made.width * made.height)}
+        assert {(0x34, 0x3A, 0x40), (0xF4, 0xF5, 0xF7)} <= colours  # walls on the ground
+    made_of = json.loads(saved(page, "#tool-geojson", tmp_path).read_text())
+    assert made_of["coordinates"].startswith("metres of the plan")
+    kinds = {feature["properties"]["kind"] for feature in made_of["features"]}
+    assert {"wall", "room", "track", "position"} <= kinds
+    (position,) = (f for f in made_of["features"] if f["properties"]["kind"] == "position")
+    assert position["geometry"]["coordinates"] == [7.0, 7.5]
+    assert not page.wrong
+    page.context.close()
+
+
+def test_a_georeferenced_plan_gives_longitude_latitude_and_mgrs(browser: Any, tmp_path: Path) -> None:
+    pytest.importorskip("pyproj")
+    from echostep_app.team.georeference import GroundPlane
+
+    with PageServer(walked(PLACED), LOCAL) as server:
+        page = looking(browser, server.url)
+        page.mouse.click(*spot(page, 4.0, 7.5))
+        wait_for(page, "/38S MB \\d{5} \\d{5}/.test(document.querySelector('#sheet-text').textContent)")
+        said = page.inner_text("#sheet-text")
+        place = GroundPlane(PLACED).place(4.0, 7.5, 0.0, None)
+        lat, lon = (float(part.strip(" °")) for part in said.split("·")[0].split(","))
+        assert [lat, lon] == pytest.approx([place.lat_deg, place.lon_deg], abs=2e-6)
+        features = json.loads(saved(page, "#tool-geojson", tmp_path).read_text())
+        assert "coordinates" not in features
+        (position,) = (f for f in features["features"] if f["properties"]["kind"] == "position")
+        assert position["geometry"]["coordinates"] == pytest.approx([place.lon_deg, place.lat_deg], abs=2e-4)
+        for zone, band, easting, northing, wanted in MGRS:
+            found = page.evaluate(
+                "async (a) => (await import(new URL('static/tools/globe.js', document.baseURI))).mgrs(...a)",
+                [zone, band, easting, northing],
+            )
+            assert found == wanted
+        assert not page.wrong
+        page.context.close()
+
+
+MGRS = (  # the first: 38SMB4488 of the manual of GeoConvert; easting and northing of the others by the rule of the lettering
+    (38, "S", 444500.0, 3688500.0, "38S MB 44500 88500"),
+    (31, "N", 166021.4, 0.0, "31N AA 66021 00000"),
+    (32, "V", 500000.0, 6651411.2, "32V NM 00000 51411"),
+    (60, "", 500000.0, 9e6, ""),
+)
+
+
+def test_lengths_in_feet_and_a_page_that_remembers(browser: Any, url: str) -> None:
+    page = looking(browser, url)
+    wait_for(page, "document.querySelector('#place').textContent.includes(' m')")
+    page.click("#tools-button")
+    page.select_option("#unit", "ft")
+    page.keyboard.press("Escape")
+    for selector in ("#place", "#echoes", "#status-text", "#bar-text"):
+        wait_for(page, f"/\\d (ft|in)\\b/.test(document.querySelector('{selector}').textContent)")
+        assert not page.evaluate(f"/\\d (m|cm)\\b/.test(document.querySelector('{selector}').textContent)")
+    said = page.evaluate(
+        "async (a) => { const { inUnits } = await import(new URL('static/tools/units.js', document.baseURI)); return a.map(inUnits); }",
+        ["tracking, 0.2 m", "x 1.0, y -2.0 m", "12 m to go", "to 5 cm", "in 3 min, 4 metres", "2 minutes at 5 m/s"],
+    )
+    assert said == [
+        "tracking, 0.7 ft",
+        "x 3.3, y -6.6 ft",
+        "39 ft to go",
+        "to 2 in",
+        "in 3 min, 13 feet",
+        "2 minutes at 16 ft/s",
+    ]
+    page.reload()
+    wait_for(page, f"{READY} && document.querySelector('#unit').value === 'ft'")
+    page.context.close()
+
+
+def test_keys_titles_and_what_was_said(browser: Any, url: str) -> None:
+    page = looking(browser, url)
+    page.focus("#map")
+    page.keyboard.press("?")
+    assert page.is_visible("#keys-title")
+    page.keyboard.press("Escape")
+    nameless = "[...document.querySelectorAll('button, select, input')].filter((e) => e.offsetParent && !e.title).map((e) => e.id)"
+    assert page.evaluate(nameless) == []
+    assert page.get_attribute("#north", "title") == "North up (N)"
+    page.keyboard.press("g")
+    wait_for(page, "!document.querySelector('#hint').hidden")
+    page.click("#tools-button")
+    wait_for(page, "document.querySelector('#heard').textContent.includes('Tap where you want to go.')")
+    assert page.evaluate("document.querySelectorAll('#heard li').length") == 1
+    assert not page.wrong
+    page.context.close()
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_tools_and_the_charts_keep_nobody_out(
+    browser: Any, url: str, size: tuple[int, int], tmp_path: Path
+) -> None:
+    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
+
+    page = looking(browser, url, {"viewport": {"width": size[0], "height": size[1]}})
+    page.focus("#map")
+    page.keyboard.press("c")
+    wait_for(page, "document.querySelector('#charts').ariaLabel.includes('foot 100.0')")
+    page.screenshot(path=tmp_path / f"charts-{size[0]}.png")
+    assert page.evaluate(UNREACHED) == []
+    found = Axe().run(page)
+    page.click("#tools-button")
+    page.screenshot(path=tmp_path / f"tools-{size[0]}.png")
+    again = Axe().run(page)
+    assert overflow(page) == (0, 0)
+    assert page.evaluate(
+        "[...document.querySelectorAll('#tools *')].every((e) => e.getBoundingClientRect().right <= innerWidth)"
+    )
+    page.context.close()
+    assert found.violations_count == 0, found.generate_report()
+    assert again.violations_count == 0, again.generate_report()
+
+
+def test_it_can_be_installed_as_an_app(browser: Any, url: str) -> None:
+    """Chromium reads the manifest and finds no reason against it but that this window is in incognito mode; nothing is fetched from elsewhere."""
+    asked: list[str] = []
+    page = loaded_page(browser, url, DESK, READY)
+    page.on("request", lambda request: asked.append(request.url))
+    page.reload()
+    wait_for(page, READY)
+    devtools = page.context.new_cdp_session(page)
+    manifest = devtools.send("Page.getAppManifest")
+    assert manifest["errors"] == []
+    assert json.loads(manifest["data"])["name"] == "echostep"
+    why = [error["errorId"] for error in devtools.send("Page.getInstallabilityErrors")["installabilityErrors"]]
+    assert set(why) <= {"in-incognito"}
+    assert asked
+    assert all(address.startswith(url) for address in asked)  # it works without the internet
+    page.context.close()

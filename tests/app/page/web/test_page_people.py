@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: MIT
+"""A newcomer, a responder and a commander each visit their page in Chromium, in five windows at once, on the demo's plan and on seven floors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from echostep.plan.model import Plan
+from echostep_app.team.messages.report import ReportedAlarm
+from operation.teams import ServedTeam, Team, place
+from page.browser import READY, loaded_page, overflow, wait_for
+from page.web.test_page_visit import PLACES, Place, Visit
+from waiting import until
+
+SIZES = ((1280, 800), (360, 740), (740, 360), (320, 256), (1920, 1080))
+TABLE_READY = "echostep.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
+Look = Callable[[str], None]
+
+
+@contextmanager
+def windows(browser: Any, url: str, ready: str, tmp_path: Path) -> Iterator[tuple[list[Any], Look]]:
+    """A page of each size, and `look`, which checks all of them by axe and takes their pictures; what goes wrong on them fails the test."""
+    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
+
+    pages = [loaded_page(browser, url, {"viewport": {"width": w, "height": h}}, ready) for w, h in SIZES]
+
+    def look(moment: str) -> None:
+        for (width, _), page in zip(SIZES, pages, strict=True):
+            page.screenshot(path=tmp_path / f"{width}-{moment}.png")
+            found = Axe().run(page)
+            assert found.violations_count == 0, f"{width}, {moment}: {found.generate_report()}"
+            assert overflow(page) == (0, 0), f"{width}, {moment}"
+
+    yield pages, look
+    for page in pages:
+        assert not page.wrong
+        assert page.is_hidden("#fault")
+        page.context.close()
+
+
+def legend(page: Any) -> None:
+    """Open the legend and close it by its key."""
+    page.click("#legend-button")
+    wait_for(page, "document.querySelector('dialog[open]').innerText.includes('tairs')")
+    page.keyboard.press("Escape")
+    wait_for(page, "!document.querySelector('dialog[open]')")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", PLACES)
+def test_a_newcomer_looks_around(browser: Any, name: str, tmp_path: Path) -> None:
+    """Reads where the wearer is, turns and zooms the map, tries legend, tap, other floors and colours: nothing of that moves the estimate."""
+    spot = PLACES[name]
+    visit = Visit(spot)
+    with visit.page:
+        visit.walk(0.5)
+        with windows(browser, visit.page.url, READY, tmp_path) as (pages, look):
+            look("0-arrives")
+            before = visit.estimates[-1]
+            for page in pages:
+                assert page.inner_text("#status-text").startswith("tracking, ")
+                assert spot.said[0].split(",")[0].rstrip(".").lower() in page.inner_text("#place").lower()
+                legend(page)
+                page.click("#closer")
+                page.click("#north")
+                page.mouse.click(*middle(page))
+                wait_for(page, "document.querySelector('#sheet-text').textContent")
+                page.click("#sheet-close")
+                other_floor(page, spot.plan)
+                page.click("#whole")
+                page.click("#tools-button")
+                page.select_option("#theme", "dark")
+                page.keyboard.press("Escape")
+            look("1-dark")
+            visit.walk(0.5)
+            for page in pages:
+                page.click("#follow")
+                wait_for(
+                    page,
+                    f"echostep.scene.frame.told.x_m === {visit.estimates[-1].x_m!r} && echostep.scene.level === {before.level}",
+                )
+            assert visit.hear(undone=0, check_ins=0)
+
+
+def middle(page: Any) -> tuple[float, float]:
+    box = page.locator("#map").bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def other_floor(page: Any, plan: Plan) -> None:
+    """Go to the last floor, by button or list; a plan of one floor has neither."""
+    last = len(plan.levels) - 1
+    if not last:
+        assert page.is_hidden("#floors")
+        return
+    if page.is_visible("#floor"):
+        page.select_option("#floor", str(last))
+    else:
+        page.click(f"#floors button:nth-child({last + 1})")
+    wait_for(page, f"echostep.scene.level === {last}")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", PLACES)
+def test_a_responder_is_guided_and_calls(browser: Any, name: str, tmp_path: Path) -> None:
+    """Goes to a room; is sent to one in distress by a commander; calls for help, and is all right again: on every window."""
+    spot = PLACES[name]
+    visit = Visit(spot)
+    with visit.page:
+        visit.walk(0.5)
+        with windows(browser, visit.page.url, READY, tmp_path) as (pages, look):
+            pages[2].select_option("#goal", label=spot.room)  # a phone held sideways
+            for page in pages:
+                wait_for(page, "echostep.last.guidance?.own && echostep.last.guidance.path.length > 1")
+                assert page.is_visible("#cue")
+            x_m, y_m = spot.wrong
+            visit.page.set_errand(x_m, y_m, visit.estimates[-1].level, "Ben sends you to Finn, in distress")
+            for page in pages:
+                wait_for(
+                    page, f"echostep.last.goal?.x_m === {x_m} && echostep.last.guidance?.path.at(-1)?.[0] === {x_m}"
+                )
+                assert page.inner_text("#errand") == "Ben sends you to Finn, in distress"
+            look("1-sent")
+            pages[3].click("#help")  # at 400 %
+            assert until(lambda: called(visit, "mayday"))
+            visit.walk(0.1)
+            for page in pages:
+                wait_for(
+                    page, "document.querySelector('#alarm-text').textContent.startsWith('Mayday: you asked for help.')"
+                )
+            look("2-mayday")
+            pages[1].click("#fine")
+            assert until(lambda: called(visit, "over"))
+            visit.walk(0.1)
+            for page in pages:
+                wait_for(page, "document.querySelector('#alarm-text').textContent === 'The mayday is over.'")
+
+
+def called(visit: Visit, kind: str) -> bool:
+    visit.hear(undone=0, check_ins=0)
+    alarm = visit.tracker.watch.alarm
+    return alarm is not None and alarm.kind == kind
+
+
+def team_on(spot: Place) -> Team:
+    """Three wearers along the walk of a plan, and one on its last floor."""
+    team = Team(spot.plan)
+    for who, (x_m, y_m) in zip(("Anna", "Eve", "Gil"), spot.way, strict=True):
+        team.hear(who, place(spot.plan, x_m, y_m, 0))
+    team.hear("Kim", place(spot.plan, *spot.way[1], len(spot.plan.levels) - 1))
+    return team
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", PLACES)
+def test_a_commander_answers_a_mayday(browser: Any, name: str, tmp_path: Path) -> None:
+    """Sees it come, opens its details, sends the nearest one, acknowledges it, and goes back: each on another window, seen on all."""
+    spot = PLACES[name]
+    team, last = team_on(spot), len(spot.plan.levels) - 1
+    sent: list[tuple[str, bytes]] = []
+    with ServedTeam(team) as served:
+
+        def send(topic: str, payload: bytes) -> bool:
+            sent.append((topic, payload))
+            return True
+
+        served.page.feed.send = send
+
+        def arrives() -> None:
+            """What the broker distributes."""
+            assert until(lambda: sent)
+            team.put_bytes(*sent.pop())
+            served.show()
+
+        with windows(browser, served.page.url, TABLE_READY, tmp_path) as (pages, look):
+            for page in pages:
+                assert page.inner_text("#status-text") == "connected"
+                legend(page)
+                page.fill("#me", "Ben")
+            team.hear("Kim", place(spot.plan, *spot.way[1], last), alarm=ReportedAlarm("mayday", "fall", 1, 14.0))
+            served.show()
+            for page in pages:
+                wait_for(page, f"!document.querySelector('#mayday').hidden && echostep.scene.level === {last}")
+                page.click("#mayday-open")
+                wait_for(page, "document.querySelectorAll('#rescuers li').length === 3")
+            look("1-distress")
+            pages[2].click("#rescuers li:first-child button")
+            arrives()
+            for page in pages:
+                wait_for(page, "document.querySelector('#rescuers li').innerText.includes('sent by Ben')")
+            pages[3].click("#acknowledge")
+            arrives()
+            for page in pages:
+                wait_for(
+                    page, "document.querySelector('#acknowledge').hidden && document.querySelector('#mayday').hidden"
+                )
+                wait_for(page, "document.body.dataset.alarm === 'false'")
+                page.click("#close")
+                wait_for(page, "document.querySelector('#list .note').textContent.includes('acknowledged by Ben')")
+            look("2-acknowledged")

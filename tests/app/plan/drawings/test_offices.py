@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: MIT
+"""Drawings in many habits become the same plan: seven doors in their gaps, seven spaces with their names; or the import says what it did not read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from echostep.plan.model import Plan
+from echostep_app.plan.importers.formats import import_plan
+from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.summary import doors_in_gaps
+from echostep_app.plan.places.faces import OUTSIDE
+from echostep_app.plan.places.spaces import find_spaces
+from echostep_app.plan.questions import with_questions
+from plan.drawings import drawn_offices as drawn
+from plan.drawings.drawn_offices import DOOR_STYLES, WALL_STYLES, Doors, Walls, write_office
+
+TURN = 33.0
+ROOM_M2 = 5.88 * 4.63  # R2, between its walls
+
+
+def facts(plan: Plan) -> tuple[int, int, int, float]:
+    """Doors, doors in gaps, different spaces that have a room's name, area of R2."""
+    level, spaces = plan.levels[0], find_spaces(plan, 0)
+    assert spaces is not None
+    homes = {room.name: spaces.face_at(*room.at_m) for room in level.rooms}
+    area = spaces.faces.areas[homes["R2"]].area if homes["R2"] != OUTSIDE else 0.0
+    return len(level.doors), doors_in_gaps(level), len(set(homes.values()) - {OUTSIDE}), float(area)
+
+
+def is_right(plan: Plan) -> bool:
+    doors, in_gaps, spaces, area = facts(plan)
+    return (doors, in_gaps, spaces) == (7, 7, 7) and abs(area - ROOM_M2) < 0.6
+
+
+@pytest.mark.parametrize("turn", [0.0, TURN])
+@pytest.mark.parametrize("walls", WALL_STYLES, ids=lambda walls: str(walls.__name__))
+def test_walls_of_all_habits(tmp_path: Path, walls: Walls, turn: float) -> None:
+    plan = import_plan(write_office(tmp_path / "a.dxf", walls, turn=turn))
+    assert is_right(plan), facts(plan)
+
+
+@pytest.mark.parametrize("turn", [0.0, TURN])
+@pytest.mark.parametrize("door", DOOR_STYLES, ids=lambda door: str(door.__name__))
+def test_doors_of_all_habits(tmp_path: Path, door: Doors, turn: float) -> None:
+    plan = import_plan(write_office(tmp_path / "a.dxf", door=door, turn=turn))
+    assert is_right(plan), facts(plan)
+
+
+@pytest.mark.parametrize(
+    "layers", [("AR_Innenwände", "AR_Türen"), ("CLOISONS", "PORTES"), ("墙体", "门窗"), ("A-WALL", "A-WALL")]
+)
+def test_layers_of_doors(tmp_path: Path, layers: tuple[str, str]) -> None:
+    """门窗 holds doors and windows; A-WALL both walls and doors."""
+    plan = import_plan(write_office(tmp_path / "a.dxf", layers=layers))
+    assert is_right(plan), facts(plan)
+
+
+def test_a_mirrored_block_and_what_stands_beside_the_walls(tmp_path: Path) -> None:
+    for plan in (
+        import_plan(write_office(tmp_path / "a.dxf", mirrored=True)),
+        import_plan(write_office(tmp_path / "b.dxf", extra=drawn.furnished)),
+    ):
+        assert is_right(plan), facts(plan)
+
+
+@pytest.mark.parametrize("door", [drawn.nothing, drawn.folding])
+def test_a_room_behind_a_gap_is_asked_about(tmp_path: Path, door: Doors) -> None:
+    plan = with_questions(import_plan(write_office(tmp_path / "a.dxf", door=door)))
+    texts = [question.text for question in plan.levels[0].questions if question.is_proposed]
+    assert plan.levels[0].doors == ()
+    assert len([text for text in texts if "has no door, but a gap" in text]) == len(texts) > 0
+
+
+def test_double_doors_without_a_swing_are_told(tmp_path: Path) -> None:
+    """Single leaves drawn open lie in their gaps, that in the corner too; of two that face each other none fits the gap."""
+    report = ImportReport()
+    level = import_plan(write_office(tmp_path / "a.dxf", door=drawn.leaves_alone), report=report).levels[0]
+    assert (len(level.doors), doors_in_gaps(level)) == (6, 6)
+    assert report.left_out["door in no wall"] == 2
+    assert [question.text for question in level.questions] == ["door in no wall, left out: is it a door?"] * 2

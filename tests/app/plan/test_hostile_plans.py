@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT
+"""Plans that would cost hours, gigabytes or a crash: one clear error, or read without what cannot be; Ctrl-C ends an import."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from echostep.errors import EchostepError
+from echostep.plan.model import load_plan
+from echostep.plan.plan_file import MOST_CORNERS
+from echostep_app.plan.check import check_plan
+from echostep_app.plan.importers import limited
+from echostep_app.plan.importers.formats import import_plan
+from echostep_app.plan.importers.imdf.archive import FREE_BYTES, MOST_FILES, MOST_RATIO, Archive
+from echostep_app.plan.importers.limited import import_limited, open_limited
+from echostep_app.plan.importers.parsing import LARGEST_BYTES
+from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.writer import plan_json
+
+SQUARE = ((0, 0, 4, 0), (4, 0, 4, 4), (4, 4, 0, 4), (0, 4, 0, 0))
+
+
+def drawing(path: Path, *more: str) -> Path:
+    """A square of walls in millimetres, and other entities on the layer of walls."""
+    lines = [
+        f"0\nLINE\n8\nWalls\n10\n{1000 * a}\n20\n{1000 * b}\n11\n{1000 * c}\n21\n{1000 * d}\n" for a, b, c, d in SQUARE
+    ]
+    head = "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n"
+    path.write_text(head + "".join(lines) + "".join(more) + "0\nENDSEC\n0\nEOF\n")
+    return path
+
+
+def arc(radius: str) -> str:
+    return f"0\nARC\n8\nWalls\n10\n0.0\n20\n0.0\n40\n{radius}\n50\n0.0\n51\n90.0\n"
+
+
+def test_unknown_entities_are_left_out(tmp_path: Path) -> None:
+    report = ImportReport()
+    file = drawing(tmp_path / "a.dxf", "0\nAEC_WALL\n5\n99\n8\nWalls\n10\n1.0\n")
+    assert len(import_plan(file, report=report).levels[0].walls) == len(SQUARE)
+    assert sum("AEC_WALL" in what for what in report.left_out) == 1
+
+
+@pytest.mark.parametrize("radius", ["1e300", "1e15", "1e12"])
+def test_an_arc_larger_than_the_earth_is_refused_at_once(tmp_path: Path, radius: str) -> None:
+    with pytest.raises(EchostepError, match=r"ARC is 100 km away"):
+        import_plan(drawing(tmp_path / "a.dxf", arc(radius)))
+
+
+def test_a_zip_that_unpacks_a_hundredfold_is_refused(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.zip", "w", zipfile.ZIP_DEFLATED) as packed:
+        packed.writestr("level.geojson", b" " * (FREE_BYTES + 4 * MOST_RATIO * 8192))
+        packed.writestr("unit.geojson", b"{}")
+    with Archive(tmp_path / "a.zip") as archive:
+        assert archive.text("unit.geojson") == "{}"
+        with pytest.raises(EchostepError, match=r"level\.geojson: unpacks to more than"):
+            archive.text("level.geojson")
+
+
+def test_a_zip_of_too_many_files_is_refused(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as packed:
+        for k in range(MOST_FILES + 1):
+            packed.writestr(f"{k}.geojson", b"")
+    with pytest.raises(EchostepError, match=r"a\.zip: the zip file has 1001 files; expected 1000 at most"):
+        import_plan(tmp_path / "a.zip")
+
+
+@pytest.mark.parametrize("suffix", ["dxf", "osm", "geojson"])
+def test_a_file_too_large_to_be_one_building_is_not_read(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a.{suffix}"
+    path.touch()
+    os.truncate(path, LARGEST_BYTES + 1)
+    with pytest.raises(EchostepError, match=rf"a\.{suffix}: larger than 512 MiB"):
+        import_plan(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (json.dumps({"echostep_plan": 1, "levels": [{"walls": [[0, 0, 100_001, 0]]}]}), "within 100000 m"),
+        ('{"echostep_plan": 1, "levels": ' + "[" * 2000 + "]" * 2000 + "}", r"a\.json"),
+    ],
+    ids=["far", "deep"],
+)
+def test_a_plan_that_is_too_wide_or_too_deep_is_one_error(tmp_path: Path, text: str, named: str) -> None:
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(EchostepError, match=named):
+        load_plan(tmp_path / "a.json")
+
+
+def plan_file(path: Path, obstacle: list[list[float]]) -> Path:
+    level = {"walls": SQUARE, "obstacles": [obstacle], "rooms": [{"name": "r", "at": [3, 1]}]}
+    path.write_text(json.dumps({"echostep_plan": 1, "levels": [level]}))
+    return path
+
+
+def test_repeated_corners_are_one(tmp_path: Path) -> None:
+    plan = load_plan(plan_file(tmp_path / "a.json", [[1, 1], [2, 1], [2, 1], [2, 2], [1, 2], [1, 2], [1, 1]]))
+    assert plan.levels[0].obstacles[0].tolist() == [[1, 1], [2, 1], [2, 2], [1, 2]]
+    check_plan(plan)
+
+
+def test_an_obstacle_of_a_million_corners_is_named(tmp_path: Path) -> None:
+    corners = [[math.cos(k), math.sin(k)] for k in range(MOST_CORNERS + 1)]
+    with pytest.raises(EchostepError, match=r"obstacles\[0\]: 10001 corners, expected 10000 at most"):
+        load_plan(plan_file(tmp_path / "a.json", corners))
+
+
+@pytest.mark.process
+def test_an_import_in_its_own_process_gives_the_same_plan_and_the_same_errors(tmp_path: Path) -> None:
+    file = drawing(tmp_path / "a.dxf")
+    assert plan_json(open_limited(file)) == plan_json(import_plan(file))
+    with pytest.raises(EchostepError, match=r"b\.osm: no such file"):
+        open_limited(tmp_path / "b.osm")
+
+
+@pytest.mark.process
+def test_an_import_that_takes_too_long_or_crashes_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limited, "CHILD", "import time; time.sleep(60)")
+    monkeypatch.setattr(limited, "LONGEST_S", 0.2)
+    with pytest.raises(EchostepError, match="takes longer"):
+        import_limited(tmp_path / "a.dxf")
+    monkeypatch.setattr(limited, "LONGEST_S", 60.0)
+    monkeypatch.setattr(limited, "CHILD", "import os; os.abort()")
+    with pytest.raises(EchostepError, match=r"a\.dxf: the import failed"):
+        import_limited(tmp_path / "a.dxf")
+    monkeypatch.setattr(
+        limited, "CHILD", "from echostep_app.plan.importers import limited as l; l._limit_memory(); bytes(5 << 30)"
+    )
+    with pytest.raises(EchostepError, match="MemoryError"):
+        import_limited(tmp_path / "a.dxf")
+
+
+@pytest.mark.process
+def test_ctrl_c_ends_an_import_and_its_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limited, "CHILD", "import time; time.sleep(600)")
+    before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, 0.2)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            import_limited(tmp_path / "a.dxf")  # returns once its process has ended
+    finally:
+        signal.signal(signal.SIGALRM, before)

@@ -1,0 +1,315 @@
+# SPDX-License-Identifier: MIT
+"""What the check finds, that it finds nothing in sound plans, and the pictures."""
+
+from __future__ import annotations
+
+import json
+import warnings
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+from typer.testing import CliRunner
+
+from echostep.errors import EchostepError
+from echostep.plan.model import Level, Plan, load_plan, parse_plan
+from echostep_app.cli import app
+from echostep_app.plan.check import check_plan
+from echostep_app.plan.cropping import within
+from echostep_app.plan.pictures.drawing import draw_plan
+from echostep_app.plan.places.findings import PlanFinding
+
+DEMO = Path(str(resources.files("echostep"))) / "plans/demo.json"
+
+
+def flat(walls: Sequence[Sequence[float]], **fields: Any) -> Plan:
+    return house([{"name": "ground", "walls": walls} | fields])
+
+
+def house(levels: list[dict[str, Any]], **fields: Any) -> Plan:
+    return parse_plan(json.dumps({"echostep_plan": 1, "levels": levels} | fields).encode())
+
+
+def box(x: float = 0.0, y: float = 0.0, wide: float = 4.0, high: float = 3.0) -> list[list[float]]:
+    """Four walls, without the door from x + 1 to x + 2 in the south."""
+    u, v = x + wide, y + high
+    return [[x, y, x + 1, y], [x + 2, y, u, y], [u, y, u, v], [u, v, x, v], [x, v, x, y]]
+
+
+def door(x: float = 0.0, y: float = 0.0) -> dict[str, Any]:
+    return {"line": [x + 1, y, x + 2, y]}
+
+
+def kinds(plan: Plan) -> list[str]:
+    return [finding.kind for finding in check_plan(plan)]
+
+
+ROOM = {"name": "A", "at": [2, 1]}
+
+
+def test_sound_plans() -> None:
+    assert kinds(load_plan(DEMO)) == []
+    assert kinds(flat(box(), doors=[door()], rooms=[ROOM])) == []
+    assert kinds(flat([])) == []
+
+
+def test_an_open_room() -> None:
+    wide: list[list[float]] = [[0, 0, 1, 0], [3, 0, 4, 0], *box()[2:]]
+    (finding,) = check_plan(flat(wide, rooms=[ROOM]))
+    assert finding.kind == "open room"
+    assert "is 2 m wide or less" in finding.text
+    assert finding.position_m == pytest.approx((2.0, 0.0), abs=0.3)
+    assert kinds(flat([], rooms=[ROOM])) == ["open room"]
+    (finding,) = check_plan(flat([[0, 0, 4, 0], [4, 0, 4, 2.6], [4, 3, 0, 3], [0, 3, 0, 0]], rooms=[ROOM]))
+    assert finding.position_m == pytest.approx((4.0, 2.8), abs=0.3)
+    assert "is 0.5 m wide or less" in finding.text
+
+
+def test_a_gap_that_people_can_pass_is_a_passage() -> None:
+    """Two rooms without a listed door: one opens to the other, the other to the outside."""
+    walls: list[list[float]] = [*box(0, 0, 8), [4, 0, 4, 1], [4, 1.9, 4, 3]]
+    rooms = [ROOM, {"name": "B", "at": [6, 1]}]
+    assert kinds(flat(walls, rooms=rooms)) == []
+    assert kinds(house([{"walls": walls, "rooms": rooms}], start={"x": 6, "y": 2, "heading_deg": 0})) == []
+    assert kinds(flat([*walls, [4, 1, 4, 1.9]], rooms=rooms)) == ["unreachable"]
+
+
+def test_walls_that_almost_meet() -> None:
+    walls = box()
+    walls[2] = [4, 0.04, 4, 3]
+    (finding,) = check_plan(flat(walls, doors=[door()]))
+    assert finding.kind == "gap"
+    assert finding.position_m[0] == 4.0
+    assert 0.0 <= finding.position_m[1] <= 0.04
+    assert "0.040 m" in finding.text
+    assert len(finding.lines_m) == 2
+    walls[2] = [4, 0.004, 4, 3]
+    assert kinds(flat(walls, doors=[door()])) == []
+    walls[2] = [4, 0.2, 4, 3]
+    assert kinds(flat(walls, doors=[door()])) == []
+
+
+def test_faces_of_a_wall_with_an_open_end_are_no_gap() -> None:
+    assert kinds(flat([[0, 0, 5, 0], [0, 0.08, 5, 0.08]])) == []
+
+
+def test_a_wall_that_crosses_another_is_no_gap() -> None:
+    assert kinds(flat([[0, 0, 5, 0], [2, -0.06, 2, 0.06]])) == []
+
+
+def test_overlapping_walls() -> None:
+    (finding,) = check_plan(flat([[0, 0, 5, 0], [4, 0, 9, 0], [5, 0, 5, 3]]))
+    assert finding.kind == "overlap"
+    assert "1.00 m" in finding.text
+    assert kinds(flat([[0, 0, 5, 0], [5, 0, 0, 0]])) == ["overlap"]
+    assert kinds(flat([[0, 0, 5, 0], [5, 0, 9, 0], [2, 0, 2, 4]])) == []
+
+
+def test_a_window_over_a_wall_overlaps_too() -> None:
+    assert kinds(flat([[0, 0, 5, 0]], windows=[[1, 0, 2, 0]])) == ["overlap"]
+
+
+def test_rooms_that_no_door_joins() -> None:
+    walls = [*box(), *box(10)]
+    rooms = [ROOM, {"name": "B", "at": [12, 1]}]
+    assert kinds(flat(walls, doors=[door(), door(10)], rooms=rooms)) == []
+    closed: list[list[float]] = [*walls, [11, 0, 12, 0]]
+    (finding,) = check_plan(flat(closed, doors=[door()], rooms=[*rooms, {"name": "C", "at": [1, 1]}]))
+    assert finding.kind == "unreachable"
+    assert "'B'" in finding.text
+    assert finding.position_m == (12.0, 1.0)
+
+
+def test_reached_from_the_start() -> None:
+    levels = [{"name": "g", "walls": [*box(), [1, 0, 2, 0]], "rooms": [ROOM]}]
+    assert kinds(house(levels, start={"x": 3, "y": 2, "heading_deg": 0})) == []
+    assert kinds(house(levels, start={"x": 9, "y": 2, "heading_deg": 0})) == ["unreachable", "start"]  # outside
+
+
+def test_doors_without_walls() -> None:
+    (finding,) = check_plan(flat(box(), doors=[door(), {"line": [10, 1, 11, 1], "name": "moon"}]))
+    assert finding.kind == "door"
+    assert "moon" in finding.text
+    assert kinds(flat(box(), doors=[{"line": [1, 0.3, 2, 0.3]}])) == ["door"]
+    assert kinds(flat(box(), doors=[{"line": [1.05, 0, 1.95, 0]}])) == []
+    (finding,) = check_plan(flat([*box(), [1, 0, 2, 0]], doors=[door()]))
+    assert "a wall runs through" in finding.text
+
+
+STAIRS = {"kind": "stairs", "name": "S", "levels": [0, 1], "outline": [[0.5, 0.5], [1.5, 0.5], [1.5, 1.5], [0.5, 1.5]]}
+
+
+def test_levels_need_a_way() -> None:
+    levels = [{"name": name, "walls": box(), "doors": [door()], "rooms": [ROOM]} for name in "gh"]
+    assert kinds(house(levels, connectors=[STAIRS])) == []
+    assert kinds(house(levels)) == ["way", "unreachable", "way"]
+    outside = STAIRS | {"outline": [[10, 0], [11, 0], [11, 1]]}
+    assert kinds(house(levels, connectors=[outside])) == ["way", "way"]
+    assert [f.level for f in check_plan(house([*levels, {"name": "roof", "walls": box()}], connectors=[STAIRS]))] == [2]
+
+
+def test_stairs_behind_walls() -> None:
+    levels = [{"name": name, "walls": box(), "doors": [door()], "rooms": [ROOM]} for name in "gh"]
+    shut = [[0.4, 0.4, 1.6, 0.4], [1.6, 0.4, 1.6, 1.6], [1.6, 1.6, 0.4, 1.6], [0.4, 1.6, 0.4, 0.4]]
+    levels[1] = levels[1] | {"walls": [*box(), *shut], "rooms": []}
+    (finding,) = check_plan(house(levels, connectors=[STAIRS]))
+    assert (finding.level, "no way out" in finding.text) == (1, True)
+    ajar = [
+        [0.4, 0.4, 1.6, 0.4],
+        [1.6, 0.4, 1.6, 1.6],
+        [1.6, 1.6, 1.4, 1.6],
+        [0.6, 1.6, 0.4, 1.6],
+        [0.4, 1.6, 0.4, 0.4],
+    ]
+    levels[1] = levels[1] | {"walls": [*box(), *ajar], "doors": [{"line": [0.6, 1.6, 1.4, 1.6]}, door()]}
+    assert kinds(house(levels, connectors=[STAIRS])) == []
+
+
+@pytest.mark.parametrize(
+    "outline", [[[0, 0], [1, 1], [1, 0], [0, 1]], [[0, 0], [1, 1], [2, 2]], [[-1e5, 0], [1e5, 1], [1e5, 0]]]
+)
+def test_odd_outlines_of_stairs(outline: list[list[float]]) -> None:
+    levels = [{"name": name, "walls": box(), "doors": [door()], "rooms": [ROOM]} for name in "gh"]
+    assert "way" in kinds(house(levels, connectors=[STAIRS | {"outline": outline}]))
+
+
+def test_upper_rooms_are_reached_by_stairs_alone() -> None:
+    upper = {"name": "h", "walls": [*box(), [1, 0, 2, 0]], "rooms": [{"name": "up", "at": [3, 2]}]}
+    ground = {"name": "g", "walls": box(), "doors": [door()], "rooms": [ROOM, {"name": "B", "at": [3, 1]}]}
+    assert kinds(house([ground, upper], connectors=[STAIRS])) == []
+    cut = upper | {"walls": [*box(), [1, 0, 2, 0], [2.5, 0, 2.5, 3]]}
+    assert kinds(house([ground, cut], connectors=[STAIRS])) == ["unreachable"]
+
+
+SMALL = st.integers(0, 5).map(float)
+WALLS = st.lists(st.tuples(SMALL, SMALL, SMALL, SMALL).filter(lambda w: w[:2] != w[2:]), max_size=12)
+
+
+@given(WALLS, st.lists(st.tuples(SMALL, SMALL), max_size=3))
+@settings(max_examples=60, deadline=None)
+def test_any_walls_can_be_checked(walls: list[tuple[float, ...]], rooms: list[tuple[float, float]]) -> None:
+    plan = flat([list(w) for w in walls], rooms=[{"name": "r", "at": list(at)} for at in rooms])
+    findings = check_plan(plan)
+    assert [finding.number for finding in findings] == list(range(1, len(findings) + 1))
+    once = {tuple(sorted((w[:2], w[2:]))) for w in walls}
+    if len(once) < len(walls):
+        assert "overlap" in {finding.kind for finding in findings}
+
+
+def test_walls_of_a_rectangle() -> None:
+    walls = np.array([[0, 0, 10, 0], [20, 20, 30, 30], [-5, 5, 15, 5], [4, 4, 4.01, 4]], dtype=np.float64)
+    assert within(walls, (0, -1, 10, 10)).tolist() == walls[[0, 2, 3]].tolist()
+    assert within(walls, (0, -1, 10, 10), least_m=0.1).tolist() == walls[[0, 2]].tolist()
+    assert not len(within(walls, (100, 100, 101, 101)))
+
+
+@pytest.mark.slow
+def test_pictures(tmp_path: Path) -> None:
+    plan = load_plan(DEMO)
+    draw_plan(plan, tmp_path / "plan.png", [0])
+    seen = imread(tmp_path / "plan.png")[..., :3]
+    draw_plan(plan, tmp_path / "part.png", [0], (0, 0, 5, 5))
+    draw_plan(plan, tmp_path / "wrong.png", [0], None, [PlanFinding("gap", 0, (5.0, 5.0), "x", ((1, 1, 9, 9),), 1)])
+    wrong = imread(tmp_path / "wrong.png")[..., :3]
+    assert (seen.min(axis=2) < 0.4).mean() > 0.002  # walls
+    assert seen.shape == wrong.shape
+    red = (wrong[..., 0] > 0.7) & (wrong[..., 1] < 0.2)
+    assert red.sum() > 100
+    assert ((seen[..., 0] > 0.7) & (seen[..., 1] < 0.2)).sum() == 0
+    draw_plan(plan, tmp_path / "plan.svg", [0])
+    first = (tmp_path / "plan.svg").read_bytes()
+    draw_plan(plan, tmp_path / "plan.svg", [0])
+    assert b"<svg" in first
+    assert first == (tmp_path / "plan.svg").read_bytes()
+    for label in ("x / m", "y / m", "wall", "start"):
+        assert f"<!-- {label} -->".encode() in first
+    with pytest.raises(EchostepError, match=r"\.svg or \.pdf"):
+        draw_plan(plan, tmp_path / "plan.gif", [0])
+    with pytest.raises(EchostepError, match="cannot write"):
+        draw_plan(plan, tmp_path / "none" / "plan.png", [0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["$x^$", "$\\frac{1}", "a\tb\nc", "x" * 5000, "\U0001f600", "$$", "&<>"])
+def test_any_name_is_drawn(tmp_path: Path, name: str) -> None:
+    plan = house(
+        [{"name": name, "walls": box(), "rooms": [{"name": name, "at": [2, 1]}]}] * 2,
+        connectors=[STAIRS | {"name": name}],
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # letters that the font lacks
+        draw_plan(plan, tmp_path / "plan.svg", [0, 1], None, check_plan(plan))
+        draw_plan(plan, tmp_path / "plan.png", [0])
+    ET.parse(tmp_path / "plan.svg")
+
+
+@pytest.mark.slow
+def test_many_walls_become_pixels(tmp_path: Path) -> None:
+    at = np.arange(30_000) * 0.01
+    walls = np.column_stack((at, at, at + 0.01, at + 0.01))
+    plan = Plan("line", (Level("g", 0.0, walls),), None, "")
+    draw_plan(plan, tmp_path / "line.png", [0])
+    dark = imread(tmp_path / "line.png")[..., :3].max(axis=2) < 0.4
+    assert dark.any(axis=0).mean() > 0.8  # the diagonal crosses nearly all columns
+    assert dark.mean() < 0.02
+
+
+def test_commands(tmp_path: Path) -> None:
+    run = CliRunner().invoke
+    good = run(app, ["plan", "check", str(DEMO)])
+    assert (good.exit_code, "nothing wrong" in good.output) == (0, True)
+    (tmp_path / "bad.json").write_text(
+        '{"echostep_plan": 1, "levels": [{"name": "g", "walls": [[0,0,1,0],[1.05,0,1.05,4]]}]}'
+    )
+    bad = run(app, ["plan", "check", str(tmp_path / "bad.json"), "--picture", str(tmp_path / "bad.png")])
+    assert bad.exit_code == 1
+    assert "1. g, x 1.00 m, y 0.00 m: walls almost meet: 0.050 m apart" in bad.output
+    assert (tmp_path / "bad.png").stat().st_size > 1000
+    assert f"picture: {tmp_path / 'bad.png'}\n" in bad.output
+    shown = run(app, ["plan", "show", str(DEMO), "-o", str(tmp_path / "show.svg"), "--level", "Ground floor"])
+    assert shown.exit_code == 0
+    for wrong in (["--level", "7"], ["--bounds", "1,2,3"], ["--bounds", "1,2,0,3"], ["--bounds", "1,2,nan,3"]):
+        failed = run(app, ["plan", "show", str(DEMO), "-o", str(tmp_path / "x.png"), *wrong])
+        assert isinstance(failed.exception, EchostepError)
+
+
+@pytest.mark.slow
+def test_no_label_covers_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rooms too close for their names, findings on one spot: what is drawn is apart, and the title counts the names left out."""
+    rooms = [{"name": f"a long name of a room {k}", "at": [4 + 0.3 * (k % 5), 4 + 0.2 * (k // 5)]} for k in range(40)]
+    plan = flat([[0, 0, 10, 0], [10, 0, 10, 10], [10, 10, 0, 10], [0, 10, 0, 0]], rooms=rooms)
+    findings = [PlanFinding("gap", 0, (2.0, 2.0), "x", (), k) for k in range(1, 5)]
+    figures: list[Figure] = []
+    save = Figure.savefig
+
+    def kept(figure: Figure, *arguments: Any, **options: Any) -> None:
+        figures.append(figure)
+        save(figure, *arguments, **options)
+
+    monkeypatch.setattr(Figure, "savefig", kept)
+    draw_plan(plan, tmp_path / "plan.png", [0], None, findings)
+    (axes,) = figures[0].axes
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert {"1", "2", "3", "4"} < {text.get_text() for text in axes.texts}
+    assert len(boxes) < 4 + 40
+    assert not [(a, b) for k, a in enumerate(boxes) for b in boxes[:k] if a.overlaps(b)]
+    assert f"({44 - len(boxes)} names do not fit" in axes.get_title()
+
+
+def test_many_rooms_without_a_door_are_one_finding() -> None:
+    """Six closed rooms beside one that has a door."""
+    closed = [[[x, 0, x + 4, 0], [x + 4, 0, x + 4, 3], [x + 4, 3, x, 3], [x, 3, x, 0]] for x in range(10, 70, 10)]
+    walls = [*box(), *(wall for one in closed for wall in one)]
+    rooms = [ROOM, *({"name": f"C{k}", "at": [12 + 10 * k, 1]} for k in range(6))]
+    start = {"x": 2, "y": 1, "heading_deg": 0}
+    (finding,) = check_plan(house([{"name": "ground", "walls": walls, "doors": [door()], "rooms": rooms}], start=start))
+    assert finding.kind == "no door"
+    assert finding.text.startswith("6 rooms have no door, as 'C0': ")

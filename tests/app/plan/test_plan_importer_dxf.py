@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: MIT
+"""Importing drawings: what each entity becomes, units, layers, doors, and what a damaged one gets."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from ezdxf.filemanagement import new
+from typer.testing import CliRunner
+
+from echostep.errors import EchostepError
+from echostep.plan.model import Plan, load_plan
+from echostep_app.cli import app
+from echostep_app.plan.importers.dxf import entities as dxf_entities
+from echostep_app.plan.importers.formats import import_plan, open_plan
+from echostep_app.plan.importers.hints import Hints
+
+
+def drawing(insunits: int = 6) -> tuple[Any, Any]:
+    doc = new("R2010")
+    doc.header["$INSUNITS"] = insunits
+    for layer in ("A-WALL", "A-GLAZ", "A-DOOR", "Stairs", "A-ROOM", "Furniture"):
+        doc.layers.add(layer)
+    return doc, doc.modelspace()
+
+
+def imported(doc: Any, folder: Path, **hints: Any) -> Plan:
+    doc.saveas(folder / "ground.dxf")
+    return import_plan(folder / "ground.dxf", Hints(**hints))
+
+
+def walls_of(plan: Plan) -> set[tuple[tuple[float, ...], ...]]:
+    return {tuple(sorted((tuple(w[:2]), tuple(w[2:])))) for w in plan.levels[0].walls.tolist()}
+
+
+@pytest.mark.parametrize(
+    ("code", "metre"), [(4, 1000.0), (5, 100.0), (6, 1.0), (1, 39.37007874015748), (2, 3.280839895013123)]
+)
+def test_units_are_read(tmp_path: Path, code: int, metre: float) -> None:
+    doc, space = drawing(code)
+    space.add_line((0, 0), (5 * metre, 0), {"layer": "A-WALL"})
+    assert walls_of(imported(doc, tmp_path)) == {((0, 0), (5, 0))}
+
+
+def test_no_units_are_asked_for(tmp_path: Path) -> None:
+    doc, space = drawing(0)
+    space.add_line((0, 0), (5000, 0), {"layer": "A-WALL"})
+    with pytest.raises(EchostepError, match=r"ground.dxf.*units.*--units mm"):
+        imported(doc, tmp_path)
+    assert walls_of(imported(doc, tmp_path, units="mm")) == {((0, 0), (5, 0))}
+
+
+def test_lines_of_all_kinds(tmp_path: Path) -> None:
+    doc, space = drawing()
+    space.add_lwpolyline([(0, 0), (10, 0), (10, 5)], close=True, dxfattribs={"layer": "A-WALL"})
+    space.add_polyline2d([(20, 0), (25, 0), (25, 5)], dxfattribs={"layer": "a-wall-new"})
+    space.add_arc((40, 0), 2, 0, 90, dxfattribs={"layer": "A-WALL"})
+    space.add_line((0, 50), (5, 50), {"layer": "A-GLAZ"})
+    space.add_line((0, 70), (5, 70), {"layer": "Furniture"})
+    plan = imported(doc, tmp_path)
+    found = walls_of(plan)
+    assert {((0, 0), (10, 0)), ((10, 0), (10, 5)), ((0, 0), (10, 5)), ((20, 0), (25, 0)), ((25, 0), (25, 5))} <= found
+    arc = plan.levels[0].walls[plan.levels[0].walls[:, 0] > 30]
+    assert np.hypot(*(arc[:, 2:] - arc[:, :2]).T).sum() == pytest.approx(math.pi, rel=0.01)
+    assert np.hypot(arc[:, 0] - 40, arc[:, 1]) == pytest.approx(2.0, abs=0.01)
+    assert len(plan.levels[0].windows) == 1
+    assert plan.levels[0].walls[:, 1].max() < 40
+
+
+def test_blocks_are_taken_apart(tmp_path: Path) -> None:
+    """A wall on layer 0 of a block lies on the layer of the block, turned and moved with it."""
+    doc, space = drawing()
+    block = doc.blocks.new("ROOM")
+    block.add_line((0, 0), (3, 0), {"layer": "0"})
+    outer = doc.blocks.new("WING")
+    outer.add_blockref("ROOM", (1, 0), {"layer": "0"})
+    space.add_blockref("WING", (10, 20), {"layer": "A-WALL", "rotation": 90})
+    assert walls_of(imported(doc, tmp_path)) == {((10, 21), (10, 24))}
+
+
+def test_layers_are_chosen(tmp_path: Path) -> None:
+    doc, space = drawing()
+    space.add_line((0, 0), (5, 0), {"layer": "Furniture"})
+    with pytest.raises(EchostepError, match=r"--layer walls=NAME; layers: Furniture"):
+        imported(doc, tmp_path)
+    assert len(imported(doc, tmp_path, layers={"walls": ["FURN*"]}).levels[0].walls) == 1
+
+
+def test_pieces_of_one_wall_are_one(tmp_path: Path) -> None:
+    doc, space = drawing()
+    for x in range(10):
+        space.add_line((x, 0), (x + 1, 0), {"layer": "A-WALL"})
+        space.add_line((x + 1, 0), (x, 0), {"layer": "A-WALL"})
+    space.add_line((3, 0), (3, 4), {"layer": "A-WALL"})
+    assert walls_of(imported(doc, tmp_path)) == {((0, 0), (10, 0)), ((3, 0), (3, 4))}
+
+
+def with_gap() -> tuple[Any, Any]:
+    doc, space = drawing()
+    space.add_line((0, 0), (4, 0), {"layer": "A-WALL"})
+    space.add_line((5, 0), (9, 0), {"layer": "A-WALL"})
+    return doc, space
+
+
+@pytest.mark.parametrize("loose", [True, False])
+def test_a_swing_is_a_door(tmp_path: Path, loose: bool) -> None:
+    doc, space = with_gap()
+    target = space if loose else doc.blocks.new("DOOR")
+    target.add_arc((4, 0), 1, 0, 90, dxfattribs={"layer": "A-DOOR"})
+    target.add_line((4, 0), (4, 1), {"layer": "A-DOOR"})
+    if not loose:
+        space.add_blockref("DOOR", (0, 0), {"layer": "A-DOOR"})
+    doors = imported(doc, tmp_path).levels[0].doors
+    assert len(doors) == 1
+    assert doors[0].line == pytest.approx((4, 0, 5, 0), abs=0.01)
+
+
+def test_a_double_door(tmp_path: Path) -> None:
+    doc, space = with_gap()
+    block = doc.blocks.new("DOOR")
+    block.add_arc((4, 0), 0.5, 0, 90)
+    block.add_arc((5, 0), 0.5, 90, 180)
+    space.add_blockref("DOOR", (0, 0), {"layer": "A-DOOR"})
+    doors = imported(doc, tmp_path).levels[0].doors
+    assert [door.line for door in doors] == [pytest.approx((4, 0, 5, 0), abs=0.01)]
+
+
+def test_a_plain_line_is_a_door_and_cuts_the_wall(tmp_path: Path) -> None:
+    doc, space = drawing()
+    space.add_line((0, 0), (9, 0), {"layer": "A-WALL"})
+    space.add_line((4, 0), (5, 0), {"layer": "A-DOOR"})
+    plan = imported(doc, tmp_path)
+    assert walls_of(plan) == {((0, 0), (4, 0)), ((5, 0), (9, 0))}
+    assert plan.levels[0].doors[0].line == pytest.approx((4, 0, 5, 0), abs=0.002)
+
+
+def test_storeys_with_stairs_and_names(tmp_path: Path) -> None:
+    for name in ("ground", "first"):
+        doc, space = drawing()
+        space.add_lwpolyline([(0, 0), (10, 0), (10, 5), (0, 5)], close=True, dxfattribs={"layer": "A-WALL"})
+        for i in range(10):
+            space.add_line((1 + 0.3 * i, 1), (1 + 0.3 * i, 2), {"layer": "Stairs"})
+        space.add_text("Hall " + name, dxfattribs={"layer": "A-ROOM", "insert": (5, 3)})
+        space.add_mtext("Store\\P2", dxfattribs={"layer": "A-ROOM", "insert": (8, 3)})
+        doc.saveas(tmp_path / f"{name}.dxf")
+    plan = import_plan(tmp_path / "ground.dxf", Hints(storey_height_m=3.0), [tmp_path / "first.dxf"])
+    assert [(level.name, level.height_m) for level in plan.levels] == [("ground", 0.0), ("first", 3.0)]
+    assert [room.name for room in plan.levels[1].rooms] == ["Hall first", "Store 2"]
+    assert [(c.kind, c.levels) for c in plan.connectors] == [("stairs", (0, 1))]
+    assert np.ptp(plan.connectors[0].outline_m, axis=0) == pytest.approx([2.7, 1.0], abs=0.15)
+
+
+def test_a_national_grid_comes_near(tmp_path: Path) -> None:
+    doc, space = drawing()
+    space.add_line((3456789.25, 5678901), (3456799.25, 5678901), {"layer": "A-WALL"})
+    space.add_text("Hall", dxfattribs={"layer": "A-ROOM", "insert": (3456790.25, 5678902)})
+    plan = imported(doc, tmp_path)
+    assert walls_of(plan) == {((0.25, 0), (10.25, 0))}
+    assert plan.levels[0].rooms[0].at_m == (1.25, 1)
+
+
+def test_hostile_drawings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dxf_entities, "MOST_PARTS", 3000)
+    doc, space = drawing()
+    space.add_line((0, 0), (5, 0), {"layer": "A-WALL"})
+    space.add_line((0, 0), (5e8, 0), {"layer": "A-WALL"})
+    with pytest.raises(EchostepError, match=r"ground.dxf: layer 'A-WALL': LINE is 100 km away"):
+        imported(doc, tmp_path)
+    doc, space = drawing()
+    names = [f"B{i}" for i in range(8)]
+    doc.blocks.new(names[0]).add_line((0, 0), (1, 0))
+    for inner, outer in zip(names, names[1:], strict=False):
+        block = doc.blocks.new(outer)
+        for i in range(10):
+            block.add_blockref(inner, (i, 0))
+    space.add_blockref(names[-1], (0, 0), {"layer": "A-WALL"})
+    with pytest.raises(EchostepError, match="more than 3000 parts"):
+        imported(doc, tmp_path)
+    doc, space = drawing()
+    doc.blocks.new("GRID").add_line((0, 0), (1, 0))
+    space.add_blockref(
+        "GRID",
+        (0, 0),
+        {"layer": "A-WALL", "row_count": 30000, "column_count": 30000, "row_spacing": 1, "column_spacing": 1},
+    )
+    with pytest.raises(EchostepError, match="repeated"):
+        imported(doc, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "raw",
+    [
+        b"",
+        b"hello",
+        b"\x00" * 1000,
+        b"0\nSECTION\n2\nENTITIES\n0\nLINE\n",
+        b"AutoCAD Binary DXF\r\n\x1a\x00" + b"\xff" * 99,
+    ],
+)
+def test_no_drawing(tmp_path: Path, raw: bytes) -> None:
+    (tmp_path / "a.dxf").write_bytes(raw)
+    with pytest.raises(EchostepError, match=r"a.dxf: ") as caught:
+        import_plan(tmp_path / "a.dxf")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("deep", "walls"), [(16, 5), (17, 4)])
+def test_blocks_in_blocks_are_read_to_a_depth(tmp_path: Path, deep: int, walls: int) -> None:
+    doc, space = drawing()
+    for a, b in (((0, 0), (4, 0)), ((4, 0), (4, 4)), ((4, 4), (0, 4)), ((0, 4), (0, 0))):
+        space.add_line(a, b, {"layer": "A-WALL"})
+    doc.blocks.new("B1").add_line((2, 0), (2, 3), {"layer": "A-WALL"})
+    for k in range(2, deep + 1):
+        doc.blocks.new(f"B{k}").add_blockref(f"B{k - 1}", (0, 0), {"layer": "A-WALL"})
+    space.add_blockref(f"B{deep}", (0, 0), {"layer": "A-WALL"})
+    assert len(walls_of(imported(doc, tmp_path))) == walls
+
+
+def test_room_numbers_of_blocks(tmp_path: Path) -> None:
+    """Room tags are often attributes of a block."""
+    doc, space = with_gap()
+    doc.blocks.new("TAG")
+    space.add_blockref("TAG", (2, 2), {"layer": "A-ROOM"}).add_attrib("NUMBER", "2.14", (2, 2), {"layer": "A-ROOM"})
+    assert [(room.name, room.at_m) for room in imported(doc, tmp_path).levels[0].rooms] == [("2.14", (2, 2))]
+
+
+@pytest.mark.long
+@pytest.mark.process
+def test_commands(tmp_path: Path) -> None:
+    doc, _ = with_gap()
+    doc.saveas(tmp_path / "ground.dxf")
+    command = ["plan", "import", str(tmp_path / "ground.dxf"), "-o", str(tmp_path / "plan.json")]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0
+    assert "ground, 0 m: 9 x 0 m, 2 walls (8 m)" in done.output
+    assert load_plan(tmp_path / "plan.json").digest == open_plan(tmp_path / "ground.dxf").digest
+    again = CliRunner().invoke(app, [*command, "--layer", "walls=A-DOOR", "--layer", "walls=A-W*", "--units", "mm"])
+    assert again.exit_code == 0
+    for wrong, named in (
+        (["--layer", "roofs=A"], "KIND=PATTERN"),
+        (["--layer", "walls"], "KIND"),
+        (["--units", "li"], "--units li"),
+    ):
+        failed = CliRunner().invoke(app, [*command, *wrong])
+        assert isinstance(failed.exception, EchostepError)
+        assert named in str(failed.exception)
+    both = ["plan", "import", str(tmp_path / "a.ifc"), str(tmp_path / "b.ifc"), "-o", str(tmp_path / "plan.json")]
+    assert "only drawings" in str(CliRunner().invoke(app, both).exception)

@@ -1,0 +1,331 @@
+# SPDX-License-Identifier: MIT
+"""Importing building models: two storeys with walls, a door, a window, a room and stairs, and what is no model."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+
+from echostep.errors import EchostepError
+from echostep.plan.model import Plan
+from echostep_app.plan.importers.formats import import_plan
+from echostep_app.plan.importers.report import ImportReport
+
+ifcopenshell = pytest.importorskip("ifcopenshell", reason="ifcopenshell is not installed: pip install 'echostep[ifc]'")
+
+
+class Model:
+    """A building in millimetres."""
+
+    def __init__(self, schema: Literal["IFC2X3", "IFC4", "IFC4X3"] = "IFC4") -> None:
+        from ifcopenshell.api import aggregate, context, owner, project, root, unit
+
+        self.file: Any = project.create_file(version=schema)
+        if schema == "IFC2X3":  # needs an owner of each element
+            person, company = owner.add_person(self.file), owner.add_organisation(self.file)
+            owner.add_person_and_organisation(self.file, person=person, organisation=company)
+            owner.add_application(self.file)
+        self.project = root.create_entity(self.file, ifc_class="IfcProject", name="House")
+        unit.assign_unit(self.file)  # millimetres
+        model = context.add_context(self.file, context_type="Model")
+        self.body = context.add_context(
+            self.file, context_type="Model", context_identifier="Body", target_view="MODEL_VIEW", parent=model
+        )
+        self.site = root.create_entity(self.file, ifc_class="IfcSite", name="Site")
+        self.laid_out = root.create_entity(self.file, ifc_class="IfcBuilding", name="Building")
+        aggregate.assign_object(self.file, products=[self.site], relating_object=self.project)
+        aggregate.assign_object(self.file, products=[self.laid_out], relating_object=self.site)
+
+    def storey(self, name: str, z_m: float) -> Any:
+        from ifcopenshell.api import aggregate, root
+
+        storey = root.create_entity(self.file, ifc_class="IfcBuildingStorey", name=name)
+        aggregate.assign_object(self.file, products=[storey], relating_object=self.laid_out)
+        self._put(storey, 0, 0, z_m, 0)
+        return storey
+
+    def box(
+        self,
+        kind: str,
+        at: tuple[float, float, float],
+        size: tuple[float, float, float],
+        turn: float = 0.0,
+        name: str = "",
+    ) -> Any:
+        """An element of length, thickness and height in metres; its corner is at `at`."""
+        from ifcopenshell.api import geometry, root
+
+        element = root.create_entity(self.file, ifc_class=kind, name=name)
+        shape = geometry.add_wall_representation(
+            self.file, context=self.body, length=size[0], thickness=size[1], height=size[2]
+        )
+        geometry.assign_representation(self.file, product=element, representation=shape)
+        self._put(element, *at, turn)
+        return element
+
+    def cut(self, wall: Any, at: tuple[float, float, float], size: tuple[float, float, float]) -> Any:
+        from ifcopenshell.api import feature
+
+        opening = self.box("IfcOpeningElement", at, size)
+        feature.add_feature(self.file, feature=opening, element=wall)
+        return opening
+
+    def fill(self, opening: Any, element: Any) -> None:
+        from ifcopenshell.api import feature
+
+        feature.add_filling(self.file, opening=opening, element=element)
+
+    def contain(self, storey: Any, *elements: Any) -> None:
+        from ifcopenshell.api import spatial
+
+        spatial.assign_container(self.file, products=list(elements), relating_structure=storey)
+
+    def _put(self, product: Any, x: float, y: float, z: float, turn: float) -> None:
+        from ifcopenshell.api import geometry
+
+        c, s = math.cos(turn), math.sin(turn)
+        matrix = np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, z], [0, 0, 0, 1]])
+        geometry.edit_object_placement(self.file, product=product, matrix=matrix)
+
+
+def write_house(folder: Path) -> Path:
+    """6 m by 4 m, walls of 0.3 m, on two floors 3 m apart; a door in the south, a window in the north of the ground floor."""
+    model = Model()
+    model.site.RefLatitude, model.site.RefLongitude = (53, 6, 36), (8, 51, 0)
+    for i in range(2):
+        model.storey(f"Floor {i}", 3.0 * i)
+        z = 3.0 * i
+        south = model.box("IfcWall", (0, 0, z), (6, 0.3, 2.8))
+        north = model.box("IfcWall", (0, 3.7, z), (6, 0.3, 2.8))
+        model.box("IfcWall", (0.3, 0.3, z), (3.4, 0.3, 2.8), math.pi / 2)
+        model.box("IfcWall", (6, 0.3, z), (3.4, 0.3, 2.8), math.pi / 2)
+        if i == 0:
+            model.cut(south, (2, -0.1, 0), (1, 0.5, 2.1))
+            model.box("IfcDoor", (2, 0.1, 0), (1, 0.1, 2.1), name="Front door")
+            model.cut(north, (2, 3.6, 0.8), (2, 0.5, 1.2))
+            model.box("IfcWindow", (2, 3.8, 0.8), (2, 0.1, 1.2))
+    model.box("IfcSpace", (0.3, 0.3, 0), (5.4, 3.4, 2.8), name="Hall")
+    model.box("IfcStairFlight", (0.5, 0.5, 0), (1, 2.5, 3.0), name="Stairs")
+    path = folder / "house.ifc"
+    model.file.write(str(path))
+    return path
+
+
+@pytest.fixture(scope="module")
+def house(tmp_path_factory: pytest.TempPathFactory) -> Plan:
+    return import_plan(write_house(tmp_path_factory.mktemp("ifc")))
+
+
+def test_storeys_and_their_walls(house: Plan) -> None:
+    assert [(level.name, level.height_m) for level in house.levels] == [("Floor 0", 0.0), ("Floor 1", 3.0)]
+    upper = house.levels[1].walls
+    assert len(upper) == 8
+    assert np.hypot(*(upper[:, 2:] - upper[:, :2]).T).sum() == pytest.approx(2 * (6 + 4) + 2 * (5.4 + 3.4), abs=0.02)
+    ground = house.levels[0].walls
+    assert (upper.min(), upper.max()) == (0.0, 6.0)
+    inside_door = (
+        (ground[:, [1, 3]].max(axis=1) < 0.31)
+        & (ground[:, [0, 2]].min(axis=1) > 1.99)
+        & (ground[:, [0, 2]].max(axis=1) < 3.01)
+    )
+    assert all(x0 == x1 for x0, _, x1, _ in ground[inside_door])  # only its jambs
+
+
+def test_doors_windows_rooms_and_stairs(house: Plan) -> None:
+    ground = house.levels[0]
+    assert [door.name for door in ground.doors] == ["Front door"]
+    x0, y0, x1, y1 = ground.doors[0].line
+    assert sorted((x0, x1)) == pytest.approx([2, 3], abs=0.01)
+    assert (y0, y1) == pytest.approx((0.15, 0.15), abs=0.01)
+    assert len(ground.windows) >= 2
+    assert not len(house.levels[1].windows)
+    assert [room.name for room in ground.rooms] == ["Hall"]
+    assert [(c.kind, c.name, c.levels) for c in house.connectors] == [("stairs", "Stairs", (0, 1))]
+
+
+def test_its_place_on_earth(house: Plan) -> None:
+    assert house.georeference is not None
+    assert (house.georeference.longitude_deg, house.georeference.latitude_deg) == pytest.approx((8.85, 53.11))
+    assert house.georeference.rotation_rad == 0.0
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("", "not an IFC file"),
+        ("hello", "not an IFC file"),
+        ("ISO-10303-21;\nHEADER;\nnonsense", "not an IFC file|storey"),
+        (
+            "ISO-10303-21;HEADER;FILE_DESCRIPTION((''),'2;1');FILE_NAME('','',(''),(''),'','','');FILE_SCHEMA(('IFC4'));ENDSEC;DATA;ENDSEC;END-ISO-10303-21;",
+            "storey|Storey",
+        ),
+    ],
+)
+def test_no_model(tmp_path: Path, text: str, named: str) -> None:
+    (tmp_path / "a.ifc").write_text(text)
+    with pytest.raises(EchostepError, match=named) as caught:
+        import_plan(tmp_path / "a.ifc")
+    assert "\n" not in str(caught.value)
+
+
+def imported(model: Model, folder: Path) -> tuple[Plan, ImportReport]:
+    model.file.write(str(folder / "a.ifc"))
+    report = ImportReport()
+    return import_plan(folder / "a.ifc", report=report), report
+
+
+def without_shape(model: Model, kind: str, **about: Any) -> Any:
+    """An element without a representation."""
+    from ifcopenshell.api import root
+
+    element = root.create_entity(model.file, ifc_class=kind, name=kind)
+    for name, value in about.items():
+        setattr(element, name, value)
+    return element
+
+
+@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4", "IFC4X3"])
+@pytest.mark.parametrize("leaf", ["drawn open", "without a shape", "closed"])
+def test_a_door_lies_in_its_opening(tmp_path: Path, leaf: str, schema: Literal["IFC2X3", "IFC4", "IFC4X3"]) -> None:
+    """The wall x 4.0 to 4.2 has an opening y 3 to 5, which reaches out of the wall on one side."""
+    model = Model(schema)
+    model.storey("Ground", 0.0)
+    wall = model.box("IfcWall", (4.2, 0, 0), (8, 0.2, 2.6), math.pi / 2)
+    opening = model.cut(wall, (4.0, 3.0, 0), (0.5, 2.0, 2.1))
+    if leaf == "without a shape":
+        door = without_shape(model, "IfcDoor")
+    else:
+        door = model.box("IfcDoor", (4.05, 3.0, 0), (1.0, 0.05, 2.1) if leaf == "drawn open" else (0.05, 2.0, 2.1))
+    model.fill(opening, door)
+    plan, report = imported(model, tmp_path)
+    assert len(plan.levels[0].doors) == 1
+    x0, y0, x1, y1 = plan.levels[0].doors[0].line
+    assert (x0, x1) == pytest.approx((4.1, 4.1), abs=0.01)
+    assert sorted((y0, y1)) == pytest.approx([3, 5], abs=0.01)
+    assert report.left_out == {}
+
+
+def test_a_door_without_opening_has_its_placement(tmp_path: Path) -> None:
+    """A leaf drawn open, 0.9 m wide along the placement's x."""
+    model = Model()
+    model.storey("Ground", 0.0)
+    model.box("IfcWall", (0, 0, 0), (4, 0.2, 2.6))
+    model.box("IfcWall", (4.9, 0, 0), (4, 0.2, 2.6))
+    door = model.box("IfcDoor", (4.0, 0.1, 0), (0.9, 0.9, 2.1))
+    door.OverallWidth, door.OverallHeight = 900.0, 2100.0
+    plan, _ = imported(model, tmp_path)
+    assert [one.line for one in plan.levels[0].doors] == [pytest.approx((4.0, 0.1, 4.9, 0.1), abs=0.01)]
+
+
+def test_what_has_no_shape_is_counted_and_filled_openings_place_windows(tmp_path: Path) -> None:
+    model = Model()
+    model.storey("Ground", 0.0)
+    wall = model.box("IfcWall", (0, 0, 0), (8, 0.2, 2.6))
+    model.fill(model.cut(wall, (2, -0.1, 0.8), (1.5, 0.4, 1.2)), without_shape(model, "IfcWindow"))
+    for kind in ("IfcDoor", "IfcWindow", "IfcWall"):
+        without_shape(model, kind)
+    for kind in ("IfcSlab", "IfcFurniture", "IfcFurniture"):
+        model.box(kind, (0, 0, 0), (1, 1, 0.2))
+    plan, report = imported(model, tmp_path)
+    assert len(plan.levels[0].windows) >= 2
+    assert report.left_out == {
+        "IfcWall without a shape": 1, "IfcWindow without a shape": 1, "IfcDoor without a shape, an opening or a width": 1,
+        "IfcSlab": 1, "IfcFurniture": 2,
+    }  # fmt: skip
+    assert "doors without a shape were left out" in report.doubts[0]
+
+
+def test_reference_levels_are_no_storeys(tmp_path: Path) -> None:
+    """Levels without walls, doors and rooms close to another one; two half storeys with walls stay, and are told."""
+    model = Model()
+    walls = [model.box("IfcWall", (0, 0, z), (8, 0.2, 2.0)) for z in (0.0, 2.9, 4.2)]
+    named = {
+        name: model.storey(name, z)
+        for name, z in (("Slab 0", -0.36), ("Ground", 0.0), ("Slab 1", 2.6), ("First", 2.9), ("Half", 4.2))
+    }
+    for name, wall in zip(("Ground", "First", "Half"), walls, strict=True):
+        model.contain(named[name], wall)
+    plan, report = imported(model, tmp_path)
+    assert [level.name for level in plan.levels] == ["Ground", "First", "Half"]
+    assert report.doubts == [
+        "reference levels, not storeys: Slab 0 (-0.36 m), Slab 1 (2.6 m)",
+        "levels First and Half are 1.30 m apart: half storeys, or reference levels?",
+    ]
+
+
+def test_names_of_storeys_and_rooms(tmp_path: Path) -> None:
+    """Of a storey the name goes before the long name, of a room the other way round."""
+    model = Model()
+    storey = model.storey("Ground floor", 0.0)
+    storey.LongName = "ACID00000001"
+    model.box("IfcWall", (0, 0, 0), (8, 0.2, 2.6))
+    model.box("IfcSpace", (1, 1, 0), (2, 2, 2.6), name="1.01").LongName = "Kitchen"
+    plan, _ = imported(model, tmp_path)
+    assert plan.levels[0].name == "Ground floor"
+    assert [room.name for room in plan.levels[0].rooms] == ["Kitchen"]
+
+
+def test_a_packed_model(tmp_path: Path) -> None:
+    house = write_house(tmp_path)
+    with zipfile.ZipFile(tmp_path / "house.ifczip", "w", zipfile.ZIP_DEFLATED) as packed:
+        packed.write(house, "model/house.ifc")
+    assert import_plan(tmp_path / "house.ifczip").digest == import_plan(house).digest
+    with zipfile.ZipFile(tmp_path / "none.ifczip", "w") as packed:
+        packed.writestr("readme.txt", "x")
+    for name, raw, named in (
+        ("none.ifczip", None, "no .ifc file in it"),
+        ("bad.ifczip", b"PK\x03\x04x", "not a zip file"),
+    ):
+        if raw is not None:
+            (tmp_path / name).write_bytes(raw)
+        with pytest.raises(EchostepError, match=named):
+            import_plan(tmp_path / name)
+
+
+def concrete_kinds(kind: str) -> list[str]:
+    """The classes of IFC4 below one that a model can have."""
+
+    def below(declaration: Any) -> list[Any]:
+        return [declaration, *(inner for one in declaration.subtypes() for inner in below(one))]
+
+    declared = ifcopenshell.ifcopenshell_wrapper.schema_by_name("IFC4").declaration_by_name(kind)
+    return [one.name() for one in below(declared) if not one.is_abstract()]
+
+
+@pytest.mark.slow
+def test_every_class_of_elements_is_used_or_counted(tmp_path: Path) -> None:
+    """One element of each class of IFC4, all far above the storeys; those that are no bodies of a building, as openings, are not counted."""
+    model = Model()
+    ground = model.storey("Ground", 0.0)
+    model.contain(ground, model.box("IfcWall", (0, 0, 0), (8, 0.2, 2.6)))
+    silent = {
+        kind
+        for parent in ("IfcFeatureElement", "IfcPort", "IfcVirtualElement", "IfcElementComponent")
+        for kind in concrete_kinds(parent)
+    }
+    kinds = sorted({*concrete_kinds("IfcElement"), "IfcSpace"} - silent)
+    for kind in kinds:
+        model.box(kind, (0, 0, 50.0), (2, 0.2, 2.0))
+    plan, report = imported(model, tmp_path)
+    assert len(kinds) > 100
+    assert len(plan.levels[0].walls) == 4
+    assert {what.split()[0] for what in report.left_out} == set(kinds)
+    assert sum(report.left_out.values()) == len(kinds)
+
+
+def test_what_lies_on_one_level_alone_is_counted(tmp_path: Path) -> None:
+    model = Model()
+    for k in range(2):
+        model.storey(f"Floor {k}", 3.0 * k)
+        model.box("IfcWall", (0, 0, 3.0 * k), (8, 0.2, 2.6))
+    model.box("IfcStairFlight", (1, 1, 0), (1, 2, 1.0))
+    model.box("IfcTransportElement", (4, 1, 0), (1, 1, 6.0)).PredefinedType = "ESCALATOR"
+    model.box("IfcTransportElement", (6, 1, 0), (1, 1, 6.0)).PredefinedType = "ELEVATOR"
+    plan, report = imported(model, tmp_path)
+    assert [connector.kind for connector in plan.connectors] == ["lift"]
+    assert report.left_out == {"stairs on one level only": 1, "IfcTransportElement that is no lift": 1}

@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: MIT
+"""Importing IMDF: folder and zip give the same plan; units, openings, stairs; what a damaged or hostile archive gets."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import command_line
+from echostep.errors import EchostepError
+from echostep.plan.model import Plan
+from echostep_app.plan.check import check_plan
+from echostep_app.plan.importers.formats import import_plan
+from echostep_app.plan.importers.hints import Hints
+from echostep_app.plan.importers.imdf import archive
+
+LON, LAT = -2.978, 56.46
+EAST, NORTH = 1 / 61_650.0, 1 / 111_360.0  # degrees a metre there
+
+
+def at(x: float, y: float) -> list[float]:
+    return [LON + x * EAST, LAT + y * NORTH]
+
+
+def box(x0: float, y0: float, x1: float, y1: float) -> dict[str, Any]:
+    return {"type": "Polygon", "coordinates": [[at(x0, y0), at(x1, y0), at(x1, y1), at(x0, y1), at(x0, y0)]]}
+
+
+def line(x0: float, y0: float, x1: float, y1: float) -> dict[str, Any]:
+    return {"type": "LineString", "coordinates": [at(x0, y0), at(x1, y1)]}
+
+
+def feature(kind: str, key: str, geometry: Any, **about: Any) -> dict[str, Any]:
+    return {"type": "Feature", "id": key, "feature_type": kind, "geometry": geometry, "properties": about}
+
+
+def storey(i: int) -> dict[str, list[dict[str, Any]]]:
+    """Hall of 10 m by 8 m with a shop, stairs, a lift and a pillar."""
+    on = {"level_id": f"L{i}"}
+    return {
+        "level": [feature("level", f"L{i}", box(0, 0, 10, 8), ordinal=i, name={"en": f"Floor {i}"})],
+        "unit": [
+            feature("unit", f"hall{i}", box(0, 0, 10, 5), category="walkway", **on),
+            feature("unit", f"shop{i}", box(0, 5, 5, 8), category="room", name={"en": "Shop", "de": "Laden"}, **on),
+            feature("unit", f"lift{i}", box(5, 5, 7, 8), category="elevator", **on),
+            feature("unit", f"stairs{i}", box(7, 5, 10, 8), category="stairs", **on),
+            feature("unit", f"pillar{i}", box(4, 2, 4.5, 2.5), category="column", **on),
+        ],
+        "opening": [
+            feature("opening", f"o{i}", line(2, 5, 3, 5), category="pedestrian", door={"type": "swinging"}, **on),
+            feature("opening", f"p{i}", line(5.5, 5, 6.5, 5), category="pedestrian", **on),
+        ],
+        "fixture": [feature("fixture", f"f{i}", box(8, 1, 9, 2), category="desk", **on)],
+    }
+
+
+def files(levels: int = 2) -> dict[str, Any]:
+    rows = [storey(i) for i in range(levels)]
+    found = {
+        f"{kind}.geojson": {"type": "FeatureCollection", "features": [f for row in rows for f in row[kind]]}
+        for kind in rows[0]
+    }
+    venue = feature("venue", "V", box(0, 0, 10, 8), name={"en": "Mall"})
+    return {
+        "manifest.json": {"version": "1.0.0"},
+        "venue.geojson": {"type": "FeatureCollection", "features": [venue]},
+        **found,
+    }
+
+
+def folder(path: Path, tree: dict[str, Any]) -> Path:
+    path.mkdir(exist_ok=True)
+    for name, content in tree.items():
+        (path / name).write_text(content if isinstance(content, str) else json.dumps(content))
+    return path
+
+
+def zipped(path: Path, tree: dict[str, Any]) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        for name, content in tree.items():
+            file.writestr(f"venue/{name}", content if isinstance(content, str) else json.dumps(content))
+    return path
+
+
+@pytest.fixture
+def mall(tmp_path: Path) -> Plan:
+    return import_plan(folder(tmp_path / "mall", files()))
+
+
+def test_a_zip_is_a_folder(mall: Plan, tmp_path: Path) -> None:
+    assert import_plan(zipped(tmp_path / "mall.zip", files())).digest == mall.digest
+
+
+def test_what_becomes_of_a_mall(mall: Plan) -> None:
+    assert (mall.name, [(level.name, level.height_m) for level in mall.levels]) == (
+        "Mall",
+        [("Floor 0", 0.0), ("Floor 1", 3.5)],
+    )
+    ground = mall.levels[0]
+    assert [room.name for room in ground.rooms] == ["Shop"]
+    assert [(door.state, round(door.width_m, 2)) for door in ground.doors] == [("unknown", 1.0), ("open", 1.0)]
+    assert len(ground.obstacles) == 1
+    length = np.hypot(*(ground.walls[:, 2:] - ground.walls[:, :2]).T).sum()
+    assert length == pytest.approx(36 + 5 + 3 + 2 + 3 - 2 + 2, abs=0.2)  # outside, shop, lift, doors, pillar
+    assert {(c.kind, c.levels) for c in mall.connectors} == {("stairs", (0, 1)), ("lift", (0, 1))}
+    assert check_plan(mall) == []
+
+
+def test_a_relationship_joins_stairs_apart(tmp_path: Path) -> None:
+    tree = files()
+    tree["unit.geojson"]["features"][8]["geometry"] = box(0, 0, 1, 1)
+    ends = {
+        "origin": {"id": "stairs0", "feature_type": "unit"},
+        "destination": {"id": "stairs1", "feature_type": "unit"},
+    }
+    relation = feature("relationship", "r", None, category="stairs", direction="undirected", **ends)
+    plan = import_plan(folder(tmp_path / "a", tree))
+    assert [c.kind for c in plan.connectors] == ["lift"]
+    tree["relationship.geojson"] = {"type": "FeatureCollection", "features": [relation]}
+    plan = import_plan(folder(tmp_path / "b", tree))
+    assert sorted(c.kind for c in plan.connectors) == ["lift", "stairs", "stairs"]
+    relation["properties"] |= {"intermediary": 3, "origin": [], "destination": {"id": {}}}
+    assert len(import_plan(folder(tmp_path / "c", tree)).connectors) == 1
+
+
+def changed(name: str, place: int, **about: Any) -> dict[str, Any]:
+    tree = files()
+    tree[name]["features"][place] |= about
+    return tree
+
+
+@pytest.mark.parametrize(
+    ("tree", "named"),
+    [
+        ({"unit.geojson": "{}"}, "no level.geojson in it"),
+        ({"manifest.json": "{}"}, "level.geojson"),
+        (files() | {"unit.geojson": "[1"}, "unit.geojson: not JSON"),
+        (files() | {"unit.geojson": "[" * 100_000}, "unit.geojson: not JSON"),
+        (files() | {"level.geojson": {"type": "FeatureCollection", "features": []}}, "no levels"),
+        (
+            changed("unit.geojson", 1, properties={"category": "room", "level_id": "L9"}),
+            r"unit features\[1\]: there is no level 'L9'",
+        ),
+        (changed("unit.geojson", 1, properties={"category": "room"}), r"unit features\[1\].properties.level_id"),
+        (changed("unit.geojson", 1, properties={"category": 4, "level_id": "L0"}), r"unit.geojson.*category"),
+        (changed("unit.geojson", 1, id=None), r"unit.geojson: features\[1\].id"),
+        (
+            changed("unit.geojson", 1, geometry={"type": "Polygon", "coordinates": [[[0, 0]]]}),
+            r"unit.geojson: features\[1\].geometry",
+        ),
+        (changed("level.geojson", 1, properties={"ordinal": "x"}), r"level features\[1\].properties.ordinal"),
+        (changed("level.geojson", 0, geometry={"coordinates": []}), r"level.geojson: features\[0\].geometry"),
+    ],
+)
+def test_wrong_archives(tmp_path: Path, tree: dict[str, Any], named: str) -> None:
+    with pytest.raises(EchostepError, match=named) as caught:
+        import_plan(zipped(tmp_path / "a.zip", tree))
+    assert "\n" not in str(caught.value)
+
+
+def test_hostile_zips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.zip").write_bytes(b"PK\x03\x04 nothing")
+    with pytest.raises(EchostepError, match="not a zip file"):
+        import_plan(tmp_path / "a.zip")
+    with pytest.raises(EchostepError, match="not a zip file"):
+        import_plan(tmp_path / "none.zip")
+    monkeypatch.setattr(archive, "LARGEST_BYTES", 1_000_000)
+    bomb = zipped(tmp_path / "b.zip", files() | {"level.geojson": " " * 2_000_000})
+    with pytest.raises(EchostepError, match=r"level.geojson: unpacks to more than 0 MiB"):
+        import_plan(bomb)
+    raw = bytearray(zipped(tmp_path / "c.zip", files()).read_bytes())
+    raw[200:400] = bytes(200)
+    (tmp_path / "c.zip").write_bytes(raw)
+    with pytest.raises(EchostepError, match=r"c\.zip"):
+        import_plan(tmp_path / "c.zip")
+
+
+def without_openings(rooms: int = 8) -> dict[str, Any]:
+    """One level: a corridor of 40 m, rooms of 5 m on one side, and a store behind the first room that only this room touches."""
+    on = {"level_id": "L0"}
+    units = [feature("unit", "way", box(0, 0, 5 * rooms, 2), category="walkway", **on)]
+    units += [
+        feature("unit", f"u{k}", box(5 * k, 2, 5 * k + 5, 6), category="office", name={"en": f"R{k}"}, **on)
+        for k in range(rooms)
+    ]
+    units.append(feature("unit", "store", box(0, 6, 4, 9), category="storage", name={"en": "Store"}, **on))
+    tree = files(1)
+    tree["level.geojson"]["features"] = [feature("level", "L0", box(0, 0, 5 * rooms, 9), ordinal=0, name={"en": "G"})]
+    tree["unit.geojson"]["features"] = units
+    tree["opening.geojson"]["features"] = tree["fixture.geojson"]["features"] = []
+    return tree
+
+
+def test_files_may_end_in_json(mall: Plan, tmp_path: Path) -> None:
+    renamed = {name.replace(".geojson", ".json"): content for name, content in files().items()}
+    assert import_plan(folder(tmp_path / "a", renamed)).digest == mall.digest
+    assert import_plan(zipped(tmp_path / "mall.zip", renamed)).digest == mall.digest
+    renamed["level.json"]["features"] = []
+    with pytest.raises(EchostepError, match=r"level\.json: it has no levels"):
+        import_plan(folder(tmp_path / "c", renamed))
+
+
+def test_rooms_without_openings_are_one_cause(tmp_path: Path) -> None:
+    plan = import_plan(folder(tmp_path / "a", without_openings()))
+    (finding,) = check_plan(plan)
+    assert finding.kind == "no door"
+    assert finding.text.startswith("9 rooms have no door, as 'R0'; the level has none at all")
+
+
+def test_assumed_doors_reach_every_room(tmp_path: Path) -> None:
+    plan = import_plan(folder(tmp_path / "a", without_openings()), Hints(doors_m=0.9))
+    doors = plan.levels[0].doors
+    assert [(door.name, round(door.width_m, 3), door.state) for door in doors] == [("assumed", 0.9, "unknown")] * 9
+    assert all(door.line[1] == door.line[3] == pytest.approx(2.0, abs=0.01) for door in doors[:8])  # on the corridor
+    assert doors[8].line[1] == pytest.approx(6.0, abs=0.01)  # the store's, to the room beside it
+    assert check_plan(plan) == []
+
+
+def test_assumed_doors_pass_walls_drawn_with_a_thickness(tmp_path: Path) -> None:
+    """Rooms 0.2 m apart have a wall each: a door in both."""
+    tree = without_openings(1)
+    tree["unit.geojson"]["features"][2] = feature(
+        "unit", "store", box(0, 6.2, 4, 9), category="storage", name={"en": "Store"}, level_id="L0"
+    )
+    plan = import_plan(folder(tmp_path / "a", tree), Hints(doors_m=0.8))
+    assert sorted(round(door.line[1], 1) for door in plan.levels[0].doors) == [2.0, 6.0, 6.2]
+    assert [finding.kind for finding in check_plan(plan)] == []
+
+
+def test_an_opening_drawn_as_a_point_gets_the_width(tmp_path: Path) -> None:
+    tree = without_openings(2)
+    opening = feature(
+        "opening", "o", {"type": "Point", "coordinates": at(1.5, 2.0)}, category="pedestrian", level_id="L0"
+    )
+    tree["opening.geojson"]["features"] = [opening]
+    plan = import_plan(folder(tmp_path / "a", tree), Hints(doors_m=0.9))
+    assert plan.levels[0].doors[0].line == pytest.approx((1.05, 2.0, 1.95, 2.0), abs=0.01)
+    assert len(plan.levels[0].doors) == 3  # and one each of the other room and the store
+
+
+def test_doors_that_are_drawn_stay_as_they_are(mall: Plan, tmp_path: Path) -> None:
+    assert import_plan(folder(tmp_path / "a", files()), Hints(doors_m=0.9)).levels[0].doors == mall.levels[0].doors
+
+
+@pytest.mark.process
+def test_the_import_says_that_there_are_no_doors(tmp_path: Path) -> None:
+    source, out = folder(tmp_path / "a", without_openings()), tmp_path / "plan.json"
+    done = command_line.echostep("plan", "import", source, "-o", out)
+    assert "has no door openings, so its rooms cannot be entered: --doors 0.9" in done.stdout
+    done = command_line.echostep("plan", "import", source, "-o", out, "--doors", "0.9")
+    assert "9 doors are assumed" in done.stdout
+    assert "no door openings" not in done.stdout
+
+
+@pytest.mark.parametrize("name", ["plan.xml", "plan.osm"])
+def test_an_unknown_xml_is_answered_with_the_formats(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text(
+        '<?xml version="1.0"?><IndoorFeatures xmlns="http://www.opengis.net/indoorgml/1.0/core"/>'
+    )
+    with pytest.raises(EchostepError, match=r"IndoorFeatures.*DXF, IFC, IMDF.*OpenStreetMap.*WRLD"):
+        import_plan(tmp_path / name)
+
+
+def test_doors_are_for_imdf(tmp_path: Path) -> None:
+    with pytest.raises(EchostepError, match="--doors is for IMDF alone"):
+        import_plan(tmp_path / "plan.osm", Hints(doors_m=0.9))

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: MIT
+"""Importing OpenStreetMap indoor data: XML and Overpass JSON give the same plan; tags; what a damaged file gets."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from echostep.errors import EchostepError
+from echostep.plan.model import Plan
+from echostep_app.plan.check import check_plan
+from echostep_app.plan.importers.formats import import_plan, open_plan
+from echostep_app.plan.importers.osm.elements import levels_of
+from echostep_app.plan.importers.report import ImportReport
+
+LON, LAT = 8.85, 53.11
+EAST, NORTH = 1 / 66_945.0, 1 / 111_300.0  # degrees a metre there
+
+
+def node(key: int, x: float, y: float, **tags: str) -> dict[str, Any]:
+    return {"type": "node", "id": key, "lon": LON + x * EAST, "lat": LAT + y * NORTH, "tags": tags}
+
+
+def way(key: int, nodes: list[int], **tags: str) -> dict[str, Any]:
+    return {"type": "way", "id": key, "nodes": nodes, "tags": {k.replace("__", ":"): v for k, v in tags.items()}}
+
+
+HOUSE = [
+    node(1, 0, 0), node(2, 10, 0), node(3, 10, 8), node(4, 0, 8),
+    node(5, 6, 0), node(6, 6, 8), node(7, 6, 4, door="yes", width="1.2"), node(8, 0, 4, entrance="main", level="0"),
+    node(9, 2, 2), node(10, 4, 2), node(11, 8, 6, highway="elevator", level="0;1"), node(12, 6, 3),
+    way(20, [1, 5, 2, 3, 6, 4, 8, 1], building="yes", name="House"),
+    way(21, [5, 2, 3, 6, 7, 12, 5], indoor="room", level="0-1", name="Hall"),
+    way(22, [1, 5, 12, 7, 6, 4, 8, 1], indoor="corridor", level="0;1", name="Corridor"),
+    way(23, [9, 10], highway="steps", level="0;1", width="2"),
+]  # fmt: skip
+
+
+def xml(elements: list[dict[str, Any]]) -> str:
+    rows = []
+    for e in elements:
+        inner = "".join(f'<tag k="{k}" v="{v}"/>' for k, v in e["tags"].items()) + "".join(
+            f'<nd ref="{n}"/>' for n in e.get("nodes", [])
+        )
+        place = f' lon="{e["lon"]!r}" lat="{e["lat"]!r}"' if "lon" in e else ""
+        rows.append(f'<{e["type"]} id="{e["id"]}"{place}>{inner}</{e["type"]}>')
+    return '<?xml version="1.0" encoding="UTF-8"?><osm version="0.6">' + "".join(rows) + "</osm>"
+
+
+def imported(folder: Path, elements: Any, name: str = "house.json") -> Plan:
+    (folder / name).write_text(
+        json.dumps({"version": 0.6, "elements": elements}) if name.endswith("json") else xml(elements)
+    )
+    return import_plan(folder / name)
+
+
+def test_xml_and_json_are_one_plan(tmp_path: Path) -> None:
+    plan = imported(tmp_path, HOUSE)
+    assert plan.digest == imported(tmp_path, HOUSE, "house.osm").digest
+    assert (plan.name, [level.height_m for level in plan.levels]) == ("House", [0.0, 3.5])
+
+
+def test_what_becomes_of_a_house(tmp_path: Path) -> None:
+    plan = imported(tmp_path, HOUSE)
+    ground, upper = plan.levels
+    assert [room.name for room in ground.rooms] == ["Hall", "Corridor"]
+    length = np.hypot(*(ground.walls[:, 2:] - ground.walls[:, :2]).T).sum()
+    assert length == pytest.approx(36 + 8 - 1.2 - 0.9, abs=0.1)
+    assert len(ground.walls) == 7
+    assert sorted(door.width_m for door in ground.doors) == [pytest.approx(0.9, abs=0.01), pytest.approx(1.2, abs=0.01)]
+    assert len(upper.doors) == 1
+    assert {(c.kind, c.levels) for c in plan.connectors} == {("stairs", (0, 1)), ("lift", (0, 1))}
+    stairs = next(c for c in plan.connectors if c.kind == "stairs")
+    assert np.ptp(stairs.outline_m, axis=0) == pytest.approx([2, 2], abs=0.02)
+    assert check_plan(plan) == []
+    assert plan.georeference is not None
+    assert plan.georeference.latitude_deg == pytest.approx(LAT, abs=1e-4)
+
+
+def test_geometry_in_the_ways(tmp_path: Path) -> None:
+    """Overpass `out geom` has no nodes of its own."""
+    at = {e["id"]: {"lon": e["lon"], "lat": e["lat"]} for e in HOUSE if e["type"] == "node"}
+    ways = [e | {"geometry": [at[n] for n in e["nodes"]]} for e in HOUSE if e["type"] == "way"]
+    assert len(imported(tmp_path, ways).levels[0].walls) == 5
+
+
+def test_multipolygons_glass_and_locked_doors(tmp_path: Path) -> None:
+    members = [{"type": "way", "ref": 30, "role": "outer"}]
+    tags = {"type": "multipolygon", "indoor": "room", "level": "2"}
+    more = [
+        way(30, [1, 5, 12, 7, 6, 4, 8, 1]),
+        {"type": "relation", "id": 40, "members": members, "tags": tags},
+        node(13, 3, 5, door="hinged", locked="yes"), node(14, 3, 7), node(15, 3, 3),
+        way(31, [14, 13, 15], indoor="wall", level="0", material="glass"),
+    ]  # fmt: skip
+    plan = imported(tmp_path, [*HOUSE, *more])
+    assert [level.name for level in plan.levels] == ["level 0", "level 1", "level 2"]
+    assert len(plan.levels[0].windows) == 2
+    assert [door.state for door in plan.levels[0].doors].count("closed") == 1
+
+
+@pytest.mark.parametrize(
+    ("tags", "levels"),
+    [
+        ({"level": "0"}, [0]),
+        ({"level": "1;0"}, [0, 1]),
+        ({"level": "-2--1"}, [-2, -1]),
+        ({"level": "-1-1"}, [-1, 0, 1]),
+        ({"level": "0.5"}, [0.5]),
+        ({"level": "0", "repeat_on": "2-3"}, [0, 2, 3]),
+        ({"level": "ground"}, []),
+        ({"level": "nan;1e9"}, []),
+        ({}, []),
+    ],
+)
+def test_levels(tags: dict[str, str], levels: list[float]) -> None:
+    assert levels_of(tags) == levels
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ('{"elements": 3}', "elements: expected a list"),
+        ('{"elements": []}', "indoor"),
+        ('{"elements": [{"type": "node", "id": "a"}]}', "node 'a'"),
+        ('{"elements": [{"type": "node", "id": 7, "lon": 200, "lat": 0}]}', "node 7: lon"),
+        ('{"elements": [{"type": "node", "id": 7, "lon": NaN, "lat": 0}]}', "NaN"),
+        ('{"elements": [{"type": "way", "id": 7, "nodes": [true]}]}', "way 7"),
+        (
+            '{"elements": [{"type": "way", "id": 7, "nodes": [1, 2], "tags": {"indoor": "room", "level": "0"}}]}',
+            "indoor",
+        ),
+        (json.dumps({"elements": [*HOUSE, node(50, 4e6, 0)]}), "km apart"),
+        (
+            json.dumps({"elements": [*HOUSE, way(51, [1, 5], indoor="wall", level="0-9999999")]}),
+            "way 51|range of levels",
+        ),
+    ],
+)
+def test_wrong_json(tmp_path: Path, text: str, named: str) -> None:
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(EchostepError, match=named):
+        import_plan(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("", "not XML"),
+        ("<osm>", "not XML"),
+        ("<html/>", "this XML is <html>, not <osm>: plans are read as DXF, IFC, IMDF"),
+        ('<!DOCTYPE x [<!ENTITY a "aaaa">]><osm>&a;</osm>', "DTD"),
+        ('<osm><node id="x" lon="1" lat="1"/></osm>', "node 'x'"),
+        ('<osm><node id="1" lon="nan" lat="1"/></osm>', "node 1: lon"),
+        ('<osm><node id="1" lon="1"/></osm>', "node 1: lat"),
+        ("<osm>" + "<a>" * 100_000, "not XML"),
+    ],
+)
+def test_wrong_xml(tmp_path: Path, text: str, named: str) -> None:
+    (tmp_path / "a.osm").write_text(text)
+    with pytest.raises(EchostepError, match=named) as caught:
+        import_plan(tmp_path / "a.osm")
+    assert "\n" not in str(caught.value)
+
+
+def geojson(*shapes: tuple[str, Any, dict[str, str]]) -> str:
+    features = [
+        {"type": "Feature", "properties": {"@id": f"way/{k}"} | tags, "geometry": {"type": kind, "coordinates": at}}
+        for k, (kind, at, tags) in enumerate(shapes)
+    ]
+    return json.dumps({"type": "FeatureCollection", "generator": "overpass-turbo", "features": features})
+
+
+RING = [[8.0, 50.0], [8.0001, 50.0], [8.0001, 50.0001], [8.0, 50.0001], [8.0, 50.0]]
+ROOM = {"indoor": "room", "level": "0", "name": "Room 1"}
+
+
+@pytest.mark.parametrize("name", ["export.geojson", "export.json"])
+def test_geojson_of_overpass_turbo(tmp_path: Path, name: str) -> None:
+    """A door's point lies on the wall that has a corner there; polygons with holes, several polygons, lines."""
+    hole = [[8.00002, 50.00002], [8.00004, 50.00002], [8.00004, 50.00004], [8.00002, 50.00002]]
+    (tmp_path / name).write_text(
+        geojson(
+            ("Polygon", [RING, hole], ROOM),
+            ("Point", [8.0001, 50.0], {"door": "yes", "level": "0"}),
+            ("Point", [8.00005, 50.00005], {"door": "yes", "level": "0"}),
+            ("LineString", [[8.0001, 50.0], [8.0002, 50.0]], {"indoor": "wall", "level": "0"}),
+            ("MultiPolygon", [[RING]], {"indoor": "room", "level": "1", "name": "Room 2"}),
+        )
+    )
+    report = ImportReport()
+    plan = open_plan(tmp_path / name)
+    assert import_plan(tmp_path / name, report=report).digest == plan.digest
+    assert [[room.name for room in level.rooms] for level in plan.levels] == [["Room 1"], ["Room 2"]]
+    assert len(plan.levels[0].doors) == 1
+    assert report.left_out == {"door on no wall": 1}
+    assert plan.georeference is not None
+    assert len(plan.levels[0].walls) == 4 + 3 + 1  # outline, hole, the wall beside
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (geojson(("Polygon", [[[0, 0], [1, 0], [0, 0]]], {"building": "yes"})), "indoor"),
+        (geojson(("Curve", [], ROOM)), "no type of geometry"),
+        (geojson(("Point", [200, 0], ROOM)), r"features\[0\]"),
+        (geojson(("Point", [1], ROOM)), "expected .longitude, latitude."),
+        (geojson(("Polygon", 3, ROOM)), "coordinates"),
+    ],
+)
+def test_wrong_geojson(tmp_path: Path, text: str, named: str) -> None:
+    (tmp_path / "a.geojson").write_text(text)
+    with pytest.raises(EchostepError, match=named):
+        import_plan(tmp_path / "a.geojson")
+
+
+def test_rooms_without_a_level_are_told(tmp_path: Path) -> None:
+    rooms = [way(60, [1, 2, 3, 4, 1], indoor="room", name="Lost"), way(61, [1, 2, 3, 4, 1], indoor="area")]
+    (tmp_path / "a.json").write_text(json.dumps({"elements": [*HOUSE, *rooms]}))
+    report = ImportReport()
+    import_plan(tmp_path / "a.json", report=report)
+    assert report.left_out["room without level"] == 1
+    assert report.left_out["indoor=area without level"] == 1
+    assert report.doubts[0].startswith("1 room has no level and was left out (way 60)")
+
+
+def test_a_room_drawn_as_a_relation_has_its_name(tmp_path: Path) -> None:
+    """Its outline is two open ways in opposite directions; the hole's walls have no name."""
+    outline = [way(70, [1, 2, 3]), way(71, [1, 4, 3]), way(72, [2, 3, 4, 2])]
+    members = [{"type": "way", "ref": ref, "role": role} for ref, role in ((70, "outer"), (71, "outer"), (72, "inner"))]
+    tags = {"type": "multipolygon", "indoor": "room", "level": "0", "name": "Ring"}
+    relation = {"type": "relation", "id": 7, "members": members, "tags": tags}
+    (tmp_path / "a.json").write_text(json.dumps({"elements": [*HOUSE, *outline, relation]}))
+    plan = import_plan(tmp_path / "a.json")
+    assert sum(room.name == "Ring" for level in plan.levels for room in level.rooms) == 1

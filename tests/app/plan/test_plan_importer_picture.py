@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of plans: dark areas become walls by a scale, letters are left out and counted; without a scale the next step is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw
+
+import command_line
+from echostep.errors import EchostepError
+from echostep.plan.model import load_plan
+from echostep_app.plan.importers.formats import NEXT_STEPS, PICTURES, import_plan
+from echostep_app.plan.importers.hints import Hints
+from echostep_app.plan.importers.raster.picture import threshold
+from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.summary import size_m
+from echostep_app.plan.places.gaps import door_gaps
+
+PIXEL_M = 0.02
+WALLS = (
+    (50, 50, 550, 59),
+    (50, 441, 550, 450),
+    (50, 50, 59, 450),
+    (541, 50, 550, 450),
+    (250, 50, 259, 200),
+    (250, 246, 259, 450),
+)
+
+
+def scan(path: Path, ink: int = 40, paper: int = 225) -> Path:
+    """A house of 10 m by 8 m with a partition that has a gap of 0.9 m; letters, a frame of dots, grey paper with noise."""
+    image = Image.new("L", (600, 500), paper)
+    draw = ImageDraw.Draw(image)
+    for box in WALLS:
+        draw.rectangle(box, fill=ink)
+    for x in (100, 120, 140):  # letters of 0.2 m
+        draw.rectangle((x, 150, x + 3, 160), fill=ink)
+    noise = np.random.default_rng(3).integers(-15, 15, (500, 600))
+    Image.fromarray(np.clip(np.asarray(image) + noise, 0, 255).astype(np.uint8)).save(path)
+    return path
+
+
+@pytest.mark.parametrize(("kind", "ink", "paper"), [("png", 40, 225), ("jpg", 90, 150), ("bmp", 0, 255)])
+def test_a_scan_becomes_walls(tmp_path: Path, kind: str, ink: int, paper: int) -> None:
+    report = ImportReport()
+    plan = import_plan(scan(tmp_path / f"a.{kind}", ink, paper), Hints(scale_m=PIXEL_M), report=report)
+    (level,) = plan.levels
+    assert size_m(level) == pytest.approx((10.0, 8.0), abs=0.1)
+    assert 3 <= report.left_out["spots and letters up to 0.6 m"] < 10  # JPEG adds some
+    assert report.units == "0.02 m a pixel (--scale)"
+    assert "traced from a picture" in report.doubts[0]
+    gaps = [gap for gap in door_gaps(level) if gap.width_m == pytest.approx(0.9, abs=0.1)]
+    assert gaps
+    assert all(4.0 <= gap.line[0] <= 4.2 + 2 * PIXEL_M + 1.0 for gap in gaps)
+
+
+@pytest.mark.process
+def test_the_command_takes_two_points(tmp_path: Path) -> None:
+    """The outer walls are 500 pixels and 10 m apart."""
+    path, out = scan(tmp_path / "a.png"), tmp_path / "plan.json"
+    done = command_line.echostep("plan", "import", path, "-o", out, "--scale", "50,50,550,50=10", "--no-picture")
+    assert done.returncode == 0, done.stderr
+    assert size_m(load_plan(out).levels[0]) == pytest.approx((10.0, 8.0), abs=0.1)
+
+
+@pytest.mark.parametrize("suffix", PICTURES)
+def test_a_picture_without_a_scale_is_asked_about(tmp_path: Path, suffix: str) -> None:
+    Image.new("RGB" if suffix != ".pbm" else "1", (40, 40)).save(tmp_path / f"a{suffix}")
+    with pytest.raises(EchostepError, match=r"--scale X0,Y0,X1,Y1=M traces.*plan edit PLAN --picture"):
+        import_plan(tmp_path / f"a{suffix}")
+    with pytest.raises(EchostepError, match="--units"):
+        import_plan(tmp_path / f"a{suffix}", Hints(units="m", scale_m=1.0))
+
+
+@pytest.mark.parametrize(("colour", "named"), [(255, "nothing dark"), (0, "one colour|nothing dark")])
+def test_a_picture_of_nothing(tmp_path: Path, colour: int, named: str) -> None:
+    Image.new("L", (60, 60), colour).save(tmp_path / "a.png")
+    with pytest.raises(EchostepError, match=named):
+        import_plan(tmp_path / "a.png", Hints(scale_m=PIXEL_M))
+
+
+def test_no_picture(tmp_path: Path) -> None:
+    (tmp_path / "a.png").write_bytes(b"no picture")
+    with pytest.raises(EchostepError, match="not a picture that can be read"):
+        import_plan(tmp_path / "a.png", Hints(scale_m=PIXEL_M))
+
+
+def test_the_threshold_lies_between_ink_and_paper() -> None:
+    for ink, paper in ((0, 255), (90, 150), (30, 60)):
+        values = np.full((50, 50), float(paper))
+        values[:10] = ink
+        assert ink <= threshold(values) < paper
+
+
+@pytest.mark.parametrize(
+    ("suffix", "step"),
+    [
+        (".pdf", "pdftoppm -png -r 150 FILE page"),
+        (".dwg", "DWG: save it as DXF"),
+        (".svg", "SVG: save it as DXF"),
+        (".gml", "IndoorGML or CityGML is not read: export the building as IFC, IMDF or DXF"),
+    ],
+)
+def test_what_is_not_read_has_a_next_step(suffix: str, step: str) -> None:
+    assert step in NEXT_STEPS[suffix]

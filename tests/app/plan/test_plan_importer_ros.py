@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""Importing maps of ROS: pixels to metres, thresholds, the pose of the origin; and pictures and formats that are not imported."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from echostep.errors import EchostepError
+from echostep.plan.model import Plan
+from echostep_app.plan.importers.formats import NEXT_STEPS, import_plan, open_plan
+from echostep_app.plan.importers.report import ImportReport
+
+FREE, UNKNOWN, OCCUPIED = 254, 205, 0
+YAML = "image: map.{}\nresolution: 0.05\norigin: [-10.0, -20.0, {}]\nnegate: {}\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+
+
+def grid() -> np.ndarray:
+    """A room of 8 m by 6 m with walls of 0.1 m and a gap of 0.9 m in the east, in 200 by 160 pixels; a speck inside."""
+    grid = np.full((160, 200), UNKNOWN, dtype=np.uint8)
+    grid[20:140, 20:180] = OCCUPIED
+    grid[22:138, 22:178] = FREE
+    grid[60:78, 178:180] = FREE
+    grid[100, 100] = OCCUPIED
+    return grid
+
+
+def imported(folder: Path, kind: str = "pgm", yaw: str = "0.0", *, negate: bool = False) -> tuple[Plan, ImportReport]:
+    Image.fromarray(255 - grid() if negate else grid()).save(folder / f"map.{kind}")
+    (folder / "map.yaml").write_text(YAML.format(kind, yaw, int(negate)))
+    report = ImportReport()
+    return import_plan(folder / "map.yaml", report=report), report
+
+
+@pytest.mark.parametrize(("kind", "negate"), [("pgm", False), ("png", False), ("png", True)])
+def test_a_room(tmp_path: Path, kind: str, negate: bool) -> None:
+    plan, report = imported(tmp_path, kind, negate=negate)
+    walls = plan.levels[0].walls
+    assert walls[:, ::2].min() == pytest.approx(-10 + 20 * 0.05)
+    assert walls[:, ::2].max() == pytest.approx(-10 + 180 * 0.05)
+    assert (walls[:, 1::2].min(), walls[:, 1::2].max()) == pytest.approx((-20 + 20 * 0.05, -20 + 140 * 0.05))
+    assert len(walls) == 12  # both faces, cut by the gap
+    jambs = sorted({w[1] for w in walls.tolist() if w[1] == w[3] and abs(w[2] - w[0]) < 0.2})
+    assert jambs == pytest.approx([-20 + (160 - 78) * 0.05, -20 + (160 - 60) * 0.05])
+    assert report.left_out == {"specks of less than 4 pixels": 1}
+    assert report.units == "0.05 m a pixel (resolution)"
+    assert open_plan(tmp_path / "map.yaml").digest == plan.digest
+
+
+def test_the_origin_may_be_turned(tmp_path: Path) -> None:
+    plan, _ = imported(tmp_path, yaw="1.5707963267948966")
+    walls = plan.levels[0].walls
+    assert (walls[:, ::2].min(), walls[:, ::2].max()) == pytest.approx((-10 - 140 * 0.05, -10 - 20 * 0.05))
+    assert (walls[:, 1::2].min(), walls[:, 1::2].max()) == pytest.approx((-20 + 20 * 0.05, -20 + 180 * 0.05))
+
+
+def test_a_slanting_wall_is_no_stair(tmp_path: Path) -> None:
+    slanting = np.full((200, 200), FREE, dtype=np.uint8)
+    for k in range(180):
+        slanting[10 + k, 10 + k // 2 : 13 + k // 2] = OCCUPIED
+    Image.fromarray(slanting).save(tmp_path / "map.pgm")
+    (tmp_path / "map.yaml").write_text(YAML.format("pgm", 0, 0))
+    assert len(import_plan(tmp_path / "map.yaml").levels[0].walls) <= 8
+
+
+def test_a_list_in_block_style(tmp_path: Path) -> None:
+    plan, _ = imported(tmp_path)
+    text = "# nav2\nimage: map.pgm\nmode: trinary\nresolution: 0.05\norigin:\n- -10.0\n- -20.0\n- 0\nnegate: 0\n"
+    (tmp_path / "map.yaml").write_text(text)
+    assert import_plan(tmp_path / "map.yaml").digest == plan.digest
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("", "no field image"),
+        ("a: 1", "no field image"),
+        ("image: none.pgm\nresolution: 0.05", "none.pgm: no such file"),
+        ("image: map.pgm", "resolution: 'None' is not a number"),
+        ("image: map.pgm\nresolution: 0", "resolution: expected metres"),
+        ("image: map.pgm\nresolution: nan", "resolution"),
+        ("image: map.pgm\nresolution: 0.05\norigin: [1]", "origin: expected"),
+        ("image: map.pgm\nresolution: 0.05\norigin: [1, x, 0]", "origin: 'x'|origin: ' x'"),
+        ("image: map.pgm\nresolution: 0.05\norigin: [1, 1e9, 0]", "origin"),
+        ("image: map.yaml\nresolution: 0.05", "not a picture"),
+        ("image: map.pgm\nresolution: 0.05\nnegate: 1\noccupied_thresh: 1", "no pixel is occupied"),
+    ],
+)
+def test_wrong_maps(tmp_path: Path, text: str, named: str) -> None:
+    imported(tmp_path)
+    (tmp_path / "map.yaml").write_text(text)
+    with pytest.raises(EchostepError, match=named) as caught:
+        import_plan(tmp_path / "map.yaml")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("suffix", sorted(NEXT_STEPS))
+def test_formats_that_are_not_read_name_the_next_step(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"plan{suffix.upper()}"
+    path.write_bytes(b"x")
+    for opened in (import_plan, open_plan):
+        with pytest.raises(EchostepError, match=r"--picture|save|export"):
+            opened(path)

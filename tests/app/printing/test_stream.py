@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: MIT
+"""What is printed reaches its reader, or is dropped with a reason; a run waits for no reader."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import io
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TextIO
+
+import pytest
+
+from echostep_app.printing import people
+from echostep_app.printing.console import console_for_people
+from echostep_app.printing.lines import complain, say, shown
+from echostep_app.printing.stream import QUEUE_BYTES, PeopleStream
+from waiting import ends, until
+
+FULL = Path("/dev/full")  # refuses every byte: no space left [full(4)]
+
+
+@contextlib.contextmanager
+def pipe() -> Iterator[tuple[int, TextIO]]:
+    """A pipe: our end to read, and its other end as a text stream."""
+    ours, theirs = os.pipe()
+    with os.fdopen(theirs, "w", encoding="utf-8") as stream:
+        yield ours, stream
+    with contextlib.suppress(OSError):  # closed by the test
+        os.close(ours)
+
+
+def test_what_is_written_arrives() -> None:
+    with pipe() as (ours, stream):
+        printed = PeopleStream(stream, "standard output")
+        printed.write("a cat\n")
+        printed.flush()
+        assert os.read(ours, 100) == b"a cat\n"
+        printed.outlast()
+        printed.write("a dog\n")
+        assert os.read(ours, 100) == b"a dog\n"
+        assert not printed.fault
+
+
+def test_a_reader_that_goes_is_a_fault_and_no_exception() -> None:
+    with pipe() as (ours, stream):
+        printed = PeopleStream(stream, "standard output")
+        os.close(ours)
+        printed.write("a cat\n")
+        printed.flush()
+        printed.write("a dog\n")
+        assert printed.is_gone
+        assert printed.fault == "standard output: its reader has gone"
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="no /dev/full here")
+def test_a_full_disk_is_told_with_its_reason() -> None:
+    with FULL.open("w") as stream:
+        printed = PeopleStream(stream, "standard output")
+        printed.write("x")
+        printed.flush()
+        assert printed.fault == f"standard output: {os.strerror(errno.ENOSPC)}"
+        assert printed.has_lost
+        assert not printed.is_gone
+
+
+@pytest.mark.parametrize("stream", [io.StringIO(), None])
+def test_a_stream_that_is_closed_or_not_there_takes_nothing(stream: io.StringIO | None) -> None:
+    printed = PeopleStream(stream, "standard output")
+    if stream:
+        stream.close()
+    printed.write("a cat")
+    printed.flush()
+    assert printed.fault
+    assert not printed.isatty()
+
+
+def test_a_run_waits_for_no_reader_and_drops_what_is_too_much() -> None:
+    """As a terminal that Ctrl-S has stopped, or a pager; in the middle of a drawing nothing is cut out: a text is written whole or not at all."""
+    with pipe() as (ours, stream):
+        printed = PeopleStream(stream, "standard output")
+        printed.outlast()
+        text = f"{'x' * 9_999}\n"
+        assert ends(lambda: [printed.write(text) for _ in range(100)])
+        os.set_blocking(ours, False)
+        read = bytearray()
+
+        def has_come() -> bool:
+            with contextlib.suppress(BlockingIOError):
+                read.extend(os.read(ours, 1 << 20))
+            return len(read) > 20 * len(text)
+
+        assert until(has_come)
+        printed.drain()
+        assert set(read.decode().split("\n")) <= {"x" * 9_999, ""} | {read.decode().split("\n")[-1]}
+        assert len(read) < 100 * len(text)
+        assert 100 * len(text) > QUEUE_BYTES
+        assert not printed.fault
+
+
+def test_letters_that_a_terminal_lacks_are_replaced() -> None:
+    ours, theirs = os.pipe()
+    with os.fdopen(theirs, "w", encoding="ascii") as stream:
+        printed = PeopleStream(stream, "standard output")
+        printed.write("● here\n")
+        printed.flush()
+        assert os.read(ours, 100) == b"? here\n"
+    os.close(ours)
+
+
+def test_a_fault_is_told_on_the_other_stream_once_and_kept_for_page_and_recording(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    errors = io.StringIO()
+    ours, theirs = os.pipe()
+    os.close(ours)
+    with os.fdopen(theirs, "w") as stream:
+        monkeypatch.setattr(sys, "stdout", stream)
+        monkeypatch.setattr(sys, "stderr", errors)
+        with people.to_people():
+            people.outlast_output()
+            news = people.FaultNews()
+            assert not news.words()
+            print("a cat", flush=True)
+            assert until(people.output_faults)
+            print("a dog", flush=True)
+            assert news.words() == "standard output: its reader has gone"
+            assert not people.lost_result()
+    assert errors.getvalue() == "echostep: standard output: its reader has gone; the run goes on without it\n"
+
+
+def test_names_do_not_move_the_cursor(capsys: pytest.CaptureFixture[str]) -> None:
+    """ESC and its one-letter forms, backspace, carriage return, overrides of the direction."""
+    evil = "Hall\x1b[2J\x9b1A\r\x08\u202eB\ud800"
+    assert shown(evil) == "Hall?[2J?1A???B?"
+    say(evil)
+    complain(evil)
+    console_for_people().print(evil, markup=False)
+    out, err = capsys.readouterr()
+    assert out == "Hall?[2J?1A???B?\nHall?[2J?1A?B?\n"  # rich itself drops some
+    assert err == "Hall?[2J?1A???B?\n"
+
+
+def test_a_console_still_moves_its_own_cursor() -> None:
+    file = io.StringIO()
+    console = console_for_people(file=file, force_terminal=True, _environ={"TERM": "xterm"})
+    console.show_cursor(show=False)
+    console.print("[bold]wall[/bold]")
+    assert "\x1b[?25l" in file.getvalue()
+    assert "\x1b[1mwall" in file.getvalue()

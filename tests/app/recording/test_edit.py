@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: MIT
+"""Recordings looked into, cut and mended: whatever is wrong with the file, one clear error or all that can be saved."""
+
+from __future__ import annotations
+
+import contextlib
+import struct
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import cache
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+
+from echostep.errors import EchostepError
+from echostep.ports.chunks import Chunk
+from echostep.recording.mcap_records import RAW_ENCODING
+from echostep.recording.reading import open_recording
+from echostep_app.output.derived import PRESSURE
+from echostep_app.recording.recorder import DerivedMessage, Recorder
+from echostep_app.recording.repair.contents import info
+from echostep_app.recording.repair.edit import cut, repair
+
+CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(300)]
+FIXTURE = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@cache
+def recorded() -> bytes:
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "a.mcap"
+        with Recorder(path, {"seed": "4", "start_x_y_rad": "1.0,2.0,0.0"}) as recorder:
+            for k, chunk in enumerate(CHUNKS):
+                recorder.write(chunk)
+                if not k % 10:
+                    recorder.write_derived(
+                        [DerivedMessage(PRESSURE, chunk.t_arrival_ns, {"ticks": k, "pressure_pa": 101_325.0})]
+                    )
+        return path.read_bytes()
+
+
+@cache
+def packed() -> bytes:
+    file = BytesIO()
+    writer = Writer(file, chunk_size=600, compression=CompressionType.ZSTD)
+    writer.start()
+    channels = {port: writer.register_channel(f"/{port}/bytes", RAW_ENCODING, 0) for port in ("board", "mtx")}
+    for chunk in CHUNKS:
+        writer.add_message(channels[chunk.port], chunk.t_arrival_ns, chunk.data, 0)
+    writer.finish()  # type: ignore[no-untyped-call]
+    return file.getvalue()
+
+
+def write(path: Path) -> bytes:
+    path.write_bytes(recorded())
+    return recorded()
+
+
+def chunks_of(path: Path) -> list[Chunk]:
+    return list(open_recording(path).chunks())
+
+
+def saved(content: bytes, folder: Path) -> list[Chunk]:
+    """What `repair` makes of a file, by the format's own reader; empty when it says that nothing can be saved."""
+    (folder / "bad.mcap").write_bytes(content)
+    out = folder / "out.mcap"
+    out.unlink(missing_ok=True)
+    try:
+        repair(folder / "bad.mcap", out)
+    except EchostepError:
+        assert not out.exists()
+        return []
+    with out.open("rb") as file:
+        return [
+            Chunk(channel.topic.split("/")[1], message.log_time, message.data)
+            for _, channel, message in make_reader(file).iter_messages(log_time_order=False)
+            if channel.topic.endswith("/bytes")
+        ]
+
+
+def test_a_whole_recording_is_described(tmp_path: Path) -> None:
+    write(tmp_path / "a.mcap")
+    text = "\n".join(info(tmp_path / "a.mcap"))
+    assert "6.0 s" in text
+    assert f"board: {sum(len(c.data) for c in CHUNKS if c.port == 'board')} bytes in 200 chunks" in text
+    assert "/pressure 30" in text
+    assert text.endswith("whole")
+
+
+def swapped(apart_ns: int, folder: Path) -> list[str]:
+    """`info` of a recording in which a chunk of the board stands behind one of the MTx that came so much later."""
+    with Recorder(folder / "a.mcap", {}) as recorder:
+        for k in range(1, 50):
+            t_ns = k * 1_000_000_000
+            recorder.write(Chunk("mtx", t_ns + apart_ns, b"x"))
+            recorder.write(Chunk("board", t_ns, b"x"))
+    return info(folder / "a.mcap")
+
+
+def test_some_milliseconds_between_two_ports_are_no_fault(tmp_path: Path) -> None:
+    assert swapped(20_000_000, tmp_path)[-1] == "  whole"
+
+
+def test_a_repair_is_offered_for_what_it_mends_alone(tmp_path: Path) -> None:
+    late = swapped(500_000_000, tmp_path)
+    assert late[-1] == "  49 chunks of one port came long after later ones of another: repair leaves them so"
+    (tmp_path / "cut.mcap").write_bytes(write(tmp_path / "b.mcap")[:-100])
+    assert info(tmp_path / "cut.mcap")[-1].endswith("makes a whole file of what is readable")
+    repair(tmp_path / "cut.mcap", tmp_path / "c.mcap")
+    assert info(tmp_path / "c.mcap")[-1] == "  whole"
+
+
+def test_no_terminal_obeys_a_strangers_recording(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "a.mcap", {"note": "\x1b]0;owned\x07" + "x" * 10_000}) as recorder:
+        recorder.write(Chunk("bo\x1b[2Jard", 1, b"x"))
+    text = "\n".join(info(tmp_path / "a.mcap"))
+    assert "\x1b" not in text
+    assert len(text) < 6000
+
+
+def test_mending_a_whole_file_changes_nothing_in_it(tmp_path: Path) -> None:
+    assert saved(write(tmp_path / "a.mcap"), tmp_path) == CHUNKS
+    assert open_recording(tmp_path / "out.mcap").metadata == {"seed": "4", "start_x_y_rad": "1.0,2.0,0.0"}
+    assert "nothing was wrong" in "\n".join(repair(tmp_path / "a.mcap", tmp_path / "b.mcap"))
+
+
+@given(st.data())
+@FIXTURE
+def test_a_file_cut_off_anywhere_keeps_all_before(tmp_path: Path, draw: st.DataObject) -> None:
+    whole = write(tmp_path / "a.mcap")
+    end = draw.draw(st.integers(0, len(whole)))
+    found = saved(whole[:end], tmp_path)
+    assert found == CHUNKS[: len(found)]
+    (tmp_path / "cut.mcap").write_bytes(whole[:end])
+    with contextlib.suppress(EchostepError):
+        assert chunks_of(tmp_path / "cut.mcap") == found
+
+
+@pytest.mark.slow
+@given(st.data())
+@FIXTURE
+def test_damage_in_the_middle_costs_what_is_damaged_and_little_more(tmp_path: Path, draw: st.DataObject) -> None:
+    """Bytes overwritten, removed or put in between: all messages that are not touched, but for a few beside them, are saved."""
+    whole = write(tmp_path / "a.mcap")
+    begin = draw.draw(st.integers(2000, len(whole) - 2000))
+    gone = draw.draw(st.integers(0, 300))
+    junk = draw.draw(st.binary(max_size=300))
+    found = saved(whole[:begin] + junk + whole[begin + gone :], tmp_path)
+    unhurt = [chunk for chunk in found if chunk in CHUNKS]
+    size = len(whole) / (len(CHUNKS) * 1.1)
+    assert len(unhurt) >= len(CHUNKS) - gone / size - 8
+
+
+@given(st.binary(max_size=400), st.booleans())
+@FIXTURE
+def test_garbage_ends_in_one_error_or_nothing_believed(tmp_path: Path, junk: bytes, magic: bool) -> None:
+    path = tmp_path / "junk.mcap"
+    path.write_bytes((b"\x89MCAP0\r\n" if magic else b"") + junk)
+    out = tmp_path / "o.mcap"
+    runs: list[Callable[[], object]] = [lambda: info(path), lambda: repair(path, out), lambda: cut(path, 0, 1, out)]
+    for run in runs:
+        with pytest.raises(EchostepError, match=r"junk\.mcap"):
+            run()
+        assert not out.exists()
+
+
+@pytest.mark.parametrize("length", [(1 << 64) - 1, 1 << 63, 1 << 40, 1 << 28, 0])
+def test_a_record_of_impossible_length_is_passed_over(tmp_path: Path, length: int) -> None:
+    whole = bytearray(write(tmp_path / "a.mcap"))
+    at = whole.index(CHUNKS[150].data, 5000) - 31
+    assert whole[at] == 5
+    whole[at + 1 : at + 9] = struct.pack("<Q", length)
+    assert saved(bytes(whole), tmp_path) == CHUNKS[:150] + CHUNKS[151:]
+
+
+def test_a_lost_beginning_is_made_up_for_by_the_summary(tmp_path: Path) -> None:
+    whole = bytearray(write(tmp_path / "a.mcap"))
+    whole[8:700] = bytes(692)
+    found = saved(bytes(whole), tmp_path)
+    assert found == CHUNKS[-len(found) :]
+    assert len(found) > 280
+
+
+@pytest.mark.slow
+@given(st.data())
+@FIXTURE
+def test_a_damaged_byte_in_a_compressed_file_costs_a_chunk_at_most(tmp_path: Path, draw: st.DataObject) -> None:
+    damaged = bytearray(packed())
+    damaged[draw.draw(st.integers(8, len(damaged) - 1))] ^= draw.draw(st.integers(1, 255))
+    found = saved(bytes(damaged), tmp_path)
+    assert len([chunk for chunk in found if chunk in CHUNKS]) > len(CHUNKS) - 30
+
+
+@given(st.floats(0.0, 7.0), st.floats(0.0, 7.0))
+@FIXTURE
+def test_a_piece_is_what_came_in_between(tmp_path: Path, begin_s: float, end_s: float) -> None:
+    write(tmp_path / "a.mcap")
+    out = tmp_path / "piece.mcap"
+    out.unlink(missing_ok=True)
+    expected = [c for c in CHUNKS if round(begin_s * 1e9) <= c.t_arrival_ns < round(end_s * 1e9)]
+    if not expected:
+        with pytest.raises(EchostepError):
+            cut(tmp_path / "a.mcap", begin_s, end_s, out)
+        assert not out.exists()
+        return
+    cut(tmp_path / "a.mcap", begin_s, end_s, out)
+    assert chunks_of(out) == expected
+
+
+def test_a_piece_is_not_written_over_its_origin(tmp_path: Path) -> None:
+    whole = write(tmp_path / "a.mcap")
+    here = tmp_path / "a.mcap"
+    runs: list[Callable[[], object]] = [lambda: cut(here, 0, 3, here), lambda: repair(here, here)]
+    for run in runs:
+        with pytest.raises(EchostepError, match="another name"):
+            run()
+    assert (tmp_path / "a.mcap").read_bytes() == whole
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    write(tmp_path / "a.mcap")
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(EchostepError, match="cannot write"):
+        repair(tmp_path / "a.mcap", tmp_path / "file" / "b.mcap")
+
+
+@pytest.mark.process
+def test_a_full_disk_under_a_piece_is_named(tmp_path: Path) -> None:
+    write(tmp_path / "a.mcap")
+    limited = (
+        "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))\n"
+        "sys.argv = ['echostep', 'repair', sys.argv[1], '-o', sys.argv[2]]\n"
+        "from echostep_app.cli import main; main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", limited, tmp_path / "a.mcap", tmp_path / "b.mcap"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (2, f"echostep: {tmp_path}/b.mcap: cannot write: File too large\n")
+    assert not (tmp_path / "b.mcap").exists()

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: MIT
+"""Recordings with flipped bits: the track does not end early, and the replay says what it skipped."""
+
+from __future__ import annotations
+
+import random
+import struct
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from echostep.localization.estimate import Estimate
+from echostep.localization.limits import TRACKING_M
+from echostep.plan.model import load_plan
+from echostep.ports.chunks import Chunk, portion_of
+from echostep.recording.mcap_records import HEAD_SIZE
+from echostep.recording.reading import open_recording
+from echostep.tracker import Tracker
+from echostep_app.recording.recorder import Recorder
+from echostep_app.recording.repair.contents import info
+from echostep_app.recording.repair.edit import repair
+from echostep_app.session.losses import skipped
+from places import PLAN
+from reliability.damaged_blocks import KINDS, damage_once
+from reliability.flip_recording import (
+    Replayed,
+    arrival_offsets,
+    compare,
+    draw_flips,
+    flip_once,
+    record_walk,
+    replay,
+)
+from walks import DEMO, walk_chunks
+
+SECONDS = 8.0
+CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(300)]
+
+
+def track(chunks: tuple[Chunk, ...]) -> tuple[list[Estimate], Tracker]:
+    tracker = Tracker(load_plan(DEMO), None, None, 1)
+    return tracker.take(portion_of(chunks)), tracker
+
+
+@cache
+def undamaged() -> list[Estimate]:
+    return track(walk_chunks(SECONDS))[0]
+
+
+def nth(port: str, n: int) -> int:
+    """Index of the n-th chunk of a port."""
+    return [k for k, chunk in enumerate(walk_chunks(SECONDS)) if chunk.port == port][n]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("port", "n", "bit"),
+    [("board", 0, 41), ("mtx", 5, 41), ("board", 1500, 31), ("board", 1500, 41), ("mtx", 305, 42), ("board", 1500, 55)],
+)
+def test_one_flipped_bit_of_an_arrival_time_harms_no_estimate_and_is_counted(port: str, n: int, bit: int) -> None:
+    chunks = list(walk_chunks(SECONDS))
+    k = nth(port, n)
+    chunks[k] = replace(chunks[k], t_arrival_ns=chunks[k].t_arrival_ns ^ 1 << bit)
+    estimates, tracker = track(tuple(chunks))
+    first = n < 100  # of its port: until the next ones have shown that it is wrong, it is the only one
+    assert compare(Replayed(estimates, []), undamaged()) in (("same", "near") if first else ("same",))
+    assert tracker.streams.front_end.bad_arrivals >= 1
+
+
+def write(path: Path) -> bytes:
+    with Recorder(path, {"seed": "1"}) as recorder:
+        for chunk in CHUNKS:
+            recorder.write(chunk)
+    return path.read_bytes()
+
+
+def damage(path: Path, offset: int, bit: int) -> None:
+    content = bytearray(path.read_bytes())
+    content[offset] ^= 1 << bit
+    path.write_bytes(content)
+
+
+def test_a_flipped_arrival_time_is_corrected_by_repair(tmp_path: Path) -> None:
+    times = arrival_offsets(write(tmp_path / "a.mcap"))
+    damage(tmp_path / "a.mcap", times[100] + 5, 0)
+    assert any("1 arrival times contradict" in line for line in info(tmp_path / "a.mcap"))
+    repair(tmp_path / "a.mcap", tmp_path / "b.mcap")
+    found = list(open_recording(tmp_path / "b.mcap").chunks())
+    assert [chunk.data for chunk in found] == [chunk.data for chunk in CHUNKS]
+    assert max(abs(a.t_arrival_ns - b.t_arrival_ns) for a, b in zip(found, CHUNKS, strict=True)) <= 40_000_000
+    assert info(tmp_path / "b.mcap")[-1] == "  whole, but made of a damaged recording"
+
+
+def test_a_wrong_length_costs_a_few_messages_not_all_behind_it(tmp_path: Path) -> None:
+    """Bit 13 of a length would swallow a hundred messages, an impossible opcode ended the reading."""
+    for name, offset, bit in (("length", 1 + 1, 5), ("opcode", 0, 6)):
+        path = tmp_path / f"{name}.mcap"
+        record = arrival_offsets(write(path))[150] - HEAD_SIZE - 6
+        assert struct.unpack_from("<B", path.read_bytes(), record) == (5,)
+        damage(path, record + offset, bit)
+        recording = open_recording(path)
+        found = list(recording.chunks())
+        assert set(found) <= set(CHUNKS)
+        assert len(found) >= len(CHUNKS) - 3
+        assert (recording.own_damage.places, recording.own_damage.altered) == (1, True)
+        said = skipped(recording, Tracker(load_plan(DEMO)).streams)
+        assert any("checksum is wrong" in line for line in said)
+        assert any("damaged bytes in one place were not used" in line for line in said)
+
+
+def test_channels_are_read_from_the_end_when_the_beginning_is_damaged(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    content = write(path)
+    damage(path, content.index(b"/mtx/bytes") - 9 - 8, 7)  # opcode or length of the channel's record
+    assert len(list(open_recording(path).chunks())) >= len(CHUNKS) - 2
+
+
+def test_a_whole_recording_says_nothing(tmp_path: Path) -> None:
+    write(tmp_path / "a.mcap")
+    recording = open_recording(tmp_path / "a.mcap")
+    list(recording.chunks())
+    assert skipped(recording, Tracker(load_plan(DEMO)).streams) == []
+
+
+@pytest.mark.slow
+def test_no_flip_ends_a_track_early_without_a_word(tmp_path: Path) -> None:
+    """The small version of `make flips`."""
+    with Recorder(tmp_path / "walk.mcap", {"seed": "1"}) as recorder:
+        for chunk in walk_chunks(SECONDS):
+            recorder.write(chunk)
+    content = (tmp_path / "walk.mcap").read_bytes()
+    expected = replay(tmp_path / "walk.mcap", load_plan(DEMO)).estimates
+    assert list(expected) == undamaged()
+    for where in draw_flips(content, 3, 5):
+        flip = flip_once(content, where, load_plan(DEMO), expected, tmp_path)
+        assert not flip.bad
+        assert flip.said
+
+
+@pytest.mark.long
+def test_no_damaged_block_is_tracked_over_and_each_is_told(tmp_path: Path) -> None:
+    """The small version of the second half of `make flips`: each kind of damage once."""
+    record_walk(tmp_path / "walk.mcap", SECONDS)
+    content, plan, rng = (tmp_path / "walk.mcap").read_bytes(), load_plan(PLAN), random.Random(2)
+    expected = replay(tmp_path / "walk.mcap", plan).estimates
+    for kind in KINDS:
+        distance_m, told = damage_once(content, kind, rng, plan, expected, tmp_path)
+        assert distance_m < TRACKING_M, kind
+        assert told, kind

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: MIT
+"""Recordings: nothing that was written is lost, and a file that ends too early is read up to there."""
+
+from __future__ import annotations
+
+import contextlib
+import struct
+from pathlib import Path
+
+import pytest
+import zstandard
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.reader import NonSeekingReader
+from mcap.writer import CompressionType, Writer
+
+from echostep.errors import EchostepError
+from echostep.ports.chunks import LATEST_NS, Chunk
+from echostep.recording.mcap_records import RECORD_LIMIT, decompress_chunk, port_of
+from echostep.recording.message_runs import PORTION_BYTES
+from echostep.recording.reading import open_recording
+from echostep_app.recording.recorder import Recorder
+from echostep_app.recording.repair.recovery import Recovery
+from waiting import PATIENCE_S, until
+
+CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 256]) * (n % 40 + 1)) for n in range(300)]
+
+
+def write(path: Path, chunks: list[Chunk] = CHUNKS) -> bytes:
+    path.unlink(missing_ok=True)
+    with Recorder(path, {"seed": "4", "note": "a test"}) as recorder:
+        for chunk in chunks:
+            recorder.write(chunk)
+    return path.read_bytes()
+
+
+def test_round_trip(tmp_path: Path) -> None:
+    write(tmp_path / "a.mcap")
+    recording = open_recording(tmp_path / "a.mcap")
+    assert recording.metadata == {"seed": "4", "note": "a test"}
+    assert list(recording.chunks()) == CHUNKS
+    assert not recording.own_damage.truncated
+
+
+@given(st.data())
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_cut_file_gives_what_came_before_the_cut(tmp_path: Path, draw: st.DataObject) -> None:
+    whole = write(tmp_path / "a.mcap")
+    cut = draw.draw(st.integers(400, len(whole) - 200))
+    (tmp_path / "cut.mcap").write_bytes(whole[:cut])
+    recording = open_recording(tmp_path / "cut.mcap")
+    found = list(recording.chunks())
+    assert found == CHUNKS[: len(found)]
+    assert len(found) >= len(CHUNKS) * (cut - 800) // len(whole) - 1
+
+
+@given(st.data())
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_damage_never_raises_anything_else(tmp_path: Path, draw: st.DataObject) -> None:
+    damaged = bytearray(write(tmp_path / "a.mcap", CHUNKS[:40]))
+    changed = draw.draw(st.integers(1, 6))
+    for _ in range(changed):
+        damaged[draw.draw(st.integers(0, len(damaged) - 1))] = draw.draw(st.integers(0, 255))
+    (tmp_path / "bad.mcap").write_bytes(damaged)
+    with contextlib.suppress(EchostepError):
+        found, recovered = list(open_recording(tmp_path / "bad.mcap").chunks()), recovered_chunks(tmp_path / "bad.mcap")
+        assert len(found) >= len(recovered) - changed  # a message whose number is damaged is out of order, and left out
+        rest = iter(recovered)
+        assert all(chunk in rest for chunk in found)
+
+
+def recovered_chunks(path: Path) -> list[Chunk]:
+    """The same by the recovery, message by message."""
+    return [
+        Chunk(port_of(m.channel), min(m.t_ns, LATEST_NS), m.body)
+        for m in Recovery(path).messages()
+        if port_of(m.channel)
+    ]
+
+
+def test_a_recording_comes_in_portions_that_join_to_all_of_it(tmp_path: Path) -> None:
+    chunks = [Chunk("board" if n % 3 else "mtx", n, bytes(n % 251)) for n in range(10_000)]
+    write(tmp_path / "a.mcap", chunks)
+    portions = list(open_recording(tmp_path / "a.mcap").portions())
+    assert len(portions) > 3
+    assert [chunk for portion in portions for chunk in portion.chunks()] == chunks
+    joined = b"".join(portion.of("mtx").received for portion in portions)
+    assert joined == b"".join(chunk.data for chunk in chunks if chunk.port == "mtx")
+
+
+def test_a_chunk_larger_than_a_portion_is_read(tmp_path: Path) -> None:
+    chunks = [Chunk("board", 1, bytes(3 * PORTION_BYTES)), Chunk("board", 2, b"after")]
+    write(tmp_path / "a.mcap", chunks)
+    assert list(open_recording(tmp_path / "a.mcap").chunks()) == chunks
+
+
+def test_arrival_times_from_another_age_are_bounded(tmp_path: Path) -> None:
+    write(tmp_path / "a.mcap", [Chunk("board", (1 << 64) - 1, b"x")])
+    assert list(open_recording(tmp_path / "a.mcap").chunks()) == [Chunk("board", LATEST_NS, b"x")]
+
+
+def test_a_source_that_can_wait_is_never_more_than_half_a_second_ahead_of_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("echostep_app.recording.background_writer.MAX_WAIT_S", PATIENCE_S)
+    recorder = Recorder(tmp_path / "a.mcap", {})
+    for chunk in CHUNKS:
+        recorder.write(chunk)
+        recorder.wait_for_disk(chunk)
+    found = list(open_recording(tmp_path / "a.mcap").chunks())
+    assert found == CHUNKS[: len(found)]
+    assert CHUNKS[-1].t_arrival_ns - found[-1].t_arrival_ns <= 500_000_000
+    recorder.close()
+
+
+def test_who_does_not_wait_finds_everything_in_the_file_a_moment_later(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.mcap", {})
+    for chunk in CHUNKS:
+        recorder.write(chunk)
+    assert until(lambda: kept_chunks(tmp_path / "a.mcap") == CHUNKS)
+    recorder.close()
+
+
+def kept_chunks(path: Path) -> list[Chunk]:
+    """What is in a file by now, which may be nothing."""
+    with contextlib.suppress(EchostepError):
+        return list(open_recording(path).chunks())
+    return []
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_a_recording_that_another_tool_has_packed_into_chunks_is_the_same(
+    tmp_path: Path, compression: CompressionType
+) -> None:
+    write(tmp_path / "a.mcap")
+    with (tmp_path / "a.mcap").open("rb") as file, (tmp_path / "b.mcap").open("wb") as packed:
+        writer = Writer(packed, chunk_size=1000, compression=compression)
+        writer.start()
+        reader = NonSeekingReader(file)
+        topics: dict[str, int] = {}
+        for _, channel, message in reader.iter_messages(log_time_order=False):
+            if channel.topic not in topics:
+                topics[channel.topic] = writer.register_channel(channel.topic, channel.message_encoding, 0)
+            writer.add_message(topics[channel.topic], message.log_time, message.data, message.publish_time)
+        writer.add_metadata("echostep", {"seed": "4", "note": "a test"})
+        writer.finish()  # type: ignore[no-untyped-call]
+    recording = open_recording(tmp_path / "b.mcap")
+    assert recording.metadata == {"seed": "4", "note": "a test"}
+    assert list(recording.chunks()) == CHUNKS
+    assert not recording.own_damage.truncated
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", "", "unheard"])
+@given(junk=st.binary(max_size=200), claimed=st.integers(0, (1 << 64) - 1))
+@settings(max_examples=40)
+def test_a_damaged_chunk_is_left_closed(compression: str, junk: bytes, claimed: int) -> None:
+    name = compression.encode()
+    body = struct.pack("<QQQII", 0, 0, claimed, 0, len(name)) + name + struct.pack("<Q", len(junk)) + junk
+    assert decompress_chunk(body) in (None, b"", junk)
+
+
+def test_a_chunk_that_would_fill_the_memory_is_left_closed() -> None:
+    squeezed = zstandard.ZstdCompressor(level=19).compress(bytes(RECORD_LIMIT + 5))
+    head = struct.pack("<QQQII", 0, 0, 10, 0, 4) + b"zstd" + struct.pack("<Q", len(squeezed))
+    assert len(squeezed) < 100_000
+    assert decompress_chunk(head + squeezed) is None
+
+
+@pytest.mark.parametrize(("exponent", "opened"), [(27, True), (28, False)])
+def test_a_chunk_with_a_window_above_128_mib_is_left_closed(exponent: int, opened: bool) -> None:
+    """A frame of one raw block [RFC 8878, 3.1.1]: window descriptor without mantissa, block header with size and the mark of the last."""
+    frame = struct.pack("<IBB", 0xFD2FB528, 0, exponent - 10 << 3) + (10 << 3 | 1).to_bytes(3, "little") + bytes(10)
+    head = struct.pack("<QQQII", 0, 0, 10, 0, 4) + b"zstd" + struct.pack("<Q", len(frame))
+    assert decompress_chunk(head + frame) == (bytes(10) if opened else None)
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"\x89MCAP0\r\n"])
+def test_what_is_no_recording_is_named(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "x.mcap").write_bytes(content)
+    with pytest.raises(EchostepError, match=r"x\.mcap"):
+        open_recording(tmp_path / "x.mcap")
+
+
+def test_a_missing_recording_is_named(tmp_path: Path) -> None:
+    with pytest.raises(EchostepError, match="cannot read"):
+        open_recording(tmp_path / "none.mcap")

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""`echostep score`: the table, JSON, the page in Chromium, and faults in one line."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from board_runs import ROOT
+from command_line import echostep
+
+PLAN = ROOT / "host/core/echostep/plans/demo.json"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A true way along the corridor of the demo plan, and two tracks of it, one without radius and with a name that is markup."""
+    folder = tmp_path_factory.mktemp("score")
+    t_s = np.arange(0.0, 20.0, 0.1)
+    true = np.column_stack([t_s, 2.0 + t_s, np.full(len(t_s), 7.5)])
+    rng = np.random.default_rng(1)
+    off = rng.normal(0.0, 0.3, (len(t_s), 2))
+    radius = np.full((len(t_s), 1), 0.9)
+    _write(folder / "truth.csv", "t,x,y", true)
+    _write(folder / "ours.csv", "t_s,x_m,y_m,radius95_m", np.hstack([true + np.insert(off, 0, 0.0, axis=1), radius]))
+    _write(folder / "<b>[red]theirs.csv", "t,x,y", true + [0.0, 1.0, 0.0])
+    return folder
+
+
+def _write(path: Path, names: str, table: Any) -> None:
+    np.savetxt(path, table, delimiter=",", header=names, comments="", fmt="%.6f")
+
+
+def test_the_table_has_a_column_a_track_and_says_what_was_read(folder: Path) -> None:
+    done = echostep(
+        "score",
+        folder / "ours.csv",
+        folder / "<b>[red]theirs.csv",
+        "--truth",
+        folder / "truth.csv",
+        "--plan",
+        PLAN,
+        "--setup",
+        90,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "ours.csv: time is t_s, x is x_m, y is y_m, radius95 is radius95_m" in done.stdout
+    assert "<b>[red]theirs.csv" in done.stdout
+    row = next(line for line in done.stdout.splitlines() if "CE95" in line)
+    assert re.search(r"0\.\d\d m .*1\.00 m .*ISO/IEC 18305:2016, 8\.9", row), row
+    assert re.search(r"set-up time .*90 s .*90 s .*8\.15", done.stdout)
+
+
+def test_json_has_every_figure_and_null_for_none(folder: Path) -> None:
+    done = echostep("score", folder / "<b>[red]theirs.csv", "--truth", folder / "truth.csv", "--json")
+    tree = json.loads(done.stdout)
+    (card,) = tree["tracks"]
+    assert (card["ce50_m"], card["ce95_m"], card["evaal_m"]) == pytest.approx((1.0, 1.0, 1.0))
+    assert (card["se95_m"], card["zone_probability"], card["radius95_holds"]) == (None, None, None)
+    assert {"name", "unit", "source", "meaning"} == set(tree["definitions"][0])
+
+
+def test_a_fault_is_one_line_and_status_2(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "bad.csv").write_text("t,x,y\n1,2,three\n")
+    done = echostep("score", tmp_path / "bad.csv", "--truth", folder / "truth.csv")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"echostep: {tmp_path}/bad.csv:2: column y: 'three' is not a number\n"
+    missing = echostep("score", tmp_path / "none.csv", "--truth", folder / "truth.csv")
+    assert missing.stderr == f"echostep: {tmp_path}/none.csv: cannot read it: No such file or directory\n"
+
+
+@pytest.mark.slow
+def test_the_page_needs_nothing_else_and_escapes_names(folder: Path, tmp_path: Path) -> None:
+    html = tmp_path / "new/score.html"
+    tracks = [folder / "ours.csv", folder / "<b>[red]theirs.csv"]
+    assert echostep("score", *tracks, "--truth", folder / "truth.csv", "--plan", PLAN, "--html", html).returncode == 0
+    text = html.read_text()
+    assert "<b>[red]" not in text
+    assert not re.findall(r"(?:src|href)=\"(?!data:)", text)
+    pictures = [base64.b64decode(data) for data in re.findall(r"data:image/svg\+xml;base64,([^\"]+)", text)]
+    assert len(pictures) == 4  # one distribution, two plans, one Stanford diagram
+    assert all(picture.startswith(b"<?xml") for picture in pictures)
+    assert text.count('alt=""') == 0
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_the_page_in_a_browser(browser: Any, folder: Path, tmp_path: Path, width: int) -> None:
+    """Every picture is drawn, nothing sticks out on a phone, axe finds nothing."""
+    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
+
+    html = tmp_path / "score.html"
+    done = echostep("score", folder / "ours.csv", "--truth", folder / "truth.csv", "--html", html)
+    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, f"page: {html}")
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    try:
+        page.goto(html.as_uri())
+        drawn = page.evaluate("[...document.images].map((i) => i.complete && i.naturalWidth > 100)")
+        wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        found = Axe().run(page)
+    finally:
+        page.close()
+    assert drawn == [True] * 3
+    assert wide == 0
+    assert found.violations_count == 0, found.generate_report()
+
+
+@pytest.mark.process
+def test_the_same_files_give_the_same_page(folder: Path, tmp_path: Path) -> None:
+    pages = []
+    for name in ("a.html", "b.html"):
+        echostep("score", folder / "ours.csv", "--truth", folder / "truth.csv", "--html", tmp_path / name)
+        pages.append((tmp_path / name).read_text())
+    assert pages[0] == pages[1]

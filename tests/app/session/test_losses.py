@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""The last lines of a run say how much was lost and why, and where it ended; a start that cannot be is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from board_runs import ROOT
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.plan.model import Pose, load_plan
+from echostep_app.cli import app
+from echostep_app.recording.recorder import Recorder
+from echostep_app.session.losses import Losses
+from echostep_app.session.metadata import run_metadata
+from page.frames import told
+from walks import walk_chunks
+
+PLAN = ROOT / "host/core/echostep/plans/demo.json"
+
+
+class Run:
+    """A tracker of which only what the losses look at is played."""
+
+    def __init__(self) -> None:
+        self.state = SimpleNamespace(check_ins=0, undone=0, right=0.999)
+        self.plan = SimpleNamespace(is_drawn=True)
+        self.watchers: list[Any] = []
+        self.losses = Losses(self)  # type: ignore[arg-type]
+        self.t_s = 0.0
+
+    def go(self, seconds: int, status: TrackStatus, *, silent: bool = False, echoes: bool = True) -> None:
+        for _ in range(seconds):
+            self.t_s += 1.0
+            e: Estimate = told(t_s=self.t_s, status=status)
+            measured: Any = SimpleNamespace(t_s=[self.t_s] if echoes else [])
+            self.watchers[0](None if silent else measured, e)
+
+
+def test_a_walk_that_was_never_lost() -> None:
+    run = Run()
+    assert run.losses.describe() == ""
+    run.go(31, TrackStatus.TRACKING)
+    assert run.losses.describe() == "never lost in 30 s"
+
+
+def test_each_reason_with_its_time() -> None:
+    run = Run()
+    run.go(11, TrackStatus.TRACKING)
+    run.go(4, TrackStatus.LOST, silent=True)
+    run.go(2, TrackStatus.UNCERTAIN)
+    run.state.check_ins = 1
+    run.go(1, TrackStatus.TRACKING)
+    run.state.right = 0.01
+    run.go(9, TrackStatus.LOST)
+    run.state.undone, run.state.right = 1, 0.999
+    run.go(3, TrackStatus.TRACKING)
+    run.go(8, TrackStatus.UNCERTAIN, echoes=False)
+    assert run.losses.describe() == (
+        "lost for 13 s of 37 s, uncertain for 10 s: the echoes did not fit the plan after the position was set by hand at 18 s (9 s), "
+        "several places fitted (7 s), nothing came from the foot (4 s), there were no echoes (3 s); position set by hand once, 1 of them undone"
+    )
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path, plan = tmp_path_factory.mktemp("walk") / "walk.mcap", load_plan(PLAN)
+    with Recorder(path, run_metadata(plan, Pose(2.0, 7.5, 0.0), 1, "test")) as recorder:
+        for chunk in walk_chunks():
+            recorder.write(chunk)
+            recorder.wait_for_disk(chunk)
+    return path
+
+
+def replayed(recording: Path, out: Path, *more: str) -> tuple[int, str]:
+    command = ["replay", str(recording), "--plan", str(PLAN), "--headless", "--out", str(out), *more]
+    done = CliRunner().invoke(app, command)
+    return done.exit_code, done.output + str(done.exception or "")
+
+
+@pytest.mark.slow
+def test_a_replay_says_how_it_went_and_where_it_ended(recording: Path, tmp_path: Path) -> None:
+    code, said = replayed(recording, tmp_path)
+    assert code == 0, said
+    lines = said.splitlines()
+    assert any(line.startswith("walk: never lost in 1") for line in lines), said
+    assert "end: in Office 2" in lines or "end: in North corridor" in lines, said
+
+
+def test_a_start_outside_is_refused_with_the_nearest_place(recording: Path, tmp_path: Path) -> None:
+    code, said = replayed(recording, tmp_path, "--start", "100,7.5,0")
+    assert code != 0
+    assert "--start 100,7.5,0: it is outside the building: the nearest possible place is 24.70,7.50" in said
+    assert not (tmp_path / "track.csv").exists()
+
+
+def test_a_plan_whose_start_is_in_a_wall_is_refused(tmp_path: Path) -> None:
+    walled = tmp_path / "walled.json"
+    walled.write_text(PLAN.read_text().replace('"x": 2.0', '"x": 1.02'))
+    assert walled.read_text() != PLAN.read_text()
+    done = CliRunner().invoke(app, ["live", "--plan", str(walled), "--board", str(tmp_path / "no-port"), "--headless"])
+    assert done.exit_code != 0
+    assert "the plan's start 1.02,7.5,0: it is inside a wall: the nearest possible place is 1.30,7.50" in str(
+        done.exception
+    )

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT
+"""Results of a run: the tables and the summary are there before the picture is drawn; a run without a page loads no server."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from board_runs import ROOT
+from echostep.errors import EchostepError
+from echostep.plan.model import load_plan
+from echostep_app.session import results
+from page.frames import told
+from waiting import PATIENCE_S
+
+TRACKER: Any = SimpleNamespace(
+    plan=load_plan(ROOT / "host/core/echostep/plans/demo.json"), beacon_places=lambda _: []
+)  # what the results ask of a tracker
+
+
+def test_track_and_summary_come_before_the_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    seen: list[str] = []
+    monkeypatch.setattr(
+        results,
+        "draw_track",
+        lambda path, *_: seen.append((path.parent / "track.csv").read_text() + capsys.readouterr().out),
+    )
+    results.write_results(tmp_path, TRACKER, None, results.Result("walk", [told(t_s=1.0)]))
+    assert seen[0].startswith("t_s,x_m")
+    assert "estimates: 1" in seen[0]
+
+
+def test_a_picture_that_cannot_be_written_is_one_error_after_the_summary(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "track.png").mkdir()
+    with pytest.raises(EchostepError, match="cannot write the picture: Is a directory"):
+        results.write_results(tmp_path, TRACKER, None, results.Result("walk", [told(t_s=1.0)]))
+    assert "estimates: 1" in capsys.readouterr().out
+    assert (tmp_path / "track.csv").exists()
+
+
+def test_a_table_that_cannot_be_written_is_an_error_of_a_run_without_estimates_too(tmp_path: Path) -> None:
+    (tmp_path / "track.csv").mkdir()
+    with pytest.raises(EchostepError, match="cannot write the track: Is a directory"):
+        results.write_results(tmp_path, TRACKER, None, results.Result("walk", []))
+
+
+@pytest.mark.process
+def test_a_replay_without_a_page_loads_no_server() -> None:
+    code = "import sys, echostep_app.session.runs.replay; print({'uvicorn', 'starlette', 'pydantic', 'matplotlib'} & sys.modules.keys())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE_S, check=True)
+    assert done.stdout == "set()\n"

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: MIT
+"""Certificates for TLS, made once a module."""
+
+from __future__ import annotations
+
+import pytest
+
+from echostep_app.team import outbox
+from team.team_broker import Certificates
+from waiting import PATIENCE_S
+
+
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No report becomes too old to be sent, however long other programs have the cores."""
+    monkeypatch.setattr(outbox, "FRESH_S", PATIENCE_S)
+    monkeypatch.setattr(outbox, "CLOSING_S", PATIENCE_S)
+
+
+@pytest.fixture(scope="module")
+def certificates(tmp_path_factory: pytest.TempPathFactory) -> Certificates:
+    return Certificates(tmp_path_factory.mktemp("certificates"))

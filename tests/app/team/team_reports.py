@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: MIT
+"""Reports for the tests of the team: one that is right, and its parts."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from board_runs import ROOT
+from echostep.plan.model import load_plan
+from echostep_app.team.messages.report import Motion, Position, Report, ReportedPlace, StreamReport, moment
+
+PLAN = Path(ROOT / "host/core/echostep/plans/demo.json")
+POSITION = Position(12.5, 0.0, 3.0, 2.0, 0.04, 0.01, 0.09, 0.75, 0.5, 0.1, 0, "Ground floor", 0.98, 0.0, 0.1)
+PLACE = ReportedPlace(48.2, 16.37, None, 0.31, None, 61.4)
+
+
+def report(name: str = "anna", sequence: int = 1, at_s: float | None = None, **fields: Any) -> Report:
+    """A report of team red that says it was sent at this Unix time, now by default."""
+    sent_s = time.time() if at_s is None else at_s
+    made = Report(
+        1, "red", name, "0123abcd", sequence, moment(sent_s), moment(sent_s + 10.0), "live", "tracking", POSITION,
+        Motion(7, 9.5, 1.2, 0.4), PLACE, StreamReport(100.0, 360.0, 0, 0, 0, True, ()), "Demo office", load_plan(PLAN).digest, "0.1.0", None, 0,
+    )  # fmt: skip
+    return replace(made, **fields)

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: MIT
+"""What is said of the delivery of reports is what the receiver said: a broker that refuses them, one that has them, a radio that leaves some out."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from echostep.plan.model import load_plan
+from echostep.tracker import Tracker
+from echostep_app.team.endpoint import Outlet, parse_endpoint
+from echostep_app.team.messages.report import ReportedAlarm
+from echostep_app.team.mqtt.broker import UnwantedError
+from echostep_app.team.mqtt.publisher import Listener, MqttTransport
+from echostep_app.team.outbox import Delivery, Outbox
+from echostep_app.team.publish import Publishing
+from team.network import box_to
+from team.team_broker import Broker, needs_broker
+from team.team_reports import PLAN, report
+from waiting import until
+
+MAYDAY = ReportedAlarm("mayday", "help", 1, 3.0)
+needs_passwords = pytest.mark.skipif(
+    shutil.which("mosquitto_passwd") is None, reason="mosquitto_passwd is not installed"
+)
+
+
+@pytest.fixture
+def guarded(tmp_path: Path) -> Broker:
+    """A broker that lets wearer1 publish for team `green` alone."""
+    passwords, rules = tmp_path / "pw", tmp_path / "acl"
+    subprocess.run(["mosquitto_passwd", "-b", "-c", passwords, "wearer1", "x"], check=True, capture_output=True)
+    rules.write_text("user wearer1\ntopic readwrite echostep/green/anna/#\n")
+    return Broker(tmp_path, f"password_file {passwords}", f"acl_file {rules}")
+
+
+@needs_broker
+@needs_passwords
+@pytest.mark.process
+def test_a_refused_report_is_told_within_a_second_and_not_counted_as_sent(guarded: Broker) -> None:
+    with guarded as broker:
+        words: list[str] = []
+        begin_s = time.monotonic()
+        box = box_to(f"mqtt://wearer1:x@127.0.0.1:{broker.port}", words)
+        box.offer(report())
+        assert until(lambda: words)
+        told_s = time.monotonic() - begin_s
+        said = box.close()
+    assert "the broker does not let user wearer1 publish as red/anna (Not authorized): check --team, --name" in words[0]
+    assert told_s < 1.0
+    assert "0 of 1 reports sent" in said
+    assert "at the end: the broker does not let" in said
+
+
+@needs_broker
+@needs_passwords
+@pytest.mark.process
+def test_what_the_rules_allow_is_acknowledged_and_other_topics_are_refused(guarded: Broker) -> None:
+    with guarded as broker:
+        url = f"mqtt://wearer1:x@127.0.0.1:{broker.port}"
+        outlet = Outlet((parse_endpoint(url),), "anna", "green")
+        lines: list[str] = []
+        with Publishing(outlet, Tracker(load_plan(PLAN)), "live", lines.append) as publishing:
+            assert publishing.receipt(1) == "It is being sent."
+            publishing._offer(replace(report(), team="green", alarm=MAYDAY))
+            assert until(lambda: "broker has it" in publishing.receipt(1))
+            assert publishing.receipt(2) == "It is being sent."
+            assert publishing.fault == ""
+        assert "2 of 2 reports sent" in lines[-1]
+        listener = Listener(parse_endpoint(url), ["echostep/green/anna/#"], lambda *_: None)
+        listener.open()
+        with pytest.raises(UnwantedError, match="Not authorized"):
+            listener.publish("echostep-table/green/mark", b"{}")
+        listener.close()
+
+
+@needs_broker
+@pytest.mark.process
+def test_an_old_protocol_cannot_refuse_so_its_answer_is_no_receipt(tmp_path: Path) -> None:
+    with Broker(tmp_path) as broker:
+        transport = MqttTransport(parse_endpoint(broker.url), "red", "anna", "0123abcd")
+        kinds = []
+        for transport._use_mqtt5 in (True, False):
+            transport.open()
+            kinds.append(transport.send(report()))
+            transport.close(ended=True)
+    assert kinds == [Delivery.ACKNOWLEDGED, Delivery.SENT]
+
+
+def test_a_mayday_that_cannot_go_out_is_told_first() -> None:
+    lines: list[str] = []
+    outlet = Outlet((parse_endpoint("mqtt://127.0.0.1:1"),), "anna", "green")
+    with Publishing(outlet, Tracker(load_plan(PLAN)), "live", lines.append) as publishing:
+        assert until(lambda: publishing.fault)
+        publishing._offer(report(alarm=MAYDAY))
+        assert any(line.startswith("MAYDAY has not gone out: mqtt://127.0.0.1:1: ") for line in lines)
+        assert publishing.receipt(1).startswith("It has not gone out: mqtt://127.0.0.1:1: ")
+
+
+def test_a_transport_that_leaves_reports_out_sends_none() -> None:
+    class Radio:
+        def open(self) -> None: ...
+
+        def send(self, _: object) -> Delivery:
+            return Delivery.LEFT_OUT
+
+        def close(self, *, ended: bool) -> None: ...
+
+    box = Outbox(Radio(), "radio", print)
+    box.offer(report(alarm=MAYDAY))
+    assert until(lambda: box.counts.left_out)
+    assert "0 of 1 reports sent, 0 overtaken by newer ones, 0 unsent, 1 left out" in box.close()
+    assert box.delivered is None

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""Faults of TLS and of the network end in one sentence with the next step; each is provoked on real sockets and files."""
+
+from __future__ import annotations
+
+import errno
+import socket
+import ssl
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+import trustme
+
+from echostep.errors import EchostepError
+from echostep_app.team.cot import StreamTransport
+from echostep_app.team.endpoint import parse_endpoint
+from echostep_app.team.faults import in_words
+from echostep_app.team.tls import tls_context
+from free_ports import free_port
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """An authority, the certificate of `takserver` with its key, and the same of a stranger."""
+    folder, authority = tmp_path_factory.mktemp("tls"), trustme.CA()
+    made = {name: folder / f"{name}.pem" for name in ("ca", "server", "stranger")}
+    authority.cert_pem.write_to_path(str(made["ca"]))
+    for name, issuer in (("server", authority), ("stranger", trustme.CA())):
+        issuer.issue_cert("takserver").private_key_and_cert_chain_pem.write_to_path(str(made[name]))
+    return made
+
+
+@contextmanager
+def tak(files: dict[str, Path], *, tls: bool = True) -> Iterator[int]:
+    """A server for one connection; its port."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(files["server"])
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            with suppress(OSError), server.accept()[0] as plain:
+                if tls:
+                    with context.wrap_socket(plain, server_side=True) as wrapped:
+                        wrapped.recv(10)
+                else:
+                    plain.sendall(b"MQTT or something else that is no TLS\n" * 10)
+                    plain.recv(1000)
+
+        thread = threading.Thread(target=serve, daemon=True)
+        thread.start()
+        yield server.getsockname()[1]
+    thread.join()
+
+
+def fault(url: str) -> str:
+    """What is said of an attempt to connect; empty when it succeeds."""
+    transport = StreamTransport(parse_endpoint(url))
+    try:
+        transport.open()
+    except OSError as error:
+        return in_words(error)
+    finally:
+        transport.close(ended=True)
+    return ""
+
+
+def test_a_certificate_of_another_name_is_named_and_its_name_can_be_given(files: dict[str, Path]) -> None:
+    with tak(files) as port:
+        said = fault(f"cot+tls://127.0.0.1:{port}?ca={files['ca']}")
+    assert said.startswith("the server's certificate is for another name: use that name as the host (in /etc/hosts")
+    assert "name=NAME" in said
+    with tak(files) as port:
+        assert fault(f"cot+tls://127.0.0.1:{port}?ca={files['ca']}&name=takserver") == ""
+    with tak(files) as port:
+        assert "for another name" in fault(f"cot+tls://127.0.0.1:{port}?ca={files['ca']}&name=other")
+
+
+def test_an_unknown_authority_and_a_port_without_tls_are_named(files: dict[str, Path]) -> None:
+    with tak(files) as port:
+        said = fault(f"cot+tls://127.0.0.1:{port}?name=takserver")
+    assert said.endswith("does not know: give the file of the authority that has signed it with ca=FILE")
+    with tak(files, tls=False) as port:
+        assert "does not speak TLS" in fault(f"cot+tls://127.0.0.1:{port}?ca={files['ca']}")
+
+
+def test_faults_of_the_network_say_where_to_look() -> None:
+    assert "nothing listens at that address" in fault(f"cot+tcp://127.0.0.1:{free_port()}")
+    assert "check its spelling" in in_words(socket.gaierror(socket.EAI_NONAME, "Name or service not known"))
+    for number in (errno.ENETUNREACH, errno.EHOSTUNREACH):
+        assert "is this computer in its network?" in in_words(OSError(number, "unreachable"))
+    assert "does not answer" in in_words(TimeoutError("timed out"))
+    assert in_words(BrokenPipeError("it broke")) == "it broke"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("client.p12", b"\x30\x82\x0a\x00\x02\x01\x03", r"is damaged, or is DER: openssl x509 -inform der"),
+        ("empty.pem", b"", "holds no certificate and no key"),
+        ("half.pem", b"-----BEGIN CERTIFICATE-----\nno\n-----END CERTIFICATE-----\n", "cannot use"),
+    ],
+)
+def test_a_file_that_is_no_certificate_is_named_with_the_remedy(
+    tmp_path: Path, name: str, content: bytes, said: str
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(EchostepError, match=said) as caught:
+        tls_context(parse_endpoint(f"cot+tls://h?cert={path}&key={path}"))
+    assert name in str(caught.value)
+    assert "_ssl.c" not in str(caught.value)
+
+
+def test_a_name_needs_tls() -> None:
+    with pytest.raises(EchostepError, match="ca, cert, key, password and name are for cot"):
+        parse_endpoint("cot+tcp://h?name=takserver")

@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: MIT
+"""The outbox: the newest report first, broken lines, heartbeats; motion, places, events and addresses."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from echostep.errors import EchostepError
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.plan.model import Georeference, load_plan
+from echostep_app.team import outbox
+from echostep_app.team.cot import event, uid
+from echostep_app.team.endpoint import parse_endpoint
+from echostep_app.team.georeference import GroundPlane
+from echostep_app.team.messages.report import BadReportError, Report, check_name, decode, encode
+from echostep_app.team.outbox import Delivery, Outbox, aged, stamped
+from echostep_app.team.picture import draw_team
+from echostep_app.team.publish import ReportHistory
+from team.letters import NOW, UNIX, heard, said
+from team.team_reports import PLACE, PLAN, POSITION, report
+from waiting import PATIENCE_S, ends, until
+
+
+class Recorded:
+    """A line that keeps what it is given, and breaks when it is told to."""
+
+    def __init__(self) -> None:
+        self.sent: list[Report] = []
+        self.broken = False
+        self.hold = threading.Event()
+        self.hold.set()
+        self.opened = 0
+
+    def open(self) -> None:
+        if self.broken:
+            raise ConnectionRefusedError("refused")
+        self.opened += 1
+
+    def send(self, report: Report) -> Delivery:
+        self.hold.wait(2.0 * PATIENCE_S)
+        if self.broken:
+            raise BrokenPipeError("it broke")
+        self.sent.append(report)
+        return Delivery.SENT
+
+    def close(self, *, ended: bool) -> None:
+        pass
+
+
+@pytest.mark.usefixtures("patient")
+def test_every_report_goes_out_when_the_line_is_quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outbox, "HEARTBEAT_S", PATIENCE_S)
+    line = Recorded()
+    box = Outbox(line, "line", print)
+    for k in range(500):
+        box.offer(report(position=replace(POSITION, t_s=float(k))))
+    assert "500 of 500 reports sent, 0 overtaken" in box.close()
+    assert [r.position.t_s for r in line.sent if r.position] == [float(k) for k in range(500)]
+    assert [r.sequence for r in line.sent] == list(range(1, 501))
+
+
+@pytest.mark.slow
+def test_a_slow_line_sends_the_newest_and_counts_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outbox, "FRESH_S", 0.05)
+    line = Recorded()
+    line.hold.clear()
+    box = Outbox(line, "line", print)
+
+    def offer_all() -> None:
+        for k in range(3000):
+            box.offer(report(position=replace(POSITION, t_s=float(k))))
+
+    assert ends(offer_all)  # although the line stands still
+    time.sleep(0.1)  # at least: what waits is older than FRESH_S then
+    line.hold.set()
+    assert until(lambda: line.sent and line.sent[-1].position and line.sent[-1].position.t_s == 2999.0)
+    box.close()
+    assert len(line.sent) < 1200
+    assert box.counts.sent + box.counts.overtaken == box.counts.offered == 3000
+    assert line.sent[-1].superseded == box.counts.overtaken
+
+
+@pytest.mark.usefixtures("patient")
+def test_a_broken_line_is_opened_again_and_no_later_report_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outbox, "HEARTBEAT_S", PATIENCE_S)
+    monkeypatch.setattr(outbox, "RETRY_PAUSES_S", (0.02, 0.05))
+    line, words = Recorded(), list[str]()
+    box = Outbox(line, "line", words.append)
+    box.offer(report())
+    assert until(lambda: line.sent)
+    line.broken = True
+    for k in range(5):
+        box.offer(report(position=replace(POSITION, t_s=100.0 + k)))
+    assert until(lambda: words)
+    line.broken = False
+    assert until(lambda: line.sent[-1].position and line.sent[-1].position.t_s == 104.0)
+    for k in range(50):
+        box.offer(report(position=replace(POSITION, t_s=200.0 + k)))
+    summary = box.close()
+    assert [r.position.t_s for r in line.sent if r.position and r.position.t_s >= 200.0] == [
+        200.0 + k for k in range(50)
+    ]
+    assert line.opened == 2
+    assert words == ["line: it broke; tracking goes on, trying again", "line: connected again"]
+    assert "connection broken 1 times" in summary
+
+
+@pytest.mark.usefixtures("patient")
+def test_a_line_that_never_opens_does_not_hold_up_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither the time for the last reports nor the pause before the next try is waited for."""
+    monkeypatch.setattr(outbox, "RETRY_PAUSES_S", (10.0 * PATIENCE_S,))
+    line = Recorded()
+    line.broken = True
+    box = Outbox(line, "line", lambda _: None)
+    box.offer(report())
+    said: list[str] = []
+    assert ends(lambda: said.append(box.close()))
+    assert "0 of 1 reports sent, 0 overtaken by newer ones, 1 unsent" in said[0]
+
+
+def test_silence_makes_a_position_wide_and_lost() -> None:
+    fresh = stamped(report(), 2, UNIX, 0.5, 0)
+    silent = stamped(report(), 3, UNIX, 4.0, 0)
+    assert fresh.position
+    assert silent.last_place
+    assert (fresh.status, fresh.position.xx_m2) == ("tracking", POSITION.xx_m2)
+    assert (silent.status, silent.position, silent.place, silent.last_place.age_s) == ("lost", None, None, 4.0)
+    assert silent.last_place.xx_m2 == pytest.approx(POSITION.xx_m2 + 36.0)
+    assert silent.last_place.radius95_m > 14.0
+    assert aged(POSITION, 0.0) == POSITION
+    decode(encode(silent))
+
+
+def test_a_position_is_known_until_it_is_older_than_an_estimate_can_be() -> None:
+    sharp = report(position=replace(POSITION, xx_m2=0.0, xy_m2=0.0, yy_m2=0.0, radius95_m=0.0))
+    assert stamped(sharp, 3, UNIX, 2.5, 0).status == "lost"  # 2.5 s at 1.5 m/s: 9 m
+    settled = stamped(sharp, 3, UNIX, 2.0, 0)
+    assert settled.position
+    assert settled.place
+    assert (settled.status, settled.place.sd_m, settled.last_place) == ("tracking", PLACE.sd_m, None)
+
+
+def test_a_heartbeat_repeats_the_last_report(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outbox, "HEARTBEAT_S", 0.05)
+    line = Recorded()
+    box = Outbox(line, "line", print)
+    box.offer(report())
+    assert until(lambda: len(line.sent) > 3)
+    box.close()
+    assert [r.sequence for r in line.sent] == list(range(1, len(line.sent) + 1))
+    assert line.sent[3].position
+    assert line.sent[3].position.age_s > 0.1
+    assert box.counts.sent == 1
+
+
+def test_motion_knows_steps_way_pace_and_rest() -> None:
+    trail = ReportHistory()
+    walk = [
+        Estimate(0.5 * k, 0.6 * min(k, 10), 0.0, 0.1, 0.0, 0.1, 0.0, 0.1, min(k, 10), TrackStatus.TRACKING)
+        for k in range(21)
+    ]
+    motions = [trail.motion(e) for e in walk]
+    assert motions[10].speed_m_s == pytest.approx(1.2)
+    assert motions[20].walked_m == pytest.approx(6.0)
+    assert motions[20].still_s == pytest.approx(5.0)
+    assert (motions[20].speed_m_s, motions[20].steps) == (0.0, 10)
+
+
+def test_a_place_on_earth() -> None:
+    turned = replace(load_plan(PLAN), georeference=Georeference(16.0, 48.0, 0.5 * math.pi), uncertainty_m=0.4)
+    there = GroundPlane(turned).place(100.0, 0.0, 0.3, 0.0)  # the plan's x points north
+    assert there.lat_deg == pytest.approx(48.0 + 100.0 / 111_200.0, abs=1e-6)
+    assert there.lon_deg == pytest.approx(16.0, abs=1e-9)
+    assert there.course_deg == pytest.approx(0.0, abs=1e-9)
+    assert there.sd_m == pytest.approx(0.5)
+    west = GroundPlane(turned).place(0.0, 100.0, 0.3, 0.5 * math.pi)
+    assert west.lon_deg == pytest.approx(16.0 - 100.0 / 74_630.0, abs=1e-6)
+    assert west.course_deg == pytest.approx(270.0)
+
+
+def test_a_replay_says_that_it_is_one_and_when_it_was_recorded() -> None:
+    recorded = "2026-11-21T10:00:00.000Z"
+    made = {source: event(report(source=source, recorded=recorded, place=PLACE)) for source in ("replay", "simulated")}
+    replayed, simulated = (ElementTree.fromstring(made[source] or b"") for source in ("replay", "simulated"))
+    assert (replayed.get("how"), simulated.get("how")) == ("m-r", "m-s")
+    assert replayed.get("start") == recorded < str(replayed.get("time"))
+    assert f"recorded {recorded}" in (replayed.findtext("detail/remarks") or "")
+    assert decode(encode(report(recorded=recorded))).recorded == recorded
+
+
+def test_an_event_of_cursor_on_target() -> None:
+    made = event(report(battery_percent=55, place=replace(PLACE, sd_m=0.311)))
+    assert made is not None
+    top = ElementTree.fromstring(made)
+    assert (top.tag, top.get("version"), top.get("type"), top.get("how")) == ("event", "2.0", "a-f-G-U-C", "m-f")
+    assert top.get("uid") == "echostep-red-anna"
+    times = [top.get(key) for key in ("time", "start", "stale")]
+    assert times[0] == times[1] is not None
+    point = top.find("point")
+    assert point is not None
+    assert point.attrib == {
+        "lat": "48.20000000",
+        "lon": "16.37000000",
+        "hae": "9999999.0",
+        "ce": "0.32",
+        "le": "9999999.0",
+    }
+    group = top.find("detail/__group")
+    assert group is not None
+    assert group.attrib == {"name": "Red", "role": "Team Member"}
+    contact, track, status = (top.find(f"detail/{name}") for name in ("contact", "track", "status"))
+    assert contact is not None
+    assert contact.get("callsign") == "anna"
+    assert track is not None
+    assert (track.get("course"), track.get("speed")) == ("61.4", "1.20")
+    assert status is not None
+    assert status.get("battery") == "55"
+    assert "95 % within 0.8 m" in (top.findtext("detail/remarks") or "")
+    assert event(report(place=None)) is None
+
+
+def test_every_wearer_has_his_own_uid() -> None:
+    pairs = [("a", "b"), ("a-b", "c"), ("a", "b-c"), ("a-b-c", "d"), ("a", "b-c-d"), ("a-b", "c-d")]
+    assert len({uid(*pair) for pair in pairs}) == len(pairs)
+
+
+@given(st.text(max_size=32))
+def test_no_name_breaks_the_xml(name: str) -> None:
+    try:
+        check_name(name)
+    except BadReportError:
+        return
+    made = event(report(name))
+    assert made is not None
+    contact = ElementTree.fromstring(made).find("detail/contact")
+    assert contact is not None
+    assert contact.get("callsign") == name
+
+
+@pytest.mark.parametrize(
+    ("url", "why"),
+    [
+        ("localhost:1883", "mqtt://"),
+        ("http://localhost", "mqtt://"),
+        ("mqtt://", "HOST"),
+        ("mqtt://host:99999", "not an address"),
+        ("mqtt://host:0", "HOST"),
+        ("mqtt://[::1", "not an address"),
+        ("mqtt://host/path", "HOST"),
+        ("mqtt://host?ca=x", "ca"),
+        ("mqtts://host?key=x", "key belongs to a certificate"),
+        ("mqtts://host?colour=red", "colour"),
+        ("cot+udp://me:secret@host", "user"),
+        ("ftp://me:secret@host", "ftp|expected"),
+    ],
+)
+def test_a_wrong_address_is_named_without_its_password(url: str, why: str) -> None:
+    with pytest.raises(EchostepError, match=why) as found:
+        parse_endpoint(url)
+    assert "secret" not in str(found.value)
+
+
+def test_an_address_with_everything() -> None:
+    e = parse_endpoint("mqtts://me:p%40ss@[::1]:8884?ca=a.pem&cert=b.pem&key=c.pem")
+    assert (e.host, e.port, e.user, e.password, e.secure) == ("::1", 8884, "me", "p@ss", True)
+    assert str(e) == "mqtts://[::1]:8884"
+    assert e.files == {"ca": "a.pem", "cert": "b.pem", "key": "c.pem"}
+
+
+def test_the_picture_of_a_team(tmp_path_factory: pytest.TempPathFactory) -> None:
+    folder = tmp_path_factory.mktemp("team")
+    roster = heard(said(), said("$x_1$", status="lost"), said("w", status="waiting", position=None))
+    for name in ("team.png", "team.svg", "team.pdf"):
+        draw_team(folder / name, load_plan(PLAN), roster.members(NOW), NOW)
+        assert (folder / name).stat().st_size > 10_000
+    for label in ("tracking, 95 % ellipse", "x / m"):
+        assert f"<!-- {label} -->" in (folder / "team.svg").read_text()

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: MIT
+"""Certificates in PKCS #12 and encrypted keys: a server that wants a client's certificate accepts them; what cannot be opened is one sentence."""
+
+from __future__ import annotations
+
+import socket
+import ssl
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+import trustme
+from cryptography import x509
+from cryptography.hazmat.primitives import serialization as form
+from cryptography.hazmat.primitives.serialization import pkcs12
+
+from echostep.errors import EchostepError
+from echostep_app.team.endpoint import parse_endpoint
+from echostep_app.team.tls import tls_context
+from waiting import PATIENCE_S
+
+TAK = b"atakatak"  # the password that TAK servers use
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An authority, the server's certificate for takserver, and a client's in every form."""
+    folder, authority = tmp_path_factory.mktemp("pkcs12"), trustme.CA()
+    issued = authority.issue_cert("anna@example.org")
+    authority.cert_pem.write_to_path(str(folder / "ca.pem"))
+    authority.issue_cert("takserver").private_key_and_cert_chain_pem.write_to_path(str(folder / "server.pem"))
+    issued.private_key_and_cert_chain_pem.write_to_path(str(folder / "client.pem"))
+    root = x509.load_pem_x509_certificate(authority.cert_pem.bytes())
+    client = x509.load_pem_x509_certificate(issued.cert_chain_pems[0].bytes())
+    key = form.load_pem_private_key(issued.private_key_pem.bytes(), None)
+    for name, password in (("tak", TAK), ("own", b"secret"), ("open", None)):
+        cipher = form.BestAvailableEncryption(password) if password else form.NoEncryption()
+        made = pkcs12.serialize_key_and_certificates(b"anna", key, client, [root], cipher)  # type: ignore[arg-type]
+        (folder / f"{name}.p12").write_bytes(made)
+    trust = pkcs12.serialize_key_and_certificates(None, None, None, [root], form.BestAvailableEncryption(TAK))
+    (folder / "trust.p12").write_bytes(trust)
+    locked = key.private_bytes(form.Encoding.PEM, form.PrivateFormat.PKCS8, form.BestAvailableEncryption(b"secret"))
+    (folder / "locked.pem").write_bytes(locked + issued.cert_chain_pems[0].bytes())
+    (folder / "secret").write_bytes(b"secret\n")
+    (folder / "wrong").write_text("another")
+    return folder
+
+
+@contextmanager
+def tak(folder: Path) -> Iterator[tuple[int, list[bytes]]]:
+    """A server that wants a certificate of the authority; its port, and what it was sent."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(folder / "server.pem")
+    context.load_verify_locations(folder / "ca.pem")
+    context.verify_mode = ssl.CERT_REQUIRED
+    received = list[bytes]()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(PATIENCE_S)
+
+        def serve() -> None:
+            with (
+                suppress(OSError),
+                server.accept()[0] as plain,
+                context.wrap_socket(plain, server_side=True) as wrapped,
+            ):
+                wrapped.sendall(b"welcome")
+                received.append(wrapped.recv(100))
+
+        thread = threading.Thread(target=serve, daemon=True)
+        thread.start()
+        yield server.getsockname()[1], received
+        thread.join()
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "ca={0}/trust.p12&cert={0}/tak.p12",
+        "ca={0}/trust.p12&cert={0}/tak.p12&key={0}/tak.p12",
+        "ca={0}/trust.p12&cert={0}/own.p12&password={0}/secret",
+        "ca={0}/ca.pem&cert={0}/open.p12",
+        "ca={0}/ca.pem&cert={0}/locked.pem&password={0}/secret",
+        "ca={0}/ca.pem&cert={0}/client.pem",
+    ],
+)
+def test_a_server_that_wants_a_certificate_accepts_it(folder: Path, query: str) -> None:
+    context = tls_context(parse_endpoint(f"cot+tls://127.0.0.1?name=takserver&{query.format(folder)}"))
+    with (
+        tak(folder) as (port, received),
+        socket.create_connection(("127.0.0.1", port)) as plain,
+        context.wrap_socket(plain) as wrapped,
+    ):
+        assert wrapped.recv(100) == b"welcome"  # with TLS 1.3 a refused certificate would show here
+        wrapped.sendall(b"an event")
+    assert received == [b"an event"]
+
+
+@pytest.mark.parametrize(
+    ("query", "said"),
+    [
+        ("cert={0}/own.p12", r"cert=.*own\.p12: is PKCS #12 with a password: write it into a file, password=FILE"),
+        ("cert={0}/own.p12&password={0}/ca.pem", "that of password=FILE does not open it"),
+        ("cert={0}/trust.p12", "holds no certificate with its key: it is not a client's file; is it for ca="),
+        ("cert={0}/locked.pem", "the key is encrypted: write its password into a file, password=FILE"),
+        ("cert={0}/locked.pem&password={0}/wrong", "or has another password"),
+        ("cert={0}/client.pem&password={0}/none", "password=.*none: there is no such file"),
+        ("cert={0}/ca.pem", "lacks its certificate or its key"),
+    ],
+)
+def test_what_cannot_be_opened_is_one_sentence(folder: Path, query: str, said: str) -> None:
+    with pytest.raises(EchostepError, match=said) as caught:
+        tls_context(parse_endpoint(f"cot+tls://host?{query.format(folder)}"))
+    assert "\n" not in str(caught.value)
+    assert "_ssl.c" not in str(caught.value)
+
+
+def test_the_key_is_never_written_without_a_password(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written, write = list[bytes](), Path.write_bytes
+
+    def kept(path: Path, content: bytes) -> int:
+        written.append(content)
+        return write(path, content)
+
+    monkeypatch.setattr(Path, "write_bytes", kept)
+    tls_context(parse_endpoint(f"cot+tls://host?cert={folder}/tak.p12"))
+    assert b"BEGIN ENCRYPTED PRIVATE KEY" in b"".join(written)
+    assert b"BEGIN PRIVATE KEY" not in b"".join(written)
+
+
+def test_without_the_package_both_remedies_are_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("echostep.extras.find_spec", lambda name: None if name == "cryptography" else object())
+    with pytest.raises(
+        EchostepError, match=r"pip install 'echostep\[pkcs12\]'; or once: openssl pkcs12 .* -out tak.pem"
+    ):
+        tls_context(parse_endpoint(f"cot+tls://host?cert={folder}/tak.p12"))

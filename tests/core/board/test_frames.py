@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: MIT
+"""Board frames: golden vectors, any split of any stream, damage that stays local, a stale firmware."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+from cobs import cobs
+from hypothesis import given
+from hypothesis import strategies as st
+
+from board_runs import ROOT
+from echostep.board import messages as m
+from echostep.board.frames import BoardReader, FrameCounts, StaleFirmwareError, encode
+from naive.frames import BoardReader as NaiveReader
+
+VECTORS = [json.loads(line) for line in (ROOT / "protocol/vectors.jsonl").read_text().splitlines()]
+CLASSES = {kind.__name__.lower(): kind for kind in m.BY_ID.values()}
+
+
+def message_of(vector: dict[str, object]) -> m.Message:
+    fields = vector["fields"]
+    assert isinstance(fields, dict)
+    return CLASSES[str(vector["message"]).replace("_", "")](**fields)
+
+
+def gyros(n: int) -> m.Gyros:
+    return m.Gyros(ticks=n * 10_000, thigh=n % 7, calf=-(n % 5), belt=0)
+
+
+@pytest.mark.parametrize(
+    "vector", [v for v in VECTORS if "message" in v], ids=lambda v: f"{v['message']}-{v['sequence']}"
+)
+def test_vectors_encode_and_decode(vector: dict[str, object]) -> None:
+    message = message_of(vector)
+    frame = bytes.fromhex(str(vector["frame"]))
+    assert encode(message, int(str(vector["sequence"]))) == frame
+    if isinstance(message, m.Identity):  # its golden values hold foreign schema hashes
+        with pytest.raises(StaleFirmwareError):
+            BoardReader().feed(frame)
+    else:
+        assert BoardReader().feed(frame) == [message]
+
+
+@pytest.mark.parametrize(
+    "vector", [v for v in VECTORS if "cobs" in v], ids=lambda v: f"{v['cobs']}-{len(v['plain']) // 2}"
+)
+def test_cobs_vectors(vector: dict[str, str]) -> None:
+    assert cobs.encode(bytes.fromhex(vector["plain"])).hex() == vector["encoded"]
+
+
+@pytest.mark.process
+def test_generated_files_are_fresh() -> None:
+    done = subprocess.run(
+        [sys.executable, ROOT / "protocol/generate.py", "--check"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout
+
+
+@given(st.binary(max_size=600), st.lists(st.integers(0, 600), max_size=8))
+def test_any_split_gives_the_same(noise: bytes, cuts: list[int]) -> None:
+    stream = b"".join(encode(gyros(n), n) for n in range(12)) + noise + b"\0" + encode(gyros(99), 12)
+    whole, split = BoardReader(), BoardReader()
+    expected = whole.feed(stream)
+    edges = sorted({0, len(stream), *(c % len(stream) for c in cuts)})
+    found = [x for a, b in zip(edges, edges[1:], strict=False) for x in split.feed(stream[a:b])]
+    assert found == expected
+    assert split.counts == whole.counts
+    assert found[:12] == [gyros(n) for n in range(12)]
+    assert found[-1] == gyros(99)
+
+
+@given(st.sampled_from(["flip", "drop", "insert"]), st.data())
+def test_damage_costs_only_the_frames_it_touches(kind: str, draw: st.DataObject) -> None:
+    frames = [encode(gyros(n), n) for n in range(20)]
+    stream = bytearray(b"".join(frames))
+    at = draw.draw(st.integers(0, len(stream) - 1))
+    if kind == "flip":
+        stream[at] ^= draw.draw(st.integers(1, 255))
+    elif kind == "drop":
+        del stream[at]
+    else:
+        stream.insert(at, draw.draw(st.integers(0, 255)))
+    reader = BoardReader()
+    found = reader.feed(bytes(stream))
+    assert len(found) >= 18  # a damaged closing zero joins two frames, never more
+    assert set(found) <= {gyros(n) for n in range(20)}
+    assert found == sorted(found)
+
+
+def seen(reader: BoardReader | NaiveReader, parts: list[bytes]) -> tuple[list[m.Message], FrameCounts, bool]:
+    """Messages and counts, and whether a stale firmware ended it."""
+    found: list[m.Message] = []
+    try:
+        for part in parts:
+            found += reader.feed(part)
+    except StaleFirmwareError:
+        return [], FrameCounts(), True
+    return found, reader.counts, False
+
+
+@given(
+    st.lists(st.one_of(st.sampled_from([v["frame"] for v in VECTORS if "message" in v]), st.none()), max_size=40),
+    st.lists(st.tuples(st.integers(0, 2_000), st.integers(0, 255)), max_size=8),
+    st.lists(st.integers(0, 2_000), max_size=5),
+)
+def test_like_the_naive_twin(frames: list[str | None], damage: list[tuple[int, int]], cuts: list[int]) -> None:
+    stream = bytearray(b"".join(encode(gyros(n), n) if f is None else bytes.fromhex(f) for n, f in enumerate(frames)))
+    for at, value in damage:
+        if at < len(stream):
+            stream[at] = value
+    edges = sorted({0, len(stream), *(min(c, len(stream)) for c in cuts)})
+    parts = [bytes(stream[a:b]) for a, b in zip(edges, edges[1:], strict=False)]
+    assert seen(BoardReader(), parts) == seen(NaiveReader(), parts)
+
+
+def test_frames_end_where_their_zero_is() -> None:
+    stream = b"".join(encode(gyros(n), n) for n in range(5))
+    reader = BoardReader()
+    ends = reader.frames(stream[:30]).end.tolist() + (30 + reader.frames(stream[30:]).end).tolist()
+    assert ends == [at + 1 for at, octet in enumerate(stream) if octet == 0]
+
+
+@given(st.binary(max_size=4000))
+def test_noise_never_raises_and_memory_is_bounded(noise: bytes) -> None:
+    reader = BoardReader()
+    try:
+        reader.feed(noise)
+    except StaleFirmwareError:
+        pytest.fail("noise passed for an identity")
+    assert len(reader._rest) <= 66
+
+
+@pytest.mark.parametrize("length", [253, 254, 255, 256])
+def test_overlong_frames_are_counted_and_skipped(length: int) -> None:
+    reader = BoardReader()
+    found = reader.feed(cobs.encode(b"\1" * length) + b"\0" + encode(gyros(1), 0))
+    assert found == [gyros(1)]
+    assert reader.counts.bad_length == 1
+
+
+def test_stale_firmware_names_both_hashes() -> None:
+    stale = m.Identity(0, 0xDEADBEEF, 1, 0, 0, 1)
+    with pytest.raises(StaleFirmwareError, match=rf"0xDEADBEEF.*0x{m.SCHEMA_HASH:08X}"):
+        BoardReader().feed(encode(stale, 0))
+
+
+def test_a_foreign_identity_amid_good_frames_is_noise() -> None:
+    reader = BoardReader()
+    reader.feed(encode(gyros(0), 0))
+    assert reader.feed(encode(m.Identity(0, 0xDEADBEEF, 1, 0, 0, 1), 1)) == []
+    assert reader.counts.bad_message == 1
+
+
+def test_frames_of_another_schema_fail_their_checksum() -> None:
+    plain = bytes([0x03, 0, 0]) + gyros(1).pack()
+    import binascii
+
+    payload = plain + binascii.crc_hqx(plain, m.SCHEMA_SEED ^ 1).to_bytes(2, "little")
+    reader = BoardReader()
+    assert reader.feed(cobs.encode(payload) + b"\0") == []
+    assert reader.counts.bad_crc == 1
+
+
+def test_lost_sequence_numbers_are_counted_across_the_wrap() -> None:
+    reader = BoardReader()
+    for sequence in (65534, 65535, 2, 3):
+        reader.feed(encode(gyros(1), sequence))
+    assert reader.counts.lost == 2
+
+
+@pytest.mark.parametrize("value", [2, 255])
+def test_unknown_enumerations_are_rejected(value: int) -> None:
+    reader = BoardReader()
+    assert reader.feed(encode(m.Ping(0, value, 0, 100), 0)) == []
+    assert reader.counts.bad_message == 1

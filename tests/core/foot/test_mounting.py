@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: MIT
+"""Any mounting: the toe's direction is found from how the foot tips, and the track does not depend on how the sensor sits."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from board_runs import ROOT
+from echostep.arrays import Floats
+from echostep.foot.alignment import Alignment, aligned
+from echostep.foot.steps import Foot, Step, Track, walk_track
+from echostep.plan.model import Plan, load_plan
+from echostep.ports.chunks import MTX, Chunk, portion_of
+from echostep.tracker import Tracker
+from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata
+from echostep_app.scorecard.truth import Truth, errors
+from echostep_app.simulation.devices.board import PythonBoard
+from echostep_app.simulation.scenario import Scenario
+from echostep_studies.bench.recordings.feet import SETS
+from echostep_studies.frame.recordings import DATA, read_sets
+from foot import foot_walks as fw
+from needs_data import needs_data
+
+
+def axis_mountings() -> list[Floats]:
+    """The 24 rotations that bring axes onto axes."""
+    found = []
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            turn = np.eye(3)[list(order)] * np.array(signs)[:, None]
+            if np.linalg.det(turn) > 0.0:
+                found.append(turn)
+    return found
+
+
+def walked(manner: str, mounting: Floats, steps: int = 10) -> Track:
+    samples = fw.samples(fw.course(fw.MANNERS[manner], steps), 100, mounting, np.random.default_rng(1))
+    return aligned(walk_track(*samples))
+
+
+def off_rad(a: Floats | float, b: Floats | float) -> float:
+    return float(np.abs(np.angle(np.exp(1j * (np.asarray(a) - np.asarray(b))))).max())
+
+
+@pytest.mark.slow
+def test_every_axis_mounting_and_random_ones_give_the_toes_direction() -> None:
+    mountings = [*axis_mountings(), *(fw.any_rotation(np.random.default_rng(k)) for k in range(10))]
+    assert len(mountings) == 34
+    for mounting in mountings:
+        track = walked("walking", mounting)
+        assert track.toe_known
+        assert off_rad(track.heading_rad, 0.0) < 0.1
+        assert [step.move_m[0] for step in track.steps] == pytest.approx([1.3] * 10, abs=0.03)
+        assert [step.move_m[1] for step in track.steps] == pytest.approx([0.0] * 10, abs=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "manner", ["backward", "sideways", "running", "upstairs", "downstairs", "turning", "strolling"]
+)
+def test_steps_in_any_direction_do_not_turn_the_toe(manner: str) -> None:
+    """The first step as the toe sees it, in some mountings; backward steps go backward, sideways ones to the side."""
+    true = fw.MANNERS[manner].move_m
+    for k in range(4):
+        track = walked(manner, fw.any_rotation(np.random.default_rng(k)), 20)
+        assert track.toe_known
+        first = np.array(track.steps[0].move_m[:2])
+        assert off_rad(math.atan2(first[1], first[0]), math.atan2(true[1], true[0])) < 0.15
+
+
+def test_live_the_first_steps_wait_for_the_toe_and_no_others() -> None:
+    mounting = axis_mountings()[7]
+    t, accel, gyro = fw.samples(fw.course(fw.MANNERS["walking"], 6), 100, mounting, np.random.default_rng(2))
+    foot, alignment, waited, steps = Foot(), Alignment(), 0, []
+    for k in range(len(t)):
+        events = foot.feed(t[k : k + 1], accel[k : k + 1], gyro[k : k + 1])
+        told = alignment.feed(events, float(t[k]))
+        waited += bool(events) and not told and any(isinstance(e, Step) for e in events)
+        steps += [e for e in told if isinstance(e, Step)]
+    assert waited <= 2
+    assert len(steps) == 6
+    assert np.array([s.move_m[:2] for s in steps]) == pytest.approx(np.tile([1.3, 0.0], (6, 1)), abs=0.15)
+
+
+@pytest.fixture(scope="module")
+def live() -> tuple[Plan, Scenario, list[Chunk]]:
+    """A simulated walk, x of the MTx to the toe."""
+    plan = load_plan(ROOT / "host/core/echostep/plans/demo.json")
+    scenario = Scenario(plan, ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 7.5), (18.0, 7.5)), 5, PythonBoard(5))
+    return plan, scenario, list(scenario.chunks())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("which", [0, 5, 11, 18, 22])
+def test_live_the_mtx_may_sit_in_any_way(live: tuple[Plan, Scenario, list[Chunk]], which: int) -> None:
+    """The same bytes with the sensor's axes turned: as good a track."""
+    plan, scenario, chunks = live
+    mounting = axis_mountings()[which]
+    frames, turned = MtxReader(), []
+    for chunk in chunks:
+        if chunk.port == MTX:
+            samples = [
+                s._replace(accel=tuple((mounting @ s.accel).tolist()), gyro=tuple((mounting @ s.gyro).tolist()))
+                for s in frames.feed(chunk.data)
+            ]
+            chunk = replace(chunk, data=b"".join(encode_frame(MTDATA, pack_mtdata(s)) for s in samples))
+        turned.append(chunk)
+    found = Tracker(plan, scenario.start, seed=0).take(portion_of(turned))
+    off = errors(found, Truth(scenario.walk.t_s, scenario.walk.trunk_m))
+    assert off is not None
+    assert off.mean_m < 0.2
+    assert off.max_m < 0.8
+    assert off.coverage95 > 0.8
+
+
+def test_a_foot_that_does_not_tip_is_taken_to_have_x_to_the_toe_until_it_tips() -> None:
+    alignment = Alignment()
+    step = Step(0.0, 1.0, (0.2, 0.1, 0.0), np.eye(3), 0.0, 0.01)
+    assert alignment.feed([step, step], 1.0) == []
+    assert alignment.waiting
+    assert [event.move_m for event in alignment.feed([step], 1.0) if isinstance(event, Step)] == [step.move_m] * 3
+    assert len(alignment.feed([step], 2.0)) == 1
+    (tipped,) = alignment.feed([replace(step, toe_rad=math.pi / 2)], 3.0)
+    assert isinstance(tipped, Step)
+    assert tipped.move_m == pytest.approx((0.1, -0.2, 0.0))
+    assert not alignment.waiting
+
+
+def test_nobody_who_stops_after_one_step_is_kept_waiting() -> None:
+    alignment = Alignment()
+    step = Step(0.0, 1.0, (0.2, 0.1, 0.0), np.eye(3), 0.0, 0.01)
+    assert alignment.feed([step], 1.0) == []
+    assert alignment.feed([], 3.0) == []
+    assert alignment.feed([], 6.0) == [step]
+
+
+@pytest.mark.slow
+@needs_data()
+def test_on_real_feet_the_toe_looks_where_they_walk() -> None:
+    """Thirty feet, mounted as their owners liked, turned once more: long steps go within a toe-out angle of the toe's direction."""
+    for k, recording in enumerate(read_sets(DATA, SETS)[0]):
+        turn = fw.any_rotation(np.random.default_rng(k))
+        track = aligned(walk_track(recording.t_s, recording.accel @ turn.T, recording.gyro @ turn.T))
+        assert track.toe_known, recording.name
+        before = [0.0, *(step.heading_rad for step in track.steps)]
+        travel = []
+        for step, heading in zip(track.steps, before, strict=False):
+            turned = math.remainder(step.heading_rad - heading, 2.0 * math.pi)
+            if math.hypot(*step.move_m[:2]) > 0.6 and abs(turned) < 1.5:
+                toe = heading + 0.5 * turned
+                travel.append(math.remainder(math.atan2(step.move_m[1], step.move_m[0]) - toe, 2.0 * math.pi))
+        if travel:  # a shuffling foot makes no long step
+            assert abs(np.median(travel)) < math.radians(20.0), (recording.group, recording.name)

@@ -1,0 +1,406 @@
+# SPDX-License-Identifier: MIT
+"""Heights and floors from pressure: the filter, the record's file, the command, real climbs."""
+
+from __future__ import annotations
+
+import datetime
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from typer.testing import CliRunner
+
+from echostep.arrays import Floats
+from echostep.errors import EchostepError
+from echostep_app.cli import app
+from echostep_app.simulation.devices.board_sensors import Scp1000Model
+from echostep_studies.barometer import vertical_model as vertical
+from echostep_studies.barometer.altitude import Altitude, BarometerSettings, Heights, Pressures, noise_of
+from echostep_studies.barometer.floor_filter import FloorFilter, checked_heights
+from echostep_studies.barometer.floor_record import find_storeys, stays
+from echostep_studies.barometer.floors_command import parse_heights, record_floors
+from echostep_studies.barometer.pressure_csv import load_pressures
+from echostep_studies.floors.study import FloorScene, judge, longest_s
+from echostep_studies.frame.recordings import DATA
+from echostep_studies.simulation.air_pressure import Weather, device_temperatures, pressures
+from echostep_studies.simulation.vertical_day import climb
+from needs_data import needs_data
+
+STOREYS = np.array([0.0, 3.5, 7.0])
+PA_PER_M = 101_325.0 * 9.80665 / (287.053 * 293.15)
+
+
+def pascals(height_m: Floats) -> Floats:
+    """Of a column of dry air at 20 degC on 101325 Pa."""
+    return np.asarray(101_325.0 * np.exp(-9.80665 * height_m / (287.053 * 293.15)))
+
+
+def record(
+    height_m: Floats, rate_hz: float = 9.0, noise_pa: float = 3.0, extra_pa: NDArray[Any] | float = 0.0, seed: int = 1
+) -> Pressures:
+    rng = np.random.default_rng(seed)
+    n = len(height_m)
+    return Pressures(np.arange(n) / rate_hz, pascals(height_m) + extra_pa + noise_pa * rng.standard_normal(n))
+
+
+def stairs_up(rate_hz: float = 9.0, speed: float = 0.3) -> Floats:
+    """A minute on the ground, stairs to 3.5 m, a minute there."""
+    stand = np.zeros(round(60 * rate_hz))
+    return np.concatenate([stand, np.linspace(0.0, 3.5, round(3.5 / speed * rate_hz)), stand + 3.5])
+
+
+def known(floor: int, count: int = 3) -> Floats:
+    return np.asarray(np.eye(count)[floor])
+
+
+@pytest.mark.long
+def test_standing_keeps_the_height_under_the_weather() -> None:
+    t = np.arange(10_800) / 9.0
+    heights = Altitude().feed(record(np.zeros(10_800), extra_pa=100.0 / 3600.0 * t))  # 2.8 m of weather
+    assert abs(heights.height_m[-1]) < 1.0
+    assert (heights.moving < 0.5).mean() > 0.99
+
+
+def test_stairs_are_climbed_and_told_while_they_are() -> None:
+    way = stairs_up()
+    heights = Altitude().feed(record(way))
+    rise, variance = heights.change(300, len(way) - 1)
+    assert rise == pytest.approx(3.5, abs=3.0 * variance**0.5)
+    assert variance**0.5 < 0.5
+    on_stairs = slice(60 * 9 + 45, 60 * 9 + 100)
+    assert np.median(heights.moving[on_stairs]) > 0.7
+    assert np.median(heights.speed_m_s[on_stairs]) == pytest.approx(0.3, abs=0.1)
+
+
+@pytest.mark.parametrize("size_pa", [-50.0, -20.0, 20.0, 50.0])
+@pytest.mark.parametrize("held_s", [0.5, 5.0])
+def test_a_door_moves_nobody(size_pa: float, held_s: float) -> None:
+    n = 1200
+    t = np.arange(n) / 9.0
+    pulse = size_pa * ((t > 60.0) & (t < 60.0 + held_s))
+    samples = record(np.full(n, 3.5), extra_pa=pulse)
+    found = FloorFilter(STOREYS, prior=known(1)).feed(samples)
+    assert (found.floor == 1).all()
+    assert abs(Altitude().feed(samples).height_m[-1]) < 0.5
+
+
+def test_a_building_under_pressure_for_good_moves_nobody() -> None:
+    n = 1200
+    step = -25.0 * (np.arange(n) > 600)
+    found = FloorFilter(STOREYS, prior=known(1)).feed(record(np.full(n, 3.5), extra_pa=step))
+    assert (found.floor == 1).all()
+
+
+def test_spikes_are_no_heights() -> None:
+    way = stairs_up()
+    samples = record(way)
+    samples.pressure_pa[::97] += 400.0
+    found = FloorFilter(STOREYS, prior=known(0)).feed(samples)
+    right = found.floor == np.abs(way[:, None] - STOREYS).argmin(axis=1)
+    assert right.mean() > 0.98
+    assert found.floor[-1] == 1
+
+
+@pytest.mark.slow
+@settings(max_examples=15, deadline=None)
+@given(cuts=st.lists(st.integers(0, 400), max_size=6))
+def test_portions_change_nothing(cuts: list[int]) -> None:
+    way = np.concatenate([np.zeros(150), np.linspace(0.0, 3.5, 100), np.full(150, 3.5)])
+    samples = record(way)
+    whole_floors, whole_heights = FloorFilter(STOREYS).feed(samples), Altitude().feed(samples)
+    floors, altitude = FloorFilter(STOREYS), Altitude()
+    edges = [0, *sorted(cuts), 400]
+    parts = [Pressures(samples.t_s[a:b], samples.pressure_pa[a:b]) for a, b in zip(edges, edges[1:], strict=False)]
+    assert np.array_equal(np.concatenate([floors.feed(part).probability for part in parts]), whole_floors.probability)
+    assert np.array_equal(np.concatenate([altitude.feed(part).height_m for part in parts]), whole_heights.height_m)
+
+
+def test_an_unknown_start_is_uniform_until_the_heights_tell() -> None:
+    uneven = np.array([0.0, 5.0, 8.5])
+    way = np.concatenate([np.zeros(400), np.linspace(0.0, 5.0, 150), np.full(400, 5.0)])
+    found = FloorFilter(uneven).feed(record(way))
+    assert found.probability[300] == pytest.approx(np.full(3, 1 / 3), abs=0.05)
+    assert found.floor[-1] == 1
+    assert found.probability[-1, 1] > 0.9
+    back = FloorFilter(uneven).smooth(record(way))
+    assert (back.floor[:390] == 0).all()
+
+
+def test_the_range_of_floors_excludes_starts() -> None:
+    way = np.concatenate([np.zeros(400), np.linspace(0.0, 7.0, 240), np.full(400, 7.0)])
+    back = FloorFilter(STOREYS).smooth(record(way))
+    assert back.probability[100, 0] > 0.9
+    assert back.probability[-1, 2] > 0.9
+
+
+def test_gait_tells_a_lift_from_a_gust() -> None:
+    """A storey in three seconds may be a ride to one who stands; one who walks on meanwhile has met a gust."""
+    rise = np.concatenate([np.zeros(300), 1.75 - 1.75 * np.cos(np.linspace(0.0, np.pi, 27))])
+    samples = record(rise)
+    up = []
+    for gait in (vertical.STILL, vertical.WALKING):
+        seen = Pressures(samples.t_s, samples.pressure_pa, gait=np.full(len(rise), gait, np.int8))
+        up.append(float(FloorFilter(STOREYS, prior=known(0)).feed(seen).probability[-1, 1]))
+    assert up[0] > 0.5
+    assert 1.0 - up[1] > 4.0 * (1.0 - up[0])
+
+
+def test_nobody_climbs_where_the_plan_has_no_stairs() -> None:
+    n = 900
+    slow = 30.0 * np.clip((np.arange(n) - 450) / 90.0, 0.0, 1.0)  # a fan: 2.5 m in 10 s
+    samples = record(np.full(n, 3.5), extra_pa=-slow)
+    outside = Pressures(samples.t_s, samples.pressure_pa, place=np.full(n, vertical.OUTSIDE, np.int8))
+    found = FloorFilter(STOREYS, prior=known(1)).feed(outside)
+    assert (found.floor == 1).all()
+    assert (found.up + found.down).max() < 0.2
+
+
+def test_the_foot_on_stairs_narrows_the_height() -> None:
+    way = stairs_up()
+    samples = record(way)
+    rate = np.gradient(way, samples.t_s)
+    aided = Pressures(samples.t_s, samples.pressure_pa, foot_m_s=rate, foot_sd_m_s=np.full(len(way), 0.03))
+    alone, helped = Altitude().feed(samples), Altitude().feed(aided)
+    assert abs(helped.height_m[-1] - 3.5) < 0.3
+    middle = 60 * 9 + 50
+    assert helped.variance_m2[middle] < alone.variance_m2[middle]
+
+
+def test_a_lift_is_ridden_though_the_foot_stands() -> None:
+    ride = np.concatenate([np.zeros(300), 3.5 - 3.5 * np.cos(np.linspace(0.0, np.pi, 60)), np.full(300, 7.0)])
+    samples = record(ride)
+    still = Pressures(
+        samples.t_s, samples.pressure_pa, foot_m_s=np.zeros(len(ride)), foot_sd_m_s=np.full(len(ride), 0.03)
+    )
+    assert Altitude().feed(still).height_m[-1] == pytest.approx(7.0, abs=0.5)
+
+
+def test_samples_that_are_none_are_left_out() -> None:
+    samples = record(stairs_up())
+    bad = samples.pressure_pa.copy()
+    bad[[3, 50, 51]] = [np.nan, 0.0, np.inf]
+    t = samples.t_s.copy()
+    t[70] = t[69]
+    t[90] = np.nan
+    found = Altitude().feed(Pressures(t, bad))
+    assert len(found.t_s) == len(t) - 5
+    assert np.isfinite(found.height_m).all()
+    assert np.isfinite(found.variance_m2).all()
+
+
+def test_an_empty_portion_is_no_sample() -> None:
+    assert len(Altitude().feed(Pressures(np.zeros(0), np.zeros(0))).t_s) == 0
+    assert len(FloorFilter(STOREYS).smooth(Pressures(np.zeros(0), np.zeros(0))).t_s) == 0
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.lists(st.tuples(st.floats(0.01, 60.0), st.floats(20_000.0, 120_000.0)), min_size=1, max_size=30))
+def test_any_pressures_have_finite_heights_and_probabilities(rows: list[tuple[float, float]]) -> None:
+    samples = Pressures(np.cumsum([r[0] for r in rows]), np.array([r[1] for r in rows]))
+    heights, floors = Altitude().feed(samples), FloorFilter(STOREYS).smooth(samples)
+    assert np.isfinite(heights.height_m).all()
+    assert (heights.variance_m2 >= 0.0).all()
+    assert floors.probability.sum(axis=1) == pytest.approx(np.ones(len(floors.t_s)), abs=1e-6)
+
+
+def test_noise_is_measured_on_a_record() -> None:
+    assert noise_of(record(stairs_up(), noise_pa=3.0).pressure_pa) == pytest.approx(3.0, rel=0.1)
+
+
+def test_a_change_forgets_what_both_ends_share() -> None:
+    two = Heights(np.array([0.0, 1.0]), np.array([10.0, 10.0]), np.array([4.0, 4.0]), np.zeros(2), np.zeros(2))
+    assert two.change(0, 1) == pytest.approx((0.0, 0.01))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ways", ["stairs", "lift"])
+def test_a_simulated_quarter_of_an_hour(ways: str) -> None:
+    rng = np.random.default_rng(900)
+    heights = np.array([0.0, 3.5, 7.0, 10.5, 14.0])
+    way = climb(heights.tolist(), 900.0, rng, ways)  # type: ignore[arg-type]
+    air = pressures(way.t_s, way.height_m, way.in_shaft, Weather(), rng)
+    at = np.arange(0, len(air), 6)
+    samples = Pressures(
+        way.t_s[at], air[at] + 3.0 * rng.standard_normal(len(at)), device_temperatures(way.t_s[at], 21.0, rng)
+    )
+    away = np.abs(way.height_m[at][:, None] - heights)
+    found = FloorFilter(heights, prior=known(int(away[0].argmin()), 5)).smooth(samples)
+    score = judge(found, away, "", 1)
+    assert score.floor_right > 0.99
+    assert score.longest_wrong_s < 10.0
+
+
+def test_the_judge_counts() -> None:
+    t = np.arange(6.0)
+    assert longest_s(t, np.array([False, True, True, False, True, False])) == 2.0
+    assert longest_s(t, np.zeros(6, bool)) == 0.0
+    assert longest_s(t, np.array([False, False, False, False, True, True])) == 1.0
+    assert FloorScene().whole is False
+
+
+def test_the_boards_barometer_is_carried_up() -> None:
+    rng = np.random.default_rng(3)
+    height = np.linspace(0.0, 10.0, 4000)
+    counts, _ = Scp1000Model(rng, "high-resolution").counts(height, 20.0, 4000)
+    assert (counts[:500].mean() - counts[-500:].mean()) / 4.0 == pytest.approx(8.75 * 12.0, rel=0.02)
+    told, _ = Scp1000Model(rng, "high-resolution").counts(height, 20.0, 4000, np.full(4000, 99_000.0))
+    assert told.mean() / 4.0 == pytest.approx(99_000.0, abs=0.2)
+    assert told.std() / 4.0 == pytest.approx(1.5, rel=0.1)
+
+
+def test_weather_does_what_it_says() -> None:
+    rng = np.random.default_rng(4)
+    t = np.arange(0.0, 3600.0, 0.1)
+    calm = Weather(wander_pa=0.0, doors_s=np.inf, fan_s=np.inf)
+    air = pressures(t, np.zeros(len(t)), np.zeros(len(t), bool), calm, rng)
+    assert air[-1] - air[0] == pytest.approx(100.0, abs=0.1)
+    doors = pressures(t, np.zeros(len(t)), np.zeros(len(t), bool), Weather(0.0, 0.0, 60.0, fan_s=np.inf), rng)
+    away = np.abs(doors - np.median(doors))
+    assert 20.0 < away.max() < 120.0
+    assert np.median(away) < 0.5
+    still = replace(calm, trend_pa_h=0.0)
+    column = pressures(np.array([0.0, 400.0]), np.array([0.0, 100.0]), np.zeros(2, bool), still, rng)
+    assert np.log(column[0] / column[1]) * 287.053 * (21.0 + 273.15) / 9.80665 == pytest.approx(100.0, abs=0.01)
+
+
+def write(path: Path, samples: Pressures, factor: float = 1.0, seconds: float = 1.0) -> Path:
+    rows = [
+        f"{t * seconds:.6f},{p * factor:.4f}"
+        for t, p in zip(samples.t_s.tolist(), samples.pressure_pa.tolist(), strict=True)
+    ]
+    path.write_text("\n".join(["t_s,pressure_pa", *rows]) + "\n")
+    return path
+
+
+def test_the_command_tells_floors_and_stays(tmp_path: Path) -> None:
+    source, out = write(tmp_path / "up.csv", record(stairs_up())), tmp_path / "floors.csv"
+    options = ["--heights", "0,3.5", "--out", str(out), "--picture", str(picture := tmp_path / "floors.svg")]
+    result = CliRunner().invoke(app, ["floors", str(source), *options])
+    assert result.exit_code == 0, result.output
+    assert "climbed 3.5 m up, 0.0 m down" in result.output
+    lines = out.read_text().splitlines()
+    assert lines[0] == "t_s,floor,probability,height_m"
+    assert len(lines) == 1 + len(stairs_up())
+    assert [line.split(",")[1] for line in (lines[1], lines[-1])] == ["0", "1"]
+    assert "height / m" in picture.read_text()
+    assert f"floors: {out}, picture: {picture}" in result.output
+
+
+@pytest.mark.slow
+def test_the_storeys_are_found() -> None:
+    way = np.concatenate([stairs_up(), 3.5 + stairs_up()[540:], 7.0 - stairs_up()[540:], 3.5 - stairs_up()[540:]])
+    found = find_storeys(record(way), BarometerSettings())
+    assert found == pytest.approx([0.0, 3.5, 7.0], abs=0.3)
+    floors = record_floors(record(way), found)
+    assert [stay.floor for stay in stays(floors)] == [0, 1, 2, 1, 0]
+    with pytest.raises(EchostepError, match="one storey only"):
+        find_storeys(record(np.zeros(900)), BarometerSettings())
+
+
+@pytest.mark.parametrize("rate_hz", [0.5, 2.0, 50.0])
+def test_any_rate(rate_hz: float) -> None:
+    way = stairs_up(rate_hz)
+    found = record_floors(record(way, rate_hz, noise_pa=1.5), np.array([0.0, 3.5]))
+    away = np.abs(way[:, None] - np.array([0.0, 3.5]))
+    assert judge(found, away, "", 1).floor_right > 0.97
+    assert len(found.t_s) == len(way)
+
+
+@pytest.mark.parametrize(
+    ("factor", "seconds", "words"),
+    [
+        (0.01, 1.0, "hPa"),
+        (0.001, 1.0, "kPa"),
+        (1.0, 1000.0, "milliseconds"),
+        (1e-5, 1.0, "bar"),
+        (30.0, 1.0, "not the pressure of air"),
+    ],
+)
+def test_wrong_units_are_named(tmp_path: Path, factor: float, seconds: float, words: str) -> None:
+    source = write(tmp_path / "unit.csv", record(stairs_up()), factor, seconds)
+    with pytest.raises(EchostepError, match=words) as caught:
+        load_pressures(source)
+    assert str(source) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "no column t_s, pressure_pa"),
+        ("t_s,pressure\n0,1\n", "line 1: no column pressure_pa"),
+        ("t_s,pressure_pa\n", "no samples"),
+        ("t_s,pressure_pa\n0,abc\n1,x\n2,100000\n", "line 2: no number in pressure_pa"),
+        ("t_s,pressure_pa\n0,101325\n1,101325\n2,101325\n", "never changes"),
+        ("t_s,pressure_pa\n5,101325\n4,101320\n3,101325\n2,101326\n", "line 3: t_s does not advance"),
+        ("t_s,pressure_pa\n0,101325\n3,101320\n6,101325\n", "is it in seconds"),
+        ("t_s,t_s,pressure_pa\n0,0,1\n", "twice"),
+        ("t_s,pressure_pa\n" + "7" * 2000, "longer than"),
+    ],
+)
+def test_bad_files_are_named(tmp_path: Path, text: str, words: str) -> None:
+    source = tmp_path / "bad.csv"
+    source.write_text(text)
+    with pytest.raises(EchostepError, match=words):
+        load_pressures(source)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.binary(max_size=400))
+def test_garbage_is_refused_in_words(tmp_path_factory: pytest.TempPathFactory, junk: bytes) -> None:
+    source = tmp_path_factory.mktemp("junk") / "junk.csv"
+    source.write_bytes(b"t_s,pressure_pa,temperature_c\n" + junk)
+    with pytest.raises(EchostepError):
+        load_pressures(source)
+
+
+def test_mended_rows_are_told(tmp_path: Path) -> None:
+    lines = write(tmp_path / "m.csv", record(stairs_up())).read_text().splitlines()
+    lines[5], lines[9], lines[12] = "x,y", lines[8], "1.2,5"
+    (tmp_path / "m.csv").write_text("\n".join(lines))
+    notes = " ".join(load_pressures(tmp_path / "m.csv").notes)
+    assert "line 6" in notes
+    assert "line 13" in notes
+    assert "line 10" in notes
+
+
+@pytest.mark.parametrize("text", ["", "0,", "0,x", "3,0", "0,0.2", "nan,3", "0,1e9", "0 3"])
+def test_impossible_heights_are_refused(text: str) -> None:
+    with pytest.raises(EchostepError):
+        parse_heights(text)
+    with pytest.raises(EchostepError):
+        checked_heights(np.zeros((2, 2)))
+
+
+def test_a_start_that_is_no_floor_is_refused(tmp_path: Path) -> None:
+    source = write(tmp_path / "up.csv", record(stairs_up()))
+    for more in (["--heights", "0,3.5", "--start", "2"], ["--heights", "auto", "--start", "0"]):
+        result = CliRunner().invoke(app, ["floors", str(source), *more, "--out", str(tmp_path / "o.csv")])
+        assert isinstance(result.exception, EchostepError)
+
+
+def climbed(path: Path) -> float:
+    """Metres by the BMP180 of a log: its start and end are dated to the second, its rows come evenly."""
+    lines = path.read_text().splitlines()
+    rows = [line.split(";") for line in lines if line[:1].isdigit() and line.count(";") == 2]
+    t0, t1 = (
+        datetime.datetime.strptime(line, "Date: %Y-%m-%d - %H:%M:%S") for line in lines if line.startswith("Date")
+    )
+    table = np.array(rows, float)
+    t_s = np.arange(len(table)) * (t1 - t0).total_seconds() / len(table)
+    pressure, temperature = table[:, 1] / 10.0, table[:, 2] / 1000.0
+    found = Altitude(BarometerSettings(noise_of(pressure))).smooth(Pressures(t_s, pressure, temperature))
+    return float(found.height_m[-1] - found.height_m[0])
+
+
+@needs_data("baro")  # loruro/Barometer_STM32
+@pytest.mark.parametrize(("place", "about_m"), [("kapitol", 41.2), ("b5", 31.15)])
+def test_real_stairs_are_as_high_up_as_down(place: str, about_m: float) -> None:
+    up, down = (climbed(DATA / f"baro/{way}_{place}.log") for way in ("up", "down"))
+    print(f"{place}: {up:.2f} m up, {down:.2f} m down")
+    assert -down == pytest.approx(up, rel=0.03)
+    assert up == pytest.approx(about_m, rel=0.03)

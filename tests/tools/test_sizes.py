@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""What outgrows its limit is named, and fails `make check`."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from release import sizes
+
+pytestmark = pytest.mark.process
+
+LIMITS = """
+"files of a folder" = 1
+"lines of a file" = 4
+"lines of a function" = 2
+[parts]
+"host/core" = 4
+"host/app" = 0
+"host/studies" = 0
+"tools" = 0
+"all code" = 10
+"words of pages" = 3
+"""
+
+
+@pytest.fixture
+def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A repository with one file of four lines and a page of three words, and limits that both keep."""
+    subprocess.run(["git", "init", "--quiet", tmp_path], check=True)
+    (tmp_path / "host/core").mkdir(parents=True)
+    (tmp_path / "host/core/a.py").write_text("def f():\n    pass\n\n\n")
+    (tmp_path / "a.md").write_text("one two three")
+    (tmp_path / "limits").write_text(LIMITS)
+    monkeypatch.setattr("sys.argv", ["sizes"])
+    monkeypatch.setattr(sizes, "ROOT", tmp_path)
+    monkeypatch.setattr(sizes, "LIMITS", tmp_path / "limits")
+    return tmp_path
+
+
+@pytest.mark.usefixtures("tree")
+def test_what_keeps_its_limits_passes(capsys: pytest.CaptureFixture[str]) -> None:
+    assert sizes.main() == 0
+    assert "host/core 4 of 4" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("path", "text", "words"), [
+    ("a.md", "one two three four", "words of pages: 4 is above 3"),
+    ("host/core/a.py", "x = 1\n" * 5, "host/core/a.py: lines of a file: 5 is above 4"),
+    ("host/core/a.py", "def f():\n    pass\n    pass\n", "host/core/a.py: f: lines of a function: 3 is above 2"),
+    ("host/core/b.py", "", "host/core: files of a folder: 2 is above 1"),
+    ("tools/b.sh", "true\n", "tools: 1 is above 0"),
+])  # fmt: skip
+def test_what_outgrows_one_is_named(
+    tree: Path, capsys: pytest.CaptureFixture[str], path: str, text: str, words: str
+) -> None:
+    (tree / path).parent.mkdir(exist_ok=True)
+    (tree / path).write_text(text)
+    assert sizes.main() == 1
+    assert words in capsys.readouterr().out
+
+
+def test_generated_messages_do_not_count(tree: Path) -> None:
+    (tree / sizes.GENERATED).parent.mkdir(parents=True)
+    (tree / sizes.GENERATED).write_text("x = 1\n" * 50)
+    assert sizes.main() == 0
