@@ -99,12 +99,6 @@ page-speed: $(READY) ## latency and frame rate of the live page and of the comma
 	@tools/apt.sh chromium || true
 	$(BIN)/python -m pytest -q -s -m speed tests/app/page/web/test_page_speed.py tests/app/operation/test_table_speed.py
 
-operation: $(READY) ## 20 wearers, crews and a commander, whose page is at http://127.0.0.1:8420/ meanwhile (simulated); PORT=9000: there
-	@tools/apt.sh $(APT_PACKAGES) mosquitto
-	$(MAKE) --quiet -C firmware
-	$(MAKE) --quiet -C tools/twin
-	$(TOOL) reliability.team_operation $(if $(PORT),--port $(PORT))
-
 $(VENV)/peers: host/studies/pyproject.toml $(READY)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host/studies[bench]' || echo "Not all peers could be installed: the table says which are missing."
 	touch $@
@@ -154,12 +148,8 @@ soak: $(READY) ## eight simulated hours of the firmware through the live pipelin
 calls: $(READY) ## each call of the operating system fails in turn, in each command that runs: output, files, ports, sockets; on from where it stopped
 	$(TOOL) reliability.calls.campaign
 
-kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording
+kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording; on from where it stopped
 	$(TOOL) reliability.kill_recorder
-
-flips: $(READY) ## flip 314 random bits of a recording, one at a time, and damage 108 blocks: what becomes of the track, and what the replay says
-	$(TOOL) reliability.flip_recording
-	$(TOOL) reliability.damaged_blocks
 
 hardware: $(READY) ## checks the nets of the wiring; the printed boxes: STL in out/hardware, checked to be closed, and their pictures; not built yet
 	@tools/apt.sh openscad || true
@@ -175,4 +165,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: operation elsewhere help setup firmware twin demo real quick test long board suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak calls kill flips hardware docs site licences lock audit flash clean
+.PHONY: elsewhere help setup firmware twin demo real quick test long board suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak calls kill hardware docs site licences lock audit flash clean

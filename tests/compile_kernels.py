@@ -6,8 +6,8 @@ In: nothing. Out: kernels in the cache, for this state of the sources; on a term
 
 from __future__ import annotations
 
-from echostep.tracker.kernels import LATER, TRACKING, Part, compile_parts
-from echostep_app.session.progress import progress_line
+from echostep_app.kernel_parts import LATER, TRACKING, Part, compile_parts
+from echostep_app.printing.progress import progress_line
 from echostep_app.session.runs.demo import SIMULATION
 
 HEIGHTS = Part("echostep_studies.barometer.kernels:heights", 40)

@@ -7,7 +7,7 @@ from functools import cache
 from itertools import takewhile
 
 from board_runs import ROOT
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk
 from echostep_app.simulation.devices.board import PythonBoard
 from echostep_app.simulation.scenario import demo_scenario

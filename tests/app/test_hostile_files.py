@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.offline.imu_csv import load_imu
-from echostep.plan.model import load_plan, parse_plan
-from echostep.recording.joining import open_parts
+from echostep.plan import load_plan, parse_plan
+from echostep.recording import open_parts
 from echostep.settings import parse_settings
 from echostep.walk.recorded import recorded_start
+from echostep_app.offline.foreign_columns import load_foot
 from echostep_app.offline.leg_csv import load_legs
 from echostep_app.plan.writer import save_plan
 from echostep_app.recording.recorder import Recorder
@@ -72,7 +72,7 @@ TRACK = "t_s,x_m,X_m,y_m\n1,1,5,1\n2,2,9,2\n"
 
 @pytest.mark.parametrize(
     ("text", "read", "name"),
-    [(IMU, load_imu, "az"), (LEGS, load_legs, "thigh_rad_s"), (TRACK, lambda path: load_path(path, None), "x_m")],
+    [(IMU, load_foot, "az"), (LEGS, load_legs, "thigh_rad_s"), (TRACK, lambda path: load_path(path, None), "x_m")],
 )
 def test_a_column_given_twice_is_named(tmp_path: Path, text: str, read: Callable[[Path], object], name: str) -> None:
     (tmp_path / "twice.csv").write_text(text)

@@ -18,9 +18,9 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
 from board_runs import ELF, ROOT, TWIN  # noqa: E402
-from echostep.plan.model import load_plan  # noqa: E402
+from echostep.plan import load_plan  # noqa: E402
 from echostep.ports.chunks import BOARD, Chunk  # noqa: E402
-from echostep.recording.capture import as_json, read_capture  # noqa: E402
+from echostep.recording import as_json, read_capture  # noqa: E402
 from echostep_app.recording.recorder import Recorder  # noqa: E402
 from echostep_app.simulation.devices.board import BoardProcess  # noqa: E402
 from echostep_app.simulation.scenario import demo_scenario  # noqa: E402

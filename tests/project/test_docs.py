@@ -17,7 +17,7 @@ from board_runs import ROOT
 from command_line import echostep
 from docs import generate
 from docs.pages import commands, python, teams
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep_app.cli import app
 from team.team_broker import Broker, needs_broker
 

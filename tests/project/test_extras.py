@@ -21,8 +21,8 @@ from packaging.utils import canonicalize_name
 
 from board_runs import ROOT
 from command_line import PROGRAM, echostep
-from echostep.extras import EXTRAS
 from echostep_app import cli
+from echostep_app.extras import EXTRAS
 from foot.foot_walks import MANNERS, course, samples
 from walks import DEMO
 

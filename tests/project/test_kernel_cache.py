@@ -42,7 +42,7 @@ print(twice(shapes.{name}(3.0)))
 
 PROBE = """
 from numpy import zeros
-from echostep.plan.polyline import along
+from echostep_app.plan.polyline import along
 assert along(zeros((2, 2)), 0.0) == (0.0, 0.0, 0.0)
 print(along._cache.cache_path)
 """
@@ -153,7 +153,7 @@ def test_a_user_who_cannot_write_the_folder_for_kernels_has_them_elsewhere(open_
     (open_path / "temporary").mkdir()
     (open_path / "temporary").chmod(0o1777)
     (open_path / "chosen").mkdir()
-    (open_path / "home/.cache/echostep").mkdir(parents=True)
+    (open_path / "home/.cache/echostep_app").mkdir(parents=True)
     os.chown(open_path / "home/.cache", ANOTHER_USER, ANOTHER_USER)
     environment = {
         "HOME": f"{open_path}/home" if given == "/home" else "/nonexistent",
@@ -167,7 +167,7 @@ def test_a_user_who_cannot_write_the_folder_for_kernels_has_them_elsewhere(open_
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
         kept = open_path / f"temporary/echostep-kernels-{ANOTHER_USER}"
-        assert done.stdout.startswith(str(kept / "echostep/plan"))
+        assert done.stdout.startswith(str(kept / "echostep_app/plan"))
         assert done.stderr.count("kernels are kept in") == (not run_number) + (given == "/chosen")
         assert done.stderr.count(f"NUMBA_CACHE_DIR: {open_path}/chosen cannot be written") == (given == "/chosen")
 

@@ -12,8 +12,8 @@ import pytest
 from PIL import Image
 
 from echostep.arrays import Ints
-from echostep.localization.estimate import TrackStatus
-from echostep.plan.model import load_plan
+from echostep.localization import TrackStatus
+from echostep.plan import load_plan
 from echostep_app.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
 from echostep_app.simulation.devices.board import PythonBoard
 from echostep_app.simulation.scenario import Scenario

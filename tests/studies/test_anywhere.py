@@ -15,10 +15,9 @@ import shapely
 
 from command_line import echostep
 from echostep.arrays import Floats
-from echostep.localization.estimate import TrackStatus
-from echostep.localization.particles.start import Start
+from echostep.localization import Start, TrackStatus
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Connector, ConnectorKind, Level, Plan, Pose
+from echostep.plan import Connector, ConnectorKind, Level, Plan, Pose
 from echostep_studies.anywhere import amcl, kidnaps, plan_changes
 from echostep_studies.anywhere.study import PEER, anywhere_study
 from echostep_studies.bench import echo_changes, sites, walks

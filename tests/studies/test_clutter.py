@@ -16,11 +16,9 @@ import shapely
 from command_line import echostep
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization.estimate import TrackStatus
-from echostep.localization.particles.start import Start
-from echostep.localization.settings import CloudSettings
+from echostep.localization import CloudSettings, Start, TrackStatus
 from echostep.path import MeasuredSegment
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_studies.bench.filtering import Claim, FilterRun
 from echostep_studies.bench.laser.building import building_of, walk_from
 from echostep_studies.bench.laser.carmen_log import CarmenLog, logs_in, read_log

@@ -12,9 +12,9 @@ import pytest
 
 from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep.localization.estimate import TrackStatus
+from echostep.localization import TrackStatus
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Level, load_plan
+from echostep.plan import Level, load_plan
 from echostep_app.mapping.graph.graph import Closure
 from echostep_app.mapping.graph.nodes import Nodes
 from echostep_app.plan.check import check_plan

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.localization.echoes.likelihood import echo_model
+from echostep.localization import echo_model
 from echostep_studies.echoes.placing import grid_table, place
 from echostep_studies.echoes.sweep_rows import LIMITS_KNOWN, REAL_SHARES, share_rows
 from echostep_studies.echoes.sweeps import ROOM, Sweep, read_sweeps, simulated_sweeps

@@ -14,8 +14,8 @@ import pytest
 from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.board.gateway import Gateway
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.plan.model import load_plan
+from echostep.localization import Estimate, TrackStatus
+from echostep.plan import load_plan
 from echostep_app.simulation.scenario import START_NS
 from echostep_studies.frame.study import StudyRequest, run_study
 from echostep_studies.team import study, tracking, walks

@@ -10,7 +10,7 @@ import pytest
 
 from board_runs import ROOT, Bench, needs_twin
 from echostep.ports.chunks import BOARD, MTX
-from echostep.recording.reading import open_recording
+from echostep.recording import open_recording
 from echostep_app.simulation.devices.board import PythonBoard
 from reliability import faults
 from reliability.fault_outcomes import NORMAL_S, FaultOutcome, judge_streams, table

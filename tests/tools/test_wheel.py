@@ -7,10 +7,14 @@ import json
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from board_runs import ROOT
+from command_line import echostep
+from foot.foot_walks import MANNERS, course, samples
 from release import wheel as wheels
+from walks import DEMO
 
 pytestmark = pytest.mark.process
 
@@ -63,3 +67,40 @@ def test_an_installed_wheel_holds_its_data_and_nothing_else(fresh: tuple[Path, d
         assert (packages / name).stat().st_size > 100, name
     for record in packages.glob("echostep*.dist-info/RECORD"):
         assert "tests/" not in record.read_text()
+
+
+@pytest.fixture(scope="module")
+def core(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+    """The same with the core alone."""
+    pytest.importorskip("hatchling")
+    folder = tmp_path_factory.mktemp("core")
+    programs = wheels.environment(folder / "fresh", [wheels.build(folder, "core")], borrow=True)
+    return programs, wheels.environment_variables(programs, folder) | {"HOME": str(Path.home())}
+
+
+@pytest.mark.long
+def test_the_core_alone_decodes_tracks_and_navigates_a_foot(core: tuple[Path, dict[str, str]], tmp_path: Path) -> None:
+    programs, env = core
+    program, walk = programs / "echostep", ROOT / "tests/captures/walk.mcap"
+    decoded = wheels.run([program, "decode", ROOT / "tests/captures/board.bin"], env, tmp_path)
+    assert decoded == (ROOT / "tests/captures/board.jsonl").read_text()
+    told = wheels.run(
+        [program, "replay", walk, "--plan", DEMO, "--headless", "--out", tmp_path / "core"], env, tmp_path
+    )
+    whole = echostep("replay", walk, "--plan", DEMO, "--headless", "--out", tmp_path / "whole")
+    assert told.splitlines()[0] in whole.stdout.splitlines()  # number and digest of the estimates
+    assert (tmp_path / "core/track.csv").read_bytes() == (tmp_path / "whole/track.csv").read_bytes()
+    t_s, accel, gyro = samples(course(MANNERS["walking"], steps=6), 100, rng=np.random.default_rng(1))
+    rows = np.column_stack([t_s, accel, gyro])
+    np.savetxt(tmp_path / "imu.csv", rows, delimiter=",", header="t_s,ax,ay,az,gx,gy,gz", comments="")
+    assert "6 steps" in wheels.run([program, "foot", tmp_path / "imu.csv"], env, tmp_path)
+
+
+def test_the_core_alone_names_a_mistake_in_one_line(core: tuple[Path, dict[str, str]], tmp_path: Path) -> None:
+    programs, env = core
+    done = subprocess.run(
+        [programs / "echostep", "foot", "no.csv"], env=env, cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert done.stderr.startswith("echostep: no.csv: cannot read")
+    assert "echostep[app]" in wheels.run([programs / "echostep", "--help"], env, tmp_path)

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Common parts of the campaigns: options, a journal of finished runs, a progress bar, figures with their limits.
+"""The runner of the campaigns: options, runs that go on where they stopped, progress, figures with their limits.
 
-In: defaults, rows, figures. Out: the options; JSON lines; a table on stdout and the exit status. Owns the form of a journal.
+In: defaults, runs by name, figures. Out: the options; a JSON line a run; a table on stdout and the exit status. Owns the form of a journal.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +17,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-__all__ = ["CampaignJournal", "Figure", "none", "options", "report", "track"]
+Row = dict[str, Any]
 
 
 class Figure(NamedTuple):
@@ -34,13 +35,25 @@ class CampaignJournal:
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         self._path = path
-        self.rows: list[dict[str, Any]] = [*map(json.loads, path.read_text().splitlines())] if path.exists() else []
+        self.rows: list[Row] = [*map(json.loads, path.read_text().splitlines())] if path.exists() else []
 
-    def add(self, row: dict[str, Any]) -> None:
+    def add(self, row: Row) -> None:
         """Keep one more row at once, for a campaign may be stopped at any time."""
         self.rows.append(row)
         with self._path.open("a") as file:
             file.write(json.dumps(row) + "\n")
+
+    def play(
+        self, title: str, runs: Mapping[str, Callable[[], Any]], say: Callable[[Row], str] = lambda _: ""
+    ) -> list[Row]:
+        """The row of each run: its name, and the fields of the dataclass that it returns. Those that the file has are not run again."""
+        rows = {row.get("name"): row for row in self.rows}
+        for name in track([name for name in runs if name not in rows], title):
+            rows[name] = {"name": name} | asdict(runs[name]())
+            self.add(rows[name])
+            if text := say(rows[name]):
+                print(text, flush=True)
+        return [rows[name] for name in runs]
 
 
 def options(doc: str | None, **known: tuple[Any, str]) -> argparse.Namespace:

@@ -6,7 +6,7 @@ In: arrival times of valid measurements, estimates, the true path. Out: a `Fault
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -15,6 +15,7 @@ import numpy as np
 from echostep.arrays import Bools, Floats
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader
+from echostep.localization import Estimate, TrackStatus
 from echostep.ports.chunks import BOARD, MTX, Chunk
 
 SURE_M = 1.0  # an estimate with the status `tracking` claims to be within it
@@ -92,6 +93,13 @@ def judge_streams(
         whole_s = None if wide[-1] else float(arrived[1:][wide][-1]) - begin_s
         if outcome.whole_s is not None:
             outcome.whole_s = None if whole_s is None else max(outcome.whole_s, whole_s)
+
+
+def columns(estimates: Sequence[Estimate]) -> tuple[Floats, Floats, Bools]:
+    """Times (n,), positions (n, 2), and whether the status is `tracking` (n,)."""
+    xy_m = np.array([(e.x_m, e.y_m) for e in estimates]).reshape(-1, 2)
+    sure = np.array([e.status is TrackStatus.TRACKING for e in estimates], np.bool_)
+    return np.array([e.t_s for e in estimates]), xy_m, sure
 
 
 def judge_estimates(outcome: FaultOutcome, t_s: Floats, xy_m: Floats, sure: Bools, truth: Floats) -> None:

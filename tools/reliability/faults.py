@@ -8,17 +8,14 @@ too. Faults that the file has already are not run again. Owns the list of the tw
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import asdict
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from echostep.board.frames import BoardReader
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.plan.model import load_plan
+from echostep.localization import Estimate
+from echostep.plan import load_plan
 from echostep.ports.chunks import MTX, Chunk
 from echostep.tracker import Tracker
 from echostep_app.session.chunk_streams import portions_of
@@ -26,7 +23,7 @@ from echostep_app.simulation.devices.board import Board, BoardProcess
 from echostep_app.simulation.scenario import START_NS, Scenario, demo_scenario
 from places import OUT, PLAN, ROOT, TWIN
 from reliability.campaign import CampaignJournal, options
-from reliability.fault_outcomes import NORMAL_S, FaultOutcome, heard, judge_estimates, judge_streams, table
+from reliability.fault_outcomes import NORMAL_S, FaultOutcome, columns, heard, judge_estimates, judge_streams, table
 from twin.host_faults import HOST_FAULTS
 from twin.live_walk import BEGIN_S, END_S, HostFault, LiveWalk
 
@@ -144,18 +141,14 @@ def run(fault: TwinFault, board: Board | None = None) -> FaultOutcome:
     outcome = FaultOutcome(fault.name, reader.counts.lost + reader.counts.rejected)
     judge_streams(outcome, times_s, BEGIN_S, END_S)
     judged = [e for e in estimates if e.t_s >= BEGIN_S]
-    xy_m = np.array([(e.x_m, e.y_m) for e in judged])
-    sure = np.array([e.status is TrackStatus.TRACKING for e in judged])
-    judge_estimates(outcome, np.array([e.t_s for e in judged]), xy_m, sure, scenario.truth)
+    judge_estimates(outcome, *columns(judged), scenario.truth)
     return outcome
 
 
-def _matrix(folder: Path) -> Iterator[tuple[str, Callable[[], FaultOutcome]]]:
-    """Name of each fault, and the function that runs it; live runs keep their files in `folder`."""
-    for fault in FAULTS:
-        yield fault.name, partial(run, fault)
-    for host_fault in HOST_FAULTS:
-        yield host_fault.title, partial(run_live, host_fault, folder)
+def matrix(folder: Path) -> Mapping[str, Callable[[], FaultOutcome]]:
+    """Each fault by name, and the function that runs it; live runs keep their files in `folder`."""
+    simulated = {fault.name: partial(run, fault) for fault in FAULTS}
+    return simulated | {fault.title: partial(run_live, fault, folder) for fault in HOST_FAULTS}
 
 
 def run_live(fault: HostFault, folder: Path) -> FaultOutcome:
@@ -175,13 +168,9 @@ def main() -> int:
         out=(OUT / "faults.jsonl", "outcomes so far; they are not run again"),
         page=(False, "write the table into host/docs/faults.md"),
     )
-    journal, matrix = CampaignJournal(asked.out), dict(_matrix(asked.out.with_suffix("")))
-    for name, play in matrix.items():
-        if name not in {row["name"] for row in journal.rows}:
-            journal.add(asdict(play()))
-            print(table([FaultOutcome(**journal.rows[-1])]).splitlines()[-1], flush=True)
-    outcomes = {row["name"]: FaultOutcome(**row) for row in journal.rows}
-    done = [outcomes[name] for name in matrix]
+    runs = matrix(asked.out.with_suffix(""))
+    rows = CampaignJournal(asked.out).play("faults", runs, lambda row: table([FaultOutcome(**row)]).splitlines()[-1])
+    done = [FaultOutcome(**row) for row in rows]
     if asked.page:
         head, _, rest = PAGE.read_text().partition(MARKS[0])
         PAGE.write_text(head + MARKS[0] + table(done) + MARKS[1] + rest.partition(MARKS[1])[2])

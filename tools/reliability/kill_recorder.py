@@ -16,7 +16,6 @@ from __future__ import annotations
 import hashlib
 import os
 import random
-import signal
 import struct
 import subprocess
 import sys
@@ -24,13 +23,14 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from echostep.errors import EchostepError
-from echostep.recording.mcap_records import MCAP_MAGIC
-from echostep.recording.reading import open_recording
+from echostep.recording import MCAP_MAGIC, open_recording
 from echostep_app.recording.repair.edit import repair
-from reliability.campaign import Figure, none, options, report, track
+from places import OUT
+from reliability.campaign import CampaignJournal, Figure, none, options, report
 
 CHUNK_NS = 1_200_000  # between two chunks: 850 a second, as both ports deliver them
 ROW = struct.Struct("<Qq")
@@ -39,7 +39,6 @@ LIMIT_MS = 1000.0
 WRITER = """
 import os, struct, sys, time
 from pathlib import Path
-from echostep_app.recording.recorder import DerivedMessage
 from echostep.ports.chunks import Chunk
 from echostep_app.session.runs.recording import start_recording
 from echostep_app.output.foxglove import pose
@@ -81,32 +80,23 @@ def kill_once(wanted: Path, after_s: float) -> Kill:
     """Record under a name, kill `after_s` seconds after the first chunk, read the file; AssertionError when a chunk in the middle is missing."""
     before = recordings(wanted)
     read_end, write_end = os.pipe()
-    run = subprocess.Popen(
-        [sys.executable, "-c", WRITER, str(wanted), str(write_end)], pass_fds=[write_end], stdout=subprocess.DEVNULL
-    )
+    command = [sys.executable, "-c", WRITER, str(wanted), str(write_end)]
+    run = subprocess.Popen(command, pass_fds=[write_end], stdout=subprocess.DEVNULL)
     os.close(write_end)
-    try:
-        given = [ROW.unpack(_read_row(read_end))]
-        end = time.monotonic() + after_s
-        while time.monotonic() < end:
-            given.append(ROW.unpack(_read_row(read_end)))
-    finally:
-        run.send_signal(signal.SIGKILL)
-        run.wait()
-    while row := os.read(read_end, ROW.size):
-        given.append(ROW.unpack(row))
-    os.close(read_end)
+    with os.fdopen(read_end, "rb") as pipe:
+        try:
+            given = [ROW.unpack(pipe.read(ROW.size))]
+            end = time.monotonic() + after_s
+            while time.monotonic() < end:
+                given.append(ROW.unpack(pipe.read(ROW.size)))
+        finally:
+            run.kill()
+            run.wait()
+        given += ROW.iter_unpack(pipe.read())
     after = recordings(wanted)
     changed = sum(after.get(name) != digest for name, digest in before.items())
     (new,) = after.keys() - before.keys()
     return _loss(wanted.with_name(new), given, changed)
-
-
-def _read_row(pipe: int) -> bytes:
-    row = os.read(pipe, ROW.size)
-    if len(row) < ROW.size:
-        raise RuntimeError("the recording process ended by itself")
-    return row
 
 
 def _loss(path: Path, given: Sequence[tuple[int, int]], changed: int) -> Kill:
@@ -126,24 +116,28 @@ def _loss(path: Path, given: Sequence[tuple[int, int]], changed: int) -> Kill:
 def main() -> int:
     """Run the kills and print the losses."""
     asked = options(
-        __doc__, kills=(200, "how many"), longest=(3.0, "latest moment of a kill, s"), seed=(1, "of the moments")
+        __doc__,
+        out=(OUT / "kills.jsonl", "losses so far; they are not measured again"),
+        kills=(200, "how many"),
+        longest=(3.0, "latest moment of a kill, s"),
+        seed=(1, "of the moments"),
     )
     rng = random.Random(asked.seed)
     with tempfile.TemporaryDirectory() as folder:
-        kills = [
-            kill_once(Path(folder) / "walk.mcap", rng.uniform(0.05, asked.longest))
-            for _ in track(range(asked.kills), "kill -9")
-        ]
-    missing_ms = sorted(1e3 * kill.missing_s for kill in kills)
+        wanted, moments_s = Path(folder) / "walk.mcap", [rng.uniform(0.05, asked.longest) for _ in range(asked.kills)]
+        runs = {
+            f"{k}, after {after_s:.3f} s": partial(kill_once, wanted, after_s) for k, after_s in enumerate(moments_s)
+        }
+        kills = CampaignJournal(asked.out).play("kill -9", runs)
+    missing_ms = sorted(1e3 * kill["missing_s"] for kill in kills)
     return report(
         f"{len(kills)} kills",
         [
             Figure("missing at the end, median", f"{missing_ms[len(kills) // 2]:.0f} ms"),
             Figure("missing at worst", f"{missing_ms[-1]:.0f} ms", f"<= {LIMIT_MS:.0f} ms", missing_ms[-1] <= LIMIT_MS),
-            Figure("chunks recorded", f"{sum(kill.given for kill in kills)}"),
-            Figure("chunks missing", f"{sum(kill.missing for kill in kills)}"),
-            none("files that do not open", sum(not kill.opens for kill in kills)),
-            none("earlier recordings that changed", sum(kill.changed for kill in kills)),
+            *(Figure(f"chunks {what}", f"{sum(kill[what] for kill in kills):,}") for what in ("given", "missing")),
+            none("files that do not open", sum(not kill["opens"] for kill in kills)),
+            none("earlier recordings that changed", sum(kill["changed"] for kill in kills)),
         ],
     )
 

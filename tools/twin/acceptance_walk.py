@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.session.acceptance.protocol import Point, Visit
 from echostep_app.session.acceptance.survey import corridor
 from echostep_app.simulation.people.walker import Person, Walk, Waypoint

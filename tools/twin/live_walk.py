@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from echostep.arrays import Floats
 from echostep.board.frames import BoardReader
-from echostep.plan.model import load_plan
-from echostep.ports.arrival_clock import now_ns
-from echostep.recording.reading import open_recording
+from echostep.plan import load_plan
+from echostep.recording import open_recording
+from echostep_app.ports.arrival_clock import now_ns
 from echostep_app.simulation.scenario import demo_scenario
 from echostep_app.simulation.stimulus import BoardSensors
 from places import PLAN

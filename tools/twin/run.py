@@ -27,7 +27,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.plan.model import Plan, load_plan
+from echostep.plan import Plan, load_plan
 from echostep.xsens import MtxReader
 from echostep.xsens.reader import warm_up
 from echostep_app.commands.actions.beacon_player import simulate_gateway

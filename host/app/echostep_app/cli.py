@@ -16,10 +16,10 @@ from typing import Annotated
 import typer
 
 from echostep.errors import EchostepError, IncompleteError, words_of
-from echostep.extras import EXTRAS, lacks
 from echostep.file_mode import share_files
 from echostep_app.commands import acceptance, beacons, commander, files, hardware, plan, recordings, runs
 from echostep_app.commands.studies import add_studies
+from echostep_app.extras import EXTRAS, lacks
 from echostep_app.interruption import end_by_signals, is_asked
 from echostep_app.printing.compiling import tell_of_compiling
 from echostep_app.printing.lines import complain, say

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from echostep.extras import lacks, require
 from echostep.foot.steps import Track
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep.walk.walk import Walk
-from echostep_app.output.foot_plot import foot_figure
+from echostep_app.extras import lacks, require
+from echostep_app.output.offline_plots import foot_figure
 from echostep_app.output.track_plot import track_figure
 from echostep_app.plan.pictures.drawing import plan_svg
 from echostep_app.printing.picture_files import save_picture, svg_text

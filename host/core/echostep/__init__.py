@@ -11,13 +11,14 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from echostep.additions import face
+
 if TYPE_CHECKING:
     from echostep import foot, plan, xsens
     from echostep.board import messages
-    from echostep.localization.estimate import Estimate
-    from echostep.localization.particles.start import Start
+    from echostep.localization import Estimate, Start
     from echostep.ports.chunks import Chunk
-    from echostep.recording.capture import read_capture
+    from echostep.recording import read_capture
     from echostep.settings import Settings
     from echostep.tracker import Tracker
     from echostep.walk.walk import Walk, replay
@@ -38,24 +39,23 @@ __all__ = [
 ]
 
 _MODULES = {name: f"echostep.{name}" for name in ("foot", "plan", "xsens")} | {"messages": "echostep.board.messages"}
-_HOMES = {
-    "Chunk": "echostep.ports.chunks",
-    "Estimate": "echostep.localization.estimate",
-    "Settings": "echostep.settings",
-    "Start": "echostep.localization.particles.start",
-    "Tracker": "echostep.tracker",
-    "Walk": "echostep.walk.walk",
-    "read_capture": "echostep.recording.capture",
-    "replay": "echostep.walk.walk",
-}
+_load = face(
+    __name__,
+    {
+        "localization": "Estimate Start",
+        "ports.chunks": "Chunk",
+        "recording": "read_capture",
+        "settings": "Settings",
+        "tracker": "Tracker",
+        "walk.walk": "Walk replay",
+    },
+)
 
 
 def __getattr__(name: str) -> Any:
     if name in _MODULES:
         return importlib.import_module(_MODULES[name])
-    if name in _HOMES:
-        return getattr(importlib.import_module(_HOMES[name]), name)
-    raise AttributeError(f"module 'echostep' has no attribute {name!r}")
+    return _load(name)
 
 
 def __dir__() -> list[str]:

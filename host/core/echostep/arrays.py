@@ -29,9 +29,9 @@ def spans(holds: Bools) -> Ints:
 
 
 def record_dtype(protocol: type, array_size: int | None = None, **sizes: int) -> np.dtype[np.void]:
-    """Dtype with one field for each annotation of `protocol`, those of its bases first: float, int, Floats or Ints.
+    """Dtype with one field for each annotation of `protocol`, base classes first: float, int, Floats or Ints.
 
-    An array has `sizes[name]` values, or `array_size` where every array has the same. The module of `protocol` must postpone the evaluation of its
+    An array has `sizes[name]` values, or `array_size` if every array has the same size. The module of `protocol` must postpone the evaluation of its
     annotations. A kernel reads and writes the fields of such a record as attributes.
     """
     fields: list[Any] = []

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The command line: the whole of it where `echostep-app` is installed, else `decode`, `foot` and `replay --headless`.
+"""The command line: all of it if `echostep-app` is installed, else `decode`, `foot` and `replay --headless`.
 
-In: the command's arguments. Out: JSON lines, tracks as CSV, an exit status (0: done; 2: a mistake, named in one line). Owns nothing. What these
-commands print on standard output and write are the lines and files of the whole command line.
+In: the command's arguments. Out: JSON lines, tracks as CSV, an exit status (0: done; 2: a mistake, named in one line). Owns nothing. These
+commands print and write the same lines and files as the whole command line.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from pathlib import Path
 
 from echostep.additions import added
 from echostep.errors import EchostepError, words_of
+from echostep.kernel_cache import on_compiling
 
 WHOLE = "pages, teams, live runs, plans of other formats and the other commands: pip install 'echostep[app]'"
 
@@ -25,12 +26,13 @@ def main() -> None:
     if whole := added("commands"):
         whole()
         return
+    on_compiling.append(_tell_of_compiling)
+    status = 0
     try:
-        status = _run(sys.argv[1:])
+        _run(sys.argv[1:])
         sys.stdout.flush()
     except BrokenPipeError:  # the reader had enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        status = 0
     except (EchostepError, OSError) as error:
         print(f"echostep: {words_of(error)}", file=sys.stderr)
         status = 2
@@ -39,7 +41,12 @@ def main() -> None:
     sys.exit(status)
 
 
-def _run(words: list[str]) -> int:
+def _tell_of_compiling() -> None:
+    on_compiling.clear()
+    print("Compiling kernels, once on a computer: about a minute ...", file=sys.stderr)
+
+
+def _run(words: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="echostep", description="Indoor pedestrian tracking.", epilog=WHOLE)
     parser.add_argument("--version", action="version", version=f"echostep {version('echostep')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -54,22 +61,22 @@ def _run(words: list[str]) -> int:
     replay.add_argument("recording", type=Path, nargs="+", help="the recording (.mcap); several: the parts of one run")
     replay.add_argument("--plan", type=Path, help="the building's plan.json; without one the walk has no map")
     replay.add_argument("--seed", type=int, help="instead of the recorded one")
-    replay.add_argument("--out", type=Path, default=Path("out/replay"), metavar="FOLDER", help="of track.csv")
+    replay.add_argument("--out", type=Path, default=Path("out/replay"), metavar="FOLDER", help="folder for track.csv")
     replay.add_argument("--headless", action="store_true", help="without page and terminal view, as always here")
     replay.set_defaults(run=_replay)
     given = parser.parse_args(words)
     given.run(given)
-    return 0
 
 
 def _decode(given: argparse.Namespace) -> None:
-    from echostep.recording.capture import Decoder, as_json, read_capture
-    from echostep.recording.capture_summary import summary
+    from echostep.recording import Decoder, as_json, read_capture
 
     decoder = Decoder()
     for message in read_capture(given.file, decoder):
         print(json.dumps(as_json(message), allow_nan=False))
-    print(*summary(decoder), sep="\n", file=sys.stderr)
+    good, bad = decoder.board.counts.good + decoder.foot.counts.good, decoder.board.counts.rejected
+    skipped = decoder.mt.counts.skipped_bytes
+    print(f"board: {good} frames, {bad} rejected; MT: {skipped} bytes in no frame", file=sys.stderr)
 
 
 def _foot(given: argparse.Namespace) -> None:
@@ -83,7 +90,7 @@ def _foot(given: argparse.Namespace) -> None:
 
 
 def _replay(given: argparse.Namespace) -> None:
-    from echostep.localization.estimate import digest
+    from echostep.localization import digest
     from echostep.walk.table import write_track
     from echostep.walk.walk import replay
 

@@ -1,24 +1,33 @@
 # SPDX-License-Identifier: MIT
-"""Fields of a message from outside: checked against a structure, with one sentence about a wrong one.
+"""Fields of a message from outside: kinds of numbers and texts; checked against a structure, with one sentence about a wrong one.
 
 In: parsed JSON or TOML, which may be hostile, and a msgspec struct or a dataclass. Out: the structure, or a ValueError that begins with the path of
-the wrong field, as `levels[0].doors[2].line`. Owns nothing: a type's `Meta(description=...)` says what its values are.
+the wrong field, such as `levels[0].doors[2].line`. Owns nothing: a type's `Meta(description=...)` says what its values are.
 """
 
 from __future__ import annotations
 
 import re
 import reprlib
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import msgspec
-from msgspec import inspect
+from msgspec import Meta, inspect
 
 # names of types without a description
 KINDS = {
     "float": "a finite number", "int": "a whole number", "bool": "true or false", "str": "a text", "array": "a list", "object": "an object",
 }  # fmt: skip
 T = TypeVar("T")
+
+LIMIT_M = 1e5  # greatest coordinate: 100 km, more than any site
+Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M, description=f"a finite number within {LIMIT_M:.0f} m")]
+Deviation = Annotated[float, Meta(ge=0.0, le=LIMIT_M, description=f"a finite number from 0 to {LIMIT_M:.0f} m")]
+Longitude = Annotated[float, Meta(ge=-180.0, le=180.0, description="a finite number within 180 degrees east")]
+Latitude = Annotated[float, Meta(ge=-90.0, le=90.0, description="a finite number within 90 degrees north")]
+# Characters that UTF-8 and XML cannot hold: lone surrogates, and control characters but tab and line ends [XML 1.0, 2.2]
+UNWRITABLE = r"\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff"
+Text = Annotated[str, Meta(pattern=rf"^[^{UNWRITABLE}]*$", description="a text without control characters")]
 
 
 def checked(tree: Any, kind: type[T]) -> T:
@@ -32,7 +41,7 @@ def checked(tree: Any, kind: type[T]) -> T:
 
 
 def field_of(error: msgspec.ValidationError) -> tuple[str, bool]:
-    """The path of the field that an error is about, empty for the message itself, and whether the field is missing. Without text of the sender."""
+    """The path of the field that an error is about, empty for the message itself, and whether the field is missing. Without the sender's text."""
     words, _, path = str(error).rpartition(" - at `$")
     words, path = (words, path.strip("`.")) if words else (path, "")
     missing = re.match(r"Object missing required field `(\w+)`", words)
@@ -60,7 +69,7 @@ def _sentence(error: msgspec.ValidationError, tree: Any, root: inspect.Type) -> 
 
 
 def _described(kind: inspect.Type) -> tuple[Any, str]:
-    """A type, of a union its first one, and what it says about its values; empty: nothing."""
+    """A type (the first of a union) and its description of its values, empty if missing."""
     kind = kind.types[0] if isinstance(kind, inspect.UnionType) else kind
     if not isinstance(kind, inspect.Metadata):
         return kind, ""

@@ -3,8 +3,8 @@
 
 In: a path that is about to be written. Out: a file of mode 0600 there. Owns the answer to `--share`.
 
-A recording is where a person was, second by second. The process's umask stays as it is: compiled kernels, which other users of an installation read,
-are written meanwhile.
+A recording shows where a person was, second by second. The process's umask stays as it is: compiled kernels, which other users of an installation
+read, are written meanwhile.
 """
 
 from __future__ import annotations
@@ -27,6 +27,6 @@ def file_mode() -> int:
 
 
 def claim(path: Path) -> Path:
-    """Make the file where there is none, so that its mode is right before it has content; one that exists keeps its mode. Returns the path."""
+    """Make the file if missing, so that its mode is right before it has content; an existing file keeps its mode. Returns the path."""
     os.close(os.open(path, os.O_WRONLY | os.O_CREAT, file_mode()))
     return path

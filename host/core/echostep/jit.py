@@ -8,7 +8,7 @@ A *kernel* is called from Python; a *part* is called by kernels and other parts 
 of compiling, and none of its versions is made for one constant: numba makes them while it still takes `k = 0` before a loop for the type of `k`.
 
 numba counts references to every array that one kernel hands to another, atomically. In kernels that run once per sample or particle that takes longer
-than their work: a lean one counts none, so it returns numbers or tuples of them and makes no arrays. numba has no public option for this.
+than their work: a lean kernel counts none, so it returns numbers or tuples of numbers and makes no arrays. numba has no public option for this.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ _LEAN, _COUNTED, _INLINE = {"_nrt": False}, {"_nrt": True}, {"forceinline": True
 
 
 def kernel(function: Function) -> Function:
-    """A kernel that may make arrays, but for when a lean one calls it: then it is compiled as lean as its caller."""
+    """A kernel that may make arrays, except when a lean kernel calls it: then it is compiled as lean as its caller."""
     return _compiled(function, _KERNEL)
 
 
 def lean_kernel(function: Function) -> Function:
-    """A kernel that makes no arrays and counts no references to those that it is given."""
+    """A kernel that makes no arrays and counts no references to the arrays that it is given."""
     return _compiled(function, _KERNEL | _LEAN)
 
 
@@ -52,7 +52,7 @@ def inline_kernel(function: Function) -> Function:
 
 
 def part(function: Function) -> Function:
-    """A part that may make arrays, but for when a lean one calls it."""
+    """A part that may make arrays, except when its caller is lean."""
     return _part(function, _PART)
 
 
@@ -62,7 +62,7 @@ def lean_part(function: Function) -> Function:
 
 
 def allocating_part(function: Function) -> Function:
-    """A part that makes arrays although a lean one calls it."""
+    """A part that makes arrays although its caller is lean."""
     return _part(function, _PART | _COUNTED)
 
 
@@ -72,7 +72,7 @@ def inline_part(function: Function) -> Function:
 
 
 class _Part:
-    """What numba compiles of a part. Called from Python, where it would crash for want of a wrapper, it raises TypeError."""
+    """The object that numba compiles from a part. Called from Python, where it would crash without a wrapper, it raises TypeError."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         self.py_func = function
@@ -115,19 +115,19 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
 
 
 class _Compilations(event.Listener):
-    """Reports each kernel that is compiled because no cache has it; those that it calls are compiled within."""
+    """Reports each kernel that is compiled because no cache has it; kernels that it calls are compiled within."""
 
     def __init__(self) -> None:
         self._depth = 0
 
     def on_start(self, _event: event.Event) -> None:
-        """A kernel, or one that it calls."""
+        """Compilation of a kernel begins, or of one that it calls."""
         self._depth += 1
         if self._depth == 1 and on_compiling:
             on_compiling[-1]()
 
     def on_end(self, _event: event.Event) -> None:
-        """The end of it, also by an error."""
+        """Compilation ends, also by an error."""
         self._depth -= 1
 
 

@@ -34,7 +34,7 @@ _roots = {__package__: PACKAGE}  # name -> folder of the packages whose imports 
 
 @cache
 def cache_folder(source: str) -> Path | None:
-    """The folder of the kernels of a module, by its file; files of its other states are deleted. None: the file is not a part of a package."""
+    """The folder of the kernels of a module, by its file; files of its other states are deleted. None if the file is not part of a package."""
     path = Path(source)
     root = _root_of(path.parent)
     if root is None or not path.is_file():
@@ -50,7 +50,7 @@ def cache_folder(source: str) -> Path | None:
 
 @cache
 def _root_of(folder: Path) -> Path | None:
-    """The outermost package that holds a folder; None: the folder is not a package."""
+    """The outermost package that holds a folder; None if the folder is not a package."""
     if not (folder / "__init__.py").is_file():
         return None
     return _root_of(folder.parent) or folder
@@ -84,7 +84,7 @@ def _can_be_written(folder: Path) -> bool:
 
 @cache
 def _tell_of_other_folder(chosen: str, used: Path) -> None:
-    """Once a run."""
+    """Tell of the other folder, once a run."""
     print(
         f"echostep: NUMBA_CACHE_DIR: {chosen} cannot be written: compiled kernels are kept in {used}", file=sys.stderr
     )
@@ -92,7 +92,7 @@ def _tell_of_other_folder(chosen: str, used: Path) -> None:
 
 @cache
 def _users_folder() -> Path | None:
-    """XDG_CACHE_HOME or ~/.cache; None without a home, and where that cannot be written."""
+    """XDG_CACHE_HOME or ~/.cache; None without a home, or if that folder cannot be written."""
     try:
         folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
         folder.mkdir(parents=True, exist_ok=True)
@@ -103,7 +103,7 @@ def _users_folder() -> Path | None:
 
 @cache
 def _temporary_folder() -> Path:
-    """A folder of this user's alone, kept between runs where nobody else can have made it; it is said when it is made.
+    """A folder for this user alone, kept between runs if nobody else can have made it; its creation is reported.
 
     numba runs what it finds in its cache, so a folder that another user may write is not used.
     """
@@ -166,7 +166,7 @@ def _read(source: str) -> tuple[bytes, frozenset[str]]:
 
 @cache
 def _files_of(name: str) -> frozenset[str]:
-    """The file of a module or a package, by its full name; none where it is a name in a module."""
+    """The file of a module or a package, by its full name; none for a name in a module."""
     root, _, inside = name.partition(".")
     path = os.path.join(_roots[root], inside.replace(".", os.sep)).rstrip(os.sep)  # noqa: PTH118 (300 times a start)
     return frozenset(file for file in (f"{path}.py", f"{path}{os.sep}__init__.py") if os.path.isfile(file))  # noqa: PTH113

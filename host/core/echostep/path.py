@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The types that odometry and localization exchange: the trunk's path in pieces, and what was measured on each; the length of a path.
+"""The types that odometry and localization exchange: the trunk's path in pieces, and the measurements on each; the length of a path.
 
 In: nothing. Out: `PathSegment`, `MeasuredSegment`, `Dropout`, `Odometer`. Owns nothing. Frame: walk (z up, origin and yaw arbitrary at the start).
 """
@@ -15,7 +15,7 @@ import numpy as np
 from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
 
-# How much of an arc the way in a turn is. The simulated wearers walk whole arcs; in the one turn at hand with motion capture, on the spot,
+# Share of an arc that the way in a turn follows. The simulated wearers walk whole arcs; in the one available turn with motion capture, on the spot,
 # the pelvis went 0 to 0.4 of it [Sy 2020]
 BENT = 0.5
 Share = TypeVar("Share", float, Floats)
@@ -61,7 +61,7 @@ class StanceHeadings(NamedTuple):
 
 class BeltEvidence(NamedTuple):
     """Evidence of the belt's gyro for a step: stances since the step before; the error of the foot's heading that was removed from the step, and the
-    standard deviation of its turn without that.
+    standard deviation of its turn without that removal.
     """
 
     stances: tuple[StanceHeadings, ...]
@@ -75,7 +75,7 @@ class PathSegment:
 
     `sd_m`: standard deviation of the move per axis. `turn_sd_rad`: growth of the yaw's standard deviation. `step`: steps so far.
     `anchor_sd_m`: standard deviation of each end per axis, the same at both. `rise_m`: height gained by the foot, with its standard deviation,
-    infinite where no foot measured it. `scale_sd`: growth of the standard deviation of the scale that all lengths share. `belt`: of a foot's step.
+    infinite if no foot measured it. `scale_sd`: growth of the standard deviation of the scale that all lengths share. `belt`: of a foot's step.
     `running`: the foot rests too briefly for a walk.
     """
 
@@ -102,7 +102,7 @@ class PathSegment:
 
     @property
     def turn_rad(self) -> float:
-        """From the heading at the begin to that at the end, the shorter way round."""
+        """From the heading at the beginning to the heading at the end, the shorter way round."""
         return wrap(self.heading1_rad - self.heading0_rad)
 
     @property
@@ -115,7 +115,7 @@ class PathSegment:
         return bend * self.dy_m, -bend * self.dx_m
 
     def way_m(self, share: Share) -> tuple[Share, Share]:
-        """Way east and north in the walk frame from the begin to these shares of the segment, on a parabola."""
+        """Way east and north in the walk frame from the beginning to these shares of the segment, on a parabola."""
         bend_x, bend_y = self.bend_m
         return share * (self.dx_m + (1.0 - share) * bend_x), share * (self.dy_m + (1.0 - share) * bend_y)
 
@@ -131,7 +131,7 @@ class MeasuredSegment:
 
     `t_s`, `ranger` (0 looks left, 1 right) and `range_m` (NaN: no echo) are (n,). `height_m` (k,): heights by pressure in the same time.
     `ranger_part`: kind of ranger of the last ping, as the board has named it [protocol/messages.toml, part]; 0: not named, or no ping.
-    `barometer_starts`: how often the heights have begun anew before these, by a restart of the board, which may be another one, or by a reset value.
+    `barometer_starts`: how often the heights have restarted before these, by a restart of the board (maybe another board) or a reset value.
     `ahead_rad`: how far both rangers look ahead of abeam.
     """
 

@@ -20,10 +20,7 @@ from echostep.foot.steps import FootSettings
 from echostep.foot.trunk_path import GaitSettings
 from echostep.legs.heading import CompassErrors
 from echostep.legs.trunk_path import WearerSettings
-from echostep.localization.beacons.model import BeaconSettings
-from echostep.localization.echoes.likelihood import EchoSettings
-from echostep.localization.height.levels import ClimbSettings
-from echostep.localization.settings import CloudSettings
+from echostep.localization import BeaconSettings, ClimbSettings, CloudSettings, EchoSettings
 from echostep.timing.timeline import MtxTiming
 
 

@@ -11,7 +11,7 @@ from board_runs import ROOT, Bench, needs_twin
 from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep.board.reports import BoardReports
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.tracker import Tracker
 from echostep_app.board.faults.health import Severity, board_findings, expected_rates, gyro_celsius, rate_findings

@@ -16,9 +16,10 @@ from echostep.board.frames import encode
 from echostep.board.gateway import FEW_S, MOST_BEACONS, Gateway
 from echostep.errors import EchostepError
 from echostep.ports import chunks
-from echostep.ports.chunks import GATEWAY, MTX, Chunk, ChunkQueue
+from echostep.ports.chunks import GATEWAY, MTX, Chunk
 from echostep_app.commands.actions.beacon_player import _open_sender
 from echostep_app.ports import udp
+from echostep_app.ports.chunk_queue import ChunkQueue
 from echostep_app.ports.datagram_key import Opener, read_key, seal
 from echostep_app.ports.udp import UdpPort
 from echostep_app.simulation.devices.beacon_gateway import message

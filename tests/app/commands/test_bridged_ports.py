@@ -11,7 +11,7 @@ import pytest
 from board_runs import ROOT, needs_twin
 from bridges import bridged
 from command_line import echostep, interrupt_after
-from echostep.recording.reading import open_recording
+from echostep.recording import open_recording
 from echostep.xsens import PROJECT
 from echostep_studies.simulation.devices.mtx_setup import MtxDevice
 from players import walking_twin

@@ -15,9 +15,9 @@ from websockets.sync.client import ClientConnection
 
 from board_runs import ELF, ROOT, TWIN, needs_twin
 from command_line import echostep
-from echostep.plan.model import Door, Plan, Room, load_plan
+from echostep.plan import Door, Plan, Room, load_plan
 from echostep.ports.chunks import portion_of
-from echostep.recording.reading import open_recording
+from echostep.recording import open_recording
 from echostep.tracker import Tracker
 from echostep_app.page.elements.true_position import TruePath
 from echostep_app.page.live import LivePage

@@ -21,8 +21,8 @@ import pytest
 from board_runs import ROOT, needs_twin, tool
 from command_line import PROGRAM, echostep, interrupt_after
 from echostep.errors import EchostepError
-from echostep.plan.model import load_plan
-from echostep.recording.reading import open_recording
+from echostep.plan import load_plan
+from echostep.recording import open_recording
 from echostep_app.ports.serial_ports import SerialPorts
 from echostep_app.session.last_place import read_kept
 from waiting import PATIENCE_S, until

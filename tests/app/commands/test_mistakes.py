@@ -7,6 +7,7 @@ import errno
 import os
 import re
 import signal
+import subprocess
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
@@ -21,8 +22,8 @@ from board_runs import ROOT
 from command_line import echostep, interrupt_once_called
 from echostep.board import messages as m
 from echostep.board.frames import encode
+from echostep_app.printing.console import print_notices
 from echostep_app.recording.background_writer import BackgroundWriter
-from echostep_app.session.console import print_notices
 from echostep_app.team.outbox import Outbox
 from echostep_studies.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from players import babbling_port, pseudo_terminal, python_board
@@ -33,6 +34,7 @@ from xsens.mt_lines import on_a_terminal
 PLAN = ROOT / "host/core/echostep/plans/demo.json"
 WALK = ROOT / "tests/captures/walk.mcap"
 PAGE = ROOT / "host/docs/mistakes.md"
+Finished = subprocess.CompletedProcess[str]
 ROWS = dict(re.findall(r"^\| ([^|]+) \| `([^`]+)`", PAGE.read_text(), flags=re.M))  # what is printed, by mistake
 Mistake = Callable[
     [Path, pytest.MonkeyPatch], dict[str, str]
@@ -107,36 +109,32 @@ def no_broker(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
             "live", "--plan", PLAN, "--board", port, "--headless", "--out", folder, "--publish", url, "--name", "anna",
             "--seconds", PATIENCE_S,
         )  # fmt: skip
+    return {"said": goes_on(done), "URL": url}
+
+
+def publish_walk(folder: Path, url: str, *more: str) -> Finished:
+    """A replay that publishes to this URL."""
+    return echostep(
+        "replay", WALK, "--plan", PLAN, "--headless", "--out", folder, "--publish", url, "--name", "anna", *more
+    )
+
+
+def goes_on(done: Finished) -> str:
+    """What is said of a fault that ends nothing."""
     assert done.returncode == 0, done.stderr
-    return {"said": next(line for line in done.stdout.splitlines() if "tracking goes on" in line), "URL": url}
+    return next(line for line in done.stdout.splitlines() if "tracking goes on" in line)
 
 
 def refused_reports(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
     (folder / "pw").write_text("")
     (folder / "acl").write_text("topic readwrite echostep/green/#\n")
     with Broker(folder, f"acl_file {folder / 'acl'}") as broker:
-        done = echostep(
-            "replay",
-            WALK,
-            "--plan",
-            PLAN,
-            "--headless",
-            "--out",
-            folder,
-            "--publish",
-            broker.url,
-            "--name",
-            "anna",
-            "--team",
-            "red",
-        )
-    assert done.returncode == 0, done.stderr
-    return {"said": next(line for line in done.stdout.splitlines() if "tracking goes on" in line), "URL": broker.url}
+        return {"said": goes_on(publish_walk(folder, broker.url, "--team", "red")), "URL": broker.url}
 
 
 def publishing(folder: Path, url: str) -> str:
     """The error of a replay that publishes to this URL."""
-    done = echostep("replay", WALK, "--plan", PLAN, "--headless", "--out", folder, "--publish", url, "--name", "anna")
+    done = publish_walk(folder, url)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stdout + done.stderr
     return done.stderr.removeprefix("echostep: ").strip()
 
@@ -156,20 +154,7 @@ def other_name(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
     keys = f"certfile {folder / 'server.pem'}", f"keyfile {folder / 'server.pem'}"
     with Broker(folder, *keys) as broker:
         url = f"mqtts://127.0.0.1:{broker.port}"
-        done = echostep(
-            "replay",
-            WALK,
-            "--plan",
-            PLAN,
-            "--headless",
-            "--out",
-            folder,
-            "--publish",
-            f"{url}?ca={folder / 'ca.pem'}",
-            "--name",
-            "anna",
-        )
-    return {"said": next(line for line in done.stdout.splitlines() if "tracking goes on" in line), "URL": url}
+        return {"said": goes_on(publish_walk(folder, f"{url}?ca={folder / 'ca.pem'}")), "URL": url}
 
 
 def disk_full(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:

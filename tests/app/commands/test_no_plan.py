@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from command_line import echostep
-from echostep.localization.estimate import TrackStatus
+from echostep.localization import TrackStatus
 from echostep.localization.height.height_filter import RelativeHeight
 from echostep.localization.height.levels import HeightChange
-from echostep.plan.model import NO_PLAN
+from echostep.plan import NO_PLAN
 from echostep_app.page.elements.scene import status_text
 from echostep_app.session.metadata import run_metadata
 from echostep_app.session.runs.recording import start_recording

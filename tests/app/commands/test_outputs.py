@@ -22,7 +22,7 @@ from mcap.reader import make_reader
 
 from board_runs import ROOT
 from command_line import PROGRAM, interrupt_once_called
-from echostep.recording.reading import open_recording
+from echostep.recording import open_recording
 from echostep_app.cli import main
 from echostep_app.operation.page import TablePage
 from players import pseudo_terminal, python_board

@@ -15,13 +15,12 @@ import pytest
 from board_runs import ROOT, needs_twin
 from command_line import echostep, interrupt_after, interrupt_when
 from echostep.ports.chunks import Chunk
-from echostep.recording.reading import open_recording
+from echostep.recording import open_recording
 from echostep.xsens import PROJECT
 from echostep_app.board.faults.findings import Severity
-from echostep_app.commissioning import port_search
+from echostep_app.commissioning import serial_ports as port_search
 from echostep_app.commissioning.doctor import examine
-from echostep_app.commissioning.port_search import find_ports
-from echostep_app.commissioning.serial_ports import PortSeen, Role
+from echostep_app.commissioning.serial_ports import PortSeen, Role, find_ports
 from echostep_app.recording.device import sender
 from echostep_studies.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from players import babbling_port, pseudo_terminal, python_board, walking_twin

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from echostep.recording.reading import open_recording
+from echostep.recording import open_recording
 from echostep_studies.bench.recordings.hallways import names_in, read_hallway
 from echostep_studies.frame.recordings import DATA
 from needs_data import needs_data

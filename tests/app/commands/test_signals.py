@@ -20,8 +20,7 @@ from numba.core.registry import cpu_target
 from board_runs import ROOT
 from command_line import PROGRAM, echostep
 from echostep.ports.chunks import Chunk
-from echostep.recording.mcap_records import MCAP_MAGIC
-from echostep.recording.reading import open_recording
+from echostep.recording import MCAP_MAGIC, open_recording
 from echostep_app.interruption import end_by_signals, holding_signals, is_asked, sleep, wait_for
 from echostep_app.recording.recorder import Recorder
 from players import python_board

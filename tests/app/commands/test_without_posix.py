@@ -21,7 +21,7 @@ import pytest
 
 from board_runs import ROOT
 from command_line import PROGRAM
-from echostep.recording.reading import open_recording
+from echostep.recording import open_recording
 from waiting import PATIENCE_S
 from walks import DEMO
 

@@ -22,7 +22,7 @@ from echostep.board import messages as m
 from echostep.board.calibration import GyroSettings, gyro_rates
 from echostep.errors import EchostepError
 from echostep.legs.kinematics import LegLengths
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import Settings, parse_settings
 from echostep_app.commissioning.calibrate import STILL_S, TURN_S, WALK_S, Ports, Wearer

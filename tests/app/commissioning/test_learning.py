@@ -14,7 +14,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from commissioning.test_rangers import calibrated, pings_of, recorded
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import Settings, parse_settings
 from echostep_app.cli import app

@@ -19,8 +19,8 @@ from echostep.arrays import Floats
 from echostep.board.calibration import RangerSettings, ranges
 from echostep.board.messages import ROWS, Outcome
 from echostep.errors import EchostepError
-from echostep.localization.echoes.likelihood import EchoSettings
-from echostep.plan.model import load_plan
+from echostep.localization import EchoSettings
+from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import parse_settings
 from echostep.walls.echo_sources import Walls

@@ -14,15 +14,15 @@ from hypothesis import strategies as st
 
 from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.plan.model import Plan, Pose, load_plan
-from echostep.ports.chunks import Chunk, portion_of
-from echostep.ports.people.teammate import TEAM, Teammate, parse_teammate
+from echostep.localization import Estimate, TrackStatus
+from echostep.plan import Plan, Pose, load_plan
+from echostep.ports.chunks import TEAM, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.cues import CueKind
 from echostep_app.guidance.guided_rescue import GuidedRescue
 from echostep_app.guidance.guided_run import guidance_of
 from echostep_app.plan.routing import Route
+from echostep_app.ports.teammate import Teammate, parse_teammate
 from echostep_app.simulation.devices.board import PythonBoard
 from echostep_app.simulation.scenario import Scenario
 from echostep_studies.simulation.tower import tower

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization import Estimate, TrackStatus
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import NO_PLAN
+from echostep.plan import NO_PLAN
 from echostep.tracker import Tracker
 from echostep_app.guidance.cues import Cue, CueKind
 from echostep_app.guidance.guided_return import AGAIN, IN, TURN_M, GuidedReturn

@@ -15,7 +15,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization import Estimate, TrackStatus
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.tracker import Tracker
 from echostep_app.guidance.guided_return import GuidedReturn

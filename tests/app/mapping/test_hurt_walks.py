@@ -14,7 +14,7 @@ from board_runs import ROOT
 from command_line import echostep
 from echostep.arrays import Floats
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import NO_PLAN, Pose, load_plan, parse_plan
+from echostep.plan import NO_PLAN, Pose, load_plan, parse_plan
 from echostep.ports.chunks import Chunk
 from echostep_app.mapping.mapper import map_walk
 from echostep_app.mapping.plan import plan_of

@@ -14,8 +14,8 @@ from command_line import echostep
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.path import MeasuredSegment
-from echostep.plan.model import NO_PLAN, load_plan
-from echostep.recording.reading import open_recording
+from echostep.plan import NO_PLAN, load_plan
+from echostep.recording import open_recording
 from echostep_app.commands.actions.mapping import segments_of
 from echostep_app.mapping.joining import doubt_of, join_walks
 from echostep_app.mapping.mapper import Mapped, solve_walk

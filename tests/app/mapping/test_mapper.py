@@ -14,7 +14,7 @@ import pytest
 from board_runs import ROOT
 from command_line import echostep
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import NO_PLAN, Pose, load_plan
+from echostep.plan import NO_PLAN, Pose, load_plan
 from echostep_app.mapping.graph.graph import Closure, contradicted
 from echostep_app.mapping.growing import GrowingMap
 from echostep_app.mapping.mapper import Mapped, map_walk

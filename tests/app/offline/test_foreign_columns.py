@@ -11,9 +11,8 @@ from typer.testing import CliRunner
 
 from command_line import echostep
 from echostep.errors import EchostepError
-from echostep.offline.foreign_columns import LOGGERS, OWN, Naming, parse_naming, read_header
-from echostep.offline.imu_csv import load_imu
 from echostep_app.cli import app
+from echostep_app.offline.foreign_columns import LOGGERS, OWN, Naming, load_foot, parse_naming, read_header
 from echostep_app.offline.leg_csv import load_legs, load_pair
 from echostep_studies.barometer.pressure_csv import load_pressures
 from foot.foot_walks import MANNERS, course, samples
@@ -39,7 +38,7 @@ def write(path: Path, header: str, rows: np.ndarray, separator: str = ",", above
 
 def same(path: Path, table: np.ndarray, naming: Naming = OWN) -> tuple[str, ...]:
     """The file holds the table's samples, as far as its digits go; its notes."""
-    imu = load_imu(path, naming)
+    imu = load_foot(path, naming)
     assert np.allclose(np.diff(imu.t_s), np.diff(table[:, 0]), atol=1e-5)
     assert np.allclose(imu.accel, table[:, 1:4], atol=1e-5)
     assert np.allclose(imu.gyro, table[:, 4:7], atol=1e-5)
@@ -84,7 +83,7 @@ def test_an_export_of_mt_manager_counts_samples_and_the_counter_wraps(
     assert same(path, table) == ("read as an export of MT Manager",)
     write(path, header, np.column_stack([counter, table[:, 1:7]]), "\t")
     with pytest.raises(EchostepError, match=r"MT_00\.txt: PacketCounter counts samples, and no line .*Update Rate"):
-        load_imu(path)
+        load_foot(path)
 
 
 DOT_ABOVE = (
@@ -118,7 +117,7 @@ def test_an_export_of_movella_dot_without_gravity_is_refused(tmp_path: Path) -> 
     path = tmp_path / "free.csv"
     path.write_text(DOT_ABOVE + "PacketCounter,SampleTimeFine,Euler_X,FreeAcc_X\n1,2,3,4\n", encoding="utf-8")
     with pytest.raises(EchostepError, match=r"free\.csv: an export of Movella DOT without .*Acc_X.* custom mode 5"):
-        load_imu(path)
+        load_foot(path)
 
 
 def test_no_logger_is_taken_for_another_one() -> None:

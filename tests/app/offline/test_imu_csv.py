@@ -17,8 +17,8 @@ import pytest
 
 from command_line import echostep
 from echostep.errors import EchostepError
-from echostep.offline.imu_csv import load_imu
 from echostep_app import cli
+from echostep_app.offline.foreign_columns import load_foot
 from echostep_app.simulation.devices.mtx import specific_force_and_rate
 from echostep_app.simulation.people.walker import Person, walk
 from echostep_studies.frame.recordings import DATA
@@ -188,7 +188,7 @@ def with_header(text: str, header: str | None) -> str:
     ],
 )
 def test_every_spelling_of_a_table_is_read(tmp_path: Path, table: np.ndarray, spell: Callable[[str], str]) -> None:
-    plain = load_imu(write(tmp_path, table))
+    plain = load_foot(write(tmp_path, table))
     text = spell((tmp_path / "imu.csv").read_text())
     if "colour" in text:
         text = spell(
@@ -196,7 +196,7 @@ def test_every_spelling_of_a_table_is_read(tmp_path: Path, table: np.ndarray, sp
             + "\n"
         )
     (tmp_path / "imu.csv").write_bytes(text.encode())
-    read = load_imu(tmp_path / "imu.csv")
+    read = load_foot(tmp_path / "imu.csv")
     assert np.array_equal(read.accel[:-1], plain.accel[: len(read.accel) - 1])
     assert np.array_equal(read.gyro[:-1], plain.gyro[: len(read.gyro) - 1])
     assert len(read.t_s) in (len(plain.t_s), len(plain.t_s) - 1)
@@ -225,7 +225,7 @@ def test_a_gigabyte_of_garbage_ends_at_once_and_takes_no_memory(tmp_path: Path, 
             path.write_bytes(path.read_bytes()[: 1 << 20])  # these are rows: reading them takes what it takes
         began = time.process_time()
         with pytest.raises(EchostepError, match=r"imu\.csv"):
-            load_imu(path)
+            load_foot(path)
         assert time.process_time() - began < 20.0
 
 
@@ -233,7 +233,7 @@ def test_a_gigabyte_of_garbage_ends_at_once_and_takes_no_memory(tmp_path: Path, 
 def test_what_is_no_table_is_named(tmp_path: Path, content: str) -> None:
     (tmp_path / "x.csv").write_text(content)
     with pytest.raises(EchostepError, match=r"x\.csv"):
-        load_imu(tmp_path / "x.csv")
+        load_foot(tmp_path / "x.csv")
 
 
 @needs_data("xio_ngimu")

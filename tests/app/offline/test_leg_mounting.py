@@ -12,10 +12,11 @@ from echostep.arrays import Floats
 from echostep.legs.angle_grid import AngleGrid
 from echostep.legs.gyro_bias import GyroBias
 from echostep.legs.leg_angles import LegAngles, SwingAngles
-from echostep.legs.stride import HALF_PELVIS_M, Flag, Stride, StrideSettings, about_trunk, distance_sd_m, leg_left_m
+from echostep.legs.stride import Flag, Stride, StrideSettings
 from echostep.legs.strides import StrideEstimator
 from echostep.legs.walking_bout import Swing, leaving_share, stairs_flag
 from echostep_app.offline.leg_csv import LegSamples
+from echostep_app.offline.leg_side import HALF_PELVIS_M, about_trunk, distance_sd_m, leg_left_m
 from echostep_app.offline.leg_track import doubts, track_default
 from echostep_app.offline.mounting import walking_axis
 from echostep_app.simulation.people.walker import Person, Walk, Waypoint, walk

@@ -11,9 +11,10 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.legs.stride import Flag, StrideSettings, distance_sd_m
+from echostep.legs.stride import Flag, StrideSettings
 from echostep_app.offline.leg_csv import LegSamples, load_pair
 from echostep_app.offline.leg_pair import LEGS_DIFFER, track_pair
+from echostep_app.offline.leg_side import distance_sd_m
 from echostep_app.offline.leg_track import track_default
 from echostep_app.simulation.people.walker import Person, walk
 

@@ -12,14 +12,14 @@ import pytest
 
 from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep.offline.imu_csv import load_imu
 from echostep.ports.chunks import Chunk
-from echostep.recording.capture import Decoder, read_capture
-from echostep.recording.capture_summary import summary
+from echostep.recording import Decoder, read_capture
 from echostep.xsens import MTDATA, encode_frame
+from echostep_app.offline.foreign_columns import load_foot
 from echostep_app.offline.leg_csv import load_legs
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.report import ImportReport
+from echostep_app.recording.capture_summary import summary
 from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.contents import info
 from echostep_app.scorecard.track_columns import load_path
@@ -66,7 +66,7 @@ def foot_rows() -> list[list[str]]:
 
 def foot(folder: Path, first: dict[int, str], names: str = "t_s,ax,ay,az,gx,gy,gz", more: str = "") -> str:
     rows = [row + ([more] if more else []) for row in foot_rows()]
-    return "\n".join(load_imu(table(folder, names, rows, first)).notes)
+    return "\n".join(load_foot(table(folder, names, rows, first)).notes)
 
 
 def leg(folder: Path, first: dict[int, str]) -> str:
@@ -135,4 +135,4 @@ def test_what_is_left_out_is_counted(tmp_path: Path, reader: str) -> None:
 def test_a_table_with_decimal_commas_between_commas_is_refused(tmp_path: Path) -> None:
     rows = [[cell.replace(".", ",") for cell in row] for row in foot_rows()]
     with pytest.raises(EchostepError, match="more cells than there are names"):
-        load_imu(table(tmp_path, "t_s,ax,ay,az,gx,gy,gz", rows, {}))
+        load_foot(table(tmp_path, "t_s,ax,ay,az,gx,gy,gz", rows, {}))

@@ -10,16 +10,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.operation.operation import Operation, TableScene
 from echostep_app.operation.page import TablePage
 from echostep_app.operation.recorded.record import OperationRecorder
-from echostep_app.operation.recorded.tape import Keyframe, Tape
+from echostep_app.operation.recorded.tape import Tape
 from echostep_app.page.server import Address
 from echostep_app.plan.places.whereabouts import Whereabouts
+from echostep_app.printing.lines import moment
 from echostep_app.team.inbox import Inbox, ReceivedMessage
 from echostep_app.team.messages.marks import Mark, MarkKind
-from echostep_app.team.messages.report import Position, Report, ReportedAlarm, encode, moment
+from echostep_app.team.messages.report import Position, Report, ReportedAlarm, encode
 from echostep_studies.simulation.tower import tower
 from team.team_reports import POSITION, report
 
@@ -100,27 +101,18 @@ class Recording:
     """A team whose operation is recorded, with a keyframe every few messages."""
 
     def __init__(self, folder: Path, team: Team, keyframe_messages: int = 20) -> None:
-        self.team = team
-        self.recorder = OperationRecorder(folder / "operation.mcap", team.plan, "mqtt://broker:1883")
-        self.tape = Tape(self.recorder.path, grows=True)
+        recorder = OperationRecorder(folder / "operation.mcap", team.operation, "mqtt://broker:1883")
+        self.file, self.tape = recorder.file, recorder.tape
         self.tape._messages = keyframe_messages
-        team.on_believed = self._record
-
-    def _record(self, believed: list[ReceivedMessage]) -> None:
-        now_s, unix_s, operation = self.team.now_s, self.team.unix_s, self.team.operation
-        self.recorder.add(believed)
-        roster = operation.roster
-        self.recorder.add_condition(now_s, unix_s, roster.received, roster.rejected, connected=True)
-        if self.tape.note(now_s, len(believed)):
-            self.tape.keep(Keyframe(now_s, unix_s, self.recorder.offset, True, operation.copy()))
+        team.on_believed = lambda believed: recorder.add(believed, team.now_s, team.unix_s, connected=True)
 
     def on_disk(self) -> bool:
         """Whether the operating system has all of it."""
-        return self.recorder.path.stat().st_size == self.recorder.offset
+        return self.file.path.stat().st_size == self.file.offset
 
     def close(self) -> Path:
-        self.recorder.close()
-        return self.recorder.path
+        self.file.close()
+        return self.file.path
 
 
 def whole_team(team: Team | None = None) -> Team:

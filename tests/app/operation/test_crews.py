@@ -15,9 +15,9 @@ import pytest
 
 from echostep_app.operation import requests
 from echostep_app.operation.crews import HEAD, CrewLog
-from echostep_app.team.messages.crews import MOST_CREWS, Crew, Crews
+from echostep_app.team.messages.crews import MOST_CREWS, Crew
+from echostep_app.team.messages.marks import MarkBoard
 from echostep_app.team.messages.report import BadReportError
-from echostep_app.team.messages.shared import keep_latest
 from operation.teams import TOWER, ServedTeam, Team, place, whole_team
 from operation.test_table_page import LOOKS, shot, table
 from page.browser import loaded_page, overflow, wait_for
@@ -82,22 +82,23 @@ def test_commanders_come_to_one_state_in_any_order() -> None:
     checked = entered.after("check", "Ben", 1.8e9 + 20.0)
     assert checked is not None
     for order in ((CREW, entered, checked), (checked, CREW, entered), (entered, checked, CREW)):
-        crews, answers = Crews(), deque[tuple[str, bytes]]()
+        crews, answers = MarkBoard().crews, deque[tuple[str, bytes]]()
         for crew in order:
-            crews.receive(crew.id, crew.message[1], answers)
-        assert crews.known == {CREW.id: checked}
+            crews.receive(crew.id, crew.message, answers)
+        assert crews == {CREW.id: checked}
         assert len(answers) == sum(crew.unix_s < max(c.unix_s for c in order[: k + 1]) for k, crew in enumerate(order))
-    crews.receive(CREW.id, b"", answers)
-    assert not crews.known
+    crews.receive(CREW.id, ("", b""), answers)
+    assert not crews
 
 
 def test_of_two_changes_at_one_time_all_commanders_keep_the_same() -> None:
     anns, bens = (msgspec.structs.replace(CREW, by=by, air_min=air) for by, air in (("Ann", 30.0), ("Ben", 20.0)))
     for order in ((anns, bens), (bens, anns)):
-        known = dict[str, Crew]()
-        newer = [keep_latest(known, CREW.id, crew) for crew in order]
+        known, answers = MarkBoard().crews, deque[tuple[str, bytes]]()
+        for crew in order:
+            known.receive(CREW.id, crew.message, answers)
         assert known == {CREW.id: bens}
-        assert newer == [None, None if order[1] is bens else bens]
+        assert list(answers) == ([] if order[1] is bens else [bens.message])
 
 
 def hostile() -> list[bytes]:
@@ -114,7 +115,7 @@ def hostile() -> list[bytes]:
 @pytest.mark.parametrize("payload", hostile())
 def test_hostile_messages_are_counted(payload: bytes) -> None:
     with pytest.raises(BadReportError):
-        Crews().receive(CREW.id, payload, deque())
+        MarkBoard().crews.receive(CREW.id, (CREW.message[0], payload), deque())
     team = Team()
     team.put_bytes(f"echostep-table/crew/{CREW.id}", payload)
     assert team.operation.roster.rejected.total() == 1
@@ -122,12 +123,12 @@ def test_hostile_messages_are_counted(payload: bytes) -> None:
 
 
 def test_the_number_of_crews_is_bounded() -> None:
-    crews = Crews()
+    crews = MarkBoard().crews
     for k in range(MOST_CREWS):
         made = msgspec.structs.replace(CREW, id=f"{k:08x}")
-        crews.receive(made.id, made.message[1], deque())
+        crews.receive(made.id, made.message, deque())
     with pytest.raises(BadReportError, match=f"more than {MOST_CREWS} crews"):
-        crews.receive(CREW.id, CREW.message[1], deque())
+        crews.receive(CREW.id, CREW.message, deque())
     log = CrewLog()
     log.note(None, CREW)
     log.note(CREW, CREW)

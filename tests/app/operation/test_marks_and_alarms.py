@@ -10,23 +10,21 @@ from typing import Any, Self
 
 import pytest
 
-from echostep.plan.model import load_plan
-from echostep_app.operation.command import restore
+from echostep.plan import load_plan
 from echostep_app.operation.operation import Operation
 from echostep_app.operation.page import TablePage
 from echostep_app.operation.requests import Acknowledge, SetMark, Unmark
+from echostep_app.operation.restorer import Restorer, restore
 from echostep_app.page.elements.marks import ShownMark
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.server import Address, PageServer
-from echostep_app.session.team import mark_feed
-from echostep_app.session.team.mark_feed import MarkFeed
+from echostep_app.session.team.feeds import MarkFeed
 from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.team.endpoint import parse_endpoint, parse_outlet
 from echostep_app.team.inbox import Inbox, ListenerThread
 from echostep_app.team.messages.marks import ALL
 from echostep_app.team.messages.report import ReportedAlarm
 from echostep_app.team.mqtt.publisher import Listener
-from echostep_app.team.restorer import Restorer
 from operation.teams import TOWER, ServedTeam, whole_team
 from operation.test_table_page import shot, table
 from page.browser import LOCAL, looking, spot, wait_for
@@ -58,7 +56,7 @@ class Commander:
 
     def look(self) -> Any:
         now_s = time.monotonic()
-        believed = self.operation.update(self._inbox, now_s, time.time())
+        believed = self.operation.receive(*self._inbox.take_all(), now_s, time.time())
         restore(self._restorer, self.operation, self.receiver, believed, now_s)
         made = self.operation.scene(now_s, time.time(), connected=self.receiver.connected)
         self.page.publish(made)
@@ -67,7 +65,7 @@ class Commander:
 
 @needs_broker
 def test_two_commanders_and_a_wearer_have_one_state(browser: Any, tmp_path: Path, monkeypatch: Any) -> None:
-    monkeypatch.setattr(mark_feed, "LOOK_S", 0.0)
+    monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     with Broker(tmp_path) as broker, Commander(broker.url) as ann, Commander(broker.url) as ben:
         outlet = parse_outlet([broker.url], "anna", "red")
         subscription = TeamSubscription(outlet.endpoints[0], print)

@@ -14,14 +14,15 @@ import pytest
 from board_runs import ROOT
 from command_line import echostep
 from echostep.errors import EchostepError
-from echostep.recording.reading import open_recording
+from echostep.recording import open_recording
 from echostep_app.operation import requests
 from echostep_app.operation.operation import Operation, TableScene
 from echostep_app.operation.recorded import tape
 from echostep_app.operation.recorded.past import PastView
+from echostep_app.operation.recorded.player import Player, load
 from echostep_app.operation.recorded.record import Heard, decode_record
-from echostep_app.operation.recorded.tape import Player, Tape, load
-from echostep_app.page.requests import SetPlaying, SetSpeed
+from echostep_app.operation.recorded.tape import Tape
+from echostep_app.page.requests import Seek, SetPlaying, SetSpeed
 from echostep_app.recording.repair import contents, edit
 from operation.teams import TOWER, Recording, Team, place, whole_team
 from team.team_reports import PLAN
@@ -35,6 +36,12 @@ def played(path: Path) -> tuple[Player, Tape]:
     made = Tape(path, grows=False)
     *_, player = load(made, Operation(TOWER))
     return player, made
+
+
+def look(view: PastView, clock_s: float) -> tuple[Operation, TableScene] | None:
+    """What a page shows; None: now."""
+    t_s = view.moment(clock_s)
+    return None if t_s is None else view.at(t_s)
 
 
 def seen(scene: TableScene) -> tuple[Any, ...]:
@@ -77,22 +84,21 @@ def test_any_moment_of_a_growing_recording_is_shown_as_it_was(tmp_path: Path) ->
         moments.append((team.now_s, seen(team.operation.copy().scene(team.now_s, team.unix_s))))
         team.pass_time(7.0)
     view = PastView(made.tape)
-    assert view.look(0.0) is None
+    assert look(view, 0.0) is None
     assert until(made.on_disk)
-    begin_s = made.tape.begin_s
-    assert begin_s is not None
+    assert made.tape.span_s
     found = None
     for t_s, was in [moments[2], moments[0], moments[3], moments[1]]:
-        view.handle(requests.Seek(t_s - begin_s))
-        found = view.look(0.0)
+        view.handle(Seek(t_s - made.tape.span_s[0]))
+        found = look(view, 0.0)
         assert found is not None
         assert seen(found[1]) == was
         shown = view.shown(found[1].t_s, 1)
         assert shown is not None
         assert (shown.now, shown.live, shown.open_alarms) == (False, True, 1)
-    assert view.look(0.0) == found  # held: the same scene
+    assert look(view, 0.0) == found  # held: the same scene
     view.handle(requests.Now())
-    assert view.look(0.0) is None
+    assert look(view, 0.0) is None
     made.close()
 
 
@@ -102,15 +108,16 @@ def test_played_at_a_multiple_the_past_becomes_the_present(tmp_path: Path) -> No
     whole_team(team)
     assert until(made.on_disk)
     view = PastView(made.tape)
-    view.handle(requests.Seek(0.0))
-    assert view.look(10.0) is not None
+    view.handle(Seek(0.0))
+    assert look(view, 10.0) is not None
     for request in (SetSpeed(4.0), SetPlaying(True)):
         view.handle(request)
-    found = view.look(10.5)
+    assert look(view, 10.0) is not None
+    found = look(view, 10.5)
     assert found is not None
-    assert found[1].t_s == pytest.approx((made.tape.begin_s or 0.0) + 2.0)
+    assert found[1].t_s == pytest.approx((made.tape.span_s or (0.0, 0.0))[0] + 2.0)
     clock_s = 10.5
-    while view.look(clock_s) is not None:
+    while look(view, clock_s) is not None:
         clock_s += 0.5
         assert clock_s < 20.0
     assert not view.is_past
@@ -121,11 +128,11 @@ def test_rejected_messages_are_counted_and_do_not_fill_the_disk(tmp_path: Path) 
     team = Team()
     made = Recording(tmp_path, team)
     team.hear("Kim", place(TOWER, 1.0, 2.0, 0))
-    before = made.recorder.offset
+    before = made.file.offset
     for k in range(500):
         team.put_bytes(f"echostep/red/x{k}/estimate", bytes(8000))
     team.pass_time(2.0)
-    assert made.recorder.offset - before < 1000
+    assert made.file.offset - before < 1000
     player, _ = played(made.close())
     assert "500 x" in player.scene().refused
 
@@ -181,7 +188,6 @@ def test_keyframes_are_bounded_and_a_seek_finds_the_nearest(tmp_path: Path, monk
     assert len(made.tape._keyframes) <= 8
     times_s = [keyframe.t_s for keyframe in made.tape._keyframes]
     found = made.tape.before(team.now_s - 20.0)
-    assert found is not None
     assert found.t_s == max(t_s for t_s in times_s if t_s <= team.now_s - 20.0)
     made.close()
 

@@ -9,11 +9,10 @@ from typing import Any
 
 import pytest
 
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.ports.chunks import portion_of
-from echostep_app.session.sinks import MarkSink
-from echostep_app.session.team import mark_feed
-from echostep_app.session.team.mark_feed import MarkFeed
+from echostep_app.session.sinks import mark_sink
+from echostep_app.session.team.feeds import MarkFeed
 from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.team.endpoint import parse_outlet
 from echostep_app.team.messages.report import ReportedAlarm
@@ -32,11 +31,11 @@ WORDS = "Ben sends you to anna, in distress: Ground floor, in Meeting"
 @pytest.mark.long
 @needs_broker
 def test_who_is_sent_gets_the_way(browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mark_feed, "LOOK_S", 0.0)
+    monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     with Broker(tmp_path) as broker, Commander(broker.url) as ben, Walk(10.0, 1.0, stands=True) as walk:
         outlet = parse_outlet([broker.url], "bo", "red")
         subscription = TeamSubscription(outlet.endpoints[0], print)
-        sink = MarkSink(MarkFeed(subscription, outlet, "0123abcd", load_plan(PLAN).digest), walk.page)
+        sink = mark_sink(MarkFeed(subscription, outlet, "0123abcd", load_plan(PLAN).digest), walk.page)
         subscription.open()
         boxes = [box_to(broker.url, name=name) for name in ("anna", "bo")]
         lying = replace(POSITION, x_m=MEETING_M[0], y_m=MEETING_M[1], where="in Meeting")

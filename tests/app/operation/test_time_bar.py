@@ -13,7 +13,8 @@ from websockets.typing import Origin
 
 from echostep_app.operation.operation import Operation
 from echostep_app.operation.page import TablePage
-from echostep_app.operation.recorded.tape import Tape, load
+from echostep_app.operation.recorded.player import load
+from echostep_app.operation.recorded.tape import Tape
 from echostep_app.page.server import Address
 from operation.teams import TOWER, Recording, ServedTeam, Team, place, whole_team
 from operation.test_command import header_of, socket_of

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from echostep.localization.estimate import Estimate, digest
-from echostep.plan.model import Georeference, Plan, load_plan
+from echostep.localization import Estimate, digest
+from echostep.plan import Georeference, Plan, load_plan
 from echostep.ports.chunks import portion_of
-from echostep.recording.reading import open_recording
+from echostep.recording import open_recording
 from echostep.tracker import Tracker
 from echostep_app.output.derived import TOPICS, Derived, east_north
 from echostep_app.output.foxglove import FRAME, LOCATION, POSE, SCENE

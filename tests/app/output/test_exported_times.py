@@ -10,10 +10,9 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 
-from echostep.localization.estimate import Estimate, digest
-from echostep.plan.model import load_plan
-from echostep.recording.clock import utc_offset_ns
-from echostep.recording.reading import open_recording
+from echostep.localization import Estimate, digest
+from echostep.plan import load_plan
+from echostep.recording import open_recording, utc_offset_ns
 from echostep_app.output.track_files import export
 from echostep_app.recording.recorder import Recorder
 from echostep_app.session.options import TrackingOptions

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization import Estimate, TrackStatus
 from echostep.path import MeasuredSegment, PathSegment
 from echostep_app.output.ping_poses import placed_pings
 from echostep_app.session.acceptance.heard import SeenPings

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from echostep.foot.steps import Stance, Step, walk_track
 from echostep.foot.trunk_path import GaitSettings, TrunkPath
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization import Estimate, TrackStatus
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.tracker import Tracker

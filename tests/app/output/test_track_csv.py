@@ -7,8 +7,7 @@ import csv
 from dataclasses import replace
 from pathlib import Path
 
-from echostep.localization.estimate import TrackStatus
-from echostep.localization.particles.places import LikelyPlace
+from echostep.localization import LikelyPlace, TrackStatus
 from echostep.walk.table import write_track
 from page.frames import told
 

@@ -17,13 +17,13 @@ from pyarrow import parquet
 
 from command_line import echostep
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.plan.georeference import EarthTransform
-from echostep.plan.model import load_plan
-from echostep.recording.clock import clock_of
-from echostep.recording.reading import open_recording
-from echostep_app.output.track_files import FORMATS, TrackOnPlan
+from echostep.localization import Estimate, TrackStatus
+from echostep.plan import load_plan
+from echostep.recording import clock_of, open_recording
+from echostep_app.output.map_files import TrackOnPlan
+from echostep_app.output.track_files import FORMATS
 from echostep_app.output.track_files import export as write
+from echostep_app.plan.georeference import EarthTransform
 from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.contents import info
 from echostep_app.session.options import TrackingOptions

@@ -15,10 +15,9 @@ from typing import Any
 
 from board_runs import ROOT
 from echostep.foot.steps import Step
-from echostep.localization.estimate import Estimate
-from echostep.localization.particles.start import Start
+from echostep.localization import Estimate, Start
 from echostep.path import PathSegment
-from echostep.plan.model import Pose, load_plan
+from echostep.plan import Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.guided_run import GuidedRun

@@ -18,8 +18,8 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 from board_runs import ROOT
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.plan.model import load_plan
+from echostep.localization import Estimate, TrackStatus
+from echostep.plan import load_plan
 from echostep_app.page.elements.echo_lines import EchoLine
 from echostep_app.page.elements.scene import PageScene, ParticleSample
 from echostep_app.page.mailbox import Mailbox

@@ -29,7 +29,7 @@ MODULES: dict[str, tuple[str, ...] | None] = {
     "page/elements/alarm.py": None,
     "page/elements/guidance.py": None,
     "page/elements/likely_places.py": None,
-    "page/elements/meetings.py": None,
+    "page/elements/marks.py": None,
     "page/elements/scene.py": None,
     "page/elements/stream_rates.py": None,
     "page/elements/taps.py": None,

@@ -27,7 +27,7 @@ from websockets.sync.client import connect
 from websockets.typing import Origin
 
 from board_runs import ROOT
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep_app.commands.actions.beacon_player import simulate_gateway
 from echostep_app.simulation.devices.board import PythonBoard, Sent
 from echostep_app.simulation.scenario import Scenario

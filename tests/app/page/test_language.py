@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from echostep.plan.model import Plan, load_plan
+from echostep.plan import Plan, load_plan
 from echostep_app.commands.options import Language
 from echostep_app.page.editor import EditServer
 from echostep_app.page.elements.guidance import ShownGuidance

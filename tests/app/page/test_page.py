@@ -14,9 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.localization.estimate import Estimate, digest
-from echostep.localization.limits import BELIEVED, PROBABLE
-from echostep.plan.model import Pose
+from echostep.localization import BELIEVED, PROBABLE, Estimate, digest
+from echostep.plan import Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import PERSON, Call, CheckIn, Undo, parse_person
 from echostep.tracker import Tracker

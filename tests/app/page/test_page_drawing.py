@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import NO_PLAN, Pose
+from echostep.plan import NO_PLAN, Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.page import protocol
@@ -27,7 +27,7 @@ from echostep_app.page.elements.drawn_walls import (
 )
 from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import Mailbox
-from echostep_app.page.shared_drawing import SharedDrawing
+from echostep_app.page.shared import SharedDrawing
 from page.browser import DESK, LOCAL, PHONE, demo_walk, loaded_page, overflow, picture, wait_for
 from page.frames import told
 from waiting import until

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.plan.importers.formats import import_plan
 from page.browser import NAMES, looking, wait_for

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from echostep.plan.model import Georeference, Plan
+from echostep.plan import Georeference, Plan
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.plan.places.bearing import heading_words, north_rad
 from operation.teams import ServedTeam, Team, place

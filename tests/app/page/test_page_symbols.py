@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from echostep.plan.model import Connector, Plan
+from echostep.plan import Connector, Plan
 from echostep_app.page.mailbox import Mailbox
 from operation.teams import ServedTeam, Team, place
 from page.browser import READY, loaded_page, wait_for

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from echostep.localization.estimate import TrackStatus
-from echostep.plan.model import Georeference, Plan
+from echostep.localization import TrackStatus
+from echostep.plan import Georeference, Plan
 from echostep_app.page.elements.echo_lines import EchoLine
 from echostep_app.page.elements.scene import PageScene
 from echostep_app.page.elements.stream_rates import StreamRates

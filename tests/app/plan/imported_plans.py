@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from echostep.plan.model import Plan, Pose
+from echostep.plan import Plan, Pose
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.writer import plan_json
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from board_runs import ROOT
-from echostep.plan.georeference import EarthTransform
-from echostep.plan.model import NO_PLAN, Georeference, load_plan
+from echostep.plan import NO_PLAN, Georeference, load_plan
 from echostep_app.operation.words import shown_details
 from echostep_app.output.terminal import describe
 from echostep_app.page.mailbox import Mailbox
+from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.places.bearing import heading_words
 from echostep_app.team.commander import table
 from echostep_app.team.messages.report import encode

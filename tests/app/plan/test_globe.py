@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from board_runs import ROOT
-from echostep.plan.georeference import EarthTransform
-from echostep.plan.model import Georeference, load_plan
+from echostep.plan import Georeference, load_plan
+from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.places.globe import globe_of, utm_band, utm_zone
 
 PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.plan.plan_file import MOST_CORNERS
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers import limited

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport

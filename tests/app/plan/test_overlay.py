@@ -16,8 +16,8 @@ import pytest
 
 from board_runs import ROOT
 from command_line import echostep
-from echostep.plan.georeference import EarthTransform
-from echostep.plan.model import Georeference, Plan, load_plan
+from echostep.plan import Georeference, Plan, load_plan
+from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.pictures.overlay import EDGE_M, Overlay, overlays, write_overlays
 from echostep_studies.simulation.tower import tower
 

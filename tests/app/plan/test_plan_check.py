@@ -20,7 +20,7 @@ from matplotlib.image import imread
 from typer.testing import CliRunner
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Level, Plan, load_plan, parse_plan
+from echostep.plan import Level, Plan, load_plan, parse_plan
 from echostep_app.cli import app
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.cropping import within

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import command_line
-from echostep.plan.model import Door, load_plan
+from echostep.plan import Door, load_plan
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.importers.summary import MOST_LINES, doors_in_gaps, summary
 from plan.drawings.drawn_houses import Gap, loose, outlines, write_house

@@ -13,7 +13,7 @@ from ezdxf.filemanagement import new
 from typer.testing import CliRunner
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan, load_plan
+from echostep.plan import Plan, load_plan
 from echostep_app.cli import app
 from echostep_app.plan.importers.dxf import entities as dxf_entities
 from echostep_app.plan.importers.formats import import_plan, open_plan

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.report import ImportReport
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers.formats import import_plan, open_plan
 from echostep_app.plan.importers.osm.elements import levels_of

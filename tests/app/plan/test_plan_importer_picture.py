@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 
 import command_line
 from echostep.errors import EchostepError
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep_app.plan.importers.formats import NEXT_STEPS, PICTURES, import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.raster.picture import threshold

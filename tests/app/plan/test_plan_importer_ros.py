@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.plan.importers.formats import NEXT_STEPS, import_plan, open_plan
 from echostep_app.plan.importers.report import ImportReport
 

@@ -13,7 +13,7 @@ import shapely
 
 from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan, load_plan
+from echostep.plan import Plan, load_plan
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.writer import save_plan

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Connector, Door, Georeference, Level, Plan, Pose, Question, Room, load_plan, parse_plan
+from echostep.plan import Connector, Door, Georeference, Level, Plan, Pose, Question, Room, load_plan, parse_plan
 from echostep_app.plan.writer import plan_json, save_plan
 
 GOOD: dict[str, Any] = {

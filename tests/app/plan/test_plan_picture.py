@@ -10,7 +10,7 @@ import matplotlib.font_manager as fonts
 import pytest
 
 import command_line
-from echostep.plan.model import Plan, load_plan
+from echostep.plan import Plan, load_plan
 from echostep_app.plan.pictures import drawing, labels
 from echostep_app.plan.pictures.drawing import draw_plan
 

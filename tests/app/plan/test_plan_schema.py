@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from jsonschema import Draft202012Validator
 
 from board_runs import ROOT
-from echostep.plan.model import Plan, parse_plan
+from echostep.plan import Plan, parse_plan
 from echostep_app.plan.writer import plan_json
 from plan.test_plan_model import FULL, GOOD, PLANS, WRONG
 

@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 from echostep.arrays import Floats
-from echostep.plan.model import NO_PLAN, Connector, ConnectorKind, Door, Level, Plan
+from echostep.plan import NO_PLAN, Connector, ConnectorKind, Door, Level, Plan
 from echostep_app.plan.pictures.symbols import HALF_JAMB_M, HALF_WINDOW_M, MOST_TREADS, level_lines, way_names
 
 LINE = (2.0, 0.0, 3.0, 0.0)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.plan.georeference import EarthTransform
-from echostep.plan.model import Georeference
+from echostep.plan import Georeference
+from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.two_points import LEAST_M, MOST_SHARE, fit_two_points, parse_two_points
 
 TRUE = [

@@ -10,7 +10,7 @@ import pytest
 
 from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep.plan.model import Level, Plan, Pose, Room, load_plan
+from echostep.plan import Level, Plan, Pose, Room, load_plan
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.places.gaps import door_gaps
 from echostep_app.plan.places.standing import StandingGround, refuse_impossible

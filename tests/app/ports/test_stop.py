@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 
 from command_line import echostep
-from echostep.ports.chunks import Chunk, ChunkQueue
-from echostep.recording.reading import open_recording
+from echostep.ports.chunks import Chunk
+from echostep.recording import open_recording
+from echostep_app.ports.chunk_queue import ChunkQueue
 from echostep_app.ports.serial_ports import SerialPorts
 from echostep_app.recording.recorder import Recorder
 from echostep_app.session.runs import live

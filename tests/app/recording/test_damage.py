@@ -18,17 +18,17 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from command_line import echostep
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk
+from echostep.recording import Recording, open_recording
 from echostep.recording.damage.placing import Placement
 from echostep.recording.mcap_records import HEAD_SIZE, RAW_ENCODING
-from echostep.recording.reading import Recording, open_recording
 from echostep.tracker import Tracker
 from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.contents import info
 from echostep_app.recording.repair.edit import cut, repair
 from echostep_app.session.losses import skipped
-from reliability.flip_recording import arrival_offsets
+from recording.damages import arrival_offsets, flipped
 from walks import DEMO, walk_chunks
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(1200)]
@@ -43,12 +43,6 @@ def content() -> bytes:
             for chunk in CHUNKS:
                 recorder.write(chunk)
         return (Path(folder) / "a.mcap").read_bytes()
-
-
-def flipped(whole: bytes, offset: int, bit: int) -> bytes:
-    damaged = bytearray(whole)
-    damaged[offset] ^= 1 << bit
-    return bytes(damaged)
 
 
 def read(path: Path) -> tuple[Recording, list[Chunk]]:

@@ -21,8 +21,8 @@ from mcap.writer import CompressionType, Writer
 
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
+from echostep.recording import open_recording
 from echostep.recording.mcap_records import RAW_ENCODING
-from echostep.recording.reading import open_recording
 from echostep_app.output.derived import PRESSURE
 from echostep_app.recording.recorder import DerivedMessage, Recorder
 from echostep_app.recording.repair.contents import info

@@ -10,10 +10,8 @@ import pytest
 from mcap.reader import make_reader
 
 from echostep.ports.chunks import Chunk
-from echostep.recording.clock import utc_offset_ns
-from echostep.recording.joining import open_parts
+from echostep.recording import open_parts, open_recording, utc_offset_ns
 from echostep.recording.mcap_records import METADATA_NAME
-from echostep.recording.reading import open_recording
 from echostep_app.recording.numbered import numbered_recorder
 from echostep_app.recording.recorder import Recorder, begin_file
 from echostep_app.recording.repair.contents import info

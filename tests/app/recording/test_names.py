@@ -12,7 +12,7 @@ import pytest
 from command_line import echostep
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
-from echostep.recording.reading import open_recording
+from echostep.recording import open_recording
 from echostep_app.recording import background_writer, names
 from echostep_app.recording.recorder import DerivedMessage, Recorder, Topic
 from echostep_app.recording.repair.edit import cut, repair

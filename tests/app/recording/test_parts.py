@@ -10,8 +10,7 @@ import pytest
 
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
-from echostep.recording.joining import open_parts
-from echostep.recording.reading import open_recording
+from echostep.recording import open_parts, open_recording
 from echostep_app.output.derived import PRESSURE
 from echostep_app.recording import names
 from echostep_app.recording.numbered import numbered_recorder

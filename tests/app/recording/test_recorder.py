@@ -16,9 +16,9 @@ from mcap.writer import CompressionType, Writer
 
 from echostep.errors import EchostepError
 from echostep.ports.chunks import LATEST_NS, Chunk
+from echostep.recording import open_recording
 from echostep.recording.mcap_records import RECORD_LIMIT, decompress_chunk, port_of
 from echostep.recording.message_runs import PORTION_BYTES
-from echostep.recording.reading import open_recording
 from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.recovery import Recovery
 from waiting import PATIENCE_S, until

@@ -16,7 +16,7 @@ import pytest
 
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
-from echostep.recording.reading import open_recording
+from echostep.recording import open_recording
 from echostep_app.recording.background_writer import BackgroundWriter
 from echostep_app.recording.recorder import RAW_LIMIT, Recorder
 from reliability.kill_recorder import kill_once

@@ -13,7 +13,7 @@ import pytest
 from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
 from echostep.walk.table import write_track

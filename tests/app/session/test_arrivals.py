@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import pytest
 
-from echostep.localization.estimate import TrackStatus
+from echostep.localization import TrackStatus
 from echostep.ports.chunks import BOARD, FOOT, MTX, Chunk, portion_of
-from echostep_app.session import arrivals
-from echostep_app.session.arrivals import Arrivals
+from echostep_app.session import losses
+from echostep_app.session.losses import Arrivals
 from session.test_losses import Run
 
 S = 1_000_000_000
@@ -26,13 +26,13 @@ def test_a_port_that_fell_silent_is_named_with_its_time(monkeypatch: pytest.Monk
     made = heard(**{BOARD: 60, FOOT: 20})
     assert made.silent() == ["nothing came from the foot board since 19 s, for the last 40 s"]
     made.urls = {BOARD: "/dev/ttyACM0", FOOT: "/dev/ttyACM1"}
-    monkeypatch.setattr(arrivals, "now_ns", lambda: 160 * S)
+    monkeypatch.setattr(losses, "now_ns", lambda: 160 * S)
     assert made.silent() == ["nothing came from the foot board (/dev/ttyACM1) since 19 s, for the last 41 s"]
     assert made.worn_s == pytest.approx(60.0)
 
 
 def test_a_port_that_never_sent_is_named_and_a_whole_run_has_no_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(arrivals, "now_ns", lambda: 160 * S)
+    monkeypatch.setattr(losses, "now_ns", lambda: 160 * S)
     made = heard(**{BOARD: 60})
     made.urls = {BOARD: "a", MTX: "b"}
     assert made.silent() == ["nothing came from the MTx (b) at all"]

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from command_line import echostep
-from echostep.localization.estimate import Estimate
-from echostep.plan.model import NO_PLAN, Plan, load_plan
+from echostep.localization import Estimate
+from echostep.plan import NO_PLAN, Plan, load_plan
 from echostep.ports.chunks import Chunk, Portion, portion_of
 from echostep.tracker import Tracker
 from echostep_app.page.server import Address

@@ -13,9 +13,7 @@ from typing import Any, cast
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.height.levels import ClimbSettings
-from echostep.localization.particles.start import Air, Start
+from echostep.localization import Air, ClimbSettings, Estimate, Start, TrackStatus
 from echostep.tracker import Tracker
 from echostep.tracker.last_place import LastPlace, last_place
 from echostep.walk.recorded import recorded_start

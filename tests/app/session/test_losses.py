@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from board_runs import ROOT
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.plan.model import Pose, load_plan
+from echostep.localization import Estimate, TrackStatus
+from echostep.plan import Pose, load_plan
 from echostep_app.cli import app
 from echostep_app.recording.recorder import Recorder
 from echostep_app.session.losses import Losses

@@ -13,7 +13,7 @@ import pytest
 
 from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep_app.session import results
 from page.frames import told
 from waiting import PATIENCE_S

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from echostep.localization.estimate import Estimate
+from echostep.localization import Estimate
 from echostep.ports.chunks import Portion, portion_of
 from echostep.tracker import Tracker
 from echostep_app.session.options import OutputOptions
 from echostep_app.session.session import Session
-from echostep_app.session.sinks import DerivedSink, Sink
+from echostep_app.session.sinks import Sink, derived_sink
 from page.browser import PLAN, demo_walk
 
 
-class Heard(Sink):
+class Heard:
     """What a sink is called with."""
 
     def __init__(self, tracker: Tracker) -> None:
@@ -27,12 +27,12 @@ class Heard(Sink):
     def arrive(self) -> None:
         self.calls.append("arrive")
 
-    def take(self, portion: Portion, estimates: list[Estimate], /) -> None:
+    def take(self, portion: Portion, estimates: list[Estimate]) -> None:
         assert not estimates or self._tracker.state.estimate == estimates[-1]
         self.calls.append(f"take {len(portion.t_arrival_ns)}")
         self.estimates += estimates
 
-    def end(self, summary: str, /) -> None:
+    def end(self, summary: str) -> None:
         self.calls.append(summary)
 
 
@@ -40,7 +40,7 @@ def test_a_sink_gets_every_portion_and_the_end(tmp_path: Path, monkeypatch: pyte
     start, chunks = demo_walk(beacons=False)
     tracker = Tracker(PLAN, start, seed=1)
     session, sink = Session(tracker, "sinks", "live", OutputOptions(tmp_path, terminal=False)), Heard(tracker)
-    monkeypatch.setattr(session, "_sinks", [sink])
+    monkeypatch.setattr(session, "_sinks", [Sink(sink.take, sink.arrive, sink.end)])
     with session:
         session.track([portion_of(chunks[:3000]), portion_of([]), portion_of(chunks[3000:6000])])
     assert sink.calls == ["arrive", "take 3000", "arrive", "take 0", "arrive", "take 3000"]
@@ -54,7 +54,7 @@ def test_every_writer_gets_what_is_derived() -> None:
     start, chunks = demo_walk(beacons=False)
     tracker = Tracker(PLAN, start, seed=1)
     written: tuple[list[object], list[object]] = ([], [])
-    sink, portion = DerivedSink(tracker, [w.extend for w in written]), portion_of(chunks[:3000])
+    sink, portion = derived_sink(tracker, [w.extend for w in written]), portion_of(chunks[:3000])
     sink.take(portion, tracker.take(portion))
     assert written[0] == written[1]
     assert written[0]

@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.plan.model import load_plan
-from echostep.ports.people.teammate import Teammate, parse_teammate
+from echostep.plan import load_plan
 from echostep.tracker import Tracker
+from echostep_app.ports.teammate import Teammate, parse_teammate
 from echostep_app.session.options import OutputOptions
 from echostep_app.session.session import Session
-from echostep_app.session.team import team_feed
+from echostep_app.session.team import feeds
+from echostep_app.session.team.feeds import TeamFeed
 from echostep_app.session.team.subscription import TeamSubscription
-from echostep_app.session.team.team_feed import TeamFeed
 from echostep_app.team import outbox
 from echostep_app.team.endpoint import parse_endpoint, parse_outlet
 from team.network import box_to
@@ -38,8 +38,8 @@ def test_the_newest_place_of_the_wearer_is_heard_although_the_broker_dies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(outbox, "FRESH_S", PATIENCE_S)
-    monkeypatch.setattr(team_feed, "NEWS_S", 0.0)
-    monkeypatch.setattr(team_feed, "LOOK_S", 0.0)
+    monkeypatch.setattr(feeds, "NEWS_S", 0.0)
+    monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     said: list[str] = []
     heard: list[Teammate | None] = []
     with Broker(tmp_path) as broker:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from echostep.plan.model import Plan, load_plan
+from echostep.plan import Plan, load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.ports.people.meeting import MEETING, parse_meeting
 from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon, TeamBeacons, parse_team_beacons
@@ -35,7 +35,7 @@ def arrival_ns(chunk: Chunk | None) -> int:
 def test_teammates_on_this_plan_can_be_met(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The wearer's own reports, those on another plan and those of another team are not among them."""
     monkeypatch.setattr(outbox, "FRESH_S", PATIENCE_S)
-    monkeypatch.setattr(teammate_feed, "LOOK_S", 0.0)
+    monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     with Broker(tmp_path) as broker:
         feed, subscription = a_feed(broker, load_plan(PLAN), "bo", RUN)
         said: list[tuple[str, ...]] = []
@@ -72,7 +72,7 @@ def test_beacons_reach_teammates_once_and_hostile_ones_are_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Those of this run, of another plan and of another team are not heard; those of an earlier run under the same name are."""
-    monkeypatch.setattr(teammate_feed, "LOOK_S", 0.0)
+    monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     monkeypatch.setattr(teammate_feed, "SHARE_S", 0.0)
     plan = load_plan(PLAN)
     early = TeamBeacons(1, "bo", "0000aaaa", plan.digest, (a_beacon(3),))

@@ -11,7 +11,7 @@ import pytest
 
 import echostep
 import echostep_app
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep_app.operation import requests
 from echostep_app.operation.operation import Operation
 from echostep_app.team.messages.marks import MarkBoard

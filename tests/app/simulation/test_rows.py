@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.plan.model import Level
+from echostep.plan import Level
 from echostep_app.simulation.devices.board_sensors import Adis16100Model, CompassModel, Scp1000Model, WornGyro
 from echostep_app.simulation.people.walker import Walk
 from echostep_app.simulation.stimulus import NO_SYNC, ROW, BoardSensors

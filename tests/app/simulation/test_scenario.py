@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader
-from echostep.plan.model import Plan, load_plan
+from echostep.plan import Plan, load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep.xsens import MtxReader
 from echostep_app.simulation.devices.board import PythonBoard

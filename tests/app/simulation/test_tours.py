@@ -11,7 +11,7 @@ import pytest
 import shapely
 
 from echostep.arrays import Floats
-from echostep.plan.model import Connector, Level, Plan, load_plan
+from echostep.plan import Connector, Level, Plan, load_plan
 from echostep_app.plan.importers.formats import open_plan
 from echostep_app.plan.routing import RoutePlace
 from echostep_app.simulation.people.tours import room_tour, tour

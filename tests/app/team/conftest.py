@@ -5,9 +5,16 @@ from __future__ import annotations
 
 import pytest
 
-from echostep_app.team import outbox
+from echostep_app.team import inbox, outbox
 from team.team_broker import Certificates
 from waiting import PATIENCE_S
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A broken connection is tried again at once."""
+    for module in (inbox, outbox):
+        monkeypatch.setattr(module, "RETRY_PAUSES_S", (0.02, 0.1))
 
 
 @pytest.fixture

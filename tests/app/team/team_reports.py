@@ -9,8 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from board_runs import ROOT
-from echostep.plan.model import load_plan
-from echostep_app.team.messages.report import Motion, Position, Report, ReportedPlace, StreamReport, moment
+from echostep.localization import Estimate
+from echostep.plan import Plan, load_plan
+from echostep.tracker import Tracker
+from echostep_app.printing.lines import moment
+from echostep_app.team.endpoint import Outlet
+from echostep_app.team.messages.report import Motion, Position, Report, ReportedPlace, StreamReport
+from echostep_app.team.publish import Publishing
 
 PLAN = Path(ROOT / "host/core/echostep/plans/demo.json")
 POSITION = Position(12.5, 0.0, 3.0, 2.0, 0.04, 0.01, 0.09, 0.75, 0.5, 0.1, 0, "Ground floor", 0.98, 0.0, 0.1)
@@ -25,3 +30,12 @@ def report(name: str = "anna", sequence: int = 1, at_s: float | None = None, **f
         Motion(7, 9.5, 1.2, 0.4), PLACE, StreamReport(100.0, 360.0, 0, 0, 0, True, ()), "Demo office", load_plan(PLAN).digest, "0.1.0", None, 0,
     )  # fmt: skip
     return replace(made, **fields)
+
+
+def offered(plan: Plan, *estimates: Estimate) -> list[Report]:
+    """What a tracker on this plan offers of these estimates."""
+    reports: list[Report] = []
+    publishing = Publishing(Outlet((), "anna", "red"), Tracker(plan), "live", print)
+    publishing._offer = reports.append  # type: ignore[assignment, method-assign]
+    publishing.publish(estimates)
+    return reports

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from echostep_app.team import inbox, outbox
 from echostep_app.team.endpoint import parse_endpoint
 from echostep_app.team.inbox import ListenerThread
 from echostep_app.team.mqtt.publisher import Listener
@@ -21,16 +20,11 @@ from waiting import until
 
 pytestmark = [
     needs_broker,
+    pytest.mark.usefixtures("quick"),
     pytest.mark.filterwarnings(
         "ignore::pytest.PytestUnraisableExceptionWarning"
     ),  # paho leaves a socket that failed to shake hands to the collector
 ]
-
-
-@pytest.fixture(autouse=True)
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (inbox, outbox):
-        monkeypatch.setattr(module, "RETRY_PAUSES_S", (0.02,))
 
 
 def told(url: str) -> str:
@@ -89,6 +83,7 @@ def test_a_wrong_password_names_what_to_check(tmp_path: Path) -> None:
     assert said.endswith(
         "the broker refuses user me (Not authorized): check user and password, mqtt://USER:PASSWORD@HOST"
     )
+    assert "wrong" not in said
 
 
 def test_reports_that_are_refused_behind_an_accepted_presence_are_told_once(tmp_path: Path) -> None:

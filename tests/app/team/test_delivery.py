@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.tracker import Tracker
 from echostep_app.team.endpoint import Outlet, parse_endpoint
 from echostep_app.team.messages.report import ReportedAlarm

@@ -5,14 +5,9 @@ from __future__ import annotations
 
 import errno
 import socket
-import ssl
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
-import trustme
 
 from echostep.errors import EchostepError
 from echostep_app.team.cot import StreamTransport
@@ -20,39 +15,8 @@ from echostep_app.team.endpoint import parse_endpoint
 from echostep_app.team.faults import in_words
 from echostep_app.team.tls import tls_context
 from free_ports import free_port
-
-
-@pytest.fixture(scope="module")
-def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """An authority, the certificate of `takserver` with its key, and the same of a stranger."""
-    folder, authority = tmp_path_factory.mktemp("tls"), trustme.CA()
-    made = {name: folder / f"{name}.pem" for name in ("ca", "server", "stranger")}
-    authority.cert_pem.write_to_path(str(made["ca"]))
-    for name, issuer in (("server", authority), ("stranger", trustme.CA())):
-        issuer.issue_cert("takserver").private_key_and_cert_chain_pem.write_to_path(str(made[name]))
-    return made
-
-
-@contextmanager
-def tak(files: dict[str, Path], *, tls: bool = True) -> Iterator[int]:
-    """A server for one connection; its port."""
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    context.load_cert_chain(files["server"])
-    with socket.create_server(("127.0.0.1", 0)) as server:
-
-        def serve() -> None:
-            with suppress(OSError), server.accept()[0] as plain:
-                if tls:
-                    with context.wrap_socket(plain, server_side=True) as wrapped:
-                        wrapped.recv(10)
-                else:
-                    plain.sendall(b"MQTT or something else that is no TLS\n" * 10)
-                    plain.recv(1000)
-
-        thread = threading.Thread(target=serve, daemon=True)
-        thread.start()
-        yield server.getsockname()[1]
-    thread.join()
+from team.network import tak
+from team.team_broker import Certificates
 
 
 def fault(url: str) -> str:
@@ -67,23 +31,24 @@ def fault(url: str) -> str:
     return ""
 
 
-def test_a_certificate_of_another_name_is_named_and_its_name_can_be_given(files: dict[str, Path]) -> None:
-    with tak(files) as port:
-        said = fault(f"cot+tls://127.0.0.1:{port}?ca={files['ca']}")
+def test_a_certificate_of_another_name_is_named_and_its_name_can_be_given(certificates: Certificates) -> None:
+    c = certificates
+    with tak(c.elsewhere) as (port, _):
+        said = fault(f"cot+tls://127.0.0.1:{port}?ca={c.ca}")
     assert said.startswith("the server's certificate is for another name: use that name as the host (in /etc/hosts")
     assert "name=NAME" in said
-    with tak(files) as port:
-        assert fault(f"cot+tls://127.0.0.1:{port}?ca={files['ca']}&name=takserver") == ""
-    with tak(files) as port:
-        assert "for another name" in fault(f"cot+tls://127.0.0.1:{port}?ca={files['ca']}&name=other")
+    with tak(c.elsewhere) as (port, _):
+        assert fault(f"cot+tls://127.0.0.1:{port}?ca={c.ca}&name=broker.example") == ""
+    with tak(c.elsewhere) as (port, _):
+        assert "for another name" in fault(f"cot+tls://127.0.0.1:{port}?ca={c.ca}&name=other")
 
 
-def test_an_unknown_authority_and_a_port_without_tls_are_named(files: dict[str, Path]) -> None:
-    with tak(files) as port:
-        said = fault(f"cot+tls://127.0.0.1:{port}?name=takserver")
+def test_an_unknown_authority_and_a_port_without_tls_are_named(certificates: Certificates) -> None:
+    with tak(certificates.elsewhere) as (port, _):
+        said = fault(f"cot+tls://127.0.0.1:{port}?name=broker.example")
     assert said.endswith("does not know: give the file of the authority that has signed it with ca=FILE")
-    with tak(files, tls=False) as port:
-        assert "does not speak TLS" in fault(f"cot+tls://127.0.0.1:{port}?ca={files['ca']}")
+    with tak(None) as (port, _):
+        assert "does not speak TLS" in fault(f"cot+tls://127.0.0.1:{port}?ca={certificates.ca}")
 
 
 def test_faults_of_the_network_say_where_to_look() -> None:

@@ -9,26 +9,23 @@ from xml.etree import ElementTree
 
 import pytest
 
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.particles.places import LikelyPlace
-from echostep.plan.model import Plan, load_plan
+from echostep.localization import Estimate, LikelyPlace, TrackStatus
+from echostep.plan import Plan, load_plan
 from echostep.tracker import Tracker
 from echostep.walk.table import columns_of
 from echostep_app.operation.words import shown_wearer
+from echostep_app.output.map_files import TrackOnPlan
 from echostep_app.output.terminal import describe
-from echostep_app.output.track_files import TrackOnPlan, stretches
 from echostep_app.page.elements.taps import Taps
-from echostep_app.session.console import console
+from echostep_app.printing.console import console
 from echostep_app.session.results import Result, write_results
 from echostep_app.team.cot import events
-from echostep_app.team.endpoint import Outlet
 from echostep_app.team.messages.marks import MarkBoard
 from echostep_app.team.messages.report import Report, ReportedAlarm, decode, encode
 from echostep_app.team.outbox import stamped
-from echostep_app.team.publish import Publishing
 from echostep_app.team.roster import Roster
 from page.frames import told
-from team.team_reports import PLAN, report
+from team.team_reports import PLAN, offered, report
 
 UNIX = 1_800_000_000.0
 OFFICE, CORRIDOR = (6.0, 9.0), (6.3, 7.5)  # of the demo's building
@@ -45,13 +42,10 @@ def plan() -> Plan:
 
 
 @pytest.fixture
-def published(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> list[Report]:
+def published(plan: Plan) -> list[Report]:
     """Lost from the start; then known in an office; then lost for 40 s."""
-    offered: list[Report] = []
-    publishing = Publishing(Outlet((), "anna", "red"), Tracker(plan), "live", print)
-    monkeypatch.setattr(publishing, "_offer", offered.append)
-    publishing.publish([lost(10.0), replace(told(*OFFICE), t_s=20.0), lost(60.0)])
-    return [decode(encode(stamped(made, k, UNIX, 0.0, 0))) for k, made in enumerate(offered)]
+    reports = offered(plan, lost(10.0), replace(told(*OFFICE), t_s=20.0), lost(60.0))
+    return [decode(encode(stamped(made, k, UNIX, 0.0, 0))) for k, made in enumerate(reports)]
 
 
 def test_its_report_has_no_position_and_the_last_known_one_with_its_age(published: list[Report]) -> None:
@@ -101,5 +95,5 @@ def test_the_last_line_of_a_run_says_so(plan: Plan, tmp_path: Path) -> None:
 
 def test_files_for_maps_have_no_point_of_it(plan: Plan) -> None:
     track = TrackOnPlan([told(*OFFICE), lost(10.0), replace(told(*CORRIDOR), t_s=11.0)], plan, [])
-    assert stretches(track) == [[0], [2]]
+    assert track.stretches == [[0], [2]]
     assert columns_of(track.estimates, plan)["status"][1] == "lost"

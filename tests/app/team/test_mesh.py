@@ -18,7 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from echostep.errors import EchostepError
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep_app.team.endpoint import parse_endpoint
 from echostep_app.team.inbox import Inbox, ListenerThread
 from echostep_app.team.mesh import mesh

@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.plan.model import Georeference, load_plan
+from echostep.localization import Estimate, TrackStatus
+from echostep.plan import Georeference, load_plan
 from echostep_app.team import outbox
 from echostep_app.team.cot import event, uid
 from echostep_app.team.endpoint import parse_endpoint

@@ -4,10 +4,6 @@
 from __future__ import annotations
 
 import socket
-import ssl
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -19,7 +15,7 @@ from cryptography.hazmat.primitives.serialization import pkcs12
 from echostep.errors import EchostepError
 from echostep_app.team.endpoint import parse_endpoint
 from echostep_app.team.tls import tls_context
-from waiting import PATIENCE_S
+from team.network import tak
 
 TAK = b"atakatak"  # the password that TAK servers use
 
@@ -48,32 +44,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@contextmanager
-def tak(folder: Path) -> Iterator[tuple[int, list[bytes]]]:
-    """A server that wants a certificate of the authority; its port, and what it was sent."""
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    context.load_cert_chain(folder / "server.pem")
-    context.load_verify_locations(folder / "ca.pem")
-    context.verify_mode = ssl.CERT_REQUIRED
-    received = list[bytes]()
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        server.settimeout(PATIENCE_S)
-
-        def serve() -> None:
-            with (
-                suppress(OSError),
-                server.accept()[0] as plain,
-                context.wrap_socket(plain, server_side=True) as wrapped,
-            ):
-                wrapped.sendall(b"welcome")
-                received.append(wrapped.recv(100))
-
-        thread = threading.Thread(target=serve, daemon=True)
-        thread.start()
-        yield server.getsockname()[1], received
-        thread.join()
-
-
 @pytest.mark.parametrize(
     "query",
     [
@@ -88,7 +58,7 @@ def tak(folder: Path) -> Iterator[tuple[int, list[bytes]]]:
 def test_a_server_that_wants_a_certificate_accepts_it(folder: Path, query: str) -> None:
     context = tls_context(parse_endpoint(f"cot+tls://127.0.0.1?name=takserver&{query.format(folder)}"))
     with (
-        tak(folder) as (port, received),
+        tak(folder / "server.pem", folder / "ca.pem") as (port, received),
         socket.create_connection(("127.0.0.1", port)) as plain,
         context.wrap_socket(plain) as wrapped,
     ):
@@ -106,6 +76,7 @@ def test_a_server_that_wants_a_certificate_accepts_it(folder: Path, query: str) 
         ("cert={0}/locked.pem", "the key is encrypted: write its password into a file, password=FILE"),
         ("cert={0}/locked.pem&password={0}/wrong", "or has another password"),
         ("cert={0}/client.pem&password={0}/none", "password=.*none: there is no such file"),
+        ("ca={0}/none.pem", "ca=.*none.pem: there is no such file"),
         ("cert={0}/ca.pem", "lacks its certificate or its key"),
     ],
 )
@@ -130,7 +101,7 @@ def test_the_key_is_never_written_without_a_password(folder: Path, monkeypatch: 
 
 
 def test_without_the_package_both_remedies_are_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("echostep.extras.find_spec", lambda name: None if name == "cryptography" else object())
+    monkeypatch.setattr("echostep_app.extras.find_spec", lambda name: None if name == "cryptography" else object())
     with pytest.raises(
         EchostepError, match=r"pip install 'echostep\[pkcs12\]'; or once: openssl pkcs12 .* -out tak.pem"
     ):

@@ -17,8 +17,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from echostep.plan.model import load_plan
-from echostep_app.team.commander import _cells, as_tree, notes, table, update_roster
+from echostep.plan import load_plan
+from echostep_app.team.commander import _cells, as_tree, notes, table
 from echostep_app.team.inbox import MESSAGES_PER_TOPIC, Inbox
 from echostep_app.team.messages.report import BadReportError, Motion, Presence, check_name, decode, encode, schema
 from echostep_app.team.roster import CONTRADICTION, MAX_MEMBERS, MAX_REASONS, MemberState, Roster
@@ -125,7 +125,7 @@ def test_no_sequence_of_messages_stops_the_commander(letters: list[tuple[str | N
     inbox, roster = Inbox(), Roster()
     for letter in letters:
         inbox.put(*letter)
-    update_roster(inbox, roster)
+    roster.take(*inbox.take_all())
     assert roster.received == len(letters)
     assert len(roster.members(time.monotonic())) <= 1
     table(roster, load_plan(PLAN), time.monotonic(), connected=False, columns=60)
@@ -279,7 +279,7 @@ def test_a_flood_on_one_topic_costs_the_others_nothing() -> None:
     inbox.put("echostep/red/bob/estimate", encode(said("bob")), False)
     inbox.put("echostep/red/bob/estimate", b"x" * 1_000_000, False)
     inbox.put(None, b"", False)
-    update_roster(inbox, roster)
+    roster.take(*inbox.take_all())
     assert {(m.report.name, m.report.sequence) for m in roster.members(NOW)} == {("anna", 10_000), ("bob", 1)}
     assert roster.rejected == {"flood": 10_000 - MESSAGES_PER_TOPIC, "too long": 1, "unknown topic": 1}
     assert roster.received == 10_003

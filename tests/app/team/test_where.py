@@ -9,26 +9,20 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from echostep.plan.model import NO_PLAN, load_plan
-from echostep.tracker import Tracker
+from echostep.plan import NO_PLAN, load_plan
 from echostep_app.operation.words import level_on
 from echostep_app.team.commander import notes, table
 from echostep_app.team.cot import remarks
-from echostep_app.team.endpoint import Outlet
 from echostep_app.team.messages import report as reports
-from echostep_app.team.messages.report import BadReportError, Report, decode, encode
-from echostep_app.team.publish import Publishing
+from echostep_app.team.messages.report import BadReportError, decode, encode
 from echostep_app.team.roster import Roster
 from page.frames import told
-from team.team_reports import PLAN, POSITION, report
+from team.team_reports import PLAN, POSITION, offered, report
 
 
-def test_a_published_estimate_names_the_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    offered: list[Report] = []
-    publishing = Publishing(Outlet((), "anna", "red"), Tracker(load_plan(PLAN)), "live", print)
-    monkeypatch.setattr(publishing, "_offer", offered.append)
-    publishing.publish([told(6.0, 9.0), told(6.3, 7.5)])
-    assert [made.position.where for made in offered if made.position] == ["in Office 1", "in North corridor"]
+def test_a_published_estimate_names_the_room() -> None:
+    reports = offered(load_plan(PLAN), told(6.0, 9.0), told(6.3, 7.5))
+    assert [made.position.where for made in reports if made.position] == ["in Office 1", "in North corridor"]
 
 
 def test_the_commander_and_tak_see_it() -> None:
@@ -52,13 +46,10 @@ def test_an_older_report_has_no_place_in_words_and_a_hostile_one_is_refused() ->
         decode(reports.encode(report(position=replace(POSITION, where="in \x1b[2J"))))
 
 
-def test_a_wearer_without_a_plan_is_believed_and_meets_nobody_on_a_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wearer_without_a_plan_is_believed_and_meets_nobody_on_a_plan() -> None:
     """Its frame is its own: it is listed, and on no plan."""
-    offered: list[Report] = []
-    publishing = Publishing(Outlet((), "anna", "red"), Tracker(NO_PLAN), "live", print)
-    monkeypatch.setattr(publishing, "_offer", offered.append)
-    publishing.publish([told(6.0, 9.0)])
-    made = replace(report(), position=offered[0].position, plan=offered[0].plan, plan_sha256=offered[0].plan_sha256)
+    (own,) = offered(NO_PLAN, told(6.0, 9.0))
+    made = replace(report(), position=own.position, plan=own.plan, plan_sha256=own.plan_sha256)
     roster, plan = Roster(), load_plan(PLAN)
     assert roster.receive("echostep/red/anna/estimate", encode(made), False, 0.0, made.sent_s)
     (member,) = roster.members(0.0)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from board_runs import ROOT
-from echostep.odometry.wearer import Alarm, AlarmKind, AlarmReason
-from echostep.plan.model import load_plan
+from echostep.odometry import Alarm, AlarmKind, AlarmReason
+from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import PERSON, Call, CheckIn
 from echostep.tracker import Tracker

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from board_runs import ROOT
-from echostep.odometry.wearer import Alarm, AlarmKind, AlarmReason
-from echostep.plan.model import Pose, load_plan
+from echostep.odometry import Alarm, AlarmKind, AlarmReason
+from echostep.plan import Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import PERSON, Call
 from echostep.tracker import Tracker

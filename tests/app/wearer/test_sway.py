@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.odometry.wearer import AlarmKind
+from echostep.odometry import AlarmKind
 from echostep_app.wearer.alarm import ASK_S, SWAY_S, WearerAlarm
 from echostep_app.wearer.stillness import MotionWindows, Window
 from echostep_app.wearer.wearer_signs import StepTaken

@@ -13,7 +13,7 @@ import pytest
 from board_runs import ROOT
 from command_line import echostep, interrupt_once_called, interrupt_when
 from echostep.ports.chunks import Chunk
-from echostep.recording.reading import open_recording
+from echostep.recording import open_recording
 from echostep.xsens import PROJECT, MtxReader, OutputFormat
 from echostep_app.xsens.startup import MtxStart
 from echostep_studies.simulation.devices.mtx_setup import FACTORY, MtxDevice

@@ -17,6 +17,7 @@ from echostep.board.messages import Beacon, Identity
 from echostep.errors import EchostepError
 from echostep.localization.beacons.initialisation import locate_beacon
 from echostep.ports.chunks import BOARD, GATEWAY, Chunk, portion_of
+from echostep_app.board.gateway_words import gateway_words
 from echostep_app.ports.serial_ports import SerialPorts
 from echostep_app.ports.udp import UdpPort
 from echostep_app.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, heard_at, lay_beacons, message
@@ -53,7 +54,7 @@ def test_impossible_words_are_counted_and_named(wrong: dict[str, int], count: st
     gateway = Gateway()
     assert said(gateway, GOOD._replace(**wrong)) == []
     assert getattr(gateway.counts, count) == 1
-    assert count.replace("_", " ") in gateway.describe()
+    assert count.replace("_", " ") in gateway_words(gateway)
 
 
 def test_words_before_the_tracker_has_a_time_are_not_guessed() -> None:
@@ -67,7 +68,7 @@ def test_second_unit_under_a_number_is_refused_and_named() -> None:
     assert len(said(gateway, GOOD)) == 1
     assert said(gateway, GOOD._replace(unit=1), now_s=10.2) == []
     assert gateway.duplicates == {7}
-    assert "two beacons have the number 7" in gateway.describe()
+    assert "two beacons have the number 7" in gateway_words(gateway)
 
 
 def test_a_beacon_that_speaks_too_often_is_a_flood_and_others_are_still_heard() -> None:

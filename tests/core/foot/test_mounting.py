@@ -14,7 +14,7 @@ from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.foot.alignment import Alignment, aligned
 from echostep.foot.steps import Foot, Step, Track, walk_track
-from echostep.plan.model import Plan, load_plan
+from echostep.plan import Plan, load_plan
 from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata

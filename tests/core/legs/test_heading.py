@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from echostep.angles import wrap
-from echostep.legs.heading import CompassErrors, Heading, HeadingSettings, fit_compass_errors
+from echostep.legs.heading import CompassErrors, Heading, HeadingSettings
+from echostep_app.commissioning.fitting import fit_compass_errors
+from echostep_app.offline.leg_track import _adopt_errors
 
 IRON = CompassErrors(math.radians(6), math.radians(-4), math.radians(2), math.radians(1))
 
@@ -105,6 +107,6 @@ def test_a_second_pass_knows_the_bias_from_the_beginning() -> None:
     rate, settings = np.full_like(t, math.radians(0.4)), HeadingSettings(disturbance_rad=math.radians(3.0), same_s=0.1)
     first, second = (Heading(settings, 0.0, math.radians(1.0)) for _ in range(2))
     once = first.feed(t, rate, compass)
-    second.adopt_errors(first)
+    _adopt_errors(second, first)
     assert second.bias_sd_rad_s == first.bias_sd_rad_s
     assert np.abs(second.feed(t, rate, compass)[:, 0]).max() < 0.7 * np.abs(once[:, 0]).max()

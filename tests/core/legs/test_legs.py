@@ -13,10 +13,11 @@ from typer.testing import CliRunner
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.legs.kinematics import CURVE_SPEED, LegLengths, heel_rise
-from echostep.legs.stride import Flag, Stride, StrideSettings, distance_sd_m
+from echostep.legs.stride import Flag, Stride, StrideSettings
 from echostep.legs.strides import StrideEstimator
 from echostep_app.cli import app
 from echostep_app.offline.leg_csv import LegSamples, load_legs
+from echostep_app.offline.leg_side import distance_sd_m
 from echostep_app.offline.leg_summary import describe_legs
 from echostep_app.offline.leg_track import track_default
 from echostep_app.simulation.people.leg_angles import LegDimensions

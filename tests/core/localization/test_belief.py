@@ -12,27 +12,32 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from echostep.localization import (
+    STATED,
+    Building,
+    CloudSettings,
+    Estimate,
+    FilterSettings,
+    MapFilter,
+    Start,
+    TrackStatus,
+)
 from echostep.localization.belief import (
     ANOTHER_M,
     BY_CHANCE,
     HERE_M,
     LEAST,
     PLAN_FITS,
-    STATED,
     TEMPER,
     Belief,
     CloudHypothesis,
     CrossedWalls,
 )
-from echostep.localization.building import Building
-from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.limits import SURE
-from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.particles.start import Start
-from echostep.localization.settings import UNPLANNED_DOOR, CloudSettings, FilterSettings
+from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Pose
+from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
 from naive.belief import ANOTHER, ELSEWHERE, THIS, NaiveBelief
 

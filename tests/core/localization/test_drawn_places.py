@@ -9,14 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from echostep.localization.building import Building
+from echostep.localization import Building, DrawnPlaces, MapFilter, Start, TrackStatus
 from echostep.localization.cloud_estimate import weight_about
-from echostep.localization.drawn_places import DrawnPlaces
-from echostep.localization.estimate import TrackStatus
-from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles.start import Start
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Level, Plan, Pose
+from echostep.plan import Level, Plan, Pose
 from echostep.walls.level_sheet import lay_out_levels
 from echostep_app.plan.places.refusals import refusals
 

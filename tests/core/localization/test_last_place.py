@@ -8,15 +8,13 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization.belief import PLAN_FITS, STATED
-from echostep.localization.building import Building
-from echostep.localization.height.levels import ClimbSettings
-from echostep.localization.map_filter import UNOBSERVED_DOUBT, MapFilter
-from echostep.localization.particles.start import Air, Start
-from echostep.localization.settings import FilterSettings
+from echostep.localization import STATED, Air, Building, ClimbSettings, FilterSettings, MapFilter, Start
+from echostep.localization.belief import PLAN_FITS
+from echostep.localization.map_filter import UNOBSERVED_DOUBT
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.tracker.last_place import MOVED_M, LastPlace, start_after
+from echostep.tracker.last_place import LastPlace
 from echostep.walls.level_sheet import lay_out_levels
+from echostep_app.session.last_place import MOVED_M, start_after
 from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tower
 
 ZERO_M = 100.0  # height by pressure on the lowest floor

@@ -6,8 +6,8 @@ from __future__ import annotations
 import pytest
 
 from board_runs import ROOT
-from echostep.localization.estimate import TrackStatus
-from echostep.plan.model import load_plan
+from echostep.localization import TrackStatus
+from echostep.plan import load_plan
 from echostep.tracker import Tracker
 from page.frames import told
 

@@ -8,12 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization.building import Building
-from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles.start import Start
-from echostep.localization.settings import FilterSettings
+from echostep.localization import Building, FilterSettings, MapFilter, Start
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Pose
+from echostep.plan import Pose
 from echostep.walls.level_sheet import lay_out_levels
 from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tower
 

@@ -8,12 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization.cloud_estimate import estimate
-from echostep.localization.estimate import RISK
+from echostep.localization import ANY_LEVEL, RISK, CloudSettings, Start, estimate_of
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.particles.start import ANY_LEVEL, Start
-from echostep.localization.settings import CloudSettings
-from echostep.plan.model import Pose
+from echostep.plan import Pose
 from echostep.walls.level_sheet import lay_out_levels
 from echostep_studies.simulation.tower import tower
 
@@ -29,4 +26,4 @@ def test_a_level_that_is_not_sure_takes_part_of_the_risk(level: int, other: floa
     cloud = Cloud(CloudSettings(), start, 0.0, np.random.default_rng(1), SHEET)
     share = np.where(cloud.level == 0, 1.0 - other, max(other, 1e-12))
     cloud.log_weight = np.log(share / share.max())
-    assert math.isfinite(estimate(cloud, 0.0, 0.0, 0).protection_m) == is_finite
+    assert math.isfinite(estimate_of(cloud, 0.0, 0.0, 0).protection_m) == is_finite

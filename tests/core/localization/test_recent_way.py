@@ -9,20 +9,25 @@ from functools import cache
 import numpy as np
 import pytest
 
-from echostep.localization.building import Building
-from echostep.localization.echoes.likelihood import EchoSettings, echo_model
+from echostep.localization import (
+    BELIEVED,
+    Air,
+    Building,
+    CloudSettings,
+    EchoSettings,
+    Estimate,
+    MapFilter,
+    Start,
+    TrackStatus,
+    echo_model,
+)
 from echostep.localization.echoes.unplanned import UsablePings
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.limits import BELIEVED
-from echostep.localization.map_filter import MapFilter
 from echostep.localization.motion import height_change, move_of
 from echostep.localization.particle_arrays import Move
 from echostep.localization.particles.cloud import PASSING, Cloud
-from echostep.localization.particles.start import Air, Start
-from echostep.localization.settings import CloudSettings
 from echostep.localization.window import MOST_PIECES, PAST_M, RecentWay
 from echostep.path import MeasuredSegment
-from echostep.plan.model import Plan, Pose
+from echostep.plan import Plan, Pose
 from echostep.walls.level_sheet import lay_out_levels
 from echostep_studies.bench import sites
 from echostep_studies.bench.walks import SimulatedWalk, simulate

@@ -8,14 +8,11 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization.building import Building
+from echostep.localization import Building, CloudSettings, MapFilter, Start
 from echostep.localization.echoes.range_table import AFTER_ECHO, AFTER_SILENCE, INDEPENDENT_M, USED_M, TablePings
 from echostep.localization.grid.search_grid import SearchGrid
-from echostep.localization.map_filter import MapFilter
 from echostep.localization.particle_arrays import PingBatch
 from echostep.localization.particles.cloud import FOUND_REST, Cloud
-from echostep.localization.particles.start import Start
-from echostep.localization.settings import CloudSettings
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 from echostep.walls.echo_sources import Walls
 

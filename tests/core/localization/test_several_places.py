@@ -8,16 +8,21 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization.building import Building
-from echostep.localization.cloud_estimate import Right, estimate
-from echostep.localization.echoes.likelihood import EchoSettings, echo_model
+from echostep.localization import (
+    Building,
+    CloudSettings,
+    EchoSettings,
+    Estimate,
+    Right,
+    Start,
+    TrackStatus,
+    echo_model,
+    estimate_of,
+)
 from echostep.localization.echoes.unplanned import RangeMemory
-from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.grid.search_grid import SearchGrid
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.particles.start import Start
-from echostep.localization.settings import CloudSettings
-from echostep.plan.model import Pose
+from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
 
 APART_M = 30.0
@@ -34,7 +39,7 @@ def _in_two_places(second: float, sd_m: float = 0.1, here: float = 0.9, *, is_se
     cloud.turn_rad = cloud.turn_rad + 0.5 * math.pi * there
     cloud.log_weight = np.log(np.where(there, max(second, 1e-9), 1.0 - second))
     cloud.grid = SearchGrid(CELLS, (np.zeros(1), np.zeros(1)), UNPLANNED) if is_searching else None
-    return estimate(cloud, 0.0, 0.0, 0, right=Right(here))
+    return estimate_of(cloud, 0.0, 0.0, 0, right=Right(here))
 
 
 @pytest.mark.parametrize(("second", "x_m", "heading_rad"), [(0.4, 0.0, 0.0), (0.6, APART_M, 0.5 * math.pi)])
@@ -51,7 +56,7 @@ def test_no_place_that_has_half_of_the_weight_is_the_position() -> None:
     """Three places alike: the mean is as good as any of them."""
     cloud = Cloud(CloudSettings(), Start(Pose(0.0, 0.0, 0.0), 0.1), 0.0, np.random.default_rng(1))
     cloud.x_m = cloud.x_m + APART_M * (np.arange(len(cloud.x_m)) % 3)
-    found = estimate(cloud, 0.0, 0.0, 0)
+    found = estimate_of(cloud, 0.0, 0.0, 0)
     assert found.x_m == pytest.approx(APART_M, abs=1.0)
     assert found.status == TrackStatus.LOST
     assert len(found.hypotheses) == 3

@@ -8,16 +8,13 @@ import pytest
 
 from board_runs import quiet_rows
 from echostep.board.calibration import PRESSURE_PA
-from echostep.localization.building import Building
+from echostep.localization import Building, FilterSettings, MapFilter, Start
 from echostep.localization.height.height_filter import RelativeHeight
 from echostep.localization.height.levels import HeightChange
-from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles.start import Start
-from echostep.localization.settings import FilterSettings
 from echostep.odometry.barometer_start import BarometerStart
 from echostep.odometry.synchronizer import BAROMETER, MEASUREMENT, _measured
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Pose, load_plan
+from echostep.plan import Pose, load_plan
 from echostep.ports.chunks import BOARD, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import lay_out_levels

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from board_runs import ELF, ROOT, TWIN, needs_twin
 from echostep.board.frames import encode
-from echostep.localization.estimate import Estimate
-from echostep.odometry.front_end import FrontEnd
-from echostep.plan.model import load_plan
+from echostep.localization import Estimate
+from echostep.odometry import FrontEnd
+from echostep.plan import load_plan
 from echostep.ports.chunks import FOOT, Chunk, portion_of
 from echostep.settings import Settings
 from echostep.tracker import Tracker

@@ -14,10 +14,10 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.legs.trunk_path import GyroBlock, LegPath, WearerSettings, rotated_segment, segment_after
-from echostep.localization.estimate import Estimate, TrackStatus, digest
+from echostep.localization import Estimate, TrackStatus, digest
 from echostep.odometry.foot_legs_handover import ALIGNED_SD, KEPT_S, FootLegsHandover
 from echostep.path import PathSegment
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.simulation.devices.board import PythonBoard

@@ -22,10 +22,10 @@ from echostep.board.frames import encode
 from echostep.board.messages import ROWS, Outcome, Ping
 from echostep.foot.steps import FootSettings
 from echostep.foot.trunk_path import GaitSettings
-from echostep.odometry.front_end import FrontEnd
+from echostep.odometry import FrontEnd
 from echostep.odometry.synchronizer import BLIND_S, MAX_WAITING, MEASUREMENT, PING_AGE_S, SILENCE_S, Synchronizer
 from echostep.path import Dropout, MeasuredSegment, PathSegment
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.timing.timeline import MtxTiming
 from echostep_app.simulation.devices.board import PythonBoard

@@ -14,12 +14,11 @@ from echostep.board.calibration import RangerSettings
 from echostep.errors import EchostepError
 from echostep.foot.steps import FootSettings
 from echostep.foot.trunk_path import GaitSettings
-from echostep.localization.building import Building
-from echostep.localization.echoes.likelihood import EchoSettings, echo_model
+from echostep.localization import Building, EchoSettings, echo_model
 from echostep.localization.echoes.unplanned import UsablePings
-from echostep.odometry.front_end import FrontEnd
+from echostep.odometry import FrontEnd
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.settings import parse_settings
 from echostep.timing.timeline import MtxTiming

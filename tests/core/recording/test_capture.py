@@ -13,7 +13,7 @@ import command_line
 import echostep
 from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep.recording.capture import Decoder, as_json, read_capture
+from echostep.recording import Decoder, as_json, read_capture
 
 CAPTURES = ROOT / "tests/captures"
 NAMES = ("board.bin", "mtx.bin", "walk.mcap")

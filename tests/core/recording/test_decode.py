@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 import command_line
 from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep.recording.capture import Decoder, as_json, read_capture
-from echostep.recording.capture_summary import summary
+from echostep.recording import Decoder, as_json, read_capture
 from echostep.xsens import MTDATA, MTDATA2, MtMessage, MtSample, OutputFormat, encode_frame
 from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import BY_LENGTH, CONFIGURED, GIVEN, OutputFormats
+from echostep_app.recording.capture_summary import summary
 from echostep_studies.frame.recordings import DATA
 from echostep_studies.simulation.devices.mtx_setup import pack
 from naive.mt_frames import valid_frames

@@ -12,12 +12,12 @@ import pytest
 
 from echostep.board.frames import BoardReader, encode
 from echostep.board.messages import Gyros
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.plan.model import load_plan
-from echostep.ports.arrival_clock import SleepWatch, now_ns
+from echostep.localization import Estimate, TrackStatus
+from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, MtxTiming, Timeline
 from echostep.tracker import Tracker
+from echostep_app.ports.arrival_clock import SleepWatch, now_ns
 from timing.messages import MS, Message, times_of
 from walks import DEMO, walk_chunks
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from board_runs import ELF, ROOT, TWIN, needs_twin
-from echostep.localization.estimate import Estimate, TrackStatus, digest
-from echostep.plan.model import Plan, Pose, load_plan
+from echostep.localization import Estimate, TrackStatus, digest
+from echostep.plan import Plan, Pose, load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.xsens import FrameReader, encode_frame

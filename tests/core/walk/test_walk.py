@@ -16,7 +16,7 @@ import echostep
 from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.foot.steps import FootCounts, Step, Track
-from echostep.plan.model import NO_PLAN, Pose, load_plan
+from echostep.plan import NO_PLAN, Pose, load_plan
 from echostep.walk.table import write_track
 from echostep_app.printing.picture_files import ENDINGS
 from walks import DEMO

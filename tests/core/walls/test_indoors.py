@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.localization.building import Building
-from echostep.localization.limits import PROBABLE
-from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles.start import Start
+from echostep.localization import PROBABLE, Building, MapFilter, Start
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Pose
+from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import walkable_floor
 from echostep.walls.indoors import Indoors, indoors

@@ -16,19 +16,11 @@ from shapely import Point, Polygon
 
 from echostep.arrays import Floats
 from echostep.board import messages as m
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.height.levels import (
-    ClimbSettings,
-    HeightArrays,
-    HeightChange,
-    change_levels,
-    level_change_model,
-)
+from echostep.localization import ANY_LEVEL, ClimbSettings, CloudSettings, Estimate, Start, TrackStatus
+from echostep.localization.height.levels import HeightArrays, HeightChange, change_levels, level_change_model
 from echostep.localization.particle_arrays import Move, ParticleArrays
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.particles.start import ANY_LEVEL, Start
-from echostep.localization.settings import CloudSettings
-from echostep.plan.model import Connector, Level, Plan, Pose
+from echostep.plan import Connector, Level, Plan, Pose
 from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import (

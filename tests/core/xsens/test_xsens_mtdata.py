@@ -289,7 +289,7 @@ def turned(q: np.ndarray, vector: tuple[float, float, float]) -> np.ndarray:
 
 def test_north_west_up_becomes_east_north_up() -> None:
     level = np.array([[1.0, 0.0, 0.0, 0.0]])  # the sensor's x looks north
-    to_map = axes.to_map(level)[0]
+    to_map = axes.product(axes.TO_MAP, level)[0]
     assert np.allclose(turned(to_map, (1.0, 0.0, 0.0)), (0.0, 1.0, 0.0))
     assert np.allclose(turned(to_map, (0.0, 1.0, 0.0)), (-1.0, 0.0, 0.0))
     assert np.allclose(turned(to_map, (0.0, 0.0, 1.0)), (0.0, 0.0, 1.0))
@@ -307,7 +307,7 @@ def test_every_world_becomes_the_map(
     world: int, east: tuple[float, float, float], north: tuple[float, float, float], up: tuple[float, float, float]
 ) -> None:
     """A sensor that lies along the axes of its world: what is east there is east on the map."""
-    q = axes.to_map(axes.to_mt_world(np.array([[1.0, 0.0, 0.0, 0.0]]), world))[0]
+    q = axes.product(axes.TO_MAP, axes.to_mt_world(np.array([[1.0, 0.0, 0.0, 0.0]]), world))[0]
     assert np.allclose([turned(q, v) for v in (east, north, up)], np.eye(3), atol=1e-12)
 
 

@@ -9,49 +9,50 @@ The kinds: `output` (what is written to people), `files` (what is opened, writte
 
 from __future__ import annotations
 
-import json
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 
 from command_line import echostep
 from places import OUT
 from reliability.calls.cases import Case, cases
-from reliability.calls.run import faults_of, run
+from reliability.calls.run import Outcome, faults_of, run
 from reliability.calls.shim import KINDS, Failure, preload
-from reliability.campaign import CampaignJournal, Figure, none, options, report, track
+from reliability.campaign import CampaignJournal, Figure, none, options, report
 
 
-def campaign(case: Case, kind: str, most: int, folder: Path, journal: CampaignJournal) -> None:
-    """All failures of one kind in one command; those in the journal are not run again. `most`: calls, spread evenly over those that are made."""
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What became of a run; `said`: of one that went wrong, the ends of what it printed and of its exceptions."""
+
+    what: str
+    status: int | None
+    faults: list[str]
+    said: str
+
+
+def run_with(case: Case, failure: Failure, folder: Path, sound: Outcome) -> Result:
+    """One run with a failure, beside the `sound` one."""
+    outcome = run(case, failure, folder)
+    faults = faults_of(case, failure, outcome, sound)
+    said = f"{outcome.printed[-500:]} {outcome.crashes[-1500:]}" if faults else ""
+    return Result(f"{case.name}: {failure.kind}", outcome.status, faults, said)
+
+
+def runs_of(case: Case, kind: str, most: int, folder: Path) -> dict[str, Callable[[], Result]]:
+    """All failures of one kind in one command. `most`: calls, spread evenly over those that are made."""
     sound = run(case, Failure(kind, 0), folder / "sound")
     if sound.status != 0 or sound.crashes:
         raise SystemExit(f"{case.name}: it fails by itself: status {sound.status}: {sound.printed} {sound.crashes}")
-    numbers = (
-        sorted({1 + (sound.calls - 1) * k // max(most - 1, 1) for k in range(most)})
-        if sound.calls > most
-        else range(1, sound.calls + 1)
-    )
-    known = {(row["case"], row["kind"], row["call"], row["lasts"]) for row in journal.rows}
-    for call, lasts in track(list(product(numbers, (False, True))), f"{case.name}: {kind}, {sound.calls} calls"):
-        if (case.name, kind, call, lasts) in known:
-            continue
-        failure = Failure(kind, call, lasts)
-        outcome = run(case, failure, folder / "run")
-        faults = faults_of(case, failure, outcome, sound)
-        row = {
-            "case": case.name,
-            "kind": kind,
-            "call": call,
-            "lasts": lasts,
-            "status": outcome.status,
-            "faults": faults,
-        }
-        journal.add(row)
-        if faults:
-            print(json.dumps(row | {"printed": outcome.printed[-500:], "crashes": outcome.crashes[-1500:]}), flush=True)
+    count = min(sound.calls, most)
+    numbers = [1 + (sound.calls - 1) * k // max(count - 1, 1) for k in range(count)]
+    failures = [Failure(kind, call, lasts) for call, lasts in product(numbers, (False, True))]
+    return {f"{case.name}: {failure}": partial(run_with, case, failure, folder / "run", sound) for failure in failures}
 
 
 def main() -> int:
@@ -64,17 +65,18 @@ def main() -> int:
         only=("", "the command of this name alone"),
     )
     preload()
-    journal = CampaignJournal(asked.out)
+    journal, rows = CampaignJournal(asked.out), []
     with tempfile.TemporaryDirectory() as name, cases(Path(name)) as every:
-        chosen = [case for case in every if asked.only in ("", case.name)]
         echostep(*every[1].words(Path(name) / "first"))  # compiles and imports what the forked runs then have
+        chosen = [case for case in every if asked.only in ("", case.name)]
         for case in chosen:
             for kind in sorted(set(case.kinds) & set(asked.kinds)):
-                campaign(case, kind, asked.most, Path(name), journal)
-    counts = Counter((row["case"], row["kind"], row["status"]) for row in journal.rows)
-    rows = [Figure(f"{case}: {kind}, exit status {status}", f"{n:,}") for (case, kind, status), n in counts.items()]
-    wrong = sum(bool(row["faults"]) for row in journal.rows)
-    return report(f"{len(journal.rows):,} runs with a call that failed", [*rows, none("went wrong", wrong)])
+                runs = runs_of(case, kind, asked.most, Path(name))
+                rows += journal.play(f"{case.name}: {kind}", runs, lambda row: str(row) if row["faults"] else "")
+    counts = Counter(f"{row['what']}, exit status {row['status']}" for row in rows)
+    wrong = sum(bool(row["faults"]) for row in rows)
+    figures = [Figure(what, f"{count:,}") for what, count in counts.items()]
+    return report(f"{len(rows):,} runs with a call that failed", [*figures, none("went wrong", wrong)])
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The commands that are run while calls fail, with what they need: a recording, a port that plays a board, an operation.
+"""The commands that are run while calls fail, with what they need: a recording, a port that plays a board.
 
 In: a folder. Out: arguments of each command, the kinds of calls that it makes. Owns the files and the port that the commands read.
 """
@@ -11,8 +11,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from echostep.plan.model import load_plan
-from echostep_app.operation.recorded.record import OperationRecorder
 from echostep_app.recording.recorder import Recorder
 from free_ports import free_port
 from places import PLAN
@@ -42,40 +40,24 @@ class Case:
 @contextmanager
 def cases(folder: Path) -> Iterator[list[Case]]:
     """All cases; their port plays while the block runs."""
-    walk, operation = folder / "walk.mcap", folder / "operation.mcap"
+    walk = folder / "walk.mcap"
     with Recorder(walk, {"seed": "1"}) as recorder:
         for chunk in walk_chunks(WALK_S):
             recorder.write(chunk)
-    recorded = OperationRecorder(operation, load_plan(PLAN), NO_BROKER)
-    recorded.add_condition(1.0, 1.0, 0, {}, connected=False)
-    recorded.close()
-    replay = ("replay", str(walk), "--plan", str(PLAN), "--out", "{out}")
+    plan, out = ("--plan", str(PLAN)), ("--out", "{out}")
     with python_board() as port:
-        ports = ("--board", port, "--seconds", str(LISTEN_S))
-        live = ("live", "--plan", str(PLAN), *ports, "--out", "{out}")
+        ports, files = ("--board", port, "--seconds", str(LISTEN_S)), ("output", "files")
+        replay, live = ("replay", str(walk), *plan, *out), ("live", *plan, *ports, *out)
         publish = ("--publish", NO_BROKER, "--name", "Ann")
-        command = (
-            "command",
-            NO_BROKER,
-            "--plan",
-            str(PLAN),
-            "--seconds",
-            str(LISTEN_S),
-            "--out",
-            "{out}/operation.mcap",
-        )
+        export = ("export", str(walk), *plan, "-o", "{out}/track.csv")
+        command = ("command", NO_BROKER, *plan, "--seconds", str(LISTEN_S), "--out", "{out}/operation.mcap")
         yield [
             Case("replay on a terminal", (*replay, "--no-page"), ("output",), on_terminal=True, repeats=True),
-            Case("replay", (*replay, "--headless"), ("output", "files"), repeats=True),
-            Case("demo", ("demo", "--headless", "--out", "{out}"), ("output", "files"), repeats=True),
-            Case(
-                "export",
-                ("export", str(walk), "--plan", str(PLAN), "-o", "{out}/track.csv"),
-                ("output", "files"),
-                repeats=True,
-            ),
-            Case("record", ("record", *ports, "--out", "{out}/walk.mcap"), ("output", "files", "ports")),
-            Case("live", (*live, "--headless"), ("output", "files", "ports")),
+            Case("replay", (*replay, "--headless"), files, repeats=True),
+            Case("demo", ("demo", "--headless", *out), files, repeats=True),
+            Case("export", export, files, repeats=True),
+            Case("record", ("record", *ports, "--out", "{out}/walk.mcap"), (*files, "ports")),
+            Case("live", (*live, "--headless"), (*files, "ports")),
             Case("live with a page", (*live, "--page", "--port", str(free_port()), *publish), ("output", "sockets")),
-            Case("command", (*command, "--no-page"), ("output", "files", "sockets")),
+            Case("command", (*command, "--no-page"), (*files, "sockets")),
         ]

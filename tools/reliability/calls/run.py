@@ -22,7 +22,7 @@ from pathlib import Path
 from unittest import mock
 
 from echostep.errors import EchostepError
-from echostep.recording.reading import open_recording
+from echostep.recording import open_recording
 from echostep_app.cli import main
 from reliability.calls.cases import Case
 from reliability.calls.shim import Failure, calls_made
@@ -55,15 +55,8 @@ def run(case: Case, failure: Failure, folder: Path) -> Outcome:
     status = _wait(child, terminal[0] if terminal else None)
     for end in terminal or ():
         os.close(end)
-    files, truncated = _files(folder / "out")
-    return Outcome(
-        status,
-        int(_text(folder / "calls") or 0),
-        _text(folder / "printed"),
-        _text(folder / "crashes"),
-        files,
-        truncated,
-    )
+    calls, printed, crashes = (_text(folder / name) for name in ("calls", "printed", "crashes"))
+    return Outcome(status, int(calls or 0), printed, crashes, *_files(folder / "out"))
 
 
 def _be(case: Case, failure: Failure, folder: Path, terminal: int | None) -> None:
@@ -118,14 +111,14 @@ def _files(out: Path) -> tuple[dict[str, str], bool]:
     """Digests of the files by name, a recording's by its chunks, under the name without number; whether a recording is not whole."""
     digests, truncated = {}, False
     for path in sorted(out.rglob("*")):
-        if (
-            path.suffix == ".mcap"
-            and path.lstat().st_nlink == 1
-            and (path.parent / f"{path.name.partition('-')[0]}.mcap").exists()
-        ):
+        name, digest, recorded = (
+            path.name.partition("-")[0].removesuffix(".mcap"),
+            hashlib.sha256(),
+            path.suffix == ".mcap",
+        )
+        if recorded and path.lstat().st_nlink == 1 and path.with_name(f"{name}.mcap").exists():
             continue
-        digest = hashlib.sha256()
-        if path.suffix == ".mcap":
+        if recorded:
             try:
                 recording = open_recording(path)
                 for chunk in recording.chunks():
@@ -135,7 +128,7 @@ def _files(out: Path) -> tuple[dict[str, str], bool]:
                 truncated = True
         elif path.is_file():
             digest.update(path.read_bytes())
-        digests[path.name.partition("-")[0].removesuffix(".mcap")] = digest.hexdigest()
+        digests[name] = digest.hexdigest()
     return digests, truncated
 
 
@@ -161,8 +154,7 @@ def faults_of(case: Case, failure: Failure, outcome: Outcome, sound: Outcome) ->
             faults.append(f"no {', '.join(sorted(missing))}")
         if outcome.truncated and not (outcome.status and any(words in outcome.printed for words in TOLD)):
             faults.append("a recording is not whole, and not both its words and the exit status say so")
-        if case.repeats and (
-            other := [n for n in sound.files if outcome.files.get(n, sound.files[n]) != sound.files[n]]
-        ):
+        other = [name for name, digest in sound.files.items() if outcome.files.get(name, digest) != digest]
+        if case.repeats and other:
             faults.append(f"other than without a fault: {', '.join(other)}")
     return faults

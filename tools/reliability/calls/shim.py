@@ -36,6 +36,9 @@ class Failure:
     call: int
     lasts: bool = False
 
+    def __str__(self) -> str:
+        return f"{self.kind}, call {self.call}{' and all after it' if self.lasts else ''}"
+
     def arm(self, folder: Path) -> None:
         """From now on, in this process; files are those in `folder`."""
         number, error = KINDS[self.kind]

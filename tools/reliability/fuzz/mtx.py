@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Fuzzes the MTx decoder with mutated frames: no exception, bounded memory, and only samples within the limits pass.
 
-In: a number of frames and a seed. Out: frames per second and counts of the reader; a failure ends it by its exception.
+In: a number of frames and a seed. Out: counts of the reader; a failure ends it by its exception. Owns the frames.
 """
 
 from __future__ import annotations
 
-import resource
-import sys
-import time
 from collections import Counter
 
 import numpy as np
@@ -19,7 +16,6 @@ from echostep.xsens.packets import read_packets
 from echostep_app.xsens.requests import project_requests
 from echostep_app.xsens.setup import MtxSetup
 from echostep_studies.simulation.devices.mtx_setup import pack
-from reliability.campaign import Figure, options, report
 
 BLOCK = 20_000  # frames mutated together
 MAX_PENDING = MAX_LENGTH + 6  # bytes of the longest unfinished frame
@@ -123,24 +119,3 @@ def feed_setup(stream: bytes) -> None:
             read_packets(stream[k : k + 60])
         except ValueError:
             continue
-
-
-def main() -> int:
-    asked = options(__doc__, frames=(200_000, "mutated ones"), seed=(1, "of the mutations"))
-    fuzz(2_000, 0)  # compiles the kernels
-    began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    totals = fuzz(asked.frames, asked.seed)
-    elapsed_s = time.perf_counter() - began
-    grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-    return report(
-        f"{totals['frames']} mutated frames, no exception",
-        [
-            Figure("frames/s", f"{totals['frames'] / elapsed_s:.0f}"),
-            Figure("growth of the peak memory", f"{grown:.0f} MB"),
-            *(Figure(name, f"{count}") for name, count in totals.items()),
-        ],
-    )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

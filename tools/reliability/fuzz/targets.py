@@ -15,19 +15,19 @@ from tempfile import TemporaryDirectory
 
 from echostep.board.frames import encode
 from echostep.board.gateway import Gateway
-from echostep.offline.imu_csv import load_imu
-from echostep.plan.model import load_plan, parse_plan
+from echostep.plan import load_plan, parse_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.ports.people.check_in import parse_person
-from echostep.ports.people.tap import Tap, parse_tap
-from echostep.recording.reading import open_recording
+from echostep.recording import open_recording
 from echostep.settings import parse_settings
 from echostep.tracker import Tracker
 from echostep.xsens.message import MessageReader
+from echostep_app.offline.foreign_columns import load_foot
 from echostep_app.offline.leg_csv import load_legs
 from echostep_app.page.requests import parse_request
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.ports.datagram_key import Opener, seal
+from echostep_app.ports.tap import Tap, parse_tap
 from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.recovery import Recovery
 from echostep_app.simulation.devices.beacon_gateway import message
@@ -172,7 +172,7 @@ TARGETS: dict[str, Target] = {
     "wrld-floor": Target(written(lambda folder: write_seven_floors(folder).with_name(FLOOR)), import_floor),
     "ifc": Target(written(write_model), file("a.ifc", import_plan)),
     "legs": Target(csv("t_s,thigh_rad_s,shank_rad_s", 0.0, 0.1), file("a.csv", load_legs)),
-    "imu": Target(csv("t_s,ax,ay,az,gx,gy,gz", 0.0, 0.0, 9.8, 0.0, 0.0, 0.0), file("a.csv", load_imu)),
+    "imu": Target(csv("t_s,ax,ay,az,gx,gy,gz", 0.0, 0.0, 9.8, 0.0, 0.0, 0.0), file("a.csv", load_foot)),
     "pressure": Target(csv("t_s,pressure_pa", 101_325.0, rate_hz=10.0), file("a.csv", load_pressures)),
 }
 ALLOWED = {"plan": (ValueError,), "mqtt": (ValueError,)}  # besides EchostepError: their callers turn it into words

@@ -11,39 +11,37 @@
 
 #include <simavr/avr_ioport.h>
 
-#include "twin.h"
+#include "parts/parts.h"
 
 #define WRITE 0x8000u
+#define POWER_ON 0x0300u
 #define OFFSET_BINARY 0x0010u
 #define MAX_HERTZ 2500000u
-#define FALLING_EDGE(mode) ((mode) == 1 || (mode) == 2)
 #define MID_SCALE 2048
 #define FULL_SCALE 2047
 #define FILTER_S 0.004 /* 40 Hz */
 enum { ST2 = 6, ST1 = 7 };
-
-enum fault { GOOD, ABSENT, WRONG_CHANNEL, STUCK, WEAK, ZEROS, FAULTS };
-static const char *const fault_names[FAULTS] = { "ok", "absent", "wrong_channel", "stuck", "no_self_test", "zeros" };
+enum { WRONG_CHANNEL = OTHER_FAULTS, STUCK, WEAK, ZEROS };
 
 static struct gyro {
 	struct spi_device spi;
-	const char *name;
-	int channel_of_row;
-	enum fault fault;
 	int stuck_rate;
 	double excited; /* counts added by ST1 and ST2 at the time `excited_at` */
 	int response;   /* of this part to ST1 or ST2, counts */
 	uint16_t control, answer, incoming, count;
 	bool garbled; /* the processor uses the wrong clock edge or a too fast clock */
-} gyros[3] = { { .name = "thigh", .channel_of_row = 0 }, { .name = "calf", .channel_of_row = 1 }, { .name = "belt", .channel_of_row = 2 } };
-
+} gyros[3] = {
+	{ .spi = { .part = PART(adis16100, "thigh", PLACE_THIGH), .port = 'B', .pin = 4 } },
+	{ .spi = { .part = PART(adis16100, "calf", PLACE_CALF), .port = 'B', .pin = 5 } },
+	{ .spi = { .part = PART(adis16100, "belt", PLACE_BELT), .port = 'B', .pin = 6 } },
+};
 static bool inputs[2]; /* ST1, ST2 */
 static avr_cycle_count_t excited_at;
 
 /* Counts that the self-test inputs add once the filter has settled. */
 static double target(const struct gyro *g)
 {
-	double response = g->fault == WEAK ? g->response * 0.1 : g->response;
+	double response = g->spi.part.fault == WEAK ? g->response * 0.1 : g->response;
 
 	return (inputs[1] ? response : 0.0) - (inputs[0] ? response : 0.0);
 }
@@ -58,7 +56,6 @@ static double excitation(const struct gyro *g)
 
 static void input_changed(struct avr_irq_t *irq, uint32_t level, void *param)
 {
-	(void)irq;
 	for (int k = 0; k < 3; k++)
 		gyros[k].excited = excitation(&gyros[k]);
 	excited_at = avr->cycle;
@@ -67,8 +64,10 @@ static void input_changed(struct avr_irq_t *irq, uint32_t level, void *param)
 
 static int rate_of(const struct gyro *g)
 {
-	int rate = row.rate[g->channel_of_row] + (int)lround(excitation(g));
+	int rate = row.rate[g - gyros] + (int)lround(excitation(g));
 
+	if (g->spi.part.fault == STUCK)
+		return g->stuck_rate;
 	return rate > FULL_SCALE ? FULL_SCALE : rate < -MID_SCALE ? -MID_SCALE : rate;
 }
 
@@ -82,14 +81,11 @@ static uint16_t convert(const struct gyro *g)
 	unsigned channel = (g->control >> 10) & 3;
 	int value = channel == 0 ? rate_of(g) : channel == 1 ? temperature() : 0;
 
-	if (g->fault == STUCK && channel == 0)
-		value = g->stuck_rate;
-
-	if ((g->control & 0x0300u) != 0x0300u)
-		return 0; /* powered down */
+	if ((g->control & POWER_ON) != POWER_ON)
+		return 0;
 	if (g->control & OFFSET_BINARY)
 		value += MID_SCALE;
-	if (g->fault == WRONG_CHANNEL)
+	if (g->spi.part.fault == WRONG_CHANNEL)
 		channel ^= 1u;
 	return (uint16_t)((channel << 12) | ((unsigned)value & 0xFFFu));
 }
@@ -104,13 +100,8 @@ static void on_select(struct spi_device *self, bool on)
 		g->answer = convert(g);
 	}
 	g->count = 0;
-	if (!on || !kit_of_papers((enum place)(PLACE_THIGH + g->channel_of_row)))
-		return;
-	g->garbled = spi_hertz() > MAX_HERTZ || !FALLING_EDGE(spi_mode());
-	if (spi_hertz() > MAX_HERTZ)
-		bench_trace("adis16100 too fast");
-	else if (g->garbled)
-		bench_trace("adis16100 wrong mode");
+	if (on && part_is_plugged(&self->part))
+		g->garbled = spi_garbles("adis16100", MAX_HERTZ, spi_mode() == 1 || spi_mode() == 2);
 }
 
 static int on_exchange(struct spi_device *self, uint8_t out)
@@ -118,57 +109,55 @@ static int on_exchange(struct spi_device *self, uint8_t out)
 	struct gyro *g = (struct gyro *)self;
 	uint8_t in = (uint8_t)(g->count == 0 ? g->answer >> 8 : g->answer);
 
-	if (g->garbled) { /* all bits arrive one bit late */
-		in = (uint8_t)(in >> 1);
-		out = (uint8_t)(out >> 1);
-	}
-	g->incoming = (uint16_t)(g->incoming << 8 | out);
+	g->incoming = (uint16_t)(g->incoming << 8 | out >> g->garbled);
 	g->count++;
-	if (!kit_of_papers((enum place)(PLACE_THIGH + g->channel_of_row)))
+	if (!part_is_here(&self->part))
 		return SPI_OPEN;
-	return g->fault == ABSENT ? SPI_OPEN : g->fault == ZEROS ? 0 : in;
+	return self->part.fault == ZEROS ? 0 : in >> g->garbled;
 }
 
-void adis16100_power(void)
+static void wire(struct part *self)
 {
-	static bool wired;
+	struct gyro *g = (struct gyro *)self;
 
-	for (int k = 0; k < 3; k++) {
-		struct gyro *g = &gyros[k];
-
-		if (!g->spi.select) {
-			g->spi = (struct spi_device){ 'B', (uint8_t)(4 + k), on_select, on_exchange, false, NULL };
-			spi_add(&g->spi);
-			g->response = 199 + (int)random_below(45);
-		}
-		if (k == 0 && !wired) {
-			wired = true;
-			avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('F'), ST1), input_changed, &inputs[0]);
-			avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('F'), ST2), input_changed, &inputs[1]);
-		}
-		g->excited = 0.0;
-		g->control = g->answer = g->count = 0;
-		g->spi.selected = false;
-	}
+	spi_wire(self);
+	g->response = 199 + (int)random_below(45);
+	if (g != gyros)
+		return;
+	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('F'), ST1), input_changed, &inputs[0]);
+	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('F'), ST2), input_changed, &inputs[1]);
 }
 
-/* After a reset of the processor: its pins are inputs, and the chips pull ST1 and ST2 low. */
-void adis16100_resume(void)
+static void power(struct part *self)
+{
+	struct gyro *g = (struct gyro *)self;
+
+	g->excited = 0.0;
+	g->control = g->answer = g->count = 0;
+}
+
+/* The processor's pins are inputs, and the chips pull ST1 and ST2 low. */
+static void resume(struct part *self)
 {
 	memset(inputs, 0, sizeof inputs);
 	excited_at = avr->cycle;
 }
 
-bool adis16100_fault(const char *name, const char *value)
+static void changed(struct part *self, unsigned before)
 {
-	for (int k = 0; k < 3; k++)
-		if (!strcmp(name, gyros[k].name)) {
-			for (int f = 0; f < FAULTS; f++)
-				if (!strcmp(value, fault_names[f])) {
-					gyros[k].stuck_rate = row.rate[gyros[k].channel_of_row];
-					gyros[k].fault = (enum fault)f;
-					return true;
-				}
-		}
-	return false;
+	struct gyro *g = (struct gyro *)self;
+
+	g->stuck_rate = row.rate[g - gyros];
 }
+
+const struct model adis16100 = {
+	.kind = OF_PAPERS,
+	.faults = "ok absent wrong_channel stuck no_self_test zeros",
+	PARTS(gyros),
+	.wire = wire,
+	.power = power,
+	.resume = resume,
+	.changed = changed,
+	.select = on_select,
+	.exchange = on_exchange,
+};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * BMP390 barometer on SPI [BST-BMP390-DS002]: modes 0 and 3, at most 10 MHz; a read returns a dummy byte first.
+ * BMP390 barometer on SPI [BST-BMP390-DS002]: modes 0 and 3, at most 10 MHz; a read returns a dummy byte first, and a frame writes one byte.
  *
  * In normal mode it measures at 200 Hz / 2^ODR; a measurement sets its bit in STATUS, and reading the pressure clears it. The counts are
  * those from which the data sheet's compensation (8.5, 8.6) returns the row's pressure and temperature: found by bisection. */
@@ -8,22 +8,20 @@
 
 #include <simavr/sim_cycle_timers.h>
 
-#include "twin.h"
+#include "parts/parts.h"
 
 enum { CHIP_ID = 0x00, REV_ID, ERR_REG, STATUS, DATA, IF_CONF = 0x1A, PWR_CTRL, OSR, ODR, COEFFICIENTS = 0x31, CMD = 0x7E, REGISTERS = 0x80 };
 enum { READY_FOR_COMMANDS = 0x10, PRESSURE_READY = 0x20, TEMPERATURE_READY = 0x40, NORMAL = 0x30, THREE_WIRES = 1, SOFT_RESET = 0xB6 };
-#define MAX_HERTZ 10000000u
+enum { ZEROS = OTHER_FAULTS, WRONG_IDENTITY, EMPTY, STUCK_READY, NEVER_READY };
+#define IDENTITY 0x60
+#define OTHER_IDENTITY 0x58 /* a BMP280 */
 #define START_UP US(2000)
 #define FASTEST US(5000)
-#define RISE_NS 410u /* to 0.8 VDDIO, by 10 kohm and at most 50 pF behind the breakout's BSS138, computed */
 #define FULL_SCALE 0xFFFFFFu
 
-static struct spi_device spi;
-static enum fault { GOOD, ABSENT, ZEROS, WRONG_IDENTITY, EMPTY, STUCK_READY, NEVER_READY, FAULTS } fault;
-static const char *const fault_names[FAULTS] = { "ok", "absent", "zeros", "wrong_identity", "empty", "stuck_ready", "never_ready" };
-static uint8_t registers[REGISTERS], address, count;
-static bool garbled, reading;
-static avr_cycle_count_t up_at, sample_at;
+static struct register_file barometers[] = { { .spi = { .part = PART(bmp390, "bmp390", PLACE_PRESSURE), .port = 'D', .pin = 7 } } };
+static uint8_t registers[REGISTERS];
+static avr_cycle_count_t sample_at;
 
 /* PAR_T1 ... PAR_P11 of a typical part, as integers, and their powers of two [8.4]. */
 enum { T1, T2, T3, P1, P2, P3, P4, P5, P6, P7, P8, P9, P10, P11, PARAMETERS };
@@ -45,7 +43,6 @@ static double celsius_of(double raw, double unused)
 {
 	double d = raw - par(T1);
 
-	(void)unused;
 	return d * par(T2) + d * d * par(T3);
 }
 
@@ -82,11 +79,7 @@ static void put24(uint8_t at, uint32_t value)
 
 static avr_cycle_count_t sample(avr_t *a, avr_cycle_count_t when, void *param)
 {
-	double t = row.temperature / 20.0;
-
-	(void)a;
-	(void)param;
-	uint32_t raw_temperature = counts_at(celsius_of, t, 0);
+	uint32_t raw_temperature = counts_at(celsius_of, row.temperature / 20.0, 0);
 
 	put24(DATA, counts_at(pascal_of, row.pressure / 4.0, celsius_of(raw_temperature, 0)));
 	put24(DATA + 3, raw_temperature);
@@ -98,16 +91,14 @@ static avr_cycle_count_t sample(avr_t *a, avr_cycle_count_t when, void *param)
 static void plan_sample(avr_cycle_count_t when)
 {
 	sample_at = when;
-	avr_cycle_timer_cancel(avr, sample, NULL);
 	avr_cycle_timer_register(avr, when - avr->cycle, sample, NULL);
 }
 
-static void restart(void)
+static void power(struct part *self)
 {
 	uint8_t *c = registers + COEFFICIENTS;
 
 	memset(registers, 0, sizeof registers);
-	registers[CHIP_ID] = 0x60;
 	registers[REV_ID] = 0x01;
 	registers[STATUS] = READY_FOR_COMMANDS;
 	registers[OSR] = 0x02;
@@ -118,28 +109,35 @@ static void restart(void)
 			*c++ = (uint8_t)((unsigned)parameters[k].value >> 8 * byte);
 	sample_at = 0;
 	avr_cycle_timer_cancel(avr, sample, NULL);
-	up_at = avr->cycle + START_UP;
+	barometers->up_at = avr->cycle + START_UP;
 }
 
-static uint8_t value_at(uint8_t at)
+static int get(struct register_file *self, uint8_t at)
 {
-	uint8_t value = at < REGISTERS ? registers[at] : 0;
+	unsigned fault = self->part.fault;
+	uint8_t value = registers[at];
 
-	if (at == CHIP_ID && fault == WRONG_IDENTITY)
-		return 0x58; /* a BMP280 */
+	if (fault == ZEROS)
+		return 0;
+	if (registers[IF_CONF] & THREE_WIRES)
+		return SPI_OPEN;
+	if (at == CHIP_ID)
+		return fault == WRONG_IDENTITY ? OTHER_IDENTITY : IDENTITY;
 	if (at >= COEFFICIENTS && at < COEFFICIENTS + 21 && fault == EMPTY)
 		return 0;
 	if (at == STATUS)
-		value = fault == STUCK_READY ? value | PRESSURE_READY : fault == NEVER_READY ? value & (uint8_t)~PRESSURE_READY : value;
+		return fault == STUCK_READY ? value | PRESSURE_READY : fault == NEVER_READY ? value & ~PRESSURE_READY : value;
 	if (at >= DATA && at < DATA + 3)
 		registers[STATUS] &= (uint8_t)~PRESSURE_READY;
 	return value;
 }
 
-static void write_register(uint8_t at, uint8_t value)
+static void set(struct register_file *self, uint8_t at, uint8_t value)
 {
+	if (self->count > 2)
+		return;
 	if (at == CMD && value == SOFT_RESET)
-		restart();
+		power(&self->part);
 	if (at < IF_CONF || at >= COEFFICIENTS) /* read only */
 		return;
 	registers[at] = value;
@@ -147,77 +145,24 @@ static void write_register(uint8_t at, uint8_t value)
 		plan_sample(avr->cycle + (FASTEST << registers[ODR]));
 }
 
-static bool is_mute(void)
-{
-	return !kit_of_2026(PLACE_PRESSURE) || fault == ABSENT || avr->cycle < up_at || garbled;
-}
-
-static void on_select(struct spi_device *self, bool on)
-{
-	(void)self;
-	count = 0;
-	if (!on || !kit_of_2026(PLACE_PRESSURE))
-		return;
-	garbled = spi_hertz() > MAX_HERTZ || spi_outruns(RISE_NS);
-	if (garbled)
-		bench_trace("bmp390 clock too fast");
-}
-
-static int on_exchange(struct spi_device *self, uint8_t byte)
-{
-	uint8_t out = spi_at_rising_edges(byte);
-
-	(void)self;
-	if (is_mute())
-		return SPI_OPEN;
-	if (count++ == 0) {
-		reading = out & 0x80;
-		address = out & 0x7F;
-		return SPI_OPEN;
-	}
-	if (!reading) {
-		if (count == 2)
-			write_register(address, out);
-		return SPI_OPEN;
-	}
-	if (fault == ZEROS)
-		return 0;
-	if (registers[IF_CONF] & THREE_WIRES)
-		return SPI_OPEN;
-	return spi_answer(count == 2 ? 0 : value_at(address++)); /* the dummy byte */
-}
-
-void bmp390_power(void)
-{
-	if (!spi.select) {
-		spi = (struct spi_device){ 'D', 7, on_select, on_exchange, false, NULL };
-		spi_add(&spi);
-	}
-	restart();
-}
-
-/* After a reset of the processor: the chip goes on; simavr has lost the timer. */
-void bmp390_resume(void)
+static void resume(struct part *self)
 {
 	if (sample_at > avr->cycle)
 		plan_sample(sample_at);
 }
 
-bool bmp390_plugged(void)
-{
-	return kit_of_2026(PLACE_PRESSURE) && fault != ABSENT;
-}
-
-bool bmp390_fault(const char *name, const char *value)
-{
-	if (strcmp(name, "bmp390"))
-		return false;
-	for (int f = 0; f < FAULTS; f++)
-		if (!strcmp(value, fault_names[f])) {
-			if (fault == ABSENT && f != ABSENT)
-				restart(); /* plugged in again */
-			fault = (enum fault)f;
-			return true;
-		}
-	return false;
-}
+const struct model bmp390 = {
+	.kind = OF_2026,
+	.faults = "ok absent zeros wrong_identity empty stuck_ready never_ready",
+	PARTS(barometers),
+	.wire = spi_wire,
+	.power = power,
+	.resume = resume,
+	.changed = part_returned,
+	.select = registers_select,
+	.exchange = registers_exchange,
+	.get = get,
+	.set = set,
+	.dummy_bytes = 1,
+	.rise_ns = 410, /* to 0.8 VDDIO, by 10 kohm and at most 50 pF behind the breakout's BSS138, computed */
+};

@@ -1,83 +1,133 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * Which part is plugged in in each place: that of the papers, that of the kit of 2026, none, on a foot board, or a MaxSonar. A part that is plugged
- * in gets its power anew. */
+ * All chips, their power and faults, and which one is plugged in in each place: that of the papers, that of the kit of 2026, none, on a foot
+ * board, or a MaxSonar. A part that is plugged in gets its power anew, and so do the others of its model. */
 #include <string.h>
 
-#include "twin.h"
+#include "parts/parts.h"
 
-enum { OF_PAPERS, OF_2026, EMPTY, MAXSONAR, KINDS };
-
-static void ranger_power(void)
-{
-	pulse_power();
-	maxsonar_power();
-}
+static const struct model *const models[] = {
+	&srf02, &adis16100, &scp1000, &compass, &bmp390, &lis3mdl, &lsm6dso, &pulse, &maxsonar, &icm20649,
+};
+static struct part *parts;
 
 static struct socket {
-	const char *place;
-	const char *parts[KINDS];
-	void (*power)(void);
-	int part;
+	const char *name, *kinds;             /* of its switch, and its values */
+	const struct model *models[2];        /* that get their power anew */
+	enum kind kind;
 } sockets[PLACES] = {
-	[PLACE_RANGER_LEFT] = { "part_ranger_left", { "srf02", "pulse", NULL, "maxsonar" }, ranger_power, OF_PAPERS },
-	[PLACE_RANGER_RIGHT] = { "part_ranger_right", { "srf02", "pulse", NULL, "maxsonar" }, ranger_power, OF_PAPERS },
-	[PLACE_COMPASS] = { "part_compass", { "cmps10", "lis3mdl" }, lis3mdl_power, OF_PAPERS },
-	[PLACE_THIGH] = { "part_thigh", { "adis16100", "lsm6dso" }, lsm6dso_power, OF_PAPERS },
-	[PLACE_CALF] = { "part_calf", { "adis16100", "lsm6dso" }, lsm6dso_power, OF_PAPERS },
-	[PLACE_BELT] = { "part_belt", { "adis16100", "lsm6dso" }, lsm6dso_power, OF_PAPERS },
-	[PLACE_PRESSURE] = { "part_pressure", { "scp1000", "bmp390" }, bmp390_power, OF_PAPERS },
+	[PLACE_FOOT] = { "", "", { &icm20649 }, OF_PAPERS },
+	[PLACE_RANGER_LEFT] = { "part_ranger_left", "srf02 pulse maxsonar", { &pulse, &maxsonar }, OF_PAPERS },
+	[PLACE_RANGER_RIGHT] = { "part_ranger_right", "srf02 pulse maxsonar", { &pulse, &maxsonar }, OF_PAPERS },
+	[PLACE_COMPASS] = { "part_compass", "cmps10 lis3mdl", { &lis3mdl }, OF_PAPERS },
+	[PLACE_THIGH] = { "part_thigh", "adis16100 lsm6dso", { &lsm6dso }, OF_PAPERS },
+	[PLACE_CALF] = { "part_calf", "adis16100 lsm6dso", { &lsm6dso }, OF_PAPERS },
+	[PLACE_BELT] = { "part_belt", "adis16100 lsm6dso", { &lsm6dso }, OF_PAPERS },
+	[PLACE_PRESSURE] = { "part_pressure", "scp1000 bmp390", { &bmp390 }, OF_PAPERS },
 };
-static bool foot; /* a foot board */
 
-bool kit_of_papers(enum place place)
+bool place_has(enum place place, enum kind kind)
 {
-	return sockets[place].part == OF_PAPERS;
+	return sockets[place].kind == kind;
 }
 
-bool kit_of_2026(enum place place)
+bool part_is_plugged(const struct part *part)
 {
-	return sockets[place].part == OF_2026;
+	return place_has(part->place, part->model->kind);
 }
 
-bool kit_has_maxsonar(enum place place)
+bool part_is_here(const struct part *part)
 {
-	return sockets[place].part == MAXSONAR;
+	return part_is_plugged(part) && part->fault != ABSENT;
 }
 
-bool kit_has_foot(void)
+unsigned parts_here(const struct model *model)
 {
-	return foot;
+	unsigned count = 0;
+
+	for (const struct part *p = parts; p; p = p->next)
+		count += p->model == model && part_is_here(p);
+	return count;
 }
 
-static void plug(struct socket *s, int part)
+void parts_init(void)
 {
-	s->part = part;
-	s->power();
+	struct part **end = &parts;
+
+	for (size_t m = 0; m < sizeof models / sizeof *models; m++)
+		for (size_t k = 0; k < models[m]->count; k++) {
+			*end = (struct part *)((char *)models[m]->parts + k * models[m]->size);
+			models[m]->wire(*end);
+			end = &(*end)->next;
+		}
 }
 
-static void plug_all(int part)
+static void power(const struct model *model)
 {
+	for (struct part *p = parts; p; p = p->next)
+		if (p->model == model && model->power)
+			model->power(p);
+}
+
+void parts_power(void)
+{
+	for (size_t m = 0; m < sizeof models / sizeof *models; m++)
+		power(models[m]);
+}
+
+void parts_resume(void)
+{
+	for (struct part *p = parts; p; p = p->next)
+		if (p->model->resume)
+			p->model->resume(p);
+}
+
+static void plug(struct socket *s, enum kind kind)
+{
+	s->kind = kind;
+	for (int k = 0; k < 2 && s->models[k]; k++)
+		power(s->models[k]);
+}
+
+void kit_plug(unsigned choice)
+{
+	static const enum kind kinds[] = { OF_PAPERS, OF_2026, OF_FOOT };
+
 	drive_pin('D', 4, false);
-	foot = part == EMPTY;
 	for (int k = 0; k < PLACES; k++)
-		plug(&sockets[k], part);
-	icm20649_power();
+		plug(&sockets[k], kinds[choice]);
 }
 
 bool kit_fault(const char *name, const char *value)
 {
-	static const char *const kits[] = { "papers", "2026", "foot" };
+	for (int k = 0; k < PLACES; k++) {
+		int kind = strcmp(name, sockets[k].name) ? -1 : choice_of(sockets[k].kinds, value);
 
-	for (int k = 0; !strcmp(name, "kit") && k <= EMPTY; k++)
-		if (!strcmp(value, kits[k])) {
-			plug_all(k);
+		if (kind >= 0) {
+			plug(&sockets[k], (enum kind)kind);
 			return true;
 		}
-	for (int k = 0; k < PLACES; k++)
-		for (int part = 0; !strcmp(name, sockets[k].place) && part < KINDS; part++)
-			if (sockets[k].parts[part] && !strcmp(value, sockets[k].parts[part])) {
-				plug(&sockets[k], part);
-				return true;
-			}
+	}
+	return false;
+}
+
+void part_returned(struct part *part, unsigned before)
+{
+	if (before == ABSENT)
+		part->model->power(part);
+}
+
+bool part_fault(const char *name, const char *value)
+{
+	for (struct part *p = parts; p; p = p->next) {
+		int fault = strcmp(name, p->name) ? -1 : choice_of(p->model->faults, value);
+		unsigned before = p->fault;
+
+		if (fault < 0)
+			continue;
+		p->fault = (unsigned)fault;
+		if (p->model->changed)
+			p->model->changed(p, before);
+		return true;
+	}
 	return false;
 }

@@ -3,12 +3,10 @@
  *
  * A trigger of at least 10 us starts a burst; the echo line rises at its end and falls with the first echo, or after 38 ms without one.
  * Triggers are wired to PF5 and PF4, echo lines to PD4 and PC7 (left, right). The echo is of the own burst, or of the other ranger's. */
-#include <string.h>
-
 #include <simavr/avr_ioport.h>
 #include <simavr/sim_cycle_timers.h>
 
-#include "twin.h"
+#include "parts/parts.h"
 
 #define TRIGGER_LEAST US(10)
 #define BURST_US 450u   /* from the end of the trigger to the rising edge, 8 cycles of 40 kHz and the module's own program */
@@ -20,141 +18,124 @@
 #define HELD_US 70000u /* measured at HC-SR04 modules [forum.arduino.cc 613370: "approximately 70000"] */
 #define LONG_US 200000u /* some modules hold the line so long */
 
-static struct ranger {
-	const char *name;
-	enum place place;
-	char echo_port, echo_pin;
-	enum fault { GOOD, ABSENT, STUCK_LOW, STUCK_HIGH, DEAF, HELD, LONG, FAULTS } fault;
+enum { STUCK_LOW = OTHER_FAULTS, STUCK_HIGH, UNECHOED, HELD, LONG };
+
+static struct pulse_ranger {
+	struct part part;
+	char echo_port;
+	uint8_t echo_pin;
 	bool trigger, line;
 	avr_cycle_count_t triggered_at;
 	struct bursts bursts;
-} rangers[2] = {
-	{ .name = "left", .place = PLACE_RANGER_LEFT, .echo_port = 'D', .echo_pin = 4 },
-	{ .name = "right", .place = PLACE_RANGER_RIGHT, .echo_port = 'C', .echo_pin = 7 },
+} rangers[] = {
+	{ .part = PART(pulse, "pulse_left", PLACE_RANGER_LEFT), .echo_port = 'D', .echo_pin = 4 },
+	{ .part = PART(pulse, "pulse_right", PLACE_RANGER_RIGHT), .echo_port = 'C', .echo_pin = 7 },
 };
-static const char *const fault_names[FAULTS] = { "ok", "absent", "stuck_low", "stuck_high", "deaf", "held", "long" };
-
-static bool is_here(const struct ranger *r)
-{
-	return kit_of_2026(r->place) && r->fault != ABSENT;
-}
 
 /* Without a module the line is open, but for the left one's where SyncOut's buffer or a foot's part drives it. */
-static void set_line(struct ranger *r, bool level)
+static void set_line(struct pulse_ranger *r, bool level)
 {
+	unsigned fault = r->part.fault;
+	enum place place = r->part.place;
+
 	r->line = level;
-	if (is_here(r))
-		drive_pin(r->echo_port, (uint8_t)r->echo_pin, r->fault != STUCK_LOW && (level || r->fault == STUCK_HIGH));
-	else if (r->place == PLACE_RANGER_RIGHT || !(kit_of_papers(r->place) || kit_has_foot()))
-		floating_pin(r->echo_port, (uint8_t)r->echo_pin, true);
+	if (part_is_here(&r->part))
+		drive_pin(r->echo_port, r->echo_pin, fault != STUCK_LOW && (level || fault == STUCK_HIGH));
+	else if (place == PLACE_RANGER_RIGHT || !(place_has(place, OF_PAPERS) || place_has(PLACE_FOOT, OF_FOOT)))
+		floating_pin(r->echo_port, r->echo_pin, true);
 }
 
 static avr_cycle_count_t fall(avr_t *a, avr_cycle_count_t when, void *param)
 {
-	(void)a;
-	(void)when;
 	set_line(param, false);
 	return 0;
+}
+
+/* Until the line falls, without an echo. */
+static uint32_t longest_us(unsigned fault)
+{
+	return fault == LONG ? LONG_US : fault == HELD ? HELD_US : NO_ECHO_US;
 }
 
 /* A burst of the other ranger that begins while this one listens is not heard: a shortcut, it would arrive behind most own echoes. */
 static avr_cycle_count_t rise(avr_t *a, avr_cycle_count_t when, void *param)
 {
-	struct ranger *r = param;
+	struct pulse_ranger *r = param;
+	unsigned side = ranger_side(&r->part), fault = r->part.fault;
+	uint32_t us = bursts_first_echo(&rangers[!side].bursts, when, row.own_us[side], BLANKED_US, WINDOW_US);
 
-	const struct ranger *other = &rangers[r == rangers];
-	uint32_t us = r->fault == DEAF ? 0 : bursts_first_echo(&other->bursts, when, row.own_us[r - rangers], BLANKED_US, WINDOW_US);
-
-	bursts_add(&r->bursts, when, row.cross_us[r == rangers]);
-	if (!us)
-		us = r->fault == LONG ? LONG_US : r->fault == HELD ? HELD_US : NO_ECHO_US;
+	bursts_add(&r->bursts, when, row.cross_us[!side]);
 	set_line(r, true);
-	bench_trace("trigger %s", r->name);
-	avr_cycle_timer_register(a, US(us), fall, r);
+	bench_trace("trigger %s", side ? "right" : "left");
+	avr_cycle_timer_register(a, US(us && fault != UNECHOED ? us : longest_us(fault)), fall, r);
 	return 0;
 }
 
 static void trigger_changed(struct avr_irq_t *irq, uint32_t level, void *param)
 {
-	struct ranger *r = param;
+	struct pulse_ranger *r = param;
 	bool was = r->trigger;
 
-	(void)irq;
-	level = level && !jtag_owns_analog_pins();
-	r->trigger = level;
-	if (level && !was)
+	r->trigger = level && !jtag_owns_analog_pins();
+	if (r->trigger && !was)
 		r->triggered_at = avr->cycle;
-	if (level || !was || r->line || !is_here(r))
+	if (r->trigger || !was || r->line || !part_is_here(&r->part))
 		return;
-	if (avr->cycle - r->triggered_at < TRIGGER_LEAST) {
-		bench_trace("pulse %s trigger too short", r->name);
-		return;
-	}
-	avr_cycle_timer_cancel(avr, rise, r);
-	avr_cycle_timer_register(avr, US(BURST_US + random_below(SPREAD_US)), rise, r);
+	if (avr->cycle - r->triggered_at < TRIGGER_LEAST)
+		bench_trace("pulse %s trigger too short", ranger_side(&r->part) ? "right" : "left");
+	else
+		avr_cycle_timer_register(avr, US(BURST_US + random_below(SPREAD_US)), rise, r);
 }
 
-static void power(struct ranger *r)
+static void wire(struct part *self)
 {
+	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('F'), ranger_side(self) ? 4 : 5), trigger_changed, self);
+}
+
+/* A ping under way is over. */
+static void power(struct part *self)
+{
+	struct pulse_ranger *r = (struct pulse_ranger *)self;
+
 	avr_cycle_timer_cancel(avr, rise, r);
 	avr_cycle_timer_cancel(avr, fall, r);
 	r->bursts = (struct bursts){ 0 };
 	set_line(r, false);
 }
 
-void pulse_power(void)
-{
-	static bool wired;
-
-	for (int k = 0; !wired && k < 2; k++)
-		avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('F'), 5 - k), trigger_changed, &rangers[k]);
-	wired = true;
-	for (int k = 0; k < 2; k++)
-		power(&rangers[k]);
-}
-
-/* After a reset of the processor simavr has lost the timers: a ping under way is over. */
-void pulse_resume(void)
-{
-	pulse_power();
-}
-
 static avr_cycle_count_t glitch_ends(avr_t *a, avr_cycle_count_t when, void *param)
 {
-	struct ranger *r = param;
+	struct pulse_ranger *r = param;
 
-	(void)a;
-	(void)when;
 	if (!r->line)
-		drive_pin(r->echo_port, (uint8_t)r->echo_pin, false);
+		drive_pin(r->echo_port, r->echo_pin, false);
 	set_line(r, r->line);
 	return 0;
 }
 
-/* A disturbance of an echo line that is low, or of SyncOut: high for 3 ms. */
-bool pulse_glitch(const char *value)
+void pulse_glitch(unsigned side)
 {
-	for (int k = 0; k < 2; k++)
-		if (!strcmp(value, rangers[k].name)) {
-			if (!rangers[k].line) {
-				drive_pin(rangers[k].echo_port, (uint8_t)rangers[k].echo_pin, true);
-				avr_cycle_timer_register(avr, GLITCH, glitch_ends, &rangers[k]);
-			}
-			return true;
-		}
-	return false;
+	struct pulse_ranger *r = &rangers[side];
+
+	if (r->line)
+		return;
+	drive_pin(r->echo_port, r->echo_pin, true);
+	avr_cycle_timer_register(avr, GLITCH, glitch_ends, r);
 }
 
-bool pulse_fault(const char *name, const char *value)
+static void changed(struct part *self, unsigned before)
 {
-	if (strncmp(name, "pulse_", 6))
-		return false;
-	for (int k = 0; k < 2; k++)
-		for (int f = 0; !strcmp(name + 6, rangers[k].name) && f < FAULTS; f++)
-			if (!strcmp(value, fault_names[f])) {
-				rangers[k].fault = (enum fault)f;
-				set_line(&rangers[k], rangers[k].line);
-				return true;
-			}
-	return false;
+	struct pulse_ranger *r = (struct pulse_ranger *)self;
+
+	set_line(r, r->line);
 }
+
+const struct model pulse = {
+	.kind = OF_2026,
+	.faults = "ok absent stuck_low stuck_high deaf held long",
+	PARTS(rangers),
+	.wire = wire,
+	.power = power,
+	.resume = power, /* simavr has lost its timers */
+	.changed = changed,
+};

@@ -3,12 +3,12 @@
  *
  * After power-up it is busy for 60 ms; OPERATION 0x09 measures at 9 Hz, 0x0A at 1.8 Hz; DRDY rises with each sample and falls when
  * DATARD16 is read. Writing 1 to RSTR restarts it. DRDY is wired to PE6. */
-#include <string.h>
-
 #include <simavr/sim_cycle_timers.h>
 
-#include "twin.h"
+#include "parts/parts.h"
 
+enum { NO_EEPROM = OTHER_FAULTS, NO_START, DRDY_STUCK, DRDY_LOW, ZEROS };
+enum { FAST_MODE = 0x09, SLOW_MODE };
 enum { REVISION = 0x00, OPERATION = 0x03, RSTR = 0x06, STATUS = 0x07, DATARD8 = 0x1F, DATARD16 = 0x20, TEMPOUT = 0x21 };
 #define MAX_HERTZ 500000u
 #define START_UP US(60000)
@@ -16,32 +16,35 @@ enum { REVISION = 0x00, OPERATION = 0x03, RSTR = 0x06, STATUS = 0x07, DATARD8 = 
 #define FAST US(111000)
 #define SLOW US(556000)
 
-static struct spi_device spi;
-static enum fault { GOOD, ABSENT, NO_EEPROM, NO_START, DRDY_STUCK, DRDY_LOW, ZEROS, FAULTS } fault;
-static const char *const fault_names[FAULTS] = { "ok", "absent", "no_eeprom", "no_start", "drdy_stuck", "drdy_low", "zeros" };
+static struct spi_device barometers[] = { { .part = PART(scp1000, "scp1000", PLACE_PRESSURE), .port = 'D', .pin = 7 } };
 static bool ready, garbled;
 static uint8_t command, count, answer[2], mode;
 static avr_cycle_count_t up_at, sample_at;
 static uint32_t pressure;
 static int16_t temperature;
 
+static unsigned fault(void)
+{
+	return barometers->part.fault;
+}
+
 static void set_ready(bool on)
 {
+	bool shown = part_is_here(&barometers->part) && fault() != DRDY_LOW && fault() != ZEROS;
+
 	ready = on;
-	drive_pin('E', 6, kit_of_papers(PLACE_PRESSURE) && (fault == DRDY_STUCK || (on && fault != DRDY_LOW && fault != ABSENT && fault != ZEROS)));
+	drive_pin('E', 6, shown && (on || fault() == DRDY_STUCK));
 }
 
 static avr_cycle_count_t sample(avr_t *a, avr_cycle_count_t when, void *param)
 {
-	(void)a;
-	(void)param;
 	sample_at = 0;
-	if (mode != 0x09 && mode != 0x0A)
+	if (mode != FAST_MODE && mode != SLOW_MODE)
 		return 0;
-	pressure = mode == 0x09 ? row.pressure & ~15u : row.pressure & ~3u; /* 15 and 17 bits of the 19 */
+	pressure = mode == FAST_MODE ? row.pressure & ~15u : row.pressure & ~3u; /* 15 and 17 bits of the 19 */
 	temperature = row.temperature;
 	set_ready(true);
-	sample_at = when + (mode == 0x09 ? FAST : SLOW);
+	sample_at = when + (mode == FAST_MODE ? FAST : SLOW);
 	return sample_at;
 }
 
@@ -51,8 +54,8 @@ static void load(uint8_t address)
 
 	switch (address) {
 	case REVISION: word = REVISION_D01 << 8; break;
-	case STATUS: word = avr->cycle < up_at || fault == NO_START ? 0x0100 : ready ? 0x2000 : 0; break;
-	case DATARD8: word = (uint16_t)(mode ? (pressure >> 16) << 8 : fault == NO_EEPROM ? 0 : 0x0100); break;
+	case STATUS: word = avr->cycle < up_at || fault() == NO_START ? 0x0100 : ready ? 0x2000 : 0; break;
+	case DATARD8: word = (uint16_t)(mode ? (pressure >> 16) << 8 : fault() == NO_EEPROM ? 0 : 0x0100); break;
 	case DATARD16:
 		word = (uint16_t)pressure;
 		set_ready(false);
@@ -66,15 +69,9 @@ static void load(uint8_t address)
 
 static void on_select(struct spi_device *self, bool on)
 {
-	(void)self;
 	count = 0;
-	if (!on || !kit_of_papers(PLACE_PRESSURE))
-		return;
-	garbled = spi_hertz() > MAX_HERTZ || spi_mode() != 0;
-	if (spi_hertz() > MAX_HERTZ)
-		bench_trace("scp1000 too fast");
-	else if (garbled)
-		bench_trace("scp1000 wrong mode");
+	if (on && part_is_plugged(&self->part))
+		garbled = spi_garbles("scp1000", MAX_HERTZ, spi_mode() == 0);
 }
 
 static void plan_sample(avr_cycle_count_t when)
@@ -83,7 +80,7 @@ static void plan_sample(avr_cycle_count_t when)
 	avr_cycle_timer_register(avr, when - avr->cycle, sample, NULL);
 }
 
-static void restart(void)
+static void power(struct part *self)
 {
 	mode = 0;
 	sample_at = 0;
@@ -94,10 +91,10 @@ static void restart(void)
 
 static int exchange(uint8_t out)
 {
-	if (!kit_of_papers(PLACE_PRESSURE))
+	if (!part_is_here(&barometers->part))
 		return SPI_OPEN;
-	if (fault == ABSENT || fault == ZEROS)
-		return fault == ABSENT ? SPI_OPEN : 0;
+	if (fault() == ZEROS)
+		return 0;
 	if (count++ == 0) {
 		command = out;
 		if (!(command & 2))
@@ -106,11 +103,11 @@ static int exchange(uint8_t out)
 	}
 	if (command & 2) {
 		if (command >> 2 == RSTR && out == 1) {
-			restart();
+			power(&barometers->part);
 		} else if (command >> 2 == OPERATION && out != mode) {
 			mode = out;
 			avr_cycle_timer_cancel(avr, sample, NULL);
-			plan_sample(avr->cycle + (mode == 0x0A ? SLOW : FAST));
+			plan_sample(avr->cycle + (mode == SLOW_MODE ? SLOW : FAST));
 		}
 		return 0;
 	}
@@ -119,24 +116,12 @@ static int exchange(uint8_t out)
 
 static int on_exchange(struct spi_device *self, uint8_t out)
 {
-	int in = exchange(garbled ? out >> 1 : out); /* all bits arrive one bit late */
+	int in = exchange(out >> garbled);
 
-	(void)self;
-	return garbled && in != SPI_OPEN ? in >> 1 : in;
+	return in == SPI_OPEN ? in : in >> garbled;
 }
 
-void scp1000_power(void)
-{
-	if (!spi.select) {
-		spi = (struct spi_device){ 'D', 7, on_select, on_exchange, false, NULL };
-		spi_add(&spi);
-	}
-	spi.selected = false;
-	restart();
-}
-
-/* After a reset of the processor: the chip keeps its state; DRDY and the timer are set again. */
-void scp1000_resume(void)
+static void resume(struct part *self)
 {
 	bool level = ready;
 
@@ -146,15 +131,19 @@ void scp1000_resume(void)
 		plan_sample(sample_at);
 }
 
-bool scp1000_fault(const char *name, const char *value)
+static void changed(struct part *self, unsigned before)
 {
-	if (strcmp(name, "scp1000"))
-		return false;
-	for (int f = 0; f < FAULTS; f++)
-		if (!strcmp(value, fault_names[f])) {
-			fault = (enum fault)f;
-			set_ready(ready);
-			return true;
-		}
-	return false;
+	set_ready(ready);
 }
+
+const struct model scp1000 = {
+	.kind = OF_PAPERS,
+	.faults = "ok absent no_eeprom no_start drdy_stuck drdy_low zeros",
+	PARTS(barometers),
+	.wire = spi_wire,
+	.power = power,
+	.resume = resume,
+	.changed = changed,
+	.select = on_select,
+	.exchange = on_exchange,
+};

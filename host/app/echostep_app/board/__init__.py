@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sensor board beyond its messages: what a host subscribes to, and what a board's reports say is wrong with it.
+"""The sensor board beyond its messages: a host's subscriptions, and faults found in a board's reports.
 
 In: the board's reports. Out: findings with a remedy; subscriptions. Owns the words.
 """

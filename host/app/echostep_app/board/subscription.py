@@ -2,7 +2,7 @@
 """Which boards are asked for their optional messages, and when.
 
 In: the board's messages in order. Out: whether to send `SUBSCRIBE` now. Owns the state of the request. A board that has restarted, or whose
-port was opened anew, must be asked again; one of older firmware would count the request as damaged.
+port was reopened, must be asked again; a board with older firmware would count the request as damaged.
 """
 
 from __future__ import annotations

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from echostep.errors import EchostepError
-from echostep.extras import require
 from echostep_app.commands.groups import Ports, with_groups
 from echostep_app.commands.options import (
     LOCAL,
@@ -26,6 +25,7 @@ from echostep_app.commands.options import (
     SettingsFile,
     page_address,
 )
+from echostep_app.extras import require
 from echostep_app.printing.lines import say
 
 if TYPE_CHECKING:

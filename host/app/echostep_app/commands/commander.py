@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from echostep_app.commands.options import LOCAL, Host, Lang, Port, Seconds, TeamPlan, page_address, picture_file
+from echostep_app.commands.options import LOCAL, Host, Lang, Port, Seconds, TeamPlan, page_address, picture_option
 from echostep_app.printing.lines import complain
 
 app = typer.Typer()
@@ -32,15 +32,7 @@ def command(
     ] = Path("out/command/operation.mcap"),
     team: Annotated[str | None, typer.Option("--team", help="Only this team.")] = None,
     seconds: Seconds = None,
-    picture: Annotated[
-        Path | None,
-        typer.Option(
-            "--picture",
-            metavar="FILE",
-            help="Draw the team on its plan at the end (PNG, SVG, PDF).",
-            callback=picture_file,
-        ),
-    ] = None,
+    picture: Annotated[Path | None, picture_option("Draw the team on its plan at the end")] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the roster as JSON at the end, instead of the table.")
     ] = False,

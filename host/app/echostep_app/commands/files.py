@@ -11,8 +11,8 @@ from typing import Annotated
 
 import typer
 
-from echostep.extras import require
-from echostep_app.commands.options import Columns, Shank, Thigh, Units, needs, picture_file
+from echostep_app.commands.options import Columns, Shank, Thigh, Units, needs, picture_option
+from echostep_app.extras import require
 
 app = typer.Typer()
 
@@ -27,12 +27,7 @@ def map_command(
         Path | None,
         typer.Option("--plan", metavar="PARTIAL", help="A partial or old plan, which the walks complete and correct."),
     ] = None,
-    picture: Annotated[
-        Path | None,
-        typer.Option(
-            "--picture", metavar="FILE", callback=picture_file, help="Draw plan and path there (PNG, SVG, PDF)."
-        ),
-    ] = None,
+    picture: Annotated[Path | None, picture_option("Draw plan and path there")] = None,
 ) -> None:
     """Draw the plan of a building from recorded walks."""
     require("a drawing of walks", "scipy")
@@ -51,16 +46,13 @@ def foot(
             "--profile", metavar="NAME", help="default, or fischer2008: that paper's dead reckoning (echostep-studies)."
         ),
     ] = "default",
-    picture: Annotated[
-        Path | None,
-        typer.Option("--picture", metavar="FILE", callback=picture_file, help="Draw the track there (PNG, SVG, PDF)."),
-    ] = None,
+    picture: Annotated[Path | None, picture_option("Draw the track there")] = None,
     columns: Columns = None,
     units: Units = None,
 ) -> None:
     """Zero-velocity navigation of a recorded foot IMU."""
-    from echostep.offline.foreign_columns import parse_naming
     from echostep_app.commands.actions import offline
+    from echostep_app.offline.foreign_columns import parse_naming
 
     offline.foot(imu, out, profile, picture, parse_naming(columns, units))
 
@@ -90,18 +82,13 @@ def legs(
         float | None,
         typer.Option("--walked", metavar="M", help="The true length of this walk: print the wearer's scale."),
     ] = None,
-    picture: Annotated[
-        Path | None,
-        typer.Option(
-            "--picture", metavar="FILE", callback=picture_file, help="Draw track and strides there (PNG, SVG, PDF)."
-        ),
-    ] = None,
+    picture: Annotated[Path | None, picture_option("Draw track and strides there")] = None,
     columns: Columns = None,
     units: Units = None,
 ) -> None:
     """Distance, strides and track from recorded leg gyros: on thigh and shank, and on the belt if there is one."""
-    from echostep.offline.foreign_columns import parse_naming
     from echostep_app.commands.actions import offline
+    from echostep_app.offline.foreign_columns import parse_naming
 
     naming = parse_naming(columns, units)
     offline.legs(samples, out, offline.LegOptions(thigh, shank, profile, scale, walked), picture, naming)

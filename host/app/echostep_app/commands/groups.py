@@ -116,7 +116,7 @@ class Ports:
         split = parse_split(self.split) if self.split is not None else None
         if self.board is not None:
             return PortOptions(self.board, self.mtx, self.beacons, self.seconds, self.keep, self.foot, split)
-        from echostep_app.commissioning.port_search import find_ports
+        from echostep_app.commissioning.serial_ports import find_ports
 
         ports = find_ports(self.mtx, self.foot)
         options = {"board": ports.board, "mtx": ports.mtx, "foot": ports.foot}

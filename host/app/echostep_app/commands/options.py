@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from echostep.extras import PAGE, lacks, require
+from echostep_app.extras import PAGE, lacks, require
 from echostep_app.printing.lines import complain
 from echostep_app.printing.picture_files import check_picture
 
@@ -47,6 +47,11 @@ def picture_file(option: typer.CallbackParam, path: Path | None) -> Path | None:
         require(option.opts[0], "matplotlib")
         check_picture(path)
     return path
+
+
+def picture_option(what: str) -> Any:
+    """The option of a picture that is drawn besides."""
+    return typer.Option("--picture", metavar="FILE", callback=picture_file, help=f"{what} (PNG, SVG, PDF).")
 
 
 def page_address(page: bool | None, host: str, port: int | None, lang: Language | None = None) -> Address | None:
@@ -112,6 +117,9 @@ Start = Annotated[
 StartSd = Annotated[
     str | None,
     typer.Option("--start-sd", metavar="M,DEG", help="Standard deviations of the start: metres per axis, degrees."),
+]
+Browser = Annotated[
+    bool, typer.Option("--open/--no-open", help="Open the page in a browser where there is one.", show_default=False)
 ]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for track.csv, track.png and the recording.")]
 SettingsFile = Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")]

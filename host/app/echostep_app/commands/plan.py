@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from echostep.errors import EchostepError
-from echostep.extras import PAGE, lacks, require
-from echostep_app.commands.options import Lang, picture_file
+from echostep_app.commands.options import Lang, picture_option
+from echostep_app.extras import PAGE, lacks, require
 from echostep_app.printing.lines import say
 
 if TYPE_CHECKING:
-    from echostep.plan.model import Plan
+    from echostep.plan import Plan
 
 MOST_LINES, MOST_MARKS = 200, 300  # findings that are printed, and that are drawn
 MARK = b"echostep plan"  # in the header of the pictures that the drawing writes
@@ -32,58 +32,65 @@ Files = Annotated[
 ]
 
 
+Storey = Annotated[
+    float, typer.Option("--storey", metavar="M", help="Height of a storey where the file has none.", min=1.0, max=50.0)
+]
+Layers = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--layer",
+        metavar="KIND=PATTERN",
+        help="DXF: layers of walls, columns, windows, doors, stairs, lifts, rooms or obstacles, as walls=A-WALL*; may be repeated.",
+    ),
+]
+Unit = Annotated[
+    str | None, typer.Option("--units", metavar="UNIT", help="DXF: mm, cm, m, in or ft instead of the file's.")
+]
+Scale = Annotated[
+    str | None,
+    typer.Option(
+        "--scale",
+        metavar="M|X0,Y0,X1,Y1=M",
+        help="DXF, pictures: metres a unit (a pixel), or the distance of two known points in metres.",
+    ),
+]
+Windows = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--window",
+        metavar="X0,Y0,X1,Y1",
+        help="DXF: this part of the drawing is a storey, in its units; may be repeated, the lowest first.",
+    ),
+]
+Levels = Annotated[
+    list[str] | None,
+    typer.Option("--level", metavar="NAME", help="DXF: name of a storey; may be repeated, the lowest first."),
+]
+Align = Annotated[bool, typer.Option("--align", help="DXF: lay storeys that are drawn apart over each other.")]
+Doors = Annotated[
+    float | None,
+    typer.Option(
+        "--doors",
+        metavar="M",
+        help="IMDF: assume doors of this width where rooms or openings have none.",
+        min=0.5,
+        max=5.0,
+    ),
+]
+
+
 @app.command("import")
 def import_(
     files: Files,
     out: Annotated[Path, typer.Option("-o", "--out", metavar="PLAN", help="The plan to write (JSON).")],
-    storey: Annotated[
-        float,
-        typer.Option("--storey", metavar="M", help="Height of a storey where the file has none.", min=1.0, max=50.0),
-    ] = 3.5,
-    layer: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--layer",
-            metavar="KIND=PATTERN",
-            help="DXF: layers of walls, columns, windows, doors, stairs, lifts, rooms or obstacles, as walls=A-WALL*; may be repeated.",
-        ),
-    ] = None,
-    units: Annotated[
-        str | None, typer.Option("--units", metavar="UNIT", help="DXF: mm, cm, m, in or ft instead of the file's.")
-    ] = None,
-    scale: Annotated[
-        str | None,
-        typer.Option(
-            "--scale",
-            metavar="M|X0,Y0,X1,Y1=M",
-            help="DXF, pictures: metres a unit (a pixel), or the distance of two known points in metres.",
-        ),
-    ] = None,
-    window: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--window",
-            metavar="X0,Y0,X1,Y1",
-            help="DXF: this part of the drawing is a storey, in its units; may be repeated, the lowest first.",
-        ),
-    ] = None,
-    level: Annotated[
-        list[str] | None,
-        typer.Option("--level", metavar="NAME", help="DXF: name of a storey; may be repeated, the lowest first."),
-    ] = None,
-    align: Annotated[
-        bool, typer.Option("--align", help="DXF: lay storeys that are drawn apart over each other.")
-    ] = False,
-    doors: Annotated[
-        float | None,
-        typer.Option(
-            "--doors",
-            metavar="M",
-            help="IMDF: assume doors of this width where rooms or openings have none.",
-            min=0.5,
-            max=5.0,
-        ),
-    ] = None,
+    storey: Storey = 3.5,
+    layer: Layers = None,
+    units: Unit = None,
+    scale: Scale = None,
+    window: Windows = None,
+    level: Levels = None,
+    align: Align = False,
+    doors: Doors = None,
     picture: Annotated[bool, typer.Option("--picture/--no-picture", help="Draw the plan as PNG, beside it.")] = True,
 ) -> None:
     """Make a plan of a building that is drawn in another format, and show what came in and what was left out."""
@@ -149,10 +156,7 @@ PlanFile = Annotated[Path, typer.Argument(metavar="PLAN", help="A plan (JSON), o
 @app.command()
 def check(
     file: PlanFile,
-    picture: Annotated[
-        Path | None,
-        typer.Option("--picture", metavar="FILE", callback=picture_file, help="Draw what is wrong (PNG, SVG, PDF)."),
-    ] = None,
+    picture: Annotated[Path | None, picture_option("Draw what is wrong")] = None,
 ) -> None:
     """Tell what is wrong with a plan: exit status 0 when nothing is, 1 when something is."""
     from echostep_app.plan.check import check_plan

@@ -13,7 +13,18 @@ import typer
 
 from echostep.errors import EchostepError
 from echostep_app.commands.groups import Output, Ports, Tracking, with_groups
-from echostep_app.commands.options import LOCAL, BoardCommand, Host, Lang, Out, Port, RecordedSeed, Seed, page_address
+from echostep_app.commands.options import (
+    LOCAL,
+    BoardCommand,
+    Browser,
+    Host,
+    Lang,
+    Out,
+    Port,
+    RecordedSeed,
+    Seed,
+    page_address,
+)
 from echostep_app.printing.lines import say
 from echostep_app.simulation.kits import Kit
 
@@ -53,10 +64,7 @@ def demo(
         Kit,
         typer.Option(help="Parts on the board: of the papers, or of 2026 (not built yet; with --board-command only)."),
     ] = Kit.PAPERS,
-    browser: Annotated[
-        bool,
-        typer.Option("--open/--no-open", help="Open the page in a browser where there is one.", show_default=False),
-    ] = True,
+    browser: Browser = True,
 ) -> None:
     """Track a simulated walk through a simulated building."""
     from echostep_app.session.runs import demo as demo_run
@@ -84,7 +92,7 @@ def live(
     recording = live_run.live(options, ports.options(), outputs)
     if options.settings_path is not None:
         from echostep_app.commands.actions.learning import learn_rangers
-        from echostep_app.session.console import console
+        from echostep_app.printing.console import console
 
         learn_rangers(recording, options, console)
 
@@ -130,10 +138,7 @@ def page(
     host: Host = LOCAL,
     port: Port = None,
     lang: Lang = None,
-    browser: Annotated[
-        bool,
-        typer.Option("--open/--no-open", help="Open the page in a browser where there is one.", show_default=False),
-    ] = True,
+    browser: Browser = True,
 ) -> None:
     """Play recordings that are dropped onto a page."""
     address = page_address(True, host, port, lang)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`echostep bench-report`: what a new board tells of itself, as one text file with lines for the measurements of firmware/bench.md.
+"""`echostep bench-report`: a new board's reports about itself, as one text file with lines for the measurements of firmware/bench.md.
 
 In: ports by name, or those found on this computer. Out: the file. Owns the order of its parts, and the names of the measurements.
 """

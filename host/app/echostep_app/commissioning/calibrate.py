@@ -25,10 +25,9 @@ from echostep.settings import Settings, parse_settings, read_settings
 from echostep_app.board.faults.health import Severity, board_findings
 from echostep_app.commissioning.fitting import Fit, Values, doubt, fit_compass, fit_gyros, fit_legs, fit_mounting
 from echostep_app.commissioning.listening_bar import listening_bar
-from echostep_app.commissioning.port_search import find_boards
 from echostep_app.commissioning.poses import described, measure_poses
 from echostep_app.commissioning.probe import ProbeResult, probe
-from echostep_app.commissioning.serial_ports import access_findings, list_seen
+from echostep_app.commissioning.serial_ports import access_findings, find_boards, list_seen
 from echostep_app.offline.leg_lengths import checked_lengths
 
 STILL_S, TURN_S, WALK_S = 10.0, 20.0, 20.0  # duration of each measurement
@@ -58,7 +57,7 @@ class Wearer:
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """One calibration: instruction to the wearer, duration, and the fit by what is known. Parts with equal instructions share one measurement."""
+    """One calibration: instruction to the wearer, duration, and the fit by known settings. Parts with equal instructions share one measurement."""
 
     name: str
     request: str

@@ -33,7 +33,7 @@ from echostep_app.xsens.products import force_range_g
 DRIFT_MAX_PPM = 200.0  # a crystal is within 50, a ceramic resonator within 5000
 ANSWER_MAX_S = 0.02
 MTX_RATE_ERROR = 0.02  # relative
-CONSTANT_SAMPLES = 400  # so many equal samples in a row are a fault: a gyro has two counts of noise
+CONSTANT_SAMPLES = 400  # this many equal samples in a row are a fault: a gyro has two counts of noise
 FULL_SCALE = 2047  # counts of an ADIS16100
 SIX_AXES_FULL_SCALE = 4697  # counts of `gyros` at the 1000 deg/s of an LSM6DSO, less its last 0.1 %
 HURRIED_G = 18.0  # range of the MTx that is beyond a hurried foot's force [echostep evaluate kits]
@@ -228,7 +228,7 @@ def _clock_findings(drift: Drift, subject: str) -> list[Finding]:
 
 
 def _mtx_fault(probed: ProbeResult) -> str:
-    """Why there is no rate of samples. What was said while it was set up is a fault only where nothing came."""
+    """Why there is no rate of samples. Messages of its setup are a fault only if no byte came."""
     if probed.mtx_fault or not probed.bytes_of[MTX]:
         return probed.mtx_fault or (probed.mtx_messages or ["nothing was received"])[-1]
     count = len(probed.mtx_times_s)

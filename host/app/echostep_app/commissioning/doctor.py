@@ -15,7 +15,6 @@ from echostep_app.board.faults.health import Finding, Severity
 from echostep_app.commissioning.diagnosis import Diagnosis, judge_board, judge_mtx
 from echostep_app.commissioning.foot_diagnosis import judge_foot_board
 from echostep_app.commissioning.listening_bar import listening_bar
-from echostep_app.commissioning.port_search import find_boards
 from echostep_app.commissioning.probe import probe
 from echostep_app.commissioning.serial_ports import (
     MTX_NAME,
@@ -23,6 +22,7 @@ from echostep_app.commissioning.serial_ports import (
     Role,
     access_findings,
     find,
+    find_boards,
     holder_findings,
     latency_findings,
     list_seen,

@@ -16,7 +16,7 @@ from echostep.board.frames import BoardReader, encode
 from echostep.board.messages import GYROS_INVALID
 from echostep.board.tilt_compass import TiltCompass
 from echostep.errors import EchostepError
-from echostep.legs.heading import compass_heading, fit_compass_errors
+from echostep.legs.heading import CompassErrors, harmonics
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import StrideSettings
 from echostep.legs.strides import StrideEstimator
@@ -69,7 +69,7 @@ def bearings(probed: ProbeResult, belt: ImuSettings | None = None) -> tuple[Floa
 
 
 def _bearings_by_field(probed: ProbeResult, belt: ImuSettings | None) -> tuple[Floats, Floats]:
-    """The same of a magnetometer of three axes, compensated for tilt as while a walk is tracked."""
+    """The same for a three-axis magnetometer, compensated for tilt as during tracking."""
     sent = b"".join(encode(message, 0) for message in probed.axes)
     _, headings = TiltCompass(belt).headings(BoardReader().frames(sent))
     t_s = np.array(probed.ticks["Magnetic"], float) / TICKS_PER_S
@@ -118,7 +118,7 @@ def fit_gyros(probed: ProbeResult) -> Fit:
 
 
 def doubt(values: dict[str, Values]) -> str:
-    """Why fitted values are hardly those of a part or a person, and what to repeat; empty where nothing is odd."""
+    """Why fitted values are implausible for a part or a person, and what to repeat; empty if they are plausible."""
     for name in GYROS:
         bias = math.degrees(values.get("gyro", {}).get(f"{name}_bias_rad_s", 0.0))
         if abs(bias) > USUAL_BIAS_DEG_S:
@@ -201,3 +201,67 @@ def fit_legs(probed: ProbeResult, settings: GyroSettings, segments: LegLengths, 
     values: Values = {"thigh_m": segments.thigh_m, "shank_m": segments.shank_m, "leg_scale": round(scale, 4)}
     line = f"The walk of {walked_m:g} m was measured as {distance_m:.2f} m in {len(strides)} strides: scale {scale:.3f}"
     return {"wearer": values}, line
+
+
+FEWEST_READINGS = 20  # three for each of the six unknowns, and more
+LINEARIZATIONS = 6  # of the fit, each at the newest headings
+LARGEST_IRON_RAD = math.radians(60.0)  # about an iron field as strong as the earth's
+COMPASS_TURN_RAD = math.radians(330.0)  # to be turned: second harmonics bridge the rest
+REWEIGHTINGS = 3  # of the readings in each, for outliers
+MAD_TO_SD = 1.4826  # of a normal distribution
+SMALLEST_SPREAD_RAD = math.radians(0.2)  # of the residuals: twice the compass's resolution
+
+
+def fit_compass_errors(t_s: Floats, rate_rad_s: Floats, compass_rad: Floats) -> CompassErrors:
+    """Compass errors by the wearer's iron, from samples (n,) of a full turn on the spot; raises ValueError that names the fault of the turn.
+
+    Compass less gyro is an offset, a bias times time, and the iron. All six parameters are fitted by least squares, relinearized at the new headings.
+    """
+    turned = np.concatenate([[0.0], np.cumsum(np.diff(t_s) * 0.5 * (rate_rad_s[1:] + rate_rad_s[:-1]))])
+    read = np.isfinite(compass_rad)
+    if read.sum() < FEWEST_READINGS:
+        raise ValueError("fewer than 20 readings of the compass: is it connected?")
+    time, turn, compass = t_s[read] - t_s[0], turned[read], np.unwrap(compass_rad[read])
+    _check_turn(turn, compass)
+    if (compass[-1] - compass[0]) * (turn[-1] - turn[0]) < 0.0:
+        turn = -turn
+    offset, drift, iron = float(np.mean(compass - turn)), 0.0, np.zeros(4)
+    for _ in range(LINEARIZATIONS):
+        h = turn + offset + drift * time
+        columns = np.column_stack([np.ones_like(h), time - time.mean(), *harmonics(h)])
+        solution, residuals = _robust_least_squares(columns, compass - h)
+        offset += float(solution[0]) - float(solution[1]) * float(time.mean())
+        drift += float(solution[1])
+        iron = solution[2:]
+    if float(np.hypot(iron[0], iron[1])) > LARGEST_IRON_RAD:
+        raise ValueError(
+            "the iron beside the compass is stronger than the earth's field: move the compass away from it"
+        )
+    b, c, d, e = iron.tolist()
+    return CompassErrors(b, c, d, e, float(np.sqrt(np.mean(residuals**2))))
+
+
+def _check_turn(turn: Floats, compass: Floats) -> None:
+    """Raise ValueError unless both the gyro's angle (n,) and the compass (n,), not wrapped, show the turn."""
+    if float(np.ptp(turn)) < COMPASS_TURN_RAD:
+        raise ValueError(
+            f"the turn covers {math.degrees(float(np.ptp(turn))):.0f} degrees: turn once round on the spot, slowly"
+        )
+    if float(np.ptp(compass)) < 0.5 * COMPASS_TURN_RAD:
+        raise ValueError("the compass does not follow the turn: is it stuck, or is there a magnet beside it?")
+
+
+def _robust_least_squares(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Solution (k,) for columns (n, k) and values (n,), and the residuals (n,); outliers get less weight in each of the REWEIGHTINGS."""
+    weight = np.ones_like(values)
+    for _ in range(REWEIGHTINGS):
+        solution = np.asarray(np.linalg.lstsq(columns * weight[:, None], values * weight, rcond=None)[0], np.float64)
+        residuals = values - columns @ solution
+        spread = max(MAD_TO_SD * float(np.median(np.abs(residuals))), SMALLEST_SPREAD_RAD)
+        weight = np.minimum(1.0, 2.0 * spread / np.maximum(np.abs(residuals), 1e-9)) ** 0.5
+    return solution, residuals
+
+
+def compass_heading(bearing_rad: Floats) -> Floats:
+    """Headings (rad) counter-clockwise from the map's x (east), of bearings clockwise from north."""
+    return 0.5 * math.pi - bearing_rad

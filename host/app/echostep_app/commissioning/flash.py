@@ -96,7 +96,7 @@ def check_hex(path: Path) -> int:
 
 
 def check_digest(path: Path) -> str:
-    """SHA-256 of a file; raises EchostepError when it is not the one that the build has written beside it, where there is one."""
+    """SHA-256 of a file; raises EchostepError when it differs from the one that the build wrote beside the file, if any."""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     beside = path.with_name(f"{path.name}.sha256")
     if beside.exists() and (expected := beside.read_text(errors="replace").partition(" ")[0].strip()) != digest:
@@ -189,7 +189,7 @@ def _output(command: list[str]) -> Iterator[str]:
 
 
 def _read_all(pipe: IO[bytes], portions: SimpleQueue[bytes]) -> None:
-    """What comes through a pipe, to its end: an empty portion."""
+    """Portions from a pipe, up to its end: an empty portion."""
     while received := os.read(pipe.fileno(), 4096):
         portions.put(received)
     portions.put(b"")
@@ -220,7 +220,7 @@ def _confirm(port: str) -> str:
 
 
 def _answer(port: str) -> str | None:
-    """What the firmware at a port says; None while it is silent, or the bootloader's port is going away."""
+    """The answer of the firmware at a port, in words; None while it is silent, or the bootloader's port is going away."""
     try:
         probed = probe({BOARD: port}, PROBE_S)
     except EchostepError:

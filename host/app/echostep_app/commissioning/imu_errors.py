@@ -3,7 +3,7 @@
 
 In: forces and rates of each pose, in the part's axes. Out: `ImuSettings`; ValueError says in words what to repeat. Owns nothing.
 
-At rest the true force has one size in every pose: offset and scale of each axis are those with which the measured means lie on a sphere of that
+At rest the true force has one size in every pose: with the right offset and scale of each axis the measured means lie on a sphere of that
 radius, by least squares [Lotters et al. 1998, Procedure for in-use calibration of triaxial accelerometers]. No pose has to be level or known.
 Errors between the axes are not estimated.
 """
@@ -27,7 +27,7 @@ LEAST_M_S2 = 5.0  # at rest, half of gravity; assumed
 DRIFT_M_S2 = 0.05  # between the means of both halves of a pose: three degrees of turn are more
 ALIKE_RAD = math.radians(35.0)  # sides of a box are 90 degrees apart
 POSE_ERROR_M_S2 = 0.02  # of a pose's mean: noise, and the 0.1 to 0.2 % by which parts are not linear; assumed
-OFFSET_SD_M_S2 = 0.06  # largest sd that the poses may leave, three times that of six sides; assumed
+OFFSET_SD_M_S2 = 0.06  # largest sd that the poses may leave, three times the sd from six sides; assumed
 TURNS = 8  # of Gauss and Newton; errors of 5 % need three
 
 
@@ -95,7 +95,7 @@ def _check_geometry(slope: Floats) -> None:
 
 
 def _linearised(force: Floats, scale: Floats, gravity_m_s2: float) -> tuple[Floats, Floats]:
-    """Slopes (n, 6) of the true force's size by offset (m/s2) and by scale times gravity (m/s2), and what is missing (n,) to gravity."""
+    """Slopes (n, 6) of the true force's size by offset (m/s2) and by scale times gravity (m/s2), and gravity less that size (n,)."""
     true = force * scale
     size = np.linalg.norm(true, axis=1)
     along = true / size[:, None]

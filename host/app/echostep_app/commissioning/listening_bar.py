@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A bar that fills while the ports are listened to.
+"""A bar that fills while a command listens to the ports.
 
 In: a text, the seconds that it takes. Out: a bar on a terminal that vanishes at the end; nothing elsewhere. Owns the thread that moves it.
 """

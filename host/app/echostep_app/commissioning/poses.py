@@ -2,7 +2,7 @@
 """`echostep calibrate accelerometers`: every six-axis part of both boards lies on each of its six sides.
 
 In: the boards' ports. Out: `ImuSettings` by place, and a line for each. Owns the instructions, and the poses so far.
-Gravity is that of the foot's navigation, 9.81 m/s2: so a resting foot is at rest there, at any latitude.
+Gravity is the value of the foot's navigation, 9.81 m/s2: so a resting foot is at rest there, at any latitude.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FOOT_PLACE = "foot"
 REQUEST = "Pose {number} of {count}: lay {parts} on another side, each on a side on which it has not lain, and let go."
 EVERYTHING = "the boxes of belt, thigh, calf and foot"
 
-Listen = Callable[[str], list[ProbeResult]]  # what each board says, while this text is shown
+Listen = Callable[[str], list[ProbeResult]]  # results of each board, while this text is shown
 
 
 class Lying(NamedTuple):

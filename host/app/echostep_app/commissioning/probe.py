@@ -31,12 +31,12 @@ from echostep.board.messages import (
 )
 from echostep.board.reports import BoardReports
 from echostep.errors import EchostepError
-from echostep.ports.arrival_clock import now_s as clock_s
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep.timing.timeline import MtxTiming
 from echostep.xsens import MtxReader
 from echostep.xsens.reader import warm_up
 from echostep_app.board.subscription import SUBSCRIBE_ELECTRICAL, BoardSubscription
+from echostep_app.ports.arrival_clock import now_s as clock_s
 from echostep_app.ports.serial_ports import SerialPorts
 from echostep_app.recording.device import LISTENED_BYTES
 from echostep_app.xsens.startup import MtxStart
@@ -49,7 +49,7 @@ SELF_TEST_S = 2.2  # for a self-test and its report
 SETTLED_S = 0.7  # of board time after the first message; until then buffered bytes arrive
 MTX_WINDOW_S = 1.5  # for the rate of the MTx
 LEAST_REPLIES = 8  # for a drift
-LEAST_BOARD_S = 3.0  # of a board that starts while it is listened to: all its streams run 1 s after the start
+LEAST_BOARD_S = 3.0  # of a board that starts during the probe: all its streams run 1 s after the start
 LEAST_RATE_S = 1.0  # for rates
 
 
@@ -70,7 +70,7 @@ class ProbeResult:
     foot: list[Foot] = field(default_factory=list)  # of a foot board
     replies: list[tuple[float, float, int]] = field(default_factory=list)
     bytes_of: Counter[str] = field(default_factory=Counter)
-    first_bytes: dict[str, bytes] = field(default_factory=dict)  # by port, as many as tell the device
+    first_bytes: dict[str, bytes] = field(default_factory=dict)  # by port, enough to identify the device
     rejected: int = 0
     lost: int = 0
     stale_firmware: str = ""  # why the board's firmware does not fit; empty when it fits

@@ -17,7 +17,7 @@ from echostep.arrays import record_dtype
 from echostep.jit import kernel, part
 
 # Assumed, not measured.
-PERIODS = 1.5  # silence at least, in the times between measurements that were usual: one may be missing
+PERIODS = 1.5  # least silence, in usual times between measurements: one may be missing
 PERIOD_KEPT = 0.9  # share of the usual time between measurements that stays after a shorter one
 SAFE_S = 15.0  # of contact after which the allowed silence is the first one again
 AT_PLACE_M = 1.0  # from the last known place: the wearer is there
@@ -77,7 +77,7 @@ def update_contact(
 def _note_known(contact: Contact, t_s: float, x: float, y: float) -> None:
     """The place is known: the allowed silence doubles after a return, and is the first one again after SAFE_S of contact.
 
-    The usual time between measurements follows from those between which there was no return.
+    The usual time between measurements follows from the times without a return in between.
     """
     gap_s = t_s - contact.known_s
     was_back = contact.silent_since_s != contact.known_s

@@ -16,10 +16,10 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.plan.polyline import along, nearest, way_m
+from echostep.localization import Estimate, TrackStatus
 from echostep_app.guidance.contact import CONTACT, allowed_silence, start_contact, update_contact
 from echostep_app.guidance.target import turn_ahead
+from echostep_app.plan.polyline import along, nearest, way_m
 from echostep_app.plan.routing import Route, RoutePlace, Stretch
 
 
@@ -41,7 +41,7 @@ NEVER_KNOWN = "Your place is not known yet: walk slowly along the walls"
 # Direction beyond which the target is behind, assumed.
 AROUND_RAD = math.radians(135.0)
 RETURN_AHEAD_M = 1.0  # target of the arrow back to the route, along the route from the nearest place, assumed
-LONGEST_SPAN_S = 5.0  # between two estimates; after a longer one the arrow starts anew, assumed
+LONGEST_SPAN_S = 5.0  # between two estimates; after a longer one the arrow starts again, assumed
 ARROWS = "↑↖←↙↓↘→↗"
 
 
@@ -108,17 +108,17 @@ class Guide:
         self._arrow_s = -math.inf
         self._contact = np.zeros(1, CONTACT)[0]
         self._was_lost = False
-        self._known_level: int | None = None  # of the last known place; None: there is none yet
+        self._known_level: int | None = None  # of the last known place; None before the first
         self._last_text = ""
         self._spoken_s = -math.inf
         self.replanned = 0
 
     def cue(self, e: Estimate, heard_s: float | None = None) -> Cue:
-        """The cue at this estimate; `heard_s`: when a beacon last measured, None where there are none."""
+        """The cue at this estimate; `heard_s`: when a beacon last measured, None without beacons."""
         return self._make_cue(e, *self._choose(e, heard_s))
 
     def _choose(self, e: Estimate, heard_s: float | None) -> Choice:
-        """What to do at this estimate. An end that is reached is reached, whether beacons measure there or not."""
+        """What to do at this estimate. A reached end counts, whether beacons measure there or not."""
         lost = e.status is TrackStatus.LOST
         back, silent = self._update_contact(e, heard_s, lost)
         if e.heading_sd_rad > math.radians(self._settings.heading_sd_deg):
@@ -164,7 +164,7 @@ class Guide:
     def _update_progress(self, e: Estimate) -> None:
         """Update the stretch, by level, and the progress along it.
 
-        The nearest place is looked for near the last one first, so that progress does not jump where the route comes by again.
+        The nearest place is looked for near the last one first, so that progress does not jump where the route passes again.
         """
         if self._here.level != e.level:
             levels = [s.level for s in self.route.stretches]

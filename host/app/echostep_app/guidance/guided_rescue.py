@@ -11,16 +11,16 @@ import math
 from dataclasses import replace
 
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate
+from echostep.localization import Estimate
 from echostep.path import MeasuredSegment
-from echostep.ports.people.teammate import Teammate, parse_teammate
 from echostep.tracker import Tracker
 from echostep_app.guidance.cue_list import CueList
 from echostep_app.guidance.cues import Cue, CueKind, Guide
 from echostep_app.plan.routing import Route, RoutePlace, Routes
+from echostep_app.ports.teammate import Teammate, parse_teammate
 
 # Assumed, not measured.
-MOVED_M = 1.5  # of the other wearer: then there is a new way
+MOVED_M = 1.5  # of the other wearer: then a new way is looked for
 AGAIN_S = 2.0  # shortest time between two searches for a way
 PREFIX = "wearer:"
 
@@ -31,7 +31,7 @@ class GuidedRescue(CueList):
     def __init__(self, tracker: Tracker, name: str) -> None:
         super().__init__()
         self.name = name
-        self.bad = 0  # chunks that were no place
+        self.bad = 0  # chunks that were not a place
         self._tracker = tracker
         self._routes = Routes(tracker.plan)
         self._target: Teammate | None = None
@@ -103,5 +103,5 @@ class GuidedRescue(CueList):
 
 
 def rescued_wearer(to: str) -> str | None:
-    """The name in `wearer:NAME`; None where the destination is another one."""
+    """The name in `wearer:NAME`; None for another destination."""
     return to[len(PREFIX) :] if to.startswith(PREFIX) else None

@@ -16,21 +16,21 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Floats
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization import Estimate, TrackStatus
 from echostep.path import MeasuredSegment, Odometer
-from echostep.plan.polyline import nearest, way_m
 from echostep.tracker import Tracker
 from echostep_app.guidance.cue_list import CueList
 from echostep_app.guidance.cues import Cue, CueKind, Guide
 from echostep_app.guidance.own_way import OwnWay
 from echostep_app.guidance.target import turn_ahead
+from echostep_app.plan.polyline import nearest, way_m
 from echostep_app.plan.routing import Route, RoutePlace, Stretch
 
 # Of the way, after which a return has begun or is over: more than the steps of a search in one room
 TURN_M = 6.0
 AHEAD_M = 3.0  # of the arrow's target along the way back, as in `GuidanceSettings`
-OFF_M = 2.0  # from the way, beyond the 95 % radius, that is not on it: the width of a corridor
-BESIDE_M = 3.0  # 95 % radius of the way back beside the way in, at most: a corridor and a half
+OFF_M = 2.0  # distance from the way, beyond the 95 % radius, that is off it: the width of a corridor
+BESIDE_M = 3.0  # greatest 95 % radius of the way back beside the way in: a corridor and a half
 IN, AGAIN = "The way back", "You are going in again"
 
 
@@ -64,7 +64,7 @@ class GuidedReturn(CueList):
         self.cues.append(self._cue_in(e) if self._guide is None else self._cue_back(e, self._guide))
 
     def _cue_in(self, e: Estimate) -> Cue:
-        """The cue on the way in: direction and length of the way back; that of the return when it begins here."""
+        """The cue on the way in: direction and length of the way back; the return's cue when it begins here."""
         if e.status is not TrackStatus.LOST:
             self._since_end.add(self._way.add(e.x_m, e.y_m, e.z_m))
             progress_m, off_m = _nearest(self._line, e)
@@ -84,7 +84,7 @@ class GuidedReturn(CueList):
         return self._guide.cue(e, self._tracker.state.beacon_heard_s)
 
     def _cue_back(self, e: Estimate, guide: Guide) -> Cue:
-        """The cue on the return; that it is over when the way back has grown."""
+        """The cue on the return, or on its end when the way back has grown."""
         if e.status is not TrackStatus.LOST:
             line = self._way.line_m()
             progress_m, off_m = _nearest(line, e)
@@ -119,9 +119,9 @@ class GuidedReturn(CueList):
 
 
 def _on_track(e: Estimate) -> Estimate:
-    """An estimate relative to the track: the drift since the start moves the way back as well, so it is no error here.
+    """An estimate relative to the track: the drift since the start moves the way back as well, so it is not an error here.
 
-    Of the covariance as much is kept as a track may be beside itself.
+    The covariance is kept up to the distance that a track may be beside itself.
     """
     shrink = min(BESIDE_M / e.ellipse95.major_m, 1.0) ** 2 if e.ellipse95.major_m > 0.0 else 1.0
     xx, xy, yy = (shrink * value for value in (e.xx_m2, e.xy_m2, e.yy_m2))

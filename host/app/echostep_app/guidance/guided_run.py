@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization import Estimate, TrackStatus
 from echostep.path import MeasuredSegment
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep.tracker import Tracker
 from echostep_app.guidance.cue_list import CueList
 from echostep_app.guidance.cues import Cue, CueKind, Guide
@@ -90,7 +90,7 @@ class GuidedRun(CueList):
         self.cues.append(self._guide.cue(e, self._tracker.state.beacon_heard_s))
 
     def _find_route(self, e: Estimate) -> None:
-        """Find the route from an estimate; where there is none, the next estimate is tried."""
+        """Find the route from an estimate; if there is none, the next estimate is tried."""
         try:
             route = self._routes.way(RoutePlace(e.x_m, e.y_m, e.level), self._to)
         except EchostepError:

@@ -3,7 +3,7 @@
 
 In: positions in order of time. Out: the shortest way back to the first one along them, and its length. Owns the positions.
 
-Each position is joined to the one before it, and to every earlier one so near that the way has come by there again; of these the one with the
+Each position is joined to the one before it, and to every earlier one so near that the way has passed there again; of these the one with the
 shortest way back is kept [Dijkstra 1959, by induction: a way back runs only through earlier positions]. So a loop is cut where it closes, as far as
 the track is good enough to show it, and a way in and out of a room is left out.
 """
@@ -18,7 +18,7 @@ import numpy as np
 from echostep.arrays import Floats
 
 STEP_M = 0.5  # least distance between two positions: corners of corridors are kept
-JOIN_M = 1.0  # positions so near on one level are the same place: less than the distance of two ways on either side of a wall
+JOIN_M = 1.0  # positions this near on one level are the same place: less than the distance of two ways on either side of a wall
 LEVEL_M = 1.5  # less than this between their heights: half the height of a level
 
 
@@ -27,7 +27,7 @@ class OwnWay:
 
     def __init__(self) -> None:
         self._at: list[tuple[float, float, float]] = []  # x, y, z in m
-        self._next: list[int] = []  # the position to go to from each on the way back; of the first, itself
+        self._next: list[int] = []  # the position to go to from each on the way back; for the first, itself
         self._back_m: list[float] = []  # length of the way back from each
         self._cells: defaultdict[tuple[int, int], list[int]] = defaultdict(list)  # positions by cell of JOIN_M
         self._here = -1  # the present position; -1 before the first
@@ -54,7 +54,7 @@ class OwnWay:
         return walked_m
 
     def go_back_to(self, left_m: float) -> None:
-        """Be at the position on the way back from which at least so many metres are left."""
+        """Move to the position on the way back from which at least `left_m` is left."""
         while self._at and self._next[self._here] != self._here and self._back_m[self._next[self._here]] >= left_m:
             self._here = self._next[self._here]
 

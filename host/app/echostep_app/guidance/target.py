@@ -10,7 +10,7 @@ import math
 
 from echostep.arrays import Floats
 from echostep.jit import kernel
-from echostep.plan.polyline import along
+from echostep_app.plan.polyline import along
 
 
 @kernel

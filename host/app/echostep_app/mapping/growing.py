@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A walk that is drawn while it goes on.
 
-In: measured segments as they come. Out: `Mapped` of all so far. Owns the solution so far: what was solved stays as it is until an echo moves it,
+In: measured segments as they come. Out: `Mapped` of all so far. Owns the solution so far: solved poses stay as they are until an echo moves them,
 so a stretch costs one solution, not all of them again.
 """
 
@@ -37,7 +37,7 @@ class GrowingMap:
     def grow(self, segments: Sequence[MeasuredSegment]) -> Mapped:
         """The drawing of all segments so far, of which these are new.
 
-        Once it shows that the building has two directions, or other ones, or that odometry has a bias, all is solved anew.
+        Once it shows that the building has two directions, or other ones, or that odometry has a bias, all is solved again.
         """
         self._segments += segments
         nodes, pings = nodes_of(with_smoothed_headings(self._segments))

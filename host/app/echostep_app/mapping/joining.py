@@ -2,7 +2,7 @@
 """Several walks through one building as one drawing.
 
 In: solved walks by name, in any order, each of unknown start. Out: `Mapped`, `Join`s. Owns the conditions under which two walks are of one building:
-a place that leaves no other, most of the walls in common there, and two closures between the walks; and the standard deviations of the loose closure
+a place without a rival, most of the walls in common there, and two closures between the walks; and the standard deviations of the loose closure
 that ties the second walk to the first. Between the last node of one walk and the first of the next the path gives no constraint.
 """
 
@@ -23,11 +23,11 @@ from echostep_app.mapping.graph.nodes import Nodes, Pings
 from echostep_app.mapping.mapper import Mapped, Progress, close_loops, drawn, settle
 from echostep_app.mapping.placing import Place, find_place
 
-UNKNOWN_M, UNKNOWN_RAD = 1000.0, 10.0  # standard deviations of what lies between two walks
+UNKNOWN_M, UNKNOWN_RAD = 1000.0, 10.0  # standard deviations of the motion between two walks
 BETWEEN_M = 30.0  # of path, that counts as walked in between: more than any limit on neighbours along the path
 TIE_SD_M, TIE_SD_RAD = 0.3, math.radians(2.0)  # of a place: two cells of its images; drift of either drawing
 LEAST_LOG_ODDS = math.log(1e3)  # of a place; the best of two buildings had 30 to 1
-LEAST_COMMON_M, LEAST_SHARE = 12.0, 0.75  # of wall in common; of it, against walls in each other's free floor
+LEAST_COMMON_M, LEAST_SHARE = 12.0, 0.75  # of wall in common; its share, against walls in each other's free floor
 LEAST_CLOSURES = 2  # between two walks, beside the tie itself
 
 
@@ -157,7 +157,7 @@ def _joined(whole: Mapped, walk: Mapped, name: str) -> tuple[Mapped, Join] | str
 
 
 def doubt_of(place: Place) -> str | None:
-    """Why a place is not certain; None where it is."""
+    """Why a place is not certain; None if it is."""
     if place.common_m < LEAST_COMMON_M or place.common_m < LEAST_SHARE * (place.common_m + place.against_m):
         return "fits nowhere"
     if place.rivals:

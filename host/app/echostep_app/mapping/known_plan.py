@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A plan as a walk that passed all of its walls on both sides: walks are placed on it and tied to it like on another walk.
+"""A plan as a walk that passed all of its walls on both sides: walks are placed on it and tied to it as to another walk.
 
 In: a level of a plan. Out: `Mapped`, not to be drawn by itself. Owns the distance from which a wall is seen.
 """
@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.plan.model import Level
+from echostep.plan import Level
 from echostep_app.mapping.graph.directions import RIGHT_RAD, Directions
 from echostep_app.mapping.graph.fragments import SD_M, SD_RAD, Fragments
 from echostep_app.mapping.graph.graph import FittedWalls, Graph
@@ -19,10 +19,10 @@ from echostep_app.mapping.graph.nodes import Nodes, Pings
 from echostep_app.mapping.mapper import Mapped
 
 PIECE_M = 2.0  # of wall, seen from its middle
-BEFORE_M = 0.8  # from where: less than half of a corridor
-LEAST_M = 0.3  # a shorter piece is no wall to go by
+BEFORE_M = 0.8  # distance from which it is seen: less than half of a corridor
+LEAST_M = 0.3  # a shorter piece is not used
 RIGID_M, RIGID_RAD = 0.001, 1e-4  # standard deviations of one piece against the next: the plan does not bend
-STRAIGHT = 0.7  # share of the walls along two directions at right angles, from which the plan has such
+STRAIGHT = 0.7  # share of the walls along two directions at right angles, from which the plan has these
 
 
 def plan_as_walk(level: Level, sd_m: float) -> Mapped:
@@ -63,7 +63,7 @@ def _pieces(walls: Floats) -> Floats:
 
 
 def _base(normal_rad: Floats, length_m: Floats) -> float | None:
-    """The direction that most walls have, by length, of a right angle; None where they have none."""
+    """The direction of most walls, by length, modulo a right angle; None if they have none."""
     if not len(normal_rad):
         return None
     tried = np.arange(0.0, RIGHT_RAD, math.radians(0.5))

@@ -34,7 +34,7 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """The solved `graph` of all walks, its `pings`, what is drawn of each level, whether the (first) walk shows two directions, closures undone."""
+    """The solved `graph` of all walks, its `pings`, the drawing of each level, whether the (first) walk shows two directions, closures undone."""
 
     graph: Graph
     pings: Pings
@@ -44,13 +44,13 @@ class Mapped:
 
     @property
     def first_level(self) -> int:
-        """That on which the first level stretch of path is."""
+        """The level of the first flat stretch of path."""
         levels = self.graph.levels
         return 0 if levels is None else int(levels.of[levels.of != BETWEEN][0])
 
     @property
     def drawing(self) -> Drawing:
-        """What is drawn of the first level."""
+        """The drawing of the first level."""
         return self.drawings[self.first_level]
 
 
@@ -60,7 +60,7 @@ def map_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _s
 
 
 def drawn(solved: Mapped) -> Mapped:
-    """The same with its walls."""
+    """The solved walk with its walls."""
     return replace(solved, drawings=draw(solved.graph, solved.pings))
 
 
@@ -86,7 +86,7 @@ def find_pieces(nodes: Nodes, pings: Pings) -> tuple[Fragments, Directions]:
 
 
 def settle(graph: Graph) -> list[Closure]:
-    """Find walls and path anew by turns, now that the loops are closed. Returns the closures that are undone by it."""
+    """Find walls and path again by turns, now that the loops are closed. Returns the closures that this undoes."""
     for _ in range(GLOBAL_ROUNDS):
         find_walls(graph)
     return _undo(graph)
@@ -106,7 +106,7 @@ def new_graph(nodes: Nodes, fragments: Fragments, directions: Directions) -> Gra
 
 
 def find_walls(graph: Graph) -> None:
-    """Find which fragments are of one wall, and solve; those detected on stairs are of walls there, which constrain the heading."""
+    """Find which fragments are of one wall, and solve; fragments detected on stairs are of walls there, which constrain the heading."""
     node = graph.fragments.node
     level = np.zeros(len(node), np.int64) if graph.levels is None else graph.levels.with_flights[node]
     graph.walls = associate(graph.nodes, graph.fragments, *graph.places(), _anchored(graph), level)
@@ -129,10 +129,10 @@ def _anchored(graph: Graph) -> Bools:
 
 
 def close_loops(graph: Graph, progress: Progress, first: int = 0, before_m: float = math.inf) -> list[Closure]:
-    """Match stretch after stretch from node `first` on with what is older; a closure bends the path before the next stretch is matched, without one
+    """Match stretch after stretch from node `first` on with older ones; a closure bends the path before the next stretch is matched, without one
     the next begins in the middle of the last.
 
-    `before_m`: only with what was passed before this length of path: by the walks before. Returns closures that are undone.
+    `before_m`: only with the path before this length: of earlier walks. Returns closures that are undone.
     """
     way_m, begin, undone = graph.nodes.way_m, first, []
     while begin < len(way_m) - 1:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.plan.model import Level, Plan
+from echostep.plan import Level, Plan
 from echostep_app.plan.pictures.drawing import DOOR, OBSTACLE, WALL
 from echostep_app.printing.picture_files import check_picture, save_picture
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 WALKERS = ("#0072b2", "#009e73", "#cc79a7", "#56b4e9")
 TRUE = "#e69f00"
-WIDE_IN, HIGHEST = 12.0, 1.4  # width in inches; greatest height by width
+WIDE_IN, HIGHEST = 12.0, 1.4  # width in inches; greatest ratio of height to width
 TRUNK_M = 0.5  # width of the floor that a person walks on
 
 

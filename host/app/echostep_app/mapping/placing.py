@@ -35,7 +35,7 @@ ANY_TURN_RAD = np.radians(np.arange(0.0, 360.0, 3.0))  # tried where a building 
 
 
 class Scene(NamedTuple):
-    """What a walk shows: places on walls (w, 2) with the direction from the path to the wall, the node of each; places of free floor (k, 2)."""
+    """Evidence of a walk: places on walls (w, 2) with the direction from the path to the wall, the node of each; places of free floor (k, 2)."""
 
     wall_m: Floats
     normal_rad: Floats
@@ -47,7 +47,7 @@ class Place(NamedTuple):
     """The new map is turned by `turn_rad` about its origin, then moved by `shift_m` (2,).
 
     `log_odds`: against all other places and a new building together. `rivals`: other places within odds of RIVAL. `common_m`: length of new wall on
-    known wall; `against_m`: of walls of either in the free floor of the other. `node`: of the new walk, amid the stretch that fits best.
+    known wall; `against_m`: length of walls of either in the free floor of the other. `node`: of the new walk, amid the stretch that fits best.
     """
 
     turn_rad: float
@@ -169,7 +169,7 @@ def _modes(score: Floats) -> list[tuple[float, Ints]]:
 
 
 def _described(new: Scene, known: _Images, place: Place, base_rad: float) -> Place:
-    """The place with the lengths that agree and contradict, and the node amid what fits best."""
+    """The place with the lengths that agree and contradict, and the node amid the stretch that fits best."""
     tried = _images(new, place.turn_rad, base_rad)
     shift = np.round(place.shift_m / CELL_M).astype(np.int64)
     here = _looked_up(known, tried.wall, tried.low + shift)
@@ -190,7 +190,7 @@ def _looked_up(images: _Images, wall: Floats, low: Ints) -> Floats:
 
 
 def _values(images: _Images, side: Ints, points: Floats) -> Floats:
-    """Ratios at points (n, 2), zero outside of the image."""
+    """Ratios at points (n, 2), zero outside the image."""
     x, y = _cells(points, images.low)
     inside = (x >= 0) & (y >= 0) & (x < images.ratio.shape[1]) & (y < images.ratio.shape[2])
     ratios = np.zeros(len(points))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A drawing as a plan like any other.
 
-In: `Mapped`, the pose at which the walk began. Out: `Plan`. Owns nothing. The openings between walls are listed as doors; those that the path leads
-through are open, of the others nothing is known.
+In: `Mapped`, the pose at which the walk began. Out: `Plan`. Owns nothing. The openings between walls are listed as doors; doors that the path leads
+through are open, the state of the others is unknown.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Floats
-from echostep.plan.model import Door, Level, Plan, Pose, is_no_plan
+from echostep.plan import Door, Level, Plan, Pose, is_no_plan
 from echostep_app.mapping.graph.directions import right_angles_off
 from echostep_app.mapping.mapper import Mapped
 from echostep_app.mapping.stairs import connector, wells_of, with_wells
 from echostep_app.mapping.walls.drawing import Drawing
 from echostep_app.plan.places.gaps import door_gaps
 
-LEAST_M = 0.1  # a shorter piece is no wall
+LEAST_M = 0.1  # a shorter piece is not a wall
 ROUND = 3  # digits of a metre
-# The first heading is the course of so much of path, or of as much of it, from LEAST_COURSE_M on, as is straight: chord by length of the path, which
-# is 4 degrees about its course
+# The first heading is the course of this much of the path, or of its straight part from LEAST_COURSE_M on: ratio of chord to length of the path,
+# which is 4 degrees about its course
 COURSE_M, LEAST_COURSE_M, STRAIGHT = 4.0, 0.5, 0.998
 COURSE_SD_RAD = math.radians(1.3)  # of that course: 32 simulated starts
 SQUARE_RAD = math.radians(6.0)
@@ -36,7 +36,7 @@ Moved = Callable[[Floats], Floats]  # points (n, 2) of the walk's own frame -> i
 
 
 def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, Walked]:
-    """The plan with the first pose of the first walk at `start`, and what was walked of each level."""
+    """The plan with the first pose of the first walk at `start`, and the paths walked on each level."""
     first = mapped.graph.pose[0]
     turn, is_square = _turn(mapped, start.heading_rad)
     c, s = math.cos(turn), math.sin(turn)
@@ -50,9 +50,9 @@ def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, Walked]:
 
 
 def plan_in(mapped: Mapped, moved: Moved, start: Pose, name: str, turn_sd_rad: float = 0.0) -> tuple[Plan, Walked]:
-    """The plan in the frame that `moved` leads to, and what was walked of each level; heights are above the first level.
+    """The plan in the frame that `moved` leads to, and the paths walked on each level; heights are above the first level.
 
-    `turn_sd_rad`: standard deviation of the frame's direction, beyond that of the first 15 m of the path.
+    `turn_sd_rad`: standard deviation of the frame's direction, beyond the error of the first 15 m of the path.
     """
     walk_levels, first_level = mapped.graph.levels, mapped.first_level
     heights = np.zeros(1) if walk_levels is None else walk_levels.height_m - walk_levels.height_m[first_level]
@@ -76,7 +76,7 @@ def plan_in(mapped: Mapped, moved: Moved, start: Pose, name: str, turn_sd_rad: f
 
 
 def _turned(drawing: Drawing, mapped: Mapped, turn_sd_rad: float) -> Drawing:
-    """The drawing in a frame whose direction is known so well; all of it is doubtful where that makes it no plan."""
+    """The drawing in a frame whose direction has this standard deviation; all of it is doubtful if it is then not a plan."""
     x, y, sd_m = drawing.place_sd.T
     away_m = np.hypot(x - mapped.graph.pose[0, 0], y - mapped.graph.pose[0, 1])
     place_sd = np.column_stack([x, y, np.hypot(sd_m, turn_sd_rad * away_m)])
@@ -96,7 +96,7 @@ def _level(drawing: Drawing, moved: Moved, name: str, height_m: float) -> Level:
 
 
 def _long(walls: Floats) -> Floats:
-    """Segments (n, 4), rounded, without those that are too short."""
+    """Segments (n, 4), rounded, without too short ones."""
     rounded = np.round(walls, ROUND)
     return rounded[_length_m(rounded) > LEAST_M]
 
@@ -123,7 +123,7 @@ def _turn(mapped: Mapped, heading_rad: float) -> tuple[float, bool]:
 
 
 def _first_course(pose: Floats, way_m: Floats) -> float:
-    """Direction of the straight beginning of a path (n, 3); the first heading where there is none.
+    """Direction of the straight beginning of a path (n, 3); else the first heading.
 
     The first stride leads to where the wearer looks, whatever the toe's heading is in it.
     """

@@ -17,11 +17,11 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.legs.trunk_path import rotated_segment
-from echostep.odometry.heading_filter import FOOT, HeadingFilter
+from echostep.odometry import FOOT, HeadingFilter
 from echostep.path import BeltEvidence, MeasuredSegment, PathSegment, StanceHeadings
 
-STILL_M = 0.01  # a segment without evidence that moves farther is of the legs: the foot's frame is another one after it
-ROUNDING = 1e-14  # rad2: a foot that has stood since the begin has no error
+STILL_M = 0.01  # a segment without evidence that moves farther is of the legs: the foot's frame is a new one afterwards
+ROUNDING = 1e-14  # rad2: a foot that has stood since the beginning has no error
 
 
 class _Smoothed(NamedTuple):
@@ -38,7 +38,7 @@ def with_smoothed_headings(segments: Sequence[MeasuredSegment]) -> list[Measured
     if not any(chain_of):
         return list(segments)
     smoothed = {key: _smooth(chain) for key, chain in {id(chain): chain for chain in chain_of if chain}.items()}
-    corrected, live, error = [], 0.0, 0.0  # what is taken out of the foot's heading live, and in hindsight
+    corrected, live, error = [], 0.0, 0.0  # corrections of the foot's heading live, and in hindsight
     for measured, chain in zip(segments, chain_of, strict=True):
         s, belt, smooth = measured.segment, measured.segment.belt, smoothed.get(id(chain))
         if belt is None:
@@ -93,7 +93,7 @@ def _growth(found: _Smoothed, segment: PathSegment) -> float:
 
 
 def _turned(segment: PathSegment, live: float, begin: float, middle: float, end: float) -> PathSegment:
-    """A segment corrected by `live`: now its way is by `middle`, its last heading by `end`, and its first heading turns by `begin`."""
+    """A segment corrected by `live`: now its way is corrected by `middle`, its last heading by `end`; its first heading turns by `begin`."""
     turned = rotated_segment(segment, live - middle)
     return replace(turned, heading0_rad=segment.heading0_rad + begin, heading1_rad=segment.heading1_rad + live - end)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Stairs between the levels of a drawing, as connectors in a well with a way in on each level.
 
-In: the path on the stairs, in the plan. Out: `Well`s; levels with the walls of these. Owns their width. Echoes on stairs are not drawn:
+In: the path on the stairs, in the plan. Out: `Well`s; levels with their walls. Owns their width. Echoes on stairs are not drawn:
 the well is the rectangle about the path.
 """
 
@@ -13,13 +13,13 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Floats
-from echostep.plan.model import Connector, Door, Level
+from echostep.plan import Connector, Door, Level
 from echostep_app.mapping.graph.levels import WalkLevels
 
 HALF_M = 0.6  # of a flight's width, assumed
 DOOR_M = 1.0  # width of the way in
 CLEAR_M = 0.15  # about the well, in which other walls end: nearer ones are taken for its own
-LEAST_M = 0.1  # a shorter piece is no wall
+LEAST_M = 0.1  # a shorter piece is not a wall
 SHARED = 0.3  # of the smaller well's area: two flights in one well
 
 
@@ -32,7 +32,7 @@ class Well:
 
     @property
     def levels(self) -> tuple[int, ...]:
-        """Those that it joins."""
+        """The levels that it joins."""
         return tuple(sorted({level for level, _, _ in self.ways_in}))
 
 
@@ -75,7 +75,7 @@ def with_wells(level: Level, index: int, wells: list[Well]) -> Level:
 
 
 def _outside(walls: Floats, well: Well) -> Floats:
-    """What is left of walls (n, 4) outside of a well."""
+    """The parts of walls (n, 4) outside a well."""
     lines = shapely.difference(shapely.linestrings(walls.reshape(-1, 2, 2)), well.area.buffer(CLEAR_M))
     parts = [part for part in shapely.get_parts(lines) if part.length > LEAST_M]
     return np.array([np.array(part.coords).ravel() for part in parts]).reshape(-1, 4)
@@ -111,7 +111,7 @@ def _rim(well: Well, index: int) -> tuple[list[Floats], list[Floats]]:
 
 
 def _joined(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Intervals in order, those that are nearer than a wall's least length as one."""
+    """Intervals in order, merged where they are nearer than a wall's least length."""
     merged: list[tuple[float, float]] = []
     for low, high in sorted(intervals):
         if merged and low < merged[-1][1] + LEAST_M:

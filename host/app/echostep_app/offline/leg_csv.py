@@ -3,7 +3,7 @@
 
 In: columns `t_s,thigh_rad_s,shank_rad_s[,belt_rad_s,compass_rad]`, 50 to 500 Hz, either sign; in place of a pitch rate the rates about three axes
 in rad/s, as `thigh_x,thigh_y,thigh_z`. The other leg: the same columns with `other_` before them, or a file of its own whose times are of the same
-clock. Out: `LegSamples` with notes on what was mended, or an EchostepError that says what is wrong. Owns nothing.
+clock. Out: `LegSamples` with notes on repairs, or an EchostepError that says what is wrong. Owns nothing.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.legs.clipping import find_clipping_limits, repair_clipping
 from echostep.offline.bursts import spread
 from echostep.offline.csv_table import (
     CsvLimits,
@@ -29,8 +28,9 @@ from echostep.offline.csv_table import (
     rate_complaint,
     read_rows,
 )
-from echostep.offline.foreign_columns import ADVICE, OWN, Naming, read_header
 from echostep.offline.imu_checks import BACK_SHARE, MISSING_SHARE, RATE_RANGE_HZ, missing_share, sorted_by_time
+from echostep_app.offline.clipped_rates import find_clipping_limits, repair_clipping
+from echostep_app.offline.foreign_columns import ADVICE, OWN, Naming, read_header
 from echostep_app.offline.mounting import walking_axis
 
 COLUMNS = ("t_s", "thigh_rad_s", "shank_rad_s")
@@ -41,13 +41,13 @@ TIME, THIGH, SHANK, BELT, COMPASS = range(5)  # columns of a table of samples
 
 FASTEST_LEG_RAD_S = 20.0  # for the 99 % quantile of the rates: the shank of a sprinter reaches it
 MOST_TURNS = 4  # of a compass column that was not wrapped: beyond it, degrees are more likely than radians
-LARGEST_NUMBER = 1e6  # of a rate in any unit: larger ones are no measurement, and their squares overflow
+LARGEST_NUMBER = 1e6  # of a rate in any unit: larger ones are not measurements, and their squares overflow
 FEWEST_ROWS = 100  # fewer rows do not show a dead sensor
 
 
 @dataclass(frozen=True, slots=True)
 class LegSamples:
-    """Arrays (n,): `t_s`, `thigh`, `shank`, `belt` rad/s, `compass` rad; NaN where the file has no belt or compass. `notes`: what was mended."""
+    """Arrays (n,): `t_s`, `thigh`, `shank`, `belt` rad/s, `compass` rad; NaN where the file has no belt or compass. `notes`: repairs."""
 
     t_s: Floats
     thigh: Floats
@@ -86,7 +86,7 @@ def load_legs(path: Path | str, prefix: str = "", naming: Naming = OWN) -> LegSa
 
 
 def _mended_table(file: TextIO, prefix: str, naming: Naming) -> tuple[Floats, tuple[str, ...]]:
-    """Usable rows (n, 5) in order of time, and notes on what was mended; raises ValueError for samples that cannot be used."""
+    """Usable rows (n, 5) in order of time, and notes on repairs; raises ValueError for samples that cannot be used."""
     table, mounted = _table(file, prefix, naming)
     whole = np.isfinite(table[:, : len(COLUMNS)]).all(axis=1)
     holes = () if whole.all() else (f"{int((~whole).sum())} rows without a number in some column: skipped",)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from echostep.errors import EchostepError
 from echostep.legs.kinematics import USUAL_M, LegLengths
 
-# Assumed, all of them.
+# All assumed.
 LENGTH_RANGE_M = (0.2, 0.75)  # thigh or shank: a quarter of a height of 0.8 m, and 0.285 (to the floor) of 2.6 m
 CENTIMETRES = (15.0, 80.0)  # a number in this range is a length in centimetres: LENGTH_RANGE_M with a margin
 WALKED_RANGE_M = (3.0, 1000.0)  # length of the walk: two strides at least, and what can be measured on the ground

@@ -32,7 +32,7 @@ from echostep_app.offline.leg_track import (
 )
 
 LEGS_DIFFER = 0.04  # standard deviation of the ratio of a person's two legs [14 legs of 7 people]
-DOUBTFUL = 3.0  # times that: no two legs of one person; assumed
+DOUBTFUL = 3.0  # times that: not two legs of one person; assumed
 STRAIGHT_S, STRAIGHT_RAD = 1.0, math.radians(15.0)  # of trunks that go straight on: about a stride; assumed
 NAMES = "the first", "the other"
 LEAST_M = 3.0  # seen by both legs, to compare them: two strides
@@ -43,9 +43,9 @@ UNKNOWN = Flag.UNSEEN | Flag.BACKWARD | Flag.GAP  # strides of which a leg does 
 def track_pair(
     first: LegSamples, other: LegSamples, settings: StrideSettings, heading_rad: float | None = None
 ) -> LegTrack:
-    """The way of the trunk by both legs; `strides`: those of the first leg, and of the other where the first has no samples, with their mean length.
+    """The way of the trunk by both legs; `strides` of the first leg, and of the other where the first has no samples, with their mean length.
 
-    Belt and compass are those of the first leg, or of the other if the first has none. Raises EchostepError for times that do not overlap.
+    Belt and compass are the first leg's, or the other's if the first has none. Raises EchostepError for times that do not overlap.
     """
     if min(first.t_s[-1], other.t_s[-1]) <= max(first.t_s[0], other.t_s[0]):
         raise EchostepError("the two legs have no time in common: their times must be of the same clock")
@@ -130,7 +130,7 @@ def _ratio(common_m: Floats) -> tuple[Floats, tuple[str, ...]]:
 def _joint_strides(t_s: Floats, distance: Floats, seen: Bools, legs: Legs, differ: float) -> tuple[Stride, ...]:
     """Strides of the first leg, and of the other before and after them, with the lengths (m) and the uncertainty of both.
 
-    A stride that either leg shows has no unknown length any more. Independent errors of two legs halve in squares; so do those of their scales, by
+    A stride that either leg shows has no unknown length any more. Independent errors of two legs halve in squares; so do errors of their scales, by
     which they `differ` (sd).
     """
     strides = _in_order(*legs)
@@ -153,7 +153,7 @@ def _joint_strides(t_s: Floats, distance: Floats, seen: Bools, legs: Legs, diffe
 
 
 def _in_order(first: tuple[Stride, ...], other: tuple[Stride, ...]) -> tuple[Stride, ...]:
-    """The strides of the first leg, and those of the other before and after them."""
+    """The strides of the first leg, and the other's before and after them."""
     if not first:
         return other
     begin_s, end_s = first[0].t_start_s, first[-1].t_end_s

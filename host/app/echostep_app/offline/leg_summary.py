@@ -11,7 +11,8 @@ from pathlib import Path
 
 from echostep.errors import EchostepError
 from echostep.file_mode import claim
-from echostep.legs.stride import Flag, distance_sd_m
+from echostep.legs.stride import Flag
+from echostep_app.offline.leg_side import distance_sd_m
 from echostep_app.offline.leg_track import LegTrack
 
 TRACK_COLUMNS = ("t_s", "distance_m", "speed_m_s", "heading_rad", "x", "y")

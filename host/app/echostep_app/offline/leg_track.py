@@ -12,13 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.legs.clipping import repair_clipping
-from echostep.legs.heading import Heading
-from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings, about_trunk
+from echostep.legs.heading import BIAS, Heading
+from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings
 from echostep.legs.strides import StrideEstimator
+from echostep_app.offline.clipped_rates import repair_clipping
 from echostep_app.offline.leg_csv import LegSamples
+from echostep_app.offline.leg_side import about_trunk
 
-# Assumed, all of them.
+# All assumed.
 START_SD_RAD = math.radians(3.0)  # of a heading given for the start, as read from a plan
 TURNING_RAD_S = math.radians(25.0)  # mean rate of a stride that is flagged as turning: 28 degrees in 1.1 s
 SHORTEST_TURN_S = 0.3  # a shorter stride is not flagged: strides take about 1 s
@@ -86,7 +87,7 @@ def fused_heading(
     belt = np.where(np.isnan(samples.belt), 0.0, sign * samples.belt)
     first, heading = (Heading(heading_rad=heading_rad, sd_rad=START_SD_RAD) for _ in range(2))
     first.feed(samples.t_s, belt, samples.compass, still)
-    heading.adopt_errors(first)
+    _adopt_errors(heading, first)
     angles = heading.feed(samples.t_s, belt, samples.compass, still)
     accepted = heading.read - heading.refused
     read = (f"compass accepted in {accepted} of {heading.read} readings",) if heading.read else ()
@@ -167,3 +168,12 @@ def path_rows(t_s: Floats, distance: Floats, heading: Floats) -> Floats:
     speed = np.array([0.0, *(move[1:] / np.diff(t_s))])
     x, y = np.cumsum(move * np.cos(heading)), np.cumsum(move * np.sin(heading))
     return np.column_stack([t_s, distance, speed, np.arctan2(np.sin(heading), np.cos(heading)), x, y])
+
+
+def _adopt_errors(heading: Heading, known: Heading) -> None:
+    """Start with the gyro's bias and the iron that another filter has found in the same record, and with their variances.
+
+    Both hardly change within a record, so that their last estimate rests on all samples.
+    """
+    heading.state[BIAS:] = known.state[BIAS:]
+    heading.P[BIAS:, BIAS:] = np.diag(np.diag(known.P)[BIAS:])

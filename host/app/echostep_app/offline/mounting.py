@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The axis about which a leg swings in walking, in the frame of a gyro of three axes that is strapped on anyhow.
+"""The axis about which a leg swings in walking, in the frame of a gyro of three axes that is strapped on in any orientation.
 
 In: angular rates of one sensor of a leg that walks. Out: `Mounting`: a unit vector, how well it is defined. Owns the frequencies.
 
@@ -25,7 +25,7 @@ CLEAR_RATIO = 1.3
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
-    """`axis` (3,): unit vector; its sign is arbitrary. `ratio`: rms rate about it over that about the next principal axis."""
+    """`axis` (3,): unit vector; its sign is arbitrary. `ratio`: rms rate about it over the rms rate about the next principal axis."""
 
     axis: Floats
     ratio: float

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Other methods for recorded feet and legs, which other distributions bring: those of the papers come with `echostep-studies`.
+"""Other methods for recorded feet and legs, which other distributions bring: the papers' methods come with `echostep-studies`.
 
 In: entry points of the group `echostep.profiles`, named `foot.NAME` and `legs.NAME`. Out: the method. Owns nothing.
 """

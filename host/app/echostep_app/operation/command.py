@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
@@ -19,21 +18,21 @@ from typing import TYPE_CHECKING
 from rich.console import Console, Group
 from rich.live import Live
 
-from echostep.plan.model import Plan, load_plan
+from echostep.plan import Plan, load_plan
 from echostep_app.operation.operation import Operation
 from echostep_app.operation.recorded.record import OperationRecorder
 from echostep_app.operation.recorded.replay import replay
-from echostep_app.operation.recorded.tape import Keyframe, Tape
+from echostep_app.operation.restorer import Restorer, restore
 from echostep_app.operation.views import Views, finish, open_page
 from echostep_app.page.protocol import FRAME_S
-from echostep_app.printing.console import console_for_people
+from echostep_app.printing.console import console_for_people, print_notices
 from echostep_app.printing.people import FaultNews, outlast_output, output_faults
+from echostep_app.recording.recorder import Recorder
 from echostep_app.team.commander import table
 from echostep_app.team.endpoint import Endpoint, parse_endpoint
-from echostep_app.team.inbox import Inbox, ListenerThread, ReceivedMessage
-from echostep_app.team.messages.marks import ALL, is_shared
+from echostep_app.team.inbox import Inbox, ListenerThread, Subscription
+from echostep_app.team.messages.marks import ALL
 from echostep_app.team.messages.report import checked_name
-from echostep_app.team.restorer import Restorer
 
 if TYPE_CHECKING:
     from echostep_app.operation.page import TablePage
@@ -53,23 +52,23 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
     operation, inbox = Operation(load_plan(plan_path)), Inbox()
     checked = checked_name("--team", team) if team else None
     with ExitStack() as opened:
-        recorder = OperationRecorder(out, operation.plan, str(endpoint))
-        opened.callback(_end_recording, recorder, console)
-        tape = Tape(recorder.path, grows=True)
-        page = open_page(opened, operation, "echostep command", views, tape, console)
-        console.print(f"Recording: {recorder.path}", highlight=False)
+        recorder = OperationRecorder(out, operation, str(endpoint))
+        recording = recorder.file
+        opened.callback(_end_recording, recording, console)
+        page = open_page(opened, operation, "echostep command", views, recorder.tape, console)
+        console.print(f"Recording: {recording.path}", highlight=False)
         receiver = _receiver(endpoint, checked, operation.plan, inbox, lambda text: console.print(text, markup=False))
         opened.callback(receiver.close)
         if page and endpoint.scheme != "mesh":  # marks need a broker
             page.feed.send = receiver.send
         restorer = Restorer() if endpoint.scheme != "mesh" else None
-        run = _Run(operation, inbox, receiver, recorder, tape, restorer)
+        run = _Run(operation, inbox, receiver, recorder, restorer)
         with suppress(KeyboardInterrupt):
             _follow(run, page, console, math.inf if seconds is None else seconds, views)
         run.look(time.monotonic())
-        _write_crews(operation, recorder.path, console)
+        _write_crews(operation, recording.path, console)
     finish(operation, time.monotonic(), views)
-    recorder.check_whole()
+    recording.check_whole()
 
 
 def _write_crews(operation: Operation, recording: Path, console: Console) -> None:
@@ -88,37 +87,20 @@ class _Run:
     inbox: Inbox
     receiver: ListenerThread
     recorder: OperationRecorder
-    tape: Tape
     restorer: Restorer | None
 
     def look(self, now_s: float) -> None:
         """Empty the inbox, record its messages, and send the broker those shared messages again that it has lost."""
         unix_s, connected = time.time(), self.receiver.connected
-        believed = self.operation.update(self.inbox, now_s, unix_s)
+        believed = self.operation.receive(*self.inbox.take_all(), now_s, unix_s)
         if self.restorer:
             restore(self.restorer, self.operation, self.receiver, believed, now_s)
-        roster = self.operation.roster
-        self.recorder.add(believed)
-        self.recorder.add_faults(now_s, output_faults())
-        self.recorder.add_condition(now_s, unix_s, roster.received, roster.rejected, connected=connected)
-        if self.tape.note(now_s, len(believed)):
-            self.tape.keep(Keyframe(now_s, unix_s, self.recorder.offset, connected, self.operation.copy()))
+        self.recorder.add(believed, now_s, unix_s, connected=connected, faults=output_faults())
 
 
-def restore(
-    restorer: Restorer, operation: Operation, receiver: ListenerThread, believed: list[ReceivedMessage], now_s: float
-) -> None:
-    """Send marks and acknowledgements again that the broker has lost or replaced; `believed`: messages since the last call."""
-    topics = [m.topic for m in believed if m.topic and is_shared(m.topic)]
-    lost = restorer.look(receiver.connected, topics, lambda: operation.shared, now_s)
-    for topic, payload in lost + operation.take_answers():
-        receiver.send(topic, payload)
-
-
-def _end_recording(recorder: OperationRecorder, console: Console) -> None:
-    recorder.close()
-    while recorder.notices:
-        console.print(recorder.notices.popleft(), markup=False)
+def _end_recording(recording: Recorder, console: Console) -> None:
+    recording.close()
+    print_notices(recording.notices, console)
 
 
 def _receiver(
@@ -128,12 +110,12 @@ def _receiver(
     if endpoint.scheme == "mesh":
         from echostep_app.team.mesh.mesh import MeshListener
 
-        listener = MeshListener(endpoint, team, plan, inbox.put)
-        return ListenerThread(listener, lambda text: print_line(f"{endpoint}: {text}"))
-    from echostep_app.team.mqtt.publisher import Listener
+        listener: Subscription = MeshListener(endpoint, team, plan, inbox.put)
+    else:
+        from echostep_app.team.mqtt.publisher import Listener
 
-    topics = [f"echostep/{team or '+'}/+/+", ALL]
-    return ListenerThread(Listener(endpoint, topics, inbox.put), lambda text: print_line(f"{endpoint}: {text}"))
+        listener = Listener(endpoint, [f"echostep/{team or '+'}/+/+", ALL], inbox.put)
+    return ListenerThread(listener, lambda text: print_line(f"{endpoint}: {text}"))
 
 
 def _follow(run: _Run, page: TablePage | None, console: Console, seconds: float, views: Views) -> None:
@@ -156,10 +138,9 @@ def _follow(run: _Run, page: TablePage | None, console: Console, seconds: float,
                 time.sleep(max(min(due_s, end_s) - now_s, 0.0))
                 now_s = time.monotonic()
                 run.look(now_s)
-                for notices in (run.recorder.notices, page.notices if page else deque[str]()):
-                    while notices:
-                        console.print(notices.popleft(), markup=False)
+                print_notices(run.recorder.file.notices, console)
                 if page:
+                    print_notices(page.notices, console)
                     receiver = run.receiver
                     fault = ". ".join(filter(None, (receiver.fault, news.words())))
                     page.publish(operation.scene(now_s, time.time(), connected=receiver.connected, fault=fault))

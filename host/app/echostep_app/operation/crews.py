@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from echostep.errors import EchostepError
+from echostep_app.printing.lines import as_error
 from echostep_app.team.messages.crews import Crew
 
 MOST_LINES = 10_000  # further ones are left out
@@ -57,11 +57,8 @@ class CrewLog:
     def write(self, path: Path) -> None:
         """Write the table, in order of time; raises EchostepError when the file cannot be written."""
         rows = [event.cells for event in sorted(self.events, key=lambda event: event.crew.unix_s)]
-        try:
-            with path.open("w", encoding="utf-8", newline="") as file:
-                csv.writer(file).writerows([HEAD, *rows])
-        except OSError as error:
-            raise EchostepError(f"{path}: cannot write the crews: {error.strerror or error}") from error
+        with as_error(f"{path}: cannot write the crews"), path.open("w", encoding="utf-8", newline="") as file:
+            csv.writer(file).writerows([HEAD, *rows])
 
 
 def _event(before: Crew | None, after: Crew) -> str:

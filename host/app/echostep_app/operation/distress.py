@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import shapely
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.operation.words import current_alarm_words, last_place_words, level_on, metres, place_words
 from echostep_app.plan.routing import CLIMB
 from echostep_app.team.messages.marks import Errand, MarkBoard

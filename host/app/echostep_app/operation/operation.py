@@ -13,11 +13,11 @@ import threading
 from array import array
 from collections import Counter, deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from msgspec import structs
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.operation import requests
 from echostep_app.operation.crews import CrewLog
 from echostep_app.operation.distress import ShownDistress, errand_to, shown_distress
@@ -34,8 +34,8 @@ from echostep_app.operation.words import (
     summary_words,
 )
 from echostep_app.page.elements.marks import ShownMark
-from echostep_app.team.commander import rejected, take_messages
-from echostep_app.team.inbox import Inbox, ReceivedMessage
+from echostep_app.team.commander import rejected
+from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.crews import Crew
 from echostep_app.team.messages.marks import Mark, MarkBoard, ack_message, errand_message, is_shared
 from echostep_app.team.messages.report import BadReportError
@@ -73,11 +73,11 @@ class _Followed:
 
     number: int
     state: MemberState | None = None
-    history: deque[ShownEvent] | None = None
+    history: deque[ShownEvent] = field(default_factory=lambda: deque(maxlen=MOST_EVENTS))
 
 
 class Operation:
-    """`update` takes what an inbox holds; `scene` gives the present moment."""
+    """`receive` takes what an inbox held; `scene` gives the present moment."""
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
@@ -99,24 +99,16 @@ class Operation:
         made = Operation(self.plan)
         with self._lock:
             made.roster, made._board, made._trails = self.roster.copy(), self._board.copy(), self._trails.copy()
-            made._followed = {
-                key: replace(f, history=f.history.copy() if f.history is not None else None)
-                for key, f in self._followed.items()
-            }
+            made._followed = {key: replace(f, history=f.history.copy()) for key, f in self._followed.items()}
             made._next_number = self._next_number
         return made
-
-    def update(self, inbox: Inbox, now_s: float, unix_s: float) -> list[ReceivedMessage]:
-        """Take all messages of an inbox, and note what has changed since the last call; returns the accepted ones."""
-        messages, dropped = inbox.take_all()
-        return self.receive(messages, dropped, now_s, unix_s)
 
     def receive(
         self, messages: Sequence[ReceivedMessage], dropped: Mapping[str, int], now_s: float, unix_s: float
     ) -> list[ReceivedMessage]:
         """Take messages, and counts of dropped ones by reason; returns the accepted messages."""
         with self._lock:
-            believed = take_messages([m for m in messages if not is_shared(m.topic)], dropped, self.roster)
+            believed = self.roster.take([m for m in messages if not is_shared(m.topic)], dropped)
             believed += [m for m in messages if is_shared(m.topic) and self._receive_shared(m.topic or "", m.payload)]
             self._follow(now_s, unix_s)
         return believed
@@ -128,7 +120,7 @@ class Operation:
 
     def _receive_shared(self, topic: str, payload: bytes) -> bool:
         self.roster.received += 1
-        crews, identity = self._board.crews.known, topic.rpartition("/")[2]
+        crews, identity = self._board.crews, topic.rpartition("/")[2]
         before = crews.get(identity)
         try:
             self._board.receive(topic, payload)
@@ -171,7 +163,7 @@ class Operation:
         if isinstance(request, requests.SetCrew):
             name, members, air_min, by = request.name, request.members, request.air_min, request.by
             return Crew(1, secrets.token_hex(4), name, members, air_min, by, unix_s).message
-        if (crew := self._board.crews.known.get(request.id)) is None:
+        if (crew := self._board.crews.get(request.id)) is None:
             return "There is no such crew any more."
         after = crew.after(request.does, request.by, unix_s)
         return after.message if after else "The crew has done that already."
@@ -224,7 +216,7 @@ class Operation:
             m = self._member(number, now_s)
             if m is None:
                 return None
-            history = tuple(reversed(self._followed[m.key].history or ()))
+            history = tuple(reversed(self._followed[m.key].history))
             return shown_details(number, m, self.plan, now_s, history, self.roster.duplicates(now_s))
 
     def distress(self, number: int, now_s: float) -> ShownDistress | None:
@@ -242,7 +234,7 @@ class Operation:
         for key in self.roster.keys:
             m, followed = members[key], self._followed.get(key)
             if followed is None:
-                followed = self._followed[key] = _Followed(self._next_number, history=deque(maxlen=MOST_EVENTS))
+                followed = self._followed[key] = _Followed(self._next_number)
                 self._next_number += 1
             self._note(followed, m, now_s, unix_s)
             if m.report.status in SHOWN_STATUS and m.report.position and level_on(self.plan, m) is not None:
@@ -251,7 +243,7 @@ class Operation:
     def _note(self, followed: _Followed, m: Member, now_s: float, unix_s: float) -> None:
         """Add a change of state to the history."""
         state = m.state(now_s)
-        if state is followed.state or followed.history is None:
+        if state is followed.state:
             return
         p = m.report.last_known
         where = ", ".join(filter(None, (p.floor_name, p.where))) if p else ""
@@ -277,7 +269,7 @@ class Operation:
 
     def _shown_crews(self) -> tuple[Crew, ...]:
         """All crews; the same object while they are the same."""
-        if (crews := tuple(self._board.crews.known.values())) != self._crews:
+        if (crews := tuple(self._board.crews.values())) != self._crews:
             self._crews = crews
         return self._crews
 

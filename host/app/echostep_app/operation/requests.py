@@ -11,9 +11,9 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from echostep.plan.plan_file import Metres
+from echostep.fields import Metres
 from echostep.ports.people.payloads import Level, decoded
-from echostep_app.page.requests import MOST_REQUEST, FrameDrawn, SetPlaying, SetSpeed
+from echostep_app.page.requests import MOST_REQUEST, FrameDrawn, Seek, SetPlaying, SetSpeed
 from echostep_app.team.messages.crews import AirMinutes, Does, Members
 from echostep_app.team.messages.marks import MarkKind
 from echostep_app.team.messages.report import is_printable
@@ -74,12 +74,6 @@ class CrewDoes(msgspec.Struct, frozen=True, tag_field="kind", tag="crew_does"):
     id: Identity
     does: Does
     by: Person
-
-
-class Seek(msgspec.Struct, frozen=True, tag_field="kind", tag="seek"):
-    """Show the moment so many seconds after the beginning of the operation."""
-
-    t_s: Annotated[float, Meta(ge=0.0, le=1e10)]
 
 
 class Now(msgspec.Struct, frozen=True, tag_field="kind", tag="now"):

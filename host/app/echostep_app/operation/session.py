@@ -2,7 +2,12 @@
 """The session of one commander's page: frames at most 30 times a second, with at most two that the page has not drawn.
 
 In: a WebSocket, the feed. Out: frames. Owns what this page has been sent, and which wearer it has chosen. A page in the background draws nothing, so
-nothing is sent to it.
+nothing is sent to it. A frame, little-endian:
+
+    u32         length of the JSON header, padded with spaces to a multiple of four
+    bytes       the header (`TableHeader`)
+    float32[7]  `places` rows: wearer, x, y, level, heading, 95 % radius, protection radius (`Operation.scene`)
+    float32[5]  `trail` rows: wearer, x, y, level, age in seconds
 """
 
 from __future__ import annotations
@@ -10,21 +15,53 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
 
 from starlette.websockets import WebSocket
 
-from echostep_app.operation import requests, wire
+from echostep_app.operation import requests
+from echostep_app.operation.distress import ShownDistress
 from echostep_app.operation.operation import Operation, TableScene
-from echostep_app.operation.recorded.past import PastView
+from echostep_app.operation.recorded.past import PastView, ShownTime
 from echostep_app.operation.recorded.tape import Tape
+from echostep_app.operation.words import ShownDetails, ShownWearer
+from echostep_app.page.elements.marks import ShownMark
 from echostep_app.page.guarded_socket import MOST_UNDRAWN, GuardedSocket
-from echostep_app.page.protocol import FRAME_S, Refused
-from echostep_app.page.requests import FrameDrawn, SetPlaying, SetSpeed
+from echostep_app.page.protocol import FRAME_S, Refused, encode, hello, packed
+from echostep_app.page.requests import FrameDrawn, Seek, SetPlaying, SetSpeed
 from echostep_app.page.shared import PageCounts
 from echostep_app.page.web.faults import Faults
+from echostep_app.team.messages.crews import Crew
 
+PLACE_BYTES, TRAIL_BYTES = 7 * 4, 5 * 4
 BAR_S = 0.5  # between two frames of one scene: the time bar grows
 PAST = "The page shows the past: return to now first."
+
+
+@dataclass(frozen=True, slots=True)
+class TableHeader:
+    """One moment. `seq`: the page returns it when the frame is drawn. `list`, `marks`, `crews`: None when the page has them already.
+
+    `trail_from` 0: trails begin anew. `details`, `distress`: of the chosen wearer. `time`: of the time bar. The field names are keys of the JSON.
+    """
+
+    seq: int
+    unix_s: float
+    places: int
+    trail: int
+    trail_from: int
+    list: tuple[ShownWearer, ...] | None
+    summary: str
+    refused: str
+    connected: bool
+    fault: str
+    details: ShownDetails | None
+    distress: ShownDistress | None
+    marks: tuple[ShownMark, ...] | None
+    crews: tuple[Crew, ...] | None
+    time: ShownTime | None
+    kind: Literal["table"] = "table"
 
 
 class TableFeed:
@@ -72,7 +109,7 @@ class TableSession(GuardedSocket):
         self._sent_s = 0.0  # when, on the monotonic clock
 
     async def _greet(self) -> None:
-        await self.tell(wire.encode(wire.table_hello(self._feed.operation.plan, self._feed.title)))
+        await self.tell(encode(hello(self._feed.operation.plan, self._feed.title, replay=False)))
 
     async def _handle(self, text: str | None) -> None:
         request = requests.parse_request(text)
@@ -85,18 +122,18 @@ class TableSession(GuardedSocket):
             case requests.Choose(number):
                 self._chosen, self._due = number, True
                 self._news.set()
-            case requests.Seek() | SetPlaying() | SetSpeed() | requests.Now():
+            case Seek() | SetPlaying() | SetSpeed() | requests.Now():
                 if self._view is not None:
                     self._view.handle(request)
                     self._due = True
                     self._news.set()
             case _ if self._view is not None and self._view.is_past:
                 self._counts.refused += 1
-                await self.tell(wire.encode(Refused(PAST)))
+                await self.tell(encode(Refused(PAST)))
             case _:
                 if refusal := self._feed.act(request):
                     self._counts.refused += 1
-                    await self.tell(wire.encode(Refused(refusal)))
+                    await self.tell(encode(Refused(refusal)))
 
     async def _send(self) -> None:
         """Send a frame when there is something new, not before `FRAME_S` after the last one."""
@@ -116,10 +153,8 @@ class TableSession(GuardedSocket):
 
     async def _moment(self) -> tuple[Operation, TableScene | None]:
         """What this page shows: the newest scene, or one of the past, which another thread makes."""
-        if self._view is not None and self._view.is_past:
-            past = await asyncio.to_thread(self._view.look, time.monotonic())
-            if past is not None:
-                return past
+        if self._view is not None and (t_s := self._view.moment(time.monotonic())) is not None:
+            return await asyncio.to_thread(self._view.at, t_s)
         return self._feed.operation, self._feed.latest
 
     def _is_due(self) -> bool:
@@ -133,17 +168,26 @@ class TableSession(GuardedSocket):
         self._undrawn.add(self._seq)
         if operation is not self._shown:
             self._shown, self._trail_end, self._last, self._due = operation, 0, None, True
-        begin, self._sent_s = self._trail_end, time.monotonic()
-        lists = self._due or self._last is None or scene.rows is not self._last.rows
+        begin, last, self._sent_s = self._trail_end, self._last, time.monotonic()
+        lists = self._due or last is None or scene.rows is not last.rows
         trail, self._trail_end = operation.trail(begin, scene.t_s)
-        chosen = self._chosen if lists else None
-        details = operation.details(chosen, scene.t_s) if chosen is not None else None
-        distress = operation.distress(chosen, scene.t_s) if chosen is not None else None
-        marks = self._last is None or scene.marks is not self._last.marks
-        crews = self._last is None or scene.crews is not self._last.crews
-        latest = self._feed.latest or scene
-        shown = self._view.shown(scene.t_s, sum(row.open_alarm for row in latest.rows)) if self._view else None
-        self._last, self._due = scene, False
-        return wire.frame(
-            scene, wire.TableParts(self._seq, trail, begin, lists, marks, crews, details, distress, shown)
+        chosen, latest = self._chosen if lists else None, self._feed.latest or scene
+        header = TableHeader(
+            seq=self._seq,
+            unix_s=scene.unix_s,
+            places=len(scene.places) // PLACE_BYTES,
+            trail=len(trail) // TRAIL_BYTES,
+            trail_from=begin,
+            list=scene.rows if lists else None,
+            summary=scene.summary,
+            refused=scene.refused,
+            connected=scene.connected,
+            fault=scene.fault,
+            details=None if chosen is None else operation.details(chosen, scene.t_s),
+            distress=None if chosen is None else operation.distress(chosen, scene.t_s),
+            marks=scene.marks if last is None or scene.marks is not last.marks else None,
+            crews=scene.crews if last is None or scene.crews is not last.crews else None,
+            time=self._view.shown(scene.t_s, sum(row.open_alarm for row in latest.rows)) if self._view else None,
         )
+        self._last, self._due = scene, False
+        return packed(header, scene.places + trail)

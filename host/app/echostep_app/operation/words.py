@@ -10,10 +10,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.page.elements.marks import ShownMark
 from echostep_app.team.commander import heading_on, notes
 from echostep_app.team.cot import alarm_words
+from echostep_app.team.messages.crews import crew_of
 from echostep_app.team.messages.marks import AlarmKey, Mark, MarkBoard
 from echostep_app.team.messages.report import Position
 from echostep_app.team.roster import Member, MemberState
@@ -111,7 +112,7 @@ def shown_wearer(
         remarks.insert(0, f"acknowledged by {ack.by}")
     if errand := board.errands.get(m.key):
         remarks.insert(0, f"sent to {errand.to} by {errand.by}")
-    if crew := board.crews.of_member(m.report.name):
+    if crew := crew_of(m.report.name, board.crews.values()):
         remarks.insert(0, f"crew {crew.name}{' inside' * crew.is_inside}")
     is_open = key is not None and ack is None
     return ShownWearer(

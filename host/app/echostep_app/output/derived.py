@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from echostep.arrays import Floats
 from echostep.board.calibration import ranges
 from echostep.board.frames import BoardReader, Frames
 from echostep.board.messages import (
@@ -23,12 +24,11 @@ from echostep.board.messages import (
     Ranger,
     Status,
 )
-from echostep.extras import lacks
-from echostep.localization.estimate import Estimate, claims_place
+from echostep.localization import Estimate, claims_place
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.georeference import earth_of
 from echostep.ports.chunks import BOARD, Portion
 from echostep.tracker import Tracker
+from echostep_app.extras import lacks
 from echostep_app.output.foxglove import (  # fmt: skip
     ELLIPSE,
     LEFT_BEAM,
@@ -49,6 +49,7 @@ from echostep_app.output.foxglove import (  # fmt: skip
     topic,
     walls,
 )
+from echostep_app.plan.georeference import earth_of
 from echostep_app.recording.recorder import DerivedMessage, Topic
 
 PRESSURE_PA, TEMPERATURE_C = 0.25, 0.05  # units of a count
@@ -217,7 +218,7 @@ class Derived:
         piece_start = (len(self._track) - 2) // TRACK_PIECE * TRACK_PIECE if len(self._track) > 1 else 0
         drawn = {
             f"track_{piece_start}": (LINE_STRIP, TRACK, self._track[piece_start:]),
-            "ellipse95": (LINE_STRIP, ELLIPSE, _outline(e)),
+            "ellipse95": (LINE_STRIP, ELLIPSE, [(x, y, e.z_m) for x, y in outline95(e, ELLIPSE_POINTS).tolist()]),
         }
         for which, color in ((Ranger.LEFT, LEFT_BEAM), (Ranger.RIGHT, RIGHT_BEAM)):
             echo_ns, range_m = self._last_echo.get(which, (-1 << 62, 0.0))
@@ -252,12 +253,10 @@ def _pressures(frames: Frames, t_ns: Any) -> list[DerivedMessage]:
     return notes
 
 
-def _outline(e: Estimate) -> list[Place]:
-    """The 95 % ellipse of an estimate as points on the map."""
+def outline95(e: Estimate, points: int) -> Floats:
+    """The 95 % ellipse of an estimate as so many places (n, 2) on the map, the first one again at the end."""
     major_m, minor_m, angle_rad = e.ellipse95
+    turn = np.linspace(0.0, 2.0 * math.pi, points)
+    u, v = major_m * np.cos(turn), minor_m * np.sin(turn)
     c, s = math.cos(angle_rad), math.sin(angle_rad)
-    return [
-        (e.x_m + c * u - s * v, e.y_m + s * u + c * v, e.z_m)
-        for turn in np.linspace(0.0, 2.0 * math.pi, ELLIPSE_POINTS).tolist()
-        for u, v in [(major_m * math.cos(turn), minor_m * math.sin(turn))]
-    ]
+    return np.column_stack((e.x_m + c * u - s * v, e.y_m + s * u + c * v))

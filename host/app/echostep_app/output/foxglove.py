@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from echostep.plan.model import Level
+from echostep.plan import Level
 from echostep_app.recording.recorder import DerivedMessage, Topic
 
 MAP_FRAME, TRUNK_FRAME = "map", "trunk"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The derived messages of a run, live, to Foxglove and other viewers of its WebSocket protocol.
 
-In: derived messages. Out: the same channels, schemas and bodies as in a recording [Foxglove, ws-protocol], to each viewer. Owns the server, which
-listens behind a front that knows the protocol's older name too (`foxglove_front`).
+In: derived messages. Out: the same channels, schemas and bodies as in a recording [Foxglove, ws-protocol], to each viewer. Owns the server, which is
+that of Foxglove's SDK.
 A viewer that comes late gets plan and track at the next message: the newest version of each drawn thing is kept. A viewer that is too slow loses its
 oldest messages; nothing waits for it.
 """
@@ -10,23 +10,25 @@ oldest messages; nothing waits for it.
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from echostep.errors import EchostepError
-from echostep.extras import require
+from echostep_app.extras import require
 from echostep_app.output.derived import TOPICS
 from echostep_app.output.foxglove import FRAME, LOCATION, POSE, SCENE
-from echostep_app.output.foxglove_front import LOCAL, SubprotocolFront
 from echostep_app.recording.recorder import DerivedMessage, Topic
 
 if TYPE_CHECKING:
     from foxglove import Channel
 
+LOCAL = "127.0.0.1"
 ALL_TOPICS = (*TOPICS, POSE, FRAME, SCENE, LOCATION)
 BACKLOG = 256  # messages that may wait for one viewer: some seconds
+END_S = 1.0  # for the last bytes to viewers; assumed
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,22 +60,21 @@ class FoxgloveServer:
         self._drawn: dict[str, Any] = {}  # newest entity of the scene by its id
         self._late = False  # a viewer has subscribed to the scene since the last message
         try:
-            self._front = SubprotocolFront(address.host, address.port)
             self._server = foxglove.start_server(
-                name=title, host=LOCAL, port=0, context=context, server_listener=_listener(self),
+                name=title, host=address.host, port=address.port, context=context, server_listener=_listener(self),
                 message_backlog_size=BACKLOG,
             )  # fmt: skip
-        except (RuntimeError, OSError, ValueError) as error:
+        except RuntimeError as error:
             raise EchostepError(f"--foxglove {address.host}:{address.port}: cannot listen there: {error}") from error
-        self._front.serve(self._server.port)
-        self.url = f"ws://{f'[{address.host}]' if ':' in address.host else address.host}:{self._front.port}"
+        self.url = f"ws://{f'[{address.host}]' if ':' in address.host else address.host}:{self._server.port}"
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._server.stop()
-        self._front.close()
+        ending = threading.Thread(target=self._server.stop, daemon=True)
+        ending.start()
+        ending.join(END_S)  # a viewer that takes nothing would hold it up for ever
         for channel in self._channels.values():
             channel.close()
 

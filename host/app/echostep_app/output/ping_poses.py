@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization import Estimate, TrackStatus
 from echostep.path import MeasuredSegment
 
 

@@ -13,8 +13,9 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from echostep.plan.model import Plan
-from echostep_app.output.score_plots import as_svg, draw_distribution, draw_on_plan, draw_stanford
+from echostep.plan import Plan
+from echostep_app.output.score_plots import draw_distribution, draw_on_plan, draw_stanford
+from echostep_app.printing.picture_files import svg_text
 from echostep_app.scorecard.card import Scored
 from echostep_app.scorecard.definitions import METRICS, as_text, notes
 
@@ -112,7 +113,7 @@ def _table(report: ScoreReport) -> str:
 
 def picture(figure: Figure, words: str, alt: str) -> str:
     """A figure with its caption, inside the page."""
-    data = base64.b64encode(as_svg(figure)).decode()
+    data = base64.b64encode(svg_text(figure).encode()).decode()
     return (
         f'<figure><img alt="{escape(alt or words)}" src="data:image/svg+xml;base64,{data}">'
         f"<figcaption>{escape(words)}</figcaption></figure>"

@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: MIT
 """Pictures of scores: distribution of the errors, errors on the plan, Stanford diagrams.
 
-In: `Scored` tracks, a plan. Out: matplotlib figures, or SVG. Owns nothing. Colours that the colour-blind can tell apart [Okabe and Ito 2008]; lines
+In: `Scored` tracks, a plan. Out: matplotlib figures. Owns nothing. Colours that the colour-blind can tell apart [Okabe and Ito 2008]; lines
 differ in their dashes too.
 """
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.scorecard.card import Scored
 
 if TYPE_CHECKING:
@@ -121,16 +120,6 @@ def stanford_axes(axes: Axes, error_m: Floats, radius_m: Floats, markersize: flo
         )  # fmt: skip
     axes.plot(RANGE_M, RANGE_M, color=BLACK, lw=1.0)
     axes.set(xscale="log", yscale="log", xlim=RANGE_M, ylim=RANGE_M)
-
-
-def as_svg(figure: Figure) -> bytes:
-    """A figure as SVG; the same figure gives the same bytes."""
-    import matplotlib
-
-    file = io.BytesIO()
-    with matplotlib.rc_context({"svg.hashsalt": "echostep"}):
-        figure.savefig(file, format="svg", metadata={"Date": None})
-    return file.getvalue()
 
 
 def _figure(rows: int, width: float, height: float, **ratios: Any) -> tuple[Figure, Sequence[Axes]]:

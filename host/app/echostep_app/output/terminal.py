@@ -22,10 +22,11 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from echostep.arrays import Octets
-from echostep.localization.estimate import Estimate, claims_place
-from echostep.plan.model import Level, Plan
+from echostep.localization import Estimate, claims_place
+from echostep.plan import Level, Plan
 from echostep.tracker import Tracker
 from echostep_app.board.faults.health import Finding, Severity, all_findings
+from echostep_app.board.gateway_words import gateway_words
 from echostep_app.plan.places.bearing import heading_words
 from echostep_app.printing.running import running_note
 
@@ -181,7 +182,7 @@ def health(tracker: Tracker) -> str:
     dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
     sync = "SyncOut" if streams.synchronised else "arrival times"
     foot = f"{streams.foot_name} on {sync}"
-    gateway = f"   {tracker.gateway.describe()}" if tracker.gateway.counts.words or tracker.gateway.numbers else ""
+    gateway = f"   {gateway_words(tracker.gateway)}" if tracker.gateway.counts.words or tracker.gateway.numbers else ""
     return f"board: {board.good} frames, {board.rejected} bad, {board.lost} lost, {dropped} dropped   {foot}{gateway}"
 
 

@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.beacon_map import BeaconPlace, BeaconState
-from echostep.localization.estimate import Estimate
-from echostep.plan.model import Level, Plan
+from echostep.localization import BeaconPlace, BeaconState, Estimate
+from echostep.plan import Level, Plan
 from echostep_app.plan.routing import Route
 from echostep_app.printing.picture_files import save_picture
 from echostep_app.scorecard.truth import Truth
@@ -46,13 +45,11 @@ def track_figure(
     route: Route | None = None, beacons: Sequence[BeaconPlace] = (),
 ) -> Figure:  # fmt: skip
     """The picture: one panel for each visited level, the lowest at the bottom."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     visited = sorted({e.level for e in estimates}) or [0]
     inches = min(sum(_height(plan.levels[k]) for k in visited), MAX_HEIGHT_INCHES)
     figure = Figure(figsize=(10, inches), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
     figure.suptitle(title, parse_math=False)
     for axes, k in zip(figure.subplots(len(visited), squeeze=False)[::-1, 0], visited, strict=True):
         here = [e for e in estimates if e.level == k]

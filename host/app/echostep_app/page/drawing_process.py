@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Draws the walls of a walk without a plan while it goes on, in a process of its own: the tracker never waits for it.
 
-In: measured segments and estimates, in the tracker's thread. Out: `ShownDrawing`s, and plans for others where asked for, in a thread that waits for
+In: measured segments and estimates, in the tracker's thread. Out: `ShownDrawing`s, and plans for others on request, in a thread that waits for
 the process. Owns both. A live run's process rests after each drawing as long as it has computed: half a core at most. A replay's draws at the same
 places of the walk, however fast it is computed; each stretch is longer by a share of the way, so that an hour is drawn 150 times.
 """
@@ -19,12 +19,12 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import IO, TYPE_CHECKING, NamedTuple
 
-from echostep.extras import lacks
-from echostep.localization.estimate import Estimate
+from echostep.localization import Estimate
 from echostep.path import MeasuredSegment
-from echostep.plan.model import Pose
+from echostep.plan import Pose
+from echostep_app.extras import lacks
 from echostep_app.page.elements.drawn_walls import ShownDrawing, WalkDrawing, shown_drawing, walk_drawing
-from echostep_app.page.shared_drawing import SharedDrawing
+from echostep_app.page.shared import SharedDrawing
 from echostep_app.plan.places.refusals import refusals
 from echostep_app.plan.writer import plan_json
 
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
     from echostep_app.mapping.mapper import Mapped
 
 STRETCH_M = 8.0  # of path, from which a new drawing is made: a few seconds
-LONGER = 0.02  # of the way so far, by which the stretches of a replay are longer
-MOST_SEGMENTS = 40_000  # of a walk, about four hours; what comes later is tracked, not drawn
+LONGER = 0.02  # share of the way so far by which the stretches of a replay are longer
+MOST_SEGMENTS = 40_000  # of a walk, about four hours; later ones are tracked, not drawn
 NICE = 10  # the tracker goes first
 END_S = 5.0  # for the thread to end
 # Bytes from which an array has pages of its own, given back when it is freed. glibc raises this limit by itself: then the arrays of each drawing, a
-# little longer than those before, fit into no hole that these left, and an hour's walk takes 1 GB.
+# little longer than the ones before, fit into none of their holes, and an hour's walk takes 1 GB.
 PAGES = {"MALLOC_MMAP_THRESHOLD_": "262144"}
 CHILD = "from echostep_app.page.drawing_process import main; main()"
 Stretch = tuple[
@@ -46,7 +46,7 @@ Stretch = tuple[
 
 
 class Asked(NamedTuple):
-    """What the process is asked: to draw these segments too; `plan`: at which pose a plan of it begins, and its name; None: no plan."""
+    """A request to the process: draw these segments too; `plan`: pose at which a plan of the drawing begins, and its name; None for no plan."""
 
     segments: list[MeasuredSegment]
     plan: tuple[Pose, str] | None
@@ -63,7 +63,7 @@ class DrawingProcess:
         live: bool,
         shared: SharedDrawing | None = None,
     ) -> None:
-        """`fail` is called with the words for an end before the end; `live`: rest between two drawings; `shared` gets the plan of each drawing."""
+        """`fail` is called with the words for an early end; `live`: rest between two drawings; `shared` gets the plan of each drawing."""
         self._show, self._fail, self._live, self._shared = show, fail, live, shared
         self._stretches = Stretches(LONGER if not live else 0.0)
         self._changed = threading.Condition()

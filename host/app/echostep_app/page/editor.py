@@ -27,7 +27,7 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount, Route
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Level, Plan, load_plan, parse_plan
+from echostep.plan import Level, Plan, load_plan, parse_plan
 from echostep_app.page.server import STATIC, STOP_S, Address, open_listener, page_in
 from echostep_app.page.web.access import AccessControl
 from echostep_app.page.web.connections import Connections
@@ -46,7 +46,7 @@ SHARED = (
     "*-pages.json",
     "*-edit.json",
 )  # files of the live page
-MOST_BODY = 8_000_000  # bytes of a plan: a browser draws so much smoothly
+MOST_BODY = 8_000_000  # bytes of a plan: a browser draws this much smoothly
 MOST_PICTURE = 32_000_000  # bytes
 POST_S = 20.0  # time for a posted plan to arrive
 NO_FILE = "none"  # state of a plan file that does not exist
@@ -68,7 +68,7 @@ class PlanFile:
             raise EchostepError(f"{path}: there is no folder {self.path.parent}: make it first")
 
     def read(self) -> tuple[str, str]:
-        """The plan as JSON, and the SHA-256 of the file; an empty plan and `NO_FILE` when there is no file."""
+        """The plan as JSON, and the SHA-256 of the file; an empty plan and `NO_FILE` without a file."""
         if not self.path.exists():
             return plan_json(_empty(self.path.stem)), NO_FILE
         plan = load_plan(self.path)
@@ -88,7 +88,7 @@ class PlanFile:
         return hashlib.sha256(raw).hexdigest()
 
     def state(self) -> str:
-        """SHA-256 of the file as it is now; `NO_FILE` when there is none."""
+        """SHA-256 of the file as it is now, or `NO_FILE`."""
         try:
             return hashlib.sha256(self.path.read_bytes()).hexdigest()
         except FileNotFoundError:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The guarded socket of one page: what the sessions of all pages have in common.
+"""The guarded socket of one page: the common part of the sessions of all pages.
 
-In: a WebSocket. Out: texts and frames to the page; its requests, one by one, to the session. Owns the budget of requests and what happens on a fault.
+In: a WebSocket. Out: texts and frames to the page; its requests, one by one, to the session. Owns the budget of requests and the handling of faults.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class GuardedSocket(ABC):
 
     @abstractmethod
     async def _handle(self, text: str | None) -> None:
-        """Handle one request; None: it was not a text."""
+        """Handle one request; None if it was not a text."""
 
     @abstractmethod
     async def _send(self) -> None:
@@ -49,7 +49,7 @@ class GuardedSocket(ABC):
         self._news.set()
 
     async def disconnect(self) -> None:
-        """End the connection; the page comes back for what is served then."""
+        """End the connection; the page comes back for the content served then."""
         with contextlib.suppress(RuntimeError, WebSocketDisconnect):
             await self._socket.close(SERVICE_RESTART)
 

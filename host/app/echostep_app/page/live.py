@@ -16,10 +16,8 @@ from operator import attrgetter
 from types import TracebackType
 from typing import Any, Self
 
-from echostep.localization.echoes.likelihood import echo_model
-from echostep.localization.estimate import Estimate, unobserved
+from echostep.localization import Estimate, echo_model, unobserved
 from echostep.path import MeasuredSegment
-from echostep.ports.arrival_clock import now_ns
 from echostep.ports.chunks import BOARD, FOOT, MTX, Portion
 from echostep.tracker import Tracker
 from echostep_app.guidance.cue_list import CueList
@@ -28,8 +26,7 @@ from echostep_app.page.elements.alarm import shown_alarm
 from echostep_app.page.elements.echo_lines import EchoLine, expected_range, last_echo_lines
 from echostep_app.page.elements.guidance import ShownGuidance, guidance_of_cue
 from echostep_app.page.elements.lookahead import extrapolate, moves_as_one
-from echostep_app.page.elements.marks import ShownMark, beacon_marks
-from echostep_app.page.elements.meetings import shown_meeting
+from echostep_app.page.elements.marks import ShownMark, beacon_marks, shown_meeting
 from echostep_app.page.elements.scene import MOST_SHOWN, PageScene, is_placed, sample_of, status_text
 from echostep_app.page.elements.stream_rates import StreamRateMeter
 from echostep_app.page.elements.taps import PointPress, ShownPoints
@@ -37,12 +34,13 @@ from echostep_app.page.elements.true_position import TruePath
 from echostep_app.page.elements.undo_offer import UndoClock, echoes_fit
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.server import Address, PageServer
-from echostep_app.page.shared_drawing import SharedDrawing
+from echostep_app.page.shared import SharedDrawing
 from echostep_app.plan.routing import RoutePlace
+from echostep_app.ports.arrival_clock import now_ns
 from echostep_app.printing.running import running_note
 from echostep_app.wearer.watch import watch_of
 
-# Assumed, all of them:
+# All assumed:
 TRAIL_STEP_M = 0.02  # the trail gets a point when x or y has changed by this much
 RATES_NS = 250_000_000  # time between two measurements of the stream rates
 LOST_AFTER_S = 2.0  # without bytes of the MTx and the board: the position is lost
@@ -70,8 +68,8 @@ class LivePage:
     ) -> None:
         """`guided` must have been made before: then it watches the tracker first, and its cue exists when the page gets an estimate.
 
-        `address`: or a server that shows this page while it is entered, and goes on after it.
-        `keeps`: keep the scenes of a live run, so that it can be played again after `end`. `shared` gets the plan of what a walk without one draws.
+        `address`: an address, or a server that shows this page while it is entered, and goes on after it.
+        `keeps`: keep the scenes of a live run, so that it can be played again after `end`. `shared` gets the plan that a walk without one draws.
         """
         self._tracker, self._watched = tracker, watch_of(tracker)
         self._guided = guided
@@ -80,7 +78,7 @@ class LivePage:
         self._mailbox = Mailbox(tracker.plan, title, replay=replay, keeps=keeps)
         self.truth: TruePath | None = None  # shown beside the estimates
         self.receipt_of: Callable[[int], str] | None = None  # delivery of a mayday; None: the run's reports go nowhere
-        self.fault_sources: list[Callable[[], str]] = []  # what is wrong at present with what the run writes, in words
+        self.fault_sources: list[Callable[[], str]] = []  # present faults of the run's output, in words
         self.acknowledged_by: Callable[[int], str | None] | None = (
             None  # name of the acknowledging commander, by the alarm's number
         )
@@ -88,7 +86,7 @@ class LivePage:
         self.server = PageServer(self._mailbox, address) if isinstance(address, Address) else address
         self._model = echo_model(tracker.settings.echo)
         self._rate_meter = StreamRateMeter()
-        self._rates_ns = 0  # times of the last measurement of rates, of the last bytes, of those of MTx or board, of the last estimate
+        self._rates_ns = 0  # times of the last measurement of rates, of the last bytes, of bytes of MTx or board, of the last estimate
         self._arrived_ns = 0
         self._sensors_ns = 0
         self._estimate_ns = 0
@@ -146,7 +144,7 @@ class LivePage:
         self._mailbox.set_marks(marks)
 
     def set_errand(self, x_m: float, y_m: float, level: int, text: str) -> None:
-        """Guide all pages to one in distress, and show who sent the wearer; a level that the plan has not is ignored."""
+        """Guide all pages to a person in distress, and show who sent the wearer; a level that is not in the plan is ignored."""
         if level < len(self._tracker.plan.levels):
             self._mailbox.set_goal(RoutePlace(x_m, y_m, level), text)
 

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from operator import attrgetter
 from typing import TypeVar
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep.ports.people.check_in import Call, CheckIn, Undo
 from echostep_app.page.elements.drawn_walls import ShownDrawing
 from echostep_app.page.elements.marks import ShownMark
@@ -143,7 +143,7 @@ class Mailbox:
         self._announce()
 
     def keep(self, scene: PageScene) -> None:
-        """Add the scene of an estimate to what is shown over time, and to the history that is played after `end`, if the run keeps one."""
+        """Add the scene of an estimate to the run over time, and to the history that is played after `end`, if the run keeps one."""
         self.over_time.add(scene)
         if self._keeps and not self.replay:
             self.history.add(scene)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a run was like over time: ranges, rates and heading at each estimate, and what happened.
+"""A run over time: ranges, rates and heading at each estimate, and events.
 
 In: the scenes of new estimates, in the tracker's thread. Out: `OverTime`, which any thread may read up to a length that it has read before. Owns the
 rows and the events; their number is bounded.
@@ -12,7 +12,7 @@ from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from echostep.localization.estimate import claims_place
+from echostep.localization import claims_place
 from echostep_app.page.elements.scene import PageScene
 
 COLUMNS = 6  # time (s), range to the left and to the right (m), samples of the foot and pings a second, heading (deg); NaN: none
@@ -32,7 +32,7 @@ class OverTime:
     """Rows of float32, and events in order of time."""
 
     def __init__(self, levels: tuple[str, ...]) -> None:
-        """`levels`: their names."""
+        """`levels`: names of the levels."""
         self._levels = levels
         self._rows = array("f")
         self.events: tuple[Event, ...] = ()  # replaced, never changed
@@ -62,7 +62,7 @@ class OverTime:
         self._last = scene
 
     def _news(self, before: PageScene, now: PageScene) -> Iterator[Event]:
-        """What has changed between the scenes of two estimates."""
+        """Changes between the scenes of two estimates."""
         old, new = before.estimate, now.estimate
         if old is None or new is None:
             return

@@ -20,14 +20,13 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.page.elements.alarm import ShownAlarm
 from echostep_app.page.elements.drawn_walls import ShownDrawing
 from echostep_app.page.elements.echo_lines import EchoLine
 from echostep_app.page.elements.guidance import ShownGuidance
 from echostep_app.page.elements.likely_places import shown_places
-from echostep_app.page.elements.marks import BeaconMark, ShownMark
-from echostep_app.page.elements.meetings import ShownMeeting
+from echostep_app.page.elements.marks import BeaconMark, ShownMark, ShownMeeting
 from echostep_app.page.elements.scene import PageScene, ParticleSample
 from echostep_app.page.elements.stream_rates import StreamRates
 from echostep_app.page.elements.taps import Considered, ShownPoints
@@ -155,7 +154,7 @@ class TrailPart:
 
 @dataclass(frozen=True, slots=True)
 class DrawingPart:
-    """A new drawing in this frame: numbers of walls and points; none: there is no drawing. It ends where the trail has `trail_count` points."""
+    """A new drawing in this frame: numbers of walls and points; 0 without a drawing. It ends where the trail has `trail_count` points."""
 
     walls: int
     points: int
@@ -210,7 +209,7 @@ Message = Hello | Refused | Failed | Considered
 
 
 def _plain(value: Any) -> Any:
-    """The Python number in a number of numpy."""
+    """A number of numpy as a Python number."""
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError(f"{type(value).__name__} in a message to the page")
@@ -256,7 +255,7 @@ class OverTimePart:
 
 
 def over_time(run: OverTime, begin: int) -> bytes:
-    """What a run was like from row number `begin` on: a header and rows of float32."""
+    """A run over time from row number `begin` on: a header and rows of float32."""
     end = len(run)
     begin = min(begin, end)
     return packed(OverTimePart(begin, end - begin, COLUMNS, run.events), run.part(begin, end))
@@ -264,7 +263,7 @@ def over_time(run: OverTime, begin: int) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class FrameParts:
-    """What a frame has beside its scene, for one page.
+    """The parts of a frame beside its scene, for one page.
 
     `where`, `heading`: of the estimate in words; it claims a place if `placed`. `places`: its hypotheses in a sentence. `trail`: float32 rows x,
     y, level, the first numbered `trail_from`.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Requests of a page: texts from its WebSocket -> checked objects.
 
-In: texts, which may be damaged or hostile. Out: requests; None for a text that is none. Owns the limits.
+In: texts, which may be damaged or hostile. Out: requests; None for an invalid text. Owns the limits.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from echostep.plan.plan_file import Metres
+from echostep.fields import Metres
 from echostep.ports.people.check_in import Call, CheckIn, EnteredPlace, Undo
 from echostep.ports.people.payloads import Level, decoded
 from echostep_app.plan.routing import RoutePlace
@@ -45,7 +45,7 @@ class AtPoint(msgspec.Struct, frozen=True, tag_field="kind", tag="at_point"):
 
 
 class NoTap(msgspec.Struct, frozen=True, tag_field="kind", tag="no_tap"):
-    """The newest tap at a surveyed point was none."""
+    """The newest tap at a surveyed point was a mistake."""
 
     number: Count
 

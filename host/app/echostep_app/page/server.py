@@ -27,7 +27,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.page import protocol
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.requests import MOST_REQUEST
@@ -68,7 +68,7 @@ class SocketSession(Protocol):
         """Look for something new to send."""
 
     async def disconnect(self) -> None:
-        """End the connection; the page comes back for what is served then."""
+        """End the connection; the page comes back for the content served then."""
 
     async def run(self) -> None:
         """Serve until the page disconnects."""
@@ -79,7 +79,7 @@ S = TypeVar("S", bound=SocketSession)
 
 @dataclass(frozen=True, slots=True)
 class PageSite(Generic[S]):
-    """What a server serves: the page `index`, files of `folders` by the first part of their path, lines of `plan`, a session for each socket."""
+    """The content of a server: the page `index`, files of `folders` by the first part of their path, lines of `plan`, a session for each socket."""
 
     name: str
     plan: Plan
@@ -173,7 +173,7 @@ class SocketServer(Generic[S]):
         )
 
     def _own_routes(self) -> list[Route]:
-        """What this site serves beside."""
+        """Further routes of this site."""
         return []
 
     async def _fail(self, _: Request, error: Exception) -> Response:
@@ -213,7 +213,7 @@ class SocketServer(Generic[S]):
 class PageServer(SocketServer[PageSession]):
     """Serves the scenes of a mailbox until it is closed; raises EchostepError when it cannot listen at the address.
 
-    `uploads` takes files that are dropped onto the page; None: it takes none.
+    `uploads` takes files that are dropped onto the page; None if it takes none.
     """
 
     def __init__(self, mailbox: Mailbox, address: Address = Address(), uploads: Uploads | None = None) -> None:
@@ -238,7 +238,7 @@ class PageServer(SocketServer[PageSession]):
         ]
 
     async def _over_time(self, request: Request) -> Response:
-        """What the run was like, from row number `begin` on."""
+        """The run over time, from row number `begin` on."""
         answer = protocol.over_time(self._mailbox.over_time, request.path_params["begin"])
         return Response(answer, media_type="application/octet-stream")
 
@@ -266,7 +266,7 @@ class PageServer(SocketServer[PageSession]):
 
 
 async def page_in(path: Path, lang: str | None) -> Response:
-    """A page in a language; None: in that of each browser."""
+    """A page in a language; None: in each browser's language."""
     page = await asyncio.to_thread(path.read_text, "utf-8")
     return HTMLResponse(page.replace(HTML, f'{HTML} data-lang="{lang}"', 1) if lang else page)
 

@@ -15,8 +15,7 @@ from collections import deque
 from starlette.websockets import WebSocket
 
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate
-from echostep.ports.arrival_clock import now_ns
+from echostep.localization import Estimate
 from echostep.ports.people.check_in import Call, CheckIn, Undo
 from echostep_app.page import protocol, requests
 from echostep_app.page.elements.drawn_walls import NO_DRAWING, ShownDrawing
@@ -30,6 +29,7 @@ from echostep_app.page.protocol import FRAME_S
 from echostep_app.page.replay_cursor import ReplayCursor
 from echostep_app.page.shared import Shared
 from echostep_app.plan.places.bearing import heading_words
+from echostep_app.ports.arrival_clock import now_ns
 
 TOO_BUSY = "Not accepted: this is a replay, or the tracker is too busy."
 
@@ -68,7 +68,7 @@ class PageSession(GuardedSocket):
         await self.tell(protocol.encode(hello))
 
     async def _begin_replay(self) -> None:
-        """The live run is over: from now on the page plays its scenes, beginning with the last one, at rest."""
+        """The live run is over: from now on the page plays its scenes, beginning with the last one, paused."""
         self._cursor = ReplayCursor(self._mailbox.history, at_end=True)
         self._trail_count, self._particles, self._drawing, self._frame_due = 0, None, None, True
         await self._greet()

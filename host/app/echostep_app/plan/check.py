@@ -14,7 +14,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Bools, Floats
-from echostep.plan.model import Level, Plan
+from echostep.plan import Level, Plan
 from echostep_app.plan.places.faces import JAMB_M, OUTSIDE, TOUCH_M, Faces, extend, faces_under, find_faces
 from echostep_app.plan.places.findings import Lines, PlanFinding
 from echostep_app.plan.places.gaps import with_gaps

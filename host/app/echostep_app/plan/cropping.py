@@ -16,7 +16,7 @@ Bounds = tuple[float, float, float, float]  # x0, y0, x1, y1 in metres
 
 
 def within(segments: Floats, bounds: Bounds, least_m: float = 0.0) -> Floats:
-    """Segments whose bounding box touches the rectangle; not those shorter than `least_m` in x and in y (less than a pixel).
+    """Segments whose bounding box touches the rectangle; segments shorter than `least_m` in x and in y (less than a pixel) are left out.
 
     Takes 10 ms for a million segments.
     """
@@ -43,7 +43,7 @@ def is_clear(segments: Floats, a: Sequence[float] | Floats, b: Sequence[float] |
 
 
 def extent(segments: Floats) -> Bounds:
-    """The bounding box of all segments; 10 m by 10 m when there are none."""
+    """The bounding box of all segments; 10 m by 10 m without any."""
     if not len(segments):
         return 0.0, 0.0, 10.0, 10.0
     x0, y0 = segments.reshape(-1, 2).min(axis=0)

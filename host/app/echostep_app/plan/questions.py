@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What is doubtful in an imported plan, as questions for a person: the editor shows them, and takes an answer by one click.
+"""Doubts about an imported plan, as questions for a person: the editor shows them, and takes an answer by one click.
 
-In: a `Plan` with the questions of its importer. Out: the plan with those that follow from its check, its doors and its gaps. Owns which findings a
-person can answer, and how many are asked.
+In: a `Plan` with the questions of its importer. Out: the plan with the questions that follow from its check, its doors and its gaps. Owns which
+findings a person can answer, and how many are asked.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from echostep.plan.model import Level, Plan, Question
+from echostep.plan import Level, Plan, Question
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.places.findings import PlanFinding
 from echostep_app.plan.places.spaces import find_spaces
 
 DOORS_M = (0.6, 3.0)  # widths between which nobody asks; assumed: DIN 18040 has 0.8 m and more, closets less
 MOST_WALLS = 50_000  # of a plan that is checked at an import: a few seconds
-MOST_QUESTIONS = 60  # of a level: more are no work of two minutes
+MOST_QUESTIONS = 60  # of a level: more take longer than two minutes
 
 
 def with_questions(plan: Plan) -> Plan:
-    """The plan whose levels carry their questions, those of the importer first; each element is asked about once."""
+    """The plan whose levels carry their questions, the importer's first; each element is asked about once."""
     found: list[list[Question]] = [[*level.questions] for level in plan.levels]
     if sum(len(level.solid) for level in plan.levels) <= MOST_WALLS:
         for finding in check_plan(plan):
@@ -42,7 +42,7 @@ def _once(questions: list[Question]) -> tuple[Question, ...]:
 
 
 def _of_finding(finding: PlanFinding, level: Level) -> Iterator[Question]:
-    """The question that a finding of the check is, where the editor can answer it: not about stairs, and not about walls that overlap."""
+    """The question for a finding of the check, if the editor can answer it: not about stairs, and not about walls that overlap."""
     at, lines = finding.position_m, finding.lines_m
     if finding.kind == "gap":
         wall = next(line for line in lines if at not in (line[:2], line[2:]))
@@ -65,7 +65,7 @@ def _apart_m(one: tuple[float, float], other: tuple[float, float]) -> float:
 
 
 def _of_widths(level: Level) -> Iterator[Question]:
-    """Doors that are narrower or wider than doors are."""
+    """Doors that are narrower or wider than usual."""
     for door in level.doors:
         if not DOORS_M[0] <= door.width_m <= DOORS_M[1]:
             x0, y0, x1, y1 = door.line

@@ -16,17 +16,17 @@ import numpy as np
 from echostep.arrays import Bools, Floats, Ints
 from echostep.errors import EchostepError
 from echostep.jit import kernel, part
-from echostep.plan.model import Plan
-from echostep.plan.polyline import way_m
+from echostep.plan import Plan
 from echostep.walls.near_walls import mark_near_walls
 from echostep_app.plan.cropping import is_clear
+from echostep_app.plan.polyline import way_m
 
-# Assumed, all of them:
+# All assumed:
 CELL_M = 0.15  # side of a grid cell
 BODY_M = 0.25  # half a person's width: shortest distance of a route from a wall
 MARGIN_M = 1.5  # of the grid around the walls
-MOVED_M = 2.0  # start and destination are moved to the nearest free cell, at most so far
-MOST_TRIED = 60  # nearest free cells that are tried for one without a wall before it
+MOVED_M = 2.0  # start and destination are moved at most this far to the nearest free cell
+MOST_TRIED = 60  # nearest free cells that are tried to find one without a wall in between
 MOST_CELLS = 60_000_000  # on all levels together
 CLIMB = 3.0  # cost of a metre of height by stairs, in metres of level walk
 LIFT_M = 20.0  # cost of waiting for a lift, in metres of level walk
@@ -105,7 +105,7 @@ class Routes:
                 self._blocked[level_index][cells] = False
 
     def way(self, start: RoutePlace, end: RoutePlace) -> Route:
-        """The cheapest route; raises EchostepError when a position is outside the plan, or when there is no route."""
+        """The cheapest route; raises EchostepError when a position is outside the plan, or without a route."""
         a, b = self._cell(start, "the start"), self._cell(end, "the destination")
         trail = _search(self._blocked, self._tight, self._connector, self._serves, self._height, self._lift, a, b)
         if not len(trail):
@@ -115,7 +115,7 @@ class Routes:
         return Route(tuple(self._stretches(trail, start, end)))
 
     def _stretches(self, trail: Ints, start: RoutePlace, end: RoutePlace) -> list[Stretch]:
-        """Cut a trail of cells (k, 3) into one polyline per level, straightened; its ends are start and end unless a wall is before them."""
+        """Cut a trail of cells (k, 3) into one polyline per level, straightened; its ends are start and end unless a wall is in between."""
         stretches = []
         cuts = [0, *(np.flatnonzero(np.diff(trail[:, 0])) + 1).tolist(), len(trail)]
         for first, beyond in zip(cuts[:-1], cuts[1:], strict=True):
@@ -181,9 +181,9 @@ def _search(
     blocked: Bools, tight: Bools, connector: Ints, serves: Bools, height: Floats, lift: Bools,
     start: tuple[int, int, int], end: tuple[int, int, int],
 ) -> Ints:  # fmt: skip
-    """The cheapest trail of cells (k, 3): level, row, column; (0, 3) when there is none [Dijkstra 1959].
+    """The cheapest trail of cells (k, 3): level, row, column; (0, 3) without a route [Dijkstra 1959].
 
-    All of (levels, rows, columns): `blocked`, `tight`, and `connector`, that of each cell, -1 for none. `serves` (connectors, levels).
+    `blocked`, `tight` and `connector` (index, -1 for none) are (levels, rows, columns). `serves` (connectors, levels).
     """
     levels, rows, columns = blocked.shape
     size = rows * columns

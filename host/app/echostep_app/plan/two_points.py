@@ -18,16 +18,15 @@ from msgspec import Meta, Struct
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.fields import checked
-from echostep.plan.georeference import EarthTransform
-from echostep.plan.model import Georeference
-from echostep.plan.plan_file import Latitude, Longitude, Metres
+from echostep.fields import Latitude, Longitude, Metres, checked
+from echostep.plan import Georeference
+from echostep_app.plan.georeference import EarthTransform
 
 LEAST_M = 5.0  # between the points, assumed: a map's error of 0.5 m turns the plan by 6 degrees over this distance
 MOST_SHARE = (
-    0.05  # of the distance on the plan by which that on Earth may differ, assumed: 1 m of a map's error over 20 m
+    0.05  # of the plan's distance by which the distance on Earth may differ, assumed: 1 m of a map's error over 20 m
 )
-TURNS = 3  # of the fit: 0.2 mm are left of a plan 100 km from its origin
+TURNS = 3  # of the fit: an error of 0.2 mm is left for a plan 100 km from its origin
 
 
 class PointFields(Struct):
@@ -40,7 +39,7 @@ class PointFields(Struct):
 
 
 class TwoPointFields(Struct):
-    """What the editor posts."""
+    """The fields that the editor posts."""
 
     points: Annotated[list[PointFields], Meta(min_length=2, max_length=2, description="a list of two points")]
 
@@ -55,7 +54,7 @@ class TwoPoints:
 
     @property
     def share(self) -> float:
-        """By which share of the plan's distance the one on Earth is longer."""
+        """Share of the plan's distance by which the distance on Earth is longer."""
         return self.earth_m / self.plan_m - 1.0
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from echostep.errors import EchostepError
-from echostep.plan.model import FORMAT_VERSION, Connector, Door, Georeference, Level, Plan, Pose, Question, Room
-from echostep.plan.plan_file import UNWRITABLE
+from echostep.fields import UNWRITABLE
+from echostep.plan import FORMAT_VERSION, Connector, Door, Georeference, Level, Plan, Pose, Question, Room
 
 
 def save_plan(plan: Plan, path: Path | str) -> None:
@@ -41,7 +41,7 @@ def plan_json(plan: Plan) -> str:
 
 
 def _text(name: str) -> str:
-    """A name as a plan can hold it; those of an imported file may have any letters."""
+    """A name as a plan can hold it; names of an imported file may have any letters."""
     return re.sub(f"[{UNWRITABLE}]", " ", name)
 
 
@@ -103,7 +103,7 @@ def georeference_fields(georeference: Georeference) -> dict[str, Any]:
 
 
 def _degrees(angle_rad: float) -> float:
-    """The shortest number of degrees that is read back as the same radians; the nearest one where there is none."""
+    """The shortest number of degrees that is read back as the same radians; else the nearest one."""
     angle = math.degrees(angle_rad)
     below, above = math.nextafter(angle, -math.inf), math.nextafter(angle, math.inf)
     tried = [*(round(angle, digits) for digits in range(16)), angle, below, above]

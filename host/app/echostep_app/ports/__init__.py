@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Ports: serial ports, UDP and TCP, opened and read as chunks; who holds them, and what is wrong with them.
+"""Ports: serial ports, UDP and TCP, opened and read as chunks; who holds them, and their faults.
 
 In: names of ports and URLs. Out: chunks. Owns the open ports.
 """

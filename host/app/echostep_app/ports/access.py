@@ -49,7 +49,7 @@ def refusal(port: str) -> Refusal | None:
 
 
 def holders(port: str, processes: Path = Path("/proc")) -> list[str]:
-    """Other processes of this computer that have the port open, as `command (process 77)`; those of other users cannot be seen."""
+    """Other processes of this computer that have the port open, as `command (process 77)`; other users' processes cannot be seen."""
     held = []
     target = os.path.realpath(port)
     for folder in sorted(processes.glob("[0-9]*")):
@@ -62,7 +62,7 @@ def holders(port: str, processes: Path = Path("/proc")) -> list[str]:
 
 
 def _command(process: Path) -> str:
-    """The command of a process, shortened; its name where it shows none."""
+    """The command of a process, shortened; its name if it shows none."""
     with contextlib.suppress(OSError):
         words = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
         if words:

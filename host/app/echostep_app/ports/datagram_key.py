@@ -5,7 +5,7 @@ In: bytes and a key; datagrams. Out: sealed datagrams; the bytes in authentic on
 
     datagram = bytes | counter u64 | first 16 bytes of HMAC-SHA256(key, bytes | counter)      little-endian [protocol/README.md, RFC 2104]
 
-The counter of each datagram is greater than those before it, so that none can be sent again.
+The counter of each datagram is greater than all before it, so that none can be sent again.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What pyserial raises when a port cannot be opened, set or used."""
+"""Exceptions of pyserial when a port cannot be opened, set or used."""
 
 from __future__ import annotations
 

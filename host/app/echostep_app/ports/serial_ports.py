@@ -3,7 +3,7 @@
 
 In: URLs of ports (pyserial, or udp://). Out: `Chunk`s in order of arrival. Owns the open ports, which are locked for this process, their threads.
 
-A port that went away is opened again, under the name that its device has then, if that has a USB serial number. Its first chunk is then empty.
+A lost port is opened again, under its device's new name if the device has a USB serial number. Its first chunk is then empty.
 """
 
 from __future__ import annotations
@@ -23,9 +23,10 @@ import serial
 from serial import rfc2217
 
 from echostep.errors import EchostepError
-from echostep.ports.arrival_clock import now_ns
-from echostep.ports.chunks import Chunk, ChunkQueue
+from echostep.ports.chunks import Chunk
 from echostep_app.ports.access import holders, is_url, refusal
+from echostep_app.ports.arrival_clock import now_ns
+from echostep_app.ports.chunk_queue import ChunkQueue
 from echostep_app.ports.port_faults import PORT_FAULTS
 from echostep_app.ports.tcp import TcpPort
 from echostep_app.ports.udp import UdpPort
@@ -33,7 +34,7 @@ from echostep_app.ports.usb_number import port_of_number, usb_number
 
 AnyPort: TypeAlias = "serial.SerialBase | UdpPort | TcpPort"
 
-# Assumed, all of them.
+# All assumed.
 IDLE_S = 0.05  # longest wait for a chunk; short, so that the set-up of the MTx repeats its requests in time
 READ_TIMEOUT_S = 0.1
 WRITE_TIMEOUT_S = 0.5
@@ -56,10 +57,10 @@ class SerialPorts:
         """`urls` and `baud` by port name; only the ports named are opened."""
         self._queue = ChunkQueue()
         self._stop = threading.Event()
-        self._told: Counter[str] = Counter()  # dropped chunks by port that a notice has told of
+        self._told: Counter[str] = Counter()  # dropped chunks by port that a notice has reported
         self.urls = dict(urls)
         self._ports: dict[str, AnyPort] = {}
-        self.lost: set[str] = set()  # names under which ports were opened that are away at present
+        self.lost: set[str] = set()  # names under which the ports that are away at present were opened
         self._opened_as = {
             name: name for name in urls
         }  # by the name of the device: the name under which its chunks come
@@ -111,7 +112,7 @@ class SerialPorts:
             self.notices.append(f"{port}: cannot write: {error}")
 
     def exchange(self, one: str, other: str) -> None:
-        """The devices of two names have exchanged their ports: what is sent to either goes to the port of the other; chunks keep their names."""
+        """The devices of two names have exchanged their ports: bytes to either go to the port of the other; chunks keep their names."""
         self._opened_as[one], self._opened_as[other] = self._opened_as[other], self._opened_as[one]
         self.urls[one], self.urls[other] = self.urls[other], self.urls[one]
 
@@ -209,7 +210,7 @@ def check_different(urls: Mapping[str, str]) -> None:
 
 
 def _open(url: str, baud: int) -> AnyPort:
-    """The port, locked for this process; raises EchostepError that names the program which has it."""
+    """The port, locked for this process; raises EchostepError that names the program that has it open."""
     if refused := refusal(url):
         raise EchostepError(str(refused))
     try:

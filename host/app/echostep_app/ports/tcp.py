@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A serial port over TCP, as ser2net gives it, with the methods of a serial port.
 
-In: a URL, socket://HOST:PORT. Out: the bytes that wait, in blocks: pyserial's own port of this kind tells of one byte at a time. Owns the socket.
+In: a URL, socket://HOST:PORT. Out: the bytes that wait, in blocks: pyserial's own port of this kind reports one byte at a time. Owns the socket.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ BLOCK = 4096  # bytes of a read at most: some milliseconds of a port
 
 
 class TcpPort:
-    """A connection to the URL's address; raises EchostepError when there is none."""
+    """A connection to the URL's address; raises EchostepError when it fails."""
 
     def __init__(self, url: str, write_timeout_s: float) -> None:
         parts = urlsplit(url)

@@ -4,7 +4,7 @@
 In: a URL, udp://HOST:PORT or udp://HOST:PORT?key=FILE. Out: the bytes of the received datagrams. A zero is put before and after each datagram: frames
 end in zeros (protocol/README.md), so a damaged datagram does not damage its neighbours. Owns the socket and the counts.
 
-Whatever is sent, at most `BYTES_A_SECOND` come out, and at most `DATAGRAMS_A_SECOND` are looked at; the rest is dropped and counted. With a key only
+Whatever is sent, at most `BYTES_A_SECOND` come out, and at most `DATAGRAMS_A_SECOND` are examined; the rest is dropped and counted. With a key only
 authentic datagrams count.
 """
 
@@ -32,7 +32,7 @@ NEWS_S = 10.0  # between two notices
 
 @dataclass
 class _Budget:
-    """`left` of so much a second, at most that of `BURST_S`."""
+    """`left` of an amount a second, at most the amount of `BURST_S`."""
 
     a_second: float
     left: float
@@ -69,7 +69,7 @@ class UdpPort:
         return round(BYTES_A_SECOND)
 
     def read(self, size: int) -> bytes:
-        """Waiting datagrams until `size` bytes are reached; empty after `READ_TIMEOUT_S` without one, or while more come than are looked at."""
+        """Waiting datagrams until `size` bytes are reached; empty after `READ_TIMEOUT_S` without one, or while more come than are examined."""
         self._fill()
         if self._looks.left < 1.0:
             time.sleep(READ_TIMEOUT_S)
@@ -91,7 +91,7 @@ class UdpPort:
         self._looks.fill(passed_s)
 
     def _accepted(self, datagram: bytes) -> bytes:
-        """The datagram's bytes between zeros; none of one that is dropped or refused."""
+        """The datagram's bytes between zeros; empty if it is dropped or refused."""
         if len(datagram) > LARGEST:
             self.dropped += 1
             return b""
@@ -123,7 +123,7 @@ class UdpPort:
 
 
 def _parse(url: str) -> tuple[str, int, Opener | None]:
-    """Host, port and, with a key, what opens the datagrams."""
+    """Host, port and, with a key, the opener of the datagrams."""
     parts = urlsplit(url)
     try:
         host, port = parts.hostname, parts.port
@@ -136,7 +136,7 @@ def _parse(url: str) -> tuple[str, int, Opener | None]:
 
 
 def key_of(url: str) -> bytes | None:
-    """The key that a URL names, None without one; raises EchostepError for anything else behind the port, so that no key is left out by mistake."""
+    """The key that a URL names, None without one; raises EchostepError for anything else after the port, so that no key is left out by mistake."""
     parts = urlsplit(url)
     try:
         query = parse_qs(parts.query, keep_blank_values=True, strict_parsing=bool(parts.query))

@@ -6,6 +6,7 @@ In: what rich can render. Out: text on standard output, or on standard error. Ow
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable
 from typing import Any
 
@@ -27,3 +28,12 @@ class PeopleConsole(Console):
 def console_for_people(**options: Any) -> PeopleConsole:
     """A console on standard output as it is at each call; each message stays on one line, whatever the width of the terminal."""
     return PeopleConsole(soft_wrap=True, **options)
+
+
+console = console_for_people()  # that the commands print on
+
+
+def print_notices(notices: deque[str], to: Console = console) -> None:
+    """Print queued messages of a port, of a recorder or of a page, and empty the queue."""
+    while notices:
+        to.print(notices.popleft(), markup=False)

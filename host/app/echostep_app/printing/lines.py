@@ -8,6 +8,11 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+
+from echostep.errors import EchostepError
 
 # Control characters [ECMA-48, C0 and C1] but the line feed and the tab; overrides of the direction [Unicode, UAX 9]; lone halves of letters
 HIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
@@ -26,3 +31,17 @@ def say(*lines: str) -> None:
 def complain(text: str) -> None:
     """A line on standard error."""
     print(shown(text), file=sys.stderr)
+
+
+def moment(unix_s: float) -> str:
+    """Unix time as RFC 3339 in UTC, to the millisecond."""
+    return datetime.fromtimestamp(unix_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+@contextmanager
+def as_error(words: str, remedy: str = "") -> Iterator[None]:
+    """An OSError of the block becomes an EchostepError: these words, the system's, what to do."""
+    try:
+        yield
+    except OSError as error:
+        raise EchostepError(f"{words}: {error.strerror or error}{remedy}") from error

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from echostep.errors import EchostepError
 from echostep.file_mode import claim
+from echostep_app.printing.lines import as_error
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,11 +37,8 @@ def save_picture(figure: Figure, path: Path, *, software: str = "echostep", priv
 
     ending = check_picture(path).suffix.casefold()
     metadata = WITHOUT_DATE.get(ending, {"Software": software})
-    try:
-        with mpl.rc_context({"svg.hashsalt": SALT}):
-            figure.savefig(claim(path) if private else path, format=ending[1:], metadata=metadata)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the picture: {error.strerror or error}") from error
+    with as_error(f"{path}: cannot write the picture"), mpl.rc_context({"svg.hashsalt": SALT}):
+        figure.savefig(claim(path) if private else path, format=ending[1:], metadata=metadata)
 
 
 def svg_text(figure: Figure) -> str:

@@ -6,7 +6,7 @@ In: the newest segment and its estimate. Out: a note of a few words, beside the 
 
 from __future__ import annotations
 
-from echostep.localization.estimate import Estimate, claims_place
+from echostep.localization import Estimate, claims_place
 from echostep.path import PathSegment
 
 

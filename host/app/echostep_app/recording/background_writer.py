@@ -18,7 +18,7 @@ from pathlib import Path
 
 from echostep_app.recording.names import create
 
-# Assumed, all of them: a killed process loses less than a tenth of a second, a power failure less than a second.
+# All assumed: a killed process loses less than a tenth of a second, a power failure less than a second.
 WRITE_S = 0.05  # between two writes
 SYNC_S = 0.5  # between two fsync
 RETRY_S = 1.0  # between two attempts on a disk that refuses bytes

@@ -26,7 +26,7 @@ from echostep.xsens import FrameReader
 
 DEVICES = {BOARD: "the sensor board", MTX: "the MTx", FOOT: "the foot board"}
 LEAST_FRAMES = 3  # one of 256 wrong frames of an MTx passes its checksum
-LISTENED_BYTES = 1 << 14  # by which a device has sent so many frames: half a second of a board, two of an MTx
+LISTENED_BYTES = 1 << 14  # within which a device has sent that many frames: half a second of a board, two of an MTx
 
 _REPORTS = (BoardHealth, ClockReply, Configuration, Electrical, Identity, Parts, Status)
 _OF_EVERY_BOARD = {number for number, kind in BY_ID.items() if kind in _REPORTS}

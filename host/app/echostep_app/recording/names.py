@@ -2,7 +2,7 @@
 """Names of recordings: each run gets a new one, and no file is ever replaced.
 
 In: the name asked for, as `out/live/walk.mcap`. Out: a new file, as `out/live/walk-0007-20261122T091500Z.mcap`: number of the run, time of day (UTC).
-`walk.mcap` becomes a second name (hard link) of the newest, unless a file has that name that has no other one. Owns nothing.
+`walk.mcap` becomes a second name (hard link) of the newest, unless a file without another name has it. Owns nothing.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 from echostep.errors import EchostepError
 from echostep.file_mode import file_mode
-from echostep.recording.being_written import SUFFIX, is_being_written
+from echostep.recording import SUFFIX, is_being_written
 
 try:
     import fcntl
@@ -71,7 +71,7 @@ def part_name(first: Path, number: int) -> Path:
 
 
 def files_of(recording: Path) -> list[Path]:
-    """The files of a run in their order, by any of them."""
+    """The files of a run in their order, given any of them."""
     first = recording.with_stem(re.sub(rf"{PART_SIGN}\d{{4}}$", "", recording.stem))
     return [first, *sorted(first.parent.glob(f"{glob.escape(first.stem)}{PART_SIGN}[0-9][0-9][0-9][0-9]{SUFFIX}"))]
 

@@ -20,14 +20,14 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from echostep.errors import IncompleteError
 from echostep.ports.chunks import Chunk
-from echostep.recording.clock import log_offset_ns, with_log_time
+from echostep.recording import log_offset_ns, with_log_time
 from echostep.recording.mcap_records import DAMAGE_NAME, LIBRARY, METADATA_NAME, RAW_ENCODING
 from echostep_app.recording.background_writer import BackgroundWriter
 
-# Assumed, all of them.
+# All assumed.
 WAIT_NS = 500_000_000  # arrival time between two waits of `wait_for_disk`
 RAW_LIMIT = 1 << 26  # bytes of chunks that may wait for a full disk: an hour and a half
-DERIVED_LIMIT = 1 << 20  # unwritten bytes from which on derived messages are skipped: they can be computed again
+DERIVED_LIMIT = 1 << 20  # unwritten bytes from which derived messages are skipped: they can be computed again
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class DerivedMessage:
 
 
 def begin_file(file: IO[bytes]) -> Writer:
-    """A writer of records without chunks, as each file of ours has them: a flipped bit costs one message, not all that were compressed with it."""
+    """A writer of records without chunks, as all our files have them: a flipped bit costs one message, not all that were compressed with it."""
     writer = Writer(
         file,
         compression=CompressionType.NONE,
@@ -95,7 +95,7 @@ class Recorder:
 
     @property
     def offset(self) -> int:
-        """Bytes of the file so far, those that wait for the disk among them."""
+        """Bytes of the file so far, including those that wait for the disk."""
         return self._file.tell()
 
     @property
@@ -138,7 +138,7 @@ class Recorder:
             self._add_message(channel, message.t_ns, body)
 
     def write_damage(self, lines: Iterable[str]) -> None:
-        """Record what was wrong with the recording from which the chunks come; nothing when it was whole."""
+        """Record the damage of the recording from which the chunks come; nothing when it was whole."""
         if noted := numbered(lines):
             self._writer.add_metadata(DAMAGE_NAME, noted)
 

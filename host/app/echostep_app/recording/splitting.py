@@ -29,7 +29,7 @@ RETRY_NS = 60_000_000_000  # between two attempts to begin a part that cannot be
 
 @dataclass(frozen=True, slots=True)
 class SplitLimit:
-    """A part ends at `size` bytes, or `span_ns` after its first chunk; 0: not by that."""
+    """A part ends at `size` bytes, or `span_ns` after its first chunk; 0: no such limit."""
 
     size: int = 0
     span_ns: int = 0
@@ -47,7 +47,7 @@ def parse_split(text: str) -> SplitLimit:
 
 
 class SplitRecorder(Recorder):
-    """A recorder in parts. A part that cannot be begun is told, and the one before goes on."""
+    """A recorder in parts. A part that cannot be begun is reported, and the one before goes on."""
 
     def __init__(self, path: Path, metadata: Mapping[str, str], limit: SplitLimit) -> None:
         self._first, self._limit, self._part = path, limit, 1
@@ -59,7 +59,7 @@ class SplitRecorder(Recorder):
 
     @property
     def is_whole(self) -> bool:
-        """The same of all parts."""
+        """The same for all parts."""
         return super().is_whole and all(file.is_whole for file, _ in self._closing)
 
     @property

@@ -14,21 +14,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.localization.estimate import in_ellipse95
-from echostep.plan.model import Plan
+from echostep.localization import in_ellipse95
+from echostep.plan import Plan
 from echostep_app.scorecard.error_statistics import ErrorStatistics, error_statistics, quantile
 from echostep_app.scorecard.matching import Matched, is_surveyed, known, match
 from echostep_app.scorecard.track_columns import ScoredPath
 from echostep_app.scorecard.zones import NO_ZONE, Zones
 
 FLOOR_PENALTY_M = 15.0  # per floor [Potorti et al. 2017]
-CELL_M = 1.0  # side of the squares of which coverage is the share: a person's room
-TICK_S = 0.1  # of the moments of which availability is the share, assumed
+CELL_M = 1.0  # side of the squares that coverage counts: a person's room
+TICK_S = 0.1  # between the moments that availability counts, assumed
 
 
 @dataclass(frozen=True, slots=True)
 class Scorecard:
-    """The metrics of a track; None where its files do not state what a metric needs. Shares are from 0 to 1."""
+    """The metrics of a track; None where its files lack a metric's data. Shares are from 0 to 1."""
 
     track: str
     points: int
@@ -100,7 +100,7 @@ def score(track: ScoredPath, truth: ScoredPath, plan: Plan | None = None, setup_
 
 
 def _floors_off(at: Matched) -> Floats | None:
-    """By how many floors each point is off; NaN where one of both does not state it."""
+    """Number of floors by which each point is off; NaN where either does not state it."""
     if at.level is None or at.true_level is None:
         return None
     off = np.abs(at.level - at.true_level)
@@ -108,7 +108,7 @@ def _floors_off(at: Matched) -> Floats | None:
 
 
 def _zone_probability(at: Matched, plan: Plan) -> float | None:
-    """Share of the points in the right zone, of those where the truth is in one."""
+    """Share of the points in the right zone, among the points whose truth is in one."""
     if at.level is None or at.true_level is None:
         return None
     zones = Zones(plan)

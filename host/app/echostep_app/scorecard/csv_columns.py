@@ -44,7 +44,7 @@ class CsvColumns:
     lines: tuple[int, ...]
 
     def find(self, names: Sequence[str]) -> str | None:
-        """The first of these names that a column has, capitals being alike; None when none has. Raises EchostepError when two have it."""
+        """The first of these names that a column has, ignoring case; None when none has. Raises EchostepError when two have it."""
         written = {name.lower(): name for name in reversed(self.names)}
         found = next((written[name] for name in names if name in written), None)
         if found is not None and sum(name.lower() == found.lower() for name in self.names) > 1:
@@ -87,12 +87,12 @@ class CsvColumns:
 
 
 def is_comment(line: str) -> bool:
-    """Whether a line is words after a #, neither names of columns nor those of a TUM trajectory."""
+    """Whether a line is words after a #, neither names of columns nor of a TUM trajectory's."""
     return line.lstrip().startswith("#") and not any(mark in line for mark in SEPARATORS) and not is_tum(line)
 
 
 def is_tum(first: str) -> bool:
-    """Whether the first line is of a TUM trajectory: eight names or numbers with spaces in between."""
+    """Whether the first line belongs to a TUM trajectory: eight names or numbers with spaces in between."""
     return not any(mark in first for mark in SEPARATORS) and len(first.lstrip("# ").split()) == len(TUM)
 
 

@@ -3,7 +3,7 @@
 
 In: a `Scorecard`. Out: rows of text for tables. Owns the order of the metrics.
 
-The clauses are those of the standard's public table of contents [NIST, ISO/IEC 18305:2016 table of contents]; its text was not at hand, so each row
+The clauses are from the standard's public table of contents [NIST, ISO/IEC 18305:2016 table of contents]; its text was not at hand, so each row
 states what is computed.
 """
 
@@ -22,7 +22,7 @@ STANFORD = "Tossaint et al. 2007 (Stanford diagram)"
 
 
 class Metric(NamedTuple):
-    """A row of the scorecard: `value` of a card in `unit`, None where there is none; `meaning` in words."""
+    """A row of the scorecard: `value` of a card in `unit`, or None; `meaning` in words."""
 
     name: str
     unit: str
@@ -100,7 +100,7 @@ def notes(card: Scorecard) -> list[str]:
 
 
 def as_text(value: float | None, unit: str) -> str:
-    """A figure with its unit; a dash where there is none."""
+    """A figure with its unit; a dash if missing."""
     if value is None or math.isnan(value):
         return "-"
     if unit == "%":

@@ -2,7 +2,7 @@
 """Statistics of errors.
 
 In: errors (n,) in metres. Out: `ErrorStatistics`. Owns nothing. A percentile is linear between the order statistics [Hyndman and Fan 1996,
-definition 7]; a standard deviation is that of the errors at hand, divided by n.
+definition 7]; a standard deviation is of the errors at hand, divided by n.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from echostep.arrays import Floats
 
 @dataclass(frozen=True, slots=True)
 class ErrorStatistics:
-    """Of `count` errors, in metres; `ending_m` is the last one."""
+    """Statistics of `count` errors, in metres; `ending_m` is the last one."""
 
     count: int
     mean_m: float

@@ -3,7 +3,7 @@
 
 In: a track, a true path. Out: `Matched`: both at the same moments. Owns nothing.
 
-A true path with rows seldom apart is known at every moment: the points are the track's rows, the truth linear in between. Surveyed points are known
+A true path with rows close together is known at every moment: the points are the track's rows, the truth linear in between. Surveyed points are known
 at their moments alone: the points are theirs, the track linear between two rows that are at most GAP_S apart.
 """
 
@@ -17,8 +17,8 @@ from echostep.arrays import Bools, Floats, Ints
 from echostep.errors import EchostepError
 from echostep_app.scorecard.track_columns import ScoredPath
 
-PATH_S = 0.5  # median distance of a path's rows, more than which they are surveyed points: less than a step
-# Without a row, after which a track has no position: rows come at each step, and twice a second while standing
+PATH_S = 0.5  # median distance of a path's rows, above which they are surveyed points: less than a step
+# Time without a row after which a track has no position: rows come at each step, and twice a second while standing
 GAP_S = 2.5
 
 
@@ -79,7 +79,7 @@ def match(track: ScoredPath, truth: ScoredPath) -> Matched:
 
 
 def _at(path: ScoredPath, values: Floats | None, t_s: Floats, row: Ints, *, exact: bool) -> Floats:
-    """Values of a path at times (m,): those of the rows (m,) if they are exact, else linear between the rows."""
+    """Values of a path at times (m,): the rows' values (m,) if they are exact, else linear between the rows."""
     assert values is not None
     return values[row] if exact else np.asarray(np.interp(t_s, path.t_s, values))
 

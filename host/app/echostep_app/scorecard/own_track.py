@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization import Estimate, TrackStatus
 from echostep_app.scorecard.track_columns import ScoredPath
 
 

@@ -2,7 +2,7 @@
 """Tracks and true paths from CSV files of any tracker: which column means what.
 
 In: a CSV file, the plan's levels. Out: `ScoredPath`s. Owns the names that columns may have. Metres, seconds, radians; x and y in the frame of the
-truth, which is the plan's where there is one.
+truth, which is the plan's if there is a plan.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.errors import EchostepError
-from echostep.localization.estimate import ellipse95
-from echostep.plan.model import Plan
+from echostep.localization import ellipse95
+from echostep.plan import Plan
 from echostep_app.scorecard.csv_columns import CsvColumns, read_csv
 
 NAMES = {
@@ -58,10 +58,10 @@ SLOWEST_M_S, WALKED_M_S = (
 
 @dataclass(frozen=True, slots=True)
 class ScoredPath:
-    """A track or a true path of n rows: `t_s` (n,), `xy_m` (n, 2); None for what the file does not have.
+    """A track or a true path of n rows: `t_s` (n,), `xy_m` (n, 2); None for data that the file lacks.
 
     `level`: index of the plan's level, or the file's own number of the floor. `covariance_m2` (n, 3): xx, xy, yy. `lost`: rows that are marked
-    so. `columns`: what was found, name of the column by what it means. `time_unit`: in which the file states times.
+    so. `columns`: the columns found, name of the column by its meaning. `time_unit`: the unit of the file's times.
     """
 
     path: Path
@@ -119,7 +119,7 @@ def load_path(path: Path, plan: Plan | None) -> ScoredPath:
 
 
 def time_unit(name: str, written: Floats, xy_m: Floats) -> str:
-    """The unit of a column of times: by its name, else by the date that it would be since 1970, else by the speed that it would be."""
+    """The unit of a column of times: by its name, else by the date since 1970 that it would give, else by the speed that it would give."""
     ending = name.lower().rpartition("_")[2]
     if ending in TIME_UNITS:
         return ending

@@ -15,7 +15,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate
+from echostep.localization import Estimate
 from echostep.offline.csv_table import GREATEST
 from echostep_app.scorecard.error_statistics import error_statistics
 
@@ -60,7 +60,7 @@ class Errors:
 def load_truth(path: Path | str) -> Truth:
     """Truth from a CSV file; raises EchostepError that names the file."""
     try:
-        with warnings.catch_warnings(action="ignore"):  # of a file without rows: said below
+        with warnings.catch_warnings(action="ignore"):  # of a file without rows: reported below
             table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
     except OSError as error:
         raise EchostepError(f"{path}: cannot read the truth: {error}") from error
@@ -74,7 +74,7 @@ def load_truth(path: Path | str) -> Truth:
 
 
 def errors(estimates: Sequence[Estimate], truth: Truth) -> Errors | None:
-    """Errors over the estimates within the truth's time; None when there are none."""
+    """Errors over the estimates within the truth's time, or None."""
     inside = [e for e in estimates if truth.t_s[0] <= e.t_s <= truth.t_s[-1]]
     if not inside:
         return None

@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Floats, Ints
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.plan.places.faces import OUTSIDE
 from echostep_app.plan.places.spaces import PlanSpaces, Spaces
 
@@ -28,7 +28,7 @@ class Zones:
         self._spaces = PlanSpaces(plan)
 
     def of(self, xy_m: Floats, level: Floats) -> Ints:
-        """Places (n, 2), their levels (n,), NaN where unknown -> (n,) number of the zone, NO_ZONE where there is none."""
+        """Places (n, 2), their levels (n,), NaN where unknown -> (n,) number of the zone, or NO_ZONE."""
         number = np.full(len(xy_m), NO_ZONE, dtype=np.int64)
         for k in range(self._levels):
             here = np.flatnonzero(level == k)

@@ -14,9 +14,9 @@ from itertools import islice
 from echostep.ports.chunks import Chunk, Portion, portion_of
 from echostep_app.interruption import sleep
 from echostep_app.output.foxglove import log_line
+from echostep_app.printing.console import print_notices
 from echostep_app.printing.people import output_faults
 from echostep_app.recording.recorder import Recorder
-from echostep_app.session.console import print_notices
 
 LEAST_SLEEP_S = 0.02  # shorter waits are not worth a system call per chunk
 

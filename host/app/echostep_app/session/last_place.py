@@ -17,13 +17,11 @@ import msgspec
 
 from echostep.errors import EchostepError
 from echostep.file_mode import claim
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.height.levels import ClimbSettings
-from echostep.localization.particles.start import Start
+from echostep.localization import ClimbSettings, Estimate, Start, TrackStatus, drift_m
 from echostep.path import MeasuredSegment
-from echostep.plan.model import Plan
+from echostep.plan import Plan, Pose
 from echostep.tracker import Tracker
-from echostep.tracker.last_place import LastPlace, start_after
+from echostep.tracker.last_place import LastPlace
 from echostep.walk.recorded import bounded, possible
 from echostep_app.session.metadata import LAST
 
@@ -31,6 +29,8 @@ FILE = "last.json"
 KEPT_S = 5.0  # between two writes: a few strides
 MOST_BYTES = 4096  # of the file
 GIVE = "give a start with --start X,Y,DEG, a room, or ?"
+
+MOVED_M = 1.0  # standard deviation per axis of the way while a battery is changed on the spot: a stride
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,3 +110,17 @@ def start_last(last: Kept, plan: Plan, board: str, climbing: ClimbSettings, now:
         )
         words += f" on {plan.levels[place.level].name}; {remark}"
     return start, f"{words}. The building is searched too: after a walk meanwhile the echoes find the place."
+
+
+def start_after(place: LastPlace, away_s: float, climbing: ClimbSettings) -> Start:
+    """The start of a run that begins `away_s` after another one ended at a place: the battery was changed, or the program started again.
+
+    As after a pause (`gaps`): the cloud lies about the last place, with any heading, as the walk frame is new; the whole building is searched too,
+    for the wearer may have moved on. Pressure gives the level at once if the barometer is the same: its lag has drifted by no more than weather and
+    the air in the building allow.
+    """
+    air = place.air
+    if air is not None:
+        air = replace(air, sd_m=math.hypot(air.sd_m, drift_m(climbing, away_s)))
+    pose = Pose(place.x_m, place.y_m, 0.0, place.level)
+    return Start(pose, math.hypot(place.sd_m, MOVED_M), math.pi, air=air, after_pause=True)

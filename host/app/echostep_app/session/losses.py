@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""How much of a walk was lost, and why, and what a replay did not use of a recording: for the last lines of a run.
+"""How much of a walk was lost, and why, which ports fell silent, and what a replay did not use of a recording: for the last lines of a run.
 
-In: the tracker's estimates as they are published, its counts, a recording that was read to its end. Out: sentences. Owns the time spent in each
-condition.
+In: the tracker's estimates as they are published, its counts, portions, a recording that was read to its end. Out: sentences. Owns the time spent
+in each condition, the first and the newest arrival of each port.
 """
 
 from __future__ import annotations
 
+import math
 from collections import Counter
+from collections.abc import Mapping
 
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.limits import PROBABLE
+from echostep.localization import PROBABLE, Estimate, TrackStatus
 from echostep.path import MeasuredSegment
-from echostep.recording.reading import Recording
+from echostep.ports.chunks import BOARD, FOOT, MTX, Portion
+from echostep.recording import Recording
 from echostep.tracker import Tracker
 from echostep.tracker.state import StreamState, TrackerState
+from echostep_app.ports.arrival_clock import now_ns
 
 ECHOLESS_S = 5.0  # without a ping for so long there are no echoes: ten pings of each ranger at the slowest
 LONGEST_S = 10.0  # between two estimates; a longer gap counts as so long: estimates come twice a second
@@ -24,6 +27,10 @@ UNFITTING = "the echoes did not fit the plan"
 ECHOLESS = "there were no echoes"
 SPREAD = "several places fitted"
 DRIFTED = "without a plan nothing corrects the drift"
+NAMES = {BOARD: "the board", MTX: "the MTx", FOOT: "the foot board"}
+SILENT_S = (
+    3.0  # before the end of a run, from which a port has fallen silent: an order more than between two chunks; assumed
+)
 
 
 class Losses:
@@ -119,3 +126,46 @@ def skipped(recording: Recording, streams: StreamState) -> list[str]:
         f"  echostep repair {path} -o OUT makes a whole file of what is readable" for path in recording.to_repair()
     ]
     return [*lines, *advice]
+
+
+class Arrivals:
+    """Notes the arrival times of a run. `urls`: the ports of a live run by name; its end is the host's clock, else the newest chunk is the end."""
+
+    def __init__(self) -> None:
+        self.urls: Mapping[str, str] = {}
+        self._first_ns, self._newest_ns = math.inf, -math.inf
+        self._newest: dict[str, int] = {}
+
+    def note(self, portion: Portion) -> None:
+        """Note the chunks of a portion."""
+        if not len(portion.t_arrival_ns):
+            return
+        self._first_ns = min(self._first_ns, int(portion.t_arrival_ns[0]))
+        self._newest_ns = max(self._newest_ns, int(portion.t_arrival_ns[-1]))
+        for name in set(portion.ports) & NAMES.keys():
+            last_ns = portion.t_arrival_ns[portion.port == portion.ports.index(name)]
+            if len(last_ns):
+                self._newest[name] = int(last_ns[-1])
+
+    @property
+    def worn_s(self) -> float:
+        """From the first bytes to the end, s; 0 without bytes."""
+        return max(self._end_ns - self._first_ns, 0.0) * 1e-9 if self._newest else 0.0
+
+    @property
+    def _end_ns(self) -> float:
+        return now_ns() if self.urls else self._newest_ns
+
+    def silent(self) -> list[str]:
+        """A sentence for each port from which nothing came at the end, or at all."""
+        lines = []
+        for name, words in NAMES.items():
+            if name not in self.urls and name not in self._newest:
+                continue
+            port = f" ({self.urls[name]})" if name in self.urls else ""
+            if name not in self._newest:
+                lines.append(f"nothing came from {words}{port} at all")
+            elif (silent_s := (self._end_ns - self._newest[name]) * 1e-9) > SILENT_S:
+                since_s = (self._newest[name] - self._first_ns) * 1e-9
+                lines.append(f"nothing came from {words}{port} since {since_s:.0f} s, for the last {silent_s:.0f} s")
+        return lines

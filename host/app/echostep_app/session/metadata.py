@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The text fields that a recording holds beside the bytes: what a replay needs, and what its reader may want to know.
 
-In: plan, start, seed, settings; what the command line gave. Out: fields by name; a start. Owns nothing. `walk.recorded` reads the fields.
+In: plan, start, seed, settings; what the command line gave. Out: fields by name; a start, or EchostepError for one that cannot be. Owns nothing.
+`walk.recorded` reads the fields.
 """
 
 from __future__ import annotations
@@ -17,12 +18,14 @@ import numpy as np
 
 from echostep.board.messages import SCHEMA_HASH
 from echostep.errors import EchostepError
-from echostep.localization.particles.start import ANY_LEVEL, Start
-from echostep.plan.model import NO_PLAN, Plan, Pose
-from echostep.ports.arrival_clock import now_ns
+from echostep.localization import ANY_LEVEL, Start
+from echostep.plan import NO_PLAN, Plan, Pose
 from echostep.ports.people.check_in import MOST_SD_M
 from echostep.walk.recorded import ANYWHERE, CHECK_IN_START, START_LIMIT_M
 from echostep_app.plan.importers.limited import open_limited
+from echostep_app.plan.places.standing import refuse_impossible
+from echostep_app.ports.arrival_clock import now_ns
+from echostep_app.printing.console import console
 from echostep_app.session.options import TrackingOptions
 
 ROOM_M = 2.0  # standard deviation of a start in a room without an outline: half a large room
@@ -94,6 +97,21 @@ def start_given(tracking: TrackingOptions, plan: Plan) -> Pose | Start | None:
         raise EchostepError("--start-sd: the plan has no start: give one with --start X,Y,DEG")
     sd_m, sd_deg = _parse_spread(tracking.start_sd)
     return Start(plan.start, sd_m, math.radians(sd_deg))
+
+
+def check_start(plan: Plan, start: Pose | Start | None, *, given: bool, recorded: bool = False) -> None:
+    """Refuse an impossible start. `given`: on the command line; else it is the recording's if `recorded`, and only noted, or the plan's."""
+    start = start.pose if isinstance(start, Start) else start
+    if start is None or start.level < 0 or not plan.is_drawn:
+        return  # a check-in, a room, anywhere, on any level; no plan that could object
+    shown = f"{start.x_m:g},{start.y_m:g},{math.degrees(start.heading_rad):.0f}"
+    if recorded and not given:
+        try:
+            refuse_impossible(plan, start, f"Note: the recorded start {shown}")
+        except EchostepError as error:
+            console.print(str(error), markup=False)
+        return
+    refuse_impossible(plan, start, f"--start {shown}" if given else f"the plan's start {shown}")
 
 
 def parse_start(text: str, spread: str | None, plan: Plan) -> Pose | Start:

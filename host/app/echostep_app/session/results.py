@@ -11,16 +11,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from echostep.errors import EchostepError
-from echostep.extras import lacks
-from echostep.localization.estimate import Estimate, claims_place, digest
-from echostep.plan.model import Plan
+from echostep.localization import Estimate, claims_place, digest
+from echostep.plan import Plan
 from echostep.tracker import Tracker
 from echostep.walk.table import write_track
+from echostep_app.extras import lacks
 from echostep_app.guidance.cue_list import CueList
 from echostep_app.output.track_plot import draw_track
 from echostep_app.plan.places.whereabouts import Whereabouts
+from echostep_app.printing.console import console
+from echostep_app.printing.lines import as_error
 from echostep_app.scorecard.truth import Errors, Truth, errors
-from echostep_app.session.console import console
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +38,8 @@ class Result:
 
 def output_folder(path: Path) -> Path:
     """The folder for the results, made if it is missing; raises EchostepError when that fails."""
-    try:
+    with as_error(f"{path}: cannot make the folder", "; give another one with --out"):
         path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot make the folder: {error.strerror}; give another one with --out") from error
     return path
 
 

@@ -17,48 +17,44 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from echostep.errors import EchostepError, words_of
-from echostep.extras import lacks
-from echostep.localization.estimate import Estimate
-from echostep.ports.chunks import Portion
+from echostep.localization import Estimate
+from echostep.ports.chunks import TEAM, Portion
 from echostep.ports.people.check_in import PERSON
 from echostep.ports.people.meeting import MEETING
 from echostep.ports.people.team_beacons import TEAM_BEACONS
-from echostep.ports.people.teammate import TEAM
-from echostep.recording.clock import clock_of, utc_offset_ns
-from echostep.recording.reading import Recording
+from echostep.recording import Recording, clock_of, utc_offset_ns
 from echostep.tracker import Tracker
-from echostep.tracker.kernels import LATER, TRACKING, Part, compile_parts, compiling_later
+from echostep_app.extras import lacks
 from echostep_app.guidance.guided_rescue import GuidedRescue
 from echostep_app.guidance.guided_run import guidance_of
 from echostep_app.interruption import holding_signals, is_asked
+from echostep_app.kernel_parts import LATER, TRACKING, Part, compile_parts, compiling_later
 from echostep_app.output.terminal import TerminalView
 from echostep_app.page.elements.true_position import TruePath
 from echostep_app.plan.places.refusals import refusals
+from echostep_app.printing.console import console, print_notices
 from echostep_app.printing.people import FaultNews, outlast_output
+from echostep_app.printing.progress import progress_line
 from echostep_app.recording.recorder import DerivedMessage, Recorder
 from echostep_app.scorecard.truth import Truth
-from echostep_app.session.arrivals import Arrivals
 from echostep_app.session.browser import open_browser
 from echostep_app.session.chunk_streams import MessageSource
-from echostep_app.session.console import console, print_notices
-from echostep_app.session.losses import Losses
+from echostep_app.session.losses import Arrivals, Losses
 from echostep_app.session.options import OutputOptions
-from echostep_app.session.progress import progress_line
 from echostep_app.session.results import Result, summary_words, write_results
 from echostep_app.session.sinks import (
-    DerivedSink,
-    MarkSink,
-    PageSink,
-    ReportSink,
     Sink,
-    SpokenCueSink,
-    TeammateSink,
-    TerminalSink,
+    derived_sink,
+    mark_sink,
+    page_sink,
+    spoken_cue_sink,
+    teammate_sink,
+    terminal_sink,
 )
 
 if TYPE_CHECKING:
     from echostep_app.page.live import LivePage
-    from echostep_app.page.shared_drawing import SharedDrawing
+    from echostep_app.page.shared import SharedDrawing
     from echostep_app.session.team.subscription import TeamSubscription
     from echostep_app.team.endpoint import Endpoint, Outlet
     from echostep_app.team.publish import Publishing, Source
@@ -158,7 +154,7 @@ class Session:
         print_page(console, page.server.urls)
         page.fault_sources.append(FaultNews().words)
         self.page = opened.enter_context(page)
-        self._sinks.append(PageSink(page))
+        self._sinks.append(page_sink(page))
         self.message_sources.append((PERSON, page.pop_check_ins))
         if self.output.browser and open_browser(page.url):
             page.wait_for_page()
@@ -185,7 +181,7 @@ class Session:
         clock = clock_of(self.recorded.metadata) if self.recorded else None
         publishing = Publishing(self.output.outlet, self.tracker, self.source, _print_line, clock)
         self._publishing = opened.enter_context(publishing)
-        self._sinks.append(ReportSink(publishing))
+        self._sinks.append(Sink(lambda _, estimates: publishing.publish(estimates)))
         if self.page:
             self.page.receipt_of = publishing.receipt
             self.page.fault_sources.append(lambda: publishing.fault)
@@ -221,8 +217,7 @@ class Session:
 
     def _read_team(self, subscription: TeamSubscription, outlet: Outlet, run: str) -> None:
         """Read teammates and beacons; the place of the wearer whom a rescuer is guided to; and for a page the commanders' marks."""
-        from echostep_app.session.team.mark_feed import MarkFeed
-        from echostep_app.session.team.team_feed import TeamFeed
+        from echostep_app.session.team.feeds import MarkFeed, TeamFeed
         from echostep_app.session.team.teammate_feed import TeammateFeed
 
         page, plan = self.page, self.tracker.plan
@@ -230,14 +225,14 @@ class Session:
             feed = TeamFeed(subscription, outlet.team, self.guided.name, plan, _print_line)
             self.message_sources.append((TEAM, feed.pop))
         teammates = TeammateFeed(subscription, outlet, run, plan)
-        self._sinks.append(TeammateSink(teammates, self.tracker, page, self._drawing))
+        self._sinks.append(teammate_sink(teammates, self.tracker, page, self._drawing))
         self.message_sources.append((TEAM_BEACONS, teammates.beacons))
         if page is None:
             return
         self.message_sources.append((MEETING, lambda: teammates.meetings(page.pop_meetings())))
         marks = MarkFeed(subscription, outlet, run, plan.digest)
         page.acknowledged_by = marks.acknowledged_by
-        self._sinks.append(MarkSink(marks, page))
+        self._sinks.append(mark_sink(marks, page))
 
     def track(
         self,
@@ -270,13 +265,13 @@ class Session:
         """The terminal, and what is derived from estimates, for the recording and for viewers."""
         sinks: list[Sink] = []
         if view:
-            sinks.append(TerminalSink(view, self.guided))
+            sinks.append(terminal_sink(view, self.guided))
         elif self.guided:
-            sinks.append(SpokenCueSink(self.guided))
+            sinks.append(spoken_cue_sink(self.guided))
         if writers := [*([recorder.write_derived] if recorder else []), *self._writers]:
             known_ns = utc_offset_ns(self.recorded.metadata) if self.recorded else None
             offset_ns = recorder.log_offset_ns if recorder else known_ns or 0
-            sinks.append(DerivedSink(self.tracker, writers, offset_ns))
+            sinks.append(derived_sink(self.tracker, writers, offset_ns))
             if self.tracker.plan.georeference and (words := lacks("/location", "pyproj")):
                 console.print(f"Longitude and latitude are left out: {words}", markup=False, highlight=False)
         return sinks

@@ -9,7 +9,7 @@ from __future__ import annotations
 from importlib.resources import as_file, files
 from itertools import islice
 
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep_app.simulation.devices.board import PythonBoard
 from echostep_app.simulation.scenario import demo_scenario
 

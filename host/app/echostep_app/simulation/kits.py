@@ -10,7 +10,7 @@ from enum import Enum
 
 
 class Kit(Enum):
-    """Which parts are on the board: those of the papers, or those of the kit of 2026 (firmware/README.md; not built yet)."""
+    """Which parts are on the board: the papers' parts, or the kit of 2026 (firmware/README.md; not built yet)."""
 
     PAPERS = "papers"
     OF_2026 = "2026"

@@ -17,7 +17,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.board.frames import encode
 from echostep.board.messages import Configure
-from echostep.plan.model import Plan, Pose
+from echostep.plan import Plan, Pose
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep_app.board.subscription import SUBSCRIBE
 from echostep_app.simulation.devices.board import Board, PythonBoard
@@ -48,7 +48,7 @@ class Scenario:
         person: Person | None = None, model: MtxModel | None = None, configure: Configure | None = None,
         kit: Kit = Kit.PAPERS, foot_board: Board | None = None, worn: WornGyro | None = None,
     ) -> None:  # fmt: skip
-        """`configure` is sent to the board before it starts; `foot_board` plays the one on the foot, in the place of an MTx.
+        """`configure` is sent to the board before it starts; `foot_board` is the one on the foot, instead of an MTx.
 
         `worn`: how the belt's gyro is worn, perfectly by default; of the papers' kit.
         """
@@ -78,7 +78,7 @@ class Scenario:
         return np.column_stack([w.t_s, w.trunk_m, w.heading_rad, w.height_m])[::TRUTH_MS]
 
     def chunks(self) -> Iterator[Chunk]:
-        """Chunks of both ports in order of arrival, those of a block as soon as the board has lived through it."""
+        """Chunks of both ports in order of arrival, a block's chunks as soon as the board has run through it."""
         mtx = self._mtx_chunks() if self.foot is None else iter(())
         coming: list[Chunk] = []
         following = next(mtx, None)
@@ -109,7 +109,7 @@ class Scenario:
             self.foot.board.close()
 
     def _board_chunks(self, start: int, stop: int) -> list[Chunk]:
-        """The board's bytes of these milliseconds as a USB host gets them, those of one instant together."""
+        """The board's bytes of these milliseconds as a USB host gets them, bytes of one instant together."""
         gathered: dict[int, bytes] = {}
         ranging = self._board.may_range(stop - start) if isinstance(self._board, PythonBoard) else None
         for t_ns, part in self._board.advance(self.sensors.rows(start, stop, ranging)):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Floats
-from echostep.plan.model import Level
+from echostep.plan import Level
 from echostep_app.simulation.devices.board_sensors import Adis16100Model, CompassModel, Scp1000Model, WornGyro
 from echostep_app.simulation.people.walker import RATE_HZ, Walk
 from echostep_app.simulation.world.acoustics import SRF02, Acoustics, speed_of_sound_m_s
@@ -46,7 +46,7 @@ class BoardSensors:
 
         `acoustics`: of the rangers; `barometer`: another one than an SCP1000; `worn`: how the belt's gyro is worn, perfectly by default.
 
-        `air_pa`: the true pressure at each millisecond of the walk (`weather.pressures`), in the place of its heights.
+        `air_pa`: the true pressure at each millisecond of the walk (`weather.pressures`), instead of its heights.
         """
         self._walk = walk
         self._walls = [level.solid for level in levels]

@@ -17,10 +17,9 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from echostep.plan.model import NO_PLAN, Plan
+from echostep.plan import NO_PLAN, Plan
 from echostep_app.plan.places.bearing import heading_words
 from echostep_app.team.cot import alarm_words
-from echostep_app.team.inbox import Inbox, ReceivedMessage
 from echostep_app.team.messages.report import WITHOUT_PLAN
 from echostep_app.team.roster import CLOCK_OFF_S, NO_STEP_S, Member, MemberState, Roster, nearest
 
@@ -44,22 +43,6 @@ STYLES = {
     MemberState.STALE: "bold red", MemberState.UNCERTAIN: "yellow",
     MemberState.WAITING: "cyan", MemberState.TRACKING: "green", MemberState.ENDED: "grey62",
 }  # fmt: skip
-
-
-def update_roster(inbox: Inbox, roster: Roster) -> None:
-    """Move all messages and drop counts of the inbox into the roster."""
-    take_messages(*inbox.take_all(), roster)
-
-
-def take_messages(
-    messages: Sequence[ReceivedMessage], dropped: Mapping[str, int], roster: Roster
-) -> list[ReceivedMessage]:
-    """Put messages into the roster, and counts of dropped ones by reason; returns the accepted ones."""
-    believed = [message for message in messages if roster.receive(*message)]
-    for reason, count in dropped.items():
-        roster.received += count
-        roster.count_rejected(reason, count)
-    return believed
 
 
 def table(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from echostep.errors import EchostepError
-from echostep.extras import require
+from echostep_app.extras import require
 from echostep_app.team.messages.report import checked_name
 
 PORTS = {"mqtt": 1883, "mqtts": 8883, "cot+udp": 6969, "cot+tcp": 8087, "cot+tls": 8089, "mesh": 0}

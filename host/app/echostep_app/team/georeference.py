@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from echostep.plan.georeference import EarthTransform
-from echostep.plan.model import Plan
+from echostep.plan import Plan
+from echostep_app.plan.georeference import EarthTransform
 from echostep_app.team.messages.report import ReportedPlace
 
 

@@ -19,9 +19,10 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Protocol
 
-from echostep.localization.estimate import RISK, WALKER_M_S, claims_place, ellipse95, trust
+from echostep.localization import RISK, WALKER_M_S, claims_place, ellipse95, trust
+from echostep_app.printing.lines import moment
 from echostep_app.team.faults import in_words
-from echostep_app.team.messages.report import Position, Report, ReportedAlarm, moment
+from echostep_app.team.messages.report import Position, Report, ReportedAlarm
 
 # After so long without a new estimate the last one is sent again, with its age and a larger covariance
 HEARTBEAT_S = 2.0

@@ -11,8 +11,8 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from echostep.localization.estimate import ellipse95
-from echostep.plan.model import Plan
+from echostep.localization import ellipse95
+from echostep.plan import Plan
 from echostep_app.printing.picture_files import save_picture
 from echostep_app.team.messages.report import Position
 from echostep_app.team.roster import Member, MemberState
@@ -30,14 +30,12 @@ COLOURS = {  # distinguishable with colour blindness [Okabe and Ito 2008]
 
 def draw_team(path: Path, plan: Plan, members: Sequence[Member], now_s: float) -> None:
     """Draw each floor with members on it, and each member with 95 % ellipse, heading and state; raises EchostepError."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
     placed = [m for m in members if (p := m.report.last_known) is not None and 0 <= p.floor < len(plan.levels)]
     floors = sorted({p.floor for m in placed if (p := m.report.last_known)}) or [0]
     figure = Figure(figsize=(10, 6 * len(floors)), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
     for k, floor in enumerate(floors):
         level = plan.levels[floor]
         axes = figure.add_subplot(

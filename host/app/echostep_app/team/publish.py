@@ -19,14 +19,15 @@ from types import TracebackType
 from typing import Literal, Self
 
 from echostep.errors import EchostepError
-from echostep.localization.estimate import CHI2_95, Estimate, TrackStatus, claims_place
-from echostep.odometry.wearer import WearerWatch
+from echostep.localization import CHI2_95, Estimate, TrackStatus, claims_place
+from echostep.odometry import WearerWatch
 from echostep.path import Odometer
-from echostep.plan.model import Level, Plan
+from echostep.plan import Level, Plan
 from echostep.tracker import Tracker
 from echostep_app.board.faults.health import all_findings
 from echostep_app.plan.places.bearing import KNOWN_HEADING_RAD
 from echostep_app.plan.places.whereabouts import Whereabouts
+from echostep_app.printing.lines import moment
 from echostep_app.team.cot import StreamTransport, UdpTransport
 from echostep_app.team.endpoint import Endpoint, Outlet
 from echostep_app.team.georeference import GroundPlane
@@ -37,7 +38,6 @@ from echostep_app.team.messages.report import (
     Report,
     ReportedAlarm,
     StreamReport,
-    moment,
     printable,
 )
 from echostep_app.team.outbox import HEARTBEAT_S, Delivery, Outbox, Transport, without_place

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from echostep.ports.people.team_beacons import BEACONS, parse_team_beacons
+from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.report import (
     BadReportError,
     Position,
@@ -142,6 +143,14 @@ class Roster:
             return False
         return True
 
+    def take(self, messages: Sequence[ReceivedMessage], dropped: Mapping[str, int]) -> list[ReceivedMessage]:
+        """Receive messages, and count dropped ones by reason; returns the accepted ones."""
+        believed = [message for message in messages if self.receive(*message)]
+        for reason, count in dropped.items():
+            self.received += count
+            self.count_rejected(reason, count)
+        return believed
+
     def count_rejected(self, reason: str, count: int = 1) -> None:
         """Count rejected payloads; after MAX_REASONS different reasons the others are counted together."""
         reason = reason[:100]
@@ -265,17 +274,12 @@ def _jumps(before: Position | None, after: Position | None) -> bool:
     return distance > reach_m + before.radius95_m + after.radius95_m + 1.0
 
 
-def distance_m(a: Position, b: Position) -> float | None:
-    """Straight distance of two positions; None when they are on different floors."""
-    return math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) if a.floor == b.floor else None
-
-
 def nearest(member: Member, others: Iterable[Member]) -> tuple[float, Member] | None:
     """Distance to the closest other member on the same floor, and that member, by their last reports."""
-    if member.report.position is None:
+    if (here := member.report.position) is None:
         return None
+    positions = [(o, o.report.position) for o in others if o is not member]
     candidates = [
-        (d, o) for o in others
-        if o is not member and o.report.position is not None and (d := distance_m(member.report.position, o.report.position)) is not None
-    ]  # fmt: skip
+        (math.hypot(p.x_m - here.x_m, p.y_m - here.y_m), o) for o, p in positions if p and p.floor == here.floor
+    ]
     return min(candidates, key=lambda pair: pair[0], default=None)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """TLS to brokers and TAK servers.
 
-In: an endpoint with its files, PEM or PKCS #12. Out: a context that always verifies the server's certificate and name; EchostepError that names the
-file and what to do. Owns nothing.
+In: an endpoint with its files, PEM or PKCS #12 (.p12, .pfx, as TAK servers hand them out). Out: a context that always verifies the server's
+certificate and name; EchostepError that names the file and what to do. Owns nothing. PKCS #12 needs the package cryptography (extra `pkcs12`), which
+reads the old ciphers too (RC2, 3DES) that OpenSSL 3 reads with `-legacy` alone.
 """
 
 from __future__ import annotations
@@ -11,13 +12,19 @@ import secrets
 import ssl
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from echostep.errors import EchostepError
+from echostep_app.extras import lacks
 from echostep_app.team.endpoint import Endpoint
-from echostep_app.team.pkcs12 import DER_SEQUENCE, authorities, identity
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.serialization.pkcs12 import PKCS12KeyAndCertificates
 
 PEM = b"-----BEGIN"  # how a file of text begins somewhere
+DER_SEQUENCE = b"\x30"  # how PKCS #12 begins, and DER
+# Passwords of a PKCS #12 whose own is not given; the last: of every file that a TAK server makes [TAK, makeCert.sh]
+USUAL = (None, b"", b"atakatak")
 LARGEST_FILE = 1 << 20  # bytes, of certificates
 WORDS = {
     "KEY_VALUES_MISMATCH": "the key is not that of the certificate: give the two that were made together",
@@ -56,34 +63,67 @@ def tls_context(endpoint: Endpoint) -> ssl.SSLContext:
 
 
 def _trust(context: ssl.SSLContext, endpoint: Endpoint, content: bytes, password: bytes | None) -> None:
-    """Load the authorities."""
-    path = endpoint.files["ca"]
+    """Load the authorities: all certificates of the file."""
     if PEM in content:
-        context.load_verify_locations(path)
+        context.load_verify_locations(endpoint.files["ca"])
         return
-    try:
-        context.load_verify_locations(cadata=authorities(content, password, Path(path).name))
-    except EchostepError as error:
-        raise EchostepError(f"{endpoint}: ca={path}: {error}") from error
+    held = _pkcs12(endpoint, "ca", content, password)
+    from cryptography.hazmat.primitives.serialization import Encoding
+
+    certificates = [each for each in (held.cert, *held.additional_certs) if each is not None]
+    if not certificates:
+        raise _unusable(endpoint, "ca", "holds no certificate")
+    pem = "".join(each.certificate.public_bytes(Encoding.PEM).decode() for each in certificates)
+    context.load_verify_locations(cadata=pem)
 
 
 def _identify(context: ssl.SSLContext, endpoint: Endpoint, content: bytes, password: bytes | None) -> None:
     """Load the client's certificate and key; those of PKCS #12 by a file, in which the key is encrypted, that exists for that moment only."""
-    path = endpoint.files["cert"]
     if PEM in content:
         context.load_cert_chain(
-            path, endpoint.files.get("key"), password=_no_password if password is None else password
+            endpoint.files["cert"], endpoint.files.get("key"), password=_no_password if password is None else password
         )
         return
+    held = _pkcs12(endpoint, "cert", content, password)
+    from cryptography.hazmat.primitives import serialization as form
+
+    if held.key is None or held.cert is None:
+        why = "holds no certificate with its key: it is not a client's file; is it for ca=?"
+        raise _unusable(endpoint, "cert", why)
     cover = secrets.token_bytes(16).hex().encode()
-    try:
-        pem = identity(content, password, Path(path).name, cover)
-    except EchostepError as error:
-        raise EchostepError(f"{endpoint}: cert={path}: {error}") from error
+    key = held.key.private_bytes(form.Encoding.PEM, form.PrivateFormat.PKCS8, form.BestAvailableEncryption(cover))
+    chain = [each.certificate.public_bytes(form.Encoding.PEM) for each in (held.cert, *held.additional_certs)]
     with TemporaryDirectory() as folder:
         copy = Path(folder) / "client.pem"
-        copy.write_bytes(pem)
+        copy.write_bytes(b"".join([*chain, key]))
         context.load_cert_chain(copy, password=cover)
+
+
+def _pkcs12(endpoint: Endpoint, name: str, content: bytes, password: bytes | None) -> PKCS12KeyAndCertificates:
+    """What a file of PKCS #12 holds; raises EchostepError when it cannot be opened."""
+    if lacking := lacks("PKCS #12", "cryptography"):
+        file = Path(endpoint.files[name]).name
+        pem = f"{file.rpartition('.')[0] or file}.pem"
+        remedy = f"{lacking}; or once: openssl pkcs12 -legacy -nodes -in {file} -out {pem}, then {pem}"
+        raise _unusable(endpoint, name, remedy)
+    from cryptography.hazmat.primitives.serialization.pkcs12 import load_pkcs12
+
+    said = ""
+    for tried in (password, *USUAL):
+        try:
+            return load_pkcs12(content, tried)
+        except ValueError as error:
+            said = str(error)
+    if "password" not in said.lower():
+        der = "is damaged, or is DER: openssl x509 -inform der -in FILE -out FILE.pem makes PEM of a certificate"
+        raise _unusable(endpoint, name, der)
+    remedy = "that of password=FILE does not open it" if password is not None else "write it into a file, password=FILE"
+    raise _unusable(endpoint, name, f"is PKCS #12 with a password: {remedy}")
+
+
+def _unusable(endpoint: Endpoint, name: str, why: str) -> EchostepError:
+    """The error of a file that cannot be used."""
+    return EchostepError(f"{endpoint}: {name}={endpoint.files[name]}: {why}")
 
 
 def _content(endpoint: Endpoint, name: str) -> bytes:
@@ -93,13 +133,11 @@ def _content(endpoint: Endpoint, name: str) -> bytes:
         with path.open("rb") as file:
             content = file.read(LARGEST_FILE)
     except FileNotFoundError:
-        raise EchostepError(f"{endpoint}: {name}={path}: there is no such file") from None
+        raise _unusable(endpoint, name, "there is no such file") from None
     except OSError as error:
-        raise EchostepError(f"{endpoint}: {name}={path}: cannot be read: {error.strerror}") from error
+        raise _unusable(endpoint, name, f"cannot be read: {error.strerror}") from error
     if name != "password" and PEM not in content and not content.startswith(DER_SEQUENCE):
-        raise EchostepError(
-            f"{endpoint}: {name}={path}: holds no certificate and no key: a PEM file has lines with -----BEGIN"
-        )
+        raise _unusable(endpoint, name, "holds no certificate and no key: a PEM file has lines with -----BEGIN")
     return content
 
 

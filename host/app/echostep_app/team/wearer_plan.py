@@ -16,8 +16,9 @@ from pathlib import Path
 
 from echostep.errors import EchostepError
 from echostep.file_mode import claim
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.plan.places.refusals import refusals
+from echostep_app.printing.lines import as_error
 from echostep_app.team.endpoint import Endpoint
 from echostep_app.team.inbox import ListenerThread
 from echostep_app.team.messages.report import checked_name
@@ -96,7 +97,7 @@ def _kept(payload: bytes, name: str, folder: Path) -> Path:
     """The file of a drawing, written unless it is there; raises EchostepError when it cannot be written, or holds something else."""
     letters = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)
     path = folder / f"drawing-{letters}-{hashlib.sha256(payload).hexdigest()[:DIGITS]}.json"
-    try:
+    with as_error(f"{path}: cannot write the drawing"):
         folder.mkdir(parents=True, exist_ok=True)
         if path.exists():
             if path.read_bytes() != payload:
@@ -105,8 +106,6 @@ def _kept(payload: bytes, name: str, folder: Path) -> Path:
         part = path.with_suffix(".part")
         claim(part).write_bytes(payload)
         part.replace(path)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the drawing: {error.strerror or error}") from error
     return path
 
 

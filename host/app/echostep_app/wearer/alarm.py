@@ -2,12 +2,12 @@
 """The wearer's alarm: a question after 20 s without motion, a mayday after 30 s; a question after a fall, a mayday 10 s later; a call for help.
 
 In: signs of the wearer (windows with or without motion, steps, falls), taps. Out: the present `Alarm`, and every change of it. Owns the time of the
-last motion. All times are those of the samples.
+last motion. All times are the samples' times.
 
 The times follow NFPA 1982 (PASS), quoted from memory: alarm after 30 s without motion (+5/-0 s), a warning about 10 s before; to be compared with a
 copy of the standard before use. Differences: a mayday for lack of motion also ends when the wearer walks, there only by hand; a fall leads to a
-question and a mayday sooner, and motion alone, which ends a question for lack of motion, does not end that one. There is no sound of 95 dB, no
-housing and no test by the standard: this is no PASS.
+question and a mayday sooner, and motion alone, which ends a question for lack of motion, does not end this one. There is no sound of 95 dB, no
+housing and no test by the standard: this is not a PASS.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import math
 from collections import deque
 from collections.abc import Sequence
 
-from echostep.odometry.wearer import Alarm, AlarmKind, AlarmReason
+from echostep.odometry import Alarm, AlarmKind, AlarmReason
 from echostep_app.wearer.falls import Fall
 from echostep_app.wearer.stillness import WINDOW_S, Window
 from echostep_app.wearer.wearer_signs import Sign, StepTaken
@@ -24,9 +24,9 @@ from echostep_app.wearer.wearer_signs import Sign, StepTaken
 ASK_S, MAYDAY_S = 20.0, 30.0  # without motion
 ANSWER_S = 10.0  # to answer after a fall: as long as between question and mayday for lack of motion
 WALKED_STEPS = 3  # of the foot: the wearer walks; a helper who turns a wearer over makes fewer
-OVER_S = 30.0  # an alarm that has ended is reported as over for so long
+OVER_S = 30.0  # an alarm that has ended is reported as over for this long
 SWAY_S = 120.0  # after the last movement, for which sway alone suppresses the question: a foot at rest is moved more often than that
-GAP_S = 2.0  # a longer time without samples is no time without motion
+GAP_S = 2.0  # a longer time without samples does not count as time without motion
 MARGIN_S = WINDOW_S  # how late windows of the other sensor may come
 MOST_CHANGES = 1000  # that are kept
 

@@ -4,8 +4,8 @@
 In: tenths of a second of the belt (with the thigh's force beside them) and of the foot, and strides, in order of their messages. Out: `Fall`s; the
 trunk's tilt. Owns the standing directions and what was last upright.
 
-The phases are those of [Kangas et al. 2008, Gait & Posture 28, 285-291] at the waist: impact of at least 2 g, then posture, lying when the vertical
-force is at most half of gravity, a tilt of 60 degrees; their dip below 0.6 g before the impact is not asked for, since slow falls lack it. To exclude
+The phases are from [Kangas et al. 2008, Gait & Posture 28, 285-291] at the waist: impact of at least 2 g, then posture, lying when the vertical
+force is at most half of gravity, a tilt of 60 degrees; their dip below 0.6 g before the impact is not required, since slow falls lack it. To exclude
 work on the knees the thigh must lie too, where it has an accelerometer; to exclude impacts of walking, running and jumps, the impact must come after
 the trunk was last upright (or just before), and the wearer must then move little.
 
@@ -123,7 +123,7 @@ class Falls:
         return self._belt.tilt_rad if now_s - self._belt.newest_s <= FRESH_S else math.nan
 
     def add_stride(self, t0_s: float, t1_s: float, length_m: float) -> None:
-        """A stride between two times: the standing directions are learnt from those of a wearer on foot."""
+        """A stride between two times: the standing directions are learnt from strides of a wearer on foot."""
         if length_m < STRIDE_M or not 0.0 < t1_s - t0_s < STRIDE_S:
             return
         belt, foot = (

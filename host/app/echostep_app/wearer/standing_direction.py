@@ -34,7 +34,7 @@ class StandingDirection:
         self._across: Vector = self._up
 
     def add_stride(self, forces: Sequence[Vector], rates: Sequence[Vector]) -> None:
-        """Mean specific forces (k, 3) of tenths of a stride, and mean rates (m, 3) of those that show how the sensor turns in it."""
+        """Mean specific forces (k, 3) of tenths of a stride, and mean rates (m, 3) of the tenths that show how the sensor turns."""
         force = np.mean(np.array(forces), axis=0) if forces else np.full(3, math.nan)
         if not abs(float(np.linalg.norm(force)) - GRAVITY_M_S2) < AROUND_GRAVITY_M_S2:
             return

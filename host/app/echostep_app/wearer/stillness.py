@@ -26,7 +26,7 @@ SHORT, GROUPS = 25, 5  # short means of 0.02 s in a window of half a second, lon
 # all windows, hence never in most of ten. Where recorded feet are stillest it is 0.6 to 2.
 LEAST_RATIO = 2.5
 # rad/s, standard deviation of the long means, all channels: in public recordings of quiet standing 40-100 % of the half seconds of shanks and
-# thighs exceed it, 0-80 % of those of feet; breathing turns neither.
+# thighs exceed it, 0-80 % of the half seconds of feet; breathing turns neither.
 LEAST_RAD_S = 0.004
 WINDOW_S = 0.5
 MOST_SAMPLES = 10_000  # of one window, 20 kHz: no sensor has more, and times that stand still fill no memory
@@ -39,7 +39,7 @@ SWAY_WINDOWS, LEAST_SWAYING = 10, 8
 
 
 def swaying(t_s: Floats, windows: Ints, values: Floats) -> Bools:
-    """Whether windows (w,) sway; `windows` (n,), ascending from 0: that of each sample (n, c) in rad/s, taken at `t_s` (n,)."""
+    """Whether windows (w,) sway; `windows` (n,), ascending from 0: the window of each sample (n, c) in rad/s, taken at `t_s` (n,)."""
     part = np.clip(SHORT * (t_s / WINDOW_S - np.floor(t_s / WINDOW_S)), 0, SHORT - 1).astype(np.int64)
     flat, total = windows * SHORT + part, int(windows[-1] + 1) * SHORT
     counts = np.bincount(flat, minlength=total)
@@ -58,7 +58,7 @@ def sways(short: Floats) -> Bools:
 
 
 class Window(NamedTuple):
-    """Half a second of one sensor that ends at `end_s`; `moved`: there was motion. `sways`: none, but sway for some time."""
+    """Half a second of one sensor that ends at `end_s`; `moved`: there was motion. `sways`: no motion, but sway for some time."""
 
     end_s: float
     moved: bool

@@ -63,7 +63,7 @@ class Tenths:
 
 
 def _tenths(rows: Floats, index: Ints, begins: Ints) -> list[Tenth | None]:
-    """Whole tenths, which begin at the rows `begins`; None for one of too few samples."""
+    """Whole tenths, which begin at the rows `begins`; None for a tenth with too few samples."""
     count = np.diff(np.r_[begins, len(rows)])
     means = np.add.reduceat(rows[:, 1:], begins) / count[:, None]
     force, rate = rows[:, 1:4], rows[:, 4:7]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The watch over a tracker's wearer: signs of motion, steps and falls, and the alarm that follows from them.
 
-In: what the tracker's front end tells. Out: `alarm`, the trunk's tilt. Owns the signs and the alarm.
+In: output of the tracker's front end. Out: `alarm`, the trunk's tilt. Owns the signs and the alarm.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from echostep.arrays import Floats, Ints
 from echostep.legs.trunk_path import GyroBlock
-from echostep.odometry.wearer import Alarm, WearerWatch
+from echostep.odometry import Alarm, WearerWatch
 from echostep.path import PathSegment
 from echostep.tracker import Tracker
 from echostep_app.wearer.alarm import WearerAlarm
@@ -26,7 +26,7 @@ def watch_of(tracker: Tracker) -> AlarmWatch:
 
 
 class AlarmWatch(WearerWatch):
-    """Hands what the front end tells to the signs, and these to the alarm, message by message."""
+    """Passes the output of the front end to the signs, and these to the alarm, message by message."""
 
     def __init__(self) -> None:
         self.wearer_alarm = WearerAlarm()
@@ -38,7 +38,7 @@ class AlarmWatch(WearerWatch):
         return self.wearer_alarm.alarm
 
     def trunk_tilt_rad(self, t_s: float) -> float:
-        """The trunk's tilt at a time; NaN where the belt does not tell."""
+        """The trunk's tilt at a time; NaN if the belt does not give it."""
         return self.signs.falls.trunk_tilt_rad(t_s)
 
     def add_foot(self, t_s: Floats, gyro: Floats, accel: Floats, message_index: Ints) -> None:

@@ -41,7 +41,7 @@ _Found = Window | StepTaken | _Stride | tuple[str, Tenth]
 
 
 class WearerSigns:
-    """Call the `add_` methods with what a portion brings, then `settle`; `pop` when convenient."""
+    """Call the `add_` methods with the contents of a portion, then `settle`; `pop` when convenient."""
 
     def __init__(self) -> None:
         self.falls = Falls()
@@ -58,7 +58,7 @@ class WearerSigns:
         self._found += [(int(message_index[k]), (FOOT, tenth)) for k, tenth in tenths]
 
     def add_belt(self, t_s: Floats, gyro: Floats, accel: Floats, thigh_accel: Floats, message_index: Ints) -> None:
-        """Samples of the belt, as those of the foot, with the thigh's specific force (n, 3) at the same instants."""
+        """Samples of the belt, as for the foot, with the thigh's specific force (n, 3) at the same instants."""
         tenths = self._belt.cut(t_s, accel, gyro, thigh_accel)
         self._found += [(int(message_index[k]), (BELT, tenth)) for k, tenth in tenths]
 
@@ -82,7 +82,7 @@ class WearerSigns:
         return signs
 
     def settle(self) -> None:
-        """Put what the portion brought in order of its messages."""
+        """Put the portion's signs in order of its messages."""
         found, self._found = self._found, []
         for _, sign in sorted(found, key=itemgetter(0)):
             fall = None

@@ -16,18 +16,18 @@ _TEXT = re.compile(r"[ -~]+")
 
 
 def product_text(code: bytes) -> str:
-    """The product code as text, "" when it is none: printable, padded with blanks or zeros [LLCP, ProductCode]."""
+    """The product code as text, "" unless it is printable, padded with blanks or zeros [LLCP, ProductCode]."""
     text = code.rstrip(b"\0").decode("latin-1").strip()
     return text if _TEXT.fullmatch(text) else ""
 
 
 def firmware_text(answer: bytes) -> str:
-    """Major, minor and revision of the firmware; "" when it is none [LLCP, FirmwareRevision]."""
+    """Major, minor and revision of the firmware; "" for another answer [LLCP, FirmwareRevision]."""
     return ".".join(map(str, answer[:3])) if len(answer) >= 3 else ""
 
 
 def force_range_g(product: str) -> float | None:
-    """Largest force in g of an MTi by its product code, as `MTi-3-8A7G6`; None where it is not known."""
+    """Largest force in g of an MTi by its product code, as `MTi-3-8A7G6`; None if unknown."""
     match = re.match(r"MTi-(\d+)", product)
     if match is None:
         return None

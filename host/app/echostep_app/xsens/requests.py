@@ -34,7 +34,7 @@ _ERRORS = {  # [LLCP, Error]
 class Request:
     """A message to the MT, and the payload `answer` of its acknowledgement (None: any).
 
-    `optional`: the setup goes on when it is refused. `instead`: when it is refused, these take the place of it and of all that follow, and
+    `optional`: the setup goes on when it is refused. `instead`: when it is refused, these replace it and all that follow, and
     `remark` is printed. `rates`: the answer lists at least these outputs at these rates (Hz), by identifier.
     """
 
@@ -69,7 +69,7 @@ OUTPUTS = {
     0xC020: "magnetic field",
 }
 COUNTER, NEEDED, WITH_ORIENTATION = 0x1020, (0x4020, 0x8020), (0x2010, 0x4020, 0x8020, 0xC020)
-WITH_EACH = 0xFFFF  # in the place of a rate: with every message [LLCP, SetOutputConfiguration]
+WITH_EACH = 0xFFFF  # instead of a rate: with every message [LLCP, SetOutputConfiguration]
 
 
 def set_rate(rate_hz: float) -> tuple[Request, ...]:

@@ -19,9 +19,11 @@ from collections import deque
 from enum import Enum
 from typing import NamedTuple
 
+import numpy as np
+
 from echostep.xsens.frames import ERROR, MTDATA, MTDATA2, WAKE_UP, Frame, FrameReader, encode_frame
 from echostep.xsens.mtdata import PROJECT
-from echostep.xsens.mtdata2 import missing_contents
+from echostep.xsens.mtdata2 import decode_mtdata2, find_packets
 from echostep.xsens.reader import MtxReader
 from echostep_app.xsens.products import firmware_text, product_text
 from echostep_app.xsens.requests import (
@@ -73,7 +75,7 @@ class MtxSetup:
     """
 
     def __init__(self, requests: tuple[Request, ...], rate_hz: float) -> None:
-        """`requests`: those between GoToConfig and GoToMeasurement."""
+        """`requests`: to be sent between GoToConfig and GoToMeasurement."""
         self._requests = requests
         self._rate_hz = rate_hz
         self._frames = FrameReader()
@@ -157,7 +159,7 @@ class MtxSetup:
             self.state = State.WRONG_MODE if self._failure else State.CONFIGURED
 
     def _handle_refusal(self, request: Request, why: str, now_s: float) -> None:
-        """Handle a refused request: repeat, replace by those of the MTx's successors, skip, or abandon the setup."""
+        """Handle a refused request: repeat, replace by requests of the MTx's successors, skip, or abandon the setup."""
         if request is GO_TO_CONFIG or request is GO_TO_MEASUREMENT:
             return  # it is sent again until its tries are over
         if request.instead:
@@ -207,7 +209,7 @@ class MtxSetup:
         if newest.mid == MTDATA and len(newest.payload) != PROJECT.length:
             return f"MTData of {len(newest.payload)} bytes instead of {PROJECT.length}"
         if not self._reader.counts.good:
-            missing = missing_contents(newest.payload) if newest.mid == MTDATA2 else []
+            missing = _missing_contents(newest.payload) if newest.mid == MTDATA2 else []
             what = " and ".join([", ".join(missing[:-1]), missing[-1]] if len(missing) > 1 else missing)
             kind = "MTData2" if newest.mid == MTDATA2 else "MTData"
             return f"{kind} without {what}" if what else f"{kind} whose values are not possible"
@@ -221,7 +223,7 @@ class MtxSetup:
 
     @property
     def _within(self) -> str:
-        """How long an answer was waited for, where the device has answered before: it is slow, not deaf."""
+        """Time that an answer was waited for, if the device has answered before: it is slow, not deaf."""
         return f" within {TRIES * TIMEOUT_S:g} s" if self._acknowledged else ""
 
     @property
@@ -253,3 +255,11 @@ class MtxSetup:
         if self.state is State.SILENT:
             return "MTx: silent: check its supply, its cable and the port; waiting for it"
         return "MTx: configuration in progress"
+
+
+def _missing_contents(payload: bytes) -> list[str]:
+    """Fields of a sample that are missing in a payload, in words."""
+    packets = find_packets(np.frombuffer(payload, np.uint8), np.array([0]), np.array([len(payload)]))
+    _, counter, sent = decode_mtdata2(np.frombuffer(payload, np.uint8), packets)
+    present = {"sample counter": counter[0] >= 0, "acceleration": sent[0, 0], "rate of turn": sent[0, 1]}
+    return [name for name, is_there in present.items() if not is_there]

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from echostep.errors import EchostepError
-from echostep.ports.arrival_clock import now_s as clock_s
 from echostep.ports.chunks import MTX, Chunk
+from echostep_app.ports.arrival_clock import now_s as clock_s
 from echostep_app.xsens.requests import project_requests
 from echostep_app.xsens.setup import MtxSetup, State
 

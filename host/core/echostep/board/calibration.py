@@ -25,32 +25,24 @@ ICM20649_M_S2 = 9.80665 / 1024.0  # m/s2 per count at 30 g [DS-000192, table 2]
 BEARINGS = 3600  # counts of 0.1 degrees in a turn of the compass
 PRESSURE_PA = 0.25  # Pa per count of the barometer
 STANDARD_PA = 101_325.0  # pressure at height 0 [ISO 2533]
-HEIGHT_SCALE_M, HEIGHT_EXPONENT = 44_330.77, 0.190263  # of the height by pressure in the troposphere [ISO 2533]
+HEIGHT_SCALE_M, HEIGHT_EXPONENT = 44_330.77, 0.190263  # height from pressure in the troposphere [ISO 2533]
 GYROS = ("thigh", "calf", "belt")  # fields of a gyro sample, columns of `gyro_rates`
 BELT = GYROS.index("belt")
-# Of an accelerometer: 65 mg when new, and soldering [ICM-20649 data sheet DS-000192, table 2], twice; assumed
+# Of an accelerometer: 65 mg when new and the effect of soldering [ICM-20649 data sheet DS-000192, table 2], doubled; assumed
 OFFSET_MAX_M_S2 = 1.5
-SCALE_ERROR_MAX = 0.05  # 1.5 % when new [table 2], three times; assumed
+SCALE_ERROR_MAX = 0.05  # three times the 1.5 % of a new part [table 2]; assumed
 BIAS_MAX_RAD_S = math.radians(30.0)  # of a gyro; assumed
 AXES = ("x", "y", "z")
-MOST_BIAS_M = 0.3  # of a ranger: six times what real ones have [real sweeps of 40 kHz rangers: -0.3 to 5 cm]; assumed
-MOST_AHEAD_DEG = 60.0  # that rangers look off abeam: then they look along the way
-LEAST_RANGE_M = 0.01  # what a bias leaves of a longer range: 0 would be no echo
-
-
-class Echo(NamedTuple):
-    """One ping in SI units: `ranger` 0 looks left, 1 right; `range_m` is None without an echo."""
-
-    t_s: float
-    ranger: int
-    range_m: float | None
+MOST_BIAS_M = 0.3  # of a ranger: six times the bias of real ones [real sweeps of 40 kHz rangers: -0.3 to 5 cm]; assumed
+MOST_AHEAD_DEG = 60.0  # of the rangers off abeam: beyond it they look along the way
+LEAST_RANGE_M = 0.01  # least range after the bias is subtracted: 0 would mean no echo
 
 
 @dataclass(frozen=True, slots=True)
 class RangerSettings:
     """`speed_of_sound_m_s`; `delay_s` from the time stamp of the trigger to the ultrasonic burst; `ahead_deg`: how far both rangers look ahead of
-    abeam, as the belt carries them; `left_bias_m`, `right_bias_m`: what each measures too much (`echostep calibrate rangers`). `learn`: after each
-    live walk on a plan, suggest settings of its rangers.
+    abeam, as worn on the belt; `left_bias_m`, `right_bias_m`: how much too far each measures (`echostep calibrate rangers`). `learn`: after each
+    live walk on a plan, suggest settings for its rangers.
     """
 
     speed_of_sound_m_s: float = SPEED_OF_SOUND_M_S
@@ -61,7 +53,7 @@ class RangerSettings:
     learn: bool = False
 
     def __post_init__(self) -> None:
-        """Raise ValueError for rangers that do not look aside, or measure what no ranger does."""
+        """Raise ValueError for rangers that do not look sideways, or with values that no ranger has."""
         for name in ("left_bias_m", "right_bias_m"):
             if abs(getattr(self, name)) > MOST_BIAS_M:
                 raise ValueError(f"{name}: a ranger errs by at most {MOST_BIAS_M:g} m")
@@ -98,7 +90,7 @@ class ImuSettings:
     celsius: float = 0.0
 
     def __post_init__(self) -> None:
-        """Raise ValueError for what is no part's error."""
+        """Raise ValueError for errors that no part has."""
         for name in AXES:
             for field, value, limit in (
                 (f"scale_{name}", getattr(self, f"scale_{name}") - 1.0, SCALE_ERROR_MAX),

@@ -32,7 +32,7 @@ class FootBoardReader:
     """Samples of a byte stream; malformed frames are counted and raise no error."""
 
     def __init__(self, errors: ImuSettings | None = None) -> None:
-        """`errors`: of the part, when it was calibrated."""
+        """`errors`: errors of the part; None if it was not calibrated."""
         self._errors = errors or ImuSettings()
         self.reader = BoardReader()
         self.reports = BoardReports()

@@ -29,8 +29,8 @@ HEAD = 3  # bytes before the body: id, sequence
 CHECKSUM = 2  # bytes
 SHORTEST = HEAD + CHECKSUM + 2  # bytes of a frame with an empty body: one byte of COBS, the closing zero
 TICKS_SIZE = 4  # bytes at the beginning of a body with a time stamp; ticks of 0.5 us [protocol/messages.toml]
-# Ticks from the last frame, in which numbers are missing because frames were lost; else the board restarted: pings are reported late.
-OLDEST_TICKS, GAP_TICKS = 2_000_000, 120_000_000  # 1 s, 60 s: in less, the sequence number does not wrap
+# Limits of the ticks since the last frame: between them missing numbers mean lost frames, outside the board restarted. Pings are reported late.
+OLDEST_TICKS, GAP_TICKS = 2_000_000, 120_000_000  # 1 s, 60 s: in a shorter time the sequence number does not wrap
 MAX_BODY = max(kind.itemsize for kind in ROWS.values())
 _HEAD_FORMAT = struct.Struct("<BH")
 _IDENTITY, _IDENTIFY, _BEACON = 0x01, 0x81, 0x20
@@ -104,7 +104,7 @@ def encode(message: Message, sequence: int) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Frames:
-    """Frames that passed every check, as columns: `id`, `sequence`, `end` = index behind the closing zero in the bytes fed, `body` (n, MAX_BODY)."""
+    """Frames that passed every check, as columns: `id`, `sequence`, `end` = index after the closing zero in the bytes fed, `body` (n, MAX_BODY)."""
 
     id: Octets
     sequence: NDArray[np.uint16]
@@ -118,7 +118,7 @@ class Frames:
         return timed
 
     def rows(self, kind: type[Message]) -> tuple[Ints, NDArray[np.void]]:
-        """Indices (k,) of the messages of a kind, and their bodies (k,) by the schema's dtype."""
+        """Indices (k,) of the messages of a kind, and their bodies (k,) in the schema's dtype."""
         frame_index = (self.id == _ID_OF[kind]).nonzero()[0]
         row = ROWS[_ID_OF[kind]]
         return frame_index, np.ascontiguousarray(self.body[frame_index, : row.itemsize]).view(row)[:, 0]
@@ -187,7 +187,7 @@ class BoardReader:
 def _find_frames(
     stream: Octets, schema: _Schema, tally: Ints, ids: Octets, sequences: NDArray[np.uint16], ends: Ints, bodies: Octets
 ) -> tuple[int, int, int]:
-    """Fill the columns; returns the number of frames, the begin of the unfinished one, and the hash of another schema or -1.
+    """Fill the columns; returns the number of frames, the beginning of the unfinished one, and the hash of another schema or -1.
 
     Another schema ends the search only before the first good frame; after it, such an identity is a bad message.
     """
@@ -236,7 +236,7 @@ def _decode_frame(stream: Octets, start: int, end: int, payload: Octets, schema:
 
 @lean_part
 def _decode_cobs(stream: Octets, begin: int, end: int, payload: Octets) -> bool:
-    """Decode COBS of one frame of at most MAX_ENCODED bytes; false when a block ends behind the frame [Cheshire, Baker 1999]."""
+    """Decode COBS of one frame of at most MAX_ENCODED bytes; false when a block ends beyond the frame [Cheshire, Baker 1999]."""
     n = 0
     while begin < end:
         code = stream[begin] & 0xFF
@@ -246,7 +246,7 @@ def _decode_cobs(stream: Octets, begin: int, end: int, payload: Octets) -> bool:
             payload[n] = stream[k]
             n += 1
         begin += code
-        payload[n] = 0  # a zero after each block; that of the last block is behind the payload
+        payload[n] = 0  # a zero after each block; the last block's zero is beyond the payload
         n += 1
     return True
 
@@ -282,7 +282,7 @@ def _uint32(payload: Octets, offset: int) -> int:
 def _count_sequence(sequence: int, identifier: int, ticks: int, schema: _Schema, tally: Ints) -> None:
     """Count a good frame, and the frames lost before it. `ticks`: the first four bytes of the body.
 
-    A board that restarts begins at any number with small ticks. Where they are less than before, or by minutes more, no loss is counted.
+    A board that restarts begins at any number with small ticks. If the ticks are smaller than before, or larger by minutes, no loss is counted.
     """
     tally[_GOOD] += 1
     passed = 0

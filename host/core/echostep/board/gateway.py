@@ -24,8 +24,8 @@ NEW_CLOCK_MESSAGES = 10  # consecutive messages that agree on a new clock offset
 FEW_READINGS, FEW_S = (
     5,
     60.0,
-)  # a beacon of so few readings gives up its slot after so long without one: invented numbers
-FORGOTTEN_S = 1800.0  # any beacon does after so long: it is out of power or out of the building
+)  # a beacon with at most this many readings gives up its slot after this time without a reading: invented numbers
+FORGOTTEN_S = 1800.0  # any beacon gives it up after this time: it is out of power or out of the building
 LARGEST_BEARING_DEG = 180.0
 
 
@@ -92,19 +92,6 @@ class Gateway:
         readings = (self._reading(Beacon._make(row.tolist()), now_s) for row in rows)
         return [reading for reading in readings if reading is not None]
 
-    def describe(self) -> str:
-        """The counts that are not zero, as text."""
-        counts = self.counts
-        parts = [
-            f"{value} {name.replace('_', ' ')}"
-            for name in counts.__dataclass_fields__
-            if name != "words" and (value := getattr(counts, name))
-        ]
-        rejected = f"; rejected: {', '.join(parts)}" if parts else ""
-        numbers = ", ".join(map(str, sorted(self.duplicates)))
-        duplicates = f"; two beacons have the number {numbers}" if numbers else ""
-        return f"beacons: {len(self.numbers)} heard, {counts.words} readings{rejected}{duplicates}"
-
     def _reading(self, beacon: Beacon, now_s: float) -> BeaconReading | None:
         """The reading of a message; None, and counted, if a check fails."""
         counts = self._counts
@@ -150,7 +137,7 @@ class Gateway:
         return reading._replace(slot=slot)
 
     def _free_slot(self, t_s: float) -> int | None:
-        """The next slot; when all are in use, that of the beacon that has been silent for longest, if that is long enough."""
+        """The next slot; when all are in use, the slot of the beacon that has been silent longest, or None if it was heard too recently."""
         if len(self.numbers) < MOST_BEACONS:
             return len(self.numbers)
         waits_s = {

@@ -4,7 +4,7 @@
 In: board frames. Out: the heading at each `Magnetic` message. Owns the specific forces of the last two seconds.
 
 The specific force of a walking trunk averages to gravity over a stride. Its mean over the last two seconds with triangular weights (two means over a
-second each: what the first leaves of the steps, the second takes away) gives the vertical; the field's part across it points north [Caruso 2000,
+second each: the second removes the rest of the steps) gives the vertical; the field's part across it points north [Caruso 2000,
 Applications of Magnetic Sensors for Low Cost Compass Systems]. Magnetometer and belt IMU are mounted alike: x forward.
 """
 
@@ -28,7 +28,7 @@ _FORCES = [f"belt_acceleration_{axis}" for axis in "xyz"]
 
 
 def heading_of(field: Floats, vertical: Floats) -> float:
-    """Heading of the x axis (rad, counter-clockwise from east) by field (3,) and vertical (3,) in the same axes; NaN where they are parallel."""
+    """Heading of the x axis (rad, counter-clockwise from east) from field (3,) and vertical (3,) in the same axes; NaN if they are parallel."""
     up = vertical / np.linalg.norm(vertical)
     north = field - (field @ up) * up
     ahead = np.array([1.0, 0.0, 0.0]) - up[0] * up
@@ -41,12 +41,12 @@ class TiltCompass:
     """Call `headings` with the frames of each portion, in order."""
 
     def __init__(self, belt: ImuSettings | None = None) -> None:
-        """`belt`: errors of the belt's accelerometer, when it was calibrated."""
+        """`belt`: errors of the belt's accelerometer; None if it was not calibrated."""
         errors = belt or ImuSettings()
         self._offset, self._scale = errors.offset / LSM6DSO_M_S2, errors.scale  # counts, 1
         self._sums: deque[NDArray[np.int64]] = deque(
             maxlen=INTERVALS
-        )  # of each interval: the forces' counts, and how many there are
+        )  # of each interval: the forces' counts, and their number
         self._sum = np.zeros(
             4, np.int64
         )  # of the interval under way; integers: the sum does not depend on the portions

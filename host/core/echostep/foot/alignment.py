@@ -55,7 +55,7 @@ class Alignment:
 
 
 def _known(steps: list[Step]) -> float | None:
-    """Toe direction (rad) by the newest step that has one; 0 if it is within SURE_RAD of x; None if no step has one."""
+    """Toe direction (rad) from the newest step that has one; 0 if it is within SURE_RAD of x; None if no step has one."""
     toes = [step.toe_rad for step in steps if step.toe_rad is not None]
     if not toes:
         return None
@@ -73,7 +73,7 @@ def rotated_event(event: Step | Stance, toe_rad: float) -> Step | Stance:
 
 
 def aligned(track: Track) -> Track:
-    """A whole track with x to the toe, by the last step that has an estimate of its direction."""
+    """The whole track with x to the toe, from the last step that has an estimate of the toe's direction."""
     toes = [step.toe_rad for step in track.steps if step.toe_rad is not None]
     if not toes:
         return track

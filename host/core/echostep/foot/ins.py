@@ -25,7 +25,7 @@ Matrix = tuple[Vector, Vector, Vector]  # of rows
 GRAVITY_M_S2 = 9.81
 POS, VEL, TILT, GYRO_BIAS, ACCEL_BIAS, YAW, SIZE = 0, 3, 6, 9, 12, 15, 16
 
-MOTION_S = 0.1  # a foot keeps its motion for about so long: in that time its scale and alignment errors repeat
+MOTION_S = 0.1  # a foot keeps its motion for about this time, in which its scale and alignment errors repeat
 MISSED_SHARE = 1.0  # of the change over a time without samples: an impact may fall between two samples
 GYRO_CHANGE_SHARE = 0.01  # of the rate's change: a mean over the period keeps the angle, only its axis errs
 ACCEL_WANDER = 1e-4  # m/s2 per root s
@@ -50,7 +50,7 @@ class Noise(NamedTuple):
 
 class Nav(NamedTuple):
     """Navigation state: `position` m, `velocity` m/s (walk frame), `attitude` (4,) quaternion w x y z body -> walk, biases (body frame),
-    `level` (3, 3) the levelled attitude of yaw zero, `P` (16, 16) covariance of the errors, `noise` what they grow by.
+    `level` (3, 3) the levelled attitude of yaw zero, `P` (16, 16) covariance of the errors, `noise` their growth.
     """
 
     position: Floats
@@ -301,13 +301,13 @@ def update(nav: Nav, component: int, error: float, variance: float) -> None:
 
 @lean_kernel
 def update_but_gyro_bias(nav: Nav, component: int, error: float, variance: float) -> None:
-    """The same, but gyro bias and its covariance keep their values: a Schmidt-Kalman update, whose cross-covariances are those of the full one."""
+    """The same, but the gyro bias and its covariance stay: a Schmidt-Kalman update, with the cross-covariances of the full update."""
     _correct(nav, component, error, variance, GYRO_BIAS)
 
 
 @lean_part
 def _correct(nav: Nav, component: int, error: float, variance: float, considered: int) -> None:
-    """A scalar update of all but the gyro bias; the covariance of the three states from `considered` on with each other stays (SIZE: of none)."""
+    """A scalar update of all but the gyro bias; the mutual covariance of the three states from `considered` on stays (SIZE: no states)."""
     P = nav.P
     row = P[component]
     total = row[component] + variance
@@ -329,7 +329,7 @@ def _correct(nav: Nav, component: int, error: float, variance: float, considered
 
 @lean_part
 def turn(nav: Nav, centre: Floats, angle: float) -> None:
-    """Correct the yaw by an angle (rad), and position and velocity since the foot left `centre` (3,) with it."""
+    """Correct the yaw by an angle (rad), and with it position and velocity since the foot left `centre` (3,)."""
     c, s = math.cos(angle), math.sin(angle)
     x, y = nav.position[0] - centre[0], nav.position[1] - centre[1]
     u, v = nav.velocity[0], nav.velocity[1]
@@ -348,7 +348,7 @@ def decouple(nav: Nav, component: int, variance: float) -> None:
 
 @lean_part
 def reset_height(nav: Nav, height_m: float) -> None:
-    """Set the height to that of a level floor, and correct nothing by it: the drift of a runner's steps has a bias, which is not modelled."""
+    """Set the height to a level floor's, and correct nothing else: the drift of a runner's steps has a bias, which is not modelled."""
     decouple(nav, POS + 2, nav.noise.flat_m**2)
     nav.position[2] = height_m
 

@@ -97,7 +97,7 @@ def correction(compass: Magnetometer, nav: Nav, yaw: float) -> float:
 
 @allocating_part
 def _start(compass: Magnetometer, nav: Nav, h: Floats, strength: float, c: float, s: float) -> None:
-    """Initialise north by the first stance's field, iron by zero."""
+    """Initialise north with the first stance's field, iron with zero."""
     compass.field[:] = 0.0
     compass.field[NORTH], compass.field[NORTH + 1] = c * h[0] - s * h[1], s * h[0] + c * h[1]
     for i in range(DELTA):

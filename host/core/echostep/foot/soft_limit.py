@@ -16,13 +16,13 @@ from echostep.foot.ins import TILT, VEL, YAW, Nav, Vector
 from echostep.foot.stance import RING, SampleWindow
 from echostep.jit import lean_part
 
-# Assumed; the recordings of `evaluate feet` whose gyros have a wider range keep every figure.
-HIGH_RAD_S = 4.0  # no limit of a gyro for feet is lower
+# Assumed; no figure changes for the recordings of `evaluate feet` whose gyros have a wider range.
+HIGH_RAD_S = 4.0  # no gyro for feet has a lower limit
 FLAT_PER_S = 2.0  # greatest change of a flat rate, as a share of it per second: 1 % in 5 ms
-STEP_S = 0.005  # over which the change of a rate is measured, so that noise at high sample rates is none
+STEP_S = 0.005  # over which the change of a rate is measured, so that noise at high sample rates does not count
 FEWEST, SHORTEST_S = 2, 0.009  # steps of a plateau between samples, and its duration
 FLANK_S = 0.015  # on either side of a plateau
-STEEP = 3.0  # least slope of a flank, in units of the greatest of a flat rate
+STEEP = 3.0  # least slope of a flank, in units of the greatest slope of a flat rate
 NEAR = 0.94  # least height of a plateau, as a share of the greatest rate of the axis so far
 LONGEST_STEP_S = 0.03  # between two samples of a plateau
 UNSURE = 2.0  # sd of the angle, as a share of it: a heel strike has several peaks, and the flanks show one
@@ -56,7 +56,7 @@ def _flat(window: SampleWindow, axis: int, back: int, step: int) -> bool:
 
 @lean_part
 def _restore_axis(nav: Nav, window: SampleWindow, axis: int, end: int, step: int, peak: float) -> int:
-    """Correct for the plateau of an axis whose last sample is `end` before the newest; returns its samples, 0 when it is none."""
+    """Correct for the plateau of an axis whose last sample is `end` before the newest; returns its number of samples, 0 if it is no plateau."""
     newest = window.added[0] - 1
     begin, height = end, abs(window.gyro[(newest - end) % RING, axis])
     last = min(newest, RING - 1) - end - step
@@ -108,7 +108,7 @@ def _impulse(nav: Nav, window: SampleWindow, begin: int, end: int) -> Vector:
 
 @lean_part
 def _turn(nav: Nav, axis: int, angle: float, impulse: Vector) -> None:
-    """Turn the attitude by an angle (rad) about an axis of the sensor, and what the velocity got since; the covariance grows by both together."""
+    """Turn the attitude by an angle (rad) about an axis of the sensor, and the velocity gained since; the covariance grows by both together."""
     r = ins.rotation(nav.attitude)
     x, y, z = angle * r[0][axis], angle * r[1][axis], angle * r[2][axis]
     lost = (y * impulse[2] - z * impulse[1], z * impulse[0] - x * impulse[2], x * impulse[1] - y * impulse[0], x, y, z)

@@ -7,7 +7,7 @@ Two tests decide a stance, so one setting serves walking, running, stairs and sh
 statistic [Skog et al. 2010] in physical units, with a loose threshold, because a runner's foot is never still. The second is a gate on the
 normalized innovation of the filter, whose velocity is good to a few cm/s at the end of a swing; in mid swing, at metres a second, it fails.
 A standing foot rolls about its contact with the floor. The sensor then moves with angular rate times its height, and the error of the lever arm
-grows with the rate. So the update weighs a calm mid-stance much and a heel rise little, and strides do not come out short.
+grows with the rate. So the update gives a calm mid-stance much weight and a heel rise little, and strides do not come out short.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ CALM, STILL = 0.25, 0.03  # `stillness_statistic` of a standing foot, and of a f
 GATE = 16.8  # chi-square with six degrees of freedom (three velocities, three accelerations), 99 % quantile
 ROLL_M_S2 = 2.0  # acceleration of a sensor on a foot that rolls
 MOST_EXCESS = 1e3
-# Of a resting foot's force against gravity, with the bias of a sensor; a shuffling foot shows 1 to 4
+# Difference between a resting foot's force and gravity, with the bias of a sensor; a shuffling foot shows 1 to 4
 GRAVITY_ALONE_M_S2 = 1.0
 STEADY_M_S2 = (
     2.0  # greatest change of that force while a foot rests, twice the above; a foot that glides brakes at 4 to 6 m/s2
 )
-# At most, of a foot that stands on a floor which accelerates: a lift takes up to 1.2 m/s2, and a standing person shifts.
+# Limits for a foot that stands on an accelerating floor: a lift accelerates at up to 1.2 m/s2, and a standing person shifts.
 RIDING_RAD_S, RIDING_M_S2 = 0.15, 2.0
-LASTING_S = 0.15  # no swing is calm for so long: the stance is accepted, the velocity is corrected
-OVERDUE_S = 2.0  # no swing lasts so long
-PART_S, PARTS = 0.1, 5  # gyro bias: a rest is averaged in parts of this duration, so many for an update
+LASTING_S = 0.15  # no swing is calm for this long: the stance is accepted, the velocity is corrected
+OVERDUE_S = 2.0  # no swing lasts this long
+PART_S, PARTS = 0.1, 5  # gyro bias: a rest is averaged in parts of this duration, this many for an update
 SWAY_S = 0.3  # correlation time of a standing person's sway
 BIAS_FLOOR_RAD_S = 1e-3
 BIAS_GATE = 16.0  # chi-square of one rate, four sigma
@@ -107,7 +107,7 @@ def mean_force(window: SampleWindow) -> Vector:
 
 @lean_part
 def feels_gravity_alone(window: SampleWindow) -> bool:
-    """Whether the size of the mean specific force is that of gravity, whatever the level: `activity` hardly shows a smooth acceleration."""
+    """Whether the mean specific force is as large as gravity, whatever the level: `activity` hardly shows a smooth acceleration."""
     force = mean_force(window)
     return abs(math.sqrt(ins.dot(force, force)) - ins.GRAVITY_M_S2) < GRAVITY_ALONE_M_S2
 
@@ -154,7 +154,7 @@ def most_activity(swing_rad_s: float) -> float:
 def standing_velocity(nav: Nav, window: SampleWindow, height_m: float) -> Vector:
     """Velocity (3,) that a sensor at `height_m` above the contact has now if its foot rolled without sliding in the middle of the window.
 
-    Rate x height at that sample, and what the accelerometer has added since: at the end of the window the heel may already rise.
+    Rate x height at that sample, plus the velocity change from the accelerometer since: at the end of the window the heel may already rise.
     """
     newest, middle = window.added[0] - 1, _length(window) // 2
     r = ins.rotation(nav.attitude)
@@ -172,7 +172,7 @@ def standing_velocity(nav: Nav, window: SampleWindow, height_m: float) -> Vector
 def normalized_innovation(nav: Nav, expected: Vector, variance: float, force: Vector) -> tuple[float, float]:
     """Chi-square of the innovations of velocity (from `expected`) and acceleration (from 0), given the mean specific force (3,).
 
-    The part of the two level axes, and that of the vertical one.
+    Two parts: of the two level axes, and of the vertical axis.
     """
     f = ins.apply(ins.rotation(nav.attitude), ins.difference(force, nav.accel_bias))
     accel = (f[0], f[1], f[2] - ins.GRAVITY_M_S2)
@@ -204,7 +204,7 @@ def deceleration_variance(force2: float) -> float:
 def zero_velocity_update(nav: Nav, expected: Vector, variance: float, dt: float) -> None:
     """Zero-velocity update; its variance is scaled so that the information per second does not depend on the sample rate.
 
-    The gyro bias keeps its value: how a foot rolls and creeps repeats itself at each step, and would be taken for a bias.
+    The gyro bias keeps its value: the rolling and creeping of a foot repeats at each step, and would be taken for a bias.
     """
     repeated = max(1.0, nav.noise.kept_s / dt)  # samples with the same error
     for i in range(3):
@@ -234,7 +234,7 @@ def may_ride(rate2: float, force2: float) -> bool:
 
 @lean_part
 def follow_floor(nav: Nav, expected: Vector, variance: float) -> None:
-    """A floor accelerates with the foot that stands on it: reset the vertical velocity, so that neither level nor biases are corrected by it."""
+    """The floor accelerates, and the foot with it: reset the vertical velocity, so that neither level nor biases are corrected by it."""
     ins.decouple(nav, VEL + UP, variance)
     nav.velocity[UP] = expected[UP]
 
@@ -249,7 +249,7 @@ def clear_rest(sums: ZaruSums) -> None:
 
 @lean_part
 def zero_angular_rate_update(nav: Nav, sums: ZaruSums, dt: float, gyro0: Floats, gyro1: Floats) -> bool:
-    """Zero-angular-rate update of the gyro bias after each half second of rest; whether there was one.
+    """Zero-angular-rate update of the gyro bias after each half second of rest; returns whether there was one.
 
     `gyro0`, `gyro1` (3,): rates at the beginning and the end of `dt`.
     """

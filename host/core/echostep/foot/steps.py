@@ -2,7 +2,7 @@
 """Zero-velocity-aided inertial navigation of one foot: samples -> stances and steps.
 
 In: time, specific force and angular rate of the foot, any mounting, 50-500 Hz. Out: `Step` when the foot has landed, `Stance` when it has left.
-Owns the state of the kernel `zupt_ins`. Walk frame: levelled, z up, origin and yaw those of the first rest; yaw is the foot's turn since then.
+Owns the state of the kernel `zupt_ins`. Walk frame: levelled, z up, origin and yaw from the first rest; yaw is the foot's turn since then.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from echostep.foot.zupt_state import (
     TOE,
 )
 
-NO_MAG: Floats = np.empty((0, 3))  # in the place of magnetometer samples
+NO_MAG: Floats = np.empty((0, 3))  # in place of magnetometer samples
 
 
 @dataclass(frozen=True, slots=True)
 class FootSettings:
-    """`height_m`: of the sensor above the sole's contact with the floor; the instep of a shoe by default."""
+    """`height_m`: height of the sensor above the sole's contact with the floor; the instep of a shoe by default."""
 
     height_m: float = 0.08
 
@@ -56,7 +56,7 @@ class Step:
     """The foot left at `t_start_s`, landed at `t_end_s` and moved by `move_m` (walk frame) with `covariance` (3, 3) m2.
 
     `heading_rad` is its yaw after the step. The covariance holds for a known yaw before the step; `heading_sd_rad` is the growth of the yaw's
-    error: its square is the growth of the variance. All moves together are the position. `toe_rad` is the angle from the yaw to the direction of the
+    error: its square is the growth of the variance. The sum of all moves is the position. `toe_rad` is the angle from the yaw to the direction of the
     toe, as known so far; None until the foot has tipped enough to estimate it.
     """
 
@@ -74,7 +74,7 @@ class FootCounts:
     """Counts of samples: all; skipped as `impossible` (not finite, or beyond any foot) or `not_later`; `saturated` ones, with inflated covariance.
 
     `forced`: samples of rest accepted against the innovation gate. After each of the `gaps`, which include long runs of forced rest, the foot
-    is levelled anew.
+    is levelled again.
     """
 
     samples: int
@@ -111,7 +111,7 @@ class Track:
         return f"<Track: {len(self.steps)} steps, {span_s:.1f} s, {length_m:.1f} m>"
 
     def _repr_svg_(self) -> str | None:
-        """The track as a picture; None, so that the repr is shown, without matplotlib."""
+        """The track as a picture; None without matplotlib, so that the repr is shown."""
         return svg_of(self)
 
     @property
@@ -182,7 +182,7 @@ class Foot:
         return FootEvents(events, known, rows[:, ROW_HEADING], rows[:, ROW_IN_STANCE] > 0.0)
 
     def _run(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None, rows: Floats) -> list[Step | Stance]:
-        """Events of the samples; fills `rows` (n, ROW_SIZE), or nothing where it is empty."""
+        """Events of the samples; fills `rows` (n, ROW_SIZE), or nothing if it is empty."""
         t_s, accel, gyro = (np.ascontiguousarray(v, np.float64) for v in (t_s, accel, gyro))
         mag = NO_MAG if mag is None else np.ascontiguousarray(mag, np.float64)
         if t_s.ndim != 1 or any(v.shape != (len(t_s), 3) for v in (accel, gyro, *([] if mag is NO_MAG else [mag]))):

@@ -74,7 +74,7 @@ class TrunkPath:
         return segments
 
     def add_stance(self, stance: Stance) -> list[PathSegment]:
-        """The segment of standing up to half a stance before the end of this stance, if there is any."""
+        """The segment of standing up to half a stance before the end of this stance, if any."""
         segments = []
         duration_s = stance.t_end_s - stance.t_start_s
         self._rests_s.append(duration_s)
@@ -100,7 +100,7 @@ class TrunkPath:
         return [replace(segment, rise_m=float(step.move_m[2]), rise_sd_m=rise_sd)]
 
     def _moving_segment(self, t_s: float, heading: float, sd_m: float, turn_sd_rad: float) -> PathSegment:
-        """The segment from the last anchor to a new one over the foot; without a last one, an empty segment of one second."""
+        """The segment from the last anchor to a new one over the foot; without a last anchor, an empty segment of one second."""
         x, y = self._trunk_xy(heading)
         t0, x0, y0, heading0 = self._anchor or (t_s - 1.0, x, y, heading)
         t_s = max(t_s, t0)

@@ -40,25 +40,25 @@ from echostep.foot.zupt_state import (
 )
 from echostep.jit import lean_kernel, lean_part
 
-CONFIRM_S = 0.03  # a stance is reported after so much rest
-SETTLE_S = 0.2  # after so much rest the step before it has been corrected
-LEAVE_S = 0.15  # a stance ends after so long without rest: no swing is shorter
+CONFIRM_S = 0.03  # a stance is reported after this much rest
+SETTLE_S = 0.2  # after this much rest the step before it has been corrected
+LEAVE_S = 0.15  # a stance ends after this long without rest: no swing is shorter
 PERIOD_GAIN = 0.003  # relative change of the running median per sample
 GAP_S = 0.25  # shorter gaps are propagated over
-# The same, of a foot that moves: its speed changes by metres per second in a tenth of a second; assumed
+# The same for a moving foot: its speed changes by metres per second in a tenth of a second; assumed
 MOVING_GAP_S = 0.08
-STRAY_SAMPLES = 20  # so many samples in a row with earlier times: the clock was set back
+STRAY_SAMPLES = 20  # this many samples in a row with earlier times: the clock was set back
 WALK_M_S = 1.5  # mean speed of a foot while samples are missing, 1 sd
 MAX_ACCEL_M_S2, MAX_RATE_RAD_S = 1e3, 1e2  # beyond any foot
 STEEP_M_S2, STEEP_RAD_S = 15.0, 4.0  # equal readings beyond these are a sensor at its limit, not a coincidence
-LOST_SHARE = 0.3  # sd of what such a reading omits, as a share of it
-LEVEL_S = 0.1  # still for so long: gravity can be measured
-IMPATIENT_S = 3.0  # after so long without such a moment, any sample that may be a stance levels the foot
+LOST_SHARE = 0.3  # sd of the part that such a reading omits, as a share of the reading
+LEVEL_S = 0.1  # still for this long: gravity can be measured
+IMPATIENT_S = 3.0  # after this long without such a moment, any sample that may be a stance levels the foot
 STILL_TILT_RAD, UNSURE_TILT_RAD = 0.05, 0.3
 UNSURE_YAW_RAD2_S = 1.0
 DOUBT_S = 0.1  # of stances against the innovation gate: the level is wrong
 FLAT_M = 0.04  # a step that rises less is on a level floor, not on a stair, kerb or ramp
-FLAT_SDS = 2.0  # a rise within so many of its standard deviations is drift: of a runner's step, whose sd is 0.05 to 0.1 m, always downwards
+FLAT_SDS = 2.0  # a rise within this many standard deviations is drift: in a runner's step, whose sd is 0.05 to 0.1 m, always downwards
 RISER_M = 0.15  # a greater rise may be a stair: least riser of ISO 21542
 
 
@@ -148,7 +148,7 @@ def _restart(
 def _find_level(
     s: ZuptState, nav: Nav, window: SampleWindow, sample: ImuSample, events: Floats, event_count: int
 ) -> int:
-    """Level the foot after LEVEL_S of stillness, by the mean force; after IMPATIENT_S at any possible stance, with a larger tilt sd."""
+    """Level the foot after LEVEL_S of stillness, from the mean force; after IMPATIENT_S at any possible stance, with a larger tilt sd."""
     dt, t_s = sample.dt, sample.t_s
     stillness = stance.stillness_statistic(*stance.activity(window, nav.gyro_bias))
     s.waited_s += dt
@@ -228,10 +228,10 @@ def _navigate(
 
 @lean_part
 def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: ImuSample) -> bool:
-    """Detect rest by both tests of `stance` and apply the zero-velocity update; whether the foot rests.
+    """Detect rest by both tests of `stance` and apply the zero-velocity update; returns whether the foot rests.
 
-    A rest against the gate is accepted if it lasts, or if no rest was accepted for long; then the covariance is inflated first. Where a foot has
-    rested and is still, and all that contradicts it is vertical, the floor moves: a lift.
+    A rest against the gate is accepted if it lasts, or if no rest was accepted for long; then the covariance is inflated first. If a foot has
+    rested and is still, and everything that contradicts this is vertical, the floor moves: a lift.
     """
     dt, t_s = sample.dt, sample.t_s
     rate2, force2 = stance.activity(window, nav.gyro_bias)
@@ -240,9 +240,7 @@ def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Imu
     if stillness > stance.most_activity(s.swing_rad_s):
         return False
     expected = stance.standing_velocity(nav, window, s.height_m)
-    if s.rest_s >= SETTLE_S and stance.may_ride(
-        rate2, force2
-    ):  # a floor that accelerates is noticed by the velocity of now
+    if s.rest_s >= SETTLE_S and stance.may_ride(rate2, force2):  # an accelerating floor shows in the present velocity
         expected = (expected[0], expected[1], 0.0)
     variance = stance.rest_variance(nav, rate2)
     level, vertical = stance.normalized_innovation(nav, expected, variance, stance.mean_force(window))
@@ -263,7 +261,7 @@ def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Imu
 
 @lean_part
 def _track_calm(s: ZuptState, nav: Nav, window: SampleWindow, stillness: float, dt: float) -> None:
-    """Duration of the present calm, in which a foot feels gravity alone and from one direction: one that glides feels how it brakes."""
+    """Duration of the present calm, in which a foot feels gravity alone and from one direction: a gliding foot feels its braking."""
     force = ins.apply(ins.rotation(nav.attitude), stance.mean_force(window))
     if stillness >= stance.CALM or not stance.feels_gravity_alone(window):
         s.lasting_s = 0.0

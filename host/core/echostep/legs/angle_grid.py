@@ -21,7 +21,7 @@ FASTEST_RAD_S = 35.0  # a larger rate is impossible: nearly twice a sprinter's s
 
 
 class GridSample(enum.Enum):
-    """What a sample is to the grid."""
+    """How the grid uses a sample."""
 
     TAKEN = enum.auto()
     SKIPPED = enum.auto()
@@ -29,7 +29,7 @@ class GridSample(enum.Enum):
 
 
 class AngleGrid:
-    """`thigh`, `shank`, `yaw`: angles (rad) at `time(k)`; the signs are the sensors' own. A missing rate of the belt (NaN) is no turn."""
+    """`thigh`, `shank`, `yaw`: angles (rad) at `time(k)`; the signs are the sensors' own. A missing rate of the belt (NaN) counts as no turn."""
 
     def __init__(self) -> None:
         self.thigh: list[float] = []
@@ -38,7 +38,7 @@ class AngleGrid:
         self.counts = LegCounts()
         self.last_s = -math.inf
         self._rates = (0.0, 0.0, 0.0)  # of the newest sample
-        self._turned = (0.0, 0.0, 0.0)  # up to it
+        self._turned = (0.0, 0.0, 0.0)  # up to that sample
         self._origin_s = 0.0
 
     def __len__(self) -> int:
@@ -72,7 +72,7 @@ class AngleGrid:
         return GridSample.TAKEN
 
     def restart(self, t_s: float, thigh: float, shank: float, belt: float) -> None:
-        """Begin anew at this sample, with all angles 0."""
+        """Begin again at this sample, with all angles 0."""
         self.last_s, self._origin_s, self._turned = t_s, t_s, (0.0, 0.0, 0.0)
         self._rates = (thigh, shank, _turn(belt))
         self.thigh, self.shank, self.yaw = [0.0], [0.0], [0.0]

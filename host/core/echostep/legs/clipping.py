@@ -18,18 +18,16 @@ BEYOND = 1.03  # share of the limit above which a rate shows that the sensor's r
 EDGE = 2  # samples on either side of a peak, which give the slopes
 LONGEST = 100  # samples at the limit; more of them are a broken sensor, not a swing
 HIGHEST = 1.8  # largest reconstructed rate, as a multiple of the limit
-SAME_PAIRS = 3  # equal neighbours at an extreme, which a sensor within its range does not show
-SLOWEST_LIMIT_RAD_S = 2.0  # no gyro on a leg has a smaller range
 
 
 class ClippingRepair:
-    """Takes samples in blocks and returns them in order: `EDGE` samples late, those of a peak after its end."""
+    """Takes samples in blocks and returns them in order: `EDGE` samples late, samples of a peak after its end."""
 
     def __init__(self, low: Floats, high: Floats) -> None:
-        """`low`, `high` (k,): the ends of the range of each column; infinite where there is none."""
+        """`low`, `high` (k,): the ends of the range of each column; infinite without a limit."""
         self._low, self._high = low, high
         self._waiting = np.empty((0, 1 + len(low)))
-        self._returned = 0  # of those that wait: returned already, kept for their slopes
+        self._returned = 0  # waiting samples that were returned already and are kept for their slopes
 
     def feed(self, t_s: Floats, rates: Floats) -> tuple[Floats, Floats]:
         """Times (n,) and rates (n, k) of the samples that no later sample can change."""
@@ -64,7 +62,7 @@ class ClippingRepair:
 
 
 def _at_limit(rate: Floats, limit: float | Floats) -> Bools:
-    """Whether rates are at the upper limit: not below it, and not beyond it either, where only a wider sensor can be."""
+    """Whether rates are at the upper limit: not below it, and not beyond it, where only a sensor with a wider range reads."""
     at_limit: Bools = (rate >= NEAR * limit) & (rate <= BEYOND * limit)
     return at_limit
 
@@ -92,22 +90,3 @@ def _reconstruct_peaks(t_s: Floats, rate: Floats, clipped: Bools, limit: float) 
         )
         side = np.sign(limit)
         rate[begin:end] = side * np.clip(side * cubic, side * rate[begin:end], HIGHEST * abs(limit))
-
-
-def find_clipping_limits(rates: Floats) -> tuple[Floats, Floats]:
-    """Lower and upper limits (k,) of sensors with rates (n, k), by equal neighbouring readings at their extremes; infinite where none are found."""
-    low, high = np.full(rates.shape[1], -np.inf), np.full(rates.shape[1], np.inf)
-    for k, column in enumerate(rates.T):
-        for limits, extreme in ((low, float(column.min())), (high, float(column.max()))):
-            cut = column == extreme
-            if abs(extreme) > SLOWEST_LIMIT_RAD_S and (cut[1:] & cut[:-1]).sum() >= SAME_PAIRS:
-                limits[k] = extreme
-    return low, high
-
-
-def repair_clipping(t_s: Floats, rates: Floats) -> Floats:
-    """The rates (n, k) of a whole record, with peaks reconstructed at the limits found in it."""
-    repair = ClippingRepair(*find_clipping_limits(rates))
-    _, first = repair.feed(t_s, rates)
-    _, rest = repair.finish()
-    return np.vstack([first, rest])

@@ -3,7 +3,7 @@
 
 In: mean rates over rest and over whole strides, in which the leg does not turn, and the trunk's mean rate. Out: `GyroBias`. Owns the filter.
 
-A sensor whose axis is not level feels the sine of its tilt of every turn of the body: 13 degrees leak 20 degrees of a corner of 90 into the pitch.
+A sensor whose axis is not level measures each turn times the sine of its tilt: 13 degrees leak 20 degrees of a 90-degree corner into the pitch.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 BIAS_SD_RAD_S = math.radians(3.0)  # at the start [ADIS16100 datasheet: 3 deg/s with temperature]
 SMALLEST_BIAS_SD_RAD_S = math.radians(0.02)  # bias instability, assumed
 LEAK_SD = 0.35  # sine of the tilt of a strapped sensor's axis: strapped legs show 0 to 26 degrees, thighs up to 35
-GATE_SD = 3.0  # on the innovation: a stride that is none, or a rest that is none, exceeds it
+GATE_SD = 3.0  # on the innovation: a false stride or a false rest exceeds it
 
 
 @dataclass(slots=True)
@@ -44,7 +44,7 @@ class GyroBias:
         self.covariance = min(max(self.covariance, -limit), limit)
 
     def drift_variance(self, span_s: float, turn_rad: float) -> float:
-        """Variance (rad2) of the angle integrated over a time, in which the trunk has turned, by what is not known of bias and leak."""
+        """Variance (rad2), from the uncertainty of bias and leak, of the angle integrated over a time in which the trunk has turned."""
         return self.variance * span_s**2 + 2.0 * self.covariance * span_s * turn_rad + self.leak_variance * turn_rad**2
 
     def flip(self) -> None:

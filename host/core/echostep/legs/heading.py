@@ -2,11 +2,11 @@
 """Heading of the trunk from a gyro that turns with it and a disturbed compass.
 
 In: yaw rates, compass headings (rad, counter-clockwise from the map's x), whether the wearer stands. Out: heading with its standard deviation. Owns
-the filter's state: heading, gyro bias, and the compass errors by the wearer's iron; `fit_compass_errors` estimates these from a turn on the spot.
+the filter's state: heading, gyro bias, and the compass errors from the wearer's iron.
 
 Hard and soft iron that moves with a compass adds the error A + B sin h + C cos h + D sin 2h + E cos 2h to its heading h [National
 Geospatial-Intelligence Agency 2004, Handbook of Magnetic Compass Adjustment]. A depends on the mounting of the device and cannot be separated from
-the heading itself: it is left 0. Iron of the building adds errors of about 7 degrees that vary from place to place and stay alike for some metres.
+the heading itself: it is left at 0. Iron of the building adds errors of about 7 degrees that vary by place and stay similar for some metres.
 Therefore one reading has a small weight, and readings that turn while the gyro does not are rejected. `foot.magnetometer` applies the same
 principle to a field of three axes.
 """
@@ -26,7 +26,7 @@ HEADING, BIAS, IRON = 0, 1, 2  # indices of the state; from IRON on: B, C, D, E
 SIZE = 6
 
 # Assumed, not measured.
-GATE_SD = 3.0  # gate on the innovation: a normal one exceeds it in 0.3 % of readings
+GATE_SD = 3.0  # gate on the innovation: a normal innovation exceeds it in 0.3 % of readings
 STEP_S = 0.1  # of the covariance's propagation; also the compass period until two readings show it
 SHORTEST_PERIOD_S = 0.02  # of the compass
 MISSING_WALK_RAD = math.radians(30.0)  # random walk of the heading per root second while the gyro is missing
@@ -37,13 +37,6 @@ CALM_BINS = 7
 CALM_RAD_S = math.radians(1.0)
 
 # Fit of the compass errors; assumed, not measured.
-FULL_TURN_RAD = math.radians(330.0)  # to be turned: second harmonics bridge the rest
-FEWEST_READINGS = 20  # three for each of the six unknowns, and more
-LARGEST_IRON_RAD = math.radians(60.0)  # about an iron field as strong as that of the earth
-LINEARIZATIONS = 6  # of the fit, each at the newest headings
-REWEIGHTINGS = 3  # of the readings in each, for outliers
-SMALLEST_SPREAD_RAD = math.radians(0.2)  # of the residuals: twice the compass's resolution
-MAD_TO_SD = 1.4826  # of a normal distribution
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,17 +51,17 @@ class CompassErrors:
 
     def error(self, heading_rad: float) -> float:
         """Compass heading less true heading."""
-        return float(np.array([self.sin1, self.cos1, self.sin2, self.cos2]) @ _harmonics(heading_rad))
+        return float(np.array([self.sin1, self.cos1, self.sin2, self.cos2]) @ harmonics(heading_rad))
 
 
 @dataclass(frozen=True, slots=True)
 class HeadingSettings:
     """Errors of gyro and compass.
 
-    `disturbance_rad`: compass error by the building, sd; it stays alike for about `same_s`. `steady_rad`: largest difference between the turns of
+    `disturbance_rad`: compass error from the building, sd; it stays similar for about `same_s`. `steady_rad`: largest difference between the turns of
     gyro and compass within a second. `walk_rad` and `drift_rad_s2`: random walk of heading and of gyro bias per root second. `bias_sd_rad_s`: bias
     at the start, sd. `rest_sd_rad_s`: mean rate of a resting trunk over 0.1 s, sd. `first_sd_rad`: first reading of the compass, sd; small where
-    only turns relative to it matter. `iron_sd_rad`: error by the wearer's iron, sd, without calibration; `iron`: the calibration.
+    only turns relative to it matter. `iron_sd_rad`: error from the wearer's iron, sd, without calibration; `iron`: the calibration.
     """
 
     disturbance_rad: float = math.radians(8.0)
@@ -89,7 +82,7 @@ class Heading:
     def __init__(
         self, settings: HeadingSettings | None = None, heading_rad: float | None = None, sd_rad: float = 0.0
     ) -> None:
-        """`heading_rad`: at the start, with `sd_rad`; None: given by the first reading of the compass, 0 without one."""
+        """`heading_rad`: at the start, with `sd_rad`; None if given by the first reading of the compass (0 without a compass)."""
         self.settings = s = settings or HeadingSettings()
         self.state = np.zeros(SIZE)
         iron_sd = CALIBRATED_SHARE * s.iron_sd_rad if s.iron else s.iron_sd_rad
@@ -135,14 +128,6 @@ class Heading:
             headings[k] = self.state[HEADING], math.sqrt(self.P[HEADING, HEADING])
         return headings
 
-    def adopt_errors(self, known: Heading) -> None:
-        """Start with the gyro's bias and the iron that another filter has found in the same record, and with their variances.
-
-        Both hardly change within a record, so that their last estimate is that of all samples.
-        """
-        self.state[BIAS:] = known.state[BIAS:]
-        self.P[BIAS:, BIAS:] = np.diag(np.diag(known.P)[BIAS:])
-
     @property
     def bias_sd_rad_s(self) -> float:
         """Standard deviation of the gyro's bias."""
@@ -150,7 +135,7 @@ class Heading:
 
     @property
     def iron(self) -> CompassErrors:
-        """Estimated compass errors by the wearer's iron."""
+        """Estimated compass errors from the wearer's iron."""
         b, c, d, e = self.state[IRON:].tolist()
         return CompassErrors(b, c, d, e)
 
@@ -172,14 +157,14 @@ class Heading:
             self._propagate_covariance()
 
     def _start_gyro(self) -> None:
-        """First rate of the gyro: the heading known so far is the compass's, so its standard deviation is that of a first reading."""
+        """First rate of the gyro: the heading known so far is the compass's, so it gets the standard deviation of a first reading."""
         self._has_rate = True
         if self.known and not self._given:
             self.P[HEADING] = self.P[:, HEADING] = 0.0
             self.P[HEADING, HEADING] = self.settings.first_sd_rad**2
 
     def _propagate_covariance(self) -> None:
-        """Propagate the covariance by the time since it was done last."""
+        """Propagate the covariance over the time since the last propagation."""
         dt, self._since_s = self._since_s, 0.0
         f = np.eye(SIZE)
         f[HEADING, BIAS] = -dt
@@ -221,13 +206,13 @@ class Heading:
             self.P[HEADING, HEADING] = self.settings.first_sd_rad**2
             self._last, self._turned = (t_s, compass), 0.0
             return
-        harmonics = _harmonics(heading)
-        innovation = wrap(compass - heading - float(self.state[IRON:] @ harmonics))
+        waves = harmonics(heading)
+        innovation = wrap(compass - heading - float(self.state[IRON:] @ waves))
         if not self._steady(t_s, compass) or abs(innovation) > self._gate():
             self.refused += 1
             return
         row = np.zeros(SIZE)
-        row[HEADING], row[IRON:] = 1.0, harmonics
+        row[HEADING], row[IRON:] = 1.0, waves
         alike = max(1.0, self.settings.same_s / self._period_s)  # readings with the same disturbance
         self._update(row, innovation, alike * self.settings.disturbance_rad**2)
 
@@ -257,61 +242,6 @@ class Heading:
         self.P = 0.5 * (self.P + self.P.T)
 
 
-def fit_compass_errors(t_s: Floats, rate_rad_s: Floats, compass_rad: Floats) -> CompassErrors:
-    """Compass errors by the wearer's iron, from samples (n,) of a full turn on the spot; raises ValueError that names the fault of the turn.
-
-    Compass less gyro is an offset, a bias times time, and the iron. All six parameters are fitted by least squares, relinearized at the new headings.
-    """
-    turned = np.concatenate([[0.0], np.cumsum(np.diff(t_s) * 0.5 * (rate_rad_s[1:] + rate_rad_s[:-1]))])
-    read = np.isfinite(compass_rad)
-    if read.sum() < FEWEST_READINGS:
-        raise ValueError("fewer than 20 readings of the compass: is it connected?")
-    time, turn, compass = t_s[read] - t_s[0], turned[read], np.unwrap(compass_rad[read])
-    _check_turn(turn, compass)
-    if (compass[-1] - compass[0]) * (turn[-1] - turn[0]) < 0.0:
-        turn = -turn
-    offset, drift, iron = float(np.mean(compass - turn)), 0.0, np.zeros(4)
-    for _ in range(LINEARIZATIONS):
-        h = turn + offset + drift * time
-        columns = np.column_stack([np.ones_like(h), time - time.mean(), *_harmonics(h)])
-        solution, residuals = _robust_least_squares(columns, compass - h)
-        offset += float(solution[0]) - float(solution[1]) * float(time.mean())
-        drift += float(solution[1])
-        iron = solution[2:]
-    if float(np.hypot(iron[0], iron[1])) > LARGEST_IRON_RAD:
-        raise ValueError(
-            "the iron beside the compass is stronger than the earth's field: move the compass away from it"
-        )
-    b, c, d, e = iron.tolist()
-    return CompassErrors(b, c, d, e, float(np.sqrt(np.mean(residuals**2))))
-
-
-def _check_turn(turn: Floats, compass: Floats) -> None:
-    """Raise ValueError unless both the gyro's angle (n,) and the compass (n,), not wrapped, show the turn."""
-    if float(np.ptp(turn)) < FULL_TURN_RAD:
-        raise ValueError(
-            f"the turn covers {math.degrees(float(np.ptp(turn))):.0f} degrees: turn once round on the spot, slowly"
-        )
-    if float(np.ptp(compass)) < 0.5 * FULL_TURN_RAD:
-        raise ValueError("the compass does not follow the turn: is it stuck, or is there a magnet beside it?")
-
-
-def _robust_least_squares(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Solution (k,) for columns (n, k) and values (n,), and the residuals (n,); outliers get less weight in each of the REWEIGHTINGS."""
-    weight = np.ones_like(values)
-    for _ in range(REWEIGHTINGS):
-        solution = np.asarray(np.linalg.lstsq(columns * weight[:, None], values * weight, rcond=None)[0], np.float64)
-        residuals = values - columns @ solution
-        spread = max(MAD_TO_SD * float(np.median(np.abs(residuals))), SMALLEST_SPREAD_RAD)
-        weight = np.minimum(1.0, 2.0 * spread / np.maximum(np.abs(residuals), 1e-9)) ** 0.5
-    return solution, residuals
-
-
-def compass_heading(bearing_rad: Floats) -> Floats:
-    """Headings (rad) counter-clockwise from the map's x (east), of bearings clockwise from north."""
-    return 0.5 * math.pi - bearing_rad
-
-
-def _harmonics(heading_rad: float | Floats) -> Floats:
+def harmonics(heading_rad: float | Floats) -> Floats:
     """Sines and cosines of the heading and of twice the heading: (4,) or (4, n)."""
     return np.array([np.sin(heading_rad), np.cos(heading_rad), np.sin(2.0 * heading_rad), np.cos(2.0 * heading_rad)])

@@ -26,17 +26,17 @@ import numpy as np
 from echostep.arrays import Floats
 
 GRAVITY_M_S2 = 9.81
-# Of thigh and shank alike, where they are not known: adults of both sexes are 1.65 m high in the mean [NCD-RisC 2016, world], times 0.245 and 0.246
+# Of thigh and shank alike, if not known: adults of both sexes are 1.65 m tall on average [NCD-RisC 2016, world], times 0.245 and 0.246
 # [Winter 2009].
 USUAL_M = 0.405
 # Dorsiflexion of the ankle every 4 % of the stride from heel strike to toe off, degrees [Perry 1992; Winter 2009; Kadaba 1990, read to a degree].
 DORSIFLEXION_DEG = (2, 1, -1, 1, 3, 6, 8, 9, 10, 11, 13, 13, 12, 8, 1, -7, -13, -16, -16)
 DORSIFLEXION_STEP = 0.04  # phase between two values
-# With speed the push-off comes earlier and goes farther [Schwartz 2008]: so much more plantarflexion per unit of speed / sqrt(g leg) beyond that of
-# the curve (1.35 m/s with legs of 0.86 m), at a phase of 0.56; half of it for what is slower. The foot's own gyros show 70 degrees per unit between
+# With speed the push-off comes earlier and goes farther [Schwartz 2008]: this much more plantarflexion per unit of speed / sqrt(g leg) beyond the
+# curve's speed (1.35 m/s with legs of 0.86 m), at a phase of 0.56; half of it below. The foot's own gyros show 70 degrees per unit between
 # 1.55 and 1.95 m/s (two legs of one person), and about 30 down to 1.05 m/s (two of another).
 PUSH_OFF_RAD, CURVE_SPEED = math.radians(60.0), 0.465
-# From none to all of it; the change at 0.4 is a third of that at 0.56, at 0.5 three quarters (the same feet)
+# From none to all of this change; at 0.4 it is a third of its value at 0.56, at 0.5 three quarters (the same feet)
 PUSH_OFF_PHASES = (0.33, 0.56)
 # In lengths of the shank: 0.039 of the body's height over 0.246 [Winter 2009, after Drillis and Contini].
 ANKLE_HEIGHT = 0.16
@@ -51,7 +51,7 @@ PELVIS = 1.017  # factor on a stride: two hips 17 cm apart turn by 4 degrees eit
 HALVES = (0.06, 0.08, 0.10)
 # Phases between which the foot carries alone: the other one leaves at TOE_OFF - 0.5 and lands at 0.5, with a margin at both ends.
 SINGLE_SUPPORT = (0.14, 0.42)
-# Least shank over thigh of a shank measured to the floor: to the floor it is 0.285 of the height, to the ankle 0.246, the thigh is 0.245
+# Least ratio of shank to thigh for a shank measured to the floor: to the floor it is 0.285 of the height, to the ankle 0.246, the thigh is 0.245
 # [Winter 2009]; the limit lies between 1.00 and 1.16, as persons differ.
 SHANK_TO_FLOOR_RATIO = 1.14
 FLOOR_TO_ANKLE_RATIO = 0.285 / 0.246
@@ -129,7 +129,7 @@ def travel(
     rolls: bool = True,
     speed: float = CURVE_SPEED,
 ) -> Travel:
-    """Travel of the hips over the standing foot at phases (n,); `struck`: phase of the heel strike, None when the foot stood before.
+    """Travel of the hips over the standing foot at phases (n,); `struck`: phase of the heel strike, None if the foot stood before.
 
     `rolls`: whether the foot rises about its ball; on stairs it hardly does while it carries. `speed`: relative speed of the walk.
     """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Angles of thigh and shank against the vertical: the integrated rates, less the gyros' errors, from a level that gyros do not measure.
 
-In: the grid of integrated rates, signs, moments at which the leg stands, begins and ends of strides. Out: angles between two grid indices. Owns the
+In: the grid of integrated rates, signs, moments of standing, beginnings and ends of strides. Out: angles between two grid indices. Owns the
 gyros' errors and the level.
 
 Gyros do not measure the angles at one moment: a Kalman filter, `SwingAngles`, estimates them from the angles while standing and their mean
@@ -24,7 +24,7 @@ from echostep.legs.walking_bout import climbs
 
 # Assumed, not measured, where no source is named.
 STANDING_RAD = (0.0, math.radians(-3.0))  # thigh, shank: the weight is in front of the ankles
-MEAN_RAD = (math.radians(7.0), math.radians(-14.2))  # over a stride, by the curves of `kinematics`
+MEAN_RAD = (math.radians(7.0), math.radians(-14.2))  # over a stride, from the curves of `kinematics`
 STANDING_SD_RAD = math.radians(4.0)  # of standing persons; a foot is often a little ahead
 BRIEF_SD_RAD, BRIEF_S = math.radians(12.0), 1.0  # of a shorter rest: it may be one between two steps, legs apart
 # Of people's mean angles [offsets of sagittal angles: Kadaba 1990], which all strides share
@@ -32,11 +32,11 @@ MEAN_SD_RAD = math.radians(8.0)
 STRIDE_SD_RAD = math.radians(1.5)  # growth in a stride: soft tissue
 UNKNOWN_SD_RAD = math.radians(20.0)  # before anything is known
 Signs = tuple[float, float]
-# Of the change of a mean angle from stride to stride, and about the first stride of a walk, whose first swing is a smaller one, assumed.
+# Of the change of a mean angle from stride to stride, and at the first stride of a walk, whose first swing is smaller, assumed.
 CLOSURE_SD_RAD, FIRST_CLOSURE_SD_RAD = math.radians(1.5), math.radians(5.0)
-# Of the rate of a standing leg over a window of rest, by sway; windows overlap seven times, so the sd of one is the root of 7 times 0.7 deg/s.
+# Of the rate of a standing leg over a window of rest, due to sway; windows overlap seven times, so the sd of one is the root of 7 times 0.7 deg/s.
 REST_SD_RAD_S = math.radians(1.9)
-UPRIGHT_RANGE_RAD = math.radians(74.0)  # range of the shank in a usual stride, by the curves of `kinematics`
+UPRIGHT_RANGE_RAD = math.radians(74.0)  # range of the shank in a usual stride, from the curves of `kinematics`
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,11 +49,11 @@ class SwingAngles:
     variance: float = UNKNOWN_SD_RAD**2
 
     def moved(self, thigh: float, shank: float, index: int, drift: float) -> SwingAngles:
-        """The level at a later index, where integration finds these angles; `drift`: variance (rad2) of what the gyros' errors have added."""
+        """The level at a later index, where integration finds these angles; `drift`: variance (rad2) added by the gyros' errors."""
         return SwingAngles(thigh, shank, index, self.variance + STRIDE_SD_RAD**2 + drift)
 
     def corrected(self, off: tuple[float, float], sd: float) -> SwingAngles:
-        """Kalman update by the differences `off` (thigh, shank) of the usual angles from those found, with this sd."""
+        """Kalman update by the differences `off` (thigh, shank) of the usual angles from the angles found, with this sd."""
         gain = self.variance / (self.variance + sd * sd)
         return SwingAngles(
             self.thigh + gain * off[0], self.shank + gain * off[1], self.index, (1.0 - gain) * self.variance
@@ -66,7 +66,7 @@ class SwingAngles:
 
 
 class StrideMean:
-    """Mean angles (thigh, shank, yaw) of a stride between two grid indices; `first`: of a walk."""
+    """Mean angles (thigh, shank, yaw) of a stride between two grid indices; `first`: whether it is the first of a walk."""
 
     def __init__(self, begin: int, end: int, grid: AngleGrid, *, first: bool) -> None:
         self.begin, self.end, self.first = begin, end, first
@@ -86,7 +86,7 @@ class LegAngles:
     def between(self, signs: Signs, begin: int, end: int) -> tuple[Floats, Floats]:
         """Angles (n,) of thigh and shank at grid indices begin..end, from the level with the present biases.
 
-        A turn between these indices is taken as even for its leak, so that the pelvis' rotation to and fro adds nothing.
+        For its leak, a turn between these indices is assumed even, so that the pelvis' rotation to and fro adds nothing.
         """
         level, grid = self.level, self._grid
         indices = np.arange(begin, end + 1)
@@ -100,7 +100,7 @@ class LegAngles:
         return angles[0], angles[1]
 
     def move_level(self, signs: Signs, k: int) -> None:
-        """Take the level to grid index k by integration; it is known the less, the longer the way and the wider the turn to there."""
+        """Take the level to grid index k by integration; the longer the way there and the wider the turn, the less it is known."""
         if k == self.level.index:
             return
         thigh, shank = self.between(signs, k, k)
@@ -121,10 +121,10 @@ class LegAngles:
         self.level = SwingAngles(rested.thigh, rested.shank, k, rested.variance)
 
     def learn_closure(self, signs: Signs, begin: int, end: int, *, first: bool) -> None:
-        """Update the gyros' errors by a stride: its mean angles are those of the stride before, but for bias and leak.
+        """Update the gyros' errors by a stride: its mean angles equal the previous stride's, but for bias and leak.
 
-        Mid swing is the moment of the fastest turn, so that angles there scatter with its time; means do not. The first stride of a walk (`first`),
-        and one after a gap, has none before it: its angles at both ends are compared.
+        Mid swing is the moment of the fastest turn, so angles there scatter with its timing; means do not. The first stride of a walk (`first`)
+        or after a gap has no previous stride: its angles at both ends are compared.
         """
         before, self._mean = self._mean, StrideMean(begin, end, self._grid, first=first)
         if before is None or before.end != begin:
@@ -140,7 +140,7 @@ class LegAngles:
             bias.learn(sign * rate, sd / span_s, yaw)
 
     def correct_level(self, signs: Signs, begin: int, end: int) -> None:
-        """Correct the level by the mean angles of a stride; a shorter one is nearer to standing, and on stairs they are others."""
+        """Correct the level by the mean angles of a stride; a shorter stride is nearer to standing, and on stairs the mean angles differ."""
         thigh, shank = self.between(signs, begin, end)
         strike = heel_strike_index(shank)
         phase = (np.arange(strike, len(shank)) - strike) / (len(shank) - 1)

@@ -7,7 +7,7 @@ first and the last swing.
 
 A stride goes from mid swing to mid swing. Before the first and after the last mid swing the hips move over the standing foot; these edges are
 reported, too. A gyro does not measure the vertical (`level`). Its bias is its rate at rest, and the change of its angle over a stride, less
-what leaks into it from a turn (`gyro_bias`).
+the leak from a turn (`gyro_bias`).
 
 Two gyros in the sagittal plane of one leg do not give the length of strides sideways, backward or in place, or of crawling: these are flagged, their
 length is 0, and their standard deviation covers the possible length.
@@ -39,7 +39,7 @@ STAIRS_M, STAIRS_RISE_M = 0.57, 0.34  # two treads of 28.5 and 17 cm; houses dif
 STAIRS_WEIGHT = 0.15  # of the length by the angles
 OWN_SD_M = 0.06  # of one stride, besides the scale: 99 strides of four real legs
 EDGE_SD_M = 0.12  # of an edge of a walk: ten edges of the same legs
-# Of a stride that this leg does not show, at least: half of a usual one, for it may be none or a whole one
+# At least, for a stride that this leg does not show: half a usual stride, for it may be none or a whole one
 BLIND_SD_M = 0.65
 LOOK = 3  # grid samples on either side, from which a rate is computed
 SWING_END = 0.35  # of the peak rate: below it the swing is over
@@ -57,10 +57,10 @@ class StrideEstimator:
     """Strides from samples, returned when no later sample can change them; equal samples give equal strides, in blocks of any size."""
 
     def __init__(self, settings: StrideSettings | None = None, sign: tuple[float, float] | None = None) -> None:
-        """`sign`: of the gyros of thigh and shank, where it is known from the same recording."""
+        """`sign`: of the gyros of thigh and shank, if known from the same recording."""
         self.settings = settings or StrideSettings()
         self.swings = Swings(sign)
-        self.revised = False  # whether the signs were decided anew
+        self.revised = False  # whether the signs were decided again
         self._grid = AngleGrid()
         self._angles = LegAngles(self._grid)
         self._moved = 0  # grid samples with a moving shank
@@ -88,7 +88,7 @@ class StrideEstimator:
         return None if self._still_since is None else self._grid.time(self._still_since)
 
     def feed(self, t_s: Floats, thigh: Floats, shank: Floats, belt: Floats | None = None) -> list[Stride]:
-        """Strides completed by samples (n,): time, rates in rad/s; `belt`: of the trunk about the vertical, NaN or None where it is not measured."""
+        """Strides completed by samples (n,): time, rates in rad/s; `belt`: of the trunk about the vertical, NaN or None if not measured."""
         turns = np.full(len(t_s), np.nan) if belt is None else belt
         for sample in zip(t_s.tolist(), thigh.tolist(), shank.tolist(), turns.tolist(), strict=True):
             self._take(*sample)
@@ -288,12 +288,12 @@ class StrideEstimator:
         return length, 0.0, pace_flag(length * GRID_HZ / cycle, self.settings.segments), OWN_SD_M
 
     def _relative_speed(self, way: Travel, cycle: int) -> float:
-        """Relative speed of a stride of `cycle` grid samples; by unscaled lengths, so that lengths are linear in their scale."""
+        """Relative speed of a stride of `cycle` grid samples; from unscaled lengths, so that lengths are linear in their scale."""
         segments = self.settings.segments
         return min(segments.relative_speed(way.stride()[0] / segments.scale * GRID_HZ / cycle), FASTEST)
 
     def _begin_piece(self, peak: int, strike: int | None) -> tuple[float, float]:
-        """Travel (m) from the beginning of the walk to its first mid swing, and by how much less the stride after it is than in a steady walk.
+        """Travel (m) from the beginning of the walk to its first mid swing, and how much shorter the next stride is than in a steady walk.
 
         `strike`: grid samples from mid swing to heel strike; None when no stride follows.
         """
@@ -314,7 +314,7 @@ class StrideEstimator:
         return length + swing.first_half_m(), pace * swing.after_s - swing.second_half_m()
 
     def _rests(self, first: int) -> bool:
-        """Whether neither sensor moves in the CALM grid samples from an index on: so little happens in a walk only where it begins or ends."""
+        """Whether neither sensor moves in the CALM grid samples from an index on: in a walk this happens only where it begins or ends."""
         rates = self._grid.rates(max(first, 0))[:CALM] * np.array(self.swings.sign) - np.array(
             [b.value for b in self.bias]
         )
@@ -345,7 +345,7 @@ class StrideEstimator:
         self._add_edge(bout.begin, end, length)
 
     def _end_piece(self, peak: int, end: int, *, stands: bool) -> float:
-        """Travel (m) from the last mid swing to the end of the walk, less what the stride before it was counted too long."""
+        """Travel (m) from the last mid swing to the end of the walk, less the excess length counted for the stride before it."""
         bout, span = self._bout, end - peak
         pace = bout.pace_m_s or 0.0
         thigh, shank = self._angles.between(self.swings.sign, peak, end)

@@ -34,7 +34,7 @@ LEAD_WEIGHT = 0.25  # of the thigh's lead in the score of the relative sign
 BACKWARD_LEAD = -0.1  # lead of the thigh below which the walk goes backward
 LAGS = range(5, 26, 5)  # of the shank behind the thigh
 TREND_S = 1.2  # running mean subtracted from the angles
-HALF_SWING = int(0.3 * GRID_HZ)  # longest before the peak of a swing: a swing takes 0.4 s
+HALF_SWING = int(0.3 * GRID_HZ)  # longest time before the peak of a swing: a swing takes 0.4 s
 TOP_SHARE = 0.5  # of the peak: above it the rate belongs to the top of a swing, assumed
 FOREMOST_SHARE = 0.2  # the shank is near its foremost angle within this share of its turn since mid swing
 STOPPED_SHARE = 0.05  # rate of a shank that has stopped, over the rate at mid swing
@@ -103,7 +103,7 @@ def rate_skewness(rate: Floats) -> float:
 
 
 def angle_correlation(rates: Floats) -> float:
-    """Correlation of both angles about their running mean, which removes the drift by the gyros' biases; rates (n, 2)."""
+    """Correlation of both angles about their running mean, which removes the drift from the gyros' biases; rates (n, 2)."""
     angles = np.cumsum(rates, axis=0) / GRID_HZ
     width = int(TREND_S * GRID_HZ)
     if len(angles) > 2 * width:

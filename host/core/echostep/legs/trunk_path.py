@@ -4,7 +4,7 @@
 In: samples of thigh, calf and belt, with the compass where it was read, in blocks. Out: `PathSegment`s, as from the foot. Owns the estimators of
 strides and heading, and the latest headings.
 
-Lengths come from `strides`, directions from `heading`, in a walk frame of their own: its x axis is that of the compass, or without one the wearer's
+Lengths come from `strides`, directions from `heading`, in a walk frame of their own: its x axis is the compass's, or without a compass the wearer's
 first heading.
 """
 
@@ -66,7 +66,7 @@ class LegPath:
     """Path segments from blocks of samples; the size of the blocks changes only the time at which a segment is returned."""
 
     def __init__(self, settings: WearerSettings, iron: CompassErrors | None = None) -> None:
-        """`iron`: errors of the compass, when it was calibrated."""
+        """`iron`: errors of the compass; None if it was not calibrated."""
         lengths = LegLengths(settings.thigh_m, settings.shank_m, settings.leg_scale)
         self._strides = StrideEstimator(StrideSettings(lengths, calibrated=settings.leg_scale != 1.0))
         limits = np.array([RANGE_RAD_S, RANGE_RAD_S, np.inf])  # of thigh, calf, belt
@@ -113,7 +113,7 @@ class LegPath:
         self._covered_s = t1
         standing = Flag.STANDING in stride.flags
         self.steps += 0 if standing else 1
-        # No way before: the wearer may turn on the spot
+        # No displacement before it: the wearer may turn on the spot
         begun = t1 - SETTING_OFF_S if Flag.EDGE in stride.flags else t0
         ahead, aside = self._direction(max(t0, begun), t1)
         length = share * stride.length_m

@@ -4,7 +4,7 @@
 In: angles of the knee, speeds. Out: `Bout`, flags. Owns nothing but these records.
 
 At its edges, the first and the last swing, this leg does not carry the hips; it measures their speed only while it stands. In a swing between two
-stances the speed is taken to change evenly from that at toe off to that after heel strike. In a steady walk both are the pace. A walk begins and ends
+stances the speed is taken to change evenly from toe off to after heel strike. In a steady walk both are the pace. A walk begins and ends
 within about a step [Breniere and Do 1986; Jian 1993]: the first swing leaves from slow hips and lands under hips at pace; the closing one leaves at
 pace and lands beside the other foot under hips that all but rest.
 """
@@ -29,7 +29,7 @@ BENT_RAD = math.radians(25.0)
 EXTENDS_RAD, BENDS_RAD = math.radians(30.0), math.radians(20.0)
 LEAST_RISE_M = 0.04  # in half a stride; a step is 0.15 to 0.2 m high [DIN 18065]
 PACES = (0.32, 0.55)  # speed / sqrt(g leg): 0.9 and 1.6 m/s with legs of 0.86 m [Froude number 0.10 and 0.30]
-SPEED_S = 0.15  # over which a speed is taken: long against noise, short against a step
+SPEED_S = 0.15  # over which a speed is taken: long compared with noise, short compared with a step
 SETTING_OFF = 0.25  # speed over the pace when the first foot leaves the floor [Breniere and Do 1986; Jian 1993]
 
 
@@ -37,7 +37,7 @@ SETTING_OFF = 0.25  # speed over the pace when the first foot leaves the floor [
 class Bout:
     """A walk under way, in grid indices: `begin`, whether it begins with standing, `peaks`: its mid swings.
 
-    The fields from `cycle` (grid samples) on are those of the newest stride.
+    The fields from `cycle` (grid samples) on belong to the newest stride.
     """
 
     begin: int
@@ -46,7 +46,7 @@ class Bout:
     cycle: int = int(USUAL_STRIDE_S * GRID_HZ)
     pace_m_s: float | None = None
     trail_m: float = 0.0  # ankle behind the hip at toe off
-    strike: int = 0  # grid samples after the mid swing before
+    strike: int = 0  # grid samples after the preceding mid swing
     toe_off: int = 0  # index
     blind: Flag = Flag.NONE  # UNSEEN or BACKWARD
     lead: float = math.nan  # of the thigh before the shank, mean of the last strides
@@ -100,9 +100,9 @@ class Swing(NamedTuple):
 
 
 def leaving_share(trail_m: float, usual_m: float) -> float:
-    """Speed of the hips over the pace when a foot leaves the floor for the first time, by its distance behind the hips over the usual one.
+    """Speed of the hips over the pace when a foot leaves the floor for the first time, from its distance behind the hips over the usual distance.
 
-    A foot that leaves from beside the other is the first to leave; one that is as far behind as ever leaves after a step of the other.
+    A foot that leaves from beside the other is the first to leave; a foot as far behind as usual leaves after a step of the other.
     """
     share = min(max(trail_m / usual_m, 0.0), 1.0) if usual_m > 0.0 else 0.0
     return SETTING_OFF + (1.0 - SETTING_OFF) * share

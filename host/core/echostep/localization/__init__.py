@@ -2,7 +2,75 @@
 """The particle filter on the plan: path and pings -> position.
 
 In: `MeasuredSegment`s and beacon readings. Out: `Estimate`s: position, covariance, heading, status. Owns the particles and the beacon map.
-
-Others may import `map_filter`, `beacon_map`, `building`, `settings`, `estimate`, `belief`, and what the five sub-packages name. The floors stand in
-`.importlinter`.
+The names below are its public interface; only studies and tests look behind it.
 """
+
+from typing import TYPE_CHECKING
+
+from echostep.additions import face
+
+if TYPE_CHECKING:
+    from echostep.localization.beacon_map import BeaconPlace, BeaconState
+    from echostep.localization.beacons.model import BeaconSettings
+    from echostep.localization.belief import STATED
+    from echostep.localization.building import Building
+    from echostep.localization.cloud_estimate import Right, estimate_of
+    from echostep.localization.drawn_places import DrawnPlaces
+    from echostep.localization.echoes.likelihood import (
+        EchoModel,
+        EchoSettings,
+        echo_density,
+        echo_model,
+        likeliest_source,
+        outlier_density,
+        planned_density,
+    )
+    from echostep.localization.echoes.rangers import echo_of
+    from echostep.localization.estimate import (
+        CHI2_95,
+        RISK,
+        WALKER_M_S,
+        Estimate,
+        TrackStatus,
+        claims_place,
+        digest,
+        ellipse95,
+        in_ellipse95,
+        trust,
+        unobserved,
+    )
+    from echostep.localization.first_call import call_kernels
+    from echostep.localization.height.levels import ClimbSettings, drift_m
+    from echostep.localization.limits import BELIEVED, PROBABLE, TRACKING_M
+    from echostep.localization.map_filter import MapFilter
+    from echostep.localization.particles.places import LikelyPlace
+    from echostep.localization.particles.start import ANY_LEVEL, Air, Start
+    from echostep.localization.settings import CloudSettings, FilterSettings
+    from echostep.localization.team.meeting import TimedMeeting, carries_position, on_the_way, start_at
+    from echostep.localization.team.meeting_memory import MeetingEffect, MeetingNews, MeetingQueue
+    from echostep.localization.team.shared_beacons import MOST_TEAMMATES, TeamBeaconMap, shared_beacons
+
+__getattr__ = face(
+    __name__,
+    {
+        "beacon_map": "BeaconPlace BeaconState",
+        "beacons.model": "BeaconSettings",
+        "belief": "STATED",
+        "building": "Building",
+        "cloud_estimate": "Right estimate_of",
+        "drawn_places": "DrawnPlaces",
+        "echoes.likelihood": "EchoModel EchoSettings echo_density echo_model likeliest_source outlier_density planned_density",
+        "echoes.rangers": "echo_of",
+        "estimate": "CHI2_95 RISK WALKER_M_S Estimate TrackStatus claims_place digest ellipse95 in_ellipse95 trust unobserved",
+        "first_call": "call_kernels",
+        "height.levels": "ClimbSettings drift_m",
+        "limits": "BELIEVED PROBABLE TRACKING_M",
+        "map_filter": "MapFilter",
+        "particles.places": "LikelyPlace",
+        "particles.start": "ANY_LEVEL Air Start",
+        "settings": "CloudSettings FilterSettings",
+        "team.meeting": "TimedMeeting carries_position on_the_way start_at",
+        "team.meeting_memory": "MeetingEffect MeetingNews MeetingQueue",
+        "team.shared_beacons": "MOST_TEAMMATES TeamBeaconMap shared_beacons",
+    },
+)

@@ -37,7 +37,7 @@ EXPECTED_SHARE = 0.6  # of the greatest range at which a beacon was received: wi
 
 
 class BeaconState(StrEnum):
-    """What is known of a beacon's health."""
+    """Known state of a beacon's health."""
 
     WELL = "well"
     MOVED = "moved"
@@ -95,7 +95,7 @@ class BeaconMap:
             self._note_unexpected(cloud, segment.t1_s)
 
     def places(self, cloud: Cloud, t_s: float) -> list[BeaconPlace]:
-        """Every beacon with a place, by slot. One that was moved has none until it is located anew, nor has any when another cloud is tracked now."""
+        """Every beacon with a place, by slot. A moved beacon has none until it is located again, and none has one once another cloud is tracked."""
         if not self._is_of(cloud):
             return []
         beacons = moments(cloud.beliefs, cloud.weight)
@@ -143,7 +143,7 @@ class BeaconMap:
         return cloud.beliefs.mean.shape[1] == len(self._heard_s)
 
     def _begin_anew(self, cloud: Cloud) -> None:
-        """Forget the places, which were those of a wrong cloud, and when each beacon was last received."""
+        """Forget the places, which came from a wrong cloud, and when each beacon was last received."""
         self._health, self._waiting = initial_health(0), no_waiting(0)
         self._heard_s, self._reach_m, self._unexpected_s = [], [], []
         cloud.beliefs = empty_beliefs(len(cloud.x_m), 0)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The belief: how probable each hypothesis of the trunk's place is.
 
-In: of each cloud the log of its density of the last echoes over that without a plan (`echoes.unplanned`), and of the share that crossed no wall.
+In: for each cloud, logs of its density of the last echoes over the density without a plan (`echoes.unplanned`), and of its share crossing no wall.
 Out: probabilities. Owns their logarithms.
 
 Hypotheses: the trunk is in a cloud, tracked or searching; `elsewhere` in this building, with the density without a plan; in another building than
@@ -21,7 +21,7 @@ from echostep.localization.limits import PROBABLE, SURE
 from echostep.localization.particle_arrays import Move
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.settings import UNPLANNED_DOOR
-from echostep.plan.model import Pose
+from echostep.plan import Pose
 
 # Assumed, not measured.
 PLAN_FITS = 0.99  # prior probability that the plan is the building's
@@ -30,7 +30,7 @@ STATED = 0.99  # prior probability of a stated start, if the plan fits
 # measured badly: once in 1.8 km of simulated soak), and until a search has found (95 % within 40 m); in another while parts are alike (wings, levels)
 HERE_M, ANOTHER_M = (2000.0, 13.0), (30.0, 60.0)
 WRONG_PER_M = 2e-5  # probability that the trunk leaves all clouds on a metre of the path (carried, a door that is no door): once in 50 km
-# Power of the echoes' densities: their errors are alike on a longer path than that on which they count as one (plan, sway, speed of sound)
+# Power of the echoes' densities: their errors are alike on a longer path than the one on which they count as one (plan, sway, speed of sound)
 TEMPER = 0.3
 BY_CHANCE = 0.3  # of a search's mass, that stays elsewhere when it has found a place: a table is no exact likelihood
 CROSSED_M = 4.0  # from one way through a wall, within which another is through the same one; path of a cloud through it
@@ -44,7 +44,7 @@ LEAST_LOG_ODDS = -700.0  # whose exponential is a number
 class CloudHypothesis:
     """The trunk is in this cloud. `log_weight`: of its probability.
 
-    `table`: the same cloud on a grid, while a search on one is compared with it: by the range table, too. `doubts`: log-odds that
+    `table`: the same cloud on a grid, while a search on a grid is compared with it: by the range table, too. `doubts`: log-odds that
     ranges to beacons of each teammate have taken from it.
     """
 
@@ -54,7 +54,7 @@ class CloudHypothesis:
     doubts: dict[str, float] = field(default_factory=dict)
 
     def weigh(self, log_pings: float, log_passed: float) -> None:
-        """Multiply by the density of pings over that without a plan, given as logarithms, and by the share that crossed no wall."""
+        """Multiply by the density of pings over the density without a plan, given as logarithms, and by the share that crossed no wall."""
         self.log_weight += TEMPER * log_pings + max(log_passed, UNPLANNED_DOOR)
 
     def change_levels(self, move: Move, change: HeightChange) -> float:
@@ -73,7 +73,7 @@ class CrossedWalls:
         self._log_passed = 0.0  # of the last CROSSED_M
 
     def charge(self, at: Pose, path_m: float, log_passed: float) -> float:
-        """What of `log_passed` counts for a cloud that has moved so far to `at`; the log of the share that crossed no wall."""
+        """The part of `log_passed` that counts for a cloud that has moved by `path_m` to `at`; the log of the share that crossed no wall."""
         if any(
             was.level == at.level and math.hypot(was.x_m - at.x_m, was.y_m - at.y_m) < CROSSED_M
             for was in self._crossed
@@ -109,17 +109,17 @@ class Belief:
         return 1.0 / (1.0 + math.exp(-max(self._log_odds, LEAST_LOG_ODDS)))
 
     def probability(self, each: CloudHypothesis | None) -> float:
-        """That the trunk is in this cloud, 0 of none; of a plan that is SURE to be the building's, conditional on that."""
+        """Probability that the trunk is in this cloud, 0 if None; if the plan is SURE to be the building's, conditional on that."""
         fits = self.plan_fits
         return 0.0 if each is None else math.exp(each.log_weight) * (1.0 if fits >= SURE else fits)
 
     @property
     def is_doubted(self) -> bool:
-        """Whether it is probable that the trunk is where no cloud is, if the plan fits."""
+        """Whether the trunk is probably in no cloud, if the plan fits."""
         return math.exp(self.log_elsewhere) > PROBABLE
 
     def normalise(self) -> float:
-        """Let the weights have the sum 1; returns the logarithm of what they had."""
+        """Scale the weights to the sum 1; returns the logarithm of their sum before."""
         total = float(np.logaddexp.reduce([self.log_elsewhere, *(each.log_weight for each in self.clouds)]))
         for each in self.clouds:
             each.log_weight -= total
@@ -127,10 +127,10 @@ class Belief:
         return total
 
     def judge_plan(self, path_m: float = 0.0) -> None:
-        """Normalise; what the weights had is evidence for the plan.
+        """Normalise; the sum of the weights before is evidence for the plan.
 
         `path_m`: length of the path on which they were changed. A plan that fits has clouds that predict the echoes nearly always, and soon again;
-        another building's has them where it is alike. So the plan is judged by a hidden Markov model of two states for each [Rabiner 1989].
+        another building's plan has them where it is alike. So the plan is judged by a hidden Markov model of two states for each [Rabiner 1989].
         """
         total = self.normalise()
         here, log_here = _predicted(self._well[0], HERE_M, path_m, total)
@@ -149,9 +149,9 @@ class Belief:
             self._move(each, share)
 
     def begin_search(self, cloud: Cloud, log_pings: float) -> None:
-        """Let a cloud search for what is elsewhere; `log_pings`: log of its density of the path that it has searched over that without a plan.
+        """Let a cloud search elsewhere; `log_pings`: log of its density of the path that it has searched over the density without a plan.
 
-        It takes the place of an earlier search that has found nothing.
+        It replaces an earlier search that has found nothing.
         """
         if self.search is not None:
             self._move(self.search, 1.0)
@@ -188,7 +188,7 @@ class Belief:
             self.search, self.tracked.table = None, None
 
     def raise_to(self, each: CloudHypothesis, least: float) -> None:
-        """Let the probability of a cloud, if the plan fits, be at least `least`."""
+        """Raise the probability of a cloud, if the plan fits, to at least `least`."""
         was = math.exp(each.log_weight)
         if was < least:
             each.log_weight = _log(least) - _log(1.0 - least) + _log(1.0 - was)
@@ -204,9 +204,9 @@ def _mean_share(lengths_m: tuple[float, float]) -> float:
 
 
 def _predicted(well: float, lengths_m: tuple[float, float], path_m: float, log_ratio: float) -> tuple[float, float]:
-    """The probability that a cloud predicts the echoes after a move, and the log of the density of what was measured over that without a plan.
+    """The probability that a cloud predicts the echoes after a move, and the log of the measurements' density over the density without a plan.
 
-    `well`: the probability before; `lengths_m`: mean lengths of the path with and without such a cloud; `log_ratio`: of the density with it.
+    `well`: the probability before; `lengths_m`: mean lengths of the path with and without such a cloud; `log_ratio`: of the density with one.
     """
     stays = math.exp(-path_m * (1.0 / lengths_m[0] + 1.0 / lengths_m[1]))
     well = stays * well + (1.0 - stays) * _mean_share(lengths_m)

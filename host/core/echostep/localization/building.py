@@ -26,7 +26,7 @@ class Building:
     """Data of a plan, shared by all filters on it: walls, sheet of levels, floor; tables are made when a cloud first needs them."""
 
     def __init__(self, walls: Walls, sheet: LevelSheet | None = None, drawn: DrawnPlaces | None = None) -> None:
-        """`drawn`: how well its places are known, where it was drawn by a walk."""
+        """`drawn`: how well its places are known, if it was drawn by a walk."""
         self.walls, self.sheet, self.drawn = walls, sheet, drawn or DrawnPlaces()
         self.floor = walkable_floor(walls.index.walls)
         self.indoors = indoors(self.floor)
@@ -61,7 +61,7 @@ class Building:
         return self._cells[model]
 
     def log_loss_in_air(self, x_m: Floats, y_m: Floats, path_m: float) -> Floats | None:
-        """Loss of log-weight (n,) on this length of path, of particles in the air beside an upper level; None where there is none."""
+        """Loss of log-weight (n,) on this length of path, of particles in the air beside an upper level; None if there are none."""
         return None if self.upper_levels is None else self.upper_levels.log_loss(x_m, y_m, path_m)
 
     def weight_outside(self, x_m: Floats, y_m: Floats, weight: Floats) -> float:

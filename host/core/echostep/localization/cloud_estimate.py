@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The estimate of a cloud: its moments, and how likely small errors are.
 
-In: the tracked cloud, that of a search, how probable each is. Out: `Estimate`. Owns nothing.
+In: the tracked cloud, a search's cloud, the probability of each. Out: `Estimate`. Owns nothing.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ def weight_about(
 ) -> tuple[float, float]:  # fmt: skip
     """Weight of the particles (n,) within each of two distances of a place in the map, and within HALF_STOREY_M of its height.
 
-    `map_sd_m`: standard deviation per axis of the map itself there. A particle then counts by the probability that the map is off by less than what
-    is left to the limit: a lower bound of that of the sum of both errors.
+    `map_sd_m`: standard deviation per axis of the map itself there. A particle then counts by the probability that the map is off by less than the
+    rest of the limit: a lower bound for the sum of both errors.
     """
     near, about = 0.0, 0.0
     for i in range(len(weight)):
@@ -87,7 +87,7 @@ def _within(left_m: float, sd_m: float) -> float:
 
 
 class Right(NamedTuple):
-    """Probability that the trunk is in the tracked cloud, `here`, and in that of a search."""
+    """Probability that the trunk is in the tracked cloud, `here`, and in a search's cloud."""
 
     here: float
     search: float = 0.0
@@ -96,16 +96,16 @@ class Right(NamedTuple):
 SURELY = Right(1.0)
 
 
-def estimate(
+def estimate_of(
     cloud: Cloud, t_s: float, walk_heading_rad: float, step: int, sd_m: float = 0.0, right: Right = SURELY,
     elsewhere: Elsewhere | None = None, search: Cloud | None = None, map_sd_m: float = 0.0,
 ) -> Estimate:  # fmt: skip
     """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean], and how likely small errors are.
 
-    The mean of a cloud with several likely places may lie in none of them: the position is then that of the likeliest place, if that has more than
-    half of the weight, and MUCH_LIKELIER times that near the mean. `sd_m`: standard deviation per axis to be added; `right`: probability that the
-    cloud is right, otherwise the trunk is `elsewhere`. While tracking, the covariance is the cloud's; otherwise that of the mixture of both about the
-    position. The hypotheses are those of `search`, if there is one. `map_sd_m`: standard deviation per axis of the map itself there, as a drawing
+    The mean of a cloud with several likely places may lie in none of them: the position is then the likeliest place, if it has more than
+    half of the weight, and MUCH_LIKELIER times the weight near the mean. `sd_m`: standard deviation per axis to add; `right`: probability that the
+    cloud is right, otherwise the trunk is `elsewhere`. While tracking, the covariance is the cloud's; otherwise the covariance of the mixture of both
+    about the position. The hypotheses come from `search`, if given. `map_sd_m`: standard deviation per axis of the map itself there, as a drawing
     states it; it is part of `sd_m`, and makes small errors less likely.
     """
     weight = cloud.weight
@@ -151,7 +151,7 @@ def places_of_both(cloud: Cloud, search: Cloud, right: Right, walk_heading_rad: 
 
 
 def _moments_at(place: LikelyPlace, mean: Moments, cloud: Cloud, weight: Floats) -> Moments:
-    """The moments about a place, with its heading; those about the mean, if they have half as much weight near them."""
+    """The moments about a place, with its heading; the moments about the mean, if half as much weight is near the mean."""
     distance_m = np.hypot(cloud.map_x_m - place.x_m, cloud.y_m - place.y_m)
     near, about = (float(weight[distance_m < limit_m].sum()) for limit_m in (TRACKING_M, LOST_M))
     if near < MUCH_LIKELIER * mean.near:
@@ -164,7 +164,7 @@ def _moments_at(place: LikelyPlace, mean: Moments, cloud: Cloud, weight: Floats)
 
 
 def _status(near: float, about: float, level: float) -> TrackStatus:
-    """Status from the probabilities of errors below TRACKING_M and below LOST_M, and that of the likeliest level."""
+    """Status from the probabilities of errors below TRACKING_M and below LOST_M, and of the likeliest level."""
     if near >= SURE and level >= BELIEVED:
         return TrackStatus.TRACKING
     return TrackStatus.UNCERTAIN if about >= PROBABLE else TrackStatus.LOST
@@ -201,7 +201,7 @@ class Elsewhere(NamedTuple):
 
 
 def _levels_of_both(one: tuple[float, ...], other: tuple[float, ...], right: Right) -> tuple[float, ...]:
-    """Probability of each level, if the trunk is in one of both clouds."""
+    """Probability of each level, if the trunk is in one of the two clouds."""
     both = [right.here * a + right.search * b for a, b in zip(one, other, strict=True)]
     return tuple(p / sum(both) for p in both)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""How well places of a drawing are known in the building: what its own error adds to that of a place on it.
+"""How well places of a drawing are known in the building: the drawing's own error, added to the error of a place on it.
 
 In: the levels of a plan. Out: standard deviations. Owns the distance in which walls count. A shift of the drawing about a wearer makes no echo fit
-worse, so no echo tells it: it widens what is claimed, and a start that was known in the building. Plans that state none are taken for exact.
+worse, so no echo reveals it: it widens the claimed errors, and a start that was known in the building. Plans that state none are taken as exact.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.localization.particles.start import ANY_LEVEL, Start
-from echostep.plan.model import Level
+from echostep.plan import Level
 
 HEARD_M = 5.0  # of a wall, within which it places the wearer: the rangers' reach without a second reflection
 
@@ -28,7 +28,7 @@ class DrawnPlaces:
         self.are_stated = any(len(rows) for rows in self._places)
 
     def sd_m(self, x_m: float, y_m: float, level: int) -> float:
-        """Standard deviation per axis of the drawing about a place: the largest of the walls that may be heard there, or that of the nearest one."""
+        """Standard deviation per axis of the drawing about a place: the largest of the walls that may be heard there, or the nearest one's."""
         rows = self._places[level] if 0 <= level < len(self._places) else np.zeros((0, 3))
         if not len(rows):
             return 0.0
@@ -37,7 +37,7 @@ class DrawnPlaces:
         return float(rows[near, 2].max())
 
     def widened(self, start: Start) -> Start:
-        """A start that is known in the building, as one on the drawing."""
+        """A start that is known in the building, as a start on the drawing."""
         if not self.are_stated or start.pose is None or start.pose.level == ANY_LEVEL:
             return start
         sd_m = self.sd_m(start.pose.x_m, start.pose.y_m, start.pose.level)

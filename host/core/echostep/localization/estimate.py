@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The estimate: a position with its covariance, and a status that states how far to trust it.
 
-In: what `cloud_estimate` has computed. Out: `Estimate`, immutable, and what is read from it: ellipse, whether it claims a place. Owns nothing.
+In: values computed by `cloud_estimate`. Out: `Estimate`, immutable, and values read from it: ellipse, whether it claims a place. Owns nothing.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ class Estimate:
     """Trunk position in the map (m), covariance (xx, xy, yy in m2), heading (rad), at `t_s`.
 
     `level` is the likeliest one (an index into the plan's), `levels` the probability of each, `z_m` the height in the plan's metres.
-    `protection_m`: radius on that level beyond which the error is with probability RISK, infinite where none is that safe. `right`: probability that
+    `protection_m`: radius on that level beyond which the error is with probability RISK, infinite if none is that safe. `right`: probability that
     the cloud is right; `plan_fits`: that the plan is the building's; `outside`: that the trunk is outside of the building.
-    `hypotheses`: the likely places of a wide cloud, or of one on several levels, the likeliest first.
+    `hypotheses`: the likely places of a wide cloud, or of a cloud on several levels, the likeliest first.
 
     >>> import echostep
     >>> last = echostep.replay("walk.mcap", "demo.json").estimates[-1]
@@ -118,7 +118,7 @@ def ellipse95(xx_m2: float, xy_m2: float, yy_m2: float) -> Ellipse:
 
 
 def claims_place(status: str) -> bool:
-    """Whether a position of this status is a place that may be named, drawn or sent; a lost one may lie in none of the places that fit.
+    """Whether a position of this status is a place that may be named, drawn or sent; a lost position may lie in none of the places that fit.
 
     The one rule for page, terminal, reports, TAK, maps and the summary of a run. Without a plan only the page differs: it draws the end of the path.
     """

@@ -18,7 +18,7 @@ from echostep.board.gateway import BeaconReading
 from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.belief import PLAN_FITS, STATED, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
 from echostep.localization.building import Building
-from echostep.localization.cloud_estimate import Right, estimate, weight_about
+from echostep.localization.cloud_estimate import Right, estimate_of, weight_about
 from echostep.localization.echoes.likelihood import EchoSettings
 from echostep.localization.echoes.range_bias import RangeBias
 from echostep.localization.echoes.unplanned import RangeMemory, UnplannedDensities, UsablePings, evidence_share
@@ -38,11 +38,11 @@ from echostep.localization.team.meeting_memory import MeetingEffect, MeetingMemo
 from echostep.localization.team.meetings import weigh_by
 from echostep.localization.window import RecentWay
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Pose
+from echostep.plan import Pose
 
 SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports the cloud, assumed
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate: no plan is more exact
-# Standard deviation per axis when all views are hidden: a plan that explains few echoes may be so far off
+# Standard deviation per axis when all views are hidden: a plan that explains few echoes may be this far off
 HIDDEN_SD_M = 0.15
 BY_DEFINITION = 1.0 - 1e-6  # without a plan: the map begins where the walk began, and no echo can contradict that
 UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, assumed
@@ -167,7 +167,7 @@ class MapFilter:
         self._way.clear()
 
     def _new_cloud(self, start: Start, walk_heading_rad: float) -> Cloud:
-        """A cloud of a start; a search, where the place is unknown."""
+        """A cloud from a start; a search, if the place is unknown."""
         s, b = self._settings, self._building
         start = b.drawn.widened(start)
         cloud = Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor)
@@ -176,7 +176,7 @@ class MapFilter:
         return cloud
 
     def _table(self) -> tuple[GridCells, RangeMemory]:
-        """The cells of a grid, and the density of pings without a plan that is as inexact as they are."""
+        """The cells of a grid, and the density of pings without a plan that is as inexact as the cells."""
         unplanned = RangeMemory(self._building.background(self._model), inexact(self._settings))
         return self._building.cells(self._model), unplanned
 
@@ -192,7 +192,7 @@ class MapFilter:
     def _search_beside(self, air: Air | None, walk_heading_rad: float) -> None:
         """Search the whole building in addition to the tracked cloud, which covers the near places.
 
-        `air`: calibration of the heights by pressure; None: the level is unknown, so places above and below are searched more densely than the rest.
+        `air`: calibration of the heights by pressure; None if the level is unknown: places above and below are searched more densely than the rest.
         """
         if self.cloud.is_searching or not len(self._building.floor.x_m):
             return
@@ -212,12 +212,12 @@ class MapFilter:
             )
 
     def _search_if_doubted(self, walk_heading_rad: float) -> None:
-        """Search the building where the trunk is probably in no cloud."""
+        """Search the building if the trunk is probably in no cloud."""
         if self.belief.is_doubted and len(self._building.floor.x_m):
             self._begin_search(Start(), walk_heading_rad)
 
     def _follow_barometer(self, measured: MeasuredSegment) -> None:
-        """Let the lag of the height by pressure drift over a pause; forget it where the heights begin anew."""
+        """Let the lag of the height by pressure drift over a pause; forget it where the heights begin again."""
         anew = len(measured.height_m) > 0 and measured.barometer_starts != self._barometer_starts
         if anew:
             self._barometer_starts = measured.barometer_starts
@@ -289,13 +289,13 @@ class MapFilter:
             each.weigh(share * log_ratio, self._passed(each, move, evidence.log_path))
 
     def _passed(self, each: CloudHypothesis, move: Move, log_passed: float) -> float:
-        """What counts of the log of the share of a cloud that crossed no wall."""
+        """The part that counts of the log of a cloud's share that crossed no wall."""
         if self.belief.search is not None or self.belief.probability(each) < BELIEVED:
             return log_passed
         return self._crossed.charge(self._believed(0.0), math.hypot(move.dx_m, move.dy_m), log_passed)
 
     def _compare(self, path_m: float) -> None:
-        """Update the belief after a move: end what is improbable, and merge what is in one place."""
+        """Update the belief after a move: end improbable clouds, and merge clouds in one place."""
         belief = self.belief
         belief.judge_plan(path_m)
         belief.leave(WRONG_PER_M * path_m)
@@ -330,7 +330,7 @@ class MapFilter:
             sd_m = math.hypot(sd_m, map_sd_m)
         right = Right(belief.probability(belief.tracked), belief.probability(belief.search))
         search = belief.search.cloud if belief.search else None
-        new = estimate(
+        new = estimate_of(
             self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, self._building.elsewhere, search,
             map_sd_m,
         )  # fmt: skip

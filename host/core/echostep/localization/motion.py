@@ -43,7 +43,7 @@ def height_change(measured: MeasuredSegment, riding_m: float) -> HeightChange:
 
 
 class Gap(Enum):
-    """`PAUSE`: nothing came; `UNOBSERVED`: the foot was silent for long; `MUTE`: the foot stood and no ranger measured."""
+    """`PAUSE`: nothing came; `UNOBSERVED`: the foot was silent for a long time; `MUTE`: the foot stood and no ranger measured."""
 
     PAUSE = auto()
     UNOBSERVED = auto()
@@ -72,7 +72,7 @@ class Gaps:
         return Gap.MUTE if is_mute else None
 
     def _is_mute(self, measured: MeasuredSegment) -> bool:
-        """Whether the foot has stood for MUTE_S without a ping, once until the next one."""
+        """Whether the foot has stood for MUTE_S without a ping; true once until the next ping."""
         segment = measured.segment
         if len(measured.t_s):
             is_mute = self._since_ping.path_m < STANDING_M and measured.t_s[0] - self._ping_s > MUTE_S

@@ -21,7 +21,7 @@ UNPLANNED_DOOR = -6.0  # log-probability (1 in 400) that a way leads through a w
 class CloudSettings:
     """Size of the cloud, spread of a start whose errors are not stated, and noise that the path's own covariance leaves out.
 
-    `step_sd`: of a move's length, per square root of a metre, twice that of a foot; `turn_sd_deg`, `scale_sd`: drift of the walk frame's rotation
+    `step_sd`: of a move's length, per square root of a metre, twice a foot's; `turn_sd_deg`, `scale_sd`: drift of the walk frame's rotation
     and of the lengths, likewise. `start_scale_sd`, `scale_sd`: of nine walks with surveyed or captured feet. `start_veer_sd_deg`: of a bias
     of the path, degrees that it turns on each metre of a straight way, as by unequal wheels; feet have none. `resample_below`: effective share of the
     cloud at which it is resampled (systematic). The size follows the spread [Fox 2003, KLD-sampling]: enough particles that the distribution over
@@ -75,7 +75,7 @@ def echo_models(s: FilterSettings) -> tuple[EchoModel, EchoModel]:
 
 
 def with_plan_error(s: FilterSettings) -> EchoSettings:
-    """The settings of the echoes, with the error of the plan's walls in that of the ranges."""
+    """The settings of the echoes, with the error of the plan's walls in the error of the ranges."""
     return replace(s.echo, sd_m=math.hypot(s.echo.sd_m, s.plan_sd_m))
 
 

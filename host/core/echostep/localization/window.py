@@ -19,7 +19,7 @@ from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import Cloud
 from echostep.walls.echo_sources import Walls
 
-PAST_M = 40.0  # path that is passed again: that on which a place is found
+PAST_M = 40.0  # path that is passed again: the path on which a place is found
 MOST_PIECES = 1_000  # of it: eight minutes of standing
 
 
@@ -42,12 +42,12 @@ class RecentWay:
             self.length_m -= math.hypot(first.dx_m, first.dy_m)
 
     def clear(self) -> None:
-        """Forget the path: what comes next may begin elsewhere."""
+        """Forget the path: the next move may begin elsewhere."""
         self._pieces.clear()
         self.length_m = 0.0
 
     def search(self, cloud: Cloud, model: EchoModel) -> float:
-        """Let a search process the way from its beginning; returns the log of its density of the pings over that without a plan."""
+        """Let a search process the way from its beginning; returns the log of its density of the pings over the density without a plan."""
         log_pings = 0.0
         for move, pings, change in self._pieces:
             log_pings += cloud.search(move, pings, model)

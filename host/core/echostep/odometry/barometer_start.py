@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The first readings of a barometer may be its reset value: heights by pressure begin anew at the jump to the true ones.
+"""The first readings of a barometer may be its reset value: heights by pressure begin again at the jump to the true ones.
 
-In: times and heights of the board's barometer, restarts of the board. Out: for each height how often the heights have begun anew; those before a new
-beginning tell nothing of those after it. Owns the newest reading, and how many there were since the last beginning.
+In: times and heights of the board's barometer, restarts of the board. Out: for each height how often the heights have begun again; heights before a
+new beginning tell nothing about heights after it. Owns the newest reading, and the number of readings since the last beginning.
 
-A BMP280 gave 68500 Pa, its reset value, before its first conversion [finitespace/BME280, issue 59]; as a height that is 3 km, beside which no storey
+A BMP280 gave 68500 Pa, its reset value, before its first conversion [finitespace/BME280, issue 59]; this is a height of 3 km, beside which no storey
 is seen for the rest of the walk.
 """
 
@@ -31,7 +31,7 @@ class BarometerStart:
         self._t_s, self._height_m = math.nan, math.nan
 
     def starts(self, t_s: Floats, height_m: Floats, board_restarts: Ints) -> Ints:
-        """How often heights have begun anew before each reading (n,): at restarts of the board, and at jumps right after its start."""
+        """How often heights have begun again before each reading (n,): at restarts of the board, and at jumps right after its start."""
         if not len(t_s):
             return board_restarts
         if self._count >= SETTLING and board_restarts[-1] == self._board_restarts:

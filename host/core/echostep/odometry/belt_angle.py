@@ -27,7 +27,7 @@ class BeltAngle:
         self._kept: deque[tuple[Floats, Floats]] = deque()  # times and angles of each block, with the sample before it
 
     def add(self, t_s: Floats, rate_rad_s: Floats) -> None:
-        """A block of samples (n,). One with a missing sample, or whose samples are all alike as of a dead gyro, is left out."""
+        """A block of samples (n,). A block with a missing sample, or with equal samples only (a dead gyro), is left out."""
         if not (np.isfinite(t_s).all() and np.isfinite(rate_rad_s).all()) or np.ptp(rate_rad_s) == 0.0:
             return
         times, rates = np.append(self._t_s, t_s), np.append(self._rate, rate_rad_s)
@@ -44,11 +44,11 @@ class BeltAngle:
 
     @property
     def oldest_s(self) -> float:
-        """Time of the oldest angle; infinite without any."""
+        """Time of the oldest angle; infinite without angles."""
         return float(self._kept[0][0][0]) if self._kept else math.inf
 
     def angle_rad(self, t_s: float) -> float | None:
-        """The angle (not wrapped) at a time; None where it is not known (yet)."""
+        """The angle (not wrapped) at a time; None if it is not known (yet)."""
         for times, angles in reversed(self._kept):
             if times[0] <= t_s <= times[-1]:
                 return float(np.interp(t_s, times, angles))

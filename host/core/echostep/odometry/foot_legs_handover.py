@@ -30,7 +30,7 @@ KEPT_S = 30.0  # of leg samples and foot segments
 MAX_LENGTH_ERROR = 0.35  # share by which the legs' length may differ from the foot's; beyond it no leg gyros are worn
 MIN_OVERLAP_M = 3.0  # of the foot's path, to compare lengths
 ALIGNED_SD = 0.025  # of the scale that the foot gives: a person's scale changes by 2 to 3 % with speed
-STRIDES_SD = 0.05  # of the same, over the root of the path (m) that gives it: 0.06 m a stride of 1.4 m
+STRIDES_SD = 0.05  # of the same scale, divided by the root of the path (m) that gives it: 0.06 m a stride of 1.4 m
 REJOIN_SD_RAD = math.radians(2.0)  # of the angle between foot and legs where the foot takes over
 BRIDGE_M_S, BRIDGE_M = 0.4, 1.5  # standard deviation of an unobserved gap: per second, and at most
 BRIEF_S = 1.0  # a longer gap counts as unobserved
@@ -46,15 +46,15 @@ class FootLegsHandover:
         self._settings, self._iron = settings, iron
         self._leg_path: LegPath | None = None  # while the legs are active
         self._kept_blocks: deque[GyroBlock] = deque()
-        self._kept_segments: deque[PathSegment] = deque()  # of the foot, of the same time as the kept blocks
+        self._kept_segments: deque[PathSegment] = deque()  # of the foot, over the same time as the kept blocks
         self._returned: list[PathSegment] = []  # of the foot that came back, not yet active
         self._covered_s = -math.inf  # end of the common path
         self._foot_turn_rad = self._leg_turn_rad = 0.0  # rotation of each source's frame into the common walk frame
         self._leg_scale = 1.0
-        self._compared_m = (0.0, 0.0)  # path that both have measured, by foot and by legs, of all dropouts
+        self._compared_m = (0.0, 0.0)  # path measured by both, foot and legs, over all dropouts
         self._foot_seen = False
         self._step = 0  # of the last segment
-        self._step_base: int | None = 0  # added to the active source's own count; None: set at its next segment
+        self._step_base: int | None = 0  # added to the active source's own count; None until its next segment
 
     @property
     def legs_observed_s(self) -> float:
@@ -120,7 +120,7 @@ class FootLegsHandover:
         return [self._append(self._as_common(segment), 0.0) for segment in segments if segment.t1_s > self._covered_s]
 
     def _as_common(self, segment: PathSegment) -> PathSegment:
-        """A segment of the legs in the common frame; where the foot has given its scale, the scale is known as well as that."""
+        """A segment of the legs in the common frame; once the foot has given the scale, its error is at most the foot's."""
         scaled = rotated_segment(segment, self._leg_turn_rad, self._leg_scale)
         if self._compared_m[0] == 0.0:
             return scaled
@@ -178,7 +178,7 @@ class FootLegsHandover:
 
 
 def _is_straight(segment: PathSegment) -> bool:
-    """Whether a segment is an observed stride straight on."""
+    """Whether a segment is an observed straight stride."""
     is_long = math.hypot(segment.dx_m, segment.dy_m) > STRAIGHT_M
     return is_long and not segment.unobserved and abs(segment.turn_rad) < STRAIGHT_RAD
 

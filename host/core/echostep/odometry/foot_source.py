@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The foot's samples, of whichever device is worn on it: an MTx, or a foot board.
+"""The foot's samples, from the device worn on it: an MTx or a foot board.
 
 In: portions of chunks. Out: `FootSamples`. Owns the readers of both, and which of the two is worn: the one whose first chunk came first.
 """
@@ -17,7 +17,7 @@ from echostep.foot.ins import Noise
 from echostep.ports.chunks import FOOT, MTX, Portion
 from echostep.xsens import MtBatch, MtxCounts, MtxReader
 
-# What differs from an MTx, which was calibrated by its maker: cross-axis sensitivity 2 %, sensitivity within 1.5 %, zero rate within 5 deg/s (three
+# Differences from an MTx, which was calibrated by its maker: cross-axis sensitivity 2 %, sensitivity within 1.5 %, zero rate within 5 deg/s (three
 # sd), zero force within 65 mg (two sd) [ICM-20649 data sheet DS-000192, tables 1 and 2, as remembered: compare them with a copy].
 ICM20649_NOISE = Noise(accel_share=0.01, gyro_share=0.015, accel_bias=0.3, gyro_bias=0.03)
 
@@ -43,7 +43,7 @@ class FootSource:
 
     @property
     def counts(self) -> MtxCounts:
-        """Counts of the device's samples, those of a foot board by the names of an MTx's."""
+        """Counts of the device's samples; a foot board's counts have the names of an MTx's."""
         if self.port != FOOT:
             return self.mtx.counts
         frames = self.board.reader.counts

@@ -20,7 +20,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.board.calibration import GyroSettings, Imus, RangerSettings, heights, ranges, six_axes
-from echostep.board.frames import BoardReader, Frames, encode
+from echostep.board.frames import BoardReader, Frames
 from echostep.board.messages import (
     BoardHealth,
     Configuration,
@@ -49,14 +49,11 @@ from echostep.odometry.heading_fusion import HeadingFusion
 from echostep.odometry.synchronizer import BAROMETER, MEASUREMENT, Synchronizer
 from echostep.odometry.wearer import WearerWatch
 from echostep.path import Dropout, MeasuredSegment, PathSegment
-from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk, Portion, portion_of
+from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, POINT, TEAM, Portion
 from echostep.ports.people.check_in import PERSON
 from echostep.ports.people.meeting import MEETING
-from echostep.ports.people.tap import POINT
 from echostep.ports.people.team_beacons import TEAM_BEACONS
-from echostep.ports.people.teammate import TEAM
 from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
-from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
 
 _REPORTS = (Identity, Configuration, Status, GyroHealth, BoardHealth, Parts)
 
@@ -72,7 +69,7 @@ class FrontEndCounts:
     bad_arrivals: int = 0  # messages whose arrival time contradicts their counter; most keep their time by the counter
     clock_steps: int = 0  # of the host's clock
     barometer_jumps: int = 0  # right after its start: the heights before them are not used
-    stray_edges: int = 0  # on the board's SyncOut input, none of the MTx's
+    stray_edges: int = 0  # on the board's SyncOut input, not from the MTx
 
 
 class FrontEnd:
@@ -83,7 +80,7 @@ class FrontEnd:
         wearer: WearerSettings | None = None, gyro: GyroSettings | None = None, iron: CompassErrors | None = None,
         imus: Imus | None = None, watch: WearerWatch | None = None,
     ) -> None:  # fmt: skip
-        """`iron`: errors of the compass, when it was calibrated; `imus`: those of the six-axis parts; `watch`: is told what the wearer does."""
+        """`iron`: errors of the compass, if calibrated; `imus`: errors of the six-axis parts; `watch`: observes the wearer."""
         errors = imus or Imus()
         self.board = BoardReader()
         self.foot_source = FootSource(errors.foot)
@@ -110,7 +107,7 @@ class FrontEnd:
 
     @property
     def pending_segments(self) -> tuple[PathSegment, ...]:
-        """Segments that are known already, but whose pings are not all in."""
+        """Known segments whose pings have not all arrived."""
         return self._synchronizer.segments
 
     @property
@@ -157,13 +154,6 @@ class FrontEnd:
         # Synchronize: segments and pings -> segments with their pings.
         return self._synchronizer.pop_ready(times.board_newest_s, times.mtx_newest_s, observed_s)
 
-    def warm_up(self) -> None:
-        """Compile the kernels, so that no chunk waits for it later; leaves the front end as it was."""
-        other = FrontEnd(self.timeline.timing, self._ranger, FootSettings(), GaitSettings())
-        sample = MtSample(0, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
-        ping = Chunk(BOARD, 0, encode(Ping(0, 0, Outcome.ECHO, 5_000), 0))
-        other.process(portion_of([ping, Chunk(MTX, 0, encode_frame(MTDATA, pack_mtdata(sample)))]))
-
     def _read_foot(self, portion: Portion) -> FootSamples:
         """The foot's samples. When the first chunk shows that a foot board is worn, its clock and its part's noise are used."""
         unknown = self.foot_source.port is None
@@ -179,7 +169,7 @@ class FrontEnd:
                 self._unknown_ports += int((portion.port == k).sum())
 
     def _count_bad_times(self, board: Arrivals, times: Times) -> None:
-        """Messages that should have a time and have none."""
+        """Count messages that should have a time but have none."""
         self._bad_times += int((np.isnan(times.board_s) & (board.kind != SILENT)).sum() + np.isnan(times.mtx_s).sum())
 
     def _advance_clock(self, times: Times) -> None:
@@ -271,7 +261,7 @@ class FrontEnd:
         return [replace(segment, belt=self.heading_fusion.evidence) for segment in self.path.add_step(step)]
 
     def _add_belt(self, blocks: deque[tuple[int, GyroBlock]], before: float = math.inf) -> None:
-        """Hand the blocks of gyro samples that are filled before a message to the fusion of the headings."""
+        """Hand the gyro blocks that are filled before a message to the heading fusion."""
         while blocks and blocks[0][0] < before:
             self.heading_fusion.add_belt(blocks.popleft()[1])
 
@@ -292,7 +282,7 @@ class FrontEnd:
     ) -> Floats:
         """Merge foot and legs into one path, message by message, and hand its segments to the synchronizer.
 
-        Returns by message (n,) the time up to which foot or legs have been observed.
+        Returns, for each message (n,), the time up to which foot or legs have been observed.
         """
         count, next_segment = len(times.mtx_newest_s), 0
         block_index, legs_s = [0], [self.handover.legs_observed_s]

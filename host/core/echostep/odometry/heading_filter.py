@@ -3,7 +3,7 @@
 
 In: `StanceHeadings`. Out: state and covariance, whether the belt can be trusted. Owns the model of both headings' errors.
 
-Between two stances the foot's error walks at random as its navigation states; the belt's error is its noise, its bias times time, its scale error
+Between two stances the foot's error walks at random as stated by its navigation; the belt's error is its noise, its bias times time, its scale error
 times the turn. Trunk and foot differ by a constant angle, from stance to stance by JITTER_RAD, and more where the wearer turns.
 """
 
@@ -34,7 +34,7 @@ SURE_SCALE = 0.03  # sd, two right angles; real belts err by 1 to 2 %
 LARGEST_SCALE = 0.1  # sensitivity, and 20 degrees of tilt of the axis, which cost 6 %
 SCALE_WALK = 0.001  # from stance to stance: a belt that shifts, 1 % in a hundred strides
 MEMORY = 20  # stances in the mean of the squared normalized innovations; 1 is expected
-LARGEST_MEAN_SQUARE = 2.5  # of a belt that is worn; about 20 normal ones exceed it once in 10,000
+LARGEST_MEAN_SQUARE = 2.5  # of a worn belt; the mean of about 20 normal ones exceeds it once in 10,000
 CORRELATED_S = 30.0  # the error of the bias acts in one direction until walls correct the heading: as a random walk of this much growth
 
 
@@ -50,7 +50,7 @@ class HeadingFilter:
 
     @property
     def trusted(self) -> bool:
-        """Whether the turns of the foot have confirmed those of the belt."""
+        """Whether the foot's turns have confirmed the belt's turns."""
         known = self.P[SCALE, SCALE] < SURE_SCALE**2 and abs(self.state[SCALE]) < LARGEST_SCALE
         return bool(known and self._mean_square < LARGEST_MEAN_SQUARE)
 
@@ -60,7 +60,7 @@ class HeadingFilter:
         return float(bias * dt + self.P[SCALE, SCALE] * turn_rad**2)
 
     def propagate(self, stance: StanceHeadings, kept: float = 1.0) -> Floats:
-        """The state up to a stance; returns the transition (SIZE, SIZE). `kept`: share of the foot's error that is not left to the rest."""
+        """Propagate the state to a stance; returns the transition (SIZE, SIZE). `kept`: share of the foot's error that is not left to the rest."""
         dt, turn = stance.t_s - self._last.t_s, wrap(stance.foot_rad - self._last.foot_rad)
         self._last, self._turn_rad = stance, turn
         f = np.eye(SIZE)
@@ -75,7 +75,7 @@ class HeadingFilter:
         return f
 
     def update(self, stance: StanceHeadings) -> bool:
-        """Update by the measured difference; False: the innovation is beyond the gate."""
+        """Update by the measured difference; False if the innovation is beyond the gate."""
         innovation = wrap(stance.foot_rad - stance.belt_rad - float(MEASURED @ self.state))
         towards = self.P @ MEASURED
         variance = float(MEASURED @ towards) + JITTER_RAD**2 + (TWIST_SHARE * self._turn_rad) ** 2

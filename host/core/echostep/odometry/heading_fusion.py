@@ -5,12 +5,12 @@ In: blocks of belt rates, steps and stances of the foot (walk frame), in order o
 for each. Owns the filter of foot less belt heading and the correction of the foot's heading.
 
 In the middle of each stance, and at both ends of standing, foot less belt heading is measured. The filter's estimate of the foot's error is
-divided by the variances of both turns. Only a recent error is corrected: a bias found later must not bend the path that is behind, or all
+divided by the variances of both turns. Only a recent error is corrected: a bias found later must not bend the path already walked, or all
 corrections would sum up to the foot's own drift. In the long run the foot is more accurate, since its error grows with the root of time: the
 correction fades. A drawing, which needs no heading at once, uses a smoother [mapping.smoothed_heading].
 
 Without evidence that the belt gyro turns with the foot the correction is kept as it is: a dead, loose or reversed gyro never corrects. A gap of foot
-or belt, or REFUSALS stances in a row beyond the gate, begin the evidence anew.
+or belt, or REFUSALS stances in a row beyond the gate, restart the evidence.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ REST_S = 1.0  # a longer stance is standing [foot.trunk_path], which is measured
 EDGE_S = 0.25  # half a stance from them
 # Walking adds to the bias by turns about the other axes: two belts on one pelvis differ by 0.08 deg/s more in walking than at rest [legs_qmt].
 WALKING_RAD_S = math.radians(0.06)
-# Some strides, in which jitter lets the filter find an error of the foot; what is older is no longer sought
+# Some strides, in which jitter lets the filter find an error of the foot; older errors are no longer sought
 RECENT_S = 10.0
 REFUSALS = 3  # stances in a row, assumed
 # A stride's turn is known to a degree; beyond this the foot's samples were missing, and its frame is a new one
@@ -41,7 +41,7 @@ class HeadingFusion:
     """Call `add_belt` and `corrected` in order of the messages."""
 
     def __init__(self) -> None:
-        self.correction_rad = 0.0  # error of the foot's heading so far, as far as it is known
+        self.correction_rad = 0.0  # known error of the foot's heading so far
         self.evidence: BeltEvidence | None = None  # of the last step; None before there is a belt
         self._belt = BeltAngle()
         self._filter: HeadingFilter | None = None
@@ -49,7 +49,7 @@ class HeadingFusion:
         self._growth = 0.0  # variance of the foot's turn since then, rad2
         self._share = 0.0  # of the foot's turn error that the last stance has taken out, and the next is expected to
         self._promised = 0.0  # variance (rad2) that steps since the last stance did not state
-        self._owed = 0.0  # of that what was not taken out
+        self._owed = 0.0  # the part of it that was not taken out
         self._refused = 0  # stances in a row
         self._stances: list[StanceHeadings] = []  # since the last step
 
@@ -59,7 +59,7 @@ class HeadingFusion:
 
     @property
     def trusted(self) -> bool:
-        """Whether the turns of the foot have confirmed those of the belt."""
+        """Whether the foot's turns have confirmed the belt's turns."""
         return self._filter is not None and self._filter.trusted
 
     def corrected(self, event: Step | Stance) -> Step | Stance:
@@ -112,7 +112,7 @@ class HeadingFusion:
         self._last, self._growth = headings, 0.0
 
     def _correct(self, known: HeadingFilter, headings: StanceHeadings, last: StanceHeadings) -> bool:
-        """Correct the foot by the belt's share of its estimated error; False: the difference is beyond the gate."""
+        """Correct the foot by the belt's share of its estimated error; False if the difference is beyond the gate."""
         dt = headings.t_s - last.t_s
         belt = known.belt_variance(dt, wrap(headings.foot_rad - last.foot_rad))
         share = headings.growth_rad2 / (headings.growth_rad2 + belt)

@@ -30,7 +30,7 @@ class _Measurement(Protocol):
     value_m: float  # range of a ping, NaN without an echo, or height by pressure
     source: int  # ranger of a ping (0 looks left, 1 right), or BAROMETER
     ranger_part: int  # of a ping: kind of its ranger; 0: not named
-    barometer_starts: int  # of a height: how often the heights have begun anew before it
+    barometer_starts: int  # of a height: how often the heights have begun again before it
 
 
 MEASUREMENT = record_dtype(_Measurement)
@@ -66,7 +66,7 @@ class _WaitingSegments(NamedTuple):
 
 
 class _Progress(NamedTuple):
-    """By message (n,): newest time of the board and of the MTx, and the time up to which foot or legs have been observed."""
+    """For each message (n,): newest time of the board and of the MTx, and the time up to which foot or legs have been observed."""
 
     board_s: Floats
     mtx_s: Floats
@@ -122,7 +122,7 @@ class Synchronizer:
     def pop_ready(
         self, board_newest_s: Floats, mtx_newest_s: Floats, observed_s: Floats
     ) -> list[MeasuredSegment | Dropout]:
-        """Segments and dropouts that are certain after these messages (n,), from how far each port has come with each; NaN: no message yet.
+        """Segments and dropouts that are certain after these messages (n,), by the newest time of each port after each; NaN: no message yet.
 
         `observed_s` (n,): time up to which foot or legs have been observed.
         """
@@ -161,7 +161,7 @@ def _pieces(
 
 
 def _measured(segment: PathSegment, measurements: Records, ahead_rad: float) -> MeasuredSegment:
-    """A segment with its pings, and apart from them the heights since the newest beginning of heights."""
+    """A segment with its pings, and separately the heights since their newest beginning."""
     is_ping = measurements["source"] != BAROMETER
     ranger_part, heights = measurements["ranger_part"][is_ping], measurements[~is_ping]
     starts = int(heights["barometer_starts"][-1]) if len(heights) else 0

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Who is told, beside the tracker, what the wearer does: samples, segments and taps as they come. This one does nothing with them.
+"""A watch over the wearer beside the tracker: receives samples, segments and taps as they come. This one does nothing with them.
 
 In: samples of foot, legs and belt and segments of the path, each with the index of the message that brought it; taps. Out: an `Alarm`, None while
-all is well. Owns nothing. A watch that is handed to the tracker overrides what concerns it.
+all is well. Owns nothing. A watch that is handed to the tracker overrides the methods that concern it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class AlarmReason(StrEnum):
 class Alarm:
     """An alarm: `number` of this run; `since_s`: time of the last motion, of the fall, of the call for help, or of its end.
 
-    `mayday_s`: of a question, when it becomes a mayday.
+    `mayday_s`: time at which a question becomes a mayday.
     """
 
     kind: AlarmKind
@@ -47,7 +47,7 @@ class Alarm:
 
 
 class WearerWatch:
-    """The front end calls the `add_` methods with what a portion brings, then `settle`; the tracker calls the others."""
+    """The front end calls the `add_` methods with the data of a portion, then `settle`; the tracker calls the others."""
 
     alarm: Alarm | None = None
 
@@ -55,7 +55,7 @@ class WearerWatch:
         """Samples of the foot: t_s (n,), gyro (n, 3) rad/s, accel (n, 3) m/s2, message_index (n,)."""
 
     def add_belt(self, t_s: Floats, gyro: Floats, accel: Floats, thigh_accel: Floats, message_index: Ints, /) -> None:
-        """Samples of the belt, as those of the foot, with the thigh's specific force (n, 3) at the same instants."""
+        """Samples of the belt, in the form of the foot's samples, with the thigh's specific force (n, 3) at the same instants."""
 
     def add_legs(self, message_index: int, block: GyroBlock, /) -> None:
         """A block of the leg gyros."""
@@ -64,7 +64,7 @@ class WearerWatch:
         """Segments of the path."""
 
     def settle(self) -> None:
-        """The portion is complete: its samples and segments in the order of their messages."""
+        """The portion is complete: process its samples and segments in the order of their messages."""
 
     def advance(self) -> None:
         """The portion's estimates are published."""

@@ -15,13 +15,13 @@ from echostep.arrays import Floats
 
 WITHIN = 0.25  # largest step within a burst, as a share of the time between bursts; assumed
 ALIKE_SHARE = 0.8  # least share of the bursts that have the usual size; assumed
-BETWEEN_QUANTILE = 0.9  # of the steps: one between two bursts, for bursts of up to ten samples
-PAUSE = 1.5  # times the usual time between bursts; after a longer one samples are missing, and a burst begins by the usual period
+BETWEEN_QUANTILE = 0.9  # quantile of the steps that lies between two bursts, for bursts of up to ten samples
+PAUSE = 1.5  # times the usual time between bursts; after a longer pause samples are missing, and the usual period is assumed
 FEWEST = 8  # bursts
 
 
 def spread(t_s: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """The times (n,), evenly spaced within each burst, and a note; unchanged, without a note, where they do not come in bursts of one size."""
+    """The times (n,), evenly spaced within each burst, and a note; unchanged, without a note, if they do not come in bursts of one size."""
     steps = np.diff(t_s)
     if len(steps) < FEWEST or (steps < 0.0).any():
         return t_s, ()

@@ -32,7 +32,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, slots=True)
 class CsvLimits:
-    """`line_chars`: a longer line is an error. `lines`: reading stops after so many. `early_rows`: rows after which garbage is given up, or None."""
+    """`line_chars`: a longer line is an error. `lines`: most lines that are read. `early_rows`: rows after which garbage is given up, or None."""
 
     line_chars: int = LONGEST_LINE
     lines: int | None = None
@@ -94,9 +94,9 @@ def read_rows(
 ) -> CsvTable:  # fmt: skip
     """Rows of the lines after the header, from line `first` on; empty lines are skipped.
 
-    `columns`: index of each wanted column, -1 for one that the file lacks.
+    `columns`: index of each wanted column, -1 if the file lacks it.
 
-    A row with more cells than the header has names counts as one without numbers: a decimal comma between commas moves all cells behind it. With
+    A row with more cells than the header has names counts as a row without numbers: a decimal comma between commas moves all cells after it. With
     `limits.early_rows`, raises ValueError when fewer than two rows exist, or when most of them lack a number in one of the first `required` columns.
     """
     (names, separator), values, numbers, bad = header, array("d"), array("q"), 0
@@ -127,7 +127,7 @@ def _check_share(rows: int, bad: int) -> None:
 
 
 def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, too_fast: str) -> str:
-    """Message for a sample rate (Hz) outside of the range, with the likely unit of t_s or else the advice for it; empty inside."""
+    """Message for a sample rate (Hz) outside the range, with the likely unit of t_s or else the given advice; empty inside."""
     if range_hz[0] <= rate <= range_hz[1]:
         return ""
     for unit, option, factor in TIME_UNITS:
@@ -138,7 +138,7 @@ def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, to
 
 
 def number_of(text: str) -> float:
-    """The number in a cell; NaN where there is none, or one that no sensor and no clock gives."""
+    """The number in a cell; NaN if missing, or if no sensor and no clock gives such a number."""
     try:
         number = float(text)
     except ValueError:

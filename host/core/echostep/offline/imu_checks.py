@@ -28,9 +28,9 @@ GRAVITY_RANGE_M_S2 = (
     7.0,
     13.0,
 )  # of the specific force at rest: 30 % for errors of the sensor and a foot not quite at rest
-G_RANGE = (0.7, 1.3)  # of the same in units of gravity
+G_RANGE = (0.7, 1.3)  # the same in units of gravity
 FASTEST_FOOT_RAD_S = 40.0  # 2300 deg/s; common gyros end at 2000 deg/s
-FASTEST_QUANTILE = 0.999  # of the rates, compared with it: single spikes are left out
+FASTEST_QUANTILE = 0.999  # of the rates, compared with that limit: single spikes are left out
 RATE_RANGE_HZ = (45.0, 550.0)  # 50 to 500 Hz with a margin of 10 %
 REGULAR_SHARE = 0.01  # largest share of sorted times that follow each other within half a period
 BACK_SHARE = 0.02  # largest share of rows whose time goes back
@@ -151,13 +151,13 @@ def notes(table: Floats, columns: Sequence[str]) -> tuple[str, ...]:
 
 
 def missing_share(steps: Floats) -> float:
-    """Share of missing samples, by the differences of time (n,): one less the number of samples over that of median periods."""
+    """Share of missing samples, from the differences of time (n,): one less the ratio of samples to median periods."""
     forward = steps[steps > 0.0]
     return 1.0 - len(forward) * float(np.median(forward)) / float(forward.sum())
 
 
 def _clipped(column: Floats, steep: float) -> tuple[float, float] | None:
-    """The extreme value that a column (n,) repeats, and its share of the rows; None when it repeats none beyond `steep`."""
+    """The extreme value that a column (n,) repeats, and its share of the rows; None if it repeats no value beyond `steep`."""
     for limit in (float(column.max()), float(column.min())):
         at_limit = column == limit
         repeated = at_limit[1:] & at_limit[:-1]

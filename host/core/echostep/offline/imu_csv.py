@@ -25,7 +25,7 @@ from echostep.foot.steps import Stance, Step, Track, walk_track
 from echostep.foot.trunk_path import RUN_STANCE_S
 from echostep.offline.bursts import spread
 from echostep.offline.csv_table import CsvLimits, column_of, lines_of, number_of, open_samples, read_rows
-from echostep.offline.foreign_columns import ADVICE, OWN, Naming, read_header
+from echostep.offline.header import HeaderReader, own_header
 from echostep.offline.imu_checks import complaint, contradiction, end_sd_m, notes, sorted_by_time, whole_rows
 
 COLUMNS = ("t_s", "ax", "ay", "az", "gx", "gy", "gz")
@@ -47,16 +47,16 @@ class Imu:
     notes: tuple[str, ...] = ()
 
 
-def load_imu(path: Path | str, naming: Naming = OWN) -> Imu:
-    """Samples of a CSV file; raises EchostepError that names the file and what is wrong with which column."""
-    table, mended = open_samples(path, partial(_mended_table, naming=naming))
+def load_imu(path: Path | str, header: HeaderReader = own_header) -> Imu:
+    """Samples of a CSV file; raises EchostepError that names the file, the column and what is wrong with it."""
+    table, mended = open_samples(path, partial(_mended_table, read_header=header))
     mag = table[:, 7:10] if table.shape[1] > len(COLUMNS) else None
     return Imu(table[:, 0], table[:, 1:4], table[:, 4:7], mag, (*mended, *notes(table, COLUMNS)))
 
 
-def _mended_table(file: TextIO, naming: Naming) -> tuple[Floats, tuple[str, ...]]:
+def _mended_table(file: TextIO, read_header: HeaderReader) -> tuple[Floats, tuple[str, ...]]:
     """Usable rows (n, 7) or (n, 10) in order of time, and notes on what was mended; raises ValueError for samples that cannot be used."""
-    table, left_out = _table(lines_of(file, CsvLimits()), naming)
+    table, left_out = _table(lines_of(file, CsvLimits()), read_header)
     table, holes = whole_rows(table)
     if empty := int(np.isnan(table[:, len(COLUMNS) :]).any(axis=1).sum()):
         left_out = (f"{empty} rows without a number of the magnetometer: used without it",)
@@ -67,13 +67,13 @@ def _mended_table(file: TextIO, naming: Naming) -> tuple[Floats, tuple[str, ...]
     return table, (*holes, *left_out, *mended, *spreading)
 
 
-def _table(lines: Iterator[str], naming: Naming) -> tuple[Floats, tuple[str, ...]]:
-    """The columns (n, 7), or (n, 10) with a magnetometer, in SI units, and notes on where they come from and on one that is not whole."""
-    head = read_header(lines, naming)
+def _table(lines: Iterator[str], read_header: HeaderReader) -> tuple[Floats, tuple[str, ...]]:
+    """The columns (n, 7), or (n, 10) with a magnetometer, in SI units, and notes on their origin and on an incomplete magnetometer."""
+    head = read_header(lines)
     header = head.names
     if missing := [name for name in COLUMNS if name not in header]:
         hint = ": the first line must name the columns" if all(map(math.isfinite, map(number_of, header))) else ""
-        raise ValueError(f"no column {', '.join(missing)}{hint}; expected {','.join(COLUMNS)}[,mx,my,mz]{ADVICE}")
+        raise ValueError(f"no column {', '.join(missing)}{hint}; expected {','.join(COLUMNS)}[,mx,my,mz]{head.advice}")
     wanted = COLUMNS + MAG_COLUMNS if all(name in header for name in MAG_COLUMNS) else COLUMNS
     columns = [column_of(header, name) for name in wanted]
     half = [name for name in MAG_COLUMNS if name in header and name not in wanted]
@@ -104,7 +104,7 @@ def write_foot_track(path: Path | str, track: Track) -> None:
 
 
 def _describe_runs(track: Track) -> str:
-    """The steps that ended in a stance too brief for walking, and how well such a step is known, in words; empty without any."""
+    """The steps that ended in a stance too brief for walking, and how well such a step is known, in words; empty if none."""
     brief = [
         math.sqrt(float(step.covariance[0, 0] + step.covariance[1, 1]))
         for step, after in zip(track.events, track.events[1:], strict=False)

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The building's plan: plan.json, its checks, its drawing, routes through it, and importers of other formats.
+"""The building's plan, as plan.json holds it.
 
-In: plan files; drawings and maps of other programs (`importers`). Out: `Plan`: levels of walls, doors, rooms and connectors, in metres (map frame).
-Owns the file format and everything that needs shapely.
+In: a plan file. Out: `Plan`: levels of walls, doors, rooms and connectors, in metres (map frame). Owns the file format.
 """
 
 from echostep.plan.model import (
+    FORMAT_VERSION,
+    NO_PLAN,
     Connector,
     ConnectorKind,
     Door,
@@ -14,12 +15,17 @@ from echostep.plan.model import (
     Level,
     Plan,
     Pose,
+    Question,
     Room,
+    is_no_plan,
     load_plan,
     parse_plan,
+    sides,
 )
 
 __all__ = [
+    "FORMAT_VERSION",
+    "NO_PLAN",
     "Connector",
     "ConnectorKind",
     "Door",
@@ -28,7 +34,10 @@ __all__ = [
     "Level",
     "Plan",
     "Pose",
+    "Question",
     "Room",
+    "is_no_plan",
     "load_plan",
     "parse_plan",
+    "sides",
 ]

@@ -44,7 +44,7 @@ def _no_places() -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """A room's name and its position; its outline (n, 2) in metres, None where the plan has none."""
+    """A room's name and its position; its outline (n, 2) in metres, or None."""
 
     name: str
     at_m: tuple[float, float]
@@ -68,9 +68,9 @@ class Door:
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What an import could not decide, for a person to answer in the plan editor; walks ignore it.
+    """A question that an import could not decide, for a person to answer in the plan editor; walks ignore it.
 
-    `at_m`: where to look. `lines_m`: the doors or walls that it is about. `is_proposed`: they are no part of the plan, but may be.
+    `at_m`: where to look. `lines_m`: the doors or walls that it is about. `is_proposed`: they are not part of the plan, but may be.
     """
 
     text: str
@@ -105,14 +105,14 @@ class Level:
 
     @property
     def is_refused(self) -> bool:
-        """Whether it was drawn by a walk, and most of its places are not known to a room: it is no plan."""
+        """Whether it was drawn by a walk and most of its places are not known to within a room: then it is no plan."""
         return is_no_plan(self.place_sd)
 
     @property
     def heard(self) -> Floats:
-        """All segments that echoes are compared with: those that are solid, and the doubtful walls of a drawing.
+        """All segments that echoes are compared with: the solid ones, and the doubtful walls of a drawing.
 
-        Of these the distance from places beside them is known better than their place in the building.
+        The distance of doubtful walls from places beside them is known better than their place in the building.
         """
         if not len(self.place_sd) or self.is_refused:
             return self.solid
@@ -127,7 +127,7 @@ class Level:
 
 
 def is_no_plan(place_sd: Floats) -> bool:
-    """Whether most of a drawn storey's places (k, 3) are not known to a room."""
+    """Whether most of a drawn storey's places (k, 3) are not known to within a room."""
     return len(place_sd) > 0 and float(np.median(place_sd[:, 2])) > MOST_PLACE_SD_M
 
 
@@ -165,7 +165,7 @@ class Georeference:
 class Plan:
     """A building; a notebook shows it as a picture.
 
-    `digest`: SHA-256 of the file. `uncertainty_m`: standard deviation of the walls' positions, None where unknown.
+    `digest`: SHA-256 of the file. `uncertainty_m`: standard deviation of the walls' positions, None if unknown.
     """
 
     name: str
@@ -183,16 +183,16 @@ class Plan:
         return f"<Plan {short(self.name)}: {short(names)}; {walls} walls, {rooms} rooms>"
 
     def _repr_svg_(self) -> str | None:
-        """All levels as a picture, for a notebook; None, so that the repr is shown, without matplotlib."""
+        """All levels as a picture, for a notebook; None without matplotlib, so that the repr is shown."""
         return svg_of(self)
 
     @property
     def is_drawn(self) -> bool:
-        """Whether it has anything that echoes are compared with: NO_PLAN, and a drawing that is refused, have not."""
+        """Whether it has segments that echoes are compared with; NO_PLAN and a refused drawing have none."""
         return any(len(level.heard) for level in self.levels)
 
 
-# Where there is no plan, the map begins where the walk begins: x to the right of the first heading, y ahead.
+# Without a plan, the map begins where the walk begins: x to the right of the first heading, y ahead.
 NO_PLAN = Plan("no plan", (Level("", 0.0, _no_segments()),), Pose(0.0, 0.0, 0.5 * math.pi), "")
 
 
@@ -301,7 +301,7 @@ def _level_index(reference: str | int, where: str, names: list[str]) -> int:
 
 
 def _outline(points: Sequence[tuple[float, float]], where: str) -> Floats:
-    """An outline of at least three corners -> (n, 2) float64; corners repeated one after the other are one."""
+    """An outline of at least three corners -> (n, 2) float64; consecutive equal corners count as one."""
     if len(points) > plan_file.MOST_CORNERS:
         raise ValueError(f"{where}: {len(points)} corners, expected {plan_file.MOST_CORNERS} at most")
     corners = [corner for corner, _ in groupby(points)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The fields of plan.json: `plan/model.py` makes a `Plan` of them.
+"""The fields of plan.json: `plan/model.py` makes a `Plan` from them.
 
 In: nothing. Out: structs whose types check each field, and say what it is. Owns the limits.
 """
@@ -10,19 +10,13 @@ from typing import Annotated, Literal
 
 from msgspec import UNSET, Meta, Struct, UnsetType
 
-LIMIT_M = 1e5  # greatest coordinate: 100 km, more than any site
+from echostep.fields import LIMIT_M, Deviation, Latitude, Longitude, Metres, Text
+
 MOST_CORNERS = 10_000  # of an outline: a room of a drawing with arcs has hundreds
 DoorState = Literal["open", "closed", "unknown"]
 ConnectorKind = Literal["stairs", "lift", "ramp"]
 QuestionAbout = Literal["door", "wall", "room"]
 
-Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M, description=f"a finite number within {LIMIT_M:.0f} m")]
-Deviation = Annotated[float, Meta(ge=0.0, le=LIMIT_M, description=f"a finite number from 0 to {LIMIT_M:.0f} m")]
-Longitude = Annotated[float, Meta(ge=-180.0, le=180.0, description="a finite number within 180 degrees east")]
-Latitude = Annotated[float, Meta(ge=-90.0, le=90.0, description="a finite number within 90 degrees north")]
-# What UTF-8 and XML cannot hold: lone surrogates, and control characters but tab and line ends [XML 1.0, 2.2]
-UNWRITABLE = r"\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff"
-Text = Annotated[str, Meta(pattern=rf"^[^{UNWRITABLE}]*$", description="a text without control characters")]
 Reference = Annotated[Text | int, Meta(description="the name or the index of a level")]
 Point = Annotated[tuple[Metres, Metres], Meta(description="[x, y] in metres")]
 Outline = Annotated[list[Point], Meta(description="a list of corners, [x, y] in metres")]
@@ -47,7 +41,7 @@ class DoorFields(Struct):
 
 
 class QuestionFields(Struct):
-    """What an import could not decide."""
+    """A question that an import could not decide."""
 
     text: Text
     about: Annotated[QuestionAbout, Meta(description="one of door, wall, room")]

@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Bytes of the ports: `Chunk`; `Portion`, many of them as columns; the queue between the threads that read the ports and the run.
+"""Bytes of the ports: `Chunk`; `Portion`, many of them as columns.
 
-In: chunks from live ports, a recording or a simulation. Out: the same chunks as the columns of a `Portion`. Owns the chunks that wait, and the number
-of those dropped: the queue is bounded for each port, so that one port never crowds out another.
+In: chunks from live ports, a recording or a simulation. Out: the same chunks as the columns of a `Portion`. Owns nothing.
 """
 
 from __future__ import annotations
 
-import threading
-from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
@@ -21,12 +18,12 @@ from echostep.jit import kernel
 # Names of the ports.
 BOARD = "board"
 MTX = "mtx"
-FOOT = "foot"  # a second board, at the ankle, in the place of an MTx
+FOOT = "foot"  # a second board, at the ankle, in place of an MTx
 GATEWAY = "gateway"
+POINT = "point"  # taps at surveyed points: they never reach the tracker, a track is judged by them
+TEAM = "team"  # places of teammates, for a rescuer's guidance
 
 LATEST_NS = 1 << 62  # a later arrival time (damage in a recording) is replaced by this one; assumed
-MOST_BYTES = 1 << 24  # of one port that wait: minutes of the board's or the MTx's bytes
-CHUNK_BYTES = 100  # of memory that a chunk takes besides its bytes, about
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,33 +146,3 @@ def _copy_ranges(received: Octets, start: Ints, end: Ints, joined: Octets) -> No
         for byte_index in range(start[k], end[k]):
             joined[joined_index] = received[byte_index]
             joined_index += 1
-
-
-class ChunkQueue:
-    """Call `put` from any thread, `get` from one. `dropped`: chunks by port that found no room."""
-
-    def __init__(self) -> None:
-        self.dropped: Counter[str] = Counter()
-        self._chunks: deque[Chunk] = deque()
-        self._bytes: Counter[str] = Counter()  # that wait, by port
-        self._changed = threading.Condition()
-
-    def put(self, chunk: Chunk) -> None:
-        """Append a chunk; it is dropped and counted when too many bytes of its port wait."""
-        size = len(chunk.data) + CHUNK_BYTES
-        with self._changed:
-            if self._bytes[chunk.port] + size > MOST_BYTES:
-                self.dropped[chunk.port] += 1
-                return
-            self._bytes[chunk.port] += size
-            self._chunks.append(chunk)
-            self._changed.notify()
-
-    def get(self, timeout_s: float) -> Chunk | None:
-        """The oldest chunk; None after the timeout."""
-        with self._changed:
-            if not self._chunks and not self._changed.wait_for(lambda: bool(self._chunks), timeout_s):
-                return None
-            chunk = self._chunks.popleft()
-            self._bytes[chunk.port] -= len(chunk.data) + CHUNK_BYTES
-            return chunk

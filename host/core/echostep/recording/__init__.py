@@ -1,5 +1,29 @@
 # SPDX-License-Identifier: MIT
-"""Recordings: all received chunks in an MCAP file, written, read, described, cut and repaired.
+"""Recordings: all received chunks of a run in an MCAP file, read; `echostep_app.recording` writes, describes, cuts and repairs them.
 
-In: chunks, or a file. Out: a file, or portions of chunks. Owns the file while it is written.
+In: a file. Out: its portions of chunks, its metadata, its damage. Owns the file while it is read.
 """
+
+from typing import TYPE_CHECKING
+
+from echostep.additions import face
+
+if TYPE_CHECKING:
+    from echostep.recording.being_written import SUFFIX, is_being_written
+    from echostep.recording.capture import Decoder, as_json, port_of_bytes, read_capture
+    from echostep.recording.clock import clock_of, log_offset_ns, utc_offset_ns, with_log_time
+    from echostep.recording.joining import open_parts
+    from echostep.recording.mcap_records import MCAP_MAGIC
+    from echostep.recording.reading import Recording, open_recording
+
+__getattr__ = face(
+    __name__,
+    {
+        "being_written": "SUFFIX is_being_written",
+        "capture": "Decoder as_json port_of_bytes read_capture",
+        "clock": "clock_of log_offset_ns utc_offset_ns with_log_time",
+        "joining": "open_parts",
+        "mcap_records": "MCAP_MAGIC",
+        "reading": "Recording open_recording",
+    },
+)

@@ -26,14 +26,14 @@ from echostep.xsens.message import MessageReader, as_object
 
 READ_BYTES = 1 << 16  # of one read of the file: many frames, little memory
 HEAD_BYTES = 1 << 20  # of a port, by which the output format of legacy data is found; assumed
-BOARD_FRAME, MT_FRAME = 10, 5  # bytes of a frame besides the body, about: to compare what two readers have understood
+BOARD_FRAME, MT_FRAME = 10, 5  # approximate bytes of a frame besides the body, to compare what two readers understood
 MESSAGE_NAMES: dict[type, str] = {kind: kind.__name__ for kind in BY_ID.values()}
 Chunks = Iterator[tuple[str, bytes]]  # port, bytes
 
 
 @dataclass
 class Decoder:
-    """Bytes of named ports -> messages; the readers count good and damaged frames. `tracked` counts what the tracker would make of the MT's bytes."""
+    """Bytes of named ports -> messages; the readers count good and damaged frames. `tracked` counts the MT's bytes as the tracker would read them."""
 
     board: BoardReader = field(default_factory=BoardReader)
     foot: BoardReader = field(default_factory=BoardReader)
@@ -92,7 +92,7 @@ def _head(chunks: Iterable[tuple[str, bytes]]) -> bytes:
 
 
 def port_of_bytes(path: Path) -> str | None:
-    """The port whose reader understands more bytes of the first blocks in which one is understood; None when none is."""
+    """The port whose reader understands more bytes of the first blocks in which any byte is understood; None if no byte is."""
     board, mt = BoardReader(), FrameReader(LONGEST)
     for received in _blocks(path):
         understood = {BOARD: BOARD_FRAME * len(board.feed(received)), MTX: _bytes_of_frames(mt, received)}
@@ -102,7 +102,7 @@ def port_of_bytes(path: Path) -> str | None:
 
 
 def _port_that_sends(path: Path) -> str:
-    """The same; raises EchostepError for None."""
+    """The same; raises EchostepError instead of returning None."""
     if (port := port_of_bytes(path)) is None:
         raise EchostepError(f"{path}: neither board frames nor Xbus frames nor an MCAP recording")
     return port

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The time of day of a recording.
 
-In: its metadata. Out: Unix times of arrival times, and what lies between the two clocks; None where the time of day was not recorded, as in a
-simulation. Owns nothing. The clock of the arrivals never steps; what lies between it and UTC is therefore read once, at the start.
+In: its metadata. Out: Unix times of arrival times, and the offset between the two clocks; None if the time of day was not recorded, as in a
+simulation. Owns nothing. The clock of the arrivals never steps; its offset from UTC is therefore read once, at the start.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The parts of a run as one recording.
 
-In: files, folders and patterns. Out: a `Recording` of all parts in order; what is missing between them is damage that is told. Owns nothing.
+In: files, folders and patterns. Out: a `Recording` of all parts in order; parts missing between them are reported as damage. Owns nothing.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ class JoinedRecording(Recording):
         return [*(f"{part.path.name}: {line}" for part in self.parts for line in part.damage()), *self._missing()]
 
     def damage_notes(self) -> list[str]:
-        """The same, to be noted in a recording that is made of this one."""
+        """The same, to be noted in a recording made from this one."""
         return [*(line for part in self.parts for line in part.damage_notes()), *self._missing()]
 
     def _missing(self) -> list[str]:
-        """A sentence for each hole in the numbers of the parts, and for a last part behind which there is another one."""
+        """A sentence for each gap in the numbers of the parts, and for a last part that another one follows."""
         numbers = [0, *map(number_of, self.parts)]
         lines = [
             f"{'parts' if b - a > 2 else 'part'} {a + 1}{f' to {b - 1}' if b - a > 2 else ''} of the run "
@@ -60,7 +60,7 @@ class JoinedRecording(Recording):
 
 
 def number_of(part: Recording) -> int:
-    """The number of a part, 1 where its metadata have none that can be."""
+    """The number of a part, 1 if its metadata have no possible one."""
     text = part.metadata.get(PART, "1")
     return int(text) if text.isascii() and text.isdigit() and 1 <= len(text) <= 4 and int(text) else 1
 

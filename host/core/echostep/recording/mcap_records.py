@@ -35,7 +35,7 @@ CHANNEL_IDS = 1 << 16  # a channel number has 16 bits
 
 METADATA_NAME = "echostep"  # of the metadata record
 DAMAGE_NAME = (
-    "echostep.damage"  # of a second one, at the end: what was wrong with the recording of which this one was made
+    "echostep.damage"  # of a second one, at the end: what was wrong with the recording from which this one was made
 )
 PART_NAME = "echostep.part"  # of a record at the end of a part: which file goes on, as the value of `NEXT`
 RUN, PART, NEXT = "run", "part", "next"  # metadata keys of a recording in parts: its first file, the number of the part

@@ -31,7 +31,7 @@ from echostep.recording.mcap_records import (
     read_uint,
 )
 
-PORTION_BYTES = 1 << 18  # about, of the file in one portion: about five seconds of a walk; assumed
+PORTION_BYTES = 1 << 18  # of the file in one portion, approximately: about five seconds of a walk; assumed
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class MessageRun:
 
 @dataclass
 class PortChannels:
-    """Channels read so far: `names` of ports, by channel number the index into `names` (-1: of no port), and `known`: whether it was read.
+    """Channels read so far: `names` of ports; for each channel number the index into `names` (-1: no port), and `known`: whether it was read.
 
     `misnamed`: topics of channels that carry bytes of a port but are not named as one, or the reverse: one of the two is damaged.
     """
@@ -56,7 +56,7 @@ class PortChannels:
     _settled: set[int] = field(default_factory=set)  # numbers of the channels in a trusted summary
 
     def add_summary(self, ending: Ending) -> None:
-        """Add the channels that are repeated at the end; no later record changes those of a trusted summary."""
+        """Add the channels that are repeated at the end; no later record changes the channels of a trusted summary."""
         for opcode, body in ending.summary:
             if opcode == Opcode.CHANNEL and (channel := parse_record(Channel, body)):
                 self.add(body)

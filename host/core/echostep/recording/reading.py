@@ -43,17 +43,17 @@ from echostep.recording.message_runs import MessageRun, PortChannels, read_messa
 
 @dataclass
 class Recording:
-    """A recording on disk. What is wrong with it is known once its portions were iterated."""
+    """A recording on disk. Its damage is known once its portions have been iterated."""
 
     path: Path
     metadata: dict[str, str] = field(default_factory=dict)
     own_damage: FileDamage = field(default_factory=FileDamage)  # of this very file
     fraction: float = 0.0  # of the file, read so far
     grows: bool = False  # it is being written: reading ends before an unfinished record
-    resume: int = -1  # offset from which `portions_from` goes on behind the last portion; -1 inside a compressed chunk
-    library: str = ""  # by which the file was written
+    resume: int = -1  # offset from which `portions_from` goes on after the last portion; -1 inside a compressed chunk
+    library: str = ""  # that wrote the file
     goes_on_in: str = ""  # name of the file with the next part of the run
-    before: list[str] = field(default_factory=list)  # damage of the recordings of which this one was made
+    before: list[str] = field(default_factory=list)  # damage of the recordings from which this one was made
     _log_offset_ns: int = 0  # log time minus arrival time
     _ended: bool = False  # its end record was read
     _intact: bool | None = None  # whether the checksum is right; None: unknown yet
@@ -73,7 +73,7 @@ class Recording:
         self.fraction = 1.0
 
     def portions_from(self, offset: int) -> Iterator[Portion]:
-        """The portions behind a `resume` offset; all of them from 0 on. Channels are those known before the first message."""
+        """The portions after a `resume` offset; all of them for 0. Channels are those known before the first message."""
         if not offset:
             yield from self.portions()
             return
@@ -94,11 +94,11 @@ class Recording:
         return [self.path] if self.own_damage else []
 
     def damage(self) -> list[str]:
-        """What is wrong with the file, as sentences, once it was read; and what was wrong with those of which it was made."""
+        """Damage of the file, as sentences, once it was read; and damage of the files from which it was made."""
         return [*self._own_sentences(), *self.before]
 
     def damage_notes(self) -> list[str]:
-        """The same, to be noted in a recording that is made of this one."""
+        """The same, to be noted in a recording made from this one."""
         return [*made_of(self.path, self._own_sentences()), *self.before]
 
     def _own_sentences(self) -> list[str]:
@@ -118,7 +118,7 @@ class Recording:
         yield from self._from(file, len(MCAP_MAGIC), self._channels)
         self.own_damage.truncated = not (
             self._ended or self._intact or self.grows
-        )  # not of a file that is read no further
+        )  # not for a file that is not read to its end
 
     def _from(self, file: Octets, offset: int, channels: PortChannels) -> Iterator[MessageRun | tuple[int, bytes]]:
         """The records from an offset on."""
@@ -132,7 +132,7 @@ class Recording:
                     return
                 if opcode == Opcode.DATA_END and (matches := checksum_matches(file, begin)) is not None:
                     self.own_damage.altered |= not matches
-                    if matches:  # whatever follows, all before is there
+                    if matches:  # whatever follows, everything before it is there
                         self._ended = True
                         return
                 if opcode == Opcode.CHUNK:
@@ -153,7 +153,7 @@ class Recording:
                 self.goes_on_in = stored.metadata.get(NEXT, "")
 
     def _placed(self, runs: Iterator[MessageRun]) -> Iterator[Portion]:
-        """The portions without messages that are not in their place; those of an intact file, or of another recorder, as they are."""
+        """The portions without misplaced messages; portions of an intact file, or of another recorder, unchanged."""
         placement, this = Placement(), next(runs, None)
         if self._intact or self.grows or not self.library.startswith(LIBRARY):
             yield from (run.portion for run in chain([this] if this else [], runs))
@@ -170,7 +170,7 @@ class Recording:
     def _marked(
         self, records: Iterator[MessageRun | tuple[int, bytes]], end: int
     ) -> Iterator[MessageRun | tuple[int, bytes]]:
-        """The records of a compressed chunk that ends at `end`: only behind the last one can reading go on."""
+        """The records of a compressed chunk that ends at `end`: reading can go on only after the last one."""
         before = next(records, None)
         self.resume = -1
         while before is not None:
@@ -214,7 +214,7 @@ class Recording:
             offset = end
 
     def _on_arrival_clock(self, run: MessageRun) -> MessageRun:
-        """The messages with their arrival times; where the metadata's clock cannot be true, log times stay: a constant shift harms nothing."""
+        """The messages with their arrival times; if the metadata's clock cannot be true, log times stay: a constant shift harms nothing."""
         portion, offset_ns = run.portion, self._log_offset_ns
         if not offset_ns or np.median(portion.t_arrival_ns) < offset_ns:
             self._log_offset_ns = 0

@@ -99,7 +99,7 @@ def line(clock: ArrivalClock, device_s: float) -> float:
 
 @part
 def _believed_lag(clock: ArrivalClock, bucket: int, lag: float, t_arrival_ns: int) -> float:
-    """The lag to use for an early arrival: that of the least early one when `CONFIRMING` of them came within the kept buckets, else infinite."""
+    """The lag to use for an early arrival: the least early one's when `CONFIRMING` of them came within the kept buckets, else infinite."""
     if clock.early == 0 or bucket - clock.early_bucket > KEPT_BUCKETS:
         clock.early, clock.early_bucket, clock.early_lag_s = 1, bucket, lag
     else:

@@ -5,8 +5,8 @@ In: counter values with their arrival times. Out: seconds since the device's fir
 
 Counters are protected by checksums, arrival times are not: a recording may have flipped bits, and a host that slept may have a clock that stood
 still. So a message whose counter goes on from the newest one keeps its time by the counter, whatever its arrival time; a message whose counter jumps
-needs an arrival time that agrees. One whose counter and arrival are both those of a time that has passed is dropped: a block of the recording was
-written twice, or in another's place. What contradicts is counted. Only several arrival times that contradict in the same way are believed:
+needs an arrival time that agrees. A message whose counter and arrival both belong to a past time is dropped: a block of the recording was
+written twice, or in another's place. Contradictions are counted. Only several arrival times that contradict in the same way are believed:
 
     the counter fits a device that started since the newest message    a restart: the arrival time sets the new epoch
     the arrival is whole wraps of the counter later                    a gap
@@ -30,7 +30,7 @@ BEHIND_S = 1.0  # greatest age of a message relative to the newest one: a ping i
 SMOOTH_S = 1.0  # a counter that is at most this far from the newest goes on from it
 RATE_ERROR = 400e-6  # s/s, greatest difference of two crystals over a gap
 MOST_OF_A_WRAP = 0.125  # of the tolerance: beyond it, after a week, any arrival would agree with some number of wraps
-BACKLOG_S = 1.0  # late arrivals of a counter that goes on are believed after so long: a process that was stopped reads its backlog in less
+BACKLOG_S = 1.0  # late arrivals of a counter that goes on are believed after this time: a process that was stopped reads its backlog in less
 
 
 class DeviceClock(ArrivalClock, Protocol):
@@ -46,7 +46,7 @@ class DeviceClock(ArrivalClock, Protocol):
     run_newest_ns: int
     run_late_s: float  # delay of the first of them against its counter
     contradicted: int  # messages whose arrival time contradicts their counter
-    jumps: int  # those of them that were dropped
+    jumps: int  # contradicting messages that were dropped
     restarts: int
     steps: int  # of the host's clock
     newest_s: float  # used by the timeline: `t_s` of the newest message, NaN before it
@@ -65,7 +65,7 @@ def new_clock(unit_s: float, modulus: int) -> Any:
 
 @kernel
 def read(clock: DeviceClock, value: int, t_arrival_ns: int, restarted: bool, leads: bool) -> float:
-    """Device seconds of a counter value; NaN for one that is dropped (a jump, counted).
+    """Device seconds of a counter value; NaN if it is dropped (a jump, counted).
 
     `restarted`: in the first message after a start. `leads`: no other clock is above this one; else a contradiction is settled by a new epoch.
     """
@@ -92,7 +92,7 @@ def _elapsed_s(clock: DeviceClock, t_arrival_ns: int) -> float:
 
 @part
 def _agrees(clock: DeviceClock, delta: int, late_s: float, wraps: int) -> bool:
-    """Whether an arrival is about where a counter `delta` counts from the newest one puts it.
+    """Whether an arrival agrees with a counter `delta` counts from the newest one.
 
     Whole wraps need confirmation where the counter goes on, and where they are so many that any arrival would agree.
     """
@@ -106,9 +106,9 @@ def _agrees(clock: DeviceClock, delta: int, late_s: float, wraps: int) -> bool:
 
 @part
 def _is_old(clock: DeviceClock, delta: int, late_s: float) -> bool:
-    """Whether counter and arrival both are those of a time before the newest message: it stands twice in a recording, or in the wrong place.
+    """Whether counter and arrival both belong to a time before the newest message: it stands twice in a recording, or in the wrong place.
 
-    A counter that seems to be `delta` ahead is then whole wraps less behind, and its arrival is as much earlier.
+    A counter that seems to be `delta` ahead is then behind by whole wraps less `delta`, and its arrival is as much earlier.
     """
     before_s = -(late_s + delta * clock.unit_s)
     wrap_s = clock.modulus * clock.unit_s
@@ -148,7 +148,7 @@ def _contradiction(
 
 @part
 def _extend_run(clock: DeviceClock, late_s: float, t_arrival_ns: int) -> None:
-    """Count one more arrival time that contradicts; another one than those before begins a new run. Messages of one chunk count once."""
+    """Count one more arrival time that contradicts; one that differs from those before begins a new run. Messages of one chunk count once."""
     if clock.run == 0 or abs(late_s - clock.run_late_s) > AHEAD_S:
         clock.run, clock.run_begin_ns, clock.run_late_s = 1, t_arrival_ns, late_s
     elif t_arrival_ns != clock.run_newest_ns:
@@ -158,7 +158,7 @@ def _extend_run(clock: DeviceClock, late_s: float, t_arrival_ns: int) -> None:
 
 @part
 def _advance(clock: DeviceClock, delta: int, t_arrival_ns: int) -> float:
-    """Device seconds of the value `delta` counts from the newest one, which it becomes when it is newer; -1: without an arrival time to use."""
+    """Device seconds of the value `delta` counts from the newest one; a newer value becomes the newest one. -1: no arrival time to use."""
     unwrapped = clock.newest + delta
     seconds = clock.epoch_s + unwrapped * clock.unit_s
     if delta > 0:

@@ -8,7 +8,7 @@ The MTx gives one edge per sample, so counter - edge count is a constant offset 
 offset of the edge nearest to its time by arrival. An offset with more than half of the last `VOTES` votes is locked. Then the time of a sample is
 the time of its edge; if the board has not reported that edge, it is extrapolated from the newest edge by the measured period.
 
-An edge that comes too early is none of the MTx's, but interference on the wire: it is left out, and the count goes on without it. Taken for a sample,
+An edge that comes too early is not from the MTx, but interference on the wire: it is left out, and the count goes on without it. Taken for a sample,
 it would move the times of half a second by a period, and turn a swinging foot by 0.1 rad.
 """
 
@@ -26,7 +26,7 @@ KEPT = 256  # edges in the ring: more than two seconds at 100 Hz
 OUTDATED_PERIODS = 1e3  # farther from the newest edge than this, a sample has no time by edges, assumed
 MATCH_PERIODS = 100  # largest distance of a matching edge from the time by arrival, assumed
 EARLY_PERIODS = 0.2  # an edge that comes more than this before its time is a stray one; crystals and stamps differ by 1e-4 of a period
-MOST_STRAYS = 3  # in a row; more of them are a clock that has changed, assumed
+MOST_STRAYS = 3  # in a row; more of them mean a clock that has changed, assumed
 
 
 class SyncEdges(Protocol):
@@ -95,7 +95,7 @@ def add(s: SyncEdges, edge: int, t_s: float) -> None:
 
 @part
 def _is_stray(s: SyncEdges, steps: int, t_s: float) -> bool:
-    """Whether an edge, by its count so many after the newest one, comes too early for it."""
+    """Whether an edge, `steps` counts after the newest one, comes too early."""
     measured = s.locked == 1 and s.newest - s.first >= VOTES
     return measured and 0 < steps < VOTES and t_s < s.newest_s + (steps - EARLY_PERIODS) * s.period_s
 

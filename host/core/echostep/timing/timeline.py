@@ -2,10 +2,10 @@
 """Timeline: board ticks, MTx sample counters and arrival times -> `t_s`.
 
 In: board messages and MTx samples with their time of arrival, many at once. Out: `t_s`, seconds of the board's clock since its first reset
-(without a board: of the MTx's counter). Owns every clock; no other module converts time, and none here waits for a timer.
+(without a board: of the MTx's counter). Owns every clock; no other module converts time, and nothing here waits for a timer.
 
 The board's ticks are the clock. SyncOut edges tie MTx samples to it if connected, else the lower envelopes of both ports' arrival times. Samples of
-a foot board come in the place of the MTx's: their value is the ticks of that board's own clock.
+a foot board replace the MTx's: their value is the ticks of that board's own clock.
 A device that restarts gets a new epoch, set by arrival times.
 """
 
@@ -58,10 +58,10 @@ class Arrivals(NamedTuple):
 
 
 class Times(NamedTuple):
-    """`board_s` (b,), `mtx_s` (m,): `t_s` of each message, NaN for an impossible one and for one without a time.
+    """`board_s` (b,), `mtx_s` (m,): `t_s` of each message, NaN if it is impossible or has no time.
 
     `board_message_index` (b,), `mtx_message_index` (m,): index of each message among those of both ports in order of arrival. By that index,
-    `board_newest_s` and `mtx_newest_s` (b + m,): newest time of each port once this message is in, NaN before its first one.
+    `board_newest_s` and `mtx_newest_s` (b + m,): newest time of each port after this message, NaN before its first one.
     `board_restarts` (b,): how often the board's clock has restarted up to this message.
     """
 
@@ -85,7 +85,7 @@ class Timeline:
         self._foot_latency_s = timing.latency_s
 
     def expect_foot_board(self) -> None:
-        """From now on the foot's samples are those of a foot board; to be called before the first one."""
+        """From now on the foot's samples come from a foot board; call this before the first sample."""
         self._mtx = clocks.new_clock(TICK_S, 1 << 32)
         self._foot_latency_s = BOARD_LATENCY_S
 
@@ -106,12 +106,12 @@ class Timeline:
 
     @property
     def clock_steps(self) -> int:
-        """Steps of the host's clock, or times for which it stood still."""
+        """Steps of the host's clock, or periods in which it stood still."""
         return int(self._board["steps"] + self._mtx["steps"])
 
     @property
     def stray_edges(self) -> int:
-        """Edges on the board's SyncOut input that were none of the MTx's."""
+        """Edges on the board's SyncOut input that did not come from the MTx."""
         return int(self._edges["all_strays"])
 
     @property
@@ -156,7 +156,7 @@ def _assign_times(
             steps = board_clock.steps
             times.board_s[b] = _board_time(board_clock, edges, board.value[b], board.t_arrival_ns[b], board.kind[b])
             if board_clock.steps != steps:
-                mtx_clock.started = 0  # begun anew on the clock after the step
+                mtx_clock.started = 0  # begun again on the clock after the step
             times.board_message_index[b] = message_index
             times.board_restarts[b] = board_clock.restarts
             b += 1

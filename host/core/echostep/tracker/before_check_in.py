@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The filter before a check-in, kept with all that was measured since, so that the check-in can be undone.
+"""The filter before a check-in, kept with all measurements since, so that the check-in can be undone.
 
 In: the tracker's state at a check-in, then each measured segment with its beacon readings and meetings. Out: the same state, and these segments.
-Owns the segments. Undone, the filter processes them as if there had been no check-in: the estimates from then on are those of a run without it, bit
-for bit.
+Owns the segments. After an undo the filter processes them as if there had been no check-in: the estimates from then on are those of a run
+without it, bit for bit.
 """
 
 from __future__ import annotations
@@ -12,13 +12,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from echostep.board.gateway import BeaconReading
-from echostep.localization.estimate import Estimate
-from echostep.localization.map_filter import MapFilter
-from echostep.localization.team.meeting import TimedMeeting
+from echostep.localization import Estimate, MapFilter, TimedMeeting
 from echostep.path import MeasuredSegment
 from echostep.ports.people.check_in import CheckIn
 
-# For so long a check-in can be undone: 10 s for a person, in a demo at several times real time
+# Time for which a check-in can be undone: 10 s for a person, in a demo at several times real time
 UNDO_S = 120.0
 MOST_KEPT = 2000  # segments: several times as many as a person walks in that time
 

@@ -1,89 +1,33 @@
 # SPDX-License-Identifier: MIT
-"""The kernels of a run, compiled before its first bytes come: once on a computer, in as many processes as there are cores.
+"""The kernels of a run in parts, each a function that calls its kernels once, so that they are compiled; hardly any kernel is in two of them.
 
-In: parts, each a function that calls its kernels once; hardly any kernel is in two of them. Out: kernels in the cache (`kernel_cache`), from which
-every process loads them. Owns the processes, and a mark beside the kernels of each part that is compiled.
+In: nothing. Out: kernels in the cache (`kernel_cache`), from which every process loads them. Owns nothing.
 """
 
 from __future__ import annotations
 
-import gc
-import itertools
-import os
-import platform
-import subprocess
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
 from importlib.resources import as_file, files
-from importlib.util import find_spec
-from pathlib import Path
-from pkgutil import resolve_name
-from typing import NamedTuple
 
-import numba
 import numpy as np
-from numba.core import event
 
 from echostep.board.frames import encode
 from echostep.board.gateway import BeaconReading
 from echostep.board.messages import Outcome, Ping
 from echostep.foot.steps import walk_track
-from echostep.kernel_cache import cache_folder
-from echostep.localization.building import Building
-from echostep.localization.echoes.range_bias import RangeBias
-from echostep.localization.map_filter import MapFilter
-from echostep.localization.particle_arrays import PingBatch
-from echostep.localization.particles.kernels import systematic
-from echostep.localization.particles.start import Start
-from echostep.localization.settings import FilterSettings, echo_models
-from echostep.odometry.front_end import FrontEnd
+from echostep.localization import Building, MapFilter, Start, call_kernels
+from echostep.odometry import FrontEnd
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import NO_PLAN, Plan, Pose, load_plan
+from echostep.plan import NO_PLAN, Plan, Pose, load_plan
 from echostep.ports.chunks import BOARD, Chunk, portion_of
 from echostep.settings import Settings
-from echostep.walls.echo_sources import Walls
 from echostep.walls.level_sheet import lay_out_levels
 from echostep.xsens import reader
 
-LOW_PRIORITY = 19  # niceness: a run that goes on meanwhile comes first
 KNOWN, UNKNOWN = Start(Pose(0.0, 0.0, 0.0)), Start()
-Show = Callable[[float], None]  # told of the share that is done
-
-
-class Part(NamedTuple):
-    """`module:function`, and about how many kernels it compiles."""
-
-    function: str
-    kernels: int
-
-    @property
-    def mark(self) -> Path | None:
-        """The file that says that these sources, this Python and this numba have compiled the part; None: there is no cache."""
-        module, _, name = self.function.partition(":")
-        spec = find_spec(module)
-        folder = cache_folder(spec.origin) if spec and spec.origin else None
-        return folder and folder / f"{name}-{platform.python_version()}-{numba.__version__}"
-
-    @property
-    def is_compiled(self) -> bool:
-        """Whether its kernels are in the cache."""
-        return self.mark is not None and self.mark.exists()
-
-
-WALLS = Part(f"{__name__}:walls", 112)
-FOOT = Part(f"{__name__}:foot", 91)
-BOARD_AND_CLOCKS = Part(f"{__name__}:board_and_clocks", 60)
-CLOUD = Part(f"{__name__}:cloud", 27)
-SEARCH = Part(f"{__name__}:search", 40)
-BEACONS = Part(f"{__name__}:beacons", 75)
-TRACKING = (WALLS, FOOT, BOARD_AND_CLOCKS, CLOUD)  # the longest first
-LATER = (SEARCH, BEACONS)  # what a walk from a known start may come to need
 
 
 def walls() -> None:
-    """What the walls of a plan echo."""
+    """Echoes from the walls of a plan."""
     _filter(_plan(), KNOWN)
 
 
@@ -102,23 +46,19 @@ def board_and_clocks() -> None:
 
 def cloud() -> None:
     """Particles and their rangers' bias; without a plan, for its walls are another part."""
-    _filter(NO_PLAN, KNOWN).update(_measured())
-    systematic(np.ones(2), 0.5, 2)
-    zero = np.zeros(1)
-    ping = PingBatch(zero, zero, zero, zero, np.zeros(1, np.int64), zero, zero, zero, zero, zero)
-    model, _ = echo_models(FilterSettings())
-    RangeBias(1.0).learn(ping, (zero, zero, zero), (0.0, 0.0, 0.0), Walls(np.empty((0, 4))), model)
+    _filter(NO_PLAN, KNOWN).update(measured())
+    call_kernels()
 
 
 def search() -> None:
     """The search of a whole building."""
-    _filter(_plan(), UNKNOWN).update(_measured())
+    _filter(_plan(), UNKNOWN).update(measured())
 
 
 def beacons() -> None:
     """Readings of radio beacons."""
     followed = _filter(_plan(), KNOWN)
-    followed.update(_measured(), [BeaconReading(t_s, 0, 0.5, 0.0) for t_s in (0.4, 0.6)])
+    followed.update(measured(), [BeaconReading(t_s, 0, 0.5, 0.0) for t_s in (0.4, 0.6)])
     followed.beacon_map.places(followed.cloud, 1.0)
 
 
@@ -127,7 +67,8 @@ def _filter(plan: Plan, start: Start) -> MapFilter:
     return MapFilter(Building(laid_out.walls, laid_out.sheet), start, 0.0, np.random.default_rng(0))
 
 
-def _measured() -> MeasuredSegment:
+def measured() -> MeasuredSegment:
+    """A segment with a ping."""
     segment = PathSegment(0.0, 1.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0)
     return MeasuredSegment(segment, np.array([0.5]), np.array([0]), np.array([1.0]))
 
@@ -135,79 +76,3 @@ def _measured() -> MeasuredSegment:
 def _plan() -> Plan:
     with as_file(files("echostep") / "plans/demo.json") as path:
         return load_plan(path)
-
-
-def compile_parts(parts: Sequence[Part], show: Show = lambda _share: None) -> None:
-    """Compile those of the parts that are not compiled yet, in a process for each core. What fails is left to the run: it compiles what it misses."""
-    shares = _shared_out([part for part in parts if not part.is_compiled], os.cpu_count() or 1)
-    count, total = itertools.count(1), sum(part.kernels for share in shares for part in share)
-    children: list[subprocess.Popen[bytes]] = []
-
-    def compile_share(share: Sequence[Part]) -> None:
-        with suppress(OSError), start_compiling(share) as child:
-            children.append(child)
-            while child.stdout is not None and child.stdout.read(1):
-                show(min(next(count) / total, 1.0))
-
-    with ThreadPoolExecutor(max(len(shares), 1)) as pool:
-        try:
-            list(pool.map(compile_share, shares))
-        except BaseException:
-            for child in children:
-                child.kill()
-            raise
-
-
-def _shared_out(parts: Sequence[Part], count: int) -> list[list[Part]]:
-    """The parts for each of at most `count` processes: each to the one that has least to do so far. What two parts share is then compiled once."""
-    shares: list[list[Part]] = [[] for _ in range(min(count, len(parts)))]
-    for part in sorted(parts, key=lambda part: -part.kernels):
-        min(shares, key=lambda share: sum(one.kernels for one in share)).append(part)
-    return shares
-
-
-@contextmanager
-def compiling_later(parts: Sequence[Part]) -> Iterator[subprocess.Popen[bytes] | None]:
-    """Compile these parts in a process of low priority while the block runs; None where nothing is to be done."""
-    waiting = [part for part in parts if not part.is_compiled]
-    child = start_compiling(waiting, LOW_PRIORITY) if waiting else None
-    try:
-        yield child
-    finally:
-        if child is not None:
-            child.kill()
-            child.wait()
-
-
-def start_compiling(parts: Sequence[Part], niceness: int = 0) -> subprocess.Popen[bytes]:
-    """A process that compiles these parts in turn, and prints a character for each kernel."""
-    command = [sys.executable, "-m", __name__, str(niceness), *(part.function for part in parts)]
-    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-
-
-class _Dots(event.Listener):
-    def on_start(self, _event: event.Event) -> None:
-        """A kernel begins."""
-
-    def on_end(self, _event: event.Event) -> None:
-        """A kernel is compiled."""
-        os.write(1, b".")
-
-
-def main() -> None:
-    """Compile the parts that the command line names."""
-    gc.disable()  # the process lives for seconds
-    niceness, *functions = sys.argv[1:]
-    if int(niceness) and hasattr(os, "nice"):
-        os.nice(int(niceness))
-    event.register("numba:compile", _Dots())  # type: ignore[no-untyped-call]
-    for function in functions:
-        resolve_name(function)()
-        mark = Part(function, 0).mark
-        if mark is not None:
-            mark.parent.mkdir(parents=True, exist_ok=True)
-            mark.touch()
-
-
-if __name__ == "__main__":
-    main()

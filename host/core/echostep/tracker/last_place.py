@@ -1,24 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Where a run ended, as the start of the next one: the battery was changed, or the program was started anew.
+"""Where a run ended.
 
-In: the newest estimate of a run, what its cloud knew of the heights by pressure, how long ago that was. Out: a `Start`. Owns nothing.
-
-The next run begins as after a pause (`gaps`): the cloud lies about the last place, with any heading, as the walk frame is new; the whole
-building is searched beside it, as the wearer may have moved on. Pressure gives the level at once if the barometer is the same: its lag has
-drifted by no more than weather and the air in the building allow.
+In: the newest estimate of a run, its cloud's calibration of the heights by pressure. Out: a `LastPlace`. Owns nothing.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.height.levels import ClimbSettings, drift_m
-from echostep.localization.particles.start import Air, Start
-from echostep.plan.model import Pose
-
-MOVED_M = 1.0  # standard deviation per axis of the way while a battery is changed on the spot: a stride
+from echostep.localization import Air, Estimate, TrackStatus
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,12 +29,3 @@ def last_place(estimate: Estimate | None, air: Air | None) -> LastPlace | None:
         return None
     sd_m = math.sqrt(0.5 * (estimate.xx_m2 + estimate.yy_m2))
     return LastPlace(estimate.x_m, estimate.y_m, sd_m, estimate.level, air)
-
-
-def start_after(place: LastPlace, away_s: float, climbing: ClimbSettings) -> Start:
-    """The start of a run that begins so long after another one ended at a place."""
-    air = place.air
-    if air is not None:
-        air = replace(air, sd_m=math.hypot(air.sd_m, drift_m(climbing, away_s)))
-    pose = Pose(place.x_m, place.y_m, 0.0, place.level)
-    return Start(pose, math.hypot(place.sd_m, MOVED_M), math.pi, air=air, after_pause=True)

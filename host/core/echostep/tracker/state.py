@@ -13,10 +13,8 @@ from echostep.board.frames import FrameCounts
 from echostep.board.gateway import GatewayCounts
 from echostep.board.messages import Identity, Status
 from echostep.board.reports import BoardReports
-from echostep.localization.estimate import Estimate
-from echostep.localization.team.meeting_memory import MeetingNews
-from echostep.odometry.front_end import FrontEndCounts
-from echostep.odometry.wearer import Alarm
+from echostep.localization import Estimate, MeetingNews
+from echostep.odometry import Alarm, FrontEndCounts
 from echostep.path import PathSegment
 from echostep.ports.people.team_beacons import SharedBeacon
 from echostep.xsens.reader import MtxCounts
@@ -30,7 +28,7 @@ class TrackerState:
     cloud is, NaN before the first segment; `searches`: the whole building is searched. `beacon_numbers`: by slot. `beacon_heard_s`: time of the
     newest reading that the filter used. `waits_for_start`: neither a start nor a check-in is known yet.
     `undoable`: number of the check-in that can be undone. `alarm`: the wearer's, None while all is well. `met`: the newest meeting with a teammate;
-    `meetings`: their number by name of the effect. `team_beacons`: those that each teammate has placed; `team_beacon_messages`: number of
+    `meetings`: their number by name of the effect. `team_beacons`: beacons placed by each teammate; `team_beacon_messages`: number of
     messages believed, and bad.
     """
 
@@ -59,7 +57,7 @@ class StreamState:
     """Counts of each input stream since the start, and the newest reports of the board.
 
     `status`, `identity`: the newest with a plausible time. `synchronised`: SyncOut edges time the MTx samples. `mtx`: also of a foot board's samples;
-    `foot_reports`: of a foot board about itself, None where an MTx is worn.
+    `foot_reports`: a foot board's reports about itself, None if an MTx is worn.
     """
 
     board: FrameCounts
@@ -76,7 +74,7 @@ class StreamState:
 
     @property
     def foot_name(self) -> str:
-        """What is worn on the foot."""
+        """Name of the device worn on the foot."""
         return "MTx" if self.foot_reports is None else "foot board"
 
 

@@ -17,38 +17,47 @@ import numpy as np
 from echostep.angles import wrap
 from echostep.board.gateway import BeaconReading, Gateway
 from echostep.errors import EchostepError
-from echostep.localization.beacon_map import BeaconPlace
-from echostep.localization.belief import STATED
-from echostep.localization.building import Building
-from echostep.localization.cloud_estimate import Right, estimate
-from echostep.localization.drawn_places import DrawnPlaces
-from echostep.localization.echoes.rangers import echo_of
-from echostep.localization.estimate import Estimate, TrackStatus, unobserved
-from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles.start import Start
-from echostep.localization.settings import FilterSettings
-from echostep.localization.team.meeting import TimedMeeting, carries_position, on_the_way, start_at
-from echostep.localization.team.meeting_memory import MeetingEffect, MeetingQueue
-from echostep.localization.team.shared_beacons import TeamBeaconMap, shared_beacons
-from echostep.odometry.front_end import FrontEnd
-from echostep.odometry.wearer import WearerWatch
+from echostep.localization import (
+    STATED,
+    BeaconPlace,
+    Building,
+    DrawnPlaces,
+    Estimate,
+    FilterSettings,
+    MapFilter,
+    MeetingEffect,
+    MeetingQueue,
+    Right,
+    Start,
+    TeamBeaconMap,
+    TimedMeeting,
+    TrackStatus,
+    carries_position,
+    echo_of,
+    estimate_of,
+    on_the_way,
+    shared_beacons,
+    start_at,
+    unobserved,
+)
+from echostep.odometry import FrontEnd, WearerWatch
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import NO_PLAN, Plan, Pose
-from echostep.ports.chunks import FOOT, GATEWAY, Chunk, Portion, portion_of
+from echostep.plan import NO_PLAN, Plan, Pose
+from echostep.ports.chunks import FOOT, GATEWAY, TEAM, Chunk, Portion, portion_of
 from echostep.ports.people.check_in import HEADING_SD_RAD, PERSON, Call, CheckIn, Undo, parse_person
 from echostep.ports.people.meeting import MEETING
 from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon
-from echostep.ports.people.teammate import TEAM
 from echostep.settings import Settings
+from echostep.tracker import kernels
 from echostep.tracker.before_check_in import BeforeCheckIn
 from echostep.tracker.last_place import LastPlace, last_place
 from echostep.tracker.state import ParticleSnapshot, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
 
-MAX_READINGS = 4096  # of beacons, that wait for their segment; beyond it the oldest are dropped, assumed
+MAX_READINGS = 4096  # of beacons, waiting for their segment; beyond it the oldest are dropped, assumed
 LATE_S = 0.5  # behind a published time: an older estimate is outdated: half a stride, a third of the claimed 1 m
 KNOWN_SD_RAD = 0.5  # of a heading that a check-in without one takes over, assumed
-KNOWN = 0.9  # probability of the estimate whose heading it is: a tap at another place means that the estimate was wrong
+KNOWN = 0.9  # probability of the estimate giving this heading: a tap at another place means that the estimate was wrong
 NO_PINGS = (np.empty(0), np.empty(0, np.int64), np.empty(0))
 Watch = Callable[[MeasuredSegment | None, Estimate], None]  # called with each estimate and its segment; None: a dropout
 
@@ -80,7 +89,7 @@ class Tracker:
         self.gateway = Gateway()
         self.watchers: list[Watch] = []  # called in this order
         self.team_watchers: list[Callable[[bytes], None]] = []  # called with each chunk of the port TEAM
-        self._readings: list[BeaconReading] = []  # that wait for their segment
+        self._readings: list[BeaconReading] = []  # waiting for their segment
         self._meetings = MeetingQueue()
         self._team_beacons = TeamBeaconMap()
         self._check_ins = self._bad_check_ins = self._undone = 0
@@ -95,7 +104,7 @@ class Tracker:
 
     @property
     def watch(self) -> WearerWatch:
-        """Is told what the wearer does; may be replaced before the first chunk."""
+        """Observes the wearer; may be replaced before the first chunk."""
         return self.front_end.watch
 
     @watch.setter
@@ -190,7 +199,7 @@ class Tracker:
         return self.take(portion_of([chunk]))
 
     def take(self, portion: Portion) -> list[Estimate]:
-        """Process many chunks; the estimates are those of the chunks one by one."""
+        """Process many chunks; the estimates are the same as for the chunks one by one."""
         estimates: list[Estimate] = []
         for piece in portion.cut_after(GATEWAY, TEAM_BEACONS, TEAM, MEETING, PERSON):
             estimates += self._track(piece)
@@ -208,10 +217,9 @@ class Tracker:
 
     def warm_up(self) -> None:
         """Call each kernel that tracks from this start, so that no chunk waits for its compilation; leaves the tracker as it was."""
-        self.front_end.warm_up()
-        segment = PathSegment(0.0, 1.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0)
-        measured = MeasuredSegment(segment, np.array([0.5]), np.array([0]), np.array([1.0]))
-        self._new_filter(self.start or Start(), 0.0, np.random.default_rng(0)).update(measured)
+        kernels.foot()
+        kernels.board_and_clocks()
+        self._new_filter(self.start or Start(), 0.0, np.random.default_rng(0)).update(kernels.measured())
 
     def _track(self, portion: Portion) -> list[Estimate]:
         """Estimates from a portion in which only the last chunk may be the gateway's: its readings are used from the next portion on."""
@@ -274,7 +282,7 @@ class Tracker:
         return ready
 
     def _publish(self, measured: MeasuredSegment | None, new: Estimate) -> Estimate:
-        """Call the watchers with a new estimate; its time is never before that of an earlier one.
+        """Call the watchers with a new estimate; its time is never before an earlier estimate's.
 
         Bytes that arrive after a dropout give a past position: such an estimate is extrapolated to the time of the dropout.
         """
@@ -332,7 +340,7 @@ class Tracker:
         self.filter = self._filter_at(check_in, segment.heading1_rad)
         self._check_in_s = self.front_end.newest_s
         t_s = max(segment.t1_s, self._estimate.t_s) if self._estimate else segment.t1_s
-        self._estimate = estimate(self.filter.cloud, t_s, segment.heading1_rad, segment.step, 0.0, Right(STATED))
+        self._estimate = estimate_of(self.filter.cloud, t_s, segment.heading1_rad, segment.step, 0.0, Right(STATED))
         return [self._publish(MeasuredSegment(segment, *NO_PINGS), self._estimate)]
 
     def _undo(self, before: BeforeCheckIn) -> list[Estimate]:
@@ -361,7 +369,7 @@ class Tracker:
         return None if self.start is None else self._new_filter(self.start, walk_heading_rad, self._rng)
 
     def _filter_at(self, check_in: CheckIn, walk_heading_rad: float) -> MapFilter:
-        """A filter about a check-in; a check-in without a heading takes that of the last estimate if it is known, else any."""
+        """A filter about a check-in; a check-in without a heading takes the last estimate's heading if it is known, else any."""
         heading_rad, sd_rad = check_in.heading_rad, HEADING_SD_RAD
         if heading_rad is None:
             last = self._estimate

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a recording says of its run, beside the bytes: start, seed, settings; and the tracker of a replay.
+"""Data of the run in a recording, beside the bytes: start, seed, settings; and the tracker of a replay.
 
 In: a recording's text fields. Out: start, seed, `Tracker`. Owns nothing. The names of the fields are part of the file format.
 """
@@ -15,9 +15,9 @@ import numpy as np
 from msgspec import Meta
 
 from echostep.errors import EchostepError
-from echostep.localization.particles.start import ANY_LEVEL, Air, Start
-from echostep.plan.model import Plan, Pose
-from echostep.recording.reading import Recording
+from echostep.localization import ANY_LEVEL, Air, Start
+from echostep.plan import Plan, Pose
+from echostep.recording import Recording
 from echostep.settings import Settings, parse_settings, read_settings
 from echostep.tracker import Tracker
 
@@ -29,14 +29,14 @@ Coordinate = Annotated[float, Meta(ge=-START_LIMIT_M, lt=START_LIMIT_M)]
 
 
 class RecordedRoom(msgspec.Struct):
-    """The field `start_room`: the walk begins in this outline, None: anywhere, on this level."""
+    """The field `start_room`: the walk begins in this outline, or anywhere if None, on this level."""
 
     outline_m: list[tuple[Coordinate, Coordinate]] | None = None
     level: int = ANY_LEVEL
 
 
 class RecordedPause(msgspec.Struct):
-    """The field `start_after_pause`: the heights by the barometer of the run before, None where there are none."""
+    """The field `start_after_pause`: the heights by the barometer of the run before, or None."""
 
     air: Air | None
 
@@ -47,7 +47,7 @@ def is_simulated(metadata: Mapping[str, str]) -> bool:
 
 
 def shown_name(path: Path, metadata: Mapping[str, str]) -> str:
-    """The name of a recording, which says so where it is simulated."""
+    """The name of a recording, marked if it is simulated."""
     return f"{path.name}{' (simulated)' if is_simulated(metadata) else ''}"
 
 
@@ -72,7 +72,7 @@ def tracker_of(
 
 
 def recorded_start(metadata: Mapping[str, str], path: Path) -> Pose | Start | None:
-    """The start of a recorded run, None when there is none; raises EchostepError when it is damaged."""
+    """The start of a recorded run, None if missing; raises EchostepError when it is damaged."""
     try:
         if metadata.get("start") == ANYWHERE:
             room = msgspec.json.decode(metadata.get("start_room", "{}"), type=RecordedRoom)
@@ -95,7 +95,7 @@ def recorded_start(metadata: Mapping[str, str], path: Path) -> Pose | Start | No
 
 
 def recorded_seed(metadata: Mapping[str, str], path: Path) -> int:
-    """The seed of a recorded run, 0 when there is none; raises EchostepError when it is damaged."""
+    """The seed of a recorded run, 0 if missing; raises EchostepError when it is damaged."""
     try:
         return int(metadata.get("seed", "0"))
     except ValueError as error:
@@ -103,7 +103,7 @@ def recorded_seed(metadata: Mapping[str, str], path: Path) -> int:
 
 
 def possible(air: Air | None) -> Air | None:
-    """The heights by pressure; raises ValueError where they are out of bounds."""
+    """The heights by pressure; raises ValueError if they are out of bounds."""
     if air is not None:
         bounded([air.zero_m])
         bounded([air.sd_m], least=0.0)
@@ -111,7 +111,7 @@ def possible(air: Air | None) -> Air | None:
 
 
 def bounded(values: Iterable[float], least: float = -START_LIMIT_M) -> list[float]:
-    """The values (m or rad); raises ValueError for one that is not finite, or out of bounds."""
+    """The values (m or rad); raises ValueError if one is not finite, or out of bounds."""
     numbers = list(values)
     if not all(least <= value < START_LIMIT_M for value in numbers):
         raise ValueError

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from echostep.additions import added
 from echostep.errors import EchostepError
 from echostep.file_mode import claim
-from echostep.localization.estimate import Estimate, claims_place
-from echostep.plan.georeference import earth_of
-from echostep.plan.model import Plan
+from echostep.localization import Estimate, claims_place
+from echostep.plan import Plan
 
 Columns = dict[str, list[Any]]
 COLUMNS = (
@@ -45,11 +45,15 @@ PLACE = ("longitude_deg", "latitude_deg")  # columns beside those of track.csv, 
 
 
 def columns_of(estimates: list[Estimate], plan: Plan) -> Columns:
-    """The estimates' fields by name, and longitude and latitude where the plan has a georeference and the estimate claims a place."""
+    """The estimates' fields by name, and longitude and latitude where the plan has a georeference and the estimate claims a place.
+
+    Without echostep-app there are no longitudes.
+    """
     columns: Columns = {f.name: [getattr(e, f.name) for e in estimates] for f in fields(Estimate)}
     columns["status"] = [e.status.value for e in estimates]
     columns["hypotheses"] = [" ".join(map(str, e.hypotheses)) for e in estimates]
-    if earth := earth_of(plan):
+    earth_of = added("earth")
+    if earth_of and (earth := earth_of(plan)):
         degrees = earth.degrees(np.array([(e.x_m, e.y_m) for e in estimates]))
         for name, column in zip(PLACE, degrees.T.tolist(), strict=True):
             columns[name] = [v if claims_place(e.status) else None for v, e in zip(column, estimates, strict=True)]

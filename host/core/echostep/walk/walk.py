@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.additions import added, needed, svg_of
-from echostep.extras import require
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.particles.start import Start
-from echostep.plan.model import NO_PLAN, Plan, Pose, load_plan
-from echostep.recording.joining import open_parts
+from echostep.errors import EchostepError
+from echostep.localization import Estimate, Start, TrackStatus
+from echostep.plan import NO_PLAN, Plan, Pose, load_plan
+from echostep.recording import open_parts
 from echostep.settings import Settings
 from echostep.walk.recorded import shown_name, tracker_of
 from echostep.walk.table import COLUMNS, PLACE, columns_of, refuse_none
@@ -31,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Walk:
-    """The estimates of a walk on its plan, in the order of time; a notebook shows it as a picture.
+    """The estimates of a walk on its plan, in order of time; a notebook shows it as a picture.
 
     >>> import echostep
     >>> walk = echostep.replay("walk.mcap", "demo.json")
@@ -62,8 +61,12 @@ class Walk:
 
     def to_pandas(self) -> DataFrame:
         """The same columns with the time `t_s` (s) as the index; needs pandas: pip install 'echostep[pandas]'."""
-        require("to_pandas", "pandas")
-        from pandas import DataFrame
+        try:
+            from pandas import DataFrame
+        except ModuleNotFoundError as error:
+            raise EchostepError(
+                "to_pandas needs pandas, which is not installed: pip install 'echostep[pandas]'"
+            ) from error
 
         return DataFrame(self.to_numpy()).set_index("t_s")
 
@@ -78,7 +81,7 @@ class Walk:
         return f"<Walk {self.name!r}: {len(self.estimates)} estimates, {span_s:.1f} s, {tracking:.0%} tracking, on {self.plan.name!r}>"
 
     def _repr_svg_(self) -> str | None:
-        """The picture for a notebook; None, so that the repr is shown, without matplotlib."""
+        """The picture for a notebook; None without matplotlib, so that the repr is shown."""
         return svg_of(self)
 
 
@@ -90,7 +93,7 @@ def replay(
     settings: Settings | Path | str | None = None,
     seed: int | None = None,
 ) -> Walk:
-    """Track a recording, in one file or in parts, on a plan; None: without one.
+    """Track a recording, in one file or in parts, on a plan, or without one (None).
 
     Start, settings (also a TOML file) and seed are the recorded ones unless given. Raises EchostepError when a file cannot be read, and for a
     recording without estimates.
@@ -109,6 +112,6 @@ def replay(
 
 
 def open_plan(path: Path) -> Plan:
-    """A plan.json; a plan of another format where a distribution adds importers. Raises EchostepError."""
+    """A plan.json, or a plan of another format if a distribution adds importers. Raises EchostepError."""
     importer = added("plans")
     return importer(path) if importer else load_plan(path)

@@ -49,9 +49,9 @@ class Receiver(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """What a query leaves out because it cannot be the first echo.
+    """Sources that a query leaves out because they cannot be the first echo.
 
-    Edges farther than `edge_m`, and what is farther than a wall within `sure_m` whose foot is off the axis by at most `sure_cos` (a cosine).
+    Edges farther than `edge_m`, and sources farther than a wall within `sure_m` whose foot is off the axis by at most `sure_cos` (a cosine).
     """
 
     sure_m: float
@@ -133,7 +133,7 @@ def _tabulate(tiles: Int32s, index: WallIndex) -> WallIndex:
 
 @part
 def _appended(table: SourceTable, tile: int, more: SourceTable) -> SourceTable:
-    """`table` of `tile` tiles with one tile more, in arrays that are at least doubled when they grow."""
+    """`table` of `tile` tiles with one more tile, in arrays that are at least doubled when they grow."""
     unit, rows = tile * BEARINGS, table.tile_start[tile]
     ordered, used = table.start[unit], table.screen_start[rows]
     added, screens = len(more.rows), len(more.screens)
@@ -199,7 +199,7 @@ def echo_sources(
 
 @inline_kernel
 def first_sources(receiver: Receiver, axis_rad: float, index: WallIndex, limits: Limits, sources: SourceList) -> int:
-    """`echo_sources` of a receiver with this bearing of its axis, but for those that `limits` leaves out: for loops over many receivers."""
+    """`echo_sources` of a receiver with this bearing of its axis, without the sources that `limits` leaves out: for loops over many receivers."""
     tile, u, n = tile_at(receiver.x, receiver.y, index), bearing(axis_rad), 0
     if tile >= 0 and math.isfinite(axis_rad):
         k = index.tile_number[tile] - 1
@@ -226,7 +226,7 @@ def _add_sources(
 def _sources_of_unit(
     receiver: Receiver, walls: Floats, faces: SourceTable, points: SourceTable, u: int, limits: Limits, sources: SourceList,
 ) -> int:  # fmt: skip
-    """The same, called: compiled once for all places where a call costs nothing."""
+    """The same as a call: compiled once for all places where a call costs nothing."""
     return _add_sources(receiver, walls, faces, points, u, limits, sources)
 
 
@@ -250,7 +250,7 @@ def _sources_of_missing_tile(
 def _add_faces(
     receiver: Receiver, walls: Floats, faces: SourceTable, u: int, limits: Limits, sources: SourceList
 ) -> tuple[int, float]:
-    """Feet of perpendiculars on the walls of unit u, with cosines off the axis; their number, and up to where a source can be the first.
+    """Feet of perpendiculars on the walls of unit u, with cosines off the axis; their number, and the distance up to which a source can be first.
 
     In the wall's own axes: s along its tangent t, h to the left of it.
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The walkable floor of a plan, on its sheet of levels: where an unknown start may be.
 
-In: walls (n, 4) on the sheet. Out: `Floor`: cells that no wall is too near to, inside the building. Owns nothing.
+In: walls (n, 4) on the sheet. Out: `Floor`: cells not too near to any wall, inside the building. Owns nothing.
 
 A place is inside if walls are in sight in at least half of all directions: a yard that is open on one side is, a lawn before a facade is not.
 """
@@ -23,7 +23,7 @@ BODY_M = 0.25  # half a person's width
 DIRECTIONS = 32  # in which walls are looked for
 INSIDE = 0.5  # least share of the directions that meet a wall, for a cell of the floor
 ENCLOSED = 0.75  # the same for a cell that is certainly indoors: a doorway to the outside has half
-SIGHT_M = 40.0  # how far
+SIGHT_M = 40.0  # how far walls are looked for
 EDGE_M = 2.0  # of the grid around the walls
 HALL_M = 3.0  # distance from a wall up to which floor counts where no wall encloses any
 MOST_CELLS = 40_000_000
@@ -57,7 +57,7 @@ NO_FLOOR = Floor(np.zeros(0), np.zeros(0), np.zeros(0, np.bool_))
 
 
 def walkable_floor(walls: Floats) -> Floor:
-    """The floor inside these walls (n, 4); where they enclose none, the floor within HALL_M of them."""
+    """The floor inside these walls (n, 4); if they enclose none, the floor within HALL_M of them."""
     ends = walls.reshape(-1, 2)
     if not len(ends):
         return NO_FLOOR
@@ -80,7 +80,7 @@ def walkable_floor(walls: Floats) -> Floor:
 
 @kernel
 def _walls_in_sight(blocked: Bools, sight: int) -> Ints:
-    """For each cell, in how many directions a blocked cell is met within so many cells; 0 for blocked cells."""
+    """For each cell, in how many directions a blocked cell is met within `sight` cells; 0 for blocked cells."""
     rows, columns = blocked.shape
     in_sight = np.zeros((rows, columns), np.int64)
     # Columns to the nearest one with a wall: others are between two levels of the sheet

@@ -24,7 +24,7 @@ EAR_REACH_M = 6.3  # greatest distance of an echo source: a little more than the
 JOIN_M = 0.01  # walls whose ends are no further apart are joined: drawing accuracy
 # Greatest angle off a ranger's axis: half the 55 degree cone and its rim [Girard 2011, Figure 2]; a wall at 1 m still answers there
 CONE_RAD = math.radians(40.0)
-MAX_TILES = 40_000_000  # a plan of more is not in metres, and its index would fill the memory
+MAX_TILES = 40_000_000  # a plan with more is not in metres, and its index would fill the memory
 SHORTEST_M = 1e-6  # shorter walls are left out
 FACE, POINT = 5, 8  # columns of the rows of a face and of a point (`WallIndex`)
 BEARINGS = 16  # sectors of the ranger's axis for which the tables list their rows
@@ -201,7 +201,7 @@ def crosses_wall(ax: float, ay: float, bx: float, by: float, index: WallIndex) -
 
 @part
 def _clipped(c0: float, r0: float, c1: float, r1: float, columns: int, rows: int) -> tuple[float, float, float, float]:
-    """The part of a move that is on the grid, in tiles [Liang, Barsky 1984]; -1 for none and for a move that is not finite."""
+    """The part of a move that is on the grid, in tiles [Liang, Barsky 1984]; -1 if there is none or the move is not finite."""
     if not (math.isfinite(c1 - c0) and math.isfinite(r1 - r0)):
         return -1.0, -1.0, -1.0, -1.0
     enter, leave = _within(c0, c1 - c0, columns, 0.0, 1.0)

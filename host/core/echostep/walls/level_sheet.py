@@ -20,10 +20,10 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
 from echostep.jit import kernel, part
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep.walls.echo_sources import Walls
 
-# On either side of a level on the sheet: particles do not go so far beyond the outermost walls
+# On either side of a level on the sheet: particles do not go that far beyond the outermost walls
 MARGIN_M = 50.0
 STAIRS, LIFT, RAMP = 0, 1, 2
 KINDS = {"stairs": STAIRS, "lift": LIFT, "ramp": RAMP}

@@ -26,7 +26,7 @@ from echostep.walls.tile_geometry import SLACK_M, by_bearing, covered, frame
 
 
 class Strip(NamedTuple):
-    """What of a wall can answer a tile: start and unit tangent of the wall, the stretch s0 to s1 along it, heights of the tile over it (m)."""
+    """Part of a wall that can answer a tile: start and unit tangent of the wall, the stretch s0 to s1 along it, heights of the tile over it (m)."""
 
     x: float
     y: float
@@ -76,7 +76,7 @@ def tile_faces(corners: Floats, near: Int32s, walls: Floats, slant: float) -> So
 def _face_screens(
     w: int, near: Int32s, walls: Floats, strip: Strip, slant: float, screens: Int32s, spans: Floats
 ) -> tuple[int, int]:
-    """Walls that may stand between wall w and a place in the tile, into `screens`, and what those between all of both cover, into `spans`.
+    """Walls that may stand between wall w and a place in the tile, into `screens`, and spans covered by those between all of both, into `spans`.
 
     Returns the number of each.
     """

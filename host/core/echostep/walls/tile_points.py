@@ -80,7 +80,7 @@ def tile_points(corners: Floats, near: Int32s, index: WallIndex) -> SourceTable:
 
 @part
 def _sectors(x: float, y: float, end: int, index: WallIndex, corners: Floats, sectors: Floats, rays: Floats) -> int:
-    """Sectors about the wall end x, y, and what it is in each, into `sectors`; their number, 0 where a joined end is the source instead."""
+    """Sectors about the wall end x, y, and its kind in each, into `sectors`; their number, 0 if a joined end is the source instead."""
     walls, count = index.walls, 0
     column, row = int((x - index.x0_m) / TILE_M), int((y - index.y0_m) / TILE_M)
     tile = row * index.columns + column

@@ -26,18 +26,13 @@ FROM_WORLD = {  # ENU, NED or NWU -> north, west, up
 }
 
 
-def to_map(q: Floats) -> Floats:
-    """Sensor -> MT world (n, 4) into sensor -> map (n, 4); the map's y is magnetic north."""
-    return product(TO_MAP, q)
-
-
 def to_mt_world(q: Floats, world: int) -> Floats:
     """Sensor -> ENU, NED or NWU (n, 4) into sensor -> MT world (north, west, up)."""
     return q if world == NWU else product(FROM_WORLD[world], q)
 
 
 def product(p: Floats, q: Floats) -> Floats:
-    """Hamilton products p q (n, 4) of one quaternion p (4,) with many q (n, 4): the rotation of q first, then that of p."""
+    """Hamilton products p q (n, 4) of one quaternion p (4,) with many q (n, 4): the rotation q first, then p."""
     w, x, y, z = p
     a, b, c, d = q[:, 0], q[:, 1], q[:, 2], q[:, 3]
     return np.stack(

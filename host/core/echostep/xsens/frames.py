@@ -47,7 +47,7 @@ class Frame(NamedTuple):
 class MtFrames(NamedTuple):
     """Complete frames: `bus` (n,), identifier `mid` (n,), and first byte `body` (n,) and `length` (n,) of the payload in `stream`.
 
-    `end` (n,): index, in the bytes just fed, behind the byte that completed the frame. That is the frame's last byte, or the last byte of a false
+    `end` (n,): index, in the bytes just fed, after the byte that completed the frame. That is the frame's last byte, or the last byte of a false
     frame that began before it and had to be rejected first.
     """
 
@@ -80,7 +80,7 @@ def encode_frame(mid: int, payload: bytes = b"", bus_id: int = BUS_ID) -> bytes:
 class FrameReader:
     """Frames of a byte stream. After a rejected frame, the next preamble is searched inside it.
 
-    `longest`: payload of a frame, bytes. On a live port a short one: a false preamble must not hold back the samples that follow it.
+    `longest`: payload of a frame, bytes. Short on a live port: a false preamble must not hold back the samples that follow it.
     """
 
     longest: int = MAX_LENGTH

@@ -49,7 +49,7 @@ NO_MESSAGES = Messages(
 
 
 def joined(waiting: Messages, newer: Messages) -> Messages:
-    """The message that waits, if there is one, and the newer ones."""
+    """The waiting message, if any, and the newer ones."""
     if not len(waiting.counter):
         return newer
     return Messages(*(np.concatenate(pair) for pair in zip(waiting, newer, strict=True)))
@@ -57,7 +57,7 @@ def joined(waiting: Messages, newer: Messages) -> Messages:
 
 @kernel
 def apply_gates(messages: Messages, limits: Floats, state: Ints, tally: Ints) -> tuple[Bools, int]:
-    """Whether each message (n,) is a sample that passes every gate, and the index of one that waits for the next (-1: none).
+    """Whether each message (n,) is a sample that passes every gate, and the index of a message that waits for the next (-1: none).
 
     Updates `state`, and `tally` by the results. A sample that had to wait gets the `end` of the one that confirmed it. The gates are needed
     because the checksum has 8 bits: one damaged frame in 256 passes it.

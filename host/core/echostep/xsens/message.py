@@ -58,7 +58,7 @@ class CounterGaps:
 
 
 class MtMessage(NamedTuple):
-    """One valid frame. None: not sent.
+    """One valid frame. A field is None if it was not sent.
 
     `name`: MtSample for a measurement with accel, gyro, mag or orientation, else the message's name, "" if unknown. accel m/s2, gyro rad/s, mag in
     the earth's field (sensor frame); quaternion w x y z (sensor -> `world`). `packets`: packets of MTData2 that are no field, and the rest of MTData.
@@ -120,7 +120,7 @@ class MessageReader:
         return MtMessage(NAMES.get(frame.mid, ""), frame.mid, frame.bus, packets=packets, payload=frame.payload)
 
     def _legacy(self, frame: Frame) -> MtMessage:
-        """MTData in the format that was found for its length; without one, its bytes."""
+        """MTData in the format that was found for its length; without a format, its bytes."""
         output = self.formats.of(frame.bus, len(frame.payload))
         if output is None:
             return MtMessage("MTData", frame.mid, frame.bus, payload=frame.payload)
@@ -196,7 +196,7 @@ def _quaternion(row: Floats) -> Quaternion:
 
 
 def as_object(message: MtMessage) -> dict[str, object]:
-    """The message as JSON: what was sent, with the bus where it is not that of a device alone, and bytes as hex."""
+    """The message as JSON: what was sent, with the bus unless it is a single device's, and bytes as hex."""
     sent = {
         "counter": message.counter,
         "accel": message.accel,

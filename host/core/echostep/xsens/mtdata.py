@@ -86,7 +86,7 @@ class OutputFormat:
 
     @cached_property
     def numbers(self) -> int:
-        """Number of 4-byte values at the begin of a payload."""
+        """Number of 4-byte values at the beginning of a payload."""
         return (self.mode & TEMPERATURE > 0) + 3 * len(self.calibrated) + self.orientation_values
 
     @cached_property
@@ -136,7 +136,7 @@ def decode_mtdata(rows: Octets, output: OutputFormat) -> Decoded:
 
 
 def rest_of(payload: bytes, output: OutputFormat) -> dict[str, list[int] | int]:
-    """What a payload has besides `Decoded`, as sent: `raw` (accel, gyro, mag, temperature), `analog` (one or two inputs), `status`."""
+    """Fields of a payload besides `Decoded`, as sent: `raw` (accel, gyro, mag, temperature), `analog` (one or two inputs), `status`."""
     if output.mode & RAW:
         return {"raw": list(struct.unpack_from(">10H", payload))}
     fields: dict[str, list[int] | int] = {}

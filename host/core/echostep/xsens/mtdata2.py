@@ -107,14 +107,6 @@ def decode_mtdata2(stream: Octets, packets: PacketIndex) -> Decoded:
     return Decoded(values, counter, np.column_stack([packets.begin[:, _ACCEL:] > 0, oriented]))
 
 
-def missing_contents(payload: bytes) -> list[str]:
-    """What a payload lacks of a sample, in words; empty for a whole one."""
-    packets = find_packets(np.frombuffer(payload, np.uint8), np.array([0]), np.array([len(payload)]))
-    _, counter, sent = decode_mtdata2(np.frombuffer(payload, np.uint8), packets)
-    present = {"sample counter": counter[0] >= 0, "acceleration": sent[0, 0], "rate of turn": sent[0, 1]}
-    return [name for name, is_there in present.items() if not is_there]
-
-
 def _quaternions(quantity: int, numbers: Floats) -> Floats:
     """Quaternions (n, 4) of orientations as `quantity` sends them."""
     if quantity == _QUATERNION:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Which output format the MTData of a capture have, as the messages do not contain it.
+"""The output format of the MTData in a capture, which the messages do not contain.
 
 In: frames of a capture's beginning, and what the caller knows. Out: the format by bus and length, and how it was found. Owns the formats found.
 
-It is, in this order: given; told by a Configuration message or by the answers to ReqOutputMode and ReqOutputSettings in the capture; or the simplest
+It is, in this order: given; from a Configuration message or the answers to ReqOutputMode and ReqOutputSettings in the capture; or the simplest
 format of that length with which the values are possible.
 """
 
@@ -52,7 +52,7 @@ _DEVICES, _BLOCKS, _BLOCK = 96, 98, 20
 _BLOCK_FORMAT = struct.Struct(">IHHI")  # of a block: device, length of its data, output mode, output settings
 MOST_ROWS = 500  # messages by which a format is judged; assumed
 POSSIBLE = 0.9  # least share of messages with possible values: some are damaged
-# Possible values: magnitudes of a sensor on a body, m/s2, rad/s, earth's fields; mean acceleration with gravity in it; air, degC.
+# Possible values: magnitudes of a sensor on a body, m/s2, rad/s, earth's fields; mean acceleration including gravity; air, degC.
 MOST = ((ACCEL, 200.0), (GYRO, 40.0), (MAG, 20.0))
 STRONGEST_FIELD = 4.0  # median: some iron, no magnet
 MEAN_ACCEL = (5.0, 20.0)  # m/s2
@@ -70,7 +70,7 @@ class Found(NamedTuple):
 
 @dataclass(slots=True)
 class OutputFormats:
-    """Formats by bus and length of the payload. `mode`, `settings`: given by the caller, None where not known."""
+    """Formats by bus and length of the payload. `mode`, `settings`: given by the caller, None if unknown."""
 
     mode: int | None = None
     settings: int | None = None
@@ -78,7 +78,7 @@ class OutputFormats:
     _told: dict[int, list[int | None]] = field(default_factory=dict)  # mode and settings by bus
 
     def learn(self, frames: list[Frame]) -> None:
-        """Find the formats of these frames' MTData, where they are not found yet."""
+        """Find the formats of these frames' MTData, if not found yet."""
         by_key: dict[tuple[int, int], list[bytes]] = {}
         for frame in frames:
             self._listen(frame)
@@ -90,7 +90,7 @@ class OutputFormats:
             self.found[key] = self._find(key[0], rows)
 
     def of(self, bus: int, length: int) -> OutputFormat | None:
-        """The format of MTData of this length; None where it is not known."""
+        """The format of MTData of this length; None if unknown."""
         known = self.found.get((bus, length))
         return None if known is None else known.output
 
@@ -124,7 +124,7 @@ def configured_devices(payload: bytes) -> list[tuple[int, int, int, int]]:
 
 
 def _first(mode: int | None, settings: int | None, rows: Octets, how: str) -> Found | None:
-    """The simplest format of this length, with this mode and these settings if they are known. One that is known whole needs no possible values."""
+    """The simplest format of this length, with this mode and these settings if they are known. A fully known format needs no possible values."""
     formats = _formats(rows.shape[1])
     if mode is not None and settings is not None:
         formats = _known_formats(mode, settings, rows.shape[1])
@@ -152,7 +152,7 @@ def _formats(length: int) -> tuple[OutputFormat, ...]:
     modes = [
         sum(bits)
         for bits in product((0, CALIBRATED), (0, ORIENTATION), (0, TEMPERATURE), (0, STATUS), (0, AUXILIARY))
-        if bits[0] or bits[1]  # with neither, nothing in the values tells
+        if bits[0] or bits[1]  # with neither, the values show nothing
     ]
     choices = product(
         modes,

@@ -124,7 +124,7 @@ def _numbers(content: bytes, form: int) -> list[float]:
 
 
 def _satellites(content: bytes) -> dict[str, float]:
-    """Fields of GNSSSatInfo: time of week, number of satellites; of each: system, number, carrier to noise (dBHz), flags. None for a wrong size."""
+    """Fields of GNSSSatInfo: time of week, number of satellites; for each: system, number, carrier to noise (dBHz), flags. Empty for a wrong size."""
     if len(content) < SATELLITE_HEAD or len(content) != SATELLITE_HEAD + SATELLITE * content[4]:
         return {}
     fields: dict[str, float] = dict(

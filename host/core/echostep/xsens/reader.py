@@ -2,7 +2,7 @@
 """Measurements of an MT that have passed every gate, in batches of arrays.
 
 In: bytes from the MT's port, in any split. Out: `MtBatch`es. Owns the unfinished frame, the last counter, a sample that waits for the next one,
-and the counts. Of several devices behind a master, that of the first whole sample is followed.
+and the counts. Of several devices behind a master, the device of the first whole sample is followed.
 Vectors are in the sensor frame. Orientations are sensor -> MT world (magnetic north, west, up).
 """
 
@@ -50,7 +50,7 @@ from echostep.xsens.sample import MtSample
 class MtBatch(NamedTuple):
     """Measurements in order, the fields as in `MtSample`, and the temperature in degC; NaN for mag, quaternion and temperature that are not sent.
 
-    `end` (n,): index, in the bytes just fed, behind the byte that completed the measurement.
+    `end` (n,): index, in the bytes just fed, after the byte that completed the measurement.
     """
 
     counter: Ints
@@ -77,7 +77,7 @@ EMPTY = MtBatch(
 
 @dataclass(slots=True)
 class MtxCounts:
-    """What an `MtxReader` has counted.
+    """Counts of an `MtxReader`.
 
     `lost`: counters between samples that never came, with a sample or with another message. `incomplete`: messages without counter, accel or gyro.
     `bad_counter`: samples whose counter jumped while the next one did not follow it. `other_device`: samples of devices that are not followed.

@@ -15,11 +15,9 @@ from statistics import median
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.localization.echoes.likelihood import EchoSettings, echo_model
-from echostep.localization.estimate import TrackStatus
+from echostep.localization import ClimbSettings, CloudSettings, EchoSettings, Start, TrackStatus, echo_model
 from echostep.localization.height.levels import (
     UNKNOWN_LAG_M2,
-    ClimbSettings,
     HeightArrays,
     HeightChange,
     change_levels,
@@ -35,10 +33,9 @@ from echostep.localization.particles.kernels import (
     propagate,
     systematic,
 )
-from echostep.localization.particles.start import Start, draw_poses
-from echostep.localization.settings import CloudSettings
+from echostep.localization.particles.start import draw_poses
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import walkable_floor
 from echostep.walls.level_sheet import LevelSheet, lay_out_levels, level_of

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from echostep.jit import kernel
-from echostep.localization.echoes.likelihood import EchoModel, echo_density
+from echostep.localization import EchoModel, echo_density
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.echo_sources import MOST_SOURCES, echo_sources
 from echostep.walls.index import WallIndex

@@ -13,7 +13,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan, Pose
+from echostep.plan import Plan, Pose
 
 LONG_M = 2.5  # a wall that can be missing is at least so long
 NEAR_M = 2.0  # and so near to the way

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from echostep.errors import EchostepError
-from echostep.localization.particles.start import Start
-from echostep.plan.model import Plan, Pose
+from echostep.localization import Start
+from echostep.plan import Plan, Pose
 from echostep_studies.anywhere import plan_changes
 from echostep_studies.anywhere.kidnaps import Kidnapped, asleep_in_lift, carried, off_in_lift, restarted
 from echostep_studies.bench import echo_changes, sites

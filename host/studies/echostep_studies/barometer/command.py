@@ -36,7 +36,7 @@ def floors(
     units: Units = None,
 ) -> None:
     """Floors of a recorded barometer. Writes t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
-    from echostep.offline.foreign_columns import parse_naming
+    from echostep_app.offline.foreign_columns import parse_naming
     from echostep_studies.barometer import floors_command
 
     floors_command.floors(pressure, heights, out, start, picture, parse_naming(columns, units))

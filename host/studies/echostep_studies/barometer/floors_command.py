@@ -13,7 +13,7 @@ from rich.console import Console
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.offline.foreign_columns import OWN, Naming
+from echostep_app.offline.foreign_columns import OWN, Naming
 from echostep_app.printing.picture_files import save_picture
 from echostep_studies.barometer.altitude import BarometerSettings, Pressures
 from echostep_studies.barometer.floor_filter import FloorFilter, Floors, checked_heights

@@ -18,9 +18,9 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
 from echostep.errors import EchostepError
-from echostep.offline import foreign_columns
 from echostep.offline.csv_table import MOST_BAD, CsvLimits, lines_of, open_samples, rate_complaint, read_rows
-from echostep.offline.foreign_columns import ADVICE, OWN, Naming, read_header
+from echostep_app.offline import foreign_columns
+from echostep_app.offline.foreign_columns import ADVICE, OWN, Naming, read_header
 from echostep_studies.barometer.altitude import (
     COLDEST_C,
     FASTEST_PA_S,

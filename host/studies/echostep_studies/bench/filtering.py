@@ -13,14 +13,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.localization.building import Building
-from echostep.localization.drawn_places import DrawnPlaces
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles.start import Start
-from echostep.localization.settings import CloudSettings, FilterSettings
+from echostep.localization import (
+    Building,
+    CloudSettings,
+    DrawnPlaces,
+    Estimate,
+    FilterSettings,
+    MapFilter,
+    Start,
+    TrackStatus,
+)
 from echostep.path import MeasuredSegment
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep.walls.level_sheet import lay_out_levels
 
 WARM_UP = 3  # segments for which a throw-away filter runs first, so that no compilation is timed

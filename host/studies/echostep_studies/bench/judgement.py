@@ -16,8 +16,8 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.localization.estimate import TrackStatus, in_ellipse95
-from echostep.plan.model import Plan
+from echostep.localization import TrackStatus, in_ellipse95
+from echostep.plan import Plan
 from echostep_studies.bench.filtering import Claim
 
 FOUND_M = 1.0  # a wearer is found within this error

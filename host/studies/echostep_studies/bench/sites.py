@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.plan.model import Level, Plan, Pose, load_plan
+from echostep.plan import Level, Plan, Pose, load_plan
 from echostep_app.plan.importers.formats import open_plan
 from echostep_app.plan.routing import RoutePlace
 from echostep_app.simulation.people.walker import Waypoint

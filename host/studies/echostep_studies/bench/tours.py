@@ -12,7 +12,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.plan.routing import RoutePlace, Routes
 from echostep_app.simulation.people.tours import tour as tour_of
 from echostep_app.simulation.people.walker import Waypoint

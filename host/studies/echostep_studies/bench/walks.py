@@ -14,7 +14,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.path import MeasuredSegment
-from echostep.plan.model import Plan, Pose
+from echostep.plan import Plan, Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.settings import Settings
 from echostep.tracker import Tracker

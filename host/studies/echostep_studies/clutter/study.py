@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from echostep.localization.particles.start import Start
-from echostep.localization.settings import CloudSettings
+from echostep.localization import CloudSettings, Start
 from echostep_app.output.table import Table
 from echostep_studies.bench.columns import JudgedRow, JudgedSummary, run_row, summaries, tables
 from echostep_studies.bench.filtering import FilterRun, track

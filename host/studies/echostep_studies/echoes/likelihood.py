@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.echoes.likelihood import EchoModel, EchoSettings, echo_model, log_echo
+from echostep.localization import EchoModel, EchoSettings, echo_model
+from echostep.localization.echoes.likelihood import log_echo
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep_app.output.table import console
 from echostep_studies.simulation.marker_walk import lay_markers, walk_markers

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echostep.localization.echoes.likelihood import EchoSettings, echo_model
+from echostep.localization import EchoSettings, echo_model
 from echostep.walls.echo_sources import Walls
 from echostep_app.simulation.world.acoustics import SRF02, directivity_db
 from echostep_studies.echoes.effects import Effect, pipe_range_m

@@ -21,9 +21,9 @@ from rich.console import Console
 
 from echostep.arrays import Floats
 from echostep.foot.steps import Step, walk_track
-from echostep.localization.estimate import Estimate, digest
-from echostep.plan.model import Pose, load_plan
-from echostep.recording.reading import open_recording
+from echostep.localization import Estimate, digest
+from echostep.plan import Pose, load_plan
+from echostep.recording import open_recording
 from echostep.settings import parse_settings
 from echostep.tracker import Tracker
 from echostep.walk.table import write_track

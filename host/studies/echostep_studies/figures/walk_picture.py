@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.estimate import Estimate, claims_place
+from echostep.localization import Estimate, claims_place
 from echostep.path import MeasuredSegment
-from echostep.plan.model import Plan, load_plan
+from echostep.plan import Plan, load_plan
 from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
 from echostep_app.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR

@@ -16,16 +16,17 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.jit import part
-from echostep.localization.beacons.beliefs import BeaconMeasurement, empty_beliefs, resample_beliefs, set_beliefs
-from echostep.localization.beacons.model import BeaconModel, BeaconSettings, beacon_model
+from echostep.localization import BeaconSettings, CloudSettings
+from echostep.localization.beacons.beliefs import BeaconMeasurement, empty_beliefs, set_beliefs
+from echostep.localization.beacons.model import BeaconModel, beacon_model
 from echostep.localization.beacons.slam import initial_health, propose_heading_jumps
 from echostep.localization.beacons.step import Beacons, no_waiting, update_by_reading
 from echostep.localization.particle_arrays import Move, ParticleArrays
 from echostep.localization.particles.kernels import systematic
-from echostep.localization.settings import CloudSettings
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex
 from echostep_app.simulation.world.beacon_ground import BeaconGround, is_in_reach, measure
+from echostep_studies.fischer2008.resampling import resample_beliefs
 from echostep_studies.fischer2008.walker import GuidedWalker
 
 CLOUD = CloudSettings()

@@ -15,8 +15,9 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.stride import Flag, Stride, StrideSettings, distance_sd_m
+from echostep.legs.stride import Flag, Stride, StrideSettings
 from echostep.legs.strides import StrideEstimator
+from echostep_app.offline.leg_side import distance_sd_m
 from echostep_app.simulation.people.leg_angles import LegDimensions, stair_angles
 
 CYCLES, RATE_HZ, STAND_S, EASE_S = 15, 100.0, 2.0, 0.8

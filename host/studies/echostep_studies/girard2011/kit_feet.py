@@ -14,7 +14,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.foot.ins import GRAVITY_M_S2, Noise
 from echostep.foot.steps import walk_track
-from echostep.odometry.foot_source import ICM20649_NOISE
+from echostep.odometry import ICM20649_NOISE
 from echostep_app.commissioning.imu_errors import fit_errors, pose_of
 from echostep_app.simulation.devices.foot_board import measure_foot
 from echostep_app.simulation.devices.mtx import MtxModel, measure

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from echostep.board.messages import Part, Schedule
-from echostep.localization.echoes.likelihood import EchoSettings
+from echostep.localization import EchoSettings
 from echostep.localization.echoes.rangers import ECHO_OF
 from echostep_app.output.table import Table
 from echostep_app.simulation.devices.srf02 import HALF_US

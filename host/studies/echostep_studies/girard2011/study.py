@@ -16,13 +16,9 @@ from typing import Any
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.building import Building
-from echostep.localization.echoes.likelihood import EchoSettings
-from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles.start import Start
-from echostep.localization.settings import FilterSettings
+from echostep.localization import Building, EchoSettings, FilterSettings, MapFilter, Start
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Pose
+from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
 from echostep_app.output.table import Table
 from echostep_studies.frame.report import ErrorSummary, as_dict, as_dicts, rows_by_name, summary

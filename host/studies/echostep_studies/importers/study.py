@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.output.table import Table
 from echostep_app.plan.importers.formats import is_foreign
 from echostep_app.plan.importers.limited import import_reported

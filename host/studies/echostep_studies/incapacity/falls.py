@@ -14,7 +14,7 @@ import numpy as np
 from msgspec import UNSET, UnsetType
 
 from echostep.arrays import Floats, Ints
-from echostep.odometry.wearer import AlarmKind, AlarmReason
+from echostep.odometry import AlarmKind, AlarmReason
 from echostep.path import PathSegment
 from echostep_app.output.table import Table
 from echostep_app.wearer.alarm import WearerAlarm

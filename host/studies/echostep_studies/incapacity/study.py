@@ -17,7 +17,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.legs.trunk_path import GyroBlock
-from echostep.odometry.wearer import AlarmKind
+from echostep.odometry import AlarmKind
 from echostep_app.wearer.alarm import WearerAlarm
 from echostep_app.wearer.stillness import WINDOW_S, Stillness, Window
 from echostep_app.wearer.wearer_signs import StepTaken

@@ -15,7 +15,7 @@ from echostep.arrays import Floats
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import StrideSettings
 from echostep.legs.trunk_path import WearerSettings
-from echostep.plan.model import Plan, Pose
+from echostep.plan import Plan, Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.settings import Settings
 from echostep.tracker import Tracker

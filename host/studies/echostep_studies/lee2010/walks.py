@@ -19,7 +19,7 @@ from echostep.board import messages as m
 from echostep.board.calibration import ADIS16100_RAD_S
 from echostep.board.frames import BoardReader, Frames, encode
 from echostep.legs.kinematics import LegLengths
-from echostep.plan.model import Level, Plan
+from echostep.plan import Level, Plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.timing.timeline import PLAIN, Arrivals, MtxTiming, Timeline
 from echostep_app.offline.leg_csv import LegSamples

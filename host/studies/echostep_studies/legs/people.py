@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.legs.clipping import repair_clipping
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import StrideSettings
 from echostep.legs.strides import StrideEstimator
+from echostep_app.offline.clipped_rates import repair_clipping
 from echostep_app.output.table import Table
 from echostep_studies.frame.report import as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest

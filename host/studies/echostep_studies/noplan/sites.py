@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Floats
-from echostep.plan.model import Level, Plan, load_plan
+from echostep.plan import Level, Plan, load_plan
 from echostep_app.plan.importers.formats import open_plan
 from echostep_app.plan.places.gaps import door_gaps
 from echostep_app.plan.routing import RoutePlace

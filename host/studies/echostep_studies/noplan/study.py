@@ -18,8 +18,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization.particles.start import Start
-from echostep.plan.model import Plan
+from echostep.localization import Start
+from echostep.plan import Plan
 from echostep_app.mapping.graph.nodes import nodes_of
 from echostep_app.mapping.mapper import map_walk
 from echostep_app.mapping.picture import draw_picture

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization import Estimate, TrackStatus
 from echostep_app.output.table import Table
 from echostep_app.scorecard.card import FLOOR_PENALTY_M, score
 from echostep_app.scorecard.error_statistics import error_statistics, quantile

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.scorecard.track_columns import ScoredPath
 
 

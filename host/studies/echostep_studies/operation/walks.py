@@ -17,13 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats, spans
-from echostep.localization.estimate import Estimate
-from echostep.localization.particles.start import Start
-from echostep.plan.model import Plan
+from echostep.localization import Estimate, Start
+from echostep.plan import Plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
-from echostep.tracker.last_place import start_after
 from echostep_app.plan.routing import RoutePlace
+from echostep_app.session.last_place import start_after
 from echostep_app.simulation.devices.board import PythonBoard
 from echostep_app.simulation.people.walker import Manner, Person, Waypoint
 from echostep_app.simulation.scenario import START_NS, Scenario

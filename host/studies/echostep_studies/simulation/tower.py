@@ -10,7 +10,7 @@ import hashlib
 
 import numpy as np
 
-from echostep.plan.model import Connector, Level, Plan, Pose, Room
+from echostep.plan import Connector, Level, Plan, Pose, Room
 from echostep_app.simulation.people.walker import Waypoint
 
 STOREY_M = 3.5

@@ -19,7 +19,7 @@ import shapely
 
 from echostep.arrays import Floats
 from echostep.jit import kernel
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex, build_index, crosses_wall
 from echostep_studies.papers.girard2011_rays import lambda_ray_ranges

@@ -22,7 +22,7 @@ from echostep_studies.speed.comparison import Row, Scale
 FIRST_FIX = """
 import time
 import numpy as np
-from echostep.localization.echoes.likelihood import EchoSettings, echo_model
+from echostep.localization import EchoSettings, echo_model
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.localization.particles.kernels import begin_segment
 from echostep.localization.particles.reweighting import WeightedPing, reweight_by_ping

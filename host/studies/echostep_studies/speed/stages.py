@@ -15,8 +15,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from echostep.plan.model import load_plan
-from echostep.recording.reading import open_recording
+from echostep.plan import load_plan
+from echostep.recording import open_recording
 from echostep.tracker import Tracker
 
 Spent = dict[str, float]

@@ -7,9 +7,9 @@ nothing. The drawing grows by stretches, as a live run's does, and is complete w
 
 from __future__ import annotations
 
-from echostep.localization.estimate import Estimate
+from echostep.localization import Estimate
 from echostep.path import MeasuredSegment
-from echostep.plan.model import NO_PLAN, Plan, Pose
+from echostep.plan import NO_PLAN, Plan, Pose
 from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
 from echostep_app.mapping.growing import GrowingMap

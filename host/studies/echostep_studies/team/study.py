@@ -23,9 +23,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.particles.start import Start
-from echostep.plan.model import NO_PLAN, Plan, Pose, load_plan
+from echostep.localization import Estimate, Start, TrackStatus
+from echostep.plan import NO_PLAN, Plan, Pose, load_plan
 from echostep_app.output.table import Table
 from echostep_app.plan.routing import RoutePlace
 from echostep_studies.bench import judgement, sites

@@ -15,13 +15,13 @@ from enum import StrEnum
 
 import numpy as np
 
-from echostep.localization.estimate import Estimate
-from echostep.localization.particles.start import Start
-from echostep.plan.model import Pose
+from echostep.localization import Estimate, Start
+from echostep.plan import Pose
 from echostep.ports.chunks import Chunk, portion_of
-from echostep.ports.people.meeting import MEETING, MeetingMessage, meeting_with
+from echostep.ports.people.meeting import MEETING, MeetingMessage
 from echostep.ports.people.team_beacons import SHARE_S, TEAM_BEACONS, TeamBeacons
 from echostep.tracker import Tracker
+from echostep_app.ports.reported_meeting import meeting_with
 from echostep_app.simulation.scenario import START_NS
 from echostep_app.team.outbox import aged
 from echostep_app.team.publish import position_of

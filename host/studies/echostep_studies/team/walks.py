@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Bools, Floats, spans
-from echostep.plan.model import Plan, Pose
+from echostep.plan import Plan, Pose
 from echostep.ports.chunks import Chunk
 from echostep_app.plan.routing import RoutePlace
 from echostep_app.simulation.devices.board import PythonBoard

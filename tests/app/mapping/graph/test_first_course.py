@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Pose
+from echostep.plan import Pose
 from echostep_app.mapping.mapper import map_walk
 from echostep_app.mapping.plan import plan_of
 

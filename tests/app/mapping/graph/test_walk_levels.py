@@ -13,7 +13,7 @@ import pytest
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Plan, parse_plan
+from echostep.plan import Plan, parse_plan
 from echostep_app.mapping.graph.levels import BETWEEN, find_levels
 from echostep_app.mapping.graph.nodes import nodes_of
 from echostep_app.mapping.joining import join_walks

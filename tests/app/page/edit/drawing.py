@@ -10,7 +10,7 @@ import os
 from typing import Any
 
 from board_runs import ROOT
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep_app.page.editor import EditServer
 from page.browser import spot, wait_for
 from waiting import PATIENCE_S, until

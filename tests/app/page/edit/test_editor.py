@@ -14,7 +14,7 @@ import pytest
 
 from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep.plan.model import load_plan, parse_plan
+from echostep.plan import load_plan, parse_plan
 from echostep_app.page import editor as plan_edit
 from echostep_app.page.editor import EditServer
 from echostep_app.plan.writer import plan_json, save_plan

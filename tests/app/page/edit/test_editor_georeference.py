@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from board_runs import ROOT
-from echostep.plan.georeference import EarthTransform
-from echostep.plan.model import Georeference, Plan, load_plan
+from echostep.plan import Georeference, Plan, load_plan
 from echostep_app.page.editor import EditServer
+from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.writer import save_plan
 from page.browser import wait_for
 from page.edit.drawing import PHONES, PICTURES, answer, answered, click, on_phone, opened, status, tap

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from ezdxf.filemanagement import new
 
-from echostep.plan.model import Plan, load_plan
+from echostep.plan import Plan, load_plan
 from echostep_app.page.editor import EditServer
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers.formats import import_plan

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from echostep.plan.model import Plan, Pose, load_plan, parse_plan
+from echostep.plan import Plan, Pose, load_plan, parse_plan
 from echostep_app.page.editor import EditServer
 from echostep_app.plan.writer import save_plan
 from page.browser import wait_for

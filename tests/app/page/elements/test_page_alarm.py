@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from echostep.odometry.wearer import Alarm, AlarmKind, AlarmReason, WearerWatch
+from echostep.odometry import Alarm, AlarmKind, AlarmReason, WearerWatch
 from echostep.ports.people.check_in import Call
 from echostep_app.page.elements.alarm import ShownAlarm, shown_alarm
 from echostep_app.page.mailbox import Mailbox

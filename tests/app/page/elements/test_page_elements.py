@@ -12,11 +12,9 @@ import pytest
 import shapely
 
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.particles.places import LikelyPlace
-from echostep.localization.particles.start import Start
+from echostep.localization import Estimate, LikelyPlace, Start, TrackStatus
 from echostep.path import PathSegment
-from echostep.plan.model import Plan, Pose
+from echostep.plan import Plan, Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import CheckIn
 from echostep.tracker import Tracker

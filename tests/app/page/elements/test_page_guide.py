@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from websockets.sync.client import ClientConnection
 
-from echostep.localization.estimate import Estimate
+from echostep.localization import Estimate
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.cues import Cue, CueKind

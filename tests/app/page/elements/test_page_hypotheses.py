@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.particles.places import LikelyPlace
-from echostep.localization.particles.start import Start
+from echostep.localization import Estimate, LikelyPlace, Start, TrackStatus
 from echostep.tracker import Tracker
 from echostep_app.guidance.cues import Cue, CueKind
 from echostep_app.page.elements.guidance import guidance_of_cue

@@ -10,8 +10,8 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.localization.team.meeting_memory import MeetingEffect
-from echostep_app.page.elements.meetings import WORDS, ShownMeeting
+from echostep.localization import MeetingEffect
+from echostep_app.page.elements.marks import WORDS, ShownMeeting
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.requests import Met, parse_request
 from echostep_app.page.server import PageServer

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from websockets.sync.client import ClientConnection
 
-from echostep.ports.arrival_clock import now_ns
 from echostep_app.page.elements.taps import NO_TAP, PointPress, ShownPoints
 from echostep_app.page.mailbox import Mailbox
+from echostep_app.ports.arrival_clock import now_ns
 from page.browser import READY, loaded_page, overflow, wait_for
 from page.frames import PLAN, next_frame, opened, scene, served
 from page.test_language import CUT, LOCALES, MISSING, violations

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import struct
 
-from echostep.plan.model import NO_PLAN
+from echostep.plan import NO_PLAN
 from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.xsens import MTDATA2, encode_frame

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.server import Address
 from echostep_app.page.web import uploads

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.teams import ServedTeam, Team, place
 from page.browser import READY, loaded_page, overflow, wait_for

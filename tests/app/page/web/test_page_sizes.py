@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from echostep.localization.estimate import TrackStatus
-from echostep.localization.particles.places import LikelyPlace
+from echostep.localization import LikelyPlace, TrackStatus
 from echostep_app.page.elements.alarm import ShownAlarm
 from echostep_app.page.elements.scene import PageScene, status_text
 from echostep_app.page.elements.stream_rates import StreamRates

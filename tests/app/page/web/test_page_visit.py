@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from echostep.localization.estimate import Estimate, digest
-from echostep.plan.model import Plan, Pose
+from echostep.localization import Estimate, digest
+from echostep.plan import Plan, Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import PERSON
 from echostep.tracker import Tracker

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.page import protocol
 from echostep_app.page.elements.echo_lines import EchoLine
 from echostep_app.page.mailbox import Mailbox

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from ezdxf.filemanagement import new, readfile
 
-from echostep.plan.model import Level
+from echostep.plan import Level
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.importers.summary import doors_in_gaps

@@ -14,7 +14,7 @@ from ezdxf.filemanagement import new
 from ezdxf.math import Matrix44
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.plan.importers.dxf.layers import LAYERS, meaning, patterns_of
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.importers.summary import doors_in_gaps

@@ -10,9 +10,9 @@ from pathlib import Path
 from board_runs import ELF, TWIN
 from echostep.board.frames import encode
 from echostep.board.messages import Identify
-from echostep.ports.chunks import Chunk
-from echostep.ports.people.tap import POINT, Tap
+from echostep.ports.chunks import POINT, Chunk
 from echostep.walk.recorded import SIMULATED
+from echostep_app.ports.tap import Tap
 from echostep_app.recording.recorder import Recorder
 from echostep_app.session.acceptance.protocol import Protocol
 from echostep_app.session.acceptance.survey import corridor

@@ -15,8 +15,8 @@ from board_runs import needs_twin
 from command_line import echostep
 from echostep.board.messages import SCHEMA_HASH
 from echostep.errors import EchostepError
-from echostep.ports.chunks import Chunk
-from echostep.ports.people.tap import POINT, Tap
+from echostep.ports.chunks import POINT, Chunk
+from echostep_app.ports.tap import Tap
 from echostep_app.session.acceptance.errors import by_point, score_taps
 from echostep_app.session.acceptance.page import page
 from echostep_app.session.acceptance.protocol import FIELD

@@ -9,10 +9,10 @@ from typing import cast
 
 import pytest
 
-from echostep.ports.arrival_clock import now_ns
-from echostep.ports.people.tap import Tap, parse_tap
 from echostep_app.page.elements.taps import PointPress, ShownPoints
 from echostep_app.page.live import LivePage
+from echostep_app.ports.arrival_clock import now_ns
+from echostep_app.ports.tap import Tap, parse_tap
 from echostep_app.session.acceptance import guide as guides
 from echostep_app.session.acceptance.guide import Guide
 from echostep_app.session.acceptance.protocol import FIELD

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep_app.session.acceptance.protocol import recorded_protocol
 from echostep_app.session.acceptance.survey import corridor, surveyed
 from walks import DEMO

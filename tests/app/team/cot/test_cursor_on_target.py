@@ -31,9 +31,7 @@ from waiting import PATIENCE_S, ends, until
 ECHOSTEP = [sys.executable, "-m", "echostep"]
 
 
-@pytest.fixture(autouse=True)
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outbox, "RETRY_PAUSES_S", (0.05, 0.1, 0.2))
+pytestmark = pytest.mark.usefixtures("quick")
 
 
 @pytest.mark.usefixtures("patient")
@@ -186,14 +184,8 @@ def test_events_go_out_by_tls_with_a_client_certificate(certificates: Certificat
     box.offer(report())
     assert until(lambda: server.lines)
     box.close()
-    words: list[str] = []
-    distrusting = Outbox(StreamTransport(parse_endpoint(url)), "tls", words.append)
-    distrusting.offer(report())
-    assert until(lambda: words)
-    distrusting.close()
     server.stop()
     assert ElementTree.fromstring(server.lines[0]).get("uid") == "echostep-red-anna"
-    assert "an authority that this computer does not know" in words[0]
 
 
 @pytest.mark.long

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk
 from echostep.ports.people.check_in import PERSON, Call
 from echostep.tracker import Tracker

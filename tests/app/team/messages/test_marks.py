@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import structs
 
+from echostep_app.operation.restorer import RETAINED_S, Restorer
 from echostep_app.team.messages.marks import MOST_MARKS, MOST_REMOVED, ROOT, Mark, MarkBoard, ack_message
 from echostep_app.team.messages.report import BadReportError
-from echostep_app.team.restorer import RETAINED_S, Restorer
 
 HAZARD = Mark(1, "0123abcd", "hazard", 3.0, 2.0, 1, "Ann", 1.8e9, "7" * 64)
 TOPIC, PAYLOAD = HAZARD.message

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from command_line import echostep, interrupt_once_called
 from echostep.errors import EchostepError
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep_app.operation.operation import Operation
 from echostep_app.team import inbox, wearer_plan
 from echostep_app.team.endpoint import parse_endpoint

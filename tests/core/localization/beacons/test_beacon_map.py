@@ -17,11 +17,10 @@ import pytest
 from command_line import echostep
 from echostep.angles import mean_angle
 from echostep.errors import EchostepError
+from echostep.localization import Start, digest
 from echostep.localization.beacons.beliefs import BeaconBeliefs, moments
 from echostep.localization.belief import CloudHypothesis
-from echostep.localization.estimate import digest
-from echostep.localization.particles.start import Start
-from echostep.plan.model import Plan, Pose, load_plan
+from echostep.plan import Plan, Pose, load_plan
 from echostep.ports.chunks import GATEWAY, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.guided_run import GuidedRun, destination

@@ -10,15 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from echostep.localization import BeaconSettings
 from echostep.localization.beacons.beliefs import (
     BeaconBeliefs,
     BeaconMeasurement,
     empty_beliefs,
-    resample_beliefs,
     set_beliefs,
     wrap_angle,
 )
-from echostep.localization.beacons.model import BeaconSettings, beacon_model
+from echostep.localization.beacons.model import beacon_model
 from echostep.localization.beacons.slam import (
     CLOUD_FIT,
     SUSPECT,
@@ -32,6 +32,7 @@ from echostep.localization.beacons.step import Beacons, no_waiting, update_by_re
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex
+from echostep_studies.fischer2008.resampling import resample_beliefs
 
 MODEL = beacon_model(BeaconSettings())
 Floats = np.ndarray

@@ -12,16 +12,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.arrays import Floats
+from echostep.localization import BeaconSettings
 from echostep.localization.beacons.beliefs import (
     BeaconBeliefs,
     BeaconMeasurement,
     empty_beliefs,
     moments,
     place_covariance,
-    resample_beliefs,
 )
 from echostep.localization.beacons.initialisation import locate_beacon
-from echostep.localization.beacons.model import BeaconSettings, beacon_model
+from echostep.localization.beacons.model import beacon_model
 from echostep.localization.beacons.slam import (
     CLOUD_FIT,
     LOST_FIT,
@@ -33,6 +33,7 @@ from echostep.localization.beacons.slam import (
 from echostep.localization.beacons.step import MOST_READINGS, Beacons, no_waiting, update_by_reading
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.index import build_index
+from echostep_studies.fischer2008.resampling import resample_beliefs
 from naive import beacon_readings as naive_readings
 from naive import beacons as naive
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
+from echostep.localization import EchoSettings, FilterSettings
 from echostep.localization.belief import TEMPER
-from echostep.localization.echoes.likelihood import EchoSettings
 from echostep.localization.echoes.unplanned import (
     BIN_M,
     Background,
@@ -19,7 +19,7 @@ from echostep.localization.echoes.unplanned import (
     RangeMemory,
     UnplannedDensities,
 )
-from echostep.localization.settings import UNPLANNED_DOOR, FilterSettings, with_plan_error
+from echostep.localization.settings import UNPLANNED_DOOR, with_plan_error
 
 SD_M = 0.036
 SPACING_M = 0.25

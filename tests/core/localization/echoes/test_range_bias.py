@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats, Ints
-from echostep.localization.echoes.likelihood import EchoModel, EchoSettings, detection, echo_model, normal
+from echostep.localization import EchoModel, EchoSettings, echo_model
+from echostep.localization.echoes.likelihood import detection, normal
 from echostep.localization.echoes.range_bias import RangeBias
 from echostep.localization.particle_arrays import Move, ParticleArrays, PingBatch
 from echostep.path import MeasuredSegment, PathSegment

@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization.building import Building
-from echostep.localization.echoes.likelihood import EchoSettings, detection, echo_model
+from echostep.localization import Building, EchoSettings, echo_model
+from echostep.localization.echoes.likelihood import detection
 from echostep.localization.echoes.range_table import (
     AFTER_ECHO,
     AFTER_SILENCE,

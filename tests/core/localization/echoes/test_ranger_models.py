@@ -9,11 +9,11 @@ import pytest
 from board_runs import ROOT
 from echostep.board import messages as m
 from echostep.board.frames import encode
-from echostep.localization.echoes.likelihood import EchoSettings
-from echostep.localization.echoes.rangers import ECHO_OF, echo_of
-from echostep.odometry.front_end import FrontEnd
+from echostep.localization import EchoSettings, echo_of
+from echostep.localization.echoes.rangers import ECHO_OF
+from echostep.odometry import FrontEnd
 from echostep.path import MeasuredSegment
-from echostep.plan.model import load_plan
+from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk, portion_of
 from echostep.settings import Settings
 from echostep.tracker import Tracker

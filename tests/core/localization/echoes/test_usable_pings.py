@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.localization.building import Building
-from echostep.localization.echoes.likelihood import EchoSettings, echo_model
+from echostep.localization import Building, EchoSettings, echo_model
 from echostep.localization.echoes.unplanned import UsablePings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.settings import parse_settings

@@ -8,8 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization.building import Building
-from echostep.localization.echoes.likelihood import EchoSettings, echo_model
+from echostep.localization import Building, EchoSettings, echo_model
 from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, SECTORS, UNKNOWN
 from echostep.localization.grid.cells import EAST_WALL, NORTH_WALL
 from echostep.localization.grid.kernels import GridStates, halved, shift_and_weigh, spread

@@ -6,13 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from echostep.localization.building import Building
+from echostep.localization import Building, CloudSettings, FilterSettings, MapFilter, Start
 from echostep.localization.height.levels import FALL_PER_M
-from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles.start import Start
-from echostep.localization.settings import CloudSettings, FilterSettings
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Level, Plan, Pose
+from echostep.plan import Level, Plan, Pose
 from echostep.walls.level_sheet import lay_out_levels
 
 ROOM = np.array([[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0, 8, 0, 0]], float)

@@ -10,13 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.localization.echoes.likelihood import (
-    GATE_SD,
-    SURE_COS,
-    EchoSettings,
-    echo_model,
-    planned_density,
-)
+from echostep.localization import EchoSettings, echo_model, planned_density
+from echostep.localization.echoes.likelihood import GATE_SD, SURE_COS
 from echostep.localization.particle_arrays import Move, ParticleArrays, PingBatch
 from echostep.localization.particles.kernels import begin_segment, end_segment
 from echostep.localization.particles.reweighting import (

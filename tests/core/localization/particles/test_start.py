@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from echostep.localization.building import Building
-from echostep.localization.particles.start import ANY_LEVEL, NEAR_SD_M, NEAR_SHARE, Start, draw_poses
-from echostep.plan.model import Pose
+from echostep.localization import ANY_LEVEL, Building, Start
+from echostep.localization.particles.start import NEAR_SD_M, NEAR_SHARE, draw_poses
+from echostep.plan import Pose
 from echostep.walls.level_sheet import lay_out_levels, level_of
 from echostep_studies.simulation.tower import LIFT_AT, tower
 

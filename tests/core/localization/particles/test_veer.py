@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.localization.building import Building
-from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles.start import Start
-from echostep.localization.settings import CloudSettings, FilterSettings
+from echostep.localization import Building, CloudSettings, FilterSettings, MapFilter, Start
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Pose
+from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
 
 VEER_DEG, STEP_M, WAY_M = 3.0, 0.5, 40

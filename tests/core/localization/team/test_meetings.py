@@ -13,17 +13,14 @@ from hypothesis import strategies as st
 
 from board_runs import ROOT
 from echostep.arrays import Floats
-from echostep.localization.belief import STATED, Belief
-from echostep.localization.building import Building
-from echostep.localization.map_filter import MapFilter
+from echostep.localization import STATED, Building, CloudSettings, MapFilter, MeetingEffect, Start, on_the_way, start_at
+from echostep.localization.belief import Belief
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.particles.start import Start
-from echostep.localization.settings import CloudSettings
-from echostep.localization.team.meeting import WRONG, Meeting, covariance, on_the_way, start_at
-from echostep.localization.team.meeting_memory import MOST_NAMES, PLACE_M, RENEWED_M, MeetingEffect, MeetingMemory
+from echostep.localization.team.meeting import WRONG, Meeting, covariance
+from echostep.localization.team.meeting_memory import MOST_NAMES, PLACE_M, RENEWED_M, MeetingMemory
 from echostep.localization.team.meetings import best_omega, information, places_at, weigh
 from echostep.path import Odometer, PathSegment
-from echostep.plan.model import Plan, Pose, load_plan
+from echostep.plan import Plan, Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.meeting import MEETING, MeetingMessage, parse_meeting
 from echostep.tracker import Tracker

@@ -16,16 +16,22 @@ from hypothesis import strategies as st
 
 from board_runs import ROOT
 from echostep.board.gateway import BeaconReading
+from echostep.localization import (
+    MOST_TEAMMATES,
+    Building,
+    Estimate,
+    MapFilter,
+    MeetingEffect,
+    MeetingQueue,
+    Start,
+    TeamBeaconMap,
+    digest,
+)
 from echostep.localization.belief import Belief
-from echostep.localization.building import Building
-from echostep.localization.estimate import Estimate, digest
-from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles.start import Start
 from echostep.localization.team.meeting import Meeting
-from echostep.localization.team.meeting_memory import RENEWED_M, MeetingEffect, MeetingMemory, MeetingQueue
-from echostep.localization.team.shared_beacons import MOST_TEAMMATES, TeamBeaconMap
+from echostep.localization.team.meeting_memory import RENEWED_M, MeetingMemory
 from echostep.path import Odometer
-from echostep.plan.model import Pose, load_plan
+from echostep.plan import Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.team_beacons import MOST_SHARED, TEAM_BEACONS, SharedBeacon, TeamBeacons, parse_team_beacons
 from echostep.tracker import Tracker

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The types and names of findings on the board's health.
 
-In: the board's reports. Out: what they say of a device. Owns the names.
+In: the board's reports. Out: their contents about a device. Owns the names.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def part_text_of(reports: BoardReports, device: Healthy) -> str:
 
 
 def name_of(reports: BoardReports, device: Healthy) -> str:
-    """A device with the part that was found in its place, if it is not that of the papers: `barometer (BMP390)`."""
+    """A device with the part that was found in its place, if it is not the papers' part: `barometer (BMP390)`."""
     part = part_in(reports, device)
     return NAMES[device] if part in OF_THE_PAPERS else f"{NAMES[device]} ({PART_NAMES[part]})"
 

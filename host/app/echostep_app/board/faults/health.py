@@ -2,7 +2,7 @@
 """Findings on the board's health, each with a remedy.
 
 In: the board's reports about itself, and the measured rates of its streams. Out: `Finding`s, the most severe first. Owns nothing; the texts for
-single devices are in `device_faults`, those for restarts, crashes and supply are here.
+single devices are in `device_faults`, the texts for restarts, crashes and supply are here.
 """
 
 from __future__ import annotations

@@ -21,8 +21,8 @@ from echostep_app.plan.importers.limited import open_limited
 from echostep_app.ports.datagram_key import seal
 from echostep_app.ports.port_faults import PORT_FAULTS
 from echostep_app.ports.udp import key_of
+from echostep_app.printing.console import console
 from echostep_app.scorecard.truth import load_truth
-from echostep_app.session.console import console
 from echostep_app.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
 
 BAUD = 115200

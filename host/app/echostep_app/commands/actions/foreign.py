@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from echostep.errors import EchostepError
 from echostep.offline import imu_csv
 from echostep.offline.csv_table import LONGEST_LINE, UTF_16, header_of
 from echostep.ports.chunks import BOARD
-from echostep.recording.capture import port_of_bytes
-from echostep.recording.mcap_records import MCAP_MAGIC
+from echostep.recording import MCAP_MAGIC, port_of_bytes
 from echostep_app.offline import leg_csv
+from echostep_app.printing.lines import as_error
 
 HEAD = 1 << 16  # bytes that are looked at
 PACKETS = (
@@ -47,11 +46,8 @@ def foreign(path: Path) -> str:
     """A sentence about a file that is no MCAP file; raises EchostepError when it cannot be read."""
     if path.is_dir():
         return "a folder: give one file of it"
-    try:
-        with path.open("rb") as file:
-            head = file.read(HEAD)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot read the recording: {error.strerror}") from error
+    with as_error(f"{path}: cannot read the recording"), path.open("rb") as file:
+        head = file.read(HEAD)
     if head.startswith(MCAP_MAGIC):
         return ""
     if not head:

@@ -14,13 +14,14 @@ from rich.console import Console
 
 from echostep.errors import EchostepError
 from echostep.file_mode import claim
-from echostep.localization.echoes.rangers import echo_of
-from echostep.recording.reading import open_recording
+from echostep.localization import echo_of
+from echostep.recording import open_recording
 from echostep.settings import parse_settings
 from echostep.tracker import Tracker
 from echostep_app.commands.actions.rangers import SURELY, merged, report_of, tracked
 from echostep_app.commissioning.calibrate import Sections, write_sections
 from echostep_app.commissioning.rangers.report import RangerReport
+from echostep_app.printing.lines import as_error
 from echostep_app.recording.names import files_of
 from echostep_app.session.metadata import plan_of
 from echostep_app.session.options import TrackingOptions
@@ -62,10 +63,8 @@ def _learned(recording: Path, on_plan: TrackingOptions, sections: Sections) -> s
         return f"{NOTHING}: {' '.join(found.faults or found.lines[-1:])}"
     name = files[0].stem
     out = recording.with_name(f"{name}{ENDING}")
-    try:
+    with as_error(f"{out}: cannot write the settings"):
         claim(out)
-    except OSError as error:
-        raise EchostepError(f"{out}: cannot write the settings: {error.strerror}") from error
     write_sections(out, merged(sections, found), [f"From {name}.", *found.lines])
     return f"Rangers learned from this walk: {_changes(tracker, pings.part, found)}; use them with --settings {out}"
 

@@ -16,8 +16,8 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.path import MeasuredSegment
-from echostep.plan.model import NO_PLAN, Plan, Pose
-from echostep.recording.reading import Recording, open_recording
+from echostep.plan import NO_PLAN, Plan, Pose
+from echostep.recording import Recording, open_recording
 from echostep.walk.recorded import recorded_start
 from echostep_app.mapping.graph.directions import LEAST_EVIDENCE
 from echostep_app.mapping.joining import Join, join_walks
@@ -30,10 +30,10 @@ from echostep_app.mapping.walls.place_sd import OFF_M
 from echostep_app.plan.importers.limited import open_limited
 from echostep_app.plan.places.refusals import refusals
 from echostep_app.plan.writer import save_plan
-from echostep_app.session.console import console
+from echostep_app.printing.lines import say
+from echostep_app.printing.progress import bar, with_bar
 from echostep_app.session.losses import skipped
 from echostep_app.session.options import TrackingOptions
-from echostep_app.session.progress import bar, with_bar
 from echostep_app.session.runs.replay import tracker_of
 
 PLAN_SD_M = 0.05  # of the walls of a plan that does not state it
@@ -59,7 +59,7 @@ def map_recordings(paths: Sequence[Path], plan_path: Path | None, out: Path, pic
         draw_picture(picture, plan, walked_m)
         lines.append(f"picture: {picture}")
     for line in [*lines, f"{out}: check and mend it with echostep plan edit {out}"]:
-        _say(line)
+        say(line)
 
 
 Walks = Sequence[tuple[str, Mapped]]
@@ -126,7 +126,7 @@ def segments_of(recording: Recording) -> list[MeasuredSegment]:
     portions = with_bar(recording.portions(), f"reading {recording.path.name}", lambda: recording.fraction)
     pieces = [piece for portion in portions for piece in tracker.front_end.process(portion)]
     for line in skipped(recording, tracker.streams):
-        _say(line)
+        say(line)
     segments = [piece for piece in pieces if isinstance(piece, MeasuredSegment)]
     way_m = sum(math.hypot(s.segment.dx_m, s.segment.dy_m) for s in segments)
     if way_m < LEAST_WAY_M:
@@ -142,13 +142,9 @@ def _start_of(recording: Recording) -> Pose:
     try:
         start = recorded_start(recording.metadata, recording.path)
     except EchostepError:
-        _say(f"{recording.path}: its recorded start is damaged: the drawing begins at the origin")
+        say(f"{recording.path}: its recorded start is damaged: the drawing begins at the origin")
         return NO_PLAN.start
     return start if isinstance(start, Pose) else NO_PLAN.start
-
-
-def _say(line: str) -> None:
-    console.print(line, markup=False, highlight=False)
 
 
 def described(mapped: Mapped, plan: Plan) -> list[str]:

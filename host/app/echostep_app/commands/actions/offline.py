@@ -13,23 +13,22 @@ from pathlib import Path
 
 from echostep.errors import EchostepError
 from echostep.legs.stride import StrideSettings
-from echostep.offline.foreign_columns import OWN, Naming
-from echostep.offline.imu_csv import describe_track, load_imu, own_track, write_foot_track
-from echostep.recording.capture import Decoder, as_json, read_capture
-from echostep.recording.capture_summary import summary
+from echostep.offline.imu_csv import describe_track, own_track, write_foot_track
+from echostep.recording import Decoder, as_json, read_capture
 from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import OutputFormats
+from echostep_app.offline.foreign_columns import OWN, Naming, load_foot
 from echostep_app.offline.leg_csv import load_pair
 from echostep_app.offline.leg_lengths import calibrated_scale, checked_lengths
 from echostep_app.offline.leg_pair import track_pair
 from echostep_app.offline.leg_summary import describe_legs, describe_strides, write_leg_track
 from echostep_app.offline.leg_track import track_default
 from echostep_app.offline.profiles import DEFAULT, method
-from echostep_app.output.foot_plot import draw_foot
-from echostep_app.output.leg_plot import draw_legs
+from echostep_app.output.offline_plots import draw_foot, draw_legs
+from echostep_app.printing.console import console
 from echostep_app.printing.lines import complain
 from echostep_app.printing.people import is_unread
-from echostep_app.session.console import console
+from echostep_app.recording.capture_summary import summary
 
 SCALE_RANGE = (0.5, 2.0)  # of --scale: beyond it the lengths of the leg are wrong
 
@@ -37,7 +36,7 @@ SCALE_RANGE = (0.5, 2.0)  # of --scale: beyond it the lengths of the leg are wro
 def foot(path: Path, out: Path, profile: str, picture: Path | None, naming: Naming = OWN) -> None:
     """Track a recorded foot IMU with this project's method or that of a paper."""
     track_recording = method("foot", profile, own_track)
-    imu = load_imu(path, naming)
+    imu = load_foot(path, naming)
     for note in imu.notes:
         console.print(f"{path.name}: {note}")
     track = track_recording(imu, path.name)

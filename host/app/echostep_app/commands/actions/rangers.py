@@ -11,8 +11,8 @@ from pathlib import Path
 from rich.console import Console
 
 from echostep.errors import EchostepError
-from echostep.localization.echoes.rangers import echo_of
-from echostep.recording.joining import open_parts
+from echostep.localization import echo_of
+from echostep.recording import open_parts
 from echostep.tracker import Tracker
 from echostep_app.commissioning.calibrate import Sections, read_sections, write_sections
 from echostep_app.commissioning.rangers.faults import SWAPPED

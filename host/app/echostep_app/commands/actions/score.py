@@ -14,12 +14,11 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from echostep.errors import EchostepError
 from echostep_app.output.score_page import ScoreReport, page, short_names
 from echostep_app.output.table import Table
 from echostep_app.plan.importers.limited import open_limited
 from echostep_app.printing.console import console_for_people
-from echostep_app.printing.lines import complain, say
+from echostep_app.printing.lines import as_error, complain, say
 from echostep_app.scorecard.card import score as score_track
 from echostep_app.scorecard.definitions import METRICS, as_text, notes
 from echostep_app.scorecard.track_columns import load_path
@@ -78,8 +77,6 @@ def _tree(report: ScoreReport, truth: Path) -> dict[str, object]:
 
 
 def _write(path: Path, text: str) -> None:
-    try:
+    with as_error(f"{path}: cannot write the page"):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the page: {error.strerror or error}") from error

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a wearer's own two rangers do: fitted to the pings of a recorded walk on a plan.
+"""Models of a wearer's own two rangers, fitted to the pings of a recorded walk on a plan.
 
-In: a recording, its plan. Out: settings, and what is wrong with a ranger. Owns nothing.
+In: a recording, its plan. Out: settings, and faults of a ranger. Owns nothing.
 """

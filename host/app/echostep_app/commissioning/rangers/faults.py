@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is wrong with a ranger: it looks elsewhere, is covered, or hears the arm or the floor.
+"""Faults of a ranger: it looks elsewhere, is covered, or hears the arm or the floor.
 
 In: `PosedPings` of a walk, the walls, the usual settings. Out: one sentence for each fault. Owns the limits, which are assumed.
 """
@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.echoes.likelihood import EchoSettings
+from echostep.localization import EchoSettings
 from echostep.walls.echo_sources import Walls
 from echostep_app.commissioning.rangers.fit import BLOCK, score
 from echostep_app.commissioning.rangers.known_pings import KnownPings, known_pings
@@ -22,27 +22,27 @@ LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")
 AHEAD_DEG = (-60, -45, -30, 30, 45, 60)  # axes that are tried beside abeam; smaller errors are within the beam
 OPPOSITE_DEG = 180
-POSE_SD_M = 0.2  # of places that the tracker found with a ranger that errs, assumed
+POSE_SD_M = 0.2  # of places that the tracker found with a faulty ranger, assumed
 SURE_SD, LEAST_GAIN = (
     4.0,
     0.1,
-)  # another axis explains the pings better by so many standard deviations, and by so many nats a ping
+)  # another axis explains the pings better by this many standard deviations, and by this many nats a ping
 COVER_M, COVERED = 0.3, 0.6  # cloth or a hand: most echoes come from nearer
 HEARD = 0.05  # share of echoes of a ranger that hears nothing
-ARM_M, ARM = 0.75, 0.15  # an arm's length; share of pings that something there answers, though no wall is so near
+ARM_M, ARM = 0.75, 0.15  # an arm's length; share of pings that something there answers, though no wall is that near
 FLOOR_M, FLOOR = (
     (0.75, 2.5),
     0.2,
 )  # the floor from a hip, aslant; share of pings with one and the same range that no wall explains
 SAME_M = 0.1
 SWAPPED = "The rangers are swapped: each hears the walls of the other side. Swap their plugs."
-WALL_SD = 4.0  # a range within so many of its deviations of a source is that source's
+WALL_SD = 4.0  # a range within this many of its deviations of a source is that source's
 
 
 def faults_of(pings: PosedPings, known: list[KnownPings], walls: Walls, base: EchoSettings) -> list[str]:
-    """Faults of both rangers by all pings, and by those of each with the sources before them.
+    """Faults of both rangers by all pings, and by each one's pings with the sources before them.
 
-    What a ranger that hears something says of its axis is asked before what else it may hear, which a wrong axis looks like.
+    The axis of a ranger that hears something is checked first: a wrong axis looks like the other faults.
     """
     faults = [fault for k, own in enumerate(known) if (fault := _deaf(own, k))]
     if faults:
@@ -61,7 +61,7 @@ def faults_of(pings: PosedPings, known: list[KnownPings], walls: Walls, base: Ec
 
 
 def _better_axis(pings: PosedPings, which: int, walls: Walls, settings: EchoSettings) -> int:
-    """Degrees ahead of abeam at which a ranger surely explains its pings better; 0 where it does not."""
+    """Degrees ahead of abeam at which a ranger surely explains its pings better; 0 if none."""
     own = pings.ranger == which
     if not own.any():
         return 0
@@ -82,7 +82,7 @@ def _log_p(pings: PosedPings, own: np.ndarray, walls: Walls, turn_rad: float, se
 
 
 def _deaf(known: KnownPings, which: int) -> str:
-    """Why a ranger hears no walls at all; empty where it does."""
+    """Why a ranger hears no walls at all; empty if it does."""
     name = f"The {SIDES[which]} ranger"
     if not len(known.range_m):
         return f"{name} sent no ping: run echostep doctor."
@@ -95,7 +95,7 @@ def _deaf(known: KnownPings, which: int) -> str:
 
 
 def _echo_faults(known: KnownPings, which: int, base: EchoSettings) -> list[str]:
-    """What one ranger hears instead of walls, from its pings at known places."""
+    """Echoes that one ranger hears instead of walls, from its pings at known places."""
     heard, first = known.range_m > 0.0, np.where(known.listed > 0, known.distance_m[:, 0], np.inf)
     name = f"The {SIDES[which]} ranger"
     faults = []

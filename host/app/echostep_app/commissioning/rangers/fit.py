@@ -4,7 +4,7 @@
 In: `KnownPings` in order of time, the settings to begin with. Out: `RangerFit`s. Owns nothing.
 
 Maximum likelihood on a scale on which each value is free (logarithm, logit), held by a weak prior about the settings to begin with. Errors of pings
-that follow one another are alike, so the covariance is that of the sum over blocks of pings: H^-1 J H^-1, H the curvature, J of the blocks' slopes
+that follow one another are alike, so the covariance is taken over blocks of pings: H^-1 J H^-1, H the curvature, J of the blocks' slopes
 [White 1982, maximum likelihood of misspecified models].
 """
 
@@ -17,16 +17,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.echoes.likelihood import EchoSettings, echo_model
+from echostep.localization import EchoSettings, echo_model
 from echostep.walls.index import EAR_REACH_M
 from echostep_app.commissioning.rangers.known_pings import KnownPings, log_densities
 
 BIAS, MISSED = "bias_m", "missed"  # of one ranger; the others are names of `EchoSettings`
 SHARES = (MISSED, "stray", "outlier", "hidden")
-OWN = (BIAS, "maximum_m", "rim_db", "sd_m", "stray")  # what a ranger is
-NUISANCE = (MISSED, "outlier", "hidden")  # what building, people and connections add
+OWN = (BIAS, "maximum_m", "rim_db", "sd_m", "stray")  # properties of a ranger
+NUISANCE = (MISSED, "outlier", "hidden")  # effects of building, people and connections
 FITTED = OWN + NUISANCE
-# Assumed: rangers of one kind differ by so much, on the scale of the fit; a bias by 5 cm [real rangers: -0.3 to 5 cm]
+# Assumed: rangers of one kind differ by this much, on the scale of the fit; a bias by 5 cm [real rangers: -0.3 to 5 cm]
 PRIOR_SD, PRIOR_BIAS_M = 1.0, 0.05
 START_MISSED = 0.02
 LEAST_REACH = 2.5  # of the shortest range: `EchoSettings` asks for more than 2
@@ -37,8 +37,8 @@ LEAST_PINGS = 200  # of one ranger: twenty seconds of walking
 
 @dataclass(frozen=True, slots=True)
 class RangerFit:
-    """`values` and standard deviations `sd` by name. `score`, `score_before`: mean log-density of pings that were not fitted, and of the same by the
-    settings to begin with, of which only NUISANCE was fitted; `gain_sd`: standard deviation of their difference.
+    """`values` and standard deviations `sd` by name. `score`, `score_before`: mean log-density of pings that were not fitted, and of the same pings
+    by the settings to begin with, of which only NUISANCE was fitted; `gain_sd`: standard deviation of their difference.
     """
 
     values: dict[str, float]
@@ -55,7 +55,7 @@ class RangerFit:
 
 
 def fit_ranger(pings: KnownPings, base: EchoSettings, names: Sequence[str] = FITTED) -> RangerFit:
-    """Fit the named values to the pings of one ranger; the score is that of each half of the blocks by a fit to the other."""
+    """Fit the named values to the pings of one ranger; the score of each half of the blocks is by a fit to the other."""
     folds = np.arange(len(pings.range_m)) // BLOCK % 2
     held_out, before = np.empty(len(folds)), np.empty(len(folds))
     for fold in (0, 1):
@@ -101,7 +101,7 @@ def _value(name: str, free: float) -> float:
 
 
 def _log_p(pings: KnownPings, base: EchoSettings, names: Sequence[str], x: Floats) -> Floats:
-    """Log-density (n,) at a place of the fit's scale; a reach too short for the settings counts as the shortest that they have."""
+    """Log-density (n,) at a place of the fit's scale; a reach too short for the settings counts as their shortest."""
     values = {name: _value(name, v) for name, v in zip(names, x.tolist(), strict=True)}
     bias_m, missed = values.pop(BIAS, 0.0), values.pop(MISSED, 0.0)
     reach_m = max(values.get("maximum_m", base.maximum_m), LEAST_REACH * base.minimum_m)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pings at known poses, with the plan's echo sources before each: what the ranger models are fitted to.
+"""Pings at known poses, with the plan's echo sources before each: the data of the fits of ranger models.
 
 In: walls, poses, ranges. Out: `KnownPings`; the log-density of each by an echo model. Owns nothing.
 """
@@ -13,7 +13,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel
-from echostep.localization.echoes.likelihood import EchoModel, echo_density, outlier_density, planned_density
+from echostep.localization import EchoModel, echo_density, outlier_density, planned_density
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.index import EAR_REACH_M, WallIndex
 
@@ -33,7 +33,7 @@ class KnownPings(NamedTuple):
 
 
 def known_pings(walls: Walls, x_m: Floats, y_m: Floats, axis_rad: Floats, range_m: Floats) -> KnownPings:
-    """Pings (n,) from these places along these axes; a range that is NaN or not positive is no echo."""
+    """Pings (n,) from these places along these axes; a range that is NaN or not positive is not an echo."""
     heard = np.where(range_m > 0.0, range_m, 0.0)
     x, y, axis = (np.ascontiguousarray(column, np.float64) for column in (x_m, y_m, axis_rad))
     return KnownPings(heard, *_sources(x, y, axis, walls.near(x, y)))
@@ -54,7 +54,7 @@ def _sources(x: Floats, y: Floats, axis: Floats, index: WallIndex) -> tuple[Ints
 def log_densities(pings: KnownPings, bias_m: float, missed: float, m: EchoModel) -> Floats:
     """Log-density (n,) of the pings of a ranger that measures `bias_m` too much and misses a share of all echoes.
 
-    A range beyond the ranger's limits is an echo of a source, or an outlier even over all that any ranger reaches: otherwise narrow limits would
+    A range beyond the ranger's limits is an echo of a source, or an outlier uniform over the reach of any ranger: otherwise narrow limits would
     cost nothing.
     """
     found = np.empty(len(pings.range_m))

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.localization.estimate import Estimate
+from echostep.localization import Estimate
 from echostep.path import MeasuredSegment
 from echostep.ports.chunks import Portion
 from echostep.tracker import Tracker
@@ -23,7 +23,7 @@ from echostep_app.output.ping_poses import placed_pings
 class PosedPings(NamedTuple):
     """Pings (n,) in order of time: `ranger` 0 left, 1 right; place in the map and axis; `range_m`, NaN without an echo.
 
-    The last two are numbers of the whole walk: the share of the pings that were sent while `tracking`, which alone are here, and the ranger's part.
+    The last two are numbers of the whole walk: the share of the pings that were sent while `tracking`, the only ones here, and the ranger's part.
     """
 
     ranger: Ints
@@ -36,7 +36,7 @@ class PosedPings(NamedTuple):
 
 
 class SwappedTracker(Tracker):
-    """A tracker to which each ranger's pings are the other one's."""
+    """A tracker that takes each ranger's pings as the other one's."""
 
     def _follow(self, measured: MeasuredSegment) -> list[Estimate]:
         return super()._follow(replace(measured, ranger=1 - measured.ranger))

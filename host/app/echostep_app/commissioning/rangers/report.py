@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.board.calibration import RangerSettings
-from echostep.localization.echoes.likelihood import EchoSettings
+from echostep.localization import EchoSettings
 from echostep.walls.echo_sources import Walls
 from echostep_app.commissioning.fitting import Values
 from echostep_app.commissioning.rangers.faults import SIDES, faults_of
@@ -27,13 +27,13 @@ WORDS = {
 }  # fmt: skip
 UNITS = {BIAS: "m", "maximum_m": "m", "rim_db": "dB", "sd_m": "m", MISSED: "", "stray": ""}
 BELIEVED = 0.5  # share of the pings sent while `tracking`, below which their places are not known
-SHORTEST = 3  # echoes so short, not one by chance, lower the least range; assumed
+SHORTEST = 3  # this many shorter echoes, not one by chance, lower the least range; assumed
 SURE_SD = 2.0  # of the gain on held-out pings, by which settings must be better to be written
 
 
 @dataclass(frozen=True, slots=True)
 class RangerReport:
-    """`faults` and `lines` for the wearer, and the settings by section; none where a fault stands or nothing is better than the usual ones."""
+    """`faults` and `lines` for the wearer, and the settings by section; none if a fault remains or no fit is better than the usual settings."""
 
     faults: list[str]
     lines: list[str]
@@ -66,7 +66,7 @@ def _unbelieved(placed: PosedPings) -> str:
 
 
 def _shortest(placed: PosedPings, base: EchoSettings) -> float:
-    """The least range: the usual one, or that of echoes which are shorter."""
+    """The least range: the usual one, or a shorter one from shorter echoes."""
     ranges_m = np.sort(placed.range_m[placed.range_m > 0.0])
     return min(base.minimum_m, float(ranges_m[SHORTEST - 1])) if len(ranges_m) >= SHORTEST else base.minimum_m
 

@@ -2,7 +2,7 @@
 """Which fragments are pieces of one straight wall.
 
 In: fragments at their present places. Out: `FittedWalls`. Owns the gates. Each fragment, in order of the path, joins the wall that it continues,
-or begins one. A wall that was last detected more than `KNOWN_M` of path ago is another one, unless a closure has tied both places together.
+or begins one. A wall that was last detected more than `KNOWN_M` of path ago counts as another one, unless a closure has tied both places together.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from echostep_app.mapping.graph.graph import FittedWalls
 from echostep_app.mapping.graph.nodes import Nodes
 from echostep_app.mapping.graph.spots import is_spot
 
-APART_M = 0.15  # of a fragment's middle from the line of its wall: three standard deviations of either
+APART_M = 0.15  # distance of a fragment's middle from its wall's line: three standard deviations of either
 TURNED_RAD = math.radians(6.0)
 GAP_M = 2.0  # along the wall, between the pieces of one: wider than a door
 KNOWN_M = 15.0  # of path, over which odometry alone distinguishes a wall from another beside it
@@ -29,9 +29,9 @@ SMALL_M = 0.5  # a shorter fragment begins no wall: a corner or an edge seems to
 def associate(
     nodes: Nodes, fragments: Fragments, centre_m: Floats, normal_rad: Floats, anchored: Bools, level: Ints
 ) -> FittedWalls:
-    """The walls of all fragments, each at the mean of its pieces; those of one piece too. `anchored` (f,): the place is known by a closure.
+    """The walls of all fragments, each at the mean of its pieces, also walls of one piece. `anchored` (f,): the place is known by a closure.
 
-    `level` (f,): a wall is on one.
+    `level` (f,): a wall lies on one level.
     """
     order = np.lexsort((-fragments.half_m, fragments.node))
     size_m, spot = fragments.half_m[order] * 2.0, is_spot(fragments.half_m[order])

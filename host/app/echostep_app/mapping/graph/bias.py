@@ -20,7 +20,7 @@ from echostep_app.mapping.graph.fragments import find_fragments
 from echostep_app.mapping.graph.nodes import Nodes, Pings
 
 STEP_M = 10.0  # of path: a step of the search turns it by half of the drift over it
-# Of the steps, and down to 1 of the drift: a bias is far from the walk's own drift, and only near it there is evidence
+# Scales of the steps, and, down to 1, of the drift: a bias is far from the walk's own drift, and only near it there is evidence
 SCALES = (4.0, 2.0, 1.0, 0.5, 0.25)
 MOST_STEPS = 12
 
@@ -31,7 +31,7 @@ class _Tried(NamedTuple):
 
 
 def find_bias(nodes: Nodes, pings: Pings, known_rad_m: float = 0.0) -> float:
-    """The turn (rad/m) to be added so that the walls have two directions; the `known` one unless the odds of another are LEAST_EVIDENCE."""
+    """The turn (rad/m) to be added so that the walls have two directions; `known_rad_m` unless another has the odds LEAST_EVIDENCE."""
     way_m = float(nodes.way_m[-1])
     step = 0.5 * math.sqrt(float(np.sum(nodes.turn_sd_rad**2)) / max(way_m * STEP_M, 1.0))
     bias = known_rad_m
@@ -39,7 +39,7 @@ def find_bias(nodes: Nodes, pings: Pings, known_rad_m: float = 0.0) -> float:
         wider = replace(nodes, turn_sd_rad=max(scale, 1.0) * nodes.turn_sd_rad)
         candidate = _climbed(wider, pings, bias, scale * step)
         if candidate == known_rad_m:
-            break  # as of a foot
+            break  # as for a foot
         bias = candidate
     if bias == known_rad_m:
         return known_rad_m
@@ -48,7 +48,7 @@ def find_bias(nodes: Nodes, pings: Pings, known_rad_m: float = 0.0) -> float:
 
 
 def _climbed(nodes: Nodes, pings: Pings, begin_rad_m: float, step: float) -> float:
-    """The bias from which another step gains no evidence, to the side where the first one does."""
+    """The bias from which another step gains no evidence, on the side where the first step gains some."""
     begin = _Tried(begin_rad_m, _evidence(nodes, pings, begin_rad_m))
     for way in (-step, step):
         best = begin
@@ -64,13 +64,13 @@ def _climbed(nodes: Nodes, pings: Pings, begin_rad_m: float, step: float) -> flo
 
 
 def _evidence(nodes: Nodes, pings: Pings, bias_rad_m: float) -> float:
-    """That the walls have two directions, with this bias."""
+    """Evidence that the walls have two directions, with this bias."""
     turned, turned_pings = without_bias(nodes, pings, bias_rad_m)
     return find_directions(turned, find_fragments(turned, turned_pings)).evidence
 
 
 def without_bias(nodes: Nodes, pings: Pings, bias_rad_m: float) -> tuple[Nodes, Pings]:
-    """Path and pings with so much turn added to each metre."""
+    """Path and pings with this turn added to each metre."""
     if bias_rad_m == 0.0:
         return nodes, pings
     turn = bias_rad_m * nodes.way_m

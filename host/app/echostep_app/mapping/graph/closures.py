@@ -3,11 +3,11 @@
 
 In: a graph solved so far. Out: `Closure`s with their odds. Owns the limits. The posterior of a shift is the graph's own uncertainty times the match
 of the stretch's fragments with all older ones, beside the hypothesis that the place is new; a closure carries the information of this posterior
-beyond the graph's, along the axes where there is any: in a corridor only across it. It ties the stretch to the passage that detected the matched
+beyond the graph's, along the axes that have any: in a corridor only across it. It ties the stretch to the passage that detected the matched
 walls.
 
-Fragments that continue each other are one piece of wall. A fragment ends after 2 m of path wherever it is: such a cut is nothing that a later passage
-could find again. A door is.
+Fragments that continue each other are one piece of wall. A fragment ends after 2 m of path wherever it is: a later passage cannot find such a cut
+again, but it finds a door.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from echostep.arrays import Floats, Ints
 from echostep_app.mapping.graph.graph import Closure, Graph
 from echostep_app.mapping.graph.matching import Pieces, match
 
-GAP_M = 0.35  # along the wall, up to which it goes on: half of a door; cuts leave up to three pings, 0.25 m
+GAP_M = 0.35  # greatest gap along one piece of wall: half of a door; cuts leave up to three pings, 0.25 m
 STRETCH_M = 8.0  # of path that is matched as one
-APART_M = 20.0  # of path between a stretch and what is older
+APART_M = 20.0  # of path between a stretch and older ones
 SEARCHED_M = 7.0  # beyond the uncertainty, in which older fragments are looked for
 NEW = 0.5  # probability before the match that the place is new
 LEAST_LOG_ODDS = math.log(2e4)  # every place is tried twice
@@ -31,10 +31,10 @@ SHIFTS, TURNS = 31, 5  # of the grid to either side of three standard deviations
 LEAST_SD_M, LEAST_SD_RAD = 0.04, math.radians(0.4)
 MOST_SD_M = 4.0  # of the graph's uncertainty, beyond which no closure is tried: too many places look alike
 KNOWN_SD_M = 0.15  # of a direction after the match that counts as known
-NEW_SHARE = 0.5  # of the graph's variance on an axis: what is left of it, up to which the match counts
+NEW_SHARE = 0.5  # remaining share of the graph's variance on an axis, up to which the match counts
 LEAST_OLD = 4
 LEAST_COVARIANCE = np.diag([LEAST_SD_M**2, LEAST_SD_M**2, LEAST_SD_RAD**2])
-PASSAGES = 4  # that are tried for one stretch: two of them mostly
+PASSAGES = 4  # that are tried for one stretch: mostly two
 
 
 def pieces(graph: Graph, which: Ints) -> Pieces:
@@ -46,7 +46,7 @@ def pieces(graph: Graph, which: Ints) -> Pieces:
 
 
 def stretches(graph: Graph, which: Ints) -> Pieces:
-    """The same fragments; those of one wall with less than GAP_M between them are one piece."""
+    """The same fragments; fragments of one wall with less than GAP_M between them are one piece."""
     single, of = pieces(graph, which), graph.walls.of[which]
     rows = [_row(single, np.array([k])) for k in np.flatnonzero(of < 0)]
     for wall in np.unique(of[of >= 0]).tolist():
@@ -92,7 +92,7 @@ class _Matched(NamedTuple):
 
 
 def find_closure(graph: Graph, begin: int, end: int, until_m: float) -> Closure | None:
-    """The closure of the stretch of nodes [begin, end) with what was passed before `until_m` of the path, if there is one."""
+    """The closure of the stretch of nodes [begin, end) with the path before `until_m`, or None."""
     f, way_m = graph.fragments, graph.nodes.way_m
     node = (begin + end) // 2
     usable = (f.half_m > 0.25) & (graph.level_of(f.node) == graph.level_of(np.array([node])))
@@ -139,7 +139,7 @@ def _closure(graph: Graph, new: Ints, older: Ints, node: int) -> Closure | None:
 
 
 def _said(graph: Graph, node: int, old_node: int, matched: _Matched) -> Closure | None:
-    """The information of the posterior of the shift beyond the graph's; None if there is none on any axis."""
+    """The information of the posterior of the shift beyond the graph's; None if no axis has any."""
     if (news := gained(matched.mean, matched.after, matched.before)) is None:
         return None
     shift, information = news
@@ -172,7 +172,7 @@ def _matched(single: Pieces, ways: Pieces, at: Floats, covariance: Floats) -> _M
 
 
 def _explaining(graph: Graph, single: Pieces, older: Ints, at: Floats, shift: Floats) -> Ints:
-    """Of fragments `older` those of the one passage that explains pieces `single` best when their node at `at` (2,) is moved by `shift` (3,)."""
+    """Fragments among `older` of the one passage that explains pieces `single` best when their node at `at` (2,) is moved by `shift` (3,)."""
     way_m = graph.nodes.way_m[graph.fragments.node[older]]
     order = np.argsort(way_m, kind="stable")
     passages = np.split(older[order], np.flatnonzero(np.diff(way_m[order]) > STRETCH_M) + 1)
@@ -183,7 +183,7 @@ def _explaining(graph: Graph, single: Pieces, older: Ints, at: Floats, shift: Fl
 
 
 def _nearest(graph: Graph, which: Ints, at: Floats) -> int:
-    """The node nearest to a place (2,), of those of fragments `which` (k,)."""
+    """The node of fragments `which` (k,) that is nearest to a place (2,)."""
     node = graph.fragments.node[which]
     return int(node[np.argmin(np.hypot(*(graph.pose[node, :2] - at).T))])
 
@@ -191,8 +191,8 @@ def _nearest(graph: Graph, which: Ints, at: Floats) -> int:
 def gained(mean: Floats, after: Floats, before: Floats) -> tuple[Floats, Floats] | None:
     """The information of a match alone, given the prior (zero, `before`) and the posterior (`mean`, `after`) of a shift.
 
-    Shift (3,) and information (3, 3), of x, y (m) and heading; None where the posterior is known on no axis. The informations of posterior and
-    prior differ by that of the match, whose shift is so much farther from zero. Where they differ little the match adds nothing: it confirms the
+    Shift (3,) and information (3, 3), of x, y (m) and heading; None where the posterior is known on no axis. Posterior and prior differ by
+    the match's information, whose shift is farther from zero accordingly. Where they differ little the match adds nothing: it confirms the
     graph.
     """
     root = np.linalg.cholesky(before[:2, :2])

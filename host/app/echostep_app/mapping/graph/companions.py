@@ -18,13 +18,13 @@ from echostep_app.mapping.graph.nodes import Nodes
 
 PEOPLE = 0.05  # share of the path with echoes of a person beside a ranger, assumed
 MOST_PEOPLE = 0.8  # of the echoes in the barest hall: there are columns too
-ALONG_SD_RAD = math.radians(5.0)  # of such a fragment's direction from that of the path, assumed
+ALONG_SD_RAD = math.radians(5.0)  # of such a fragment's direction from the path's direction, assumed
 COUNTED_M = 10.0  # of path to either side of a fragment, over which echoes are counted
-LEAST_HALF_M = 0.3  # of path to either side of a fragment's middle, at least, over which its direction is taken
+LEAST_HALF_M = 0.3  # least path to either side of a fragment's middle over which its direction is taken
 
 
 def people_share(nodes: Nodes, fragments: Fragments) -> Floats:
-    """Prior probability (f,) that a fragment's echoes are of a person: these come on the same share of any path, those of walls do not."""
+    """Prior probability (f,) that a fragment's echoes are of a person: people's echoes come on the same share of any path, walls' do not."""
     way_m = nodes.way_m[fragments.node]
     order = np.argsort(way_m, kind="stable")
     heard_m = np.concatenate([[0.0], np.cumsum(2.0 * fragments.half_m[order])])
@@ -35,7 +35,7 @@ def people_share(nodes: Nodes, fragments: Fragments) -> Floats:
 
 
 def density_along_path(nodes: Nodes, fragments: Fragments) -> Floats:
-    """Density (f,) of each fragment's direction, per radian, if its echoes are of a person: about that of the path beside it."""
+    """Density (f,) of each fragment's direction, per radian, if its echoes are of a person: about the path's direction beside it."""
     off = (nodes.pose[fragments.node, 2] + fragments.normal_rad - _course(nodes, fragments)) % math.pi - 0.5 * math.pi
     sd = np.hypot(fragments.sd_rad, ALONG_SD_RAD)
     density: Floats = np.exp(-0.5 * (off / sd) ** 2) / (math.sqrt(2.0 * math.pi) * sd)

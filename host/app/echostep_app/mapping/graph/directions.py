@@ -2,7 +2,7 @@
 """Whether the walls of a building have two directions at right angles, and the heading's error if so.
 
 In: nodes and fragments. Out: `Directions`. Owns the filter. A fragment has a direction of the building, or any; or its echoes are of a person, and
-it has that of the path. The one state is the direction of the building against the heading by odometry, modulo a right angle: at first it may be
+it has the path's direction. The one state is the direction of the building against the heading by odometry, modulo a right angle: at first it may be
 any, then it diffuses as the heading drifts. Its distribution is kept on a circle of cells, forward and backward along the path [Rabiner 1989], so
 that a few walls askew at the beginning do not decide. The evidence is the likelihood of all fragments against walls of any direction.
 """
@@ -31,7 +31,7 @@ CELL_RAD = RIGHT_RAD / CELLS
 
 @dataclass(frozen=True, slots=True)
 class Directions:
-    """`base_rad`: one of the directions; `drift_rad` (n,): turn of the heading at each node by which walls get them; `evidence`: logarithm of the
+    """`base_rad`: one of the directions; `drift_rad` (n,): turn of the heading at each node that aligns walls with them; `evidence`: logarithm of the
     odds that the building has them.
     """
 
@@ -116,7 +116,7 @@ def _smoothed(seen: Seen) -> Smoothed:
 
 @part
 def _likelihood(off_rad: float, sd_rad: float) -> float:
-    """Density of a fragment's direction, so far from one of the building's: along it, or any."""
+    """Density of a fragment's direction at `off_rad` from one of the building's: along it, or any."""
     r = right_angles_off(off_rad)
     variance = sd_rad * sd_rad + DIRECTION_SD_RAD**2
     return (
@@ -126,7 +126,7 @@ def _likelihood(off_rad: float, sd_rad: float) -> float:
 
 @part
 def _diffuse(belief: Floats, variance: float) -> None:
-    """Spread a distribution on the circle (CELLS,) by so much variance: steps to the two neighbours, which keep it exactly."""
+    """Spread a distribution on the circle (CELLS,) by this variance: steps to the two neighbours, which keep it exactly."""
     steps = math.ceil(variance / (0.5 * CELL_RAD**2))
     share = 0.5 * variance / (max(steps, 1) * CELL_RAD**2)
     for _ in range(min(steps, CELLS * CELLS)):

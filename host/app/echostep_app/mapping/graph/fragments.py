@@ -25,7 +25,9 @@ FARTHEST_M = 5.0  # range: beyond, echoes alternate between two walls
 CONE_RAD = math.radians(30.0)  # half of the ranger's cone, and the heading's own error
 SD_M, SD_RAD = 0.04, math.radians(1.0)  # least standard deviations: sway of the trunk, bias of a ranger
 RANGE_SD_M = 0.04
-NOISE_M = 0.025  # of one range, from a flat wall [Robot Electronics, sonar FAQ]: what residuals have beyond it is the surface's
+NOISE_M = (
+    0.025  # of one range, from a flat wall [Robot Electronics, sonar FAQ]: residuals beyond it come from the surface
+)
 # Slope of the line fitted to a surface of this standard deviation, of half length 1: off by as much at each end
 SLOPE = math.sqrt(3.0)
 
@@ -34,7 +36,7 @@ class Fragments(NamedTuple):
     """Pieces (f,) of walls, each in the frame of the `node` nearest to its middle: x ahead, y left.
 
     `centre_m` (f, 2): its middle on the wall; `normal_rad`: direction from the path to the wall; `half_m`: half its length along the wall;
-    `sd_m`, `sd_rad`: of place and direction; `pings`: how many. `ping` (k,): index of the fragment of each ping, -1: of none.
+    `sd_m`, `sd_rad`: of place and direction; `pings`: how many. `ping` (k,): index of the fragment of each ping, -1: none.
     """
 
     node: Ints
@@ -159,7 +161,7 @@ def fit_line(at: Floats, axis: Floats, range_m: Floats, member: Ints) -> tuple[f
 
 @part
 def _row(at: Floats, axis: Floats, member: Ints, fit: tuple[float, float, float]) -> Floats:
-    """The piece of these pings as a row; an sd of infinity where the wall is outside of the cone."""
+    """The piece of these pings as a row; an sd of infinity where the wall is outside the cone."""
     normal, rho, rms = fit
     c, s = math.cos(normal), math.sin(normal)
     low, high, total, square, off = math.inf, -math.inf, 0.0, 0.0, 0.0

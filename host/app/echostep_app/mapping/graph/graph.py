@@ -23,10 +23,10 @@ from echostep_app.mapping.graph.levels import WalkLevels
 from echostep_app.mapping.graph.nodes import Nodes
 
 ROUNDS = 4  # of Gauss-Newton; the graph is nearly linear
-ONE_WALL = 0.8  # share of fragments that are of the wall they lie on, at first; others, as furniture before it, lie anywhere within
+ONE_WALL = 0.8  # share of fragments that belong to the wall they lie on, at first; others, as furniture before it, lie anywhere within
 APART_M, TURNED_RAD = 0.5, math.radians(20.0)  # this distance and turn, assumed
 START_SD_M, START_SD_RAD = 0.001, 0.0005  # the first node is the origin
-# Of its heading where the building's directions hold the map: until a wall is detected it is not known against them
+# Its heading's, where the building's directions hold the map: until a wall is detected it is not known against them
 FREE_SD_RAD = math.radians(30.0)
 
 
@@ -57,9 +57,9 @@ class Closure:
 
 @dataclass
 class Graph:
-    """`pose` (n, 3), `walls`: the newest solution. `base_rad`: one of the two directions of the building; None: it has none.
+    """`pose` (n, 3), `walls`: the newest solution. `base_rad`: one of the two directions of the building; None if it has none.
 
-    `levels`: None where all nodes are on one.
+    `levels`: None if all nodes are on one level.
     """
 
     nodes: Nodes
@@ -98,7 +98,7 @@ class Graph:
         return rows.matrix(3 * len(self.nodes) + 2 * len(self.walls.rho_m))
 
     def covariance(self, new: int, old: int) -> Floats:
-        """Covariance (3, 3) of the pose of `new` less that of `old`, as factored last."""
+        """Covariance (3, 3) of the pose of `new` less the pose of `old`, as factored last."""
         assert self.factor is not None
         n = self.factor.shape[0]
         right = np.zeros((n, 3))
@@ -114,7 +114,7 @@ class Graph:
         return np.zeros(len(node), np.int64) if self.levels is None else self.levels.of[node]
 
     def paths(self) -> tuple[Floats, ...]:
-        """The path (k, 2) of each walk; nodes before the first walk are those of a plan."""
+        """The path (k, 2) of each walk; nodes before the first walk belong to a plan."""
         return tuple(np.split(self.pose[:, :2], self.nodes.begins)[1:])
 
     def places(self) -> tuple[Floats, Floats]:
@@ -164,7 +164,7 @@ class Graph:
         cp, sp_ = np.cos(phi), np.sin(phi)
         r = (cp * q[:, 0] + sp_ * q[:, 1] - walls.rho_m[wall]) / f.sd_m[used]
         ra = wrap(theta + f.normal_rad[used] - phi) / f.sd_rad[used]
-        # The weight is the probability to be of this wall, so what does not fit lets go.
+        # The weight is the probability of belonging to this wall, so misfits lose their weight.
         one = ONE_WALL * np.exp(-0.5 * (r**2 + ra**2)) / (2.0 * math.pi * f.sd_m[used] * f.sd_rad[used])
         wt = np.sqrt(one / (one + (1.0 - ONE_WALL) / (4.0 * APART_M * TURNED_RAD)))
         wd, wa = wt / f.sd_m[used], wt / f.sd_rad[used]
@@ -178,7 +178,7 @@ class Graph:
         rows.add(wt * ra, [(3 * node + 2, wa), (first + 2 * wall, -wa)])
 
     def _add_directions(self, rows: _Rows) -> None:
-        """Walls along the directions of the building; a wall at another angle is weighed by its probability to be one of them."""
+        """Walls along the directions of the building; a wall at another angle is weighted by its probability of being one of them."""
         if self.base_rad is None or not len(self.walls.rho_m):
             return
         off = (self.walls.normal_rad - self.base_rad + 0.5 * RIGHT_RAD) % RIGHT_RAD - 0.5 * RIGHT_RAD
@@ -236,6 +236,6 @@ def placed(fragments: Fragments, pose: Floats) -> tuple[Floats, Floats]:
 
 
 def contradicted(graph: Graph, closure: Closure) -> float:
-    """Log-odds of a closure to be right, less what its residual in the solved graph costs."""
+    """Log-odds that a closure is right, less the cost of its residual in the solved graph."""
     difference = graph.pose[closure.new] - graph.pose[closure.old] - closure.between
     return closure.log_odds - 0.5 * float(difference @ closure.information @ difference)

@@ -2,7 +2,7 @@
 """The levels of a walk: flat stretches of path, separated by the climb of the foot between them.
 
 In: measured segments, nodes. Out: `WalkLevels`. Owns the limits. From one stretch to the next the foot's rise is exact to centimetres; a level that
-is entered again gets its height of before, so its errors do not add up over a walk. Pressure counts only where no foot is worn.
+is entered again gets its earlier height, so its errors do not add up over a walk. Pressure counts only where no foot is worn.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from echostep_app.mapping.graph.nodes import Nodes
 
 # Assumed, not measured.
 WINDOW_M = 2.5  # of path to either side of a node: longer than the landing between two flights
-FLAT_M = 0.5  # of rise in both windows, from which it is no flat ground: steeper than a wheelchair's ramp (8 %)
+FLAT_M = 0.5  # of rise in both windows, from which the ground is not flat: steeper than a wheelchair's ramp (8 %)
 STRETCH_M = 4.0  # of flat path that is a level; a shorter one is a landing
 APART_M = 1.5  # between two levels, at least: half the usual height of a floor
 SILL_M = 0.25  # of rise from the last flat place, up to which a node still belongs to it: one step

@@ -2,7 +2,7 @@
 """How well a stretch of fragments fits older ones when it is moved and turned a little: log-likelihood ratio against a place never seen.
 
 In: fragments in the map, a grid of shifts. Out: log-ratios. Owns the model. A fragment that lies on an older one seen from the same side is explained
-by it; one in the space that an older echo found free is contradicted; one where nothing was seen is no evidence.
+by it; one in the space that an older echo found free is contradicted; one where nothing was seen is not evidence.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ OFF_SD_M, OFF_SD_RAD = 0.07, math.radians(2.5)  # of two fragments of one wall, 
 CHANCE_M, CHANCE_RAD = 1.5, math.radians(45.0)  # half widths within which a fragment of another wall would lie anywhere
 OUTLIER = 0.1  # share of fragments that no older wall explains where it should
 FREE_RATIO = math.log(0.15)  # of a fragment in space that was free: furniture and persons move
-FREE_M = 0.35  # a fragment so far before an older wall lies in free space
+FREE_M = 0.35  # a fragment this far before an older wall lies in free space
 LEAST_HALF_M = 0.05  # length of a fragment seen from its end, by which shares are formed
 POWER = 0.5  # of each metre of fragment: errors of a stretch are shared
 

@@ -18,7 +18,7 @@ from echostep.path import MeasuredSegment, PathSegment
 STILL_M, STILL_RAD = 0.01, math.radians(0.5)  # a segment that moves and turns less belongs to the node before it
 # Growth of the path's error per square root of a metre beside the step's own covariance, as the particle filter has it [particles.py]
 MOVE_SD, TURN_SD_RAD = 0.03, math.radians(0.3)
-# The same of a heading that a belt's gyro holds: in all 0.25 degrees, as simulated walks err over 5 to 50 m; two belts of one walk differ by 0.15
+# The same for a heading that a belt's gyro holds: in all 0.25 degrees, as simulated walks err over 5 to 50 m; two belts of one walk differ by 0.15
 HELD_TURN_SD_RAD = math.radians(0.2)
 LEAST_SD_M = 0.005  # of a turn on the spot: the trunk moves over the foot
 
@@ -97,6 +97,6 @@ def nodes_of(segments: Sequence[MeasuredSegment]) -> tuple[Nodes, Pings]:
 
 
 def _turn_growth(segment: PathSegment) -> float:
-    """Growth of the heading's error per square root of a metre, beyond that stated by the segment: less where the belt measured its turn."""
+    """Growth of the heading's error per square root of a metre, beyond the segment's own: less where the belt measured its turn."""
     held = segment.belt is not None and segment.turn_sd_rad < segment.belt.foot_turn_sd_rad
     return HELD_TURN_SD_RAD if held else TURN_SD_RAD

@@ -2,8 +2,8 @@
 """How flat the walls of a building are: shelves, niches and machines stand before them, so what seems one straight piece is several.
 
 In: nodes and fragments. Out: the fragments with standard deviations of such walls, and the `Directions` by them. Owns the reliefs that are
-tried. What the residuals of a piece show is in its own standard deviations; echoes are of what stands out, so some is left that only other
-pieces show. The relief is the one by which the directions of all fragments are most probable.
+tried. A piece's residuals are in its own standard deviations already; echoes come from the parts that stand out, so only other
+pieces show the rest. The relief is the one by which the directions of all fragments are most probable.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from echostep_app.mapping.graph.directions import LEAST_EVIDENCE, Directions, fi
 from echostep_app.mapping.graph.fragments import SLOPE, Fragments
 from echostep_app.mapping.graph.nodes import Nodes
 
-# Standard deviation of the surface along a piece, beyond its residuals. Of three real buildings, by laser: 0.01 to 0.10 m in all
+# Standard deviation of the surface along a piece, beyond its residuals. In three real buildings, by laser: 0.01 to 0.10 m in all
 RELIEFS_M = (0.01, 0.02, 0.03, 0.045, 0.065)
 
 
 def find_relief(nodes: Nodes, fragments: Fragments) -> tuple[Fragments, Directions]:
-    """The walls are flat unless the odds of another relief are those that two directions of the building need."""
+    """The walls are flat unless another relief has the odds that two directions of the building need."""
     flat = best = fragments, find_directions(nodes, fragments)
     for relief_m in RELIEFS_M:
         tried = with_relief(fragments, relief_m)

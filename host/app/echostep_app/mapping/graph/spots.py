@@ -3,7 +3,7 @@
 
 In: pings of no fragment, the directions of the building. Out: fragments of one spot each. Owns the limits. From one place a wall, a corner and an
 edge sound alike: the range is the same while the axis sweeps over them, and the middle of that sweep is where they are [Kuc and Siegel 1987]. A
-building with two directions decides: what is across one of them is taken for a wall.
+building with two directions decides: a spot across one of them is taken for a wall.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from echostep_app.mapping.graph.directions import LEAST_EVIDENCE, RIGHT_RAD, Dir
 from echostep_app.mapping.graph.fragments import FARTHEST_M, SD_M, Fragments, nearest_nodes
 from echostep_app.mapping.graph.nodes import Nodes, Pings
 
-LEAST, MISSED = 5, 1  # pings of a ranger, and how many may be none of the spot between two
+LEAST, MISSED = 5, 1  # pings of a ranger, and how many between two may be of other places
 SWEEP_RAD = math.radians(25.0)  # of the axis, with the same range: half of the cone
 FITS_M = 0.08  # of a range from the mean: three standard deviations
 SPOT_M = 0.15  # from the first ping to the last: the trunk moves over the feet
@@ -36,7 +36,7 @@ def is_spot(half_m: Floats) -> Bools:
 
 
 def with_spots(nodes: Nodes, pings: Pings, fragments: Fragments, directions: Directions) -> Fragments:
-    """The fragments, and behind them those of spots; of a building without directions there are none."""
+    """The fragments, followed by those of spots; a building without directions has none."""
     if directions.evidence < LEAST_EVIDENCE:
         return fragments
     spots, of_ping = _both_rangers(pings, fragments.ping < 0)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A partial or old plan, completed and corrected by walks that were placed on it.
 
-In: a level of the plan, the solved graph in its frame, what was drawn. Out: the level with new walls added, and walls that echoes passed marked as
+In: a level of the plan, the solved graph in its frame, the drawing. Out: the level with new walls added, and walls that echoes passed marked as
 doubtful. Owns the limits. A wall out of the rangers' reach stays as it was.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Bools, Floats, spans
-from echostep.plan.model import Level
+from echostep.plan import Level
 from echostep_app.mapping.graph.graph import Graph
 from echostep_app.mapping.graph.nodes import Pings
 from echostep_app.mapping.walls.drawing import Drawing
@@ -31,15 +31,15 @@ from echostep_app.mapping.walls.evidence import (
 from echostep_app.mapping.walls.lines import Lines
 
 SMOOTH_M = 0.4  # of wall, over which pings are counted together
-# Pings through a place of a wall, and how many for each that detected it, that make it doubtful
+# Pings through a place of a wall, and their number per ping that detected it, that make it doubtful
 LEAST_PASSED, PASSED_ODDS = 4.0, 2.0
 LEAST_DOUBTFUL_M, LEAST_NEW_M = 0.6, 0.6  # of a piece
-KNOWN_M = 0.3  # a drawn wall so near to one of the plan is that wall
+KNOWN_M = 0.3  # a drawn wall this near to one of the plan is that wall
 SAMPLE_M = 0.05
 
 
 class Completed(NamedTuple):
-    """`level`: the plan's with what was found; lengths of walls that are new, and that are doubtful."""
+    """`level`: the plan's level with the findings; lengths of new and of doubtful walls."""
 
     level: Level
     new_m: float
@@ -91,7 +91,7 @@ def _passed(cells: Cells, k: int, length_m: float) -> Bools:
 
 
 def _split(wall: Floats, gone: Bools) -> tuple[Floats, Floats]:
-    """The pieces of a wall (4,) that stand, and those that are doubtful; short doubts are none."""
+    """The pieces of a wall (4,) that stand, and the doubtful ones; short doubts do not count."""
     edges = spans(gone)
     edges = edges[(edges[:, 1] - edges[:, 0]) * CELL_M >= LEAST_DOUBTFUL_M]
     shares = np.minimum(edges / max(len(gone), 1), 1.0)
@@ -107,7 +107,7 @@ def _between(wall: Floats, shares: Floats) -> Floats:
 
 
 def _unknown(drawn: Floats, known: Floats) -> Floats:
-    """Pieces (n, 4) of drawn walls that are no walls of the plan."""
+    """Pieces (n, 4) of drawn walls that are not walls of the plan."""
     tree = shapely.STRtree(shapely.linestrings(known.reshape(-1, 2, 2))) if len(known) else None
     pieces = [np.zeros((0, 4))]
     for wall in drawn:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The walls of a solved graph.
 
-In: a graph, its pings. Out: `Drawing`. Owns the order: first the lines that have the building's directions, then the others from what is left.
+In: a graph, its pings. Out: `Drawing`. Owns the order: first the lines that have the building's directions, then the others from the rest.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints, spans
-from echostep.plan.model import is_no_plan
+from echostep.plan import is_no_plan
 from echostep_app.mapping.graph.companions import ALONG_SD_RAD, course_of
 from echostep_app.mapping.graph.graph import Graph
 from echostep_app.mapping.graph.nodes import Pings
@@ -30,7 +30,7 @@ from echostep_app.mapping.walls.place_sd import are_known, placed_pieces
 from echostep_app.mapping.walls.segments import ACROSS, ANY, ASKEW, Run, find_runs, meets, segments_of
 from echostep_app.mapping.walls.wall_sd import wall_sds
 
-# Of wall on one line, at least; shorter ones must be detected again, or be across the path. One passer-by in 15, in 70, goes along for longer, when
+# Least wall on one line; shorter ones must be detected again, or be across the path. One passer-by in 15, in 70, goes along for longer, when
 # one second is the mean
 LONE_M, LONE_ASKEW_M = 2.5, 6.0
 PASSAGE_M = 5.0  # of path, between two passages
@@ -41,7 +41,7 @@ ALONG_RAD = 2.0 * ALONG_SD_RAD  # of a piece from the course of the path, within
 class Drawing:
     """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of the distance of each from the places beside it.
 
-    `doubtful` (d, 4), `doubtful_sd_m` (d,): the same of short walls that no second passage confirmed, and of those whose place in the building is
+    `doubtful` (d, 4), `doubtful_sd_m` (d,): the same of short walls that no second passage confirmed, and of walls whose place in the building is
     not known well enough. `place_sd` (p, 3): x, y of pieces of both, and the standard deviation per axis of their place in the building. `paths_m`:
     the corrected path (k, 2) of each walk, or each piece of it on this level.
     """
@@ -167,7 +167,7 @@ def _own(lines: Lines, run: Run, heard: _Heard, of: Ints) -> Ints:
 
 
 def _passages(way_m: Floats) -> int:
-    """In how many passages pings at these lengths of the path (k,) were heard."""
+    """Number of passages in which pings at these lengths of the path (k,) were heard."""
     return int((np.diff(np.sort(way_m)) > PASSAGE_M).sum()) + min(len(way_m), 1)
 
 

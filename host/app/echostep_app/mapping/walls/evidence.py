@@ -24,19 +24,19 @@ CELL_M = 0.05
 SMOOTH = 2  # cells to either side that a ping speaks for: 8.5 cm between two pings of a ranger at 1.2 m/s
 MARGIN_M = 2.0  # of cells beyond the extent of a line's fragments
 FITS_M = 0.1  # of a range from the distance of the line
-BEYOND_M = 0.18  # a range longer by more than so much passed through the cell
+BEYOND_M = 0.18  # a range longer by more than this passed through the cell
 HALF_CONE_RAD = math.radians(27.5)
 BEYOND_M = 0.5  # beyond the extent of its fragments, within which a line explains pings
-HALF_TRUNK_M, CROSSED = 0.25, 100.0  # the path leads through an opening at least so wide; weight of that against pings
+HALF_TRUNK_M, CROSSED = 0.25, 100.0  # the path leads through an opening at least this wide; its weight against pings
 CORNER_M = 0.15  # of a range from the distance of a corner
 TURNING_RAD = math.radians(15.0)  # turn of a stride
 SIGHT_M = 1.0  # behind a line: more than the thickness of walls, and than the error of its place; assumed
-DOOR_M = 0.9  # clear width of a door that wheelchairs pass [DIN 18040-1]; that of a door which was only seen is assumed
+DOOR_M = 0.9  # clear width of a door that wheelchairs pass [DIN 18040-1]; assumed for a door that was only seen
 SURE_RAD, SURE_M = math.radians(15.0), 3.0  # within which a wall is hardly ever missed
 
 
 class Cells(NamedTuple):
-    """`heard`, `passed` (l, c): pings by line and cell; `first_m` (l,): place of the first cell along the line; `size` (l,): cells of it.
+    """`heard`, `passed` (l, c): pings by line and cell; `first_m` (l,): place of the first cell along the line; `size` (l,): number of its cells.
 
     `of` (k,): line that explains each ping, -1: none.
     """
@@ -68,7 +68,7 @@ def is_straight(graph: Graph, pings: Pings) -> Bools:
 def cell_counts(lines: Lines, poses: Floats, range_m: Floats, free: Bools, straight: Bools) -> Cells:
     """Pings that each cell of each line explains, and pings that passed it.
 
-    `free` (k,): pings that nothing else explains already; `straight` (k,): those with a well-known axis, which alone show that a wall is not there.
+    `free` (k,): pings that nothing else explains already; `straight` (k,): pings with a well-known axis, which alone show that a wall is missing.
     """
     first = lines.low_m - MARGIN_M
     count = np.ceil((lines.high_m - lines.low_m + 2.0 * MARGIN_M) / CELL_M).astype(np.int64)
@@ -138,7 +138,7 @@ def _count(lines: Lines, poses: Floats, range_m: Floats, free: Bools, straight: 
                 distance, normal = -distance, normal + math.pi
             fits = abs(range_m[k] - distance) < FITS_M
             if not fits and (distance >= SURE_M or range_m[k] < distance + BEYOND_M):
-                continue  # most lines, before anything is computed of them
+                continue  # most lines, before any computation
             off_axis = abs((normal - poses[k, 2] + math.pi) % (2.0 * math.pi) - math.pi)
             if off_axis > HALF_CONE_RAD:
                 continue

@@ -15,7 +15,7 @@ from echostep.arrays import Bools, Floats
 from echostep_app.mapping.graph.graph import Graph
 from echostep_app.mapping.graph.spots import is_spot
 
-SAME_M = 0.12  # two walls nearer than this, beside each other, are one: less is no wall's thickness but two errors
+SAME_M = 0.12  # two walls nearer than this, beside each other, are one: less is not a wall's thickness but two errors
 SAME_RAD = math.radians(4.0)
 BESIDE_M = 1.0  # along the walls, between two that may be one line
 ALIGNED_RAD = math.radians(2.0)  # within it a wall has a direction of the building

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""How well the place of drawn walls is known in the building: it grows with the path since the last return.
+"""How well the place of drawn walls is known in the building: the error grows with the path since the last return.
 
 In: a solved graph, pieces of lines that are walls, pings. Out: `PlacedPiece`s. Owns the frame in which they are stated: the start, and the direction
-to the first place COURSE_M away, are known, as by two taps. What a return ties to the start is known as the return is, what lies beyond it as the
-path is.
+to the first place COURSE_M away, are known, as by two taps. Walls that a return ties to the start are known as the return is, walls beyond it as
+the path is.
 """
 
 from __future__ import annotations
@@ -20,17 +20,15 @@ from echostep_app.mapping.walls.lines import Lines
 from echostep_app.mapping.walls.segments import Run
 
 COURSE_M = 15.0  # from the start to the place that gives the direction
-SCALE_SD = (
-    0.005  # of all lengths of a walk: those of the three surveyed hallways of gx5_gcp are 0.1, 0.4 and 0.7 % too long
-)
-PIECE_M = 4.0  # of wall, that is known alike: a stretch of path beside it has half a closure's length
+SCALE_SD = 0.005  # of all lengths of a walk: the three surveyed hallways of gx5_gcp are 0.1, 0.4 and 0.7 % too long
+PIECE_M = 4.0  # of wall, whose places are known alike: a stretch of path beside it has half a closure's length
 OFF_M = 0.5  # a wall is drawn where it is farther off with a probability of 0.05 at most; assumed: half of a passage
 MOST_SD_M = OFF_M / 1.96
 AT_ONCE = 64  # pieces that are solved together: an hour's walk has 15,000 unknowns, each 8 bytes of two columns
 
 
 class PlacedPiece(NamedTuple):
-    """A piece of run number `run` about `at_m` (x, y): standard deviation across the wall, and that along the worst axis."""
+    """A piece of run number `run` about `at_m` (x, y): standard deviation across the wall, and along the worst axis."""
 
     run: int
     at_m: Floats
@@ -68,7 +66,7 @@ def placed_pieces(
 
 
 def are_known(walls: int, placed: list[PlacedPiece]) -> Bools:
-    """Which of so many walls are known well enough to be drawn."""
+    """Which of this many walls are known well enough to be drawn."""
     variance, count = np.zeros(walls), np.zeros(walls)
     for piece in placed:
         variance[piece.run] += piece.across_sd_m**2
@@ -78,7 +76,7 @@ def are_known(walls: int, placed: list[PlacedPiece]) -> Bools:
 
 
 def _pieces(pings: Pings, poses: Floats, lines: Lines, run: Run, of: Ints) -> list[Heard]:
-    """A run in pieces of PIECE_M or less, those that own pings."""
+    """A run in pieces of PIECE_M or less that own pings."""
     normal_rad, rho_m = float(lines.normal_rad[run.line]), float(lines.rho_m[run.line])
     c, s = math.cos(normal_rad), math.sin(normal_rad)
     along = c * poses[:, 1] - s * poses[:, 0]

@@ -16,24 +16,24 @@ from echostep_app.mapping.graph.spots import SPOT_HALF_M
 from echostep_app.mapping.walls.evidence import CELL_M, CROSSED, SMOOTH, Cells
 from echostep_app.mapping.walls.lines import Lines
 
-HEARD_ODDS, PASSED_ODDS = 1.0, 0.6  # weight of a ping from a cell, and of one that passed it
+HEARD_ODDS, PASSED_ODDS = 1.0, 0.6  # weight of a ping from a cell, and of a ping that passed it
 BRIDGE_M, SILENT_BRIDGE_M = 0.3, 1.5  # longest gap that is closed: at any evidence, and where no ping passed
-# Farthest to the wall that an end is extended to, where no ping passed: a corridor and the corner that was cut
+# Greatest distance to the wall that an end is extended to, where no ping passed: a corridor and the corner that was cut
 EXTEND_M = 2.6
-SURE_M = 0.5  # an end is extended by so much though pings passed: they may have passed the end itself
-MEETS_M, LONG_M = 0.5, 2.0  # a short piece so near to a wall of such a length meets it
+SURE_M = 0.5  # an end is extended by this much even if pings passed: they may have passed the end itself
+MEETS_M, LONG_M = 0.5, 2.0  # a short piece this near to a wall longer than this meets it
 SNAP_M = 0.4  # an end that stands out beyond a crossing by less is cut there
 
 
 class Least(NamedTuple):
-    """Limits of a run: its pings, and its length; whether it is as wide, at least, as what reflects."""
+    """Limits of a run: its pings, and its length; whether it is at least as wide as the reflecting spot."""
 
     pings: int
     length_m: float
     widened: bool = False
 
 
-# Of a line that has a direction of the building; of any line where the building has none; of one askew to them, as corners and edges seem to be
+# For a line with a direction of the building; for any line where the building has none; for a line askew to them, as corners and edges seem to be
 ACROSS, ANY, ASKEW = Least(8, 2.0 * SPOT_HALF_M, widened=True), Least(8, 0.6), Least(12, 0.8)
 
 
@@ -122,7 +122,7 @@ def _crossing(lines: Lines, runs: list[Run], i: int, j: int) -> tuple[float, boo
 def _end(end_m: float, way: float, crossings: list[tuple[float, bool]], passed: Floats, first_m: float) -> float:
     """The end moved outward to the nearest crossing within reach that no ping passed on the way, or inward to one that it hardly exceeds.
 
-    A wall that stands there comes before one that would have to be extended, when both cross nearly there: two walls on nearly one line.
+    A wall that stands there is preferred to one that would have to be extended, when both cross nearly there: two walls on nearly one line.
     """
     best, best_m = end_m, math.inf
     for c, stands in crossings:

@@ -2,7 +2,7 @@
 """How well drawn walls are known against the path beside them.
 
 In: a solved graph, the pieces of lines that are walls, pings. Out: a standard deviation of each. Owns the number of places used. The standard
-deviation is not that of a wall's place on the map but of its distance from the places beside it, over all passages: a drawing that is turned or
+deviation is not of a wall's place on the map but of its distance from the places beside it, over all passages: a drawing that is turned or
 shifted as a whole serves a person as well as another, one whose passages do not fit together is worse.
 """
 
@@ -19,13 +19,13 @@ from echostep_app.mapping.graph.nodes import Pings
 from echostep_app.mapping.walls.lines import Lines
 from echostep_app.mapping.walls.segments import Run
 
-# Of the path beside a wall, at most, each in the middle of its share of it: each costs a solution with the graph's factor. With 64 of them the whole
+# Most places on the path beside a wall, each in the middle of its share: each costs a solution with the graph's factor. With 64 the result
 # differs by 3 % (18 simulated walks)
 PLACES = 4
 
 
 def wall_sds(graph: Graph, pings: Pings, poses: Floats, lines: Lines, runs: list[Run], of: Ints) -> Floats:
-    """Standard deviation (n,) of each run: root mean square of that of its distance from the places beside it, combined with its line's own.
+    """Standard deviation (n,) of each run: root mean square over its distances from the places beside it, combined with its line's own.
 
     `poses` (k, 3): corrected place and axis of each ping; `of` (k,): the line that explains it.
     """
@@ -33,7 +33,7 @@ def wall_sds(graph: Graph, pings: Pings, poses: Floats, lines: Lines, runs: list
 
 
 def _path_sd_m(graph: Graph, pings: Pings, poses: Floats, lines: Lines, run: Run, of: Ints) -> float:
-    """What the path between a run and the places beside it adds; zero where no ping of its own is left."""
+    """Standard deviation that the path between a run and the places beside it adds; zero if no ping of its own is left."""
     normal_rad = float(lines.normal_rad[run.line])
     c, s = math.cos(normal_rad), math.sin(normal_rad)
     across, along = c * poses[:, 0] + s * poses[:, 1] - lines.rho_m[run.line], c * poses[:, 1] - s * poses[:, 0]

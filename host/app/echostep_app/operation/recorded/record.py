@@ -15,7 +15,7 @@ from __future__ import annotations
 import importlib.metadata
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
@@ -23,8 +23,9 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from echostep.plan.model import Plan
 from echostep.ports.chunks import Chunk
+from echostep_app.operation.operation import Operation
+from echostep_app.operation.recorded.tape import Keyframe, Tape
 from echostep_app.output.foxglove import log_line
 from echostep_app.recording.numbered import numbered_recorder
 from echostep_app.team.inbox import ReceivedMessage
@@ -77,64 +78,56 @@ def decode_record(data: bytes) -> Heard | Condition | None:
 
 
 class OperationRecorder:
-    """Writes an operation to a new file, numbered after `wanted`; raises EchostepError when it cannot be created. Never waits for the disk."""
+    """Writes an operation to a new file, numbered after `wanted`, and its keyframes to `tape`. Never waits for the disk.
 
-    def __init__(self, wanted: Path, plan: Plan, broker: str) -> None:
+    `file`: the recorder of the file. Raises EchostepError when it cannot be created.
+    """
+
+    def __init__(self, wanted: Path, operation: Operation, broker: str) -> None:
         fields = {
             "kind": KIND,
             "version": importlib.metadata.version("echostep"),
-            "plan_name": plan.name,
-            "plan_sha256": plan.digest,
+            "plan_name": operation.plan.name,
+            "plan_sha256": operation.plan.digest,
             "broker": broker,
             "started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"),
             "started_ns": str(time.monotonic_ns()),
         }
-        self._recorder = numbered_recorder(wanted, fields)
-        self.notices = self._recorder.notices
+        self.file = numbered_recorder(wanted, fields)
+        self.tape = Tape(self.file.path, grows=True)
+        self._operation = operation
         self._condition: Condition | None = None
         self._counted_s = -math.inf
         self._newest_ns = 0
         self._faults = 0  # of the output, that are recorded
 
-    @property
-    def path(self) -> Path:
-        """The file."""
-        return self._recorder.path
-
-    @property
-    def offset(self) -> int:
-        """Bytes of the file so far."""
-        return self._recorder.offset
-
-    def add(self, messages: Sequence[ReceivedMessage]) -> None:
-        """Record accepted messages."""
-        for m in sorted(messages, key=lambda message: message.received_s):
-            self._write(m.received_s, Heard(m.unix_s, m.retained, m.topic or "", m.payload))
-
-    def add_condition(
-        self, now_s: float, unix_s: float, received: int, rejected: Mapping[str, int], *, connected: bool
+    def add(
+        self,
+        believed: Sequence[ReceivedMessage],
+        now_s: float,
+        unix_s: float,
+        *,
+        connected: bool,
+        faults: Sequence[str] = (),
     ) -> None:
+        """Record accepted messages, and why an output takes nothing any more, each of the `faults` once; then the state of the operation."""
+        for m in sorted(believed, key=lambda message: message.received_s):
+            self._write(m.received_s, Heard(m.unix_s, m.retained, m.topic or "", m.payload))
+        self.file.write_derived(log_line(round(now_s * 1e9), fault) for fault in faults[self._faults :])
+        self._faults = max(self._faults, len(faults))
+        roster = self._operation.roster
+        self._add_condition(now_s, Condition(unix_s, connected, roster.received, dict(roster.rejected)))
+        offset, operation = self.file.offset, self._operation
+        self.tape.note(now_s, len(believed), lambda: Keyframe(now_s, unix_s, offset, connected, operation.copy()))
+
+    def _add_condition(self, now_s: float, new: Condition) -> None:
         """Record the state of the connection and the counts, when the state has changed, or counts of rejected messages after `COUNTS_S`."""
         last = self._condition
-        new = Condition(unix_s, connected, received, dict(rejected))
         counted = (last is not None and new.rejected == last.rejected) or now_s - self._counted_s < COUNTS_S
-        if last is None or connected != last.connected or not counted:
+        if last is None or new.connected != last.connected or not counted:
             self._condition, self._counted_s = new, now_s
             self._write(now_s, new)
 
-    def add_faults(self, now_s: float, faults: Sequence[str]) -> None:
-        """Record why an output takes nothing any more, each fault once."""
-        self._recorder.write_derived(log_line(round(now_s * 1e9), fault) for fault in faults[self._faults :])
-        self._faults = len(faults)
-
-    def close(self) -> None:
-        """Write the end of the file."""
-        self._recorder.close()
-
-    def check_whole(self) -> None:
-        """Raises IncompleteError when the closed recording lacks something."""
-        self._recorder.check_whole()
-
     def _write(self, t_s: float, record: Heard | Condition) -> None:
         self._newest_ns = max(self._newest_ns, round(t_s * 1e9))  # times of a port never decrease
-        self._recorder.write(Chunk(OPERATION, self._newest_ns, msgspec.msgpack.encode(record)))
+        self.file.write(Chunk(OPERATION, self._newest_ns, msgspec.msgpack.encode(record)))

@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan
-from echostep.recording.reading import open_recording
+from echostep.plan import Plan
+from echostep.recording import open_recording
 from echostep_app.operation.operation import Operation
+from echostep_app.operation.recorded.player import Player, load
 from echostep_app.operation.recorded.record import KIND
-from echostep_app.operation.recorded.tape import Player, Tape, load
+from echostep_app.operation.recorded.tape import Tape
 from echostep_app.operation.views import Views, finish, open_page
 from echostep_app.page.protocol import FRAME_S
 from echostep_app.team.commander import table

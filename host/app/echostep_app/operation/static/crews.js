@@ -2,9 +2,9 @@
 // Crews and their accountability check (PAR): who is inside, since when, when it last answered, how much of the planned air is left. What is due is said.
 
 import { localise, tr } from '../static/language.js';
-import { put, say } from './text.js';
+import { minutes, put, say } from './text.js';
 
-const CHECK_SHARE = 1 / 3;  // of the planned air until a check is due, as team/messages/crews.py says
+const CHECK_SHARE = 1 / 3;  // of the planned air until a check is due: the crew is reminded of its pressures after one and after two thirds [FwDV 7, 7.4]
 const ORDER = ['over', 'due', 'inside', 'ready', 'out'];
 const SIGNS = { over: '▲', due: '△', inside: '●', ready: '○', out: '■' };
 const DOES = { enter: 'Enters', check: 'Answered', leave: 'Is out' };
@@ -96,5 +96,3 @@ function stateOf({ entered_s, checked_s, left_s, air_min }, unix_s) {
   const air = left <= 0 ? `planned air over for ${minutes(-left)}` : `planned air ${minutes(left)} left`;
   return { state, words: `inside ${minutes(unix_s - entered_s)}, ${checked_s > entered_s ? `answered ${minutes(since)} ago` : 'not asked yet'}, ${air}${state === 'due' ? ': ask now' : ''}` };
 }
-
-const minutes = (s) => `${Math.floor(Math.max(s, 0) / 60)}:${String(Math.floor(Math.max(s, 0) % 60)).padStart(2, '0')}`;

@@ -2,7 +2,7 @@
 // The time bar over the whole operation: go back, hold, play, return to now. While the past is shown, what calls for help now is said beside it.
 
 import { tr } from '../static/language.js';
-import { put } from './text.js';
+import { minutes, put } from './text.js';
 
 const $ = (id) => document.getElementById(id);
 const SKIP_S = 10;
@@ -69,5 +69,3 @@ export class TimeBar {
     document.body.dataset.past = String(!now && live);
   }
 }
-
-const minutes = (s) => `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, '0')}`;

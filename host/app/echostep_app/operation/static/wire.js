@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames of the commander's page: the header with its rows as arrays of numbers; the layout is in operation/wire.py.
+// Frames of the commander's page: the header with its rows as arrays of numbers; the layout is in operation/session.py.
 
 export const PLACE = 7, TRAIL = 5;  // numbers in a row
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the page shows, one element a module.
+"""Elements of the page, one a module.
 
 In: the tracker's published state. Out: plain data for `page.protocol`. Owns nothing that the tracker reads.
 """

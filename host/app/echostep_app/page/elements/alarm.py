@@ -10,14 +10,14 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from echostep.odometry.wearer import AlarmKind, AlarmReason, WearerWatch
+from echostep.odometry import AlarmKind, AlarmReason, WearerWatch
 
 REPEAT_S = 5.0  # between two times that a sentence is spoken; assumed
 
 
 @dataclass(frozen=True, slots=True)
 class ShownAlarm:
-    """What is shown: `text`, and what is `spoken`, again whenever `times` changes. The names are keys of the frame's JSON."""
+    """The `text` shown, and the sentence `spoken`, again whenever `times` changes. The names are keys of the frame's JSON."""
 
     kind: str
     text: str
@@ -32,7 +32,7 @@ def shown_alarm(
     receipt_of: Callable[[int], str] | None = None,
     acknowledged_by: Callable[[int], str | None] | None = None,
 ) -> ShownAlarm | None:
-    """The present alarm; None while all is well. `receipt_of`: what is known of the delivery of a mayday; None: the run's reports go nowhere.
+    """The present alarm; None while all is well. `receipt_of`: state of delivery of a mayday; None if the run's reports go nowhere.
 
     `acknowledged_by`: name of the commander that acknowledged the alarm with a given number.
     """

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Floats
-from echostep.localization.estimate import Estimate
+from echostep.localization import Estimate
 from echostep_app.mapping.graph.levels import BETWEEN
 
 if TYPE_CHECKING:

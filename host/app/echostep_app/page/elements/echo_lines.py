@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.jit import kernel
-from echostep.localization.echoes.likelihood import EchoModel, likeliest_source
-from echostep.localization.estimate import Estimate
+from echostep.localization import EchoModel, Estimate, likeliest_source
 from echostep.path import MeasuredSegment
 from echostep.walls.echo_sources import MOST_SOURCES, echo_sources
 from echostep.walls.index import WallIndex

@@ -2,7 +2,7 @@
 """Guidance as a page shows it: of the run's cues, or to a destination that was chosen on the page.
 
 In: cues with their route; for a destination chosen on a page: estimates, a place, the plan. Out: `ShownGuidance`. Owns the plan's route planner
-(made at the first request, in a thread) and the progress along a route to a chosen destination. Until that route is found, and where there is none,
+(made at the first request, in a thread) and the progress along a route to a chosen destination. Until that route is found, and if there is none,
 neither a direction nor a line is shown.
 """
 
@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from echostep.localization.estimate import Estimate
-from echostep.plan.model import Plan
-from echostep.plan.polyline import along, way_m
+from echostep.localization import Estimate
+from echostep.plan import Plan
 from echostep_app.guidance.cues import Cue, CueKind, Guide
+from echostep_app.plan.polyline import along, way_m
 from echostep_app.plan.routing import Route, RoutePlace, Routes
 
 SEARCH_INTERVAL_S = 5.0  # shortest time between two searches for a route, in data time
 ON_THE_WAY = (CueKind.AHEAD, CueKind.TURN, CueKind.CHANGE, CueKind.OFF)
-LOOKING, NO_ROUTE = "looking", "none"  # kinds of a guidance without a route
+LOOKING, NO_ROUTE = "looking", "none"  # kinds of guidance without a route
 
 Points = tuple[tuple[float, float], ...]  # (x, y) in map metres
 
@@ -92,7 +92,7 @@ class RouteFinder:
         self._lock = threading.Lock()
 
     def find(self, estimate: Estimate, goal: RoutePlace) -> Route:
-        """The route from an estimate to a place; raises EchostepError when there is none."""
+        """The route from an estimate to a place; raises EchostepError without one."""
         with self._lock:
             self._routes = self._routes or Routes(self._plan)
             return self._routes.way(RoutePlace(estimate.x_m, estimate.y_m, estimate.level), goal)
@@ -137,7 +137,7 @@ class Destination:
 
 
 def without_route(goal: RoutePlace, estimate: Estimate, reason: str) -> ShownGuidance:
-    """What is shown while no route is known: no direction and no line, which would lead through walls.
+    """The guidance while no route is known: no direction and no line, which would lead through walls.
 
     `reason`: why there is none, empty while it is searched for.
     """

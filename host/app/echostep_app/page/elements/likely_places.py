@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The places that fit, as a sentence: "1, 3 in North corridor 62 % · 2 in South corridor 31 %"; the numbers are those of the rings on the map.
+"""The places that fit, as a sentence: "1, 3 in North corridor 62 % · 2 in South corridor 31 %"; the numbers match the rings on the map.
 
 In: an estimate, its hypotheses' places in words, a plan. Out: which are shown; words. Owns nothing.
 """
@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from echostep.localization.estimate import Estimate, claims_place
-from echostep.localization.particles.places import LikelyPlace
-from echostep.plan.model import Plan
+from echostep.localization import Estimate, LikelyPlace, claims_place
+from echostep.plan import Plan
 
 
 def shown_places(estimate: Estimate) -> tuple[LikelyPlace, ...]:

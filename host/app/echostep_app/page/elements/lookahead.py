@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from echostep.angles import wrap
-from echostep.localization.estimate import Estimate, claims_place, ellipse95, trust
+from echostep.localization import Estimate, claims_place, ellipse95, trust
 from echostep.path import PathSegment
 from echostep_app.plan.places.bearing import KNOWN_HEADING_RAD
 
@@ -19,7 +19,7 @@ DRIFT_M = 0.05  # standard deviation that is added per segment and axis to the f
 
 
 def moves_as_one(estimate: Estimate) -> bool:
-    """Whether the step of the mean is that of all particles: they are at one place and share a heading.
+    """Whether all particles make the step of the mean: they are at one place and share a heading.
 
     In a search each has its own heading; the step of their mean would move them through walls.
     """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Marks as a page draws them: beacons, and what commanders set (a cleared room, a hazard, a meeting point).
+"""Marks as a page draws them: beacons, and marks of commanders (a cleared room, a hazard, a meeting point); the newest meeting in words.
 
-In: a tracker, in its thread. Out: `BeaconMark`s that any thread may read. Owns nothing.
+In: a tracker, in its thread; its state. Out: `BeaconMark`s that any thread may read, `ShownMeeting`. Owns the words.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ import math
 from dataclasses import dataclass
 from itertools import islice
 
-from echostep.localization.beacon_map import BeaconState
-from echostep.localization.estimate import CHI2_95, ellipse95
+from echostep.localization import CHI2_95, BeaconState, MeetingEffect, ellipse95
 from echostep.ports.people.team_beacons import MOST_SHARED
 from echostep.tracker import Tracker
+from echostep.tracker.state import TrackerState
 
 # A beacon counts as heard this long after its last reading: longer than a step, at whose end readings are used
 RECENT_S = 1.5
@@ -68,3 +68,26 @@ def beacon_marks(tracker: Tracker, t_s: float) -> tuple[BeaconMark, ...]:
         )
         for number, (name, b) in islice(shared.items(), MOST_SHARED) if number not in known
     )  # fmt: skip
+
+
+WORDS = {
+    MeetingEffect.USED: "{} and you agree about the place.",
+    MeetingEffect.MOVED: "Your position is now beside {}.",
+    MeetingEffect.CONTRADICTS: "{} is elsewhere by their tracker. Your position was kept: if it is wrong, tap where you are or meet another one.",
+    MeetingEffect.EMPTY: "The tracker of {} does not know the place: nothing was changed.",
+    MeetingEffect.REPEATED: "You met {} just now: nothing was changed. It counts again after 10 m.",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ShownMeeting:
+    """Meeting `number` in words. The names are keys of the frame's JSON."""
+
+    number: int
+    text: str
+
+
+def shown_meeting(state: TrackerState) -> ShownMeeting | None:
+    """The newest meeting; None before the first."""
+    news = state.met
+    return None if news is None else ShownMeeting(news.number, WORDS[news.effect].format(news.name))

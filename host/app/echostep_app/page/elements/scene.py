@@ -12,15 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Octets
-from echostep.localization.estimate import Estimate, TrackStatus, claims_place
-from echostep.localization.limits import PROBABLE
-from echostep.plan.model import Plan
+from echostep.localization import PROBABLE, Estimate, TrackStatus, claims_place
+from echostep.plan import Plan
 from echostep.tracker.state import ParticleSnapshot
 from echostep_app.page.elements.alarm import ShownAlarm
 from echostep_app.page.elements.echo_lines import EchoLine
 from echostep_app.page.elements.guidance import ShownGuidance
-from echostep_app.page.elements.marks import BeaconMark
-from echostep_app.page.elements.meetings import ShownMeeting
+from echostep_app.page.elements.marks import BeaconMark, ShownMeeting
 from echostep_app.page.elements.stream_rates import StreamRates
 from echostep_app.page.elements.true_position import TruePosition
 from echostep_app.page.elements.undo_offer import UndoOffer
@@ -47,10 +45,10 @@ class ParticleSample:
 
 @dataclass(frozen=True, slots=True)
 class PageScene:
-    """What a page shows of one moment.
+    """The state that a page shows of one moment.
 
     `arrived_ns`: host's monotonic clock when the bytes of the estimate arrived. `trail_count`: number of points of the trail up to this moment.
-    `guidance`: of the run; that to a destination chosen on a page is added by the page's session. `echoes_fit`: the plan explains the last echoes.
+    `guidance`: of the run; the page's session adds guidance to a destination chosen on the page. `echoes_fit`: the plan explains the last echoes.
     `truth`: the true position, where it is known. `gait`: that the wearer runs, in words.
     """
 

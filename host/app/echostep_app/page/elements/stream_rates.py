@@ -23,7 +23,7 @@ class StreamRates:
     """Rates over the last two seconds (None: not known yet), and counts since the start. The field names are keys of the frame's JSON.
 
     `lost`: messages that did not arrive. `rejected`: bytes or messages with wrong contents. `late_pings`: pings that came after their segment.
-    `wrong`: what is wrong with the reports, the board or a stream and what to do, as text; empty when nothing is. `foot`: what is worn on the
+    `wrong`: a fault of the reports, the board or a stream and its remedy, as text; empty if none. `foot`: the sensor worn on the
     foot; its samples are counted in `mtx_hz`.
     """
 
@@ -43,10 +43,10 @@ class StreamRateMeter:
 
     def __init__(self) -> None:
         self._counts: deque[tuple[int, int, int]] = deque()  # time (ns), MTx samples, pings
-        self._unused = 0  # messages of the MTx that are no samples, when its samples were last counted
+        self._unused = 0  # messages of the MTx that are not samples, when its samples were last counted
 
     def measure(self, tracker: Tracker, t_ns: int, fault: str = "") -> StreamRates:
-        """Rates and counts at `t_ns` of the arrival clock, which must not go back; `fault`: what is wrong with what the run writes."""
+        """Rates and counts at `t_ns` of the arrival clock, which must not go back; `fault`: what is wrong with the run's output."""
         streams = tracker.streams
         board, mtx, status = streams.board, streams.mtx, streams.status
         mtx_hz, pings_hz = self._rates_hz(mtx.good, streams.pings, t_ns)
@@ -84,7 +84,7 @@ def _unused(mtx: MtxCounts) -> int:
 
 
 def _advice(streams: StreamState, mtx_hz: float | None, pings_hz: float | None, unused: int) -> str:
-    """The gravest finding and what to do about it. `unused`: what has come from the foot since its last sample, which gave none."""
+    """The gravest finding and what to do about it. `unused`: messages or bytes from the foot since its last sample, which gave none."""
     if mtx_hz == 0.0 and unused > 0:
         incomplete = " (without counter, acceleration or rate of turn)" if streams.mtx.incomplete else ""
         return f"the {streams.foot_name} sends no usable samples{incomplete}: look at its settings, its port and its RX line: echostep doctor"

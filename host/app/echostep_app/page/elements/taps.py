@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Taps: the preview of a check-in's effect; the surveyed point that an acceptance walk asks for.
 
-In: a plan; a check-in that a page considers, and the scene that it was shown. Out: `Considered`: plain data. Owns what is known of the plan's spaces.
+In: a plan; a check-in that a page considers, and the scene that it was shown. Out: `Considered`: plain data. Owns the known spaces of the plan.
 One thread asks at a time.
 """
 
@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from echostep.localization.estimate import Estimate, TrackStatus, claims_place
-from echostep.plan.model import Plan
+from echostep.localization import Estimate, TrackStatus, claims_place
+from echostep.plan import Plan
 from echostep.ports.people.check_in import CheckIn
 from echostep_app.page.elements.likely_places import places_text, shown_places
 from echostep_app.page.elements.scene import PageScene, format_metres
@@ -21,16 +21,16 @@ from echostep_app.plan.places.spaces import PlanSpaces
 from echostep_app.plan.places.standing import StandingGround
 from echostep_app.plan.places.whereabouts import Whereabouts
 
-NO_TAP = "u"  # as a line of the terminal: the newest tap at a point was none
+NO_TAP = "u"  # as a line of the terminal: the newest tap at a point was a mistake
 DOUBTED_M = 1.0  # a check-in that is farther than this outside the ellipse of a fitting place is doubted; assumed
 
 
 @dataclass(frozen=True, slots=True)
 class Considered:
-    """What a check-in would do. The field names are keys of the JSON.
+    """The effect of a check-in. The field names are keys of the JSON.
 
     `x_m`, `y_m`: the place that it would give: the nearest possible one when the place that was asked for is impossible. `possible`: there is
-    one. `text`: what it would do, in sentences.
+    one. `text`: the effect, in sentences.
     """
 
     x_m: float
@@ -76,7 +76,7 @@ class Taps:
         self._last: tuple[Estimate | None, str, str] = (None, "", "")
 
     def where(self, estimate: Estimate) -> str:
-        """The place of an estimate in words; cached, for all pages of a live run show the same one."""
+        """The place of an estimate in words; cached, because all pages of a live run show the same one."""
         return self._words(estimate)[0]
 
     def places(self, estimate: Estimate) -> str:
@@ -99,7 +99,7 @@ class Taps:
         return f"Not accepted: {objection.reason}." if objection else ""
 
     def consider(self, check_in: CheckIn, scene: PageScene | None) -> Considered:
-        """What a check-in would do after a scene."""
+        """The effect of a check-in after a scene."""
         x_m, y_m, level, heading_rad = check_in.x_m, check_in.y_m, check_in.level, check_in.heading_rad
         objection = self._ground.objection(x_m, y_m, level)
         if objection and objection.nearest_m is None:
@@ -118,7 +118,7 @@ class Taps:
         return Considered(x_m, y_m, level, heading_rad, True, " ".join(sentences))
 
     def _changes(self, x_m: float, y_m: float, check_in: CheckIn, scene: PageScene | None) -> list[str]:
-        """How a check-in would change the estimate of a scene, and what speaks against it."""
+        """How a check-in would change the estimate of a scene, and the objections to it."""
         estimate = scene.estimate if scene else None
         if check_in.heading_rad is not None:
             heading = "You face the arrow."

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from echostep.localization.limits import BELIEVED, PROBABLE
+from echostep.localization import BELIEVED, PROBABLE
 from echostep.tracker.state import TrackerState
 
-UNDO_NS = 10_000_000_000  # for so long the page offers to undo a check-in, and again once echoes contradict it
+UNDO_NS = 10_000_000_000  # the page offers for this long to undo a check-in, and again once echoes contradict it
 
 
 @dataclass(frozen=True, slots=True)

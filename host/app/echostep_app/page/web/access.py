@@ -7,7 +7,7 @@ another site must not reach the socket: `Host` must name this machine and `Origi
 several users, the address contains a random token, and requests without it are refused.
 
 Behind a proxy the page's own address may begin with https, and is in `X-Forwarded-Host` where the proxy puts its target into `Host`: a page of
-another site cannot set that header for a socket. What is refused for its address is told, for a proxy may be the reason.
+another site cannot set that header for a socket. Pages refused for their address are reported, because a proxy may be the reason.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SECURITY_HEADERS = {
 }
 
 
-MOST_TOLD = 4  # addresses that are told; a hostile page may invent others
+MOST_TOLD = 4  # addresses that are reported; a hostile page may invent others
 SAID_CHARACTERS = 100  # of an address
 
 
@@ -104,7 +104,7 @@ class AccessControl:
         return False
 
     def _tell_of(self, page: str, remedy: str) -> None:
-        """Tell once of a page that is refused."""
+        """Report a page that is refused, once."""
         page = "".join(c for c in page[:SAID_CHARACTERS] if c.isprintable())
         if self._tell and page not in self._told and len(self._told) < MOST_TOLD:
             self._told.add(page)
@@ -118,7 +118,7 @@ def _peer(scope: Scope) -> Peer:
 
 
 def _netloc(origin: str) -> str | None:
-    """Host and port of an origin of the web; None when it is none."""
+    """Host and port of an origin of the web; None when it is not an origin."""
     try:
         parts = urlsplit(origin.lower())
     except ValueError:

@@ -14,26 +14,26 @@ from urllib.parse import urlsplit
 
 from rich.console import Console
 
-from echostep.extras import lacks
+from echostep_app.extras import lacks
 from echostep_app.page.web.access import LOOPBACK
 
 EVERY = ("0.0.0.0", "::")
 SOMEWHERE = ("192.0.2.1", 9)  # for documentation [RFC 5737]: no packet is sent there
 UNREACHED = ("127.", "169.254.")  # this machine itself [RFC 1122]; an interface that got no address [RFC 3927]
 SIOCGIFADDR, IFREQ_BYTES = 0x8915, 40  # the first IPv4 address of an interface, 20 bytes into the answer [netdevice(7)]
-BORDER = 2  # light modules around a QR code: 4 in the standard, but phones do with 2 (assumed)
+BORDER = 2  # light modules around a QR code: 4 in the standard, but phones read 2 (assumed)
 HALVES = {(False, False): " ", (True, False): "▀", (False, True): "▄", (True, True): "█"}
 
 
 def page_urls(host: str, port: int, token: str | None) -> tuple[str, ...]:
-    """URLs of a page that listens at a host, the likeliest first; for a socket on all interfaces those of every interface."""
+    """URLs of a page that listens at a host, the likeliest first; for a socket on all interfaces the URLs of every interface."""
     names = tuple(own_addresses()) or (socket.gethostname(),) if host in EVERY else (host,)
     path = f"{token}/" if token else ""
     return tuple(f"http://{f'[{name}]' if ':' in name else name}:{port}/{path}" for name in names)
 
 
 def own_addresses() -> list[str]:
-    """IPv4 addresses at which others reach this machine: first that of the route to everywhere, then those of the other interfaces."""
+    """IPv4 addresses at which others reach this machine: first the default route's, then the other interfaces'."""
     found = dict.fromkeys((*_routed(), *_of_interfaces()))
     return [address for address in found if not address.startswith(UNREACHED)]
 

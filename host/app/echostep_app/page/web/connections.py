@@ -4,8 +4,8 @@
 In: a listening socket; from the application, when a request begins and ends. Out: accepted connections, each given to a protocol. Owns the open
 connections and their timeouts.
 
-A connection without a request in progress is closed after `REQUEST_S`, and at once when a new one needs its place: so connections that say nothing
-never keep a page out. What comes faster than `ACCEPTS_A_SECOND` waits in the operating system's queue and costs the tracker nothing.
+A connection without a request in progress is closed after `REQUEST_S`, and at once when a new one needs its place: so silent connections
+never keep a page out. Connections beyond `ACCEPTS_A_SECOND` wait in the operating system's queue and cost the tracker nothing.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class Connections:
             self._open[peer] = _Connection(transport, time.monotonic())
 
     async def _sweep(self) -> None:
-        """Close what takes too long."""
+        """Close connections that take too long."""
         while True:
             await asyncio.sleep(SWEEP_S)
             self._forget_closed()
@@ -121,7 +121,7 @@ class Connections:
             connection.since_s = time.monotonic()
 
     def _close(self, peer: Peer) -> None:
-        """Close a connection at once; what is not sent yet is dropped."""
+        """Close a connection at once; unsent bytes are dropped."""
         transport = self._open.pop(peer).transport
         if isinstance(transport, asyncio.WriteTransport):
             transport.abort()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Faults of the server: exceptions in words, for the log and for the page.
 
-In: exceptions that no code of the page handles. Out: texts. Owns those that are not printed yet; each text is logged once, for a page tries again and
+In: exceptions that no code of the page handles. Out: texts. Owns texts that are not printed yet; each is logged once, because a page tries again and
 again.
 """
 
@@ -30,11 +30,11 @@ class Faults:
         self.notices.append(f"The page is no longer served: {_described(error)}. The run goes on without it.")
 
     def tell(self, sentence: str) -> None:
-        """A sentence that is no fault of the server, for the terminal."""
+        """A sentence that is not a fault of the server, for the terminal."""
         self.notices.append(sentence)
 
     def note_text(self, what: str) -> str:
-        """A fault that is no exception, in words."""
+        """A fault that is not an exception, in words."""
         text = f"The page's server has a fault: {what}"
         if text not in self._known and len(self._known) < MOST_KEPT:
             self._known.add(text)

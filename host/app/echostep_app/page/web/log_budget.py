@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Log lines of the libraries that serve the page: they go to the page's faults, which keep few, instead of to the terminal.
+"""Log lines of the libraries that serve the page: they go to the page's faults, which keep few, instead of the terminal.
 
 In: log records. Out: texts for `Faults`. Owns the handlers while it is entered.
 """

@@ -25,7 +25,7 @@ MOST_SENTENCE = 400  # characters of an answer
 
 
 class Uploads:
-    """`take` answers a post; `open_file` gets the stored file and says what came of it, or raises EchostepError. `again` takes the button's post."""
+    """`take` answers a post; `open_file` gets the stored file and returns the answer, or raises EchostepError. `again` takes the button's post."""
 
     def __init__(self, open_file: Callable[[Path], str], without_plan: Callable[[], str]) -> None:
         self._open, self._without_plan = open_file, without_plan

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from shapely.geometry import Polygon
 
-from echostep.plan.model import Connector
+from echostep.plan import Connector
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, ring
 from echostep_app.plan.importers.report import ImportReport
 
@@ -18,7 +18,7 @@ SHARED = 0.4  # shapes that share more than this part of the smaller area are on
 
 
 def join_connectors(drawn_levels: Sequence[DrawnLevel], report: ImportReport) -> tuple[Connector, ...]:
-    """The connectors between levels; the outline is the intersection of their shapes. What joins no two levels is reported."""
+    """The connectors between levels; the outline is the intersection of their shapes. Shapes that join no two levels are reported."""
     chains: list[_ConnectorChain] = []
     for i, drawn in enumerate(drawn_levels):
         for shape in drawn.connectors:

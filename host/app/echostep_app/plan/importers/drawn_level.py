@@ -16,15 +16,15 @@ from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Floats
-from echostep.plan.model import ConnectorKind, Door, Level, Question, Room
+from echostep.plan import ConnectorKind, Door, Level, Question, Room
 from echostep_app.plan.importers.straight import merge_collinear
 
-# Assumed, all of them:
+# All assumed:
 CLOSE_M = 0.01  # half the width of the widest crack between two pieces of a wall that is closed
 FLAT_M = 0.005  # greatest distance of a curve from the straight pieces that replace it
 SLIVER_M2 = 1e-3  # smaller areas are dropped
-GRID_M = 1e-3  # coordinates are rounded to it
-ACROSS_M = 3e-3  # a line nearer to a door's end than this, across it, is the jamb there: coordinates are rounded to a third of it
+GRID_M = 1e-3  # rounding step of coordinates
+ACROSS_M = 3e-3  # a line across a door's end and nearer than this is the jamb: coordinates are rounded to a third
 HALF_CUT_M = 0.05  # half the width of the strip along a door in which walls drawn as lines are cut
 TOUCH_M = 2e-3  # a face nearer to a wall than this belongs to the wall, not to a window
 FLECK_M = 0.02  # shorter pieces of window count as wall
@@ -56,7 +56,7 @@ class DrawnLevel:
     openings: list[Polygon] = field(default_factory=list)  # holes in the floor
     cuts: list[BaseGeometry] = field(
         default_factory=list
-    )  # where walls drawn as lines are cut besides at the doors' lines
+    )  # where walls drawn as lines are cut, besides the doors' lines
     questions: list[Question] = field(default_factory=list)
 
     def level(self) -> Level:
@@ -90,13 +90,13 @@ class DrawnLevel:
 
 
 def cut(line: BaseGeometry, openings: list[BaseGeometry], jambs: list[BaseGeometry]) -> BaseGeometry:
-    """A line without its parts inside the openings; what lies across a door's end, as the jambs do, stays."""
+    """A line without its parts inside the openings; pieces across a door's end, such as jambs, stay."""
     if not openings:
         return line
     across = pieces([line.intersection(shapely.union_all(jambs))])
     kept = [
         part for part in across if part.length > 6.0 * ACROSS_M
-    ]  # of a line along the door a third of that is inside
+    ]  # a third of this length of a line along the door is inside
     return joined(shapely.union_all([line.difference(shapely.union_all(openings)), *kept]))
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan, load_plan
+from echostep.plan import Plan, load_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.parsing import FORMATS
 from echostep_app.plan.importers.report import ImportReport
@@ -69,7 +69,7 @@ SNIFFED_BYTES = 4096  # read to recognise a format
 def import_plan(
     path: Path, hints: Hints | None = None, above: Sequence[Path] = (), report: ImportReport | None = None
 ) -> Plan:
-    """Import a file of another program; of drawings one file per level, `above` are the files of the higher levels. Fills the report.
+    """Import a file of another program; drawings have one file per level, `above` are the files of the higher levels. Fills the report.
 
     Raises EchostepError that names the file and the position in it.
     """
@@ -100,7 +100,7 @@ def open_plan(path: Path | str) -> Plan:
 
 
 def is_foreign(path: Path) -> bool:
-    """Whether a file is of another format than plan.json, by its name."""
+    """Whether a file has another format than plan.json, by its name."""
     return path.is_dir() or path.suffix.casefold() in OTHERS or path.name in ("main.json", "core.txt") or _is_map(path)
 
 
@@ -145,7 +145,7 @@ def _is_imdf(path: Path) -> bool:
 
 
 def _is_map(path: Path) -> bool:
-    """Whether a JSON file is of OpenStreetMap: of Overpass, or GeoJSON."""
+    """Whether a JSON file is from OpenStreetMap: of Overpass, or GeoJSON."""
     begins = [_begins_with(path, text) for text in ('"elements"', '"FeatureCollection"', '"echostep_plan"')]
     return path.suffix.casefold() == ".json" and any(begins[:2]) and not begins[2] and path.name != "main.json"
 

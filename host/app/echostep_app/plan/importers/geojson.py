@@ -16,8 +16,8 @@ from shapely.geometry import LineString, MultiLineString, MultiPolygon, Point, P
 from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Floats
-from echostep.plan.georeference import EarthTransform
-from echostep.plan.plan_file import LIMIT_M
+from echostep.fields import LIMIT_M
+from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.importers.parsing import text, typed
 
 
@@ -70,7 +70,7 @@ def shape(feature: dict[str, Any], where: str, earth: EarthTransform) -> BaseGeo
 
 
 def _polygon(rings: Any, where: str, earth: EarthTransform) -> Polygon:
-    """A polygon from its rings; of one that crosses itself, the largest valid part."""
+    """A polygon from its rings; if it crosses itself, its largest valid part."""
     rings = [_metres(corners, where, earth) for corners in typed(rings, where, list)]
     if not rings or any(len(corners) < 4 for corners in rings):
         raise ValueError(f"{where}: a polygon needs rings of four positions or more")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the person who imports a file says about it, because the file may not, or wrongly.
+"""Hints from the person who imports a file, where the file lacks a value or states a wrong one.
 
 In: nothing. Out: `Hints`. Owns the usual height of a storey.
 """
@@ -16,7 +16,7 @@ STOREY_HEIGHT_M = 3.5  # from level to level, for formats without heights: a usu
 class Hints:
     """`storey_height_m` where the file has no heights; `doors_m`: width of doors that are to be assumed (IMDF).
 
-    Of drawings: `units`; `scale_m`, metres a unit, instead of them; patterns of `layers` by kind; `windows` (x0, y0, x1, y1 in drawing units), each
+    For drawings: `units`; `scale_m`, metres a unit, instead of units; patterns of `layers` by kind; `windows` (x0, y0, x1, y1 in drawing units), each
     a level, the lowest first; `level_names`; `align`: lay the levels over each other.
     """
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Imports a file in a process of its own, with limits on time and memory.
 
-In: a path, and hints. Out: `Plan`, `ImportReport`. Owns the process. Importers stand on large libraries (ezdxf, GEOS, a parser of STEP) that a
+In: a path, and hints. Out: `Plan`, `ImportReport`. Owns the process. Importers use large libraries (ezdxf, GEOS, a parser of STEP) that a
 hostile file can keep busy for hours or crash. Here this ends in one error, and Ctrl-C ends it at once.
 """
 
@@ -15,13 +15,13 @@ from dataclasses import asdict
 from pathlib import Path
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan, load_plan, parse_plan
+from echostep.plan import Plan, load_plan, parse_plan
 from echostep_app.plan.importers.formats import import_plan, is_foreign
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.writer import plan_json
 
-# Assumed: ten times what the largest plan that was tried takes.
+# Assumed: ten times the need of the largest plan that was tried.
 LONGEST_S = 300.0
 MOST_MEMORY = 4 << 30  # bytes of address space
 MOST_OUTPUT = 1 << 28  # characters of a plan
@@ -30,7 +30,7 @@ CHILD = "from echostep_app.plan.importers.limited import main; main()"
 
 
 def open_limited(path: Path | str) -> Plan:
-    """As `formats.open_plan`, other formats than plan.json in a process with limits; doubts about an import go to stderr."""
+    """As `formats.open_plan`, with formats other than plan.json in a process with limits; doubts about an import go to stderr."""
     path = Path(path)
     if not is_foreign(path):
         return load_plan(path)
@@ -46,7 +46,7 @@ def import_limited(path: Path, hints: Hints | None = None, above: Sequence[Path]
 
 
 def import_reported(path: Path, hints: Hints | None = None, above: Sequence[Path] = ()) -> tuple[Plan, ImportReport]:
-    """As `import_limited`, with what the importer reports."""
+    """As `import_limited`, with the importer's report."""
     request = json.dumps([str(path), asdict(hints or Hints()), [str(file) for file in above]])
     with subprocess.Popen(
         [sys.executable, "-c", CHILD],

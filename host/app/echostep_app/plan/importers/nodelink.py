@@ -17,8 +17,8 @@ from typing import NamedTuple
 from shapely.geometry import LineString, Polygon
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan
-from echostep.plan.plan_file import LIMIT_M
+from echostep.fields import LIMIT_M
+from echostep.plan import Plan
 from echostep_app.plan.importers.connector_shapes import join_connectors
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas
 from echostep_app.plan.importers.parsing import read_text

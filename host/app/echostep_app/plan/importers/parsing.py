@@ -36,7 +36,7 @@ def read_text(path: Path) -> str:
 
 
 def decode(raw: bytes, name: str) -> str:
-    """Decode bytes as UTF-8 or UTF-16; `name`: of the file, for the error."""
+    """Decode bytes as UTF-8 or UTF-16; `name`: the file's name for the error."""
     try:
         return raw.decode("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
     except UnicodeDecodeError as error:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What an import made of a file besides the plan: units, layers, what was left out, doubts.
+"""Results of an import besides the plan: units, layers, elements left out, doubts.
 
-In: notes of an importer. Out: `ImportReport`. Owns nothing. The summary that a person reads is made of it (`summary`).
+In: notes of an importer. Out: `ImportReport`. Owns nothing. `summary` makes the text that a person reads.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 class ImportReport:
     """Filled by one importer.
 
-    `units`: which, and how they were decided. `layers`: names of the layers used, by kind of element. `left_out`: number of elements that did not
+    `units`: the units, and how they were decided. `layers`: names of the layers used, by kind of element. `left_out`: number of elements that did not
     become a part of the plan, by a description ("LINE on A-FURN"). `doubts`: sentences for the person who imports, the gravest first.
     `doors_remedy`: what to do about rooms without doors in this format.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The summary of an import in at most twelve lines: what came in, what was left out, what is doubtful.
+"""The summary of an import in at most twelve lines: elements imported, elements left out, doubts.
 
 In: a `Plan`, its `ImportReport`. Out: lines. Owns how many there are of each.
 """
@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import shapely
 
-from echostep.plan.model import Door, Level, Plan
+from echostep.plan import Door, Level, Plan
 from echostep_app.plan.cropping import extent
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.places.gaps import door_gaps
@@ -21,13 +21,13 @@ MOST_LINES = 12
 MOST_LEVELS, MOST_DOUBTS = 5, 4  # lines on levels, and on doubts; more of them are counted
 MOST_NAMES = 6  # kinds and layers in one line
 AT_WALL_M = 0.15  # greatest distance of both ends of a door from a wall: issue 44's bound for a door in a gap
-SIZES_M, DOORS_M = (2.5, 1500.0), (0.5, 3.0)  # of a level, and of half of the doors; assumed
-THROUGH_M = 0.2  # to the sides of a door, of which one must be free: half the thickness of a wall; assumed
+SIZES_M, DOORS_M = (2.5, 1500.0), (0.5, 3.0)  # plausible sizes of a level, and of half of the doors; assumed
+THROUGH_M = 0.2  # to both sides of a door, one of which must be free: half the thickness of a wall; assumed
 CLEAR_M = 0.01  # a wall nearer than this to a door's middle part runs through it
 
 
 def summary(plan: Plan, report: ImportReport) -> list[str]:
-    """Less than `MOST_LINES` lines: the caller adds one on the files written."""
+    """Fewer than `MOST_LINES` lines: the caller adds one on the files written."""
     lines = [_level(level) for level in plan.levels[:MOST_LEVELS]]
     if len(plan.levels) > MOST_LEVELS:
         more = plan.levels[MOST_LEVELS:]
@@ -109,7 +109,7 @@ def _connectors(plan: Plan) -> str:
 
 
 def _implausible(plan: Plan) -> list[str]:
-    """What no building has: levels of less than a room's or more than a campus's size, doors that nobody passes or that are gates."""
+    """Implausible sizes: levels smaller than a room or larger than a campus, doors too narrow to pass or as wide as gates."""
     said = []
     for level in plan.levels:
         if len(level.walls) and not SIZES_M[0] <= max(size_m(level)) <= SIZES_M[1]:
@@ -136,7 +136,7 @@ def _without_doors(plan: Plan, remedy: str) -> list[str]:
 
 
 def _counted(counts: Mapping[str, int]) -> str:
-    """The largest counts first; what does not fit is summed up."""
+    """The largest counts first; the rest is summed up."""
     common = Counter(counts).most_common()
     shown = ", ".join(f"{count} {what}" for what, count in common[:MOST_NAMES])
     rest = common[MOST_NAMES:]

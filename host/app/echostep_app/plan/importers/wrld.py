@@ -15,10 +15,9 @@ from msgspec import Meta, Struct
 from shapely.geometry.base import BaseGeometry
 
 from echostep.errors import EchostepError
-from echostep.fields import checked
-from echostep.plan.georeference import EarthTransform
-from echostep.plan.model import Door, Georeference, Plan
-from echostep.plan.plan_file import Longitude, Text
+from echostep.fields import Longitude, Text, checked
+from echostep.plan import Door, Georeference, Plan
+from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.importers.connector_shapes import join_connectors, same_place
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, opening, room
 from echostep_app.plan.importers.geojson import features, label, properties, shape
@@ -49,7 +48,7 @@ class FloorFields(Struct):
 
 
 class BuildingFields(Struct):
-    """What is read of main.json."""
+    """The fields that are read from main.json."""
 
     location: LocationFields
     levels: Annotated[list[FloorFields], Meta(min_length=1, description="a list of at least one level")]

@@ -14,7 +14,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from echostep.plan.model import Connector, Level, Plan, Pose, Room
+from echostep.plan import Connector, Level, Plan, Pose, Room
 from echostep_app.plan.cropping import Bounds, extent, within
 from echostep_app.plan.pictures.labels import Label, draw_labels, fonts_for
 from echostep_app.plan.places.faces import find_faces
@@ -30,12 +30,12 @@ WALL, WINDOW, DOOR, OBSTACLE = "#333333", "#56b4e9", "#d55e00", "#bbbbbb"
 ROOM, ROOM_NAME = "#f3efe6", "#555555"
 WAY, WAY_NAME = "#009e73", "#00553e"  # stairs, lifts and ramps
 WRONG = "#d0021b"
-SOFTWARE = "echostep plan"  # in the header of a PNG: by it `plan import` knows its own pictures
+SOFTWARE = "echostep plan"  # in the header of a PNG, so that `plan import` recognises its own pictures
 WIDTH_PX = 1500  # least width of a picture
 LEVEL_WIDTH_PX = 900  # least width of a level
 GROUND = (1.0, 1.0, 1.0, 0.85)  # of a picture that lies on a map
 BARE_DPI = 150  # of a picture without frame: lines are twice as wide in pixels as in points
-MANY = 20_000  # with more lines than these, pixels are drawn instead of lines
+MANY = 20_000  # with more lines than this, pixels are drawn instead of lines
 BESIDE_RING_PT = (
     (9.0, 9.0),
     (9.0, -9.0),
@@ -154,7 +154,7 @@ def _draw_ground(axes: Any, level: Level) -> None:
 
 
 def _about(levels: Sequence[Level]) -> Bounds:
-    """The rectangle around what these levels have, with a margin."""
+    """The rectangle around all elements of these levels, with a margin."""
     boxes = np.array([extent(level.solid) for level in levels if len(level.solid)] or [extent(levels[0].solid)])
     x0, y0 = boxes[:, :2].min(axis=0)
     x1, y1 = boxes[:, 2:].max(axis=0)
@@ -191,7 +191,7 @@ def _draw_areas(axes: Any, level: Level, connectors: Sequence[Connector]) -> Non
 
 
 def _draw_names(axes: Any, plan: Plan, level_index: int, view: View, findings: Sequence[PlanFinding]) -> None:
-    """Numbers of findings, names of connectors, and names of rooms, the largest first, unless there are too many to read; none over another."""
+    """Numbers of findings, names of connectors, and names of rooms, the largest first, unless there are too many to read; without overlap."""
     level = plan.levels[level_index]
     labels = [Label(f.position_m, str(f.number), 7, WRONG, BESIDE_RING_PT) for f in findings]
     for connector in plan.connectors:
@@ -209,7 +209,7 @@ def _draw_names(axes: Any, plan: Plan, level_index: int, view: View, findings: S
 
 
 def _draw_legend(figure: Figure, plan: Plan, levels: Sequence[int]) -> None:
-    """What each colour is, of the kinds that these levels have, below the picture."""
+    """The legend below the picture: the colour of each kind that these levels have."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Names on a drawn level, none over another, in fonts that have their letters.
+"""Names on a drawn level, without overlap, in fonts that have their letters.
 
 In: labels in order of importance, and the axes with their final place on the figure. Out: the texts that fit. Owns the places taken.
 A name is made smaller, then left out, where it would cover one that is drawn already.
@@ -18,8 +18,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 
-SMALLER = (1.0, 0.8, 0.6)  # of the wanted size, tried in this order; assumed
-SMALLEST_PT = 3.0  # of a name: still read when magnified
+SMALLER = (1.0, 0.8, 0.6)  # shares of the wanted size, tried in this order; assumed
+SMALLEST_PT = 3.0  # of a name: legible when magnified
 BASE_FONT = "DejaVu Sans"  # comes with matplotlib
 APART_PX = 1.0  # between two names
 

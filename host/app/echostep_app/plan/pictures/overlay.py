@@ -20,13 +20,13 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.plan.georeference import EarthTransform
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.plan.cropping import Bounds, extent
+from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.pictures.drawing import draw_bare_level
 
 KML = "http://www.opengis.net/kml/2.2"
-PIXELS_PER_M, MOST_PX = 40.0, 4096  # a door is 36 pixels wide; what older phones can show as one texture
+PIXELS_PER_M, MOST_PX = 40.0, 4096  # a door is 36 pixels wide; the largest texture of older phones
 EDGE_M = 1.0  # around the walls
 EPOCH = (1980, 1, 1, 0, 0, 0)  # of every file in the archive, so that the same plan gives the same bytes
 
@@ -44,7 +44,7 @@ class Overlay:
 
 
 def write_overlays(plan: Plan, out: Path) -> list[Overlay]:
-    """Write the KMZ file; returns what is in it. Raises EchostepError without a georeference, and when the file cannot be written."""
+    """Write the KMZ file; returns its overlays. Raises EchostepError without a georeference, and when the file cannot be written."""
     if out.suffix.casefold() != ".kmz":
         raise EchostepError(f"{out}: give a name that ends in .kmz")
     pictures = overlays(plan)
@@ -126,7 +126,7 @@ def _four(
 
 
 def _overlay(plan: Plan, level: int, earth: EarthTransform) -> Overlay:
-    """The picture of a level whose y axis points north; the box of its edges' middles, which within a kilometre is right to a centimetre."""
+    """The picture of a level whose y axis points north; the box of its edges' middles, right to a centimetre within a kilometre."""
     x0, y0, x1, y1 = extent(plan.levels[level].solid)
     bounds: Bounds = (x0 - EDGE_M, y0 - EDGE_M, x1 + EDGE_M, y1 + EDGE_M)
     width_m, height_m = bounds[2] - bounds[0], bounds[3] - bounds[1]

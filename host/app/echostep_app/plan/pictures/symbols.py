@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The lines of a level as architects draw them: walls, windows, doors, stairs, lifts, ramps; each kind has a pattern of its own.
 
-In: a `Plan`, a level. Out: segments (n, 4) in metres by kind, and names of stairs, lifts and ramps with where they lead. Owns the measures.
+In: a `Plan`, a level. Out: segments (n, 4) in metres by kind, and names of stairs, lifts and ramps with their destinations. Owns the measures.
 A plan says neither to which side a door opens nor where flights begin: no leaf's arc and no arrow along the steps is drawn.
 """
 
@@ -13,9 +13,9 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Floats
-from echostep.plan.model import Connector, ConnectorKind, Door, Level, Plan, sides
+from echostep.plan import Connector, ConnectorKind, Door, Level, Plan, sides
 
-# Assumed, all of them:
+# All assumed:
 HALF_WINDOW_M = 0.12  # from the glass to each face of its wall
 HALF_JAMB_M = 0.15  # of the tick across the wall at each side of a door
 TREAD_M = 0.3  # between two steps, of a common staircase
@@ -24,7 +24,7 @@ HEAD_SHARE = 0.15  # of a ramp's length: its arrow heads
 
 
 def level_lines(plan: Plan, level: int) -> dict[str, Floats]:
-    """The lines of a level by kind, all kinds each time. "door": jambs, and leaves that are shut; "unknown": leaves that may be open or shut."""
+    """The lines of a level by kind, always all kinds. "door": jambs, and leaves that are shut; "unknown": leaves that may be open or shut."""
     drawn = plan.levels[level]
     return {
         "wall": np.concatenate((drawn.walls, *(sides(corners) for corners in drawn.obstacles))),
@@ -35,7 +35,7 @@ def level_lines(plan: Plan, level: int) -> dict[str, Floats]:
 
 
 def way_names(plan: Plan, level: int) -> list[tuple[str, tuple[float, float]]]:
-    """Name or kind of each connector of a level, with arrows up and down where it leads there, and where that is written."""
+    """Name or kind of each connector of a level, with arrows up and down where it leads there, and the place of this text."""
     height_m = plan.levels[level].height_m
     names = []
     for way in _ways(plan, level):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Spaces of a plan: which there are, where walls leak, where a person can stand, and the space of a place.
+"""Spaces of a plan, leaks in walls, positions where a person can stand, and the space around a position.
 
 In: a plan. Out: spaces, places, findings. Owns nothing.
 """

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 
 KNOWN_HEADING_RAD = 1.0  # standard deviation above which a heading is not known, assumed
 LETTERS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
@@ -25,7 +25,7 @@ def north_rad(plan: Plan) -> float:
 def heading_words(plan: Plan, heading_rad: float | None, sd_rad: float | None = None) -> str:
     """A heading (rad, counter-clockwise from the map's x axis) as degrees clockwise from north, with its standard deviation where that is given.
 
-    North that is the map's y axis is called "plan north". Without a plan y is where the walk began to go: no letter.
+    North that is the map's y axis is called "plan north". Without a plan, y is the direction in which the walk began: no letter.
     """
     if heading_rad is None or (sd_rad is not None and sd_rad > KNOWN_HEADING_RAD):
         return NOT_KNOWN

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Floats
-from echostep.plan.model import Door, Level, Plan
+from echostep.plan import Door, Level, Plan
 
 # Assumed:
 TOUCH_M = 0.01  # walls with a smaller distance touch
@@ -35,7 +35,7 @@ class Faces:
     tree: shapely.STRtree
 
     def indices_of(self, points: Floats) -> NDArray[np.intp]:
-        """Points (n, 2) in metres -> (n,) index of the face around each, OUTSIDE where there is none."""
+        """Points (n, 2) in metres -> (n,) index of the face around each, or OUTSIDE."""
         indices = np.full(len(points), OUTSIDE, dtype=np.intp)
         which, face = (
             self.tree.query(shapely.points(points), predicate="intersects")
@@ -64,7 +64,7 @@ def extend(segments: Floats, by_m: float) -> Floats:
 
 
 def _ticks(doors: Floats) -> Floats:
-    """Short lines across both ends of doors (n, 4) -> (2n, 4): a wall that continues a door in line may lie beside it by the rounding."""
+    """Short lines across both ends of doors (n, 4) -> (2n, 4): a wall that continues a door in line may lie beside it because of rounding."""
     along = doors[:, 2:] - doors[:, :2]
     across = (along / np.hypot(*along.T)[:, None] * TOUCH_M)[:, ::-1] * (-1.0, 1.0)
     return np.concatenate(
@@ -117,7 +117,7 @@ def _beside(door: Door) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def faces_under(area: BaseGeometry, faces: Faces) -> list[int]:
-    """The faces that contain more than a tenth of a connector's area; OUTSIDE when there is none."""
+    """The faces that contain more than a tenth of a connector's area, or OUTSIDE."""
     near = faces.tree.query(area)
     held = [int(i) for i in near if faces.areas[i].intersection(area).area > 0.1 * area.area]
     return held or [OUTSIDE]

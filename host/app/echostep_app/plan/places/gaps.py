@@ -2,7 +2,7 @@
 """Gaps: openings in the walls that the plan does not list as doors.
 
 In: a level's walls and doors. Out: `Door`s. Owns the widths.
-A wall that ends free is continued: the opening ends at the first wall within a door's width.
+A wall with a free end is extended: the opening ends at the first wall within a door's width.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Floats
-from echostep.plan.model import Door, Level
+from echostep.plan import Door, Level
 
 # Assumed:
 NARROWEST_M, WIDEST_M = 0.5, 1.6  # of an opening that a door could close

@@ -13,9 +13,9 @@ from functools import lru_cache
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.extras import lacks
-from echostep.plan.georeference import EarthTransform
-from echostep.plan.model import Georeference, Plan
+from echostep.plan import Georeference, Plan
+from echostep_app.extras import lacks
+from echostep_app.plan.georeference import EarthTransform
 
 BANDS = "CDEFGHJKLMNPQRSTUVWX"  # of 8 degrees from 80 S on, the last one of 12 [NGA.STND.0037, 2.5.3]
 SOUTHMOST_DEG, NORTHMOST_DEG = -80.0, 84.0  # of UTM

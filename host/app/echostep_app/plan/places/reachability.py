@@ -11,17 +11,17 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from echostep.plan.model import Level, Plan, Room
+from echostep.plan import Level, Plan, Room
 from echostep_app.plan.places.faces import OUTSIDE, Face, Faces, connected_groups, door_faces, leader_of
 from echostep_app.plan.places.findings import PlanFinding
 
-MANY_CLOSED = 5  # from so many rooms without a door on a level, their cause is reported once; assumed
+MANY_CLOSED = 5  # from this many rooms without a door on a level, their cause is reported once; assumed
 
 
 def unreachable_rooms(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFinding]:
     """Enclosed rooms without a connection by doors, stairs or lifts to the start; without a start: to the group with most rooms.
 
-    Of many rooms of one level that have no door at all, the cause is one finding.
+    Many rooms of one level without any door give one finding on the cause.
     """
     rooms, home = _groups_of_rooms(plan, faces)
     apart = [(i, room, f) for i, room, f, group in rooms if group != home]

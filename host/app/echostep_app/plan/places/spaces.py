@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Spaces: what a level's enclosed spaces are: rooms, corridors, insides of walls.
+"""Spaces: the kinds of a level's enclosed spaces: rooms, corridors, insides of walls.
 
-In: a plan, the index of a level. Out: `Spaces`. Owns, in `PlanSpaces`, those found before. Doors are those of the plan and the gaps between walls;
+In: a plan, the index of a level. Out: `Spaces`. Owns, in `PlanSpaces`, the spaces found before. Doors are the plan's doors and gaps between walls;
 all of them count as closed.
 """
 
@@ -15,13 +15,13 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from echostep.plan.model import Connector, Door, Plan, Room
+from echostep.plan import Connector, Door, Plan, Room
 from echostep_app.plan.places.faces import OUTSIDE, Faces, door_faces, find_faces
 from echostep_app.plan.places.gaps import with_gaps
 
 # Assumed:
 WALL_M = 0.6  # a space without room and door that is narrower than this is the inside of a wall
-CORRIDOR_DOORS = 3  # a space without a name with so many doors is a corridor
+CORRIDOR_DOORS = 3  # an unnamed space with this many doors is a corridor
 ENCLOSED_SHARE = 0.5  # of the walls' hull that is enclosed in a building without names
 MOST_WALLS = 10_000  # of a level whose spaces are looked for: about a second of computing
 
@@ -34,7 +34,7 @@ class Spaces:
 
     `names`: by index of a face, the rooms without an outline whose position it contains. `outlined`: rooms with an outline, and `outlines`, their
     areas. `doors`: with the two faces that each separates. `hollow`: faces that are insides of walls. `ways`: stairs, lifts and ramps, and
-    `way_areas`. `enclosed`: all rooms lie in enclosed spaces, so that whatever is in none is outside.
+    `way_areas`. `enclosed`: all rooms lie in enclosed spaces, so that any other position is outside.
     """
 
     faces: Faces
@@ -59,7 +59,7 @@ class Spaces:
         return self.face_at(x_m, y_m) != OUTSIDE or any(area.intersects(point) for area in areas)
 
     def face_at(self, x_m: float, y_m: float) -> int:
-        """Index of the face around a position, OUTSIDE where there is none."""
+        """Index of the face around a position, or OUTSIDE."""
         return int(self.faces.indices_of(np.array([[x_m, y_m]]))[0])
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Standing: whether a person can be at a position, and if not, the nearest one where a person can.
 
-In: a plan, a position. Out: an `Objection`, or None. Owns nothing but what it has found of the plan's spaces. A level with more than
+In: a plan, a position. Out: an `Objection`, or None. Owns only the spaces that it has found. A level with more than
 `MOST_WALLS` walls is not judged.
 """
 
@@ -15,7 +15,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Level, Plan, Pose
+from echostep.plan import Level, Plan, Pose
 from echostep_app.plan.cropping import within
 from echostep_app.plan.places.spaces import PlanSpaces, Spaces
 
@@ -27,14 +27,14 @@ REACHES_M = (3.0, 30.0, 300.0, 3000.0)  # half sides of the squares that are sea
 
 @dataclass(frozen=True, slots=True)
 class Objection:
-    """Why a person cannot be at a position, in words, and the nearest possible position on the same level (None: there is none)."""
+    """Why a person cannot be at a position, in words, and the nearest possible position on the same level (None if missing)."""
 
     reason: str
     nearest_m: tuple[float, float] | None
 
     @property
     def advice(self) -> str:
-        """The nearest possible position in words; empty when there is none."""
+        """The nearest possible position in words; empty if missing."""
         return "the nearest possible place is {:.2f},{:.2f}".format(*self.nearest_m) if self.nearest_m else ""
 
 
@@ -42,7 +42,7 @@ class StandingGround:
     """Judges positions on one plan. One thread asks at a time."""
 
     def __init__(self, plan: Plan, spaces: PlanSpaces | None = None) -> None:
-        """`spaces`: of the plan, where they are shared."""
+        """`spaces`: the plan's spaces, if shared."""
         self._plan = plan
         self._spaces = spaces or PlanSpaces(plan)
 
@@ -95,7 +95,7 @@ def _nearest(spaces: Spaces, level: Level, x_m: float, y_m: float) -> tuple[floa
 
 
 def _free(area: BaseGeometry, level: Level, window: BaseGeometry) -> BaseGeometry:
-    """An area without obstacles and without what is nearer than `CLEAR_M` to a wall."""
+    """An area without obstacles and without positions nearer than `CLEAR_M` to a wall."""
     walls = within(level.solid, window.buffer(CLEAR_M).bounds)
     thick = shapely.union_all(shapely.buffer(shapely.linestrings(walls.reshape(-1, 2, 2)), CLEAR_M, quad_segs=4))
     return area.difference(shapely.union_all([thick, *_obstacles(level)]))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Whereabouts: a position in words: "in Office 1", "in the corridor, by the door of Lab".
 
-In: a plan, positions. Out: words. Owns nothing but what it has found of the plan's spaces. The page, team reports and summaries take their words
+In: a plan, positions. Out: words. Owns only the spaces that it has found. The page, team reports and summaries take their words
 from here.
 """
 
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import shapely
 
-from echostep.plan.model import Door, Plan, Room
+from echostep.plan import Door, Plan, Room
 from echostep_app.plan.cropping import is_clear
 from echostep_app.plan.places.faces import OUTSIDE
 from echostep_app.plan.places.spaces import PlanSpaces, Spaces
@@ -25,7 +25,7 @@ class Whereabouts:
     """Words for positions on one plan. One thread asks at a time."""
 
     def __init__(self, plan: Plan, spaces: PlanSpaces | None = None) -> None:
-        """`spaces`: of the plan, where they are shared."""
+        """`spaces`: the plan's spaces, if shared."""
         self._plan = plan
         self._spaces = spaces or PlanSpaces(plan)
 
@@ -97,7 +97,7 @@ def _in_an_outline(spaces: Spaces, x_m: float, y_m: float) -> str:
 
 
 def _room_of_face(spaces: Spaces, face: int) -> str:
-    """Name of the one room in a face; empty when there is none."""
+    """Name of the one room in a face, or empty."""
     rooms = spaces.names.get(face, [])
     if len(rooms) == 1:
         return rooms[0].name

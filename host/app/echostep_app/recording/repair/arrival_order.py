@@ -4,7 +4,7 @@
 In: messages of a recording in the order of the file. Out: the same messages; the chunks of each port in order of time. Owns the messages that wait
 for the next one of their port, and the number of corrected times.
 
-One thread reads a port, so its arrival times never decrease. A time that is not between those of the chunks before and after it is replaced by the
+One thread reads a port, so its arrival times never decrease. A time that is not between the times of the chunks before and after is replaced by the
 later one: bytes that arrive late harm no clock, bytes that arrive early do.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Contents of a recording: counts per port, decoded frames, gaps, and what is wrong with the file.
+"""Contents of a recording: counts per port, decoded frames, gaps, and problems of the file.
 
 In: a recording. Out: a summary as lines of text. Owns nothing.
 """
@@ -15,21 +15,20 @@ from rich.progress import Progress
 from echostep.board.messages import SCHEMA_HASH, Identity
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, FOOT, LATEST_NS, MTX
-from echostep.recording.capture import Decoder
-from echostep.recording.capture_summary import refusals
-from echostep.recording.clock import log_offset_ns, utc_offset_ns
+from echostep.recording import Decoder, log_offset_ns, utc_offset_ns
 from echostep.recording.damage.notes import made_of
 from echostep.recording.mcap_records import port_of
 from echostep_app.printing.console import console_for_people
+from echostep_app.recording.capture_summary import refusals
 from echostep_app.recording.repair.arrival_order import ArrivalOrder
 from echostep_app.recording.repair.recovery import RecordedMessage, Recovery
 
-# Assumed, all of them.
+# All assumed.
 MESSAGES_PER_UPDATE = 5000  # of the progress bar
 LONGEST_LINE = 4000  # characters
 LONGEST_VALUE = 100  # characters of a metadata value on the line of its key
 DECODED_AT_ONCE = 1 << 16  # bytes of one port
-BETWEEN_PORTS_NS = 100_000_000  # two threads read two ports: so much between the times of their chunks is no fault
+BETWEEN_PORTS_NS = 100_000_000  # two threads read two ports: this much between the times of their chunks is not a fault
 COUNTED_GAP_S = 1.0  # a longer time between two chunks of a port is counted as a gap
 
 
@@ -62,7 +61,7 @@ class Contents:
     first_ns: int = LATEST_NS  # earliest arrival
     last_ns: int = 0  # latest arrival
     out_of_order: int = 0  # chunks that arrived more than BETWEEN_PORTS_NS before an earlier chunk of another port
-    order: ArrivalOrder = field(default_factory=ArrivalOrder)  # corrects what is counted here
+    order: ArrivalOrder = field(default_factory=ArrivalOrder)  # corrects the times counted here
     decoder: Decoder = field(default_factory=Decoder)
     errors: list[str] = field(default_factory=list)  # of the decoder
     firmware: str = ""  # version and protocol hash in the board's newest Identity message
@@ -157,7 +156,7 @@ def _head(recovery: Recovery, contents: Contents) -> list[str]:
 
 
 def _time_line(metadata: Mapping[str, str]) -> list[str]:
-    """What viewers show as the time of a message, where it is not the time of day; nothing of another program's file."""
+    """The time that viewers show for a message, where it is not the time of day; nothing for another program's file."""
     if not metadata or log_offset_ns(metadata):
         return []
     if utc_offset_ns(metadata) is None:
@@ -200,19 +199,19 @@ def _port_lines(contents: Contents) -> list[str]:
 
 
 def damage_of(recovery: Recovery, contents: Contents) -> list[str]:
-    """What is wrong with a file that was read to its end, as sentences; empty for a whole one, and for one that is being written."""
+    """Damage of a file that was read to its end, as sentences; empty for a whole file, and for a file that is being written."""
     corrected = f"{contents.order.corrected} arrival times contradict their neighbours; repair corrects them"
     lines = recovery.own_damage.sentences(contents.ports, recovery.misnamed)
     return [*lines, *([corrected] if contents.order.corrected else [])]
 
 
 def damage_notes(recovery: Recovery, contents: Contents) -> list[str]:
-    """What was wrong with a recording and those before it, for the one that is made of it."""
+    """Damage of a recording and of the recordings before it, for the one that is made of it."""
     return [*made_of(recovery.path, damage_of(recovery, contents)), *recovery.before]
 
 
 def problems_of(recovery: Recovery, contents: Contents) -> list[str]:
-    """What is wrong with a file that was read to its end, as lines; empty for a complete file."""
+    """Problems of a file that was read to its end, as lines; empty for a complete file."""
     late = f"{contents.out_of_order} chunks of one port came long after later ones of another: repair leaves them so"
     end = "the end of the file is cut off behind the last message: nothing is lost, but other programs may not open it"
     lines = [*contents.errors, *recovery.before, *damage_of(recovery, contents)]
@@ -222,7 +221,7 @@ def problems_of(recovery: Recovery, contents: Contents) -> list[str]:
 
 
 def is_mended_by_repair(recovery: Recovery, contents: Contents) -> bool:
-    """Whether a repaired copy lacks a fault of this file; what the decoder could not read, and the order between ports, stay as they are."""
+    """Whether a repaired copy lacks a fault of this file; bytes that the decoder could not read, and the order between ports, stay as they are."""
     unfinished = not recovery.has_footer and not recovery.grows
     return bool(recovery.own_damage or unfinished or contents.order.corrected)
 

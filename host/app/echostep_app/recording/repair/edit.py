@@ -27,7 +27,7 @@ Metadata = Mapping[str, str]
 
 
 class RecordedEstimate(msgspec.Struct):
-    """What a start needs of a recorded estimate."""
+    """The fields of a recorded estimate that a start needs."""
 
     x_m: float
     y_m: float
@@ -108,7 +108,7 @@ def _first_arrival_ns(path: Path) -> int:
 
 
 def _start_at(path: Path, t_ns: int) -> str | None:
-    """The last recorded estimate up to a time as metadata `START` (x m, y m, heading rad, level); None when there is none."""
+    """The last recorded estimate up to a time as metadata `START` (x m, y m, heading rad, level), or None."""
     start = None
     for message in Recovery(path).messages():
         if message.channel.topic == "/estimate" and message.t_ns <= t_ns:

@@ -22,7 +22,7 @@ from mcap.records import Channel, Header, Metadata, Schema
 
 from echostep.arrays import Bools, Octets
 from echostep.errors import EchostepError
-from echostep.recording.being_written import is_being_written
+from echostep.recording import MCAP_MAGIC, is_being_written
 from echostep.recording.damage.ending import begins_as_mcap, checksum_matches, read_ending
 from echostep.recording.damage.notes import FileDamage
 from echostep.recording.damage.placing import Placement
@@ -32,7 +32,6 @@ from echostep.recording.mcap_records import (
     DAMAGE_NAME,
     HEAD_SIZE,
     LIBRARY,
-    MCAP_MAGIC,
     MESSAGE,
     MESSAGE_SIZE,
     METADATA_NAME,
@@ -67,13 +66,13 @@ class Recovery:
     has_footer: bool = False  # the recorder was closed
     grows: bool = False  # a process is writing it
     intact: bool = False  # the file's checksum says that no byte has changed since it was written
-    misnamed: set[str] = field(default_factory=set)  # topics of channels of which either name or encoding is damaged
+    misnamed: set[str] = field(default_factory=set)  # topics of channels whose name or encoding is damaged
     library: str = ""  # by which the file was written
     before: list[str] = field(default_factory=list)  # damage of the recordings of which this one was made
     size: int = 0  # of the file, bytes
     byte_offset: int = 0  # of the record that was read last
     _is_channel: Bools = field(default_factory=lambda: np.zeros(CHANNEL_IDS, np.bool_))  # by channel number
-    _settled: bool = False  # the channels are those of a summary whose checksum is right
+    _settled: bool = False  # the channels are from a summary whose checksum is right
 
     @property
     def fraction(self) -> float:
@@ -110,7 +109,7 @@ class Recovery:
                 yield from self._messages_in_chunk(content)
 
     def _placed(self, messages: Iterator[RecordedMessage]) -> Iterator[RecordedMessage]:
-        """The messages without those that are not in their place; of an intact file, or of another recorder, all of them."""
+        """The messages that are in their place; all messages of an intact file, or of another recorder."""
         placement, this = Placement(), list(islice(messages, PLACED_AT_ONCE))
         while this and not self.intact and self.library.startswith(LIBRARY):
             following = list(islice(messages, PLACED_AT_ONCE))
@@ -143,7 +142,7 @@ class Recovery:
             elif opcode == Opcode.DATA_END:
                 matches = checksum_matches(file, begin)
                 self.own_damage.altered |= matches is False
-                if matches:  # whatever follows, all before is there
+                if matches:  # whatever follows, everything before is there
                     self.intact = True
                     self.has_footer = bytes(view[size - len(MCAP_MAGIC) : size]) == MCAP_MAGIC
                     return

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Writes a new recording from the messages of another one.
 
-In: metadata, messages, what was wrong with the other one. Out: an MCAP file as the recorder writes it, the messages numbered anew. Owns the new file.
+In: metadata, messages, damage of the other one. Out: an MCAP file as the recorder writes it, the messages numbered again. Owns the new file.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class RewrittenRecording:
     """The new file; it is removed when it cannot be finished. Raises EchostepError when it cannot be written."""
 
     def __init__(self, path: Path, source: Path, schemas: Mapping[int, Schema]) -> None:
-        """`schemas`: those of the source by number; they may be added while messages are written."""
+        """`schemas`: the source's schemas by number; they may be added while messages are written."""
         if path.exists() and path.resolve() == source.resolve():
             raise EchostepError(f"{path}: that is the recording itself: give another name with -o")
         self.path = path
@@ -40,7 +40,7 @@ class RewrittenRecording:
         self._writer.add_metadata(METADATA_NAME, dict(metadata))
 
     def write_damage(self, lines: Iterable[str]) -> None:
-        """Write what was wrong with the other recording, after its last message; nothing when it was whole."""
+        """Write the damage of the other recording, after its last message; nothing when it was whole."""
         with self._report_write_errors():
             if noted := numbered(lines):
                 self._writer.add_metadata(DAMAGE_NAME, noted)

@@ -11,9 +11,9 @@ import math
 from importlib.metadata import version
 
 from echostep.board.messages import SCHEMA_HASH, Part
-from echostep.recording.capture_summary import refusals
 from echostep_app.board.faults.findings import PART_NAMES
 from echostep_app.board.faults.health import all_findings
+from echostep_app.recording.capture_summary import refusals
 from echostep_app.session.acceptance.walked import Walked
 
 Row = tuple[str, str]

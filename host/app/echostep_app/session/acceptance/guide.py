@@ -16,9 +16,9 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, TextIO
 
-from echostep.ports.arrival_clock import now_ns
-from echostep.ports.people.tap import Tap
 from echostep_app.page.elements.taps import NO_TAP, PointPress, ShownPoints
+from echostep_app.ports.arrival_clock import now_ns
+from echostep_app.ports.tap import Tap
 from echostep_app.session.acceptance.protocol import Protocol, Visit
 
 if TYPE_CHECKING:

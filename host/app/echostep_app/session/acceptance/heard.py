@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.localization.estimate import Estimate
+from echostep.localization import Estimate
 from echostep.path import MeasuredSegment
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.output.ping_poses import placed_pings
 
 # Assumed, all of them.

@@ -11,11 +11,11 @@ from html import escape
 from pathlib import Path
 from statistics import median
 
-from echostep.errors import EchostepError
-from echostep.recording.clock import clock_of
+from echostep.recording import clock_of
 from echostep.walk.recorded import is_simulated
 from echostep_app.output.score_page import document, picture
 from echostep_app.output.score_plots import draw_on_plan
+from echostep_app.printing.lines import as_error
 from echostep_app.scorecard.card import Scored
 from echostep_app.scorecard.definitions import METRICS, as_text
 from echostep_app.session.acceptance.errors import by_point, score_taps
@@ -37,12 +37,8 @@ def write_page(recording: Path) -> list[str]:
     walked = walk_again(recording)
     scored = score_taps(walked, walked.timed)
     text, out = page(walked, scored), recording.with_suffix(".html")
-    try:
+    with as_error(f"{out}: cannot write the page", "; copy the recording into a folder of yours"):
         out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise EchostepError(
-            f"{out}: cannot write the page: {error.strerror or error}; copy the recording into a folder of yours"
-        ) from error
     card = scored.card
     simulated = " (simulated)" if is_simulated(walked.recording.metadata) else ""
     figures = f"mean {card.horizontal.mean_m:.2f} m, CE50 {card.ce50_m:.2f} m, CE95 {card.ce95_m:.2f} m"
@@ -123,10 +119,3 @@ def _table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
         for name, *cells in rows
     )
     return f'<div class="wide"><table>{f"<thead><tr>{head}</tr></thead>" if heads else ""}<tbody>{body}</tbody></table></div>'
-
-
-def _cell(cell: object) -> str:
-    """A cell; one that begins with a figure is not broken."""
-    text = str(cell)
-    kind = ' class="figure"' if text[:2].strip("+-")[:1].isdigit() and len(text) < 12 else ""
-    return f"<td{kind}>{escape(text)}</td>"

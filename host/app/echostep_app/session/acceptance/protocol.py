@@ -17,10 +17,10 @@ import msgspec
 from msgspec import Meta
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan, parse_plan
-from echostep.plan.plan_file import Metres, Text
+from echostep.fields import Metres, Text
+from echostep.plan import Plan, parse_plan
 from echostep.ports.people.payloads import Level
-from echostep.ports.people.tap import MOST_POINTS
+from echostep_app.ports.tap import MOST_POINTS
 
 FIELD = "acceptance"  # of the metadata
 # Of walking, of a stop with a tap, of a turn at an end; assumed

@@ -13,12 +13,12 @@ from functools import partial
 from pathlib import Path
 from typing import TextIO
 
-from echostep.errors import EchostepError
 from echostep.walk.recorded import SIMULATED
+from echostep_app.printing.console import console
+from echostep_app.printing.lines import as_error
 from echostep_app.session.acceptance.guide import Guide
 from echostep_app.session.acceptance.page import write_page
 from echostep_app.session.acceptance.protocol import Protocol
-from echostep_app.session.console import console
 from echostep_app.session.options import OutputOptions, PortOptions, TrackingOptions
 from echostep_app.session.results import output_folder
 from echostep_app.session.runs.live import live
@@ -32,12 +32,8 @@ def acceptance(
 ) -> list[str]:
     """Guide the walk, record and track it, and write its page; returns the lines about it."""
     plan_path = output_folder(output.folder) / PLAN_NAME
-    try:
+    with as_error(f"{plan_path}: cannot write the plan", "; give another folder with --out"):
         plan_path.write_text(protocol.plan_text, encoding="utf-8")
-    except OSError as error:
-        raise EchostepError(
-            f"{plan_path}: cannot write the plan: {error.strerror}; give another folder with --out"
-        ) from error
     tracking = TrackingOptions(plan_path, settings_path=settings, seed=0)
     fields = {"note": "acceptance walk"}
     if _is_simulated(ports):

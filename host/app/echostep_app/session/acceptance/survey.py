@@ -15,10 +15,10 @@ import msgspec
 import numpy as np
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Level, Plan, Pose
-from echostep.ports.people.tap import MOST_POINTS
+from echostep.plan import Level, Plan, Pose
 from echostep_app.plan.importers.limited import open_limited
 from echostep_app.plan.writer import plan_json
+from echostep_app.ports.tap import MOST_POINTS
 from echostep_app.scorecard.csv_columns import CsvColumns, read_csv
 from echostep_app.session.acceptance.protocol import Point, Protocol
 

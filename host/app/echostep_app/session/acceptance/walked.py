@@ -14,18 +14,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.localization.estimate import Estimate
-from echostep.plan.model import Plan
-from echostep.ports.chunks import LATEST_NS
-from echostep.ports.people.tap import POINT, Tap, parse_tap
-from echostep.recording.reading import Recording, open_recording
+from echostep.localization import Estimate
+from echostep.plan import Plan
+from echostep.ports.chunks import LATEST_NS, POINT
+from echostep.recording import Recording, open_recording
 from echostep.tracker import Tracker
+from echostep_app.ports.tap import Tap, parse_tap
+from echostep_app.printing.progress import with_bar
 from echostep_app.session.acceptance.heard import SeenPings
 from echostep_app.session.acceptance.protocol import Protocol, recorded_protocol
-from echostep_app.session.arrivals import Arrivals
-from echostep_app.session.losses import Losses
+from echostep_app.session.losses import Arrivals, Losses
 from echostep_app.session.options import TrackingOptions
-from echostep_app.session.progress import with_bar
 from echostep_app.session.runs.replay import tracker_of
 
 

@@ -16,21 +16,21 @@ from pathlib import Path
 
 from echostep.errors import EchostepError
 from echostep.file_mode import claim
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep.ports.chunks import Chunk, Portion
 from echostep.tracker import Tracker
-from echostep.tracker.kernels import Part
 from echostep.walk.recorded import SIMULATED
 from echostep_app.interruption import until_asked
+from echostep_app.kernel_parts import Part
 from echostep_app.page.elements.true_position import TruePath
 from echostep_app.plan.importers.limited import open_limited
+from echostep_app.printing.console import console, print_notices
+from echostep_app.printing.progress import progress_line
 from echostep_app.recording.recorder import Recorder
 from echostep_app.scorecard.truth import load_truth
 from echostep_app.session.chunk_streams import paced, portions_of, recorded, with_messages
-from echostep_app.session.console import console, print_notices
 from echostep_app.session.metadata import run_metadata
 from echostep_app.session.options import OutputOptions
-from echostep_app.session.progress import progress_line
 from echostep_app.session.results import output_folder
 from echostep_app.session.runs.recording import start_recording
 from echostep_app.session.session import Session

@@ -14,14 +14,13 @@ from importlib.resources import files
 from pathlib import Path
 
 from echostep.errors import EchostepError, words_of
-from echostep.localization.estimate import Estimate
-from echostep.plan.model import NO_PLAN, Plan, load_plan
-from echostep.recording.joining import open_parts
-from echostep.recording.mcap_records import MCAP_MAGIC
+from echostep.localization import Estimate
+from echostep.plan import NO_PLAN, Plan, load_plan
+from echostep.recording import MCAP_MAGIC, open_parts
 from echostep.tracker import Tracker
-from echostep.tracker.kernels import LATER, TRACKING, compile_parts
 from echostep.walk.recorded import shown_name
 from echostep_app.interruption import is_asked, until_asked
+from echostep_app.kernel_parts import LATER, TRACKING, compile_parts
 from echostep_app.page.elements.scene import PageScene
 from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import Mailbox
@@ -29,8 +28,8 @@ from echostep_app.page.server import Address, PageServer
 from echostep_app.page.web.addresses import print_page
 from echostep_app.page.web.uploads import Uploads
 from echostep_app.plan.importers.limited import open_limited
+from echostep_app.printing.console import console, print_notices
 from echostep_app.session.browser import open_browser
-from echostep_app.session.console import console, print_notices
 from echostep_app.session.options import TrackingOptions
 from echostep_app.session.results import summary_words
 from echostep_app.session.runs.replay import plan_note, tracker_of

@@ -18,32 +18,38 @@ from typing import TYPE_CHECKING, Protocol
 from echostep.board.frames import BoardReader, StaleFirmwareError, encode
 from echostep.board.messages import Identify
 from echostep.errors import EchostepError
-from echostep.localization.particles.start import Start
-from echostep.plan.model import Plan
-from echostep.ports.arrival_clock import SleepWatch, now_ns
-from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk
-from echostep.ports.people.tap import POINT
+from echostep.localization import Start
+from echostep.plan import Plan
+from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, POINT, Chunk
 from echostep.settings import Settings, parse_settings, read_settings
 from echostep.timing.timeline import MtxTiming
 from echostep.tracker import Tracker
-from echostep.tracker.kernels import SEARCH
 from echostep.xsens.reader import warm_up
 from echostep_app.board.subscription import SUBSCRIBE, BoardSubscription
 from echostep_app.interruption import holding_signals, is_asked
+from echostep_app.kernel_parts import SEARCH
+from echostep_app.ports.arrival_clock import SleepWatch, now_ns
 from echostep_app.ports.serial_ports import SerialPorts, check_different
 from echostep_app.ports.usb_number import usb_number
+from echostep_app.printing.console import console, print_notices
 from echostep_app.printing.people import outlast_output
+from echostep_app.printing.progress import with_bar
 from echostep_app.recording.recorder import Recorder
 from echostep_app.session.chunk_streams import portions_of, recorded, with_messages
-from echostep_app.session.console import console, print_notices
 from echostep_app.session.last_place import PlaceKeeper, read_kept, start_last
-from echostep_app.session.metadata import LAST, clock_metadata, plan_of, run_metadata, start_given, version_metadata
+from echostep_app.session.metadata import (
+    LAST,
+    check_start,
+    clock_metadata,
+    plan_of,
+    run_metadata,
+    start_given,
+    version_metadata,
+)
 from echostep_app.session.options import OutputOptions, PortOptions, TrackingOptions
-from echostep_app.session.progress import with_bar
 from echostep_app.session.results import output_folder
 from echostep_app.session.runs.port_roles import with_right_names, with_role_check
 from echostep_app.session.runs.recording import start_recording
-from echostep_app.session.runs.starts import check_start
 from echostep_app.session.session import Session
 from echostep_app.xsens.startup import MtxStart
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from echostep_app.printing.console import console
 from echostep_app.recording.names import link_newest, remove_older
 from echostep_app.recording.numbered import numbered_recorder
 from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.splitting import SplitLimit
-from echostep_app.session.console import console
 
 
 def start_recording(

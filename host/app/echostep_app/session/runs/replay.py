@@ -10,22 +10,20 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from echostep.plan.model import Plan
-from echostep.recording.joining import open_parts
-from echostep.recording.reading import Recording
+from echostep.plan import Plan
+from echostep.recording import Recording, open_parts
 from echostep.tracker import Tracker
 from echostep.walk import recorded
 from echostep.walk.recorded import is_simulated, shown_name
 from echostep_app.interruption import until_asked
+from echostep_app.printing.console import console
+from echostep_app.printing.progress import with_bar
 from echostep_app.scorecard.truth import load_truth
 from echostep_app.session.chunk_streams import paced, portions_of
-from echostep_app.session.console import console
 from echostep_app.session.losses import skipped
-from echostep_app.session.metadata import plan_of, start_given
+from echostep_app.session.metadata import check_start, plan_of, start_given
 from echostep_app.session.options import OutputOptions, TrackingOptions
-from echostep_app.session.progress import with_bar
 from echostep_app.session.results import output_folder
-from echostep_app.session.runs.starts import check_start
 from echostep_app.session.session import Session
 
 VIEWED_PORTION = 8  # chunks tracked at once while a viewer looks on: about 10 ms

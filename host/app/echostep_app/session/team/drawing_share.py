@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from datetime import UTC, datetime
 
-from echostep.localization.estimate import Estimate
+from echostep.localization import Estimate
 from echostep.path import MeasuredSegment
-from echostep.plan.model import NO_PLAN
+from echostep.plan import NO_PLAN
 from echostep.tracker import Tracker
 from echostep_app.page.drawing_process import DrawingProcess
-from echostep_app.page.shared_drawing import SharedDrawing
+from echostep_app.page.shared import SharedDrawing
 from echostep_app.team.messages.shared_drawings import MOST_BYTES
 
 

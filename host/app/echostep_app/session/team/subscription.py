@@ -7,6 +7,8 @@ thread and the buffer of messages; the tracker never waits for it.
 
 from __future__ import annotations
 
+import math
+import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 
@@ -30,9 +32,20 @@ class TeamSubscription:
         self._inbox = Inbox()
         self._receiver: ListenerThread | None = None
 
-    def add(self, topics: Sequence[str], receive: Callable[[ReceivedMessage], None]) -> None:
-        """Have messages on these topics passed to a reader."""
+    def add(self, topics: Sequence[str], receive: Callable[[ReceivedMessage], None]) -> Callable[[], bool]:
+        """Have messages on these topics passed to a reader; returns a `look` for it, which says whether `LOOK_S` has passed since its last one."""
         self._readers.append((topics, receive))
+        looked_s = -math.inf
+
+        def look() -> bool:
+            nonlocal looked_s
+            if time.monotonic() - looked_s < LOOK_S:
+                return False
+            looked_s = time.monotonic()
+            self.look()
+            return True
+
+        return look
 
     def open(self) -> None:
         """Connect, in a thread."""

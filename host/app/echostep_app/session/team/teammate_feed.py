@@ -13,12 +13,12 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
-from echostep.localization.team.shared_beacons import MOST_TEAMMATES
-from echostep.plan.model import Plan
-from echostep.ports.people.meeting import meeting_with
+from echostep.localization import MOST_TEAMMATES
+from echostep.plan import Plan
 from echostep.ports.people.team_beacons import BEACONS, SHARE_S, SharedBeacon, TeamBeacons, parse_team_beacons
-from echostep_app.page.shared_drawing import SharedDrawing
-from echostep_app.session.team.subscription import LOOK_S, TeamSubscription
+from echostep_app.page.shared import SharedDrawing
+from echostep_app.ports.reported_meeting import meeting_with
+from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.team.endpoint import Outlet
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.shared_drawings import drawing_topic
@@ -36,20 +36,16 @@ class TeammateFeed:
         self._roster = Roster()
         self.rejected = self._roster.rejected
         self._names: tuple[str, ...] = ()
-        self._looked_s = self._shared_s = self._drawing_s = -math.inf
+        self._shared_s = self._drawing_s = -math.inf
         self._placed: dict[str, bytes] = {}  # newest beacons of each teammate that were not taken yet, by name
         self._taken: dict[str, tuple[float, bytes]] = {}  # those that were taken, and when
         self._shared = b""
         self._subscription = subscription
-        subscription.add([f"echostep/{outlet.team}/+/+"], self._receive)
+        self._looks = subscription.add([f"echostep/{outlet.team}/+/+"], self._receive)
 
     def news(self) -> tuple[str, ...] | None:
         """Names of the teammates, sorted; None when they are the same as before. Never waits."""
-        now_s = time.monotonic()
-        if now_s - self._looked_s < LOOK_S:
-            return None
-        names = tuple(sorted(self._members(now_s)))
-        if names == self._names:
+        if not self._looks() or (names := tuple(sorted(self._members(time.monotonic())))) == self._names:
             return None
         self._names = names
         return names
@@ -100,7 +96,6 @@ class TeammateFeed:
 
     def _members(self, now_s: float) -> dict[str, Member]:
         """The run with the newest report of each teammate with a position on this plan, by name."""
-        self._looked_s = now_s
         self._subscription.look()
         members = [
             m for m in self._roster.members(now_s)

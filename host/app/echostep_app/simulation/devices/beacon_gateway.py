@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Simulated beacons and their gateway: a walk among beacons -> the bytes that the gateway sends.
 
-In: where the walker is over time, the walls, the beacons. Out: chunks of the gateway's port, or frames. Owns the sequence number. Every 200 ms all
-beacons within reach and without a wall between measure, with the errors of [Fischer 2008, 4.1.1].
+In: the walker's positions over time, the walls, the beacons. Out: chunks of the gateway's port, or frames. Owns the sequence number. Every 200 ms all
+beacons within reach without a wall between measure, with the errors of [Fischer 2008, 4.1.1].
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.board.frames import encode
 from echostep.board.messages import Beacon
-from echostep.plan.model import Plan
-from echostep.plan.polyline import along, way_m
+from echostep.plan import Plan
 from echostep.ports.chunks import GATEWAY, Chunk
+from echostep_app.plan.polyline import along, way_m
 from echostep_app.simulation.scenario import START_NS, Scenario
 from echostep_app.simulation.world.beacon_ground import OUTLIER_M
 
@@ -43,7 +43,7 @@ class BeaconWorld:
 
 
 def lay_beacons(path_m: Floats, spacing_m: float, rng: np.random.Generator) -> Floats:
-    """Beacons (b, 3) dropped along a path (k, 2), so far apart, each with any orientation."""
+    """Beacons (b, 3) dropped along a path (k, 2), `spacing_m` apart, each with a random orientation."""
     count = max(int(way_m(path_m) / spacing_m), 1)
     places = np.array([(*along(path_m, spacing_m * k)[:2], rng.uniform(-math.pi, math.pi)) for k in range(count)])
     places[:, :2] += ASIDE_M * rng.uniform(-1.0, 1.0, (count, 2))
@@ -90,7 +90,7 @@ def gateway_chunks(world: BeaconWorld, t_s: Floats, xy_m: Floats, arrival_ns: In
 
 
 def with_beacons(scenario: Scenario, plan: Plan, seed: int) -> Iterator[Chunk]:
-    """A scenario's chunks with those of a gateway whose beacons lie along the walk, on a plan of one level."""
+    """A scenario's chunks with the chunks of a gateway whose beacons lie along the walk, on a plan of one level."""
     truth = scenario.truth
     places = lay_beacons(truth[:, 1:3], SPACING_M, np.random.default_rng([seed, 8]))
     arrival_ns = START_NS + np.rint(truth[:, 0] * 1e9).astype(np.int64)
@@ -99,7 +99,7 @@ def with_beacons(scenario: Scenario, plan: Plan, seed: int) -> Iterator[Chunk]:
 
 
 def _hidden(walls: Floats, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether any wall stands between two places."""
+    """Whether a wall stands between two places."""
     if not len(walls):
         return False
     dx, dy = bx - ax, by - ay

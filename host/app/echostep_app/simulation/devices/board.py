@@ -45,14 +45,14 @@ class Board(Protocol):
         """Bytes from the host."""
 
     def fault(self, text: str) -> None:
-        """A fault switch, `name=value`; raises EchostepError when there is none of that name."""
+        """A fault switch, `name=value`; raises EchostepError when no switch has that name."""
 
     def close(self) -> None:
-        """The end."""
+        """Close the board."""
 
 
 class PythonBoard:
-    """Sends what the firmware would send, without being it: no buses, no faults, no lost frames."""
+    """Sends the messages of the firmware without running it: no buses, no faults, no lost frames."""
 
     def __init__(self, seed: int = 0) -> None:
         self._rangers = Rangers(np.random.default_rng([seed, 2]))
@@ -76,7 +76,7 @@ class PythonBoard:
         return [self._sent(us, message) for us, message in messages]
 
     def may_range(self, count: int) -> NDArray[np.bool_]:
-        """Of the next `count` milliseconds those whose echoes may be looked at; orders in between may change them."""
+        """Which of the next `count` milliseconds may need echoes; orders in between may change them."""
         return self._rangers.may_fire(1000 * self._ms, count)
 
     def send(self, sent: bytes) -> None:
@@ -94,10 +94,10 @@ class PythonBoard:
         raise EchostepError(f"{text}: the Python board has no fault switches; build the twin (make demo)")
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """Nothing to release."""
 
     def _configure(self, wanted: m.Configure) -> None:
-        """Take the settings, clamped as the firmware does (firmware/configuration.c), and start the sensors anew."""
+        """Take the settings, clamped as the firmware does (firmware/configuration.c), and restart the sensors."""
         self._began_us = 1000 * self._ms
         schedule = m.Schedule(min(wanted.schedule, m.Schedule.SEQUENTIAL))
         mode = m.PressureMode(min(wanted.pressure_mode, m.PressureMode.HIGH_RESOLUTION))

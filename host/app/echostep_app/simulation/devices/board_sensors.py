@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The board's own sensors: gyros, barometer, compass.
 
-In: what is true, a seeded generator for each sensor. Out: counts as the device would give them. Owns each sensor's constant errors and drift.
+In: true values, a seeded generator for each sensor. Out: counts as the device would give them. Owns each sensor's constant errors and drift.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ HARD_IRON = 0.02  # of the wearer's gear, in units of the earth's field
 
 @dataclass(frozen=True, slots=True)
 class WornGyro:
-    """What a yaw gyro at the belt adds to its data sheet's noise and bias, all by standard deviations.
+    """Errors of a yaw gyro at the belt beyond its data sheet's noise and bias, all as standard deviations.
 
-    `scale`: sensitivity and tilt of its axis. `wander_rad_s`: of its bias within a run, correlated over `wander_s`. `walking_rad_s`: what walking
-    adds to the bias, by the rotations about the other axes. `jitter_rad`: of the trunk against the feet, correlated over `jitter_s`.
+    `scale`: sensitivity and tilt of its axis. `wander_rad_s`: of its bias within a run, correlated over `wander_s`. `walking_rad_s`: bias that
+    walking adds, by the rotations about the other axes. `jitter_rad`: of the trunk against the feet, correlated over `jitter_s`.
     """
 
     scale: float = (
@@ -54,7 +54,7 @@ class WornGyro:
     jitter_s: float = 1.0
 
     def rates(self, rate_rad_s: Floats, rate_hz: float, rng: np.random.Generator) -> Floats:
-        """What turns its axis, of the trunk's rates (n,); walking where the trunk's rate has not been zero within half a second."""
+        """Rates about its axis, from the trunk's rates (n,); walking where the trunk's rate has not been zero within half a second."""
         n = len(rate_rad_s)
         scale, walking = self.scale * rng.standard_normal(), self.walking_rad_s * rng.standard_normal()
         moving = np.convolve(rate_rad_s != 0.0, np.ones(int(rate_hz)), "same") > 0.5
@@ -66,7 +66,7 @@ class WornGyro:
 
 
 def _correlated(n: int, sd: float, over: float, rng: np.random.Generator) -> Floats:
-    """A Gauss-Markov series (n,) of a standard deviation, correlated over so many samples."""
+    """A Gauss-Markov series (n,) of a standard deviation, correlated over `over` samples."""
     from scipy.signal import lfilter
 
     correlation = math.exp(-1.0 / over)
@@ -93,7 +93,7 @@ class Scp1000Model:
     """A barometer."""
 
     def __init__(self, rng: np.random.Generator, mode: Mode = "high-speed", noise_pa: float | None = None) -> None:
-        """`noise_pa`: of another part, rms."""
+        """`noise_pa`: rms noise of another part."""
         self._rng = rng
         self._noise_pa = PRESSURE_NOISE_PA[mode] if noise_pa is None else noise_pa
         self._drift_pa = 0.0
@@ -103,7 +103,7 @@ class Scp1000Model:
     ) -> tuple[Ints, Ints]:
         """Pressure (0.25 Pa) and temperature (0.05 degC) of n milliseconds at one height or at n [ISO 2533, standard atmosphere].
 
-        `air_pa` (n,): the true pressures, in the place of heights and the barometer's own weather.
+        `air_pa` (n,): the true pressures, instead of heights and the barometer's own weather.
         """
         drawn = self._rng.standard_normal((n, 3))
         drift = self._drift_pa + PRESSURE_DRIFT_PA * math.sqrt(1e-3) * np.cumsum(drawn[:, 0])

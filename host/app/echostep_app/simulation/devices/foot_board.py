@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A foot board: the ICM-20649 on the foot, its inputs as rows for a board of its own; it was not built yet.
+"""A foot board: the ICM-20649 on the foot, its inputs as rows for a board of its own; it is not built yet.
 
 In: a walk, a seeded generator, a board. Out: extended rows whose first place is the foot, in counts of the ICM-20649; the chunks of the board's port.
 Owns the part's constant errors, and the board.
@@ -26,12 +26,12 @@ from echostep_app.simulation.people.attitude import rotations
 from echostep_app.simulation.people.walker import RATE_HZ, Walk
 from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC
 
-HEAD_START_MS = 1700  # for which the foot board has power before the belt board: two boards do not start together
+HEAD_START_MS = 1700  # time for which the foot board has power before the belt board: two boards do not start together
 BLOCK_MS = 50
 USB_LATENCY_NS = 1_000_000
 INTERPOLATED = math.sqrt(
     1.5
-)  # the twin takes values between two rows, which leaves two thirds of a white noise' variance
+)  # the twin takes values between two rows, which leaves two thirds of a white noise's variance
 CELSIUS = 24.0
 
 
@@ -96,7 +96,7 @@ def measure_foot(
 
 
 class FootBoardPort:
-    """The port of a foot board that lives through a walk beside the belt's; both are driven block by block."""
+    """The port of a foot board during a walk, beside the belt's; both are driven block by block."""
 
     def __init__(self, walk: Walk, rng: np.random.Generator, board: Board, model: FootBoardModel | None = None) -> None:
         self.sensors = FootBoardSensors(walk, rng, model)
@@ -110,7 +110,7 @@ class FootBoardPort:
             )  # the host listens from the beginning of the walk on
 
     def chunks(self, start: int, stop: int, origin_ns: int) -> list[Chunk]:
-        """What the host gets of these milliseconds; `origin_ns`: the host's clock at the walk's beginning."""
+        """Chunks that the host gets in these milliseconds; `origin_ns`: the host's clock at the walk's beginning."""
         gathered: dict[int, bytes] = {}
         for t_ns, part in self.board.advance(self.sensors.rows(start, stop)):
             arrival = origin_ns + t_ns - HEAD_START_MS * 1_000_000 + USB_LATENCY_NS
@@ -119,5 +119,5 @@ class FootBoardPort:
 
 
 def foot_rng(seed: int) -> np.random.Generator:
-    """A generator of its own, so that the belt's sensors do not change with what is on the foot."""
+    """A generator of its own, so that the belt's sensors do not change with the board on the foot."""
     return np.random.default_rng([seed, 7])

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The sensors of the kit of 2026: pulse rangers, LSM6DSO on thigh, calf and belt, LIS3MDL at the belt, BMP390; none of them was built yet.
+"""The sensors of the kit of 2026: pulse rangers, LSM6DSO on thigh, calf and belt, LIS3MDL at the belt, BMP390; none of them is built yet.
 
 In: a walk, the levels of a building, a seeded generator. Out: extended rows for a board (docs/design/bench.md). Owns the parts' errors.
 
 Axes: of thigh and calf x ahead, y up along the segment, z to the side; of the belt x ahead, y to the left, z up, tilted as a belt is. The forces on
-thigh and calf are those of gravity alone; the trunk's include its horizontal acceleration.
+thigh and calf are gravity alone; the trunk's include its horizontal acceleration.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Floats, Ints
-from echostep.plan.model import Level
+from echostep.plan import Level
 from echostep_app.simulation.devices.board_sensors import HARD_IRON, Scp1000Model
 from echostep_app.simulation.people.attitude import rotations
 from echostep_app.simulation.people.walker import RATE_HZ, Walk

@@ -34,9 +34,9 @@ class MtxModel:
     """Errors after the MTx manual (noise densities; biases as left by its calibration), its crystal, its mounting and its cable.
 
     `drift_ppm`: its period against the board's clock. `mounting_rpy_rad`: sensor -> foot. `timer_s`: latency timer of the USB adapter.
-    `yaw_walk_rad`: random walk of its yaw per square root of a metre of the foot's path, as feet have it and a data sheet does not; the field turns
+    `yaw_walk_rad`: random walk of its yaw per square root of a metre of the foot's path, found on feet but in no data sheet; the field turns
     with it, so that no compass takes it out.
-    `filter`: its on-board filter, fed with what it measures; None: a well-behaved one, that only follows the field and leans a little.
+    `filter`: its on-board filter, fed with its measurements; None: a well-behaved one that only follows the field and leans a little.
     """
 
     rate_hz: float = 100.0
@@ -56,13 +56,13 @@ class MtxModel:
 
     @property
     def baud(self) -> int:
-        """What the frames need of the MTx's rates."""
+        """The baud rate that the frames need."""
         return 115_200 if self.rate_hz <= 120.0 else 460_800
 
 
 @dataclass(frozen=True, slots=True)
 class MtxSamples:
-    """What an MTx measures: `t_s` (n,); `accel` m/s2, `gyro` rad/s, `mag` earth fields (n, 3) in its axes; `orientation` (n, 3, 3) -> MT world."""
+    """Measurements of an MTx: `t_s` (n,); `accel` m/s2, `gyro` rad/s, `mag` earth fields (n, 3) in its axes; `orientation` (n, 3, 3) -> MT world."""
 
     t_s: Floats
     accel: Floats
@@ -159,7 +159,7 @@ def _believed(r: Floats, field: Floats, model: MtxModel, period: float, rng: np.
 
 
 def _followed(wanted: Floats, decay: float, value: float) -> Floats:
-    """What a filter of first order makes of a series, beginning with a value."""
+    """A series after a filter of first order, beginning with a value."""
     values = np.empty(len(wanted))
     for k, aim in enumerate(wanted.tolist()):
         value = aim + decay * (value - aim)

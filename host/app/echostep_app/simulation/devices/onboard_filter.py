@@ -26,8 +26,8 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.extras import require
 from echostep.jit import kernel, part
+from echostep_app.extras import require
 
 GRAVITY_M_S2 = 9.81
 GAP_S = 0.25  # over a longer time between two samples the attitude is not propagated: samples are missing

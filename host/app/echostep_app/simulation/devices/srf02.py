@@ -19,7 +19,7 @@ START_US = 100_000
 HALF_US = {Schedule.CONCURRENT: 33_000, Schedule.SEQUENTIAL: 70_000}
 JITTER_US = 4_096
 RANGING_US = 61_000  # [SRF02 technical specification: up to 65 ms; measured about 61]
-POLL_US = 1_000  # later than that it is read
+POLL_US = 1_000  # it is read later than that by up to this
 FIRST_US, LAST_US = 875, 35_000  # 15 cm and 6 m, out and back
 TICKS_US = 2
 
@@ -44,7 +44,7 @@ class Rangers:
         self.start(0, Schedule.CONCURRENT)
 
     def start(self, now_us: int, schedule: Schedule) -> None:
-        """Lay the grid anew; a ping under way is still read."""
+        """Lay the grid again; a ping under way is still read."""
         self._half_us = HALF_US[schedule]
         self._jitter_us = JITTER_US if schedule == Schedule.CONCURRENT else 0
         for index, ranger in enumerate(self._both):
@@ -71,7 +71,7 @@ class Rangers:
                 self._next_slot(ranger, now_us)
 
     def may_fire(self, start_us: int, count: int) -> NDArray[np.bool_]:
-        """Of the next `count` milliseconds those in which a ranger may fire (count,): the others' echoes are never asked for.
+        """In which of the next `count` milliseconds a ranger may fire (count,): echoes of the others are never requested.
 
         A ranger that is ranging fires next in the slot after, at a moment that is drawn when it has been read.
         """

@@ -68,7 +68,7 @@ class Strides:
 
 
 def foot_path(t_s: Floats, strides: Strides, foot: FootPath, height_m: Floats) -> tuple[Floats, Floats, Bools]:
-    """Position (n, 3) of the sensor, its roll, pitch, yaw (n, 3), and whether the foot is flat, which is when nothing moves at all.
+    """Position (n, 3) of the sensor, its roll, pitch, yaw (n, 3), and whether the foot is flat: then nothing moves at all.
 
     `height_m` (n,): of the floor below the foot, which moves in a lift; on stairs the foot is over the next step before it comes down.
     """

@@ -17,9 +17,9 @@ from shapely import Polygon
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.plan.model import Connector, Plan
-from echostep.plan.polyline import way_m
+from echostep.plan import Connector, Plan
 from echostep_app.plan.cropping import is_clear
+from echostep_app.plan.polyline import way_m
 from echostep_app.plan.routing import Route, RoutePlace, Routes
 from echostep_app.simulation.people.walker import Waypoint
 
@@ -31,7 +31,7 @@ SHORTEST_M = 0.05  # a waypoint nearer to the one before it is left out
 
 
 def tour(plan: Plan, places: Sequence[RoutePlace]) -> list[Waypoint]:
-    """Through all these places; raises EchostepError when no way leads there."""
+    """Waypoints through all these places; raises EchostepError when no way leads there."""
     routes = Routes(plan)
     way: list[Waypoint] = []
     for start, end in zip(places, places[1:], strict=False):
@@ -87,7 +87,7 @@ def _places(plan: Plan, level: int) -> list[RoutePlace]:
 
 
 def waypoints(plan: Plan, route: Route) -> list[Waypoint]:
-    """Along one route."""
+    """Waypoints along one route."""
     points: list[Waypoint] = []
     for k, stretch in enumerate(route.stretches):
         z = plan.levels[stretch.level].height_m
@@ -103,7 +103,7 @@ def waypoints(plan: Plan, route: Route) -> list[Waypoint]:
 
 
 def _between(plan: Plan, connector: Connector, level: int, to: int, entered_m: Floats) -> list[Waypoint]:
-    """Inside stairs or a lift, from one level to another."""
+    """Waypoints inside stairs or a lift, from one level to another."""
     heights = [plan.levels[k].height_m for k in range(len(plan.levels))]
     if connector.kind == "lift":
         x, y = connector.outline_m.mean(axis=0).tolist()
@@ -158,7 +158,7 @@ def _detour(plan: Plan, routes: Routes, start: Waypoint, end: Waypoint) -> list[
 
 
 def _spaced(way: list[Waypoint]) -> list[Waypoint]:
-    """Without waypoints upon the ones before, but for a lift's."""
+    """The way without waypoints that repeat the one before, except a lift's."""
     points = way[:1]
     for w in way[1:]:
         last = points[-1]

@@ -42,7 +42,7 @@ ANKLE = np.array([-0.06, 0.0, 0.0])  # from the sensor on the instep, foot frame
 
 @dataclass(frozen=True, slots=True)
 class Manner:
-    """A manner of moving: strides of a length and a time, and where the body faces, from where the way leads."""
+    """A manner of moving: strides of a length and a time, and the body's direction relative to the way."""
 
     name: str
     stride_m: float
@@ -203,7 +203,7 @@ class _Schedule:
             self._hold(self._t[-1], self._trunk[-1][-1], self._heading[-1][-1:], float(self._height[-1][-1]))
 
     def ride(self, height_m: float) -> None:
-        """Take the lift to a height, if that is another."""
+        """Take the lift to a height, if it differs."""
         begin_m = float(self._height[-1][-1])
         if height_m == begin_m:
             return
@@ -235,7 +235,7 @@ class _Schedule:
     def _leg(
         self, trunk: Floats, heading: Floats, foot_m: Floats, rpy: Floats, phase: Floats, effort: Floats, climb_m_s: Floats,
     ) -> tuple[Floats, Floats]:  # fmt: skip
-        """Rates of thigh and calf: what joins the hip on its way to the ankle on its own, and on stairs the curves that people have there."""
+        """Rates of thigh and calf: they join the paths of hip and ankle, and on stairs follow people's curves there."""
         person, along = self._person, np.column_stack([np.cos(heading), np.sin(heading)])
         lever = rotations(rpy) @ ANKLE
         ankle = np.column_stack(
@@ -256,7 +256,7 @@ class _Schedule:
         return np.gradient(_smooth(thigh, LEG_SMOOTH_MS)) * RATE_HZ, np.gradient(_smooth(calf, LEG_SMOOTH_MS)) * RATE_HZ
 
     def _turn_to(self, at: Floats, course: float) -> None:
-        """Turn on the spot, the short way, a few strides if it takes that."""
+        """Turn on the spot, the short way, in several strides if needed."""
         if not self._heading:
             self._hold(self._t[-1], at[:2], np.array([course]), float(at[2]))
             return
@@ -288,7 +288,7 @@ class _Schedule:
         self._moves += [True] * len(after_s)
 
     def _grid(self, end_s: float) -> Floats:
-        """The milliseconds from where the plan ends up to a time."""
+        """The milliseconds from the end of the schedule up to a time."""
         first, self._ms = self._ms, max(self._ms, math.ceil(end_s * RATE_HZ))
         return np.arange(first, self._ms) / RATE_HZ
 

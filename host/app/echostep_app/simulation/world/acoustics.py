@@ -3,9 +3,9 @@
 
 In: the geometry of one echo. Out: its level. Owns the one table of acoustic constants, `Acoustics`; the tracker's likelihood shares nothing with it.
 
-The rangers' transducer is taken as a piston: it sends and hears with the same directivity, so that an echo has it twice. To this
-come the spreading of the wave, the absorption by the air and the losses at reflectors; what exceeds the noisy threshold is heard. The
-range therefore shrinks toward the rim of the cone, and a small reflector is heard less far than a wall [Girard 2011, 2.6.2, 2.6.3].
+The rangers' transducer is taken as a piston: it sends and hears with the same directivity, so that an echo has it twice. Added to
+this are the spreading of the wave, the absorption by the air and the losses at reflectors; an echo above the noisy threshold is heard. The
+range therefore shrinks toward the rim of the cone, and is shorter for a small reflector than for a wall [Girard 2011, 2.6.2, 2.6.3].
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ PIPE_RADIUS_M = 0.0275  # the 55 mm pipe of [Girard 2011, Figure 2a]
 
 
 class Acoustics(NamedTuple):
-    """What decides whether an echo is heard; levels in dB against a wall on the axis at 1 m."""
+    """Constants that decide whether an echo is heard; levels in dB against a wall on the axis at 1 m."""
 
     speed_m_s: float = 343.2  # of sound, dry air at 20 degC
     size: float = 4.797  # wave number x piston radius: -6 dB at 27.5 degrees each way, the 55 degree cone [Robot Electronics, sonar FAQ]
@@ -85,11 +85,11 @@ def path_db(range_m: float, off_out_rad: float, off_in_rad: float, bounces: int,
 
 @kernel
 def wall_db(distance_m: float, off_axis_rad: float, a: Acoustics) -> float:
-    """Level of a wall whose nearest point is that far away and that much off the axis [Girard 2011, Figure 1b, c]."""
+    """Level of a wall whose nearest point is at this distance and angle off the axis [Girard 2011, Figure 1b, c]."""
     return path_db(distance_m, off_axis_rad, off_axis_rad, 1, a)
 
 
 @kernel
 def rod_db(distance_m: float, off_axis_rad: float, radius_m: float, a: Acoustics) -> float:
-    """Level of an upright rod: a wall's, less the spreading by its curved face, sqrt(radius / (radius + distance)) in amplitude."""
+    """Level of an upright rod: a wall's level, less the spreading by its curved face, sqrt(radius / (radius + distance)) in amplitude."""
     return wall_db(distance_m, off_axis_rad, a) + 10.0 * math.log10(radius_m / (radius_m + distance_m))

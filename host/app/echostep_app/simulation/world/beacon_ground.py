@@ -15,7 +15,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.jit import kernel
-from echostep.plan.polyline import along, way_m
+from echostep_app.plan.polyline import along, way_m
 
 OUTLIER_M = 3.0  # added to a range [Fischer 2008, 4.1.1]
 

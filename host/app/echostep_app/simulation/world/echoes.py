@@ -6,7 +6,7 @@ the other ranger's. Owns nothing.
 
 Walls reflect sound of 40 kHz as mirrors reflect light [Kuc and Siegel 1987]: a wall answers from the foot of the perpendicular, the image of
 an image gives the path by two walls (corners, and from one ranger to the other between two walls), and an edge answers weakly. A share of the first
-echoes is missed; then a later one is reported: of what stands behind, by the same wall twice, or from where the beam is scattered (`scattering`).
+echoes is missed; then a later one is reported: from an object behind, from the same wall twice, or from where the beam is scattered (`scattering`).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from echostep_app.simulation.world.scattering import chance_of, scattered_range
 Counts = NDArray[np.uint16]
 
 CHUNK_POSES = 64  # poses that share one list of near walls
-PULSE_M = 0.1  # an echo that is missed hides the next within so much: a pulse of 16 periods at 40 kHz lasts 7 cm, there and back, and rings, assumed
+PULSE_M = 0.1  # a missed echo hides the next within this range: a pulse of 16 periods at 40 kHz lasts 7 cm, there and back, and rings, assumed
 OWN, CROSS = 0, 1
 
 
@@ -159,7 +159,7 @@ def _search_later(rangers: RangerPair, side: int, edges: Floats, search: Search)
 
 @part
 def _search_scattered(rangers: RangerPair, side: int, chance: float, search: Search) -> None:
-    """The echo of a ranger that nothing came back to by mirrors."""
+    """The echo of a ranger that received none by mirrors."""
     sign = 1.0 if side == 0 else -1.0
     axis, threshold_db = (sign * rangers.axis_x, sign * rangers.axis_y), search.threshold_db[side, OWN]
     earliest_m = search.earliest_m[side]
@@ -184,7 +184,7 @@ def _find_lit(rangers: RangerPair, walls: Floats, a: Acoustics, lit: Ints) -> in
 
 @part
 def _search_walls(rangers: RangerPair, search: Search, times: int) -> None:
-    """Echoes straight back from the foot of the perpendicular on each wall, or so many `times`, with the wearer between."""
+    """Echoes straight back from the foot of the perpendicular on each wall, or back `times` times, with the wearer in between."""
     walls, a, nearest = search.walls, search.acoustics, search.nearest_m
     for w in search.lit:
         s = foot(rangers.x, rangers.y, walls[w])

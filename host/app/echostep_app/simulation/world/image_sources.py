@@ -109,7 +109,7 @@ def in_double_cone(px: float, py: float, ax: float, ay: float, cosine: float, wa
 def wall_edges(walls: Floats) -> Floats:
     """Wall ends that diffract, (k, 6): x, y and the directions of the two walls that meet there, the same one twice at a free end.
 
-    An end that touches the middle of another wall is no edge, nor one where more than two walls meet or where two make one straight wall.
+    An end that touches the middle of another wall is not an edge, nor is one where more than two walls meet or where two make one straight wall.
     """
     edges = np.zeros((2 * len(walls), 6))
     count = 0
@@ -122,7 +122,7 @@ def wall_edges(walls: Floats) -> Floats:
 
 @part
 def _edge(walls: Floats, w: int, e: int, edge: Floats) -> bool:
-    """Fill one edge from an end of a wall; False when it is none, or that of an earlier wall."""
+    """Fill one edge from an end of a wall; False when it is not an edge, or an earlier wall's."""
     x, y = walls[w, e], walls[w, e + 1]
     ux, uy = walls[w, 2 - e] - x, walls[w, 3 - e] - y
     vx, vy = ux, uy
@@ -144,7 +144,7 @@ def _edge(walls: Floats, w: int, e: int, edge: Floats) -> bool:
 
 @part
 def _is_beside(x: float, y: float, wall: Floats) -> bool:
-    """Whether a point lies more than 2 TOUCH_M outside of the box around a wall: a quick answer for nearly all walls."""
+    """Whether a point lies more than 2 TOUCH_M outside the box around a wall: a quick answer for nearly all walls."""
     more = 2.0 * TOUCH_M
     if x < min(wall[0], wall[2]) - more or x > max(wall[0], wall[2]) + more:
         return True

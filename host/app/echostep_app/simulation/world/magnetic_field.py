@@ -23,7 +23,7 @@ WAVELENGTH_M = (3.0, 15.0)
 DISTURBANCE = 0.05  # rms of each component: 7 degrees of heading
 EARTH_T = 49e-6  # the unit, in central Europe
 DIPOLE_T_M3_A_M2 = 1e-7  # mu0 / 4 pi
-SIZE_M = 0.5  # of a machine: nearer than that it is no dipole
+SIZE_M = 0.5  # of a machine: nearer than that it is not a dipole
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 
 In: a ranger's place and axis, walls, a chance. Out: half the length of the way; 0 for none. Owns nothing.
 
-The axis of the beam is followed from wall to wall as a mirror reflects it. What stands at a wall (a frame, a joint, a board) scatters sound to all
+The axis of the beam is followed from wall to wall as a mirror reflects it. Objects at a wall (a frame, a joint, a board) scatter sound to all
 sides, so that any angle is heard; the echo then has the length of the whole way, longer than to the wall's nearest point.
 """
 
@@ -15,7 +15,7 @@ from echostep_app.simulation.world.acoustics import Acoustics, path_db
 from echostep_app.simulation.world.image_sources import TOUCH_M, crossing
 
 WALLS_MET = 4  # by one beam: each way between two walls is a metre or more, and beyond four the level is too low
-DIGITS = 1048576.0  # 2^20: what a deviate has below 1e-6 says nothing of its value
+DIGITS = 1048576.0  # 2^20: the digits of a deviate below 1e-6 say nothing of its value
 
 
 @part
@@ -23,7 +23,7 @@ def scattered_range(
     place: tuple[float, float], axis: tuple[float, float], walls: Floats, earliest_m: float, threshold_db: float,
     chance: float, a: Acoustics,
 ) -> float:  # fmt: skip
-    """Range (m) of the first place, not nearer than `earliest_m`, that scatters the beam back; `chance`: even between 0 and 1, new for each ping."""
+    """Range (m) of the first place, not nearer than `earliest_m`, that scatters the beam back; `chance`: uniform from 0 to 1, new for each ping."""
     (x, y), (dx, dy), way = place, axis, 0.0
     for met in range(WALLS_MET):
         wall, step = _first_wall(x, y, dx, dy, walls, a.maximum_m - way)
@@ -43,7 +43,7 @@ def scattered_range(
 
 @part
 def _first_wall(x: float, y: float, dx: float, dy: float, walls: Floats, reach_m: float) -> tuple[int, float]:
-    """The wall that a ray meets first, more than TOUCH_M away, and the way to it; -1 where none is within reach."""
+    """The wall that a ray meets first, more than TOUCH_M away, and the distance; -1 if none is within reach."""
     found, nearest = -1, reach_m
     for w in range(len(walls)):
         share = crossing(x, y, x + reach_m * dx, y + reach_m * dy, walls[w])
@@ -54,5 +54,5 @@ def _first_wall(x: float, y: float, dx: float, dy: float, walls: Floats, reach_m
 
 @part
 def chance_of(normal_deviate: float) -> float:
-    """A number that is even between 0 and 1, by the last digits of a normal deviate: independent of its value, and no other draw is shifted."""
+    """A number uniform between 0 and 1, from the last digits of a normal deviate: independent of its value, and no other draw is shifted."""
     return (normal_deviate * DIGITS) % 1.0

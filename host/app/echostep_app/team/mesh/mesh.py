@@ -19,7 +19,7 @@ from contextlib import suppress
 from typing import Any
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.ports.port_faults import PORT_FAULTS
 from echostep_app.team.endpoint import Endpoint
 from echostep_app.team.mesh.airtime import INTERVAL_S, PRESETS, Modem, interval_s

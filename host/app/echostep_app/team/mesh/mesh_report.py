@@ -11,11 +11,12 @@ import math
 import struct
 from dataclasses import replace
 
-from echostep.localization.estimate import ellipse95
-from echostep.plan.model import Plan
+from echostep.localization import ellipse95
+from echostep.plan import Plan
 from echostep_app.plan.places.whereabouts import Whereabouts
+from echostep_app.printing.lines import moment
 from echostep_app.team.georeference import GroundPlane
-from echostep_app.team.messages.report import Motion, Position, Report, ReportedAlarm, moment, printable
+from echostep_app.team.messages.report import Motion, Position, Report, ReportedAlarm, printable
 
 VERSION = 1
 LATE_AFTER_S = 30.0  # a position is late after three intervals; assumed

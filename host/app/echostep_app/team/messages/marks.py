@@ -13,24 +13,23 @@ of the errands of one run the latest. So what each commander knows can be sent a
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
 from echostep.ports.people.payloads import Level
-from echostep_app.team.messages.crews import Crews
+from echostep_app.team.messages.crews import MOST_CREWS, Crew
 from echostep_app.team.messages.report import BadReportError, Metres, check_name
 from echostep_app.team.messages.shared import (
     Identity,
+    Kept,
     Person,
     UnixTime,
     check_printable,
     check_room,
     decoded,
-    is_older,
-    keep_latest,
 )
 
 ROOT = "echostep-table"
@@ -93,7 +92,7 @@ class Errand(msgspec.Struct, frozen=True):
 
 AlarmKey = tuple[str, str, str]  # team, wearer, "<run>-<number>"
 RunKey = tuple[str, str, str]  # team, wearer, run
-_MARK, _ACK, _ERRAND = msgspec.json.Decoder(Mark), msgspec.json.Decoder(Ack), msgspec.json.Decoder(Errand)
+_MARK = msgspec.json.Decoder(Mark)
 
 
 def ack_message(key: AlarmKey, by: str, unix_s: float) -> tuple[str, bytes]:
@@ -130,16 +129,29 @@ class MarkBoard:
     def __init__(self) -> None:
         self.marks: dict[str, Mark] = {}
         self.removed: dict[str, Mark] = {}
-        self.acks: dict[AlarmKey, Ack] = {}
-        self.errands: dict[RunKey, Errand] = {}
-        self.crews = Crews()
+        self.acks: Kept[AlarmKey, Ack] = Kept(
+            Ack,
+            "acknowledgement",
+            MOST_ACKS,
+            lambda key, a: ack_message(key, a.by, a.unix_s),
+            lambda a: [a.by],
+            earliest=True,
+        )
+        self.errands: Kept[RunKey, Errand] = Kept(
+            Errand, "errand", MOST_ERRANDS, errand_message, lambda e: [e.by, e.to, e.where]
+        )
+        self.crews: Kept[str, Crew] = Kept(
+            Crew, "crew", MOST_CREWS, lambda _, crew: crew.message, lambda c: [c.name, c.by, *c.members]
+        )
         self.answers: deque[tuple[str, bytes]] = deque(maxlen=MOST_ANSWERS)
 
     def copy(self) -> MarkBoard:
         """A board of the same state that changes by itself."""
         made = MarkBoard()
-        made.marks, made.removed, made.acks = dict(self.marks), dict(self.removed), dict(self.acks)
-        made.errands, made.crews = dict(self.errands), self.crews.copy()
+        made.marks, made.removed = dict(self.marks), dict(self.removed)
+        made.acks.update(self.acks)
+        made.errands.update(self.errands)
+        made.crews.update(self.crews)
         return made
 
     @property
@@ -147,12 +159,9 @@ class MarkBoard:
         """Topic and payload of all that is known."""
         for mark in (*self.marks.values(), *self.removed.values()):
             yield mark.message
-        for key, ack in self.acks.items():
-            yield ack_message(key, ack.by, ack.unix_s)
-        for key, errand in self.errands.items():
-            yield errand_message(key, errand)
-        for crew in self.crews.known.values():
-            yield crew.message
+        yield from self.acks.messages
+        yield from self.errands.messages
+        yield from self.crews.messages
 
     def receive(self, topic: str, payload: bytes) -> None:
         """Take one message; raises BadReportError with the reason of its rejection."""
@@ -160,12 +169,12 @@ class MarkBoard:
         match parts[1:]:
             case ["mark", identity]:
                 self._receive_mark(identity, payload)
-            case ["ack", team, name, alarm]:
-                self._receive_ack((team, name, alarm), payload)
-            case ["errand", team, name, run]:
-                self._receive_errand((team, name, run), payload)
+            case ["ack", *key]:
+                self.acks.receive(_checked_key(key), (topic, payload), self.answers)
+            case ["errand", *key]:
+                self.errands.receive(_checked_key(key), (topic, payload), self.answers)
             case ["crew", identity]:
-                self.crews.receive(identity, payload, self.answers)
+                self.crews.receive(identity, (topic, payload), self.answers)
             case _:
                 raise BadReportError("unknown topic")
 
@@ -191,35 +200,11 @@ class MarkBoard:
         check_room(self.marks, identity, MOST_MARKS, "marks")
         self.marks[identity] = mark
 
-    def _receive_ack(self, key: AlarmKey, payload: bytes) -> None:
-        _check_key(key)
-        if not payload:
-            self.acks.pop(key, None)
-            return
-        ack = decoded(payload, _ACK, "acknowledgement")
-        check_printable(ack.by)
-        check_room(self.acks, key, MOST_ACKS, "acknowledgements")
-        known = self.acks.get(key)
-        if known is not None and is_older(known, ack):
-            self.answers.append(ack_message(key, known.by, known.unix_s))
-        else:
-            self.acks[key] = ack
 
-    def _receive_errand(self, key: RunKey, payload: bytes) -> None:
-        _check_key(key)
-        if not payload:
-            self.errands.pop(key, None)
-            return
-        errand = decoded(payload, _ERRAND, "errand")
-        check_printable(errand.by, errand.to, errand.where)
-        check_room(self.errands, key, MOST_ERRANDS, "errands")
-        if newer := keep_latest(self.errands, key, errand):
-            self.answers.append(errand_message(key, newer))
-
-
-def _check_key(key: tuple[str, str, str]) -> None:
-    """Raises BadReportError for a topic that names no wearer."""
-    for name in key[:2]:
-        check_name(name)
-    if len(key[2]) > 32:
+def _checked_key(parts: Sequence[str]) -> tuple[str, str, str]:
+    """Team, wearer and run of a topic; raises BadReportError for one that names no wearer."""
+    if len(parts) != 3 or len(parts[2]) > 32:
         raise BadReportError("unknown topic")
+    for name in parts[:2]:
+        check_name(name)
+    return parts[0], parts[1], parts[2]

@@ -12,7 +12,7 @@ import math
 import re
 import unicodedata
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from functools import lru_cache
 from typing import Annotated, Literal, TypeVar
 
@@ -20,19 +20,24 @@ import msgspec
 from msgspec import Meta
 
 from echostep.errors import EchostepError
-from echostep.fields import field_of
-from echostep.plan.plan_file import LIMIT_M
+from echostep.fields import LIMIT_M, field_of
 from echostep.ports.people.payloads import has_covariance
 
 MAX_PAYLOAD = 8192  # bytes; a report has about 900
 WITHOUT_PLAN = 64 * "0"  # the SHA-256 of no file: the wearer is tracked without a plan, in a frame of its own
 
-Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M, description="m, on the plan (x east, y north)")]
+
+def between(least: float, most: float, words: str) -> Meta:
+    """The limits of a number, both included, and what it is."""
+    return Meta(ge=least, le=most, description=words)
+
+
+Metres = Annotated[float, between(-LIMIT_M, LIMIT_M, "m, on the plan (x east, y north)")]
 Name = Annotated[
     str, Meta(min_length=1, max_length=32, pattern="^[^/+#]*$", description="printable characters, no / + #")
 ]
 Moment = Annotated[str, Meta(min_length=20, max_length=32, description="UTC, RFC 3339, by the tracker's clock")]
-Heading = Annotated[float, Meta(ge=-7.0, le=7.0, description="rad counter-clockwise from x")]
+Heading = Annotated[float, between(-7.0, 7.0, "rad counter-clockwise from x")]
 
 
 class BadReportError(ValueError):
@@ -43,32 +48,26 @@ class BadReportError(ValueError):
 class Position:
     """Where the wearer is on the plan."""
 
-    t_s: Annotated[float, Meta(ge=-1e9, le=1e12, description="the tracker's own clock at the estimate, s")]
+    t_s: Annotated[float, between(-1e9, 1e12, "the tracker's own clock at the estimate, s")]
     age_s: Annotated[
         float,
-        Meta(
-            ge=0.0,
-            le=1e9,
-            description="seconds since the estimate was made; the covariance has grown by as many seconds of walking",
+        between(
+            0.0, 1e9, "seconds since the estimate was made; the covariance has grown by as many seconds of walking"
         ),
     ]
     x_m: Metres
     y_m: Metres
-    xx_m2: Annotated[float, Meta(ge=0.0, le=1e12, description="covariance of x and x, m2")]
-    xy_m2: Annotated[float, Meta(ge=-1e12, le=1e12, description="covariance of x and y, m2")]
-    yy_m2: Annotated[float, Meta(ge=0.0, le=1e12, description="covariance of y and y, m2")]
-    radius95_m: Annotated[float, Meta(ge=0.0, le=1e7, description="longer half axis of the 95 % ellipse, m")]
+    xx_m2: Annotated[float, between(0.0, 1e12, "covariance of x and x, m2")]
+    xy_m2: Annotated[float, between(-1e12, 1e12, "covariance of x and y, m2")]
+    yy_m2: Annotated[float, between(0.0, 1e12, "covariance of y and y, m2")]
+    radius95_m: Annotated[float, between(0.0, 1e7, "longer half axis of the 95 % ellipse, m")]
     heading_rad: Heading | None
-    heading_sd_rad: Annotated[float, Meta(ge=0.0, le=100.0, description="standard deviation, rad")]
-    floor: Annotated[int, Meta(ge=-1000, le=1000, description="index of the level in the plan")]
+    heading_sd_rad: Annotated[float, between(0.0, 100.0, "standard deviation, rad")]
+    floor: Annotated[int, between(-1000, 1000, "index of the level in the plan")]
     floor_name: Annotated[str, Meta(max_length=64, description="name of the level")]
-    floor_probability: Annotated[
-        float, Meta(ge=0.0, le=1.0, description="probability that the wearer is on this floor")
-    ]
-    z_m: Annotated[
-        float, Meta(ge=-LIMIT_M, le=LIMIT_M, description="height of the floor under the wearer, on the plan's scale, m")
-    ]
-    z_sd_m: Annotated[float, Meta(ge=0.0, le=LIMIT_M, description="standard deviation of z_m, m")]
+    floor_probability: Annotated[float, between(0.0, 1.0, "probability that the wearer is on this floor")]
+    z_m: Annotated[float, between(-LIMIT_M, LIMIT_M, "height of the floor under the wearer, on the plan's scale, m")]
+    z_sd_m: Annotated[float, between(0.0, LIMIT_M, "standard deviation of z_m, m")]
     where: Annotated[
         str, Meta(max_length=100, description="the room or the corridor, in words; empty where the plan names none")
     ] = ""
@@ -82,40 +81,33 @@ class Position:
 class Motion:
     """How the wearer moves."""
 
-    steps: Annotated[int, Meta(ge=0, le=2**53, description="steps of the foot that carries the MTx")]
-    walked_m: Annotated[float, Meta(ge=0.0, le=1e9, description="length of the track so far, m")]
-    speed_m_s: Annotated[float, Meta(ge=0.0, le=100.0, description="over the last seconds, m/s")]
-    still_s: Annotated[float, Meta(ge=0.0, le=1e9, description="seconds since the last step")]
+    steps: Annotated[int, between(0, 2**53, "steps of the foot that carries the MTx")]
+    walked_m: Annotated[float, between(0.0, 1e9, "length of the track so far, m")]
+    speed_m_s: Annotated[float, between(0.0, 100.0, "over the last seconds, m/s")]
+    still_s: Annotated[float, between(0.0, 1e9, "seconds since the last step")]
 
 
 @dataclass(frozen=True, slots=True)
 class ReportedPlace:
     """Position on Earth, when the plan has a georeference."""
 
-    lat_deg: Annotated[float, Meta(ge=-90.0, le=90.0, description="WGS 84")]
-    lon_deg: Annotated[float, Meta(ge=-180.0, le=180.0, description="WGS 84")]
-    hae_m: Annotated[float, Meta(ge=-1e4, le=1e5, description="height over the ellipsoid, m")] | None
-    sd_m: Annotated[
-        float,
-        Meta(ge=0.0, le=1e7, description="standard deviation along the worst direction, georeference included, m"),
-    ]
-    hae_sd_m: Annotated[float, Meta(ge=0.0, le=1e7, description="standard deviation of hae_m, m")] | None
-    course_deg: Annotated[float, Meta(ge=0.0, le=360.0, description="heading, clockwise from true north")] | None
+    lat_deg: Annotated[float, between(-90.0, 90.0, "WGS 84")]
+    lon_deg: Annotated[float, between(-180.0, 180.0, "WGS 84")]
+    hae_m: Annotated[float, between(-1e4, 1e5, "height over the ellipsoid, m")] | None
+    sd_m: Annotated[float, between(0.0, 1e7, "standard deviation along the worst direction, georeference included, m")]
+    hae_sd_m: Annotated[float, between(0.0, 1e7, "standard deviation of hae_m, m")] | None
+    course_deg: Annotated[float, between(0.0, 360.0, "heading, clockwise from true north")] | None
 
 
 @dataclass(frozen=True, slots=True)
 class StreamReport:
     """Health of the sensors' streams."""
 
-    mtx_hz: Annotated[float, Meta(ge=0.0, le=1e6, description="samples of the MTx per second")]
-    board_hz: Annotated[float, Meta(ge=0.0, le=1e6, description="messages of the sensor board per second")]
-    bad: Annotated[int, Meta(ge=0, le=2**53, description="frames that failed a check, both ports, since the start")]
-    lost: Annotated[
-        int, Meta(ge=0, le=2**53, description="frames that were sent but not received, both ports, since the start")
-    ]
-    dropped: Annotated[
-        int, Meta(ge=0, le=2**53, description="messages that the board dropped because its buffer was full")
-    ]
+    mtx_hz: Annotated[float, between(0.0, 1e6, "samples of the MTx per second")]
+    board_hz: Annotated[float, between(0.0, 1e6, "messages of the sensor board per second")]
+    bad: Annotated[int, between(0, 2**53, "frames that failed a check, both ports, since the start")]
+    lost: Annotated[int, between(0, 2**53, "frames that were sent but not received, both ports, since the start")]
+    dropped: Annotated[int, between(0, 2**53, "messages that the board dropped because its buffer was full")]
     synchronised: Annotated[bool, Meta(description="the MTx is timed by its SyncOut wire")]
     findings: Annotated[
         tuple[Annotated[str, Meta(max_length=100)], ...],
@@ -137,11 +129,8 @@ class ReportedAlarm:
         Literal["no motion", "fall", "help"],
         Meta(description="fall: an impact, then lying; help: the wearer asked for it"),
     ]
-    number: Annotated[int, Meta(ge=1, le=2**53, description="counts the alarms of this run")]
-    age_s: Annotated[
-        float,
-        Meta(ge=0.0, le=1e9, description="seconds since the last motion, the fall, the call for help, or the end"),
-    ]
+    number: Annotated[int, between(1, 2**53, "counts the alarms of this run")]
+    age_s: Annotated[float, between(0.0, 1e9, "seconds since the last motion, the fall, the call for help, or the end")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +141,7 @@ class Report:
     team: Name
     name: Name
     run: Annotated[str, Meta(pattern="^[0-9a-f]{8}$", description="one run of one tracker; another run, another one")]
-    sequence: Annotated[int, Meta(ge=0, le=2**53, description="counts the reports made in this run")]
+    sequence: Annotated[int, between(0, 2**53, "counts the reports made in this run")]
     time: Annotated[Moment, Meta(description="when it was sent: UTC, RFC 3339, by the tracker's clock")]
     stale: Annotated[Moment, Meta(description="until when it holds, by the same clock")]
     source: Annotated[Literal["live", "replay", "simulated"], Meta(description="where the bytes come from")]
@@ -171,10 +160,8 @@ class Report:
         str, Meta(pattern="^[0-9a-f]{64}$", description="SHA-256 of the plan's file; zeros without a plan")
     ]
     version: Annotated[str, Meta(max_length=32, description="version of echostep on the tracker")]
-    battery_percent: Annotated[int, Meta(ge=0, le=100, description="charge of the tracker's computer")] | None
-    superseded: Annotated[
-        int, Meta(ge=0, le=2**53, description="reports that a newer one overtook before they could be sent")
-    ]
+    battery_percent: Annotated[int, between(0, 100, "charge of the tracker's computer")] | None
+    superseded: Annotated[int, between(0, 2**53, "reports that a newer one overtook before they could be sent")]
     recorded: Annotated[
         Moment | None, Meta(description="when the position was recorded, in a replay: UTC, by the recorder's clock")
     ] = None
@@ -295,11 +282,6 @@ def is_printable(text: str) -> bool:
     if text.isascii():
         return text.isprintable()  # the same, and fast: most texts are ASCII
     return all(unicodedata.category(c) not in ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp") for c in text)
-
-
-def moment(unix_s: float) -> str:
-    """Unix time as RFC 3339 in UTC, to the millisecond."""
-    return datetime.fromtimestamp(unix_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 @lru_cache(

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
 """What the commanders' shared messages have in common: types of fields, decoding, checks, and which of two counts.
 
-In: payloads from untrusted senders. Out: their fields; BadReportError with the reason of a rejection. Owns nothing.
+In: payloads from untrusted senders. Out: their fields; BadReportError with the reason of a rejection. Owns those that are known; their number is
+bounded.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Annotated, Protocol, TypeVar
 
 import msgspec
@@ -16,6 +18,7 @@ from echostep_app.team.messages.report import BadReportError, decode_as, is_prin
 
 Identity = Annotated[str, Meta(pattern="^[0-9a-f]{8}$")]
 Person = Annotated[str, Meta(min_length=1, max_length=32)]
+Message = tuple[str, bytes]  # topic and payload
 UnixTime = Annotated[float, Meta(ge=0.0, le=1e11)]
 
 
@@ -38,15 +41,6 @@ def is_older(one: Signed, other: Signed) -> bool:
     return (one.unix_s, one.by) < (other.unix_s, other.by)
 
 
-def keep_latest(known: dict[K, S], key: K, new: S) -> S | None:
-    """Put a message among the known ones unless it is outdated; then returns the newer one that is known."""
-    before = known.get(key)
-    if before is not None and is_older(new, before):
-        return before
-    known[key] = new
-    return None
-
-
 def check_printable(*texts: str) -> None:
     """Raises BadReportError for a text with letters that are not printed."""
     if not all(map(is_printable, texts)):
@@ -65,3 +59,37 @@ def decoded(payload: bytes, decoder: msgspec.json.Decoder[T], what: str) -> T:
         return decode_as(payload, decoder)
     except BadReportError as error:
         raise BadReportError(f"not a valid {what}: {error}") from error
+
+
+class Kept(dict[K, S]):
+    """Messages of one kind by their keys: of each key the latest, or the `earliest`."""
+
+    def __init__(
+        self, kind: type[S], what: str, most: int, message: Callable[[K, S], Message], texts: Callable[[S], Iterable[str]], *,
+        earliest: bool = False,
+    ) -> None:  # fmt: skip
+        """`what`: one in words; `most` keys; `message`: topic and payload of one; `texts`: what is in it to be printed."""
+        super().__init__()
+        self._decoder, self._what, self._most, self._earliest = msgspec.json.Decoder(kind), what, most, earliest
+        self._message, self._texts = message, texts
+
+    @property
+    def messages(self) -> Iterator[Message]:
+        """Topic and payload of each."""
+        return (self._message(key, known) for key, known in self.items())
+
+    def receive(self, key: K, message: Message, answers: deque[Message]) -> None:
+        """Take one message, an empty one removes; an outdated one is answered with what is known. Raises BadReportError."""
+        topic, payload = message
+        if not payload:
+            self.pop(key, None)
+            return
+        known, new = self.get(key), decoded(payload, self._decoder, self._what)
+        if self._message(key, new)[0] != topic:
+            raise BadReportError(f"{self._what} and topic contradict each other")
+        check_printable(*self._texts(new))
+        check_room(self, key, self._most, f"{self._what}s")
+        if known is not None and is_older(*((known, new) if self._earliest else (new, known))):
+            answers.append(self._message(key, known))
+        else:
+            self[key] = new

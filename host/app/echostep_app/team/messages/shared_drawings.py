@@ -13,7 +13,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan, parse_plan
+from echostep.plan import Plan, parse_plan
 from echostep_app.plan.places.refusals import refusals
 from echostep_app.team.messages.report import is_printable
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.arrays import Floats, Ints
+from echostep.arrays import Floats
 from echostep.jit import kernel, lean_kernel, lean_part, part
 
 TWO_PI = 2.0 * math.pi
@@ -21,9 +21,9 @@ XX, XY, X_AXIS, YY, Y_AXIS, AXIS_AXIS = 0, 1, 2, 3, 4, 5  # stored terms of the 
 
 
 class BeaconBeliefs(NamedTuple):
-    """Of n particles about b beacons.
+    """Beliefs of n particles about b beacons.
 
-    `mean` (n, b, 3): X, Y, AXIS. `cov` (n, b, 6): XX to AXIS_AXIS. `doubt` (n, b): odds that the beacon was moved, divided by those of one that has
+    `mean` (n, b, 3): X, Y, AXIS. `cov` (n, b, 6): XX to AXIS_AXIS. `doubt` (n, b): odds that the beacon was moved, relative to one that has
     just been placed.
     """
 
@@ -65,36 +65,6 @@ def place_dropped(beliefs: BeaconBeliefs, slot: int, x: Floats, y: Floats, place
         beliefs.mean[i, slot] = x[i], y[i], 0.0
         beliefs.cov[i, slot] = place_var, 0.0, 0.0, place_var, 0.0, math.pi * math.pi
         beliefs.doubt[i, slot] = 1.0
-
-
-@kernel
-def resample_beliefs(beliefs: BeaconBeliefs, chosen: Ints) -> None:
-    """Copy the beliefs of the chosen particles (n,), in ascending order, in place; their number stays."""
-    particles = len(beliefs.mean)
-    _gather_rows(beliefs.mean.reshape(particles, -1), chosen)
-    _gather_rows(beliefs.cov.reshape(particles, -1), chosen)
-    _gather_rows(beliefs.doubt, chosen)
-
-
-@lean_part
-def _gather_rows(rows: Floats, chosen: Ints) -> None:
-    """Set rows[i] = rows[chosen[i]] in place, for ascending `chosen`; `rows` (n, columns).
-
-    Sources above their target are copied from the first row on, those below it from the last row back: each source is read before it is overwritten.
-    """
-    for i in range(len(chosen)):
-        if chosen[i] > i:
-            _copy_row(rows[chosen[i]], rows[i])
-    for i in range(len(chosen) - 1, -1, -1):
-        if chosen[i] < i:
-            _copy_row(rows[chosen[i]], rows[i])
-
-
-@lean_part
-def _copy_row(source: Floats, target: Floats) -> None:
-    """Set target[k] = source[k]. Slices of their own let the compiler copy several values at once."""
-    for k in range(len(target)):
-        target[k] = source[k]
 
 
 @lean_kernel
@@ -141,7 +111,7 @@ def moments(beliefs: BeaconBeliefs, weight: Floats) -> Floats:
     """
     mean, cov, _ = beliefs
     beacons = mean.shape[1]
-    # Of offset x, offset y, their squares with the variances, sine and cosine of the axis
+    # Sums of offset x, offset y, their squares with the variances, sine and cosine of the axis
     sums = np.zeros((beacons, 5))
     for i in range(len(mean)):
         w = weight[i]

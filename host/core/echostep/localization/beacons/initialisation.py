@@ -71,7 +71,7 @@ def _extent(readings: Floats) -> float:
 
 @part
 def _search(readings: Floats, x: float, y: float, cells: int, step_m: float) -> tuple[float, float, bool]:
-    """The place of least cost on a grid of so many cells to each side of (x, y), and whether all places apart from it cost more by MARGIN."""
+    """The place of least cost on a grid of `cells` cells to each side of (x, y), and whether all others cost more by MARGIN."""
     side = 2 * cells + 1
     cost, axes = np.empty((side, side)), np.empty(len(readings))
     best, at_i, at_j = np.inf, 0, 0

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Beacons in the particle filter: reweight the particles by a measurement, and let each correct its belief of the beacon [Montemerlo 2002].
 
-In: particles, and what a beacon measured to the boot. Out: log-weights, corrected `BeaconBeliefs`. Owns `BeaconHealth`: how well measurements fit,
+In: particles, a beacon's measurement to the boot. Out: log-weights, corrected `BeaconBeliefs`. Owns `BeaconHealth`: how well measurements fit,
 from which a moved beacon and a lost cloud are noticed.
 """
 
@@ -37,9 +37,9 @@ from echostep.walls.index import WallIndex, crosses_wall
 
 # Assumed, not measured.
 GREATEST_ODDS = math.exp(3.0)  # of a particle, that a beacon was moved
-LEAST_DOUBT = 1.0 / GREATEST_ODDS  # of a particle, in terms of a beacon that has just been placed
+LEAST_DOUBT = 1.0 / GREATEST_ODDS  # of a particle, relative to a beacon that has just been placed
 CLOSE_BEARING_M2 = 0.25  # squared distance below which a bearing carries no information: half a metre
-UNKNOWN_AXIS_RAD2 = 3.0  # variance above which an axis is unknown: that of a uniform one is pi^2 / 3
+UNKNOWN_AXIS_RAD2 = 3.0  # variance above which an axis is unknown: a uniform one has pi^2 / 3
 KNOWN_AXIS_RAD2 = 1.0  # variance below which an axis determines on which side of the beacon the boot is
 FIT_SHARE = 0.12  # of the newest measurement in a running mean
 MISFIT = 0.25  # running probability below which a beacon was moved
@@ -106,7 +106,7 @@ def reweight(
     """Reweight the particles by one measurement, correct their beliefs of the beacon, and bring the greatest log-weight to 0.
 
     The likelihood mixes two hypotheses: the beacon is where the particle believes it, or it was moved and any measurement is equally likely. The
-    particle's `doubt` gives the odds of the second; a particle that holds it for more likely does not correct its belief.
+    particle's `doubt` gives the odds of the second; a particle that considers it more likely does not correct its belief.
     Returns the cloud's mean probability of the first hypothesis, and the effective size after.
     """
     k, log_weight = measurement.slot, particles.log_weight
@@ -207,7 +207,7 @@ def _bearing_density(
 def propose_heading_jumps(
     turn: Floats, log_weight: Floats, length_m: float, model: BeaconModel, rng: np.random.Generator
 ) -> None:
-    """Over a path of this length turn some particles by a random jump of the heading; their log-weight falls by how rare jumps are."""
+    """Over a path of this length turn some particles by a random jump of the heading; their log-weight falls by the rarity of jumps."""
     tried, price = model.tries_per_m * length_m, math.log(model.kick_per_m / model.tries_per_m)
     for i in range(len(turn)):
         if rng.random() < tried:

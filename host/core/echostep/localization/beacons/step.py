@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""One reading of a beacon: where it is placed first, how it reweights the cloud, and where it is placed anew after it was moved.
+"""One reading of a beacon: where it is placed first, how it reweights the cloud, and where it is placed again after it was moved.
 
-In: particles, and what a beacon measured to the boot. Out: log-weights, corrected `Beacons`. Owns `Waiting`: the readings of beacons whose place is
-not known, or not any more. `BeaconMap` and the study of guided returns call the same kernels.
+In: particles, a beacon's measurement to the boot. Out: log-weights, corrected `Beacons`. Owns `Waiting`: the readings of beacons whose place is
+not known, or no longer known. `BeaconMap` and the study of guided returns call the same kernels.
 
 A beacon that is near within its first readings was just dropped and lies about each particle (one range of twenty is too long, the first one too).
-One that was first received from afar is located from several readings, for a near one leaves open on which side of the path it lies. One that was
-moved goes on to reweight the particles, each of which doubts it for itself, while readings for a new place are collected; they count only while the
+A beacon first received from afar is located from several readings, for a near one leaves open on which side of the path it lies. A moved beacon
+continues to reweight the particles, each of which doubts it separately, while readings for a new place are collected; they count only while the
 plan supports the cloud, because a wrong cloud would place a beacon where it suits that cloud, and other beacons may fit a wrong cloud too.
 """
 

@@ -4,7 +4,7 @@
 In: a range and the plan's echo sources, nearest first. Out: a likelihood. Owns nothing.
 
 An SRF02 reports the first echo that it detects. So a source answers if it is detected and no nearer one is, and a second reflection after them all.
-Where the plan is not what stands there (furniture, people, a door that is shut, a wall that is gone), the view of a ranger is hidden, and its echo
+Where the plan differs from the building (furniture, people, a door that is shut, a wall that is gone), the view of a ranger is hidden, and its echo
 carries no information about the pose. A hidden view persists along the path, as furniture has a length. So each particle carries the probability that
 its view is hidden, a Markov chain of two states over the path [Thrun et al. 2005, 6.3: the mixture of the beam model; here with a memory].
 """
@@ -20,11 +20,11 @@ from echostep.jit import inline_kernel, inline_part, lean_kernel, lean_part
 from echostep.walls.tile_points import CORNER, EDGE
 
 # Assumed, not measured.
-# Pings: a ranger in order misses one echo in two hundred; one that is not is known after two seconds
+# Pings: a ranger in order misses one echo in two hundred; a faulty one is known after two seconds
 PRIOR_MISSED, PRIOR_HEARD = 0.1, 20.0
 LIKE_M = 0.15  # difference of two echoes from one wall: three errors of their difference
 SURE_M = 3.0  # range within which a wall is detected surely: half of the ranger's
-MOST_SILENT = 8  # pings between two such echoes: more are a door
+MOST_SILENT = 8  # pings between two such echoes: more mean a door
 REMEMBERED = 200.0  # pings: tens of metres of path
 ABSORPTION_DB_M = 2.6  # dB per metre of distance, there and back, 40 kHz in air [ISO 9613-1]
 DB = 20.0 / math.log(10.0)  # decibels per unit of the natural logarithm of a distance
@@ -39,7 +39,7 @@ LEAST_LOGIT = -8.0  # below it a source is not detected: probability 3e-4
 SURE_RAD = math.radians(20.0)  # angle off the axis within which a near wall surely answers: half of the cone
 SURE_COS = math.cos(SURE_RAD)
 MINIMAL_M, FARTHEST_M = 1e-3, 100.0  # distances between which any ranger's limits lie
-GATE_SD = 6.0  # a source further from the range than so many standard deviations adds nothing
+GATE_SD = 6.0  # a source further from the range than this many standard deviations adds nothing
 
 
 class MissedEchoes:
@@ -52,7 +52,7 @@ class MissedEchoes:
         self._silent = [0, 0]  # pings since
 
     def odds(self, ranger: int) -> float:
-        """Probability that an echo is missed over that it is received."""
+        """Odds that an echo is missed, not received."""
         return self._missed[ranger] / self._heard[ranger]
 
     def update(self, ranger: int, range_m: float) -> None:
@@ -73,17 +73,17 @@ class MissedEchoes:
 
 @dataclass(frozen=True, slots=True)
 class EchoSettings:
-    """What an SRF02 may report; lengths in metres, probabilities of one ping.
+    """Model of an SRF02's reports; lengths in metres, probabilities of one ping.
 
     `sd_m`: range error of 3-4 cm [Girard 2011, 2.6] and the trunk's sway; it grows by `slant_m` per radian off the axis.
     A wall is detected with probability 1/2 when its level equals that of a wall straight ahead at `maximum_m`, given spreading and absorption there
     and back and a beam that is `rim_db` down at 27.5 degrees each way [Girard 2011, 2.6.2, 2.6.3]; `soft_db`: decibels per unit of logit.
     The inside of a corner answers `corner_db` more weakly, any other wall end `edge_db`, and more so with distance.
-    `hidden`: share of views in which the plan is not what stands there, `hidden_m`: length of the path over which a view stays hidden (a cupboard).
+    `hidden`: share of views in which the plan differs from the building, `hidden_m`: length of the path over which a view stays hidden (a cupboard).
     `stray`: a second reflection when no source was detected, a quarter of it after a silent ping; `outlier`: anything else, from ping to ping.
-    `correlation_m`: length of the path over which errors of successive echoes become independent: those of the plan, of a ranger's bias, and of the
-    trunk's sway, which lasts half a stride. `own`: share of an echo's information that none before it has brought, however far back: a plan that is
-    not what stands there errs alike for metres (by the filter's errors among real clutter: echo-own of the studies' notebook).
+    `correlation_m`: length of the path over which errors of successive echoes become independent: errors of the plan, of a ranger's bias, and of the
+    trunk's sway, which lasts half a stride. `own`: share of an echo's information that no echo before has brought, however far back: a plan that
+    differs from the building errs alike for metres (by the filter's errors among real clutter: echo-own of the studies' notebook).
     """
 
     sd_m: float = 0.036
@@ -153,7 +153,7 @@ def echo_model(s: EchoSettings) -> EchoModel:
 
 
 def _distance_m(level: float, per_db: float, spreading: float) -> float:
-    """Distance at which spreading and absorption take this level, in logits; `spreading`: in units of that of a wall. By bisection."""
+    """Distance at which spreading and absorption take this level, in logits; `spreading`: in units of a wall's spreading. By bisection."""
     low, high = MINIMAL_M, FARTHEST_M
     for _ in range(40):
         middle = 0.5 * (low + high)
@@ -243,7 +243,7 @@ def detection(distance_m: float, off_axis_rad: float, kind: float, m: EchoModel)
 def likeliest_source(
     count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel
 ) -> tuple[int, float, float]:
-    """Which of `count` sources, nearest first, is likeliest the first that is detected; the probabilities of that, and that none is detected."""
+    """Which of `count` sources, nearest first, is likeliest to be detected first; the probabilities of this, and that none is detected."""
     unheard, answers, first = 1.0, 0.0, 0
     for k in range(count):
         heard = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], m)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
 """The bias that the ranges of both rangers have in common, learnt where the plan supports the place.
 
-In: pings, where they were sent by the mean of a cloud, its covariance, the walls. Out: `MeasuredSegment`s without the bias. Owns its mean and
+In: pings, their places by the mean of a cloud, its covariance, the walls. Out: `MeasuredSegment`s without the bias. Owns its mean and
 variance.
 
 Half of the variance of a range's error is taken to stay with the ranger [SRF02: which wavefront crosses the threshold, 3-4 cm; Robot Electronics,
-sonar FAQ]. The density without a plan learns the distance of each wall that goes on, bias and all; the plan states the distance. So what both rangers
-measure too much, which no place explains, would speak against the plan as long as walls go on. What one measures more than the other moves the
-place by half of it, and is not learnt. A Kalman filter of one state; a ping counts by its power and by the probability that it is the expected echo.
+sonar FAQ]. The density without a plan learns the distance of each wall that goes on, bias and all; the plan states the distance. So an excess of both
+rangers, which no place explains, would speak against the plan as long as walls go on. An excess of one over the other moves the place by half of
+the excess, and is not learnt. A Kalman filter of one state; a ping counts by its power and by the probability that it is the expected echo.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ STAYS = 0.5
 
 
 class RangeBias:
-    """`mean_m`, `var_m2`: of what both rangers measure too much."""
+    """`mean_m`, `var_m2`: of the excess that both rangers measure."""
 
     def __init__(self, sd_m: float) -> None:
         """`sd_m`: of a range."""
         self.mean_m, self.var_m2 = 0.0, 0.5 * STAYS * sd_m**2  # of the mean of two
 
     def corrected(self, measured: MeasuredSegment) -> MeasuredSegment:
-        """The segment with ranges without the bias."""
+        """The segment, its ranges without the bias."""
         range_m = measured.range_m
         corrected = np.maximum(range_m - self.mean_m, LEAST_RANGE_M)
         return replace(measured, range_m=np.where(range_m > LEAST_RANGE_M, corrected, range_m))
@@ -52,7 +52,7 @@ class RangeBias:
         walls: Walls,
         model: EchoModel,
     ) -> None:
-        """By corrected pings (k,), sent from `place_m` (x, y, axis in rad, each (k,)), which is known with `covariance_m2` (xx, xy, yy)."""
+        """Learn from corrected pings (k,), sent from `place_m` (x, y, axis in rad, each (k,)), which is known with `covariance_m2` (xx, xy, yy)."""
         x, y, axis = place_m
         index = walls.near(x, y)
         self.mean_m, self.var_m2 = learn_bias(
@@ -62,7 +62,7 @@ class RangeBias:
     def learn_behind(
         self, cloud: ParticleArrays, weight: Floats, move: Move, pings: PingBatch, walls: Walls, model: EchoModel
     ) -> None:
-        """By corrected pings on a move, at whose end the particles (n,) of these weights are now."""
+        """Learn from corrected pings on a move, at whose end the particles (n,) with these weights are now."""
         rest = 1.0 - pings.share
         x, y, turn = float(weight @ cloud.x_m), float(weight @ cloud.y_m), mean_angle(cloud.turn_rad, weight)
         c, s = math.cos(turn), math.sin(turn)

@@ -29,7 +29,7 @@ from echostep.walls.index import WallIndex
 SECTORS = 24  # of 15 degrees
 UNIT_M = 0.025  # of a range in the table, one byte
 TABLE_SD_M = 0.2  # a cell's half diagonal, and the heading's error over a sector
-# Of the expected ranges are off by so many times as much: edges, corners, the next wall
+# Share of the expected ranges with a larger error, and by which factor: edges, corners, the next wall
 FAR_SHARE, FAR_FACTOR = 0.2, 3.0
 LIKELY = 0.05  # probability of detection that the sources up to the expected range have together
 CHANCES = 8  # steps of the probability of an echo
@@ -37,8 +37,8 @@ RANGES = 256  # steps of the expected range
 OUTSIDE_ENTRY = CHANCES * RANGES  # entry of a place outside the building
 # The ping before, of the same ranger: silence goes on where nothing answers, and where an entry is wrong
 AFTER_ECHO, AFTER_SILENCE = 0, 1
-# Shares after an echo, and after silence: of echoes heard by the entry that are none all the same; of "no echo" where none is heard (the others are
-# second reflections and things that no plan shows); of views that are hidden; of "no echo" in these
+# Shares after an echo, and after silence: of echoes expected by the entry that are missing all the same; of "no echo" where none is expected (the
+# others are second reflections and things that no plan shows); of views that are hidden; of "no echo" in these
 MISSED, QUIET, HIDDEN, HIDDEN_QUIET = (0.02, 0.1), (0.3, 0.8), (0.1, 0.2), (0.1, 0.6)
 USUAL_SILENT = (
     1.0 - EchoSettings().stray
@@ -47,7 +47,7 @@ MOST_QUIET = 0.95
 AROUND = 2  # cells about the floor, at its walls, that share the nearest row
 UNKNOWN = -1  # no row: outside the building
 USED_M = 0.25  # path between two pings of one ranger that are used: a cell of the table
-INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one: walls go on
+INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one ping: walls go on
 
 
 class RangeTable(NamedTuple):
@@ -90,7 +90,7 @@ def range_table_of(walls: Walls, floor: Floor, model: EchoModel) -> RangeTable:
 def log_densities(ping: TablePing, model: EchoModel, table: Floats) -> None:
     """Log-density per metre of a range by the entry, to the ping's power; range 0: of no echo.
 
-    With the entry's probability the echo is that of the expected range, else as where none is expected; so is the last entry, outside.
+    With the entry's probability the echo has the expected range, else it is as where none is expected; so is the last entry, outside.
     """
     range_m, missed = ping.range_m, MISSED[ping.after]
     quiet = min(QUIET[ping.after] * ((1.0 - model.stray) / USUAL_SILENT), MOST_QUIET)
@@ -159,7 +159,7 @@ class TablePings:
     def __init__(self) -> None:
         self.odometer = Odometer()
         self._used_at_m = [-math.inf, -math.inf]  # mark on the path at the last ping of each ranger
-        self._after = [AFTER_SILENCE, AFTER_SILENCE]  # what that was
+        self._after = [AFTER_SILENCE, AFTER_SILENCE]  # whether that ping had an echo
 
     def take(self, pings: PingBatch, k: int, way_m: float) -> TablePing | None:
         """The k-th ping, `way_m` after the end of the path; None if it comes too soon after the last one of its ranger."""

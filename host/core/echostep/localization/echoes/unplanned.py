@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Which pings count, and their density if nothing is known of the pose: what a wearer anywhere in the building
-receives, or what the last echoes predict.
+"""Which pings count, and their density if nothing is known about the pose: as received by a wearer anywhere in the building,
+or as predicted by the last echoes.
 
 In: walls, their floor, `MeasuredSegment`s in order of time. Out: `Background`: log-density by range; `PingBatch` and the pings'
 densities without a plan. Owns the views of both rangers, each the line in the walk frame that it detected last, or none, and the length of the path.
 
-A cloud that explains the echoes no better than this density is wrong, or the plan is. So the density is the best that is possible without a plan: a
-wall that goes on is predicted as well as by the plan; only where a view changes has the plan more information. A smooth wall answers from the foot of
+A cloud that explains the echoes no better than this density is wrong, or the plan is. So the density is the best possible without a plan: a wall that
+goes on is predicted as well as by the plan; only where a view changes does the plan have more information. A smooth wall answers from the foot of
 the perpendicular, whatever the ranger's axis: so its distance shrinks by the way along its normal. An extended Kalman filter of distance and
 direction of the normal. An edge or a corner answers as a wall whose normal turns, which TURN_SD_RAD allows.
 """
@@ -74,7 +74,7 @@ class LastWall:
         return normal(range_m - self.distance_m, math.sqrt(self._var_m2 + self._error_m(axis_rad) ** 2))
 
     def update(self, range_m: float, axis_rad: float, power: float) -> None:
-        """Correct the line by an echo, whose error counts by `power`: those of successive echoes are alike."""
+        """Correct the line by an echo, whose error counts by `power`: errors of successive echoes are alike."""
         total = self._var_m2 + self._error_m(axis_rad) ** 2 / power
         gain_m, gain_rad = self._var_m2 / total, self._covariance_m / total
         difference = range_m - self.distance_m
@@ -94,12 +94,12 @@ class UnplannedView:
 
     def __init__(self, echo: EchoSettings) -> None:
         self._echo = echo
-        self._wall: LastWall | None = None  # None: no echo yet
+        self._wall: LastWall | None = None  # None before the first echo
         self._x_m, self._y_m = math.nan, math.nan
 
     @property
     def is_silent(self) -> bool:
-        """Whether the last ping had no echo, or there was none."""
+        """Whether the last ping had no echo, or there was no ping."""
         return self._wall is None
 
     def move(self, x_m: float, y_m: float) -> float:
@@ -119,7 +119,7 @@ class UnplannedView:
         return 0.0 if self._wall is None else self._wall.density(range_m, axis_rad)
 
     def update(self, range_m: float, axis_rad: float, power: float, goes_on: bool) -> None:
-        """Take a ping in; `goes_on`: whether the view goes on, by the densities."""
+        """Take in a ping; `goes_on`: whether the view goes on, by the densities."""
         if range_m <= 0.0:
             if not goes_on:  # otherwise it is likelier that an echo was missed
                 self._wall = None
@@ -142,7 +142,7 @@ class Background(NamedTuple):
 
 
 def background(walls: Walls, floor: Floor, model: EchoModel) -> Background:
-    """The mean of the echo density over poses evenly on the floor; of a plan without a floor: even over all ranges."""
+    """The mean of the echo density over poses evenly on the floor; for a plan without a floor, even over all ranges."""
     bins = math.ceil(model.maximum_m / BIN_M) + 1
     if not len(floor.x_m):
         return Background(np.full(bins + 1, -math.log(model.maximum_m)))
@@ -164,10 +164,10 @@ class PlacedPings(NamedTuple):
 
 
 class UnplannedDensities(NamedTuple):
-    """Of pings (k,): `stray`, probability of a second reflection where nothing answers, by the one before; `missed`, odds that a silent one missed
-    its echo, 0 for an echo; `alike`, the density if like the one before, without those.
+    """Of pings (k,): `stray`, probability of a second reflection where nothing answers, by the one before; `missed`, odds that a silent ping missed
+    its echo, 0 for an echo; `alike`, the density if like the ping before, without these two.
 
-    Logs of densities to the pings' power, with them: `anywhere` in the building, `either` that or like the one before.
+    Logs of densities to the pings' power, with both: `anywhere` in the building, `either` anywhere or like the ping before.
     """
 
     stray: Floats
@@ -223,7 +223,7 @@ def evidence_share(turn_rad: float) -> float:
 
 
 def _loss(turn_rad: float, half_rad: float) -> float:
-    """By what the information of a ping is divided on a segment that turns; 2 where it turns by `half_rad`."""
+    """Divisor of a ping's information on a segment that turns; 2 if it turns by `half_rad`."""
     return 1.0 + (turn_rad / half_rad) ** 2
 
 

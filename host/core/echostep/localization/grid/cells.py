@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The cells of a building on the sheet of levels: what is heard in each, and what stands between two.
+"""The cells of a building on the sheet of levels: the ranges to expect in each, and the walls between two cells.
 
 In: walls, their floor, the table of expected ranges. Out: `GridCells`, plain arrays for kernels. Owns nothing.
 """
@@ -29,10 +29,10 @@ Entries = np.ndarray[tuple[int, int], np.dtype[np.uint16]]
 
 
 class GridCells(NamedTuple):
-    """Cells of CELL_M in rows of `columns` from (x0_m, y0_m) on; each array is (cells,) if not said otherwise, all rows one after the other.
+    """Cells of CELL_M in rows of `columns` from (x0_m, y0_m) on; each array is (cells,) unless stated otherwise, all rows one after the other.
 
     `barrier`: bits EAST_WALL, NORTH_WALL: a wall stands between the middles of the cell and of its neighbour; CLOSED: no trunk can be there (edge of
-    the grid, air beside an upper level). `connector`: number of the connector that holds it. `level` (columns,): that of each column. `row`: its
+    the grid, air beside an upper level). `connector`: number of the connector that holds it. `level` (columns,): level of each column. `row`: its
     column of `expected` (SECTORS, floor), or UNKNOWN.
     """
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Heights of a search: what rises and heights by pressure say of each level, and of each connector there.
+"""Heights of a search: the evidence of rises and heights by pressure for each level, and for each connector there.
 
 In: `HeightChange`s. Out: `LevelFactors`. Owns heights and offsets of the height by pressure: as in `height.levels`, but common to all states on a
-level, and in a connector there, since what is on the same stairs has risen by the same path.
+level, and in a connector there, since states on the same stairs have risen by the same path.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class GridHeights:
         self._lag_m: Floats = np.full(len(sheet.height_m), 0.0 if start.air is None else start.air.zero_m)
 
     def update(self, change: HeightChange, lag_variance: float) -> tuple[LevelFactors, float]:
-        """The factors of a segment, and the variance of the offset after it, given that before."""
+        """The factors of a segment, and the variance of the offset after it, given the variance before."""
         sheet, has_pressure = self._sheet, math.isfinite(change.height_sd_m)
         variance = lag_variance + change.height_sd_m**2
         knows_lag = has_pressure and lag_variance < UNKNOWN_LAG_M2
@@ -82,7 +82,7 @@ class GridHeights:
         return math.isfinite(change.felt_sd_m) and abs(change.felt_m) > 2.0 * self._climbing.flat_sd_m
 
     def _loss_by_foot(self, rise_m: float, change: HeightChange) -> float:
-        """Log-weight that a rise costs where there is none."""
+        """Log-weight that a measured rise costs where no rise is possible."""
         if not math.isfinite(change.felt_sd_m):
             return 0.0
         sd_m = math.hypot(self._climbing.flat_sd_m, change.felt_sd_m)

@@ -3,7 +3,7 @@
 
 In: `GridCells`, states, a piece of a move, the likelihoods of a ping by entry of the table. Out: states. Owns nothing.
 
-A state is a cell and a sector of the rotation walk -> map; those of one sector are one layer. All places of a layer are off the middles of their
+A state is a cell and a sector of the rotation walk -> map; the states of one sector are one layer. All places of a layer are off the middles of their
 cells by the same remainder, so a move shifts a layer by whole cells and smears nothing.
 """
 
@@ -24,7 +24,7 @@ Weights = np.ndarray[tuple[int], np.dtype[np.float32]]
 
 
 class GridStates(NamedTuple):
-    """n states in layers: layer h holds the states first[h] to first[h + 1]; its rotation is the middle of sector h of so many.
+    """n states in layers: layer h holds the states first[h] to first[h + 1]; its rotation is the middle of sector h of `layers`.
 
     `cell` (n,), `weight` (n,), `offset_m` (layers, 2): of each place of the layer from the middle of its cell.
     """
@@ -108,7 +108,7 @@ def _shift(turn: float, dx: float, dy: float, offset: Floats) -> tuple[int, int]
 
 @lean_part
 def _moved(cell: int, east: int, north: int, cells: GridCells) -> tuple[int, bool]:
-    """The cell so far off, -1 where no trunk can be, and whether a wall stands on the way: by turns to the east and to the north."""
+    """The cell `east` and `north` cells away, -1 where no trunk can be, and whether a wall is on the way: by turns to the east and to the north."""
     crossed = False
     while east != 0 or north != 0:
         if abs(east) >= abs(north):
@@ -152,7 +152,7 @@ def spread(
 def _spread_into(
     h: int, states: GridStates, beside: float, turned: float, scratch: Weights, touched: Int32s, cells: GridCells
 ) -> int:
-    """Write to `scratch` what layer h gets, and to `touched` where; returns in how many cells."""
+    """Write to `scratch` the weights that layer h gets, and to `touched` their cells; returns the number of cells."""
     cell, weight, first, offset = states
     layers, found = len(offset), 0
     for away in (-1, 0, 1):
@@ -230,7 +230,7 @@ def weigh_levels(states: GridStates, factor: LevelFactors, cells: GridCells) -> 
 
 @kernel
 def halved(states: GridStates) -> GridStates:
-    """Twice as many layers: each state becomes two of its weight, a quarter of a sector to either side."""
+    """Twice as many layers: each state becomes two with its weight, a quarter of a sector to either side."""
     cell, weight, first, offset = states
     layers, n = len(offset), len(cell)
     new_cell, new_weight = np.empty(2 * n, np.int32), np.empty(2 * n, np.float32)

@@ -3,7 +3,7 @@
 
 In: a start, moves with the pings and the change of height on them. Out: poses drawn from the grid. Owns the weight of each state, and the heights.
 
-The lengths and the rotation of the walk frame drift little, so a state moves rigidly with the path, and what it errs by is spread over its
+The lengths and the rotation of the walk frame drift little, so a state moves rigidly with the path, and its error is spread over its
 neighbours. A layer's sector of the rotation is halved when the way within it errs by a cell: the search is as fine as the path is long. Of the many
 states of a large building the heaviest MOST_STATES are kept.
 """
@@ -41,7 +41,7 @@ WALL_SHARE = math.exp(UNPLANNED_DOOR)  # of the weight that is left behind a wal
 MOST_STATES = 300_000  # a millisecond a ping
 SPREAD_M, SPREAD_RAD = 0.05, math.radians(1.0)  # standard deviations on a metre: per axis, and of the rotation
 SPREAD_SHARE = 0.05  # of a state's weight that is due to each neighbour when it is spread
-MOST_BESIDE, MOST_TURNED = 0.2, 0.25  # of it that a neighbour gets at most: what is spread keeps its peak
+MOST_BESIDE, MOST_TURNED = 0.2, 0.25  # of the weight that a neighbour gets at most: the peak remains
 NO_PING_BEND = bend_of(math.radians(45.0))  # of a move's chord, above which its pings do not count: an uncertain turn
 
 
@@ -65,7 +65,7 @@ class SearchGrid:
         self, cells: GridCells, places: Places, unplanned: RangeMemory, heights: GridHeights | None = None,
         veer_sd_rad: float = 0.0,
     ) -> None:  # fmt: skip
-        """Evenly at these places, with any rotation.
+        """Begin evenly at these places, with any rotation.
 
         `unplanned`: density without a plan, as inexact as the table. `heights`: None in a building of one level.
         `veer_sd_rad`: standard deviation of a bias of the path, its turn on a metre.
@@ -89,7 +89,7 @@ class SearchGrid:
         self._note_least(1.0)
 
     def begin_about(self, x_m: Floats, y_m: Floats, turn_rad: Floats, share: float) -> None:
-        """Begin anew, with this share of the weight at these poses (n,), and the rest evenly."""
+        """Begin again, with this share of the weight at these poses (n,), and the rest evenly."""
         self._begin()
         s = self._states
         size = int(s.first[1])
@@ -113,13 +113,13 @@ class SearchGrid:
         return self._pings.odometer.path_m
 
     def turn_walk_frame(self, by_rad: float) -> None:
-        """Rotate all states: the heading in the walk frame has changed while that on the map has not."""
+        """Rotate all states: the heading in the walk frame has changed while the heading on the map has not."""
         self._turned_rad += by_rad
 
     def advance(self, move: Move, pings: PingBatch, model: EchoModel) -> float:
         """Move all states, and weigh them by the pings that `TablePings` takes, each where it was triggered.
 
-        Returns the log of the density of these pings over that without a plan, to the power with which they count here.
+        Returns the log of the density of these pings over the density without a plan, to the power with which they count here.
         """
         length, bend, done = math.hypot(move.dx_m, move.dy_m), math.hypot(move.bend_x_m, move.bend_y_m), 0.0
         table, log_ratio = np.empty(OUTSIDE_ENTRY + 1), 0.0
@@ -160,12 +160,12 @@ class SearchGrid:
         self._states = s._replace(cell=s.cell[:kept], weight=s.weight[:kept])
         if kept:
             self._note_least(top)
-        else:  # all are beyond the ground that the grid has
+        else:  # all are beyond the ground that the grid covers
             self._begin()
         return log_mean
 
     def change_levels(self, change: HeightChange, lag_variance: float) -> tuple[float, float]:
-        """Weigh by a change of height, and move what has reached another level.
+        """Weigh by a change of height, and move states that have reached another level.
 
         Returns the variance of the height by pressure's offset, and the log of the mean factor of the weights.
         """
@@ -177,14 +177,14 @@ class SearchGrid:
         return lag_variance, factors.log_top + math.log(max(mean, LEAST_SHARE))
 
     def _note_least(self, top: float) -> None:
-        """Note the greatest weight, and that below which a state is dropped with the next step."""
+        """Note the greatest weight, and the weight below which a state is dropped with the next step."""
         self._top, self._least, count = top, LEAST_SHARE * top, len(self)
         if count > MOST_STATES:
             sample = self._states.weight[:: max(count // 20_000, 1)]
             self._least = max(float(np.quantile(sample, 1.0 - MOST_STATES / count)), self._least)
 
     def _refine(self) -> None:
-        """Halve the sectors if the way within one errs by a cell, and spread what is due."""
+        """Halve the sectors if the way within one errs by a cell, and spread the weight that is due."""
         layers = len(self._states.offset_m)
         if self._turned(self._turn_variance, 2 * layers) < MOST_TURNED and self.path_m * math.pi / layers > CELL_M:
             self._states, layers = halved(self._states), 2 * layers
@@ -213,7 +213,7 @@ class SearchGrid:
         return float(np.partition(weight, len(weight) - count)[len(weight) - count :].sum() / weight.sum())
 
     def draw(self, count: int, rng: np.random.Generator) -> DrawnPoses:
-        """So many poses, evenly within their cells and sectors."""
+        """`count` poses, evenly within their cells and sectors."""
         poses = self._poses(systematic(self._states.weight.astype(np.float64), float(rng.random()), count))
         within = rng.random((3, count)) - 0.5
         turn = poses.turn_rad + 2.0 * math.pi / len(self._states.offset_m) * within[2]

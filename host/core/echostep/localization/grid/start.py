@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The grid of a start that is not known: evenly over the floor, and about a place where there is one.
+"""The grid of an unknown start: evenly over the floor, and about a place if one is given.
 
 In: a `Start`, the cells of the building, its floor. Out: a `SearchGrid`. Owns nothing.
 """
@@ -26,14 +26,14 @@ DRAWN = 20_000  # poses that stand for a place with a spread
 
 
 def is_unknown(start: Start) -> bool:
-    """Whether the place is searched, as more than particles about a pose."""
+    """Whether the place is searched: it is too wide for particles about a pose."""
     return start.pose is None or start.sd_m > ROOM_SD_M
 
 
 def grid_about(
     cloud: Cloud, cells: GridCells, unplanned: RangeMemory, floor: Floor, settings: FilterSettings, rng: np.random.Generator
 ) -> SearchGrid:  # fmt: skip
-    """The grid of the poses of a cloud: by it, the cloud is compared with a search as long as that is on a grid."""
+    """The grid of a cloud's poses, by which the cloud is compared with a search as long as the search is on a grid."""
     heights = None if cloud.sheet is None else GridHeights(cloud.sheet, settings.climb, Start(air=cloud.air))
     grid = SearchGrid(cells, (floor.x_m, floor.y_m), unplanned, heights, math.radians(settings.cloud.start_veer_sd_deg))
     chosen = systematic(cloud.weight, float(rng.random()), len(cloud.x_m))

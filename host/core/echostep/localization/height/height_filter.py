@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Height by pressure at this moment, also in a lift that moves; height above the start without a plan.
+"""Height by pressure at this moment, also in a moving lift; height above the start without a plan.
 
 In: heights by pressure with the time between them, the foot's rises. Out: the height at the end of each segment. Owns two Kalman filters of two
 states: the height and its rate; the height and the lag of the height by pressure behind it, a random walk.
 
-The median of a segment's heights is robust, but that of its middle: a quarter of a second old, and 0.25 m behind in a lift at 1 m/s. A rate that
-changes slowly (a lift takes more than a second to start) carries many heights on to now: simulated rides of 3.5 m with an SCP1000 have a root mean
+The median of a segment's heights is robust, but belongs to the middle: a quarter of a second old, and 0.25 m behind in a lift at 1 m/s. A rate that
+changes slowly (a lift takes more than a second to start) carries many heights to the end: simulated rides of 3.5 m with an SCP1000 have a root mean
 square error of 0.16 m, not of 0.23 m.
 """
 
@@ -28,7 +28,7 @@ UNKNOWN_M = 1e4  # standard deviation of the lag before the first pressure: any 
 
 
 class RidingHeight:
-    """`add` the heights of each segment; `height_m` is that at the end of the last one, NaN before the first height."""
+    """`add` the heights of each segment; `height_m` is the height at the end of the last one, NaN before the first height."""
 
     def __init__(self, height_sd_m: float) -> None:
         """`height_sd_m`: of one height by pressure."""
@@ -36,12 +36,12 @@ class RidingHeight:
         self.forget()
 
     def forget(self) -> None:
-        """The heights begin anew: those to come may be another barometer's."""
+        """The heights begin again: the next ones may be another barometer's."""
         self.height_m, self._rate_m_s = math.nan, 0.0
         self._hh, self._hr, self._rr = 0.0, 0.0, 0.0  # their covariance
 
     def add(self, height_m: Floats, span_s: float) -> None:
-        """Heights (k,) evenly spread over the time since those before; the last one is that of its end."""
+        """Heights (k,) evenly spread over the time since the heights before; the last one is at its end."""
         dt_s = span_s / max(len(height_m), 1)
         for height in height_m.tolist():
             if math.isnan(self.height_m):
@@ -76,7 +76,7 @@ class RelativeHeight:
         self._covariance = np.diag([0.0, UNKNOWN_M**2])
 
     def forget_lag(self) -> None:
-        """The heights by pressure begin anew: those to come may be another barometer's."""
+        """The heights by pressure begin again: the next ones may be another barometer's."""
         self._covariance = np.diag([self._covariance[HEIGHT, HEIGHT], UNKNOWN_M**2])
 
     @property

@@ -3,7 +3,7 @@
 
 In: particles after a move, and the `HeightChange` over it. Out: heights, log-weights, and levels (the level shows in x on the sheet). Owns nothing.
 
-On a level a particle has the height of that level, and a rise of the foot is unlikely. Only in a connector the height changes: on stairs and ramps
+On a level a particle has the height of that level, and a rise of the foot is unlikely. The height changes only in a connector: on stairs and ramps
 by the foot's rise, or by pressure without a foot; in a lift by pressure. It ends at the lowest and the highest level that the connector serves: a
 rise beyond is as unlikely as one on a level. A particle that leaves a connector must have the height of the level it enters. Weather slowly shifts
 the height by pressure, so each particle estimates this offset, `lag`: a Kalman filter of one state, whose variance is the same for all particles
@@ -57,12 +57,12 @@ class ClimbSettings:
 
 
 def drift_m(climbing: ClimbSettings, pause_s: float) -> float:
-    """Standard deviation of the drift of the height by pressure while nothing was measured for so long."""
+    """Standard deviation of the drift of the height by pressure over a pause without measurements."""
     return math.hypot(climbing.drift_m * math.sqrt(pause_s), WEATHER_M_S * pause_s)
 
 
 class HeightChange(NamedTuple):
-    """What is known of the height over a path segment of duration `span_s`.
+    """Measured change of height over a path segment of duration `span_s`.
 
     `felt_m`: rise by the foot, with its standard deviation (infinite: no foot). `height_m`: height by pressure on the segment, with its standard
     deviation (infinite: no pressure). `riding_m`: the same at the segment's end, where the height changes (`riding_height`).
@@ -102,7 +102,6 @@ def change_levels(
     lag_variance: float, model: LevelChangeModel, sheet: LevelSheet,
 ) -> tuple[float, float]:  # fmt: skip
     """Update heights, levels and log-weights after a move that led to the particles' present places; `noise` (n,) is standard normal.
-
     Returns the variance of `lag` afterwards, and the log of the mean factor of the weights; the greatest log-weight is 0 again.
     """
     x, y, turn, scale, log_weight = particles
@@ -180,7 +179,7 @@ class UpperLevels:
         self._is_above = above & (np.bincount(level_of(floor.x_m, sheet), minlength=len(above)) > 0)
 
     def log_loss(self, x_m: Floats, y_m: Floats, path_m: float) -> Floats | None:
-        """Loss of log-weight (n,) of places on the sheet on this length of path; None if none is in the air."""
+        """Loss of log-weight (n,) of places on the sheet on this length of path; None if no place is in the air."""
         is_above = self._is_above[level_of(x_m, self._sheet)]
         if not is_above.any():
             return None

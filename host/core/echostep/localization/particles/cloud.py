@@ -49,18 +49,18 @@ from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
 
-SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never so large
-# Weight outside of one place below which a search has found it, on one level, and on several, there after so many metres of search: exact likelihoods
-# discriminate between levels that are alike, and need a way for it; assumed
+SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never that large
+# Weight outside of one place below which a search has found it, on one level, and on several, there after this length of search: exact likelihoods
+# discriminate between levels that are alike, and need a path to do so; assumed
 FOUND_REST, LEVELS_REST, LEVELS_M = 0.03, 0.1, 10.0
 SHOWN = 5_000  # particles that show a search
 TRACED_M2_RAD = 5.0  # poses that 20,000 particles fill by the sizes of `CloudSettings`: 6,000 cells
 SCATTERED_SHARE = 0.8  # weight of a search that stays about its places after a move that was not observed, assumed
 START_SIZE = 6_000  # least particles at the start: enough of them in the tails of its distribution (`start`)
 LEAST_LEVEL = 0.01  # probability of a level that counts among those on which the trunk may be, assumed
-# Particles of a second pass (about a second for 40 m), and roughening (m, rad) of the places tried again: a coarse place is off by so much
+# Particles of a second pass (about a second for 40 m), and roughening (m, rad) of the places tried again: a coarse place is off by this much
 PASSING, PASSING_ROUGH = 5_000, (0.5, math.radians(2.0))
-# Bend of a particle's way beyond that of the segment, as a share of it: none to two arcs of a circle: a person turns on the spot, or walks
+# Bend of a particle's way beyond the segment's bend, as a share of it: none to two arcs of a circle: a person turns on the spot, or walks
 # round the end of a wall more sharply than an arc
 BENDS = (-1.0, 3.0)
 
@@ -76,7 +76,7 @@ class Cloud(Particles):
     """Particles as flat arrays of n; `log_weight` is normalised to a maximum of 0.
 
     A cloud is scattered or contracted by its number of particles, gathered or in one place by its spread: see the properties of these names.
-    `grid`: of a search, until it has found the place; the particles only show it, and are drawn from it anew after each move. `is_gathered`: since
+    `grid`: of a search, until it has found the place; the particles only show it, and are drawn from it again after each move. `is_gathered`: since
     it last was scattered by an unobserved move, less than GATHERED_REST of its weight was once farther than ROOM_M from its mean on the sheet.
     """
 
@@ -125,7 +125,7 @@ class Cloud(Particles):
         return self.grid is not None
 
     def search(self, move: Move, pings: PingBatch, model: EchoModel) -> float:
-        """Move and weigh all states of a search; returns the log of its density of the pings over that without a plan."""
+        """Move and weigh all states of a search; returns the log of its density of the pings over the density without a plan."""
         return 0.0 if self.grid is None else self.grid.advance(move, pings, model)
 
     def show_search(self) -> bool:
@@ -144,14 +144,14 @@ class Cloud(Particles):
         return True
 
     def show_every_state(self) -> None:
-        """Let the particles of a search be all states of the grid."""
+        """Make the particles of a search all states of the grid."""
         if self.grid is not None:
             poses, log_weight = self.grid.every()
             self._put(poses)
             self.log_weight = log_weight
 
     def draw_veer(self) -> None:
-        """Draw each particle's veer; after a search, once its second pass is over: that begins where the path leads back to."""
+        """Draw each particle's veer; after a search, once its second pass is over: the pass begins where the path leads back to."""
         sd_rad_m = math.radians(self._settings.start_veer_sd_deg)
         if sd_rad_m > 0.0:  # otherwise nothing is drawn: a walk on foot stays the same to the bit
             self.veer_rad_m = sd_rad_m * self._rng.standard_normal(len(self.x_m))
@@ -254,7 +254,7 @@ class Cloud(Particles):
 
     @property
     def air(self) -> Air | None:
-        """Mean and standard deviation of the lag of the height by pressure; None where nothing is known of it."""
+        """Mean and standard deviation of the lag of the height by pressure; None if it is unknown."""
         if self.sheet is None or self.lag_variance >= UNKNOWN_LAG_M2:
             return None
         weight = self.weight
@@ -262,9 +262,9 @@ class Cloud(Particles):
         return Air(mean, math.sqrt(self.lag_variance + float(weight @ (self.lag_m - mean) ** 2)))
 
     def scatter(self, move: Move, change: HeightChange | None = None) -> None:
-        """Spread by an unobserved move without regard to walls, since its path is unknown. The level is that of the height by pressure, if any.
+        """Spread by an unobserved move without regard to walls, since its path is unknown. The level follows the height by pressure, if any.
 
-        A search begins anew about where this led to.
+        A search begins again about the places reached.
         """
         self.keep(systematic(np.exp(self.log_weight), float(self._rng.random()), self._settings.largest))
         self.is_gathered = False
@@ -287,7 +287,7 @@ class Cloud(Particles):
     def reweight(self, log_factor: Floats) -> None:
         """Multiply the weights by factors, given as logarithms (n,), and resample when too few particles carry the weight.
 
-        Those of a search are its states (`show_every_state`).
+        The particles of a search are its states (`show_every_state`).
         """
         self.log_weight = self.log_weight + log_factor
         self.log_weight -= self.log_weight.max()
@@ -345,7 +345,7 @@ class Cloud(Particles):
         return noise
 
     def _draw_bends(self, move: Move) -> None:
-        """Draw the bend of each particle's path on a move, relative to that of BENT of an arc."""
+        """Draw the bend of each particle's path on a move, relative to the bend of BENT of an arc."""
         turns, count = move.bend_x_m != 0.0 or move.bend_y_m != 0.0, len(self.x_m)
         self.bend = self._rng.uniform(*BENDS, count) if turns else np.zeros(count)
 

@@ -3,7 +3,7 @@
 
 In: `ParticleArrays`, a `Move` in the walk frame, the walls. Out: the same arrays, changed in place. Owns nothing.
 
-While a segment is processed, weights are no logarithms and each particle's rotation is kept as its cosine and sine (`SegmentArrays`): a segment has
+While a segment is processed, weights are not logarithms and each particle's rotation is kept as its cosine and sine (`SegmentArrays`): a segment has
 many pings, and between two of them a particle turns by little.
 """
 
@@ -25,7 +25,7 @@ NOISE_TURN, NOISE_SCALE, NOISE_BEND = 2, 3, 4  # rows of the noise (5, n); rows 
 
 
 class MovePiece(NamedTuple):
-    """Chord of a piece of a move, and what of it its bend is (m, walk frame)."""
+    """Chord of a piece of a move, and the part of it due to the bend (m, walk frame)."""
 
     dx_m: float
     dy_m: float
@@ -67,7 +67,7 @@ def propagate(
     particles: ParticleArrays, arrays: SegmentArrays, piece: MovePiece, share: float, noise: Floats, wall_factor: float,
     walls: WallIndex,
 ) -> tuple[float, float]:  # fmt: skip
-    """Move every particle by a piece, with this share of its noise (5, n) but all of that of its bend; one that crosses a wall keeps `wall_factor`.
+    """Move every particle by a piece, with this share of its noise (5, n) but all of its bend's; one that crosses a wall keeps `wall_factor`.
 
     Returns the greatest weight afterwards, and the share of the weight that crossed no wall.
     """
@@ -93,7 +93,7 @@ def propagate(
 
 @inline_part
 def rotated(c: float, s: float, by_rad: float, to_rad: float) -> tuple[float, float]:
-    """Cosine and sine of `to_rad` from those of the angle before it turned by `by_rad`: to 1e-12 by series, exactly where it turned much."""
+    """Cosine and sine of `to_rad` from the values before a turn by `by_rad`: to 1e-12 by series, exactly for a large turn."""
     if abs(by_rad) > SMALL_RAD:
         return math.cos(to_rad), math.sin(to_rad)
     b2 = by_rad * by_rad

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Weighted particles as a struct of arrays, and what can be read from them.
+"""Weighted particles as a struct of arrays, and the values read from them.
 
 In: arrays of n particles. Out: levels, weights, places. Owns the arrays.
 """
@@ -70,7 +70,7 @@ class Particles:
 
     @property
     def hidden_share(self) -> float:
-        """Their mean."""
+        """Mean of `hidden_shares`."""
         return float(self.hidden_shares.mean())
 
     def places(self, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:
@@ -79,7 +79,7 @@ class Particles:
 
     @property
     def place_share(self) -> float:
-        """Weight of the likeliest place, on whatever level; 0 where none has enough to be listed."""
+        """Weight of the likeliest place, on whatever level; 0 if none has enough to be listed."""
         places = hypotheses(self.map_x_m, self.y_m, np.zeros(len(self.x_m), np.int64), self.turn_rad, self.weight)
         return places[0].probability if places else 0.0
 

@@ -18,7 +18,7 @@ from echostep.localization.limits import ROOM_M
 
 # Assumed, not measured.
 MOST_PLACES = 5  # likely places that are listed
-LEAST_PROBABILITY = 0.02  # probability of one that is listed
+LEAST_PROBABILITY = 0.02  # probability of a place that is listed
 SQUARE_M = 1.0  # side of a square, doubled until there are at most MOST_SQUARES
 MOST_SQUARES = 1_000_000  # memory: 8 MB
 
@@ -114,7 +114,7 @@ def _take(
 
 @part
 def _middle(heaviest: int, particles: _Particles, left: Floats) -> tuple[float, float, int]:
-    """Mean place and level of what is left in a square."""
+    """Mean place and level of the particles left in a square."""
     total, x_m, y_m, on_level = 0.0, 0.0, 0.0, -1
     for i in range(len(left)):
         if particles.square[i] == heaviest and left[i] > 0.0:

@@ -55,7 +55,7 @@ class EchoMemory(NamedTuple):
 
 
 class CloudModel(NamedTuple):
-    """What the kernels need of the settings: log-weight that crossing a wall costs, effective share that asks for resampling, the echo model."""
+    """Settings that the kernels need: log-weight that crossing a wall costs, effective share that asks for resampling, the echo model."""
 
     wall_cost: float
     resample_below: float
@@ -77,7 +77,7 @@ def propagate_and_reweight(
     """Continue from `progress` until the cloud needs to be resampled or the move is over; `noise` (5, n) is for the rest of the move.
 
     Writes to `memory.log_evidence` (k,) the log of each ping's mean likelihood under the cloud before it. Returns the new progress, the lowest
-    log of what a piece of the move left of the greatest weight, and the log of the weight that the walls left.
+    log of the share that a piece of the move left of the greatest weight, and the log of the weight that the walls left.
     """
     sources = SourceList(np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES))
     arrays, wall_factor = begin_segment(particles), math.exp(-model.wall_cost)

@@ -47,5 +47,5 @@ def kld_size(x_m: Floats, y_m: Floats, turn_rad: Floats, settings: CloudSettings
 
 
 def spread_evenly(size: int, count: int) -> Ints:
-    """At most `count` of so many indices, evenly: in a cloud that is not gathered, light places have more particles than by their weight."""
+    """At most `count` of `size` indices, evenly: in a cloud that is not gathered, light places have more particles than by their weight."""
     return np.unique(np.linspace(0, size - 1, count).astype(np.int64))

@@ -12,13 +12,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.plan.model import Pose
+from echostep.plan import Pose
 from echostep.walls.floor import Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 ANY_LEVEL = -1  # level of a start that is not known
 # A stated start is sometimes wrong: a tap beside the place, a body that does not face the way the toes point
-WIDE_SHARE = 0.07  # of the particles have these standard deviations beside those stated, assumed:
+WIDE_SHARE = 0.07  # of the particles have these standard deviations besides the stated ones, assumed:
 WIDE_SD_M, WIDE_SD_RAD = 0.9, math.radians(30.0)  # a stride, a foot that is set down turned
 # Of a search, this share is drawn about where the wearer was believed: errors are mostly small; assumed
 NEAR_SHARE, NEAR_SD_M, NEAR_SD_RAD = 0.6, 2.0, math.radians(20.0)
@@ -38,10 +38,10 @@ class Start:
     """Where the trunk may be at the beginning.
 
     `pose`: its mean, with a standard deviation `sd_m` per axis and `heading_sd_rad`; a pose with level ANY_LEVEL may be on any. Without a pose:
-    evenly over the walkable floor, on any level and with any heading, within the outline `room_m` (k, 2) on `level` if there is one; a share of them
-    `near` a pose, if there is one: with level ANY_LEVEL, above and below it too, with
-    any heading. `air`: what is known of the heights by pressure.
-    `after_pause`: at the pose an earlier run ended, and the wearer may have gone on since, so the whole building is searched beside it.
+    evenly over the walkable floor, on any level and with any heading, within the outline `room_m` (k, 2) on `level` if given; a share of them
+    `near` a pose, if given: with level ANY_LEVEL, above and below it too, with
+    any heading. `air`: calibration of the heights by pressure.
+    `after_pause`: an earlier run ended at the pose, and the wearer may have gone on since, so the whole building is searched beside it.
 
     >>> import echostep
     >>> echostep.Start()  # anywhere in the building
@@ -90,7 +90,7 @@ def draw_poses(
 
 
 def near_count(count: int) -> int:
-    """How many of so many particles, the first ones, are drawn near a pose."""
+    """How many of `count` particles, the first ones, are drawn near a pose."""
     return round(NEAR_SHARE * count)
 
 
@@ -108,12 +108,12 @@ def _drawn_near(
 
 
 def _levels(level: int, count: int, sheet: LevelSheet) -> Ints:
-    """The level of each of so many particles: the given one, or all in turn."""
+    """The level of each of `count` particles: the given one, or all in turn."""
     return np.arange(count) % len(sheet.height_m) if level == ANY_LEVEL else np.full(count, level)
 
 
 def allowed_floor(floor: Floor, start: Start, sheet: LevelSheet | None) -> Floor:
-    """The cells of the floor that a start without a pose allows; all of them where a room has none."""
+    """The cells of the floor that a start without a pose allows; all of them if a room has none."""
     level = np.zeros(len(floor.x_m), np.int64) if sheet is None else level_of(floor.x_m, sheet)
     allowed = np.ones(len(level), np.bool_) if start.level == ANY_LEVEL else level == start.level
     if start.room_m is not None:

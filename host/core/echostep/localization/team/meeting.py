@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A meeting with another wearer, and what it says of the wearer's place.
+"""A meeting with another wearer, and its evidence for the wearer's place.
 
-In: the fields of a message. Out: `Meeting`, its covariance, a start by it alone. Owns nothing.
+In: the fields of a message. Out: `Meeting`, its covariance, a start from it alone. Owns nothing.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from echostep.ports.people.check_in import MOST_SD_M, CheckIn
 SIDE_SD_M = 0.6  # per axis, of the offset between two people side by side: an arm's length
 MOVED_M_S = 1.0  # speed at which a teammate may have gone on since the report: a walk
 WIDEST_M = 10.0  # 95 % radius of the wearer's place by a meeting, above which the meeting adds nothing to the plan
-RANGE_BODY_SD_M = 0.1  # of a radio range: what bodies and antennas add
+RANGE_BODY_SD_M = 0.1  # of a radio range: added by bodies and antennas
 WRONG = {"tracking": 0.02, "uncertain": 0.2}  # probability that a meeting is wrong, by the teammate's status
 
 
@@ -50,11 +50,11 @@ class Meeting:
     share: float = 1.0
 
 
-TimedMeeting = tuple[float, Meeting]  # time (s) of a meeting, -inf where it is not known
+TimedMeeting = tuple[float, Meeting]  # time (s) of a meeting, -inf if it is not known
 
 
 def on_the_way(meeting: Meeting, segment: PathSegment, t_s: float) -> Meeting:
-    """The meeting at this time with the displacement since the begin of its segment; unchanged for an unobserved segment."""
+    """The meeting at this time with the displacement since the beginning of its segment; unchanged for an unobserved segment."""
     span_s = segment.t1_s - segment.t0_s
     if segment.unobserved or span_s <= 0.0:
         return meeting
@@ -78,7 +78,7 @@ def covariance(meeting: Meeting) -> Floats:
 
 
 def start_at(meeting: Meeting) -> CheckIn:
-    """A start by a meeting alone: about the teammate, within the radio's range and the way until then, with any heading."""
+    """A start from a meeting alone: about the teammate, within the radio's range and the way until then, with any heading."""
     range_m = 0.0 if meeting.range_m is None else meeting.range_m
     way_m2 = meeting.way_x_m**2 + meeting.way_y_m**2
     sd_m = math.sqrt(0.5 * (float(np.trace(covariance(meeting))) + range_m**2 + way_m2))

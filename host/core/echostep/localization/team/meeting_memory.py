@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Which meetings count, which wait for their segment, and what each has done.
+"""Which meetings count, which wait for their segment, and the effect of each.
 
-In: meetings. Out: whether each counts, those whose time has come. Owns when each teammate was met, and the meetings that wait.
+In: meetings. Out: whether each counts, meetings whose time has come. Owns when each teammate was met, and the meetings that wait.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class MeetingEffect(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class MeetingNews:
-    """The newest meeting: its number, counted from 1, with whom, and what it did."""
+    """The newest meeting: its number, counted from 1, with whom, and its effect."""
 
     number: int
     name: str
@@ -62,7 +62,7 @@ class MeetingMemory:
         self._contradicted_m: list[float] = []  # marks at the contradictions since the last agreement
 
     def refusal(self, meeting: Meeting) -> MeetingEffect | None:
-        """Why a meeting does not count; None where it does, which is remembered."""
+        """Why a meeting does not count; None if it counts, which is remembered."""
         if not carries_position(meeting):
             return MeetingEffect.EMPTY
         key = meeting.name, meeting.beacon
@@ -91,21 +91,21 @@ class MeetingMemory:
 def moved_probability(here: float, meeting: Meeting, count: int) -> float:
     """Probability that the meeting is right where `count` meetings contradict a cloud that is right with probability `here`.
 
-    If the cloud is right, all of them are wrong: odds of here wrong^count; otherwise this one is right with 1 - wrong.
+    If the cloud is right, all of them are wrong: odds of here * wrong^count; otherwise this one is right with 1 - wrong.
     """
     wrong = WRONG[meeting.status]
     return (1.0 - here) * (1.0 - wrong) / (here * wrong**count + 1.0 - here)
 
 
 def moved_by(meeting: Meeting, here: float, count: int) -> float | None:
-    """Probability of the teammate's place where `count` contradictions move the cloud there; None where they do not. `here`: that it is right."""
+    """Probability of the teammate's place where `count` contradictions move the cloud there, else None. `here`: probability that it is right."""
     moved = moved_probability(here, meeting, count)
     is_alone = count < CONTRADICTIONS and here >= PROBABLE
     return None if (meeting.range_m or 0.0) > PLACE_M or is_alone or moved < PROBABLE else moved
 
 
 class MeetingQueue:
-    """Meetings that wait for their segment. `counts`: of all meetings by what they did; `bad` ones are no meetings."""
+    """Meetings that wait for their segment. `counts`: of all meetings by effect; `bad` ones are no meetings."""
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
@@ -113,7 +113,7 @@ class MeetingQueue:
         self._waiting: list[TimedMeeting] = []
 
     def receive(self, payload: bytes, levels: int) -> Meeting | None:
-        """The meeting in the bytes of a chunk, on a plan of so many levels; bytes that are none are counted."""
+        """The meeting in the bytes of a chunk, on a plan of `levels` levels; other bytes are counted."""
         message = parse_meeting(payload)
         if message is None or message.level >= levels:
             self.counts["bad"] += 1
@@ -121,7 +121,7 @@ class MeetingQueue:
         return Meeting(**structs.asdict(message))
 
     def add(self, meeting: Meeting, t_s: float) -> None:
-        """Keep a meeting of this time; of too many the oldest are dropped."""
+        """Keep a meeting of this time; if too many, the oldest are dropped."""
         self._waiting = [*self._waiting, (-math.inf if math.isnan(t_s) else t_s, meeting)][-MOST_WAITING:]
 
     def pop(self, t_s: float) -> list[TimedMeeting]:

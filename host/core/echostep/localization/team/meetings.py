@@ -3,7 +3,7 @@
 
 In: a cloud with its probability, a `Meeting`. Out: the same cloud, reweighted, and how well the meeting fits it. Owns the model.
 
-The cloud is that at the begin of a segment, the meeting happened during it, up to a stride later: `on_the_way` gives it the displacement until
+The cloud is at the beginning of a segment, the meeting happened during it, up to a stride later: `on_the_way` gives it the displacement until
 then, and each particle is reweighted at its place displaced by it.
 
 If the meeting is right, the wearer stands beside the teammate: the offset is N(0, SIDE_SD_M^2) per axis after a tap, and a radio range is N(distance,
@@ -56,7 +56,7 @@ def log_density(meeting: Meeting, place: Floats, on_level: Bools, levels: int) -
 
 
 def information(meeting: Meeting, mean: Floats) -> Floats:
-    """Inverse covariance (2, 2) of the wearer's place by the meeting; of a radio range only along the line from the teammate to `mean` (2,)."""
+    """Inverse covariance (2, 2) of the wearer's place by the meeting; for a radio range only along the line from the teammate to `mean` (2,)."""
     spread = covariance(meeting)
     if meeting.range_m is None:
         inverse: Floats = np.asarray(np.linalg.inv(spread), np.float64)
@@ -127,7 +127,7 @@ def _intersection(meeting: Meeting, place: Floats, weight: Floats, log_met: Floa
 
 
 def _along(away: Floats) -> Floats:
-    """Unit vectors (n, 2); east where there is no direction."""
+    """Unit vectors (n, 2); east without a direction."""
     distance = np.hypot(away[:, 0], away[:, 1])[:, None]
     unit: Floats = np.where(distance > 0.0, away / np.maximum(distance, 1e-9), [1.0, 0.0])
     return unit

@@ -5,7 +5,7 @@ In: messages of teammates (`TeamBeacons`), readings of this wearer's gateway, th
 reading of a teammate's beacon, a range from the place that the teammate reported; `SharedBeacon`s of the wearer's own. Owns the newest message of
 each teammate, and the count of invalid messages.
 
-Such a range is fused as one by radio (`meeting_model`): by covariance intersection, for the beacon's error is its teammate's, which may be this
+Such a range is fused as a radio range (`meeting_model`): by covariance intersection, for the beacon's error is its teammate's, which may be this
 wearer's own. One reading in five is an outlier (`BeaconSettings.range_outliers`), as often as a meeting with an `uncertain` teammate is wrong. A
 reading of a beacon that k teammates report is a range to each of these places, but one measurement: each range has the power 1/k.
 """
@@ -48,7 +48,7 @@ class TeamBeaconMap:
         self.counts: Counter[str] = Counter()
 
     def receive(self, payload: bytes, levels: int) -> None:
-        """Take one message, on a plan of so many levels; bytes that are none are counted."""
+        """Take one message, on a plan of `levels` levels; other bytes are counted."""
         message = parse_team_beacons(payload)
         if message is None or any(b.level >= levels for b in message.beacons):
             self.counts["bad"] += 1
@@ -60,7 +60,7 @@ class TeamBeaconMap:
             self.reported.pop(next(iter(self.reported)))
 
     def ranges(self, readings: Sequence[BeaconReading], numbers: Sequence[int]) -> list[TimedMeeting]:
-        """Of these readings, those of beacons whose place a teammate reports, with their times; `numbers`: of the beacon in each slot."""
+        """Ranges by the readings of beacons whose place a teammate reports, with their times; `numbers`: of the beacon in each slot."""
         meetings: list[TimedMeeting] = []
         for reading in readings if self.reported else ():
             number = numbers[reading.slot]

@@ -15,7 +15,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta, structs
 
-from echostep.plan.plan_file import Metres
+from echostep.fields import Metres
 from echostep.ports.people.payloads import Level, decoded
 
 PERSON = "person"  # name of the port

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the payloads of chunks have in common: JSON of a bounded size that is checked against a structure, and covariances.
+"""Common parts of the payloads of chunks: JSON of a bounded size that is checked against a structure, and covariances.
 
 In: bytes that may be damaged or hostile. Out: a structure, or None. Owns the limits of places.
 """
@@ -30,7 +30,7 @@ class Spread(Protocol):
 
 
 def decoded(payload: bytes | str, decoder: msgspec.json.Decoder[T], most_bytes: int) -> T | None:
-    """The structure in a payload; None when the bytes are too many, or none of it."""
+    """The structure in a payload; None if the bytes are too many, or no such structure."""
     if len(payload) > most_bytes:
         return None
     try:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Beacons that a teammate has placed: retained messages on `echostep/<team>/<wearer>/beacons`, and chunks of the port `TEAM_BEACONS`.
 
-In: places of beacons by a tracker. Out: topic and bytes, and `TeamBeacons` from such bytes, which may be damaged or hostile. Owns the limits.
+In: places of beacons from a tracker. Out: topic and bytes, and `TeamBeacons` from such bytes, which may be damaged or hostile. Owns the limits.
 The bytes are recorded like those of any port, so a replay has the same beacons in the same order.
 """
 
@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from echostep.plan.plan_file import Metres
+from echostep.fields import Metres
 from echostep.ports.people.payloads import Level, Variance, decoded, has_covariance
 
 TEAM_BEACONS = "team_beacons"  # name of the port
@@ -38,7 +38,7 @@ class SharedBeacon:
 
 
 class TeamBeacons(msgspec.Struct, frozen=True):
-    """All beacons that the wearer `name` has placed in one run; they replace those of its earlier message. Numbers are unique."""
+    """All beacons that the wearer `name` has placed in one run; they replace the beacons of its earlier message. Numbers are unique."""
 
     echostep_beacons: Literal[1]
     name: Annotated[str, Meta(min_length=1, max_length=32)]
@@ -59,7 +59,7 @@ _DECODER = msgspec.json.Decoder(TeamBeacons)
 
 
 def parse_team_beacons(payload: bytes) -> TeamBeacons | None:
-    """The message in a chunk; None when the bytes are none, name a beacon twice, or hold no covariance."""
+    """The message in a chunk; None if the bytes are no such message, name a beacon twice, or hold no covariance."""
     message = decoded(payload, _DECODER, MOST_BYTES)
     if message is None:
         return None

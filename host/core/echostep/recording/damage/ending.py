@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""What the end of an MCAP file says of the bytes before it [MCAP format specification, mcap.dev/spec].
+"""What the end of an MCAP file says about the bytes before it [MCAP format specification, mcap.dev/spec].
 
-In: the bytes of a file, possibly damaged. Out: whether its data section is what was written, and the channels and schemas repeated behind it. Owns
+In: the bytes of a file, possibly damaged. Out: whether its data section is as written, and the channels and schemas repeated after it. Owns
 nothing.
 
-A closed file ends so; both checksums are CRC-32:
+A closed file ends like this; both checksums are CRC-32:
 
-    data section | data end: checksum of all before | summary: schemas, channels, ... | footer: begin of the summary, its checksum | magic
+    data section | data end: checksum of all before | summary: schemas, channels, ... | footer: start of the summary, its checksum | magic
 
-A data section with the right checksum is whole, whatever has become of the bytes behind it. Where it is damaged, the channels in a summary with the
-right checksum are believed, not those between the messages.
+A data section with the right checksum is whole, whatever has become of the bytes after it. If it is damaged, the channels in a summary with the
+right checksum are believed, not the channels between the messages.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from echostep.recording.damage.scan import record_end
 from echostep.recording.mcap_records import CHANNEL_IDS, HEAD_SIZE, MCAP_MAGIC
 
 # [MCAP format specification]
-FOOTER_SIZE = 20  # bytes of its body: begin of the summary u64, begin of its offsets u64, checksum u32
+FOOTER_SIZE = 20  # bytes of its body: start of the summary u64, start of its offsets u64, checksum u32
 DATA_END_SIZE = 4  # bytes of its body: the checksum, 0 for none
 CRC_SIZE = 4
 CHECKSUM_BYTES = 1 << 20  # of one call: Ctrl-C is seen between two
-# A beginning that differs from the magic bytes in no more bits is a damaged one, not another format; assumed
+# A beginning that differs from the magic bytes in at most this many bits is damaged, not another format; assumed
 MAGIC_BITS = 8
 
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """`data_end`: offset of the data-end record, -1 where the footer does not tell; `summary`: opcode and body of the records behind it.
+    """`data_end`: offset of the data-end record, -1 if the footer does not tell; `summary`: opcode and body of the records after it.
 
     `trusted`: the checksum of the summary is right.
     """
@@ -55,7 +55,7 @@ def begins_as_mcap(file: Octets | bytes) -> bool:
 
 
 def read_ending(file: Octets) -> Ending:
-    """The end of a file; nothing is known of one without a footer."""
+    """The end of a file; nothing is known without a footer."""
     footer = len(file) - len(MCAP_MAGIC) - FOOTER_SIZE - HEAD_SIZE
     if footer < len(MCAP_MAGIC) or file[footer] != Opcode.FOOTER:
         return Ending()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What is said of damage: of the file, of ports that a recording seems to lack, and what is noted in one that is made of a damaged one.
+"""Sentences about damage: of the file, of ports that a recording seems to lack, and as noted in a recording made from a damaged one.
 
-In: ranges without valid records, other counts of a reader, the ports with readable bytes, the topics of channels that are not named as they should.
+In: ranges without valid records, other counts of a reader, the ports with readable bytes, the topics of wrongly named channels.
 Out: sentences, the same for every command. Owns the counts of damage.
 """
 
@@ -20,10 +20,10 @@ class FileDamage:
 
     altered: bool = False  # bytes do not match the checksum written with them
     skipped: int = 0  # bytes in no valid record, before a valid one
-    places: int = 0  # of them
-    first: int = 0  # offset of the first of them
-    tail: int = 0  # bytes behind the last valid record
-    unreadable_chunks: int = 0  # chunk records that cannot be decompressed, or hold other things than records
+    places: int = 0  # number of places with such bytes
+    first: int = 0  # offset of the first place
+    tail: int = 0  # bytes after the last valid record
+    unreadable_chunks: int = 0  # chunk records that cannot be decompressed, or hold anything but records
     misplaced: int = 0  # messages that stand twice in the file, or not where they were written
     truncated: bool = False  # no end record: a walk's recorder was stopped in the middle
 
@@ -61,9 +61,9 @@ class FileDamage:
 
 
 def missing_ports(ports: Collection[str], misnamed: Collection[str]) -> list[str]:
-    """A sentence for each channel whose name is damaged, and for the board and the foot's sensor where nothing of them can be read."""
+    """A sentence for each channel whose name is damaged, and for the board and the foot's sensor if none of their bytes can be read."""
     lines = [f"the channel {topic} is damaged: the bytes of its port were not used" for topic in sorted(misnamed)]
-    for names in ((BOARD,), (MTX, FOOT)) if set(ports) & {BOARD, MTX, FOOT} else ():  # not of an operation
+    for names in ((BOARD,), (MTX, FOOT)) if set(ports) & {BOARD, MTX, FOOT} else ():  # not for an operation
         if not set(names) & set(ports):
             lines.append(
                 f"no bytes of {' or '.join(names)} can be read: nothing came, or the port's channel is damaged"
@@ -72,5 +72,5 @@ def missing_ports(ports: Collection[str], misnamed: Collection[str]) -> list[str
 
 
 def made_of(path: Path, damage: Iterable[str]) -> list[str]:
-    """The damage of a recording as it is noted in another one that is made of it."""
+    """The damage of a recording as it is noted in another recording made from it."""
     return [f"of {path.name}, of which it was made: {line}" for line in damage]

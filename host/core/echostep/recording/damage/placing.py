@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Which messages of a damaged recording stand where they were written: blocks of a disk may come twice, or in another's place.
+"""Which messages of a damaged recording stand where they were written: blocks of a disk may appear twice, or in another's place.
 
 In: the sequence numbers of messages in the order of the file; the recorder counts all its messages. Out: which of them to use. Owns the number of the
 newest message in its place, and the count of the others.
 
-The longest increasing subsequence is in its place [Schensted 1961]: of two blocks that were exchanged both are dropped, and nothing between
-them; of a block that was written twice the second one. A single number that does not fit between its neighbours is a damaged number: its message
+The longest increasing subsequence is in its place [Schensted 1961]: of two exchanged blocks both are dropped, and nothing between
+them; of a block written twice, the second copy. A single number that does not fit between its neighbours is a damaged number: its message
 is used.
 """
 
@@ -36,7 +36,7 @@ class Placement:
 
 @kernel
 def _with_neighbours(number: Floats) -> Floats:
-    """The numbers (n,), one that is not between its neighbours in their middle."""
+    """The numbers (n,); a number that is not between its neighbours is replaced by their middle."""
     repaired = number.copy()
     for k in range(1, len(number) - 1):
         before, after = number[k - 1], number[k + 1]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Where the valid records of a possibly damaged MCAP file are [MCAP format specification, mcap.dev/spec].
 
-In: the bytes of a file. Out: offsets of records, and of the next valid ones behind damage. Owns nothing.
+In: the bytes of a file. Out: offsets of records, and of the next valid ones after damage. Owns nothing.
 
 A record is valid when its opcode and its length are possible, and, for a message, when its channel is known. After any other record the scan goes on
 at the next offset from which several consecutive records are valid.
@@ -16,20 +16,13 @@ import numpy as np
 from echostep.arrays import Bools, Octets
 from echostep.errors import EchostepError
 from echostep.jit import kernel, part
-from echostep.recording.mcap_records import (
-    HEAD_SIZE,
-    MCAP_MAGIC,
-    MESSAGE,
-    MESSAGE_SIZE,
-    RECORD_LIMIT,
-    read_uint,
-)
+from echostep.recording.mcap_records import HEAD_SIZE, MCAP_MAGIC, MESSAGE, MESSAGE_SIZE, RECORD_LIMIT, read_uint
 
 # [MCAP format specification]
 CHUNK = 0x06  # opcode
 LAST_OPCODE = 0x0F
 # Assumed.
-VALID_RUN = 4  # so many consecutive records are not valid by chance
+VALID_RUN = 4  # this many consecutive records are not valid by chance
 OTHER_LIMIT = 1 << 20  # bytes; only messages and chunk records are larger
 LARGE = (
     1 << 12
@@ -74,7 +67,7 @@ def _may_follow(file: Octets, begin: int) -> bool:
 
 @kernel
 def next_valid_run(file: Octets, first: int, is_channel: Bools) -> int:
-    """Smallest offset >= `first` from which `VALID_RUN` consecutive records, or all up to the end, are valid; the file's length if there is none."""
+    """Smallest offset >= `first` from which `VALID_RUN` consecutive records, or all up to the end, are valid; the file's length if none."""
     for begin in range(first, len(file) - HEAD_SIZE + 1):
         offset, records = begin, 0
         while records < VALID_RUN and offset >= 0:

@@ -15,7 +15,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Plan, Pose
+from echostep.plan import Plan, Pose
 from echostep_studies.bench.laser.carmen_log import CarmenLog, read_log
 from echostep_studies.bench.laser.occupancy import standing_places
 from echostep_studies.bench.laser.odometry import Odometry, odometry_of

@@ -18,7 +18,7 @@ from echostep.arrays import Floats
 from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep.foot.steps import Step, walk_track
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep.settings import parse_settings
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata

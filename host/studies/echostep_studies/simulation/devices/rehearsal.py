@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.simulation.devices.board import Board
 from echostep_app.simulation.people.walker import Person
 from echostep_app.simulation.scenario import Scenario

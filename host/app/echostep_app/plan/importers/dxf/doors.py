@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Doors of a drawing: the gap in the walls that each door symbol belongs to.
 
-In: door symbols, walls. Out: `Door`s, those in no wall. Owns how far a symbol may be off its gap. A swing gives the hinge and the width; the end of
-its arc that the drawn leaf does not reach is the closed one. From the hinge along the wall the gap ends at the other jamb. Without a swing the
+In: door symbols, walls. Out: `Door`s, and symbols in no wall. Owns how far a symbol may be off its gap. A swing gives the hinge and the width; the
+end of its arc that the drawn leaf does not reach is the closed one. From the hinge along the wall the gap ends at the other jamb. Without a swing the
 longest line is the door, or its leaf drawn open.
 """
 
@@ -17,22 +17,22 @@ import shapely
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from echostep.plan.model import Door, Question
+from echostep.plan import Door, Question
 from echostep_app.plan.importers.drawn_level import opening
 from echostep_app.plan.importers.dxf.gaps import BY_M, NEAR_M, Gap, WallBands
 from echostep_app.plan.importers.dxf.symbols import NARROWEST_M, Point, Swing, Symbol
 
-LONG = 2.5  # length of a leaf by its thickness, at least; assumed
+LONG = 2.5  # least ratio of a leaf's length to its thickness; assumed
 WIDEST_M = 12.0  # of a door without a swing: gates
-LEAST_SHARE, MOST_SHARE = 0.6, 1.3  # width of a gap by the width of the leaf in it; assumed
+LEAST_SHARE, MOST_SHARE = 0.6, 1.3  # ratio of a gap's width to the width of its leaf; assumed
 CORNER_M = 0.2  # from a door in a corner to the axis of a thick wall there; assumed
 MOST_OFF_M = 0.3  # from both jambs together; assumed
-TIP_M = 0.1  # of a sliding leaf that is seen in its gap at least; assumed
-FRAME_M = 0.2  # by which a gap may be wider beyond that: frame; assumed
+TIP_M = 0.1  # least visible part of a sliding leaf in its gap; assumed
+FRAME_M = 0.2  # width that a gap may have beyond that: frame; assumed
 BESIDE_M = 6.0  # greatest width of a hole in which a door stands beside a window; assumed
 THICKEST_M = 0.5  # of a wall that is drawn through a door
-SAME_M = 0.25  # two doors with nearer middles are one, and two lines across one wall; assumed
-NEAR_JAMB_M = 0.02  # faces with less distance need no end between them
+SAME_M = 0.25  # two doors with nearer middles are one, as are two lines across one wall; assumed
+NEAR_JAMB_M = 0.02  # closer faces need no end between them
 Line = tuple[float, float, float, float]
 
 
@@ -40,8 +40,8 @@ Line = tuple[float, float, float, float]
 class PlacedDoors:
     """Doors in walls; `jambs`: ends of the walls beside them, from face to face; `cuts`: areas of walls that are drawn through the `cut_doors`.
 
-    `strays`: middles of symbols in no wall, and what would be their doors.
-    `marks`: number of small shapes that are no doors: frames of numbers, jambs.
+    `strays`: middles of symbols in no wall, and their possible doors.
+    `marks`: number of small shapes that are not doors: frames of numbers, jambs.
     """
 
     doors: list[Door] = field(default_factory=list)
@@ -69,14 +69,14 @@ class PlacedDoors:
                 self.cut_doors.append(line)
 
     def add_swing(self, swing: Swing, walls: WallBands) -> Line | None:
-        """Place a swing that lies on no layer of doors, if it fits a gap exactly; returns the gap, None where it does not."""
+        """Place a swing that lies on no layer of doors, if it fits a gap exactly; returns the gap or None."""
         line = _exact(swing, walls) or _exact(swing, walls.wider())
         if line is not None:
             self._place(line, walls)
         return line
 
     def add_pair(self, symbol: Symbol, walls: WallBands) -> Line | None:
-        """Place two swings that meet and lie on no layer of doors, if they fit a gap exactly; returns the gap, None where they do not."""
+        """Place two swings that meet and lie on no layer of doors, if they fit a gap exactly; returns the gap or None."""
         leaves = [_of_swing(_meeting(swing, symbol.swings), walls) for swing in symbol.swings]
         lines = _joined([leaf for leaf in leaves if leaf is not None])
         if len(symbol.swings) != 2 or None in leaves or len(lines) != 1:
@@ -114,7 +114,7 @@ class PlacedDoors:
                 self.jambs.append(LineString([(x - o * v, y + o * u) for o in span]))
 
     def questions(self) -> Iterator[Question]:
-        """What a person should look at: symbols in no wall, and doors that a wall is drawn through."""
+        """Questions for a person: symbols in no wall, and doors that a wall is drawn through."""
         for at, line in self.strays:
             if math.dist(line[:2], line[2:]) > BY_M:
                 yield Question("door in no wall, left out: is it a door?", "door", at, (line,), is_proposed=True)
@@ -144,7 +144,7 @@ def _drawn_line(symbol: Symbol) -> Line:
 
 
 def _meeting(swing: Swing, swings: Sequence[Swing]) -> Swing:
-    """A swing without a drawn leaf whose arc meets that of the other leaf: there both are closed."""
+    """A swing without a drawn leaf whose arc meets the other leaf's arc: both leaves are closed there."""
     for k, end in enumerate(swing.ends):  # a leaf that swings both ways is drawn closed, with two arcs
         same = (other for other in swings if other is not swing and math.dist(other.hinge, swing.hinge) < BY_M)
         if any(math.dist(end, other) < BY_M for one in same for other in one.ends):
@@ -172,7 +172,7 @@ def _of_swing(swing: Swing, walls: WallBands) -> Line | None:
         return _line(hinge, u, gap.begin_m, gap.end_m)
     if (
         swing.leaf is not None
-    ):  # the drawn leaf tells the closed end: in a larger hole, or in a wall drawn through the door
+    ):  # the drawn leaf shows the closed end: in a larger hole, or in a wall drawn through the door
         u = towards[0]
         gap = walls.gap(hinge, u, radius / 2, BESIDE_M)
         if gap is not None and gap.begin_m >= -NEAR_M and gap.end_m < BESIDE_M and gap.width_m > radius:
@@ -183,7 +183,7 @@ def _of_swing(swing: Swing, walls: WallBands) -> Line | None:
 
 
 def _exact(swing: Swing, walls: WallBands) -> Line | None:
-    """The gap that an arc from jamb to open leaf fits exactly; None for arcs that are no doors: basins, chairs, curved walls."""
+    """The gap that an arc from jamb to open leaf fits exactly; None for arcs that are not doors: basins, chairs, curved walls."""
     hinge, radius = swing.hinge, swing.radius_m
     found = []
     for u in (_unit(hinge, end) for end in swing.ends):
@@ -252,7 +252,7 @@ def _is_long(lines: Sequence[LineString]) -> bool:
 
 
 def _fits(gap: Gap, leaf_m: float) -> bool:
-    """Whether a leaf of this width, from the place that the gap was asked for, closes the gap."""
+    """Whether a leaf of this width, hung at the place that the gap was asked for, closes the gap."""
     hangs = -NEAR_M <= gap.begin_m <= NEAR_M
     return hangs and LEAST_SHARE * leaf_m <= gap.width_m <= MOST_SHARE * leaf_m + FRAME_M
 
@@ -274,7 +274,7 @@ def _joined(lines: Sequence[Line]) -> list[Line]:
 
 
 def _ends(line: Line) -> tuple[tuple[Point, Point], tuple[Point, Point]]:
-    """Each end with the other one."""
+    """Each end, paired with the other end."""
     return (line[:2], line[2:]), (line[2:], line[:2])
 
 

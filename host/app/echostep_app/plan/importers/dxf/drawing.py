@@ -19,7 +19,7 @@ from shapely.geometry import LineString, MultiLineString, Point, box
 from shapely.geometry.base import BaseGeometry
 
 from echostep.errors import EchostepError
-from echostep.plan.model import ConnectorKind, Plan, Question
+from echostep.plan import ConnectorKind, Plan, Question
 from echostep_app.plan.importers.connector_shapes import join_connectors
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas
 from echostep_app.plan.importers.dxf.doors import PlacedDoors
@@ -45,7 +45,7 @@ from echostep_app.plan.importers.report import ImportReport
 
 HALF_TREAD_M = 0.3  # half the greatest distance between neighbouring lines of one staircase: a tread
 CURVES = ("ARC", "ELLIPSE", "SPLINE", "LWPOLYLINE", "POLYLINE")  # entities that a swing may be drawn with
-DEEPEST_SYMBOL = 4  # blocks in blocks of one door
+DEEPEST_SYMBOL = 4  # nesting depth of one door's blocks
 SHOWN_STRAYS = 3
 MOST_PIECES = 2000  # of walls in a question
 
@@ -65,7 +65,7 @@ class _Storey:
         return [line for kind in kinds for entity, _ in self.sheet.kinds[kind] for line in self.of(entity)]
 
     def of(self, entity: Any) -> list[LineString]:
-        """The lines of an entity inside the window; none of one that is a door's swing."""
+        """The lines of an entity inside the window; none for a door's swing."""
         if id(entity) in self.swings:
             return []
         if id(entity) not in self._lines:
@@ -73,11 +73,11 @@ class _Storey:
         return self._lines[id(entity)]
 
     def of_part(self, part: Any) -> list[LineString]:
-        """The lines of a block's part inside the window: it lives for a moment, so its lines are not kept."""
+        """The lines of a block's part inside the window: the part exists only briefly, so its lines are not kept."""
         return [line for line in self.frame.lines(part, self.sheet.file) if self.holds(line)]
 
     def holds(self, shape: BaseGeometry) -> bool:
-        """Whether a shape is of this level."""
+        """Whether a shape belongs to this level."""
         return self.window is None or bool(self.window.intersects(shape.centroid))
 
 
@@ -183,7 +183,7 @@ def _drawn_level(storey: _Storey, drawn: DrawnLevel, report: ImportReport) -> Dr
 
 
 def _without_lines(storey: _Storey, report: ImportReport) -> None:
-    """Report entities on the layers used that have no line: texts, pictures, bodies, unknown objects."""
+    """Report entities without lines on the layers used: texts, pictures, bodies, unknown objects."""
     for kind in ("walls", "columns", "windows", "stairs", "lifts", "obstacles"):
         for entity, layer in storey.sheet.kinds[kind]:
             if storey.window is None and not storey.of(entity):
@@ -196,7 +196,7 @@ def _doors(storey: _Storey, report: ImportReport) -> PlacedDoors:
     kinds = storey.sheet.kinds
     curves = [p for p in (*storey.sheet.others, *kinds["walls"], *kinds["windows"]) if p[0].dxftype() in CURVES]
     swings = [(*pair, symbol) for pair in curves if is_swing(symbol := symbol_of(storey.of(pair[0])))]
-    storey.swings.update(id(entity) for entity, *_ in swings)  # no walls while the doors are looked for
+    storey.swings.update(id(entity) for entity, *_ in swings)  # not walls while doors are looked for
     walls = WallBands(storey.lines("walls", "columns", "windows"))
     for symbol in _symbols(storey):
         placed.add(symbol, walls)
@@ -221,7 +221,7 @@ def _left_out_walls(storey: _Storey) -> Iterator[Question]:
 def _swings_elsewhere(
     storey: _Storey, swings: list[tuple[Any, str, Symbol]], placed: PlacedDoors, walls: WallBands, report: ImportReport
 ) -> None:
-    """Place swings on layers that are not of doors, single or in pairs; those that fit no gap are what their layer says."""
+    """Place swings on layers that are not of doors, single or in pairs; swings that fit no gap keep their layer's kind."""
     doors: list[tuple[Any, str, Swing, tuple[float, float]]] = []
     left: dict[int, tuple[Any, str, Swing]] = {}  # by id of the line, which the symbols of pairs keep
     for entity, layer, symbol in swings:
@@ -243,7 +243,7 @@ def _swings_elsewhere(
 
 
 def _take_leaves(storey: _Storey, leaves: list[tuple[Swing, tuple[float, float]]]) -> None:
-    """Leaves that are drawn open among the walls or windows, beside a swing that is a door, are neither."""
+    """Leaves drawn open beside a door's swing count as neither walls nor windows."""
     kinds = storey.sheet.kinds
     drawn = [(entity, lines) for entity, _ in (*kinds["walls"], *kinds["windows"]) if (lines := storey.of(entity))]
     tree = shapely.STRtree([lines[0] for _, lines in drawn]) if leaves else shapely.STRtree([])

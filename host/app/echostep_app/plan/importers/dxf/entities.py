@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Entities of a DXF drawing with blocks expanded, and the layers that they lie on.
 
-In: a file. Out: visible entities with their effective layers. Owns the limits for untrusted drawings. What is not shown on the drawing (layers that
-are frozen or off), and what is not in the file (external references), is reported.
+In: a file. Out: visible entities with their effective layers. Owns the limits for untrusted drawings. Entities that the drawing hides (layers that
+are frozen or off) and external references, which are not in the file, are reported.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import Any
 
 from echostep.errors import EchostepError
-from echostep.extras import require
+from echostep_app.extras import require
 from echostep_app.plan.importers.parsing import read_bytes
 from echostep_app.plan.importers.report import ImportReport
 
 MOST_PARTS = 300_000  # entities in blocks
 DEEPEST_BLOCK = 16
-REMOVED = re.compile(r"Removed invalid DXF entity (\w+)\(")  # of ezdxf about entities of a kind that it does not know
-DELETED = re.compile(r"Deleted entity (\w+)\(")  # of ezdxf about entities that refer to nothing
+REMOVED = re.compile(r"Removed invalid DXF entity (\w+)\(")  # ezdxf's message on entities of an unknown kind
+DELETED = re.compile(r"Deleted entity (\w+)\(")  # ezdxf's message on entities that refer to nothing
 
 
 def read_drawing(file: Path, report: ImportReport) -> Any:
@@ -54,7 +54,7 @@ def read_drawing(file: Path, report: ImportReport) -> Any:
 class VisibleEntities:
     """The entities of a drawing's model space that are shown; iterating once reports the others.
 
-    `references`: files that the drawing refers to and that are not in it.
+    `references`: files that the drawing refers to but does not contain.
     """
 
     def __init__(self, drawing: Any, file: Path, report: ImportReport) -> None:
@@ -105,7 +105,7 @@ class VisibleEntities:
 
 
 def _layer_of(entity: Any) -> str:
-    """The layer of an entity; "0" for one of an unknown kind, which ezdxf keeps without attributes."""
+    """The layer of an entity; "0" for unknown kinds, which ezdxf keeps without attributes."""
     from ezdxf.lldxf.const import DXFError
 
     try:
@@ -115,7 +115,7 @@ def _layer_of(entity: Any) -> str:
 
 
 def _is_invisible(entity: Any) -> bool:
-    """Whether an entity is hidden by itself; not one of an unknown kind."""
+    """Whether an entity is hidden by itself; False for an unknown kind."""
     from ezdxf.lldxf.const import DXFError
 
     try:

@@ -18,20 +18,20 @@ from shapely.geometry import LineString, Polygon
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.plan.plan_file import LIMIT_M
+from echostep.fields import LIMIT_M
 
 METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 FLAT_M = 0.005  # greatest distance of an arc from the straight pieces that replace it
-FAR_M = 1e4  # larger coordinates are of a national grid: the origin is then moved to the first wall
-STRAY_M = 1e8  # a line beyond is no building, in whatever grid: twice around the Earth
-STRAY = LineString([(0.0, 0.0), (STRAY_M, 0.0)])  # in the place of a line beyond
-THINNEST_M = 0.03  # a polyline of more width is drawn as thick as its wall, of less: with a pen; assumed
+FAR_M = 1e4  # larger coordinates are in a national grid: the origin is then moved to the first wall
+STRAY_M = 1e8  # a line beyond this is not a building in any grid: twice around the Earth
+STRAY = LineString([(0.0, 0.0), (STRAY_M, 0.0)])  # replaces a line beyond that
+THINNEST_M = 0.03  # a wider polyline is drawn as thick as its wall, a narrower one with a pen; assumed
 THICKEST_M = 1.2  # a hatch that is nowhere wider fills a wall or a column, a wider one a floor; assumed
 ASKEW = 0.5  # sine of the angle between a multiline and its stored offsets below which these are wrong; at right corners it is 0.71
 PROXY_LINES = ("LINE", "ARC", "CIRCLE", "LWPOLYLINE", "POLYLINE")
 PICTURES = frozenset(
     {"IMAGE", "WIPEOUT", "VIEWPORT", "OLE2FRAME", "XLINE", "RAY", "UNDERLAY", "INSERT"}
-)  # with an outline that is no line of the building
+)  # their outlines are not lines of the building
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class DrawingFrame:
         return float(point.x) * self.scale_m - self.x0_m, float(point.y) * self.scale_m - self.y0_m
 
     def raw(self, entity: Any) -> list[LineString]:
-        """The entity as polylines in metres, `STRAY` for one that no building has; empty for an entity without a line."""
+        """The entity as polylines in metres, `STRAY` for a line that no building has; empty for an entity without a line."""
         from ezdxf.lldxf.const import DXFError
 
         try:
@@ -88,7 +88,7 @@ class DrawingFrame:
 
 
 def paths(entity: Any) -> Iterator[Any]:
-    """The outlines of an entity: one of lines and curves, several of hatches, multilines and polygons; none of texts and pictures."""
+    """The outlines of an entity: one for lines and curves, several for hatches, multilines and polygons; none for texts and pictures."""
     from ezdxf import path
 
     kind = entity.dxftype()
@@ -100,7 +100,7 @@ def paths(entity: Any) -> Iterator[Any]:
         if _askew(entity):
             entity.update_geometry()
         yield from (path.make_path(part) for part in entity.virtual_entities() if part.dxftype() in ("LINE", "ARC"))
-    elif kind == "ACAD_PROXY_ENTITY":  # an object of another program, with lines to show it by
+    elif kind == "ACAD_PROXY_ENTITY":  # an object of another program, with lines that show it
         yield from (path.make_path(part) for part in entity.virtual_entities() if part.dxftype() in PROXY_LINES)
     else:
         yield path.make_path(entity)
@@ -118,7 +118,7 @@ def corners(entity: Any) -> list[Floats]:
 
 
 def _width(entity: Any) -> float:
-    """The width of a polyline that is drawn with one width all along, in drawing units; 0 of others."""
+    """The width of a polyline that is drawn with one width all along, in drawing units; 0 for others."""
     if entity.dxftype() == "LWPOLYLINE":
         same = entity.dxf.get("const_width", 0.0)
         widths = [(same, same)] if same else [tuple(point) for point in entity.get_points("se")]

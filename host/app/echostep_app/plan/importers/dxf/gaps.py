@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Gaps in the walls along a line: where the wall ends before a place on it, and where it begins again.
 
-In: walls as lines, a place, a direction. Out: `Gap`s. Owns the width of the band that is looked along.
-Works for walls drawn as one line, as two faces with or without ends, and for a corner that a gap ends at.
+In: walls as lines, a place, a direction. Out: `Gap`s. Owns the width of the band that is searched.
+Works for walls drawn as one line, as two faces with or without ends, and for a gap that ends at a corner.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ BAND_M = 0.1  # half the width of the band along a door's line in which walls co
 NEAR_M = 0.35  # greatest distance of a hinge from the wall that it hangs on: frame and lining; assumed
 JAMB_M = 0.3  # shorter pieces of a wall give no direction: its ends, jambs, linings; assumed
 THICKEST_M = 0.6  # of a wall with a door; assumed
-STOP_M, FLAT_M = 0.03, 2e-3  # a wall stops so near to a door's end; faces with less distance are one
-WIDE_BAND_M = 0.2  # half the thickness of an outer wall, and a little; assumed
+STOP_M, FLAT_M = 0.03, 2e-3  # a wall this near to a door's end stops there; closer faces are one
+WIDE_BAND_M = 0.2  # half the thickness of an outer wall, and a margin; assumed
 BY_M = 0.15  # a point nearer to a wall than this is at it
 Point = tuple[float, float]
 
@@ -44,7 +44,7 @@ class Gap:
 
 
 class WallBands:
-    """The walls of a level, to be asked for gaps."""
+    """Finds gaps in the walls of a level."""
 
     def __init__(self, walls: Sequence[LineString]) -> None:
         self.band_m = BAND_M
@@ -77,15 +77,15 @@ class WallBands:
         return Polygon([(x + s * u - t * v, y + s * v + t * u) for s, t in corners])
 
     def wider(self) -> WallBands:
-        """The same walls, looked at in a band that reaches from a face to the axis that a thick wall is drawn by."""
+        """The same walls, searched in a band that reaches from a face to the axis by which a thick wall is drawn."""
         wide = copy(self)
         wide.band_m = WIDE_BAND_M
         return wide
 
     def wall_at(self, end: Point, outward: Point) -> tuple[float, float] | None:
-        """Of the wall that stops at a door's end and goes on in the direction `outward`: the offsets (m) of both its faces to the left of `outward`.
+        """Offsets (m), to the left of `outward`, of both faces of the wall that stops at a door's end and continues in the direction `outward`.
 
-        Both are one for a wall that is drawn as one line; None where no wall stops.
+        Both are equal for a wall drawn as one line; None if no wall stops there.
         """
         near = self.pieces[self._tree.query(shapely.Point(end), predicate="dwithin", distance=THICKEST_M)]
         if not len(near):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What the layers of a drawing mean: by their names, and which others look like walls by their lines.
+"""Meaning of a drawing's layers by their names, and other layers whose lines look like walls.
 
-In: names, patterns, lines in metres. Out: kinds of elements. Owns the patterns of names in many languages, and what lines of walls look like.
+In: names, patterns, lines in metres. Out: kinds of elements. Owns the patterns of names in many languages, and the criteria for lines of walls.
 """
 
 from __future__ import annotations
@@ -50,25 +50,25 @@ DRAWN = (
     "doors",
     "stairs",
     "lifts",
-)  # kinds whose layers have others beside them, of hatching or measures
+)  # kinds whose layers come with layers of hatching or measures
 THINNEST_M, THICKEST_M = 0.05, 0.5  # distance of the two faces of a wall; assumed
 LONG_M = 1.0  # of a piece of wall
 CROWD_M, MOST_BESIDE = (
     0.65,
     3,
-)  # so near to a face, and so many other parallels at most: cavities, plaster, linings; assumed
+)  # within this distance of a face, at most this number of other parallels: cavities, plaster, linings; assumed
 PAIRED = 0.5  # share of the lines of a layer of walls that have such a partner; assumed
-LEAST_M = 5.0  # a layer with less of them is no layer of walls; assumed
-MOST_PIECES = 20_000  # of one layer that are looked at
+LEAST_M = 5.0  # a layer with less length of them is not a layer of walls; assumed
+MOST_PIECES = 20_000  # examined pieces of one layer
 
 
 def patterns_of(own: Mapping[str, Sequence[str]]) -> dict[str, tuple[str, ...]]:
-    """Patterns by kind: the caller's own ones instead of the usual ones."""
+    """Patterns by kind: the caller's patterns replace the usual ones."""
     return {kind: tuple(name.casefold() for name in (own.get(kind) or LAYERS[kind])) for kind in LAYERS}
 
 
 def meaning(layer: str, patterns: Mapping[str, Sequence[str]]) -> str | None:
-    """The kind of element on a layer of this name; None when the name matches no pattern, or is of hatching, measures or demolition."""
+    """The kind of element on a layer of this name; None when the name matches no pattern, or denotes hatching, measures or demolition."""
     for kind, names in patterns.items():
         if matches(layer, names):
             usual = names == LAYERS[kind] and kind in DRAWN
@@ -77,7 +77,7 @@ def meaning(layer: str, patterns: Mapping[str, Sequence[str]]) -> str | None:
 
 
 def matches(layer: str, patterns: Sequence[str]) -> bool:
-    """Whether the name of a layer matches a pattern, small and capital letters being alike."""
+    """Whether the name of a layer matches a pattern, ignoring case."""
     name = layer.casefold()
     return any(fnmatchcase(name, pattern) for pattern in patterns)
 
@@ -108,7 +108,7 @@ def faces_m(lines: Sequence[LineString]) -> float:
 
 
 def parallels(pieces: Floats, most: float) -> tuple[Floats, Ints]:
-    """Of each piece (n, 4): distance (n,) to the nearest parallel one beside its middle, infinite if none is within `most`; and how many are."""
+    """For each piece (n, 4): distance (n,) to the nearest parallel beside its middle, infinite if none is within `most`; and how many are."""
     nearest, count = np.full(len(pieces), np.inf), np.zeros(len(pieces), dtype=np.int64)
     if not len(pieces):
         return nearest, count

@@ -20,16 +20,14 @@ from echostep_app.plan.importers.dxf.layers import parallels
 
 MOST_PIECES = 5000  # the longest ones, whose distances are measured
 MOST_SYMBOLS = 500  # of doors that are measured
-INNER = (0.02, 0.98)  # quantiles of the corners that count: stray lines do not
-STRAY = 1000.0  # a piece so many times longer than the median is no wall, but an error of the drawing; assumed
-THIN = (
-    0.08  # distance of parallel lines by their length below which they are the faces of a wall, not of a room; assumed
-)
+INNER = (0.02, 0.98)  # quantiles of the corners that count, without stray lines
+STRAY = 1000.0  # a piece this many times longer than the median is not a wall, but an error of the drawing; assumed
+THIN = 0.08  # ratio of distance to length of parallel lines below which they are the faces of a wall, not of a room; assumed
 Box = tuple[float, float, float, float]
 
 
 def lengths_of(by_kind: Mapping[str, Sequence[Any]], file: Path) -> dict[str, float]:
-    """Those lengths that the drawing has, in its units."""
+    """The lengths that the drawing has, in its units."""
     lengths: dict[str, float] = {}
     pieces = pieces_of_entities(by_kind["walls"])
     if len(pieces):
@@ -70,7 +68,7 @@ def _radii(entity: Any, file: Path) -> Iterator[float]:
     """Radii of the swings of a door symbol."""
     if entity.dxftype() == "INSERT":
         inner = [radius for part in parts(entity, file) if part.dxftype() == "ARC" for radius in _radii(part, file)]
-        yield from [max(inner)] if inner else []  # the leaf's; smaller ones are of its handle
+        yield from [max(inner)] if inner else []  # the leaf's radius; smaller ones belong to its handle
     elif entity.dxftype() == "ARC":
         sweep = (entity.dxf.end_angle - entity.dxf.start_angle) % 360.0
         radius = float(entity.dxf.radius)

@@ -12,8 +12,8 @@ from typing import Any
 
 from shapely.geometry import Point, Polygon
 
-from echostep.plan.model import Room
-from echostep.plan.plan_file import LIMIT_M
+from echostep.fields import LIMIT_M
+from echostep.plan import Room
 from echostep_app.plan.importers.drawn_level import areas, room
 from echostep_app.plan.importers.dxf.frame import DrawingFrame
 from echostep_app.plan.importers.report import ImportReport
@@ -42,7 +42,7 @@ def rooms_of(entities: Sequence[tuple[Any, str]], frame: DrawingFrame, file: Pat
 
 
 def _matched(names: list[Room], outlines: list[Polygon]) -> list[Room]:
-    """Each outline gets the texts inside it that no smaller one has; one without a text is numbered."""
+    """Each outline gets the texts inside it that no smaller outline has; an outline without a text is numbered."""
     left, rooms = list(names), []
     for outline in sorted(outlines, key=lambda area: area.area):
         inside = [name for name in left if outline.intersects(Point(name.at_m))]

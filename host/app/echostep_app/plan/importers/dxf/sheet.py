@@ -21,7 +21,7 @@ from echostep_app.plan.importers.dxf.units import likely_unit, scale_of, stated_
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
 
-MOST_MORE = 3.0  # length of what looks like walls on other layers, by that of the walls used, from which the import asks; assumed
+MOST_MORE = 3.0  # ratio of wall-like lines on other layers to the walls used, from which the import asks; assumed
 MOST_NAMES = 20  # of layers in an error
 Layered = list[tuple[Any, str]]  # entities with their layers
 
@@ -30,7 +30,7 @@ Layered = list[tuple[Any, str]]  # entities with their layers
 class Sheet:
     """`kinds`: entities by the meaning of their layers; `others`: those on layers without one.
 
-    `alike`: layers of the others that look like walls. `unit`: as the file states it; None where it does not, or where hints overrule it.
+    `alike`: other layers that look like walls. `unit`: as the file states it; None if missing, or if hints overrule it.
     """
 
     file: Path
@@ -74,9 +74,9 @@ def read_sheet(file: Path, hints: Hints, report: ImportReport) -> Sheet:
 
 
 def _tell(sheet: Sheet, report: ImportReport, *, asks: bool) -> tuple[str, ...]:
-    """Report the layers used, what lies on others, and those that look like walls, which are returned.
+    """Report the layers used, entities on others, and layers that look like walls, which are returned.
 
-    Raises EchostepError when most walls seem to be there.
+    Raises EchostepError when most walls seem to be on these.
     """
     for kind, pairs in sheet.kinds.items():
         for layer, _ in Counter(layer for _, layer in pairs).most_common():

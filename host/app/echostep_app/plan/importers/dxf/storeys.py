@@ -16,7 +16,7 @@ from shapely.geometry import LineString
 from echostep.arrays import Floats
 from echostep_app.plan.importers.dxf.layers import pieces_of
 
-APART = 0.05  # share of the drawing's size by which storeys beside each other are apart at least; assumed
+APART = 0.05  # least distance between storeys beside each other, as a share of the drawing's size; assumed
 LEAST_APART_M = 2.0
 LEAST_SHARE = 0.1  # of the longest group of walls: smaller groups are details; assumed
 ALIKE = 0.4  # two storeys of one building differ by less than this share of their size; assumed
@@ -48,7 +48,7 @@ def _alike(one: Box, other: Box) -> bool:
 
 
 def lies_over(one: Box, other: Box) -> bool:
-    """Whether two levels' rectangles cover each other as those of one building do."""
+    """Whether two levels' rectangles cover each other as levels of one building do."""
     a, b = shapely.box(*one), shapely.box(*other)
     return bool(a.intersection(b).area >= OVER * min(a.area, b.area))
 
@@ -60,7 +60,7 @@ def bounds_of(walls: Sequence[LineString]) -> Box:
 
 
 def alignment(walls: Sequence[LineString], below: Sequence[LineString]) -> tuple[float, float]:
-    """The move (m) that lays walls best over those of the level below: in x and in y by themselves, where their lengths pile up alike."""
+    """The move (m) that lays walls best over those of the level below: in x and in y separately, by the correlation of their length profiles."""
     return _shift(walls, below, 0), _shift(walls, below, 1)
 
 
@@ -80,7 +80,7 @@ def _shift(walls: Sequence[LineString], below: Sequence[LineString], axis: int) 
 
 
 def _profile_of(walls: Sequence[LineString], axis: int) -> tuple[Floats, Floats]:
-    """Positions (n,) along an axis of the pieces that run across it, and their lengths; of all pieces where none does."""
+    """Positions (n,) along an axis of the pieces that run across it, and their lengths; of all pieces if none does."""
     pieces = pieces_of(walls)
     step = pieces[:, 2:] - pieces[:, :2]
     across = np.abs(step[:, axis]) < 0.02 * np.hypot(*step.T)

@@ -27,10 +27,10 @@ LEAST_TURN_RAD, MOST_TURN_RAD = (
     math.radians(0.5),
     math.radians(46),
 )  # at a corner of a curve that is drawn as a polyline; assumed
-OFF = 0.04  # greatest distance of a swing's corners from its circle, by its radius: splines are no circles; assumed
+OFF = 0.04  # greatest distance of a swing's corners from its circle, relative to its radius: splines are not circles; assumed
 JOIN_M = 0.06  # drawn lines nearer than this are one symbol; assumed
 LEAF_M = 0.15  # greatest distance of a leaf's ends from the hinge and the end of the arc; assumed
-MOST_LEAF = 2.4  # length of a leaf's outline by its width: a rectangle
+MOST_LEAF = 2.4  # length of a leaf's outline relative to its width: a rectangle
 MOST_CORNERS = 2000  # of a polyline that is searched
 Point = tuple[float, float]
 
@@ -86,7 +86,7 @@ def symbols_of(lines: Sequence[LineString]) -> list[Symbol]:
 
 
 def paired(symbols: Sequence[Symbol]) -> list[Symbol]:
-    """Symbols, those of one leaf each whose arcs meet as one: a double door that is drawn as two blocks."""
+    """Symbols; two of one leaf each whose arcs meet become one: a double door that is drawn as two blocks."""
     single = [symbol for symbol in symbols if len(symbol.swings) == 1]
     left = [symbol for symbol in symbols if len(symbol.swings) != 1]
     ends = shapely.points(np.array([symbol.swings[0].ends for symbol in single]).reshape(-1, 2))
@@ -128,7 +128,7 @@ def _runs(points: Floats) -> Iterator[tuple[int, int]]:
 
 
 def _circle(points: Floats) -> Swing | None:
-    """The circle through points (n, 2) by least squares [Kasa 1976]; None when they are on none, or it is no swing."""
+    """The circle through points (n, 2) by least squares [Kasa 1976]; None when they are on no circle, or it is not a swing."""
     middle = points.mean(axis=0)
     near = points - middle
     system = np.column_stack((2 * near, np.ones(len(near))))
@@ -148,7 +148,7 @@ def _circle(points: Floats) -> Swing | None:
 def _with_leaf(swing: Swing, straight: Sequence[LineString]) -> Swing:
     """The swing with the end that a drawn leaf reaches: a line from the hinge to it.
 
-    A threshold may be drawn to the other end too: then none is told.
+    A threshold may also be drawn to the other end: then no end is chosen.
     """
     reached = [k for k, end in enumerate(swing.ends) if any(_is_leaf(line, swing.hinge, end) for line in straight)]
     return replace(swing, leaf=reached[0]) if len(reached) == 1 else swing

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Units of a drawing: as stated, if they make a building of what is drawn.
+"""Units of a drawing: as stated, if the drawing then has the size of a building.
 
-In: lengths of a drawing in its own units. Out: metres a unit, in words how that was decided; or EchostepError with the unit that makes sense. Owns
-what sizes buildings have. Most drawings state the unit of the template that they were begun with, whatever they were drawn in.
+In: lengths of a drawing in its own units. Out: metres a unit, and how that was decided; or EchostepError with the unit that makes sense. Owns
+the usual sizes of buildings. Most drawings state the unit of the template that they started from, whatever they were drawn in.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from echostep.errors import EchostepError
 from echostep_app.plan.importers.dxf.frame import METRES
 from echostep_app.plan.importers.report import ImportReport
 
-INSUNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 21: "ft"}  # 21: feet of the US survey, longer by 2e-6
+INSUNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 21: "ft"}  # 21: US survey feet, longer by 2e-6
 NAMES = {"mm": "millimetres", "cm": "centimetres", "m": "metres", "in": "inches", "ft": "feet"}
 
 
 @dataclass(frozen=True, slots=True)
 class Usual:
-    """Of a length in buildings: least and greatest (m), what is typical (m), and how far from it buildings are (standard deviation of ln)."""
+    """A length in buildings: least and greatest (m), typical (m), and the spread of buildings about that (standard deviation of ln)."""
 
     least_m: float
     most_m: float
@@ -32,7 +32,7 @@ class Usual:
     words: str
 
 
-# Assumed, from dimensions of rooms and doors in DIN 18040 and Neufert; the bounds are wide, because a building outside of them is asked about.
+# Assumed, from dimensions of rooms and doors in DIN 18040 and Neufert; the bounds are wide, because the import asks about a building outside them.
 USUAL = {
     "size": Usual(2.5, 1500.0, 30.0, 1.2, "the building is {} long"),
     "door": Usual(0.45, 2.2, 0.9, 0.25, "its doors are {} wide"),
@@ -49,7 +49,7 @@ def scale_of(
 ) -> tuple[float, str]:
     """Metres a unit, and the words for the summary; raises EchostepError when the units are not stated or contradict the lengths.
 
-    `lengths`: what was measured, by the keys of `USUAL`, in drawing units. `given`: the unit of --units.
+    `lengths`: measured lengths, by the keys of `USUAL`, in drawing units. `given`: the unit of --units.
     """
     if given is not None:
         return METRES[given], f"{given} (--units)"
@@ -74,7 +74,7 @@ def scale_of(
 
 
 def stated_unit(drawing: Any) -> str | None:
-    """The unit in the drawing's header; None when there is none that is known."""
+    """The unit in the drawing's header; None if missing or unknown."""
     try:
         return INSUNITS.get(int(drawing.header.get("$INSUNITS", 0)))
     except (TypeError, ValueError):
@@ -82,13 +82,13 @@ def stated_unit(drawing: Any) -> str | None:
 
 
 def likely_unit(lengths: Mapping[str, float]) -> str | None:
-    """The unit that makes the most usual building of the lengths; None when none does."""
+    """The unit with which the lengths are most usual for a building; None when none fits."""
     fitting = [unit for unit, metre in METRES.items() if lengths and not _contradictions(lengths, metre)]
     return min(fitting, key=lambda unit: _oddity(lengths, METRES[unit]), default=None)
 
 
 def _contradictions(lengths: Mapping[str, float], metre: float) -> list[str]:
-    """The lengths that no building has, with so many metres a unit."""
+    """The lengths that no building has, with `metre` metres a unit."""
     return [key for key, length in lengths.items() if not USUAL[key].least_m <= length * metre <= USUAL[key].most_m]
 
 

@@ -18,7 +18,7 @@ from shapely.geometry import MultiPoint, Polygon
 
 from echostep.arrays import Floats, Ints
 from echostep.errors import EchostepError
-from echostep.plan.plan_file import LIMIT_M
+from echostep.fields import LIMIT_M
 from echostep_app.plan.importers.drawn_level import areas
 from echostep_app.plan.importers.report import ImportReport
 
@@ -80,7 +80,7 @@ class Shapes:
         return SolidBody(element, corners, faces)
 
     def bodies(self, elements: list[Any], report: ImportReport) -> Iterator[SolidBody]:
-        """Bodies of elements; without an own shape those of their parts (elemented walls) or of the opening that they fill. Others are reported."""
+        """Bodies of elements; without a shape, the bodies of their parts (elemented walls) or of the opening that they fill. Others are reported."""
         for element in elements:
             body = self.body(element)
             parts = [child for child in parts_of(element) if child.is_a("IfcBuildingElementPart")]

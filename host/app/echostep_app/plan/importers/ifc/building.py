@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from echostep.errors import EchostepError
-from echostep.plan.model import ConnectorKind, Door, Georeference, Plan
+from echostep.plan import ConnectorKind, Door, Georeference, Plan
 from echostep_app.plan.importers.connector_shapes import join_connectors
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, room
 from echostep_app.plan.importers.ifc.bodies import Shapes, SolidBody
@@ -23,7 +23,7 @@ from echostep_app.plan.importers.ifc.model import open_model, storeys_of
 from echostep_app.plan.importers.report import ImportReport
 
 NO_STOREY = "at the height of no storey"
-CUT_M = 1.0  # height of the cut above the floor: about that of the rangers
+CUT_M = 1.0  # height of the cut above the floor: about the rangers' height
 WALLS = ("IfcWall", "IfcColumn", "IfcCurtainWall", "IfcPlate", "IfcMember")
 CONNECTOR_KINDS: dict[str, ConnectorKind] = {
     "IfcStair": "stairs", "IfcStairFlight": "stairs", "IfcRamp": "ramp", "IfcRampFlight": "ramp", "IfcTransportElement": "lift",

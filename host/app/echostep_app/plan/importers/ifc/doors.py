@@ -2,7 +2,7 @@
 """Doors of a model: the line across the opening that a door fills, whichever way its leaf is drawn.
 
 In: an IfcDoor. Out: the door's line and its heights. Owns nothing. The opening's rectangle lies in the wall: the line runs along the wall, in its
-middle. A door that fills no opening has its line from its placement (x along the width) when its shape is no flat leaf, else along its shape.
+middle. A door that fills no opening has its line from its placement (x along the width) when its shape is not a flat leaf, else along its shape.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from echostep_app.plan.importers.drawn_level import opening
 from echostep_app.plan.importers.ifc.bodies import Shapes, SolidBody
 
 LEAF_M = 0.4  # a door's shape that is thicker is not closed: a leaf drawn open; assumed
-NARROWEST_M, WIDEST_M = 0.4, 12.0  # widths that are believed; assumed
+NARROWEST_M, WIDEST_M = 0.4, 12.0  # plausible widths; assumed
 Line = tuple[float, float, float, float]
 
 
@@ -31,7 +31,7 @@ class PlacedDoor(NamedTuple):
 
 
 def placed_door(element: Any, shapes: Shapes, scale_m: float) -> PlacedDoor | None:
-    """Where a door is; None when neither an opening nor a shape nor a placement with a width tells it."""
+    """Where a door is; None when neither an opening nor a shape nor a placement with a width gives it."""
     width_m = float(getattr(element, "OverallWidth", None) or 0.0) * scale_m
     for relation in element.FillsVoids:
         hole = shapes.body(relation.RelatingOpeningElement)

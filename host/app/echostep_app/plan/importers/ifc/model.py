@@ -13,15 +13,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from echostep.errors import EchostepError
-from echostep.extras import require
-from echostep.plan.plan_file import LIMIT_M
+from echostep.fields import LIMIT_M
+from echostep_app.extras import require
 from echostep_app.plan.importers.parsing import LARGEST_BYTES, read_bytes
 from echostep_app.plan.importers.report import ImportReport
 
 REFERENCE_M = (
-    1.0  # a storey without walls, doors and rooms nearer than this to another one is a reference level of it; assumed
+    1.0  # a storey without walls, doors and rooms nearer than this to another one is its reference level; assumed
 )
-HALF_STOREY_M = 1.5  # storeys that are nearer are told; assumed
+HALF_STOREY_M = 1.5  # closer storeys are reported; assumed
 CONTENTS = ("IfcWall", "IfcDoor", "IfcWindow", "IfcSpace", "IfcCurtainWall")
 
 
@@ -34,7 +34,7 @@ class Storey(NamedTuple):
 
 
 def open_model(path: Path) -> Any:
-    """The model; raises EchostepError when the file is none."""
+    """The model; raises EchostepError when the file is not a model."""
     require(f"{path}: IFC", "ifcopenshell")
     ifcopenshell: Any = import_module("ifcopenshell")
     packed = path.suffix.casefold() == ".ifczip"
@@ -82,7 +82,7 @@ def storeys_of(model: Any, path: Path, report: ImportReport) -> list[Storey]:
 
 
 def _without_references(storeys: list[Storey], report: ImportReport) -> list[Storey]:
-    """Of storeys close to each other those with contents; of several without any, the highest, which is the finished floor."""
+    """Keeps, of storeys close to each other, those with contents; of several empty ones, the highest, which is the finished floor."""
     kept: list[Storey] = []
     dropped: list[Storey] = []
     for storey in storeys:

@@ -17,7 +17,7 @@ LARGEST_BYTES = 256 * 2**20
 MOST_RATIO, FREE_BYTES = (
     100,
     2**20,
-)  # unpacked size by packed size, beyond the first MiB: GeoJSON packs 5 to 30 times
+)  # ratio of unpacked to packed size, beyond the first MiB: GeoJSON packs 5 to 30 times
 MOST_FILES = 1000
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Doors where a source has none, of a width that the caller gives: an assumption, and named so.
+"""Doors of a given width where a source has none: an assumption, and named so.
 
 In: areas of rooms and of corridors in map metres, points of openings. Out: `Door`s. Owns nothing.
 A room without an opening gets a door in the middle of the longest straight piece of wall that it shares with a corridor, else with a room that has a
-door already. Rooms drawn with the thickness of the wall between them get one in each of both faces.
+door already. Rooms drawn with the thickness of the wall between them get one in each face.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import shapely
 from shapely.geometry import LineString, Point, Polygon
 
 from echostep.arrays import Floats
-from echostep.plan.model import Door
+from echostep.plan import Door
 
 ASSUMED = "assumed"  # name of such a door
 THICKEST_M = 0.6  # greatest distance of neighbours: the thickness of a wall; assumed
@@ -26,7 +26,7 @@ ONE_LINE_M = 0.05  # nearer faces are one wall: half the width in which a door c
 def doors_of_rooms(
     rooms: Sequence[Polygon], ways: Sequence[Polygon], opened: Sequence[Polygon], width_m: float
 ) -> list[Door]:
-    """Doors of `rooms` without an opening, to `ways` without walls or to rooms that have a door: `opened`, or a room before."""
+    """Doors of `rooms` without an opening, to `ways` without walls or to rooms that have a door: `opened`, or an earlier room."""
     doors: list[Door] = []
     closed = _with_doors(list(rooms), list(ways), {}, width_m, doors)
     reached = [*opened, *(room for room in rooms if all(room is not other for other in closed))]

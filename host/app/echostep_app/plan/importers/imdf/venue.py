@@ -19,8 +19,8 @@ from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from echostep.errors import EchostepError
-from echostep.plan.georeference import EarthTransform
-from echostep.plan.model import ConnectorKind, Door, DoorState, Georeference, Plan
+from echostep.plan import ConnectorKind, Door, DoorState, Georeference, Plan
+from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.importers.connector_shapes import join_connectors
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, pieces, room
 from echostep_app.plan.importers.geojson import features, label, properties, shape

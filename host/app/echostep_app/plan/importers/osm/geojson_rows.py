@@ -78,12 +78,12 @@ def _polygon(rows: _Rows, rings: Any, tags: dict[str, str], where: str) -> None:
 
 
 def without_names(tags: dict[str, str]) -> dict[str, str]:
-    """Tags of an inner ring: of the room around it, whose name it does not repeat."""
+    """Tags of an inner ring: the tags of the room around it, without its name."""
     return {key: value for key, value in tags.items() if key not in ("name", "ref")}
 
 
 def _tags(feature: dict[str, Any], where: str) -> dict[str, str]:
-    """The tags of a feature: its properties, or its property "tags"; those that begin with @ are of the exporter."""
+    """The tags of a feature: its properties, or its property "tags"; tags that begin with @ come from the exporter."""
     about = properties(feature, where)
     tags = typed(about["tags"], f"{where}.properties.tags", dict) if "tags" in about else about
     return {str(key): str(value) for key, value in tags.items() if not str(key).startswith("@") and value is not None}

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Pictures of a plan (a scan, a photograph, a page of a PDF made into a picture) -> `Plan`.
 
-In: a picture, metres a pixel. Out: `Plan` of one level. Owns what is too small for a wall. What is darker than the threshold of Otsu [1979: the one
-that separates the grey values best] becomes walls by its outlines; a picture shows no doors, so its gaps are the ways.
+In: a picture, metres a pixel. Out: `Plan` of one level. Owns what is too small for a wall. Areas darker than the threshold of Otsu [1979: the one
+that separates the grey values best] become walls by their outlines; a picture shows no doors, so gaps are the ways through.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from shapely.affinity import scale
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan
+from echostep.plan import Plan
 from echostep_app.plan.importers.drawn_level import DrawnLevel
 from echostep_app.plan.importers.raster.tracing import grey, trace
 from echostep_app.plan.importers.report import ImportReport

@@ -2,7 +2,7 @@
 """Maps of ROS navigation (map.yaml and a picture, as map_server and nav2 save them) -> `Plan`.
 
 In: map.yaml. Out: `Plan` of one level. Owns nothing. Occupied pixels become walls by their outlines [nav2_map_server, map_io: p = (255 - value) /
-255, or value / 255 with negate]; the origin is the pose of the lower left corner. What the robot saw besides walls is in the picture too, and stays.
+255, or value / 255 with negate]; the origin is the pose of the lower left corner. Other things that the robot saw are in the picture too, and stay.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from pathlib import Path
 from shapely.affinity import affine_transform
 
 from echostep.errors import EchostepError
-from echostep.plan.model import Plan
-from echostep.plan.plan_file import LIMIT_M
+from echostep.fields import LIMIT_M
+from echostep.plan import Plan
 from echostep_app.plan.importers.drawn_level import DrawnLevel
 from echostep_app.plan.importers.parsing import read_text
 from echostep_app.plan.importers.raster.tracing import grey, trace

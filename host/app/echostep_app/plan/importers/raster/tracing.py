@@ -15,13 +15,13 @@ from shapely.geometry import Polygon
 
 from echostep.arrays import Bools, Floats
 from echostep.errors import EchostepError
-from echostep.extras import require
+from echostep_app.extras import require
 from echostep_app.plan.importers.parsing import read_bytes
 
 MOST_PIXELS = 100_000_000
 
 STAIR = 1.0  # pixels by which an outline may leave the pixels' edges: a slanting wall is a stair of pixels
-LEAST_PIXELS = 4.0  # smaller groups are noise of the sensor; assumed
+LEAST_PIXELS = 4.0  # smaller groups are sensor noise; assumed
 MOST_RUNS = 2_000_000
 
 
@@ -55,7 +55,7 @@ def trace(walls: Bools) -> tuple[list[Polygon], int]:
     large = [group for group in groups if group.area >= LEAST_PIXELS]
     smooth = [
         group.normalize().simplify(STAIR) for group in large
-    ]  # normalised, a ring begins at a corner: its begin stays
+    ]  # a normalised ring begins at a corner: its beginning stays
     return [s if isinstance(s, Polygon) and s.area > 0.0 else g for s, g in zip(smooth, large, strict=True)], len(
         groups
     ) - len(large)

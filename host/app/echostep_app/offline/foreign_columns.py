@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: MIT
+"""Columns of CSV files as other programs name them, and their units.
+
+In: the first lines of a file, `--columns` and `--units`. Out: `Header`: the columns by this project's names, with the factors to SI units; an error
+for names and units that are not known. Owns the table of the loggers that are recognised without options.
+
+Sources of the table: NGIMU: short_walk.csv of github.com/xioTechnologies/Gait-Tracking. x-IMU3: Inertial.csv in the examples of
+github.com/xioTechnologies/x-IMU3-CSV. phyphox: titles of the columns in public scripts that read its exports. Sensor Logger: UNITS.md of
+github.com/tszheichoi/awesome-sensor-logger. MT Manager: text exports in a test of opensim-core's reader, and in [Voisard 2025]. Movella DOT: export
+bei_D4CA6EF17860_20210830_170505.csv of a recording, in github.com/Allwillcome/XsensDot2Mtw4OpenSense: its times step by 8333 at 120 Hz, its sensor
+at rest reads 9.65 and 0.2, which as rad/s would be a bias of 11 deg/s; the titles of the other modes: logger of the SDK for Android.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from echostep.errors import EchostepError
+from echostep.offline.csv_table import column_of, header_of
+from echostep.offline.header import Header
+from echostep.offline.imu_csv import Imu, load_imu
+
+# Quantity and factor to the SI unit of each unit; standard gravity [CGPM 1901].
+UNITS = {
+    "s": ("time", 1.0), "ms": ("time", 1e-3), "us": ("time", 1e-6), "ns": ("time", 1e-9),
+    "m/s2": ("force", 1.0), "g": ("force", 9.80665), "mg": ("force", 9.80665e-3),
+    "rad/s": ("rate", 1.0), "deg/s": ("rate", np.pi / 180.0),
+    "rad": ("angle", 1.0), "deg": ("angle", np.pi / 180.0),
+    "Pa": ("pressure", 1.0), "hPa": ("pressure", 100.0), "kPa": ("pressure", 1000.0),
+}  # fmt: skip
+QUANTITIES = {"t_s": "time", "pressure_pa": "pressure", "compass_rad": "angle"} | {
+    f"a{axis}": "force" for axis in "xyz"
+}
+RATE = re.compile(r"g[xyz]|(thigh|shank)_[xyz]|\w+_rad_s")
+COUNTER, COUNTER_PERIOD = "PacketCounter", 1 << 16  # of the samples, in exports of MT Manager
+DOT_CLOCK, DOT_CLOCK_HZ, DOT_CLOCK_PERIOD = "SampleTimeFine", 1e6, 1 << 32  # microseconds, in exports of Movella DOT
+DOT = "DeviceTag:"  # begins a line above the names of the columns
+DOT_PREAMBLE = r"sep=|\w[\w ]*: *,|.*Technologies B\. ?V\.|\s*\n"  # further ones, until an empty line
+PREAMBLE = re.compile(rf"//|Acquisition frequency:|{DOT_PREAMBLE}")  # lines above the names of the columns
+COUNTS_HZ = re.compile(r"(?:Update Rate|Acquisition frequency): *([0-9.]+) *Hz")
+ADVICE = "; other names: --columns OURS=THEIRS,...; other units: --units deg/s,g"  # for a file without the names
+MOST_PREAMBLE = 50  # lines; assumed
+
+
+def _axes(ours: str, theirs: str, letters: str = "XYZ") -> dict[str, str]:
+    """Names of three axes, ours to theirs."""
+    return {ours + axis: theirs.format(letter) for axis, letter in zip("xyz", letters, strict=True)}
+
+
+XIO = _axes("a", "Accelerometer {} (g)") | _axes("g", "Gyroscope {} (deg/s)")
+XIO_MAG = _axes("m", "Magnetometer {} (uT)")
+PHYPHOX = _axes("a", "Acceleration {} (m/s^2)", "xyz") | _axes("g", "Gyroscope {} (rad/s)", "xyz")
+XSENS = _axes("a", "Acc_{}") | _axes("g", "Gyr_{}")
+XSENS_MAG = _axes("m", "Mag_{}")
+
+
+@dataclass(frozen=True, slots=True)
+class Logger:
+    """Columns that its files have and may have (ours to theirs), units that the names do not hold, how a line `above` the names begins."""
+
+    name: str
+    has: dict[str, str]
+    may_have: dict[str, str] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    above: str = ""
+
+
+LOGGERS = (
+    Logger("NGIMU", {"t_s": "Time (s)"} | XIO, XIO_MAG),
+    Logger("x-IMU3", {"t_s": "Timestamp (us)"} | XIO, XIO_MAG),
+    Logger("phyphox", {"t_s": "Time (s)"} | PHYPHOX),
+    Logger("phyphox", {"t_s": "Time (s)", "pressure_pa": "Pressure (hPa)"}),
+    Logger("Sensor Logger", {"t_s": "seconds_elapsed", "pressure_pa": "pressure"}, units={"pressure": "hPa"}),
+    Logger("Movella DOT", {"t_s": DOT_CLOCK} | XSENS, XSENS_MAG, {"rate": "deg/s"}, DOT),
+    Logger("MT Manager", {"t_s": COUNTER} | XSENS, XSENS_MAG),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Naming:
+    """Options of the command line: `columns`, names of this project to the file's names; `units`, of a quantity, by its name."""
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+OWN = Naming()
+
+
+def parse_naming(columns: str | None, units: str | None) -> Naming:
+    """The options `--columns OURS=THEIRS,...` and `--units UNIT,...`; raises EchostepError."""
+    pairs = [pair.partition("=") for pair in columns.split(",")] if columns else []
+    for ours, _, theirs in pairs:
+        if not ours.strip() or not theirs.strip():
+            raise EchostepError(f"--columns {columns}: pairs of names are expected, as t_s=time,gx=gyro_x")
+    by_quantity: dict[str, str] = {}
+    for unit in (text.strip() for text in units.split(",")) if units else ():
+        if unit not in UNITS:
+            raise EchostepError(f"--units {unit}: unknown; there are {', '.join(UNITS)}")
+        if (quantity := UNITS[unit][0]) in by_quantity:
+            raise EchostepError(f"--units {by_quantity[quantity]},{unit}: two units of one quantity")
+        by_quantity[quantity] = unit
+    return Naming({ours.strip(): theirs.strip() for ours, _, theirs in pairs}, by_quantity)
+
+
+def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
+    """The names of the columns, taken from the lines with all lines above them; raises ValueError for missing names."""
+    above, text = _preamble(lines)
+    theirs, separator = header_of(text)
+    columns, units = dict(naming.columns), dict(naming.units)
+    notes: tuple[str, ...] = ()
+    if not columns and "t_s" not in theirs:
+        columns, more, notes = _recognised(theirs, above)
+        units = more | units
+    counts_hz, period = _counter(columns.get("t_s"), above)
+    names = _renamed(theirs, columns)
+    factors = _factors(names, theirs, units)
+    return Header(names, separator, len(above) + 1, factors, counts_hz, period, notes, ADVICE)
+
+
+def load_foot(path: Path | str, naming: Naming = OWN) -> Imu:
+    """As `load_imu`, for a file of any program."""
+    return load_imu(path, partial(read_header, naming=naming))
+
+
+def _preamble(lines: Iterator[str]) -> tuple[list[str], str]:
+    """The lines above the names of the columns, and the line of the names."""
+    above, text = list[str](), next(lines, "")
+    while PREAMBLE.match(text) and len(above) < MOST_PREAMBLE:
+        above.append(text)
+        text = next(lines, "")
+    return above, text
+
+
+def _counter(name: str | None, above: list[str]) -> tuple[float | None, int]:
+    """Counts a second and period of a column that counts samples or ticks; (None, ...) for a column of times."""
+    if name == DOT_CLOCK and _has(above, DOT):
+        return DOT_CLOCK_HZ, DOT_CLOCK_PERIOD
+    if name != COUNTER:
+        return None, COUNTER_PERIOD
+    rates = [float(found[1]) for line in above if (found := COUNTS_HZ.search(line))]
+    if not rates or not rates[-1]:
+        raise ValueError(
+            f"{COUNTER} counts samples, and no line '// Update Rate: 100.0Hz' says how many there are a second"
+        )
+    return rates[-1], COUNTER_PERIOD
+
+
+def _has(above: list[str], begin: str) -> bool:
+    """Whether one of the lines begins with `begin`."""
+    return any(line.startswith(begin) for line in above)
+
+
+def _recognised(theirs: list[str], above: list[str]) -> tuple[dict[str, str], dict[str, str], tuple[str, ...]]:
+    """Columns, units and a note of the logger that uses these names; empty for an unknown one."""
+    for logger in LOGGERS:
+        if set(logger.has.values()) <= set(theirs) and (not logger.above or _has(above, logger.above)):
+            there = {ours: name for ours, name in logger.may_have.items() if name in theirs}
+            return logger.has | there, logger.units, (f"read as an export of {logger.name}",)
+    if _has(above, DOT):
+        raise ValueError(
+            f"an export of Movella DOT without {DOT_CLOCK}, {', '.join(XSENS.values())}: record in a mode that has them, as "
+            "rate quantities or custom mode 5 (FreeAcc is without gravity, which a track needs)"
+        )
+    return {}, {}, ()
+
+
+def _renamed(theirs: list[str], columns: Mapping[str, str]) -> list[str]:
+    """The names of a file's columns with this project's names in place of theirs."""
+    for ours, name in columns.items():
+        if column_of(theirs, name) < 0:
+            raise ValueError(f"--columns {ours}={name}: no column {name}; there are {', '.join(theirs)[:300]}")
+    by_theirs = {name: ours for ours, name in columns.items()}
+    return [by_theirs.get(name, "" if name in columns else name) for name in theirs]
+
+
+def _factors(names: list[str], theirs: list[str], units: Mapping[str, str]) -> dict[str, float]:
+    """Factors to SI by name: of the unit given for the quantity, else of the unit in the brackets of the file's name."""
+    factors: dict[str, float] = {}
+    quantities = {quantity_of(name) for name in names}
+    if unused := [unit for quantity, unit in units.items() if quantity not in quantities]:
+        raise ValueError(f"--units {unused[0]}: no column has such a unit; there are {', '.join(theirs)[:300]}")
+    for name, title in zip(names, theirs, strict=True):
+        in_brackets = re.search(r"\(([^)]*)\)$", title)
+        unit = units.get(quantity_of(name)) or (in_brackets[1].replace("^", "") if in_brackets else "")
+        if unit in UNITS and UNITS[unit][0] == quantity_of(name):
+            factors[name] = UNITS[unit][1]
+    return factors
+
+
+def quantity_of(name: str) -> str:
+    """The quantity of a column by this project's name; empty for a column of any unit."""
+    name = name.removeprefix("other_")
+    return QUANTITIES.get(name) or ("rate" if RATE.fullmatch(name) else "")

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT
+"""The first line of a CSV file: which column is which, and its unit.
+
+In: lines. Out: `Header`. Owns nothing. A reader of other programs' files makes a `Header` with their names, units and counters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.offline.csv_table import header_of
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """`names` of the columns, this project's where they are known; `line`: their line in the file; `factors` to SI by name.
+
+    `counts_hz`: counts a second, if `t_s` is a counter, which wraps after `counts_period`. `notes`: which logger was recognised.
+    `advice`: for a file that lacks a column.
+    """
+
+    names: list[str]
+    separator: str
+    line: int
+    factors: Mapping[str, float] = field(default_factory=dict)
+    counts_hz: float | None = None
+    counts_period: int = 1
+    notes: tuple[str, ...] = ()
+    advice: str = ""
+
+    def in_si(self, values: Floats, names: Sequence[str]) -> Floats:
+        """Columns (n, k) of these names in SI units."""
+        scaled: Floats = values * [self.factors.get(name, 1.0) for name in names]
+        if self.counts_hz is not None:
+            time = list(names).index("t_s")
+            scaled[:, time] = since_first(values[:, time], self.counts_period) / self.counts_hz
+        return scaled
+
+
+HeaderReader = Callable[[Iterator[str]], Header]  # takes the lines up to the names of the columns
+
+
+def own_header(lines: Iterator[str]) -> Header:
+    """The names in the first line, as they are, in SI units."""
+    names, separator = header_of(next(lines, ""))
+    return Header(names, separator, 1)
+
+
+def since_first(counter: Floats, period: int) -> Floats:
+    """Counts since the first one, of a counter (n,) that wraps after `period`; NaN where there is no number."""
+    counts = np.full(len(counter), np.nan)
+    whole = np.isfinite(counter)
+    if whole.any():
+        unwrapped = np.unwrap(counter[whole], period=period)
+        counts[whole] = unwrapped - unwrapped[0]
+    return counts
