@@ -39,10 +39,9 @@ if TYPE_CHECKING:
         trust,
         unobserved,
     )
-    from echostep.localization.first_call import call_kernels
     from echostep.localization.height.levels import ClimbSettings, drift_m
     from echostep.localization.limits import BELIEVED, PROBABLE, TRACKING_M
-    from echostep.localization.map_filter import MapFilter
+    from echostep.localization.map_filter import MapFilter, call_kernels
     from echostep.localization.particles.places import LikelyPlace
     from echostep.localization.particles.start import ANY_LEVEL, Air, Start
     from echostep.localization.settings import CloudSettings, FilterSettings
@@ -62,10 +61,9 @@ __getattr__ = face(
         "echoes.likelihood": "EchoModel EchoSettings echo_density echo_model likeliest_source outlier_density planned_density",
         "echoes.rangers": "echo_of",
         "estimate": "CHI2_95 RISK WALKER_M_S Estimate TrackStatus claims_place digest ellipse95 in_ellipse95 trust unobserved",
-        "first_call": "call_kernels",
         "height.levels": "ClimbSettings drift_m",
         "limits": "BELIEVED PROBABLE TRACKING_M",
-        "map_filter": "MapFilter",
+        "map_filter": "MapFilter call_kernels",
         "particles.places": "LikelyPlace",
         "particles.start": "ANY_LEVEL Air Start",
         "settings": "CloudSettings FilterSettings",

@@ -31,6 +31,7 @@ from echostep.localization.limits import BELIEVED, LOST_M, PROBABLE, TRACKING_M
 from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, move_of
 from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.kernels import systematic
 from echostep.localization.particles.start import ANY_LEVEL, Air, Start
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
 from echostep.localization.team.meeting import WRONG, Meeting, start_at
@@ -39,6 +40,7 @@ from echostep.localization.team.meetings import weigh_by
 from echostep.localization.window import RecentWay
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose
+from echostep.walls.echo_sources import Walls
 
 SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports the cloud, assumed
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate: no plan is more exact
@@ -348,3 +350,12 @@ class MapFilter:
             return 0.0
         at = self._believed(0.0)
         return self._building.drawn.sd_m(at.x_m, at.y_m, at.level)
+
+
+def call_kernels() -> None:
+    """Call the kernels that a filter needs later than at its first segment: resampling, and learning the rangers' common bias."""
+    systematic(np.ones(2), 0.5, 2)
+    zero = np.zeros(1)
+    ping = PingBatch(zero, zero, zero, zero, np.zeros(1, np.int64), zero, zero, zero, zero, zero)
+    model, _ = echo_models(FilterSettings())
+    RangeBias(1.0).learn(ping, (zero, zero, zero), (0.0, 0.0, 0.0), Walls(np.empty((0, 4))), model)
