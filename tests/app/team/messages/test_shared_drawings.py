@@ -173,7 +173,7 @@ def fetcher(broker: Broker, folder: Path, said: list[str]) -> Callable[[str], Pa
 @needs_broker
 def test_a_commander_sees_those_who_are_on_a_drawing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One wearer is on it, the one who draws it on none."""
-    interrupt_once_called(Operation, "update", monkeypatch, lambda operation, *_: len(operation.roster.keys) == 2)
+    interrupt_once_called(Operation, "receive", monkeypatch, lambda operation, *_: len(operation.roster.keys) == 2)
     with Broker(tmp_path) as broker:
         keep(broker, drawing())
         on_it = report("bo", plan_sha256=hashlib.sha256(drawing()).hexdigest())
