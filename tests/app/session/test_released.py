@@ -18,7 +18,7 @@ from echostep_app.simulation.scenario import DEMO_WAYPOINTS
 
 def alive() -> set[int]:
     gc.collect()
-    return {id(o) for o in gc.get_objects() if isinstance(o, (Tracker, Session, LivePage))}
+    return {id(o) for o in gc.get_objects() if type(o) in {Tracker, Session, LivePage}}
 
 
 @pytest.mark.slow
