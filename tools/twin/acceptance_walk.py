@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import signal
 import sys
 from collections.abc import Sequence
 
@@ -20,7 +19,7 @@ from echostep_app.session.acceptance.protocol import Point, Visit
 from echostep_app.session.acceptance.survey import corridor
 from echostep_app.simulation.people.walker import Person, Walk, Waypoint
 from echostep_app.simulation.scenario import Scenario
-from twin.run import PtyBoard, PtyMtx, playing, wait_for_opening
+from twin.run import PtyBoard, PtyMtx, announce, playing, until_interrupted, wait_for_opening
 
 STOP_S = 1.5  # on a point that is visited standing; assumed
 WEARER = Person(stand_s=10.0)  # at both ends: longer than the foot takes for its first position, and the guide's rest
@@ -57,8 +56,8 @@ def play(text: str, rounds: int, seed: int) -> None:
     with contextlib.closing(board):
         scenario = Scenario(plan, waypoints(protocol.points, visits, plan), seed, board, WEARER)
         due = [*zip(times_s(scenario.walk, protocol.points, visits), visits, strict=True)]
-        print(f"board {board.port}\nmtx   {mtx.port}\n\nIn another terminal:\n  .venv/bin/echostep acceptance --corridor {text} "
-              f"--rounds {rounds} --board {board.port} --mtx {mtx.port}\n\nPress Enter there at each point. Ctrl-C ends.", flush=True)  # fmt: skip
+        announce(f"acceptance --corridor {text} --rounds {rounds} --board {board.port} --mtx {mtx.port}",
+                 "Press Enter there at each point. ", board=board.port, mtx=mtx.port)  # fmt: skip
         wait_for_opening(board, mtx)
         for now_s in playing(scenario, board, mtx):
             if not board.is_open:
@@ -73,11 +72,7 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=2)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)
-    with contextlib.suppress(KeyboardInterrupt):
-        play(options.corridor, options.rounds, options.seed)
-    return 0
+    return until_interrupted(lambda: play(options.corridor, options.rounds, options.seed))
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ import signal
 import subprocess
 import sys
 import threading
+from functools import partial
 
 from twin.live_walk import LIVE, HostFault, LiveWalk, replay, track
 
@@ -131,37 +132,26 @@ def mount_disk(walk: LiveWalk) -> None:
         walk.opened.callback(subprocess.check_call, ["umount", str(place)])
 
 
-def unplug_board(walk: LiveWalk) -> None:
-    walk.board.fault("usb=unplug")
-    walk.link(board=False)
+def unplug(walk: LiveWalk, *, board: bool = False, mtx: bool = False) -> None:
+    """Pull the cables of these ports."""
+    if board:
+        walk.board.fault("usb=unplug")
+    if mtx:
+        walk.mtx.unplug()
+    walk.link(board=not board, mtx=not mtx)
 
 
-def plug_board(walk: LiveWalk) -> None:
-    walk.board.fault("usb=plug")
+def plug(walk: LiveWalk, *, board: bool = False, mtx: bool = False) -> None:
+    """Plug them in again; its cable feeds the MTx, too, so that it starts anew."""
+    if board:
+        walk.board.fault("usb=plug")
+    if mtx:
+        walk.mtx.plug()
+        walk.mtx.power_on()
     walk.link()
 
 
-def unplug_mtx(walk: LiveWalk) -> None:
-    walk.mtx.unplug()
-    walk.link(mtx=False)
-
-
-def plug_mtx(walk: LiveWalk) -> None:
-    """The cable feeds it: it starts anew."""
-    walk.mtx.plug()
-    walk.mtx.power_on()
-    walk.link()
-
-
-def unplug_both(walk: LiveWalk) -> None:
-    walk.board.fault("usb=unplug")
-    walk.mtx.unplug()
-    walk.link(board=False, mtx=False)
-
-
-def plug_both(walk: LiveWalk) -> None:
-    plug_board(walk)
-    plug_mtx(walk)
+unplug_mtx, plug_mtx = partial(unplug, mtx=True), partial(plug, mtx=True)
 
 
 class Flood:
@@ -220,14 +210,6 @@ class Terminal:
             os.close(self._ours)
 
 
-def make_slow(walk: LiveWalk) -> None:
-    (walk.folder / "slow").touch()
-
-
-def make_fast(walk: LiveWalk) -> None:
-    (walk.folder / "slow").unlink()
-
-
 DATAGRAM_FLOOD, CONNECTION_FLOOD = Flood(DATAGRAMS, UDP_PORT), Flood(CONNECTIONS, PAGE_PORT)
 STOPPED, CLOSED = Terminal(), Terminal()
 HOST_FAULTS = (
@@ -237,14 +219,15 @@ HOST_FAULTS = (
     HostFault("live, stopped (SIGSTOP)", lambda walk: walk.process.send_signal(signal.SIGSTOP), go_on, 3.0),
     HostFault("live, stopped (SIGSTOP)", lambda walk: walk.process.send_signal(signal.SIGSTOP), go_on, 10.0),
     HostFault(
-        f"live, disk that takes {WRITE_S:g} s a write", make_slow, make_fast, 10.0,
+        f"live, disk that takes {WRITE_S:g} s a write",
+        lambda walk: (walk.folder / "slow").touch(), lambda walk: (walk.folder / "slow").unlink(), 10.0,
         program=(sys.executable, "-c", SLOW_DISK),
     ),
     HostFault("live, disk full", fill_disk, free_disk, 10.0, prepare=mount_disk),
     HostFault("live, recording refused from then on (RLIMIT_FSIZE)", limit_file),
-    HostFault("live, board's port unplugged", unplug_board, plug_board, 3.0),
+    HostFault("live, board's port unplugged", partial(unplug, board=True), partial(plug, board=True), 3.0),
     HostFault("live, MTx's port unplugged", unplug_mtx, plug_mtx, 3.0),
-    HostFault("live, both ports unplugged", unplug_both, plug_both, 3.0),
+    HostFault("live, both ports unplugged", partial(unplug, board=True, mtx=True), partial(plug, board=True, mtx=True), 3.0),
     HostFault(
         "live, 20,000 datagrams/s to the beacons' port, half of them invented beacons",
         DATAGRAM_FLOOD.begin, DATAGRAM_FLOOD.end, 10.0, ("--headless", "--beacons", f"udp://127.0.0.1:{UDP_PORT}"),

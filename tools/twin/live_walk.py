@@ -16,7 +16,6 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple, Self, cast
 
 import numpy as np
@@ -98,7 +97,7 @@ class LiveWalk:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         if self.live is not None:
             self.live.kill()
             self.live.wait()
@@ -188,7 +187,5 @@ def replay(run: Path) -> None:
 def track(run: Path) -> Floats:
     """Estimates of a run (n, 4): t_s, x, y, 1 for `tracking`."""
     with (run / "track.csv").open() as file:
-        rows = [
-            (float(r["t_s"]), float(r["x_m"]), float(r["y_m"]), r["status"] == "tracking") for r in csv.DictReader(file)
-        ]
+        rows = [(r["t_s"], r["x_m"], r["y_m"], r["status"] == "tracking") for r in csv.DictReader(file)]
     return np.array(rows, np.float64).reshape(-1, 4)

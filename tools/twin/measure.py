@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import track
 
+from echostep.arrays import Floats
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader, encode
 from echostep_app.board.subscription import SUBSCRIBE
@@ -24,29 +25,66 @@ from echostep_app.simulation.devices.board import BoardProcess
 from echostep_app.simulation.kits import Kit
 from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 from places import TWIN
-from reliability.campaign import options, report
+from reliability.campaign import Figure, options, report
 
 SETTLED_S = 2.0  # enumeration and start-up take less
 TICK_US = 0.5
-Figure = tuple[str, str, str, bool | None]  # what, measured, limit, passed (None: no limit)
 RIGHT_US = 6123  # the right ranger's time of flight
+TRIGGERS = ("trigger left", "trigger right")  # events in the trace, by ranger
 
 
 @dataclass
 class RunResult:
-    """Messages and losses of one run; `triggers` (per ranger) and `syncs` are time stamps in ticks of 0.5 us."""
+    """Messages, losses and the trace of the buses; `stamps` in ticks, by the event's name in the trace."""
 
-    seconds: float = 0.0
+    seconds: int
     wall_s: float = 0.0
     counts: Counter[str] = field(default_factory=Counter)
-    triggers: dict[int, list[int]] = field(default_factory=lambda: {0: [], 1: []})
-    syncs: list[int] = field(default_factory=list)
-    status: m.Status | None = None
+    stamps: defaultdict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
+    trace: list[tuple[int, str]] = field(default_factory=list)  # ns, event
+    memory: int = 0
+    dropped: dict[str, int] = field(default_factory=dict)
     lost: int = 0
     worst_flight_us: int = 0  # error of the right ranger, which hears its own echo only
 
+    def add(self, message: m.Message, t_ns: int) -> None:
+        """Take a message; before SETTLED_S only the status."""
+        if isinstance(message, m.Status):
+            self.memory = message.memory_used
+            self.dropped = {k: v for k, v in message._asdict().items() if k.startswith("dropped_") and v}
+        if t_ns < SETTLED_S * 1e9:
+            return
+        self.counts[type(message).__name__] += 1
+        if isinstance(message, m.Ping):
+            self.stamps[TRIGGERS[message.ranger]].append(message.ticks)
+            if message.ranger == m.Ranger.RIGHT:
+                self.worst_flight_us = max(self.worst_flight_us, abs(message.time_of_flight_us - RIGHT_US))
+        elif isinstance(message, m.Sync | m.Foot):
+            self.stamps[type(message).__name__.lower()].append(message.ticks)
 
-def rows() -> np.ndarray:
+    def rate(self, kind: str) -> float:
+        """Messages per second."""
+        return self.counts[kind] / (self.seconds - SETTLED_S)
+
+    def offsets(self, event: str) -> Floats:
+        """Each stamp minus the time of the nearest event (us); the board's clock begins after the true one."""
+        events = np.array([t_ns for t_ns, text in self.trace if text == event]) / 1e3
+        stamps_us = np.array(self.stamps[event]) * TICK_US
+        after = np.clip(np.searchsorted(events, stamps_us), 1, len(events) - 1)
+        nearest = np.where(stamps_us - events[after - 1] < events[after] - stamps_us, events[after - 1], events[after])
+        return np.asarray(stamps_us - nearest, np.float64)
+
+    def losses(self) -> list[Figure]:
+        """Figures of every board."""
+        return [
+            Figure(f"frames lost in {self.seconds / 60:.0f} min", str(self.lost), "0", self.lost == 0),
+            Figure("drops by stream", str(self.dropped or 0), "0", not self.dropped),
+            Figure("static RAM and deepest stack", f"{self.memory} B", "< 2200 B", self.memory < 2200),
+            Figure("speed, with the reader", f"{self.seconds / self.wall_s:.0f} x real time", "", None),
+        ]
+
+
+def rows() -> NDArray[np.void]:
     """Rows of one second: an echo on both sides, a cross echo at the left, constant rates, SyncOut at 100 Hz."""
     table = np.zeros(1000, ROW)
     table["own_us"], table["cross_us"] = [5831, RIGHT_US], [9000, 0]
@@ -57,112 +95,7 @@ def rows() -> np.ndarray:
     return table
 
 
-def run(seconds: int, schedule: m.Schedule, title: str, kit: Kit) -> tuple[RunResult, list[tuple[int, str]]]:
-    """Run the firmware for `seconds`; the messages received, and the trace of the buses as (ns, text)."""
-    board, reader, result, second = BoardProcess(TWIN), BoardReader(), RunResult(), rows()
-    board.fault(f"kit={kit.value}")
-    began = time.perf_counter()
-    for k in track(range(seconds), title):
-        if k == 1:
-            board.send(encode(m.Configure(0xFF, schedule, 200, 10, m.PressureMode.HIGH_SPEED), 0))
-            board.send(encode(SUBSCRIBE, 1))
-        for t_ns, sent in board.advance(second):
-            for message in reader.feed(sent):
-                add_message(result, message, t_ns)
-    result.wall_s, result.seconds, result.lost = time.perf_counter() - began, float(seconds), reader.counts.lost
-    board.close()
-    return result, board.trace
-
-
-def add_message(result: RunResult, message: m.Message, t_ns: int) -> None:
-    """Add a message to the result; before SETTLED_S only the status."""
-    if isinstance(message, m.Status):
-        result.status = message
-    if t_ns < SETTLED_S * 1e9:
-        return
-    result.counts[type(message).__name__] += 1
-    if isinstance(message, m.Ping):
-        result.triggers[message.ranger].append(message.ticks)
-        if message.ranger == m.Ranger.RIGHT:
-            result.worst_flight_us = max(result.worst_flight_us, abs(message.time_of_flight_us - RIGHT_US))
-    elif isinstance(message, m.Sync):
-        result.syncs.append(message.ticks)
-
-
-def stamp_offsets(stamps: list[int], truth_ns: list[int]) -> NDArray[np.float64]:
-    """Each stamp minus the time of the nearest event (us); the board's clock begins after the true one."""
-    events = np.array(truth_ns) / 1e3
-    stamps_us = np.array(stamps) * TICK_US
-    after = np.clip(np.searchsorted(events, stamps_us), 1, len(events) - 1)
-    nearest = np.where(stamps_us - events[after - 1] < events[after] - stamps_us, events[after - 1], events[after])
-    return np.asarray(stamps_us - nearest, np.float64)
-
-
-def stamp_errors(offsets: NDArray[np.float64], begin_us: float) -> tuple[float, float]:
-    """Largest absolute value and sd (us) of the errors of stamps, by the begin of the board's clock."""
-    error = offsets - begin_us
-    return float(np.abs(error).max()), float(error.std())
-
-
-def figures(seconds: int, kit: Kit) -> list[Figure]:
-    """Every figure of a belt board."""
-    result, trace = run(seconds, m.Schedule.CONCURRENT, "both rangers at once", kit)
-    slow, _ = run(min(seconds, 30), m.Schedule.SEQUENTIAL, "in turn, as in the paper", kit)
-    span, slow_span = result.seconds - SETTLED_S, slow.seconds - SETTLED_S
-    assert result.status is not None
-    dropped = {k: v for k, v in result.status._asdict().items() if k.startswith("dropped_") and v}
-    pings, gyros = result.counts["Ping"] / span, result.counts["Gyros"] / span
-    truth = {side: [t for t, text in trace if text == f"trigger {side}"] for side in ("left", "right")}
-    offsets = [stamp_offsets(result.triggers[k], truth[side]) for k, side in enumerate(("left", "right"))]
-    syncs = stamp_offsets(result.syncs, [t for t, text in trace if text == "sync"]) if result.syncs else offsets[0]
-    begin_us = float(np.median(syncs))  # by what Timer1 captures: SyncOut, or the left echo line
-    worst = [stamp_errors(each, begin_us) for each in offsets]
-    trigger = max(w for w, _ in worst)
-    return [
-        ("pings/s, both rangers at once", f"{pings:.1f}", ">= 28", pings >= 28.0),
-        (
-            "pings/s, in turn",
-            f"{slow.counts['Ping'] / slow_span:.1f}",
-            "14.3 by design",
-            slow.counts["Ping"] / slow_span > 13.5,
-        ),
-        ("gyro samples/s", f"{gyros:.1f}", "200", abs(gyros - 200.0) < 1.0),
-        ("worst trigger stamp", f"{trigger:.1f} us (sd {max(s for _, s in worst):.2f})", *_trigger_limit(trigger, kit)),
-        *(_of_the_papers(*stamp_errors(syncs, begin_us)) if kit is Kit.PAPERS else _of_2026(result, span)),
-        (f"frames lost in {seconds / 60:.0f} min", str(result.lost), "0", result.lost == 0),
-        ("drops by stream", str(dropped or 0), "0", not dropped),
-        (
-            "static RAM and deepest stack",
-            f"{result.status.memory_used} B",
-            "< 2200 B",
-            result.status.memory_used < 2200,
-        ),
-        ("speed, with the reader", f"{result.seconds / result.wall_s:.0f} x real time", "", None),
-    ]
-
-
-def _trigger_limit(worst_us: float, kit: Kit) -> tuple[str, bool]:
-    limit_us = 20.0 if kit is Kit.PAPERS else 2.0  # pulses are captured by the timers
-    return f"<= {limit_us:g} us", worst_us <= limit_us
-
-
-def _of_the_papers(worst: float, sd: float) -> list[Figure]:
-    return [("worst SyncOut stamp", f"{worst:.1f} us (sd {sd:.2f})", "<= 20 us", worst <= 20.0)]
-
-
-def _of_2026(result: RunResult, span: float) -> list[Figure]:
-    """All axes, fields, pressures, and the timing of the pulses."""
-    motions, fields, pressures = (result.counts[kind] / span for kind in ("Motion", "Magnetic", "Pressure"))
-    flight = result.worst_flight_us
-    return [
-        ("worst time of flight", f"{flight} us", "<= 2 us", flight <= 2),
-        ("samples of all axes/s", f"{motions:.1f}", "200", abs(motions - 200.0) < 1.0),
-        ("magnetic fields/s", f"{fields:.1f}", "10", abs(fields - 10.0) < 0.2),
-        ("pressures/s", f"{pressures:.1f}", "12.5", abs(pressures - 12.5) < 0.5),
-    ]
-
-
-def foot_rows() -> np.ndarray:
+def foot_rows() -> NDArray[np.void]:
     """Rows of one second of a foot that stands."""
     table = np.zeros(1000, EXTENDED_ROW)
     table["row"]["sync_us"], table["row"]["temperature"] = NO_SYNC, 480
@@ -170,39 +103,81 @@ def foot_rows() -> np.ndarray:
     return table
 
 
-def foot_figures(seconds: int) -> list[Figure]:
-    """Every figure of the foot board."""
-    board, reader, result, second = BoardProcess(TWIN), BoardReader(), RunResult(), foot_rows()
-    board.fault("kit=foot")
-    stamps: list[int] = []
-    for k in track(range(seconds), "the foot board"):
-        if k == 1:
-            board.send(encode(SUBSCRIBE, 0))
+def run(seconds: int, title: str, kit: str, second: NDArray[np.void], *asked: m.Message) -> RunResult:
+    """Run the firmware for `seconds` with the same rows in each; after the first one it is `asked`."""
+    board, reader, result = BoardProcess(TWIN), BoardReader(), RunResult(seconds)
+    board.fault(f"kit={kit}")
+    began = time.perf_counter()
+    for k in track(range(seconds), title):
+        for sequence, message in enumerate(asked if k == 1 else ()):
+            board.send(encode(message, sequence))
         for t_ns, sent in board.advance(second):
             for message in reader.feed(sent):
-                add_message(result, message, t_ns)
-                if isinstance(message, m.Foot) and t_ns >= SETTLED_S * 1e9:
-                    stamps.append(message.ticks)
+                result.add(message, t_ns)
+    result.wall_s, result.lost, result.trace = time.perf_counter() - began, reader.counts.lost, board.trace
     board.close()
-    assert result.status is not None
-    offsets = stamp_offsets(stamps, [t for t, text in board.trace if text == "foot"])
-    worst, sd = stamp_errors(
-        offsets, float(np.median(offsets))
-    )  # a constant error would not be seen: there is no other stamp
-    rate, lost, memory = len(stamps) / (seconds - SETTLED_S), reader.counts.lost, result.status.memory_used
+    return result
+
+
+def stamps(what: str, begin_us: float, limit_us: float, *offsets: Floats) -> Figure:
+    """Largest error of stamps, by the begin of the board's clock."""
+    worst_us = max(float(np.abs(each - begin_us).max()) for each in offsets)
+    sd_us = max(float(each.std()) for each in offsets)
+    return Figure(f"worst {what}", f"{worst_us:.1f} us (sd {sd_us:.2f})", f"<= {limit_us:g} us", worst_us <= limit_us)
+
+
+def rate(what: str, per_s: float, expected: float, within: float) -> Figure:
+    """A rate with the largest deviation that is allowed."""
+    return Figure(f"{what}/s", f"{per_s:.1f}", f"{expected:g}", abs(per_s - expected) < within)
+
+
+def belt_figures(seconds: int, kit: Kit) -> list[Figure]:
+    """Every figure of a belt board."""
+    sequential, concurrent = (
+        m.Configure(0xFF, schedule, 200, 10, m.PressureMode.HIGH_SPEED)
+        for schedule in (m.Schedule.SEQUENTIAL, m.Schedule.CONCURRENT)
+    )
+    result = run(seconds, "both rangers at once", kit.value, rows(), concurrent, SUBSCRIBE)
+    slow = run(min(seconds, 30), "in turn, as in the paper", kit.value, rows(), sequential, SUBSCRIBE).rate("Ping")
+    captured = "sync" if kit is Kit.PAPERS else TRIGGERS[0]  # by Timer1: SyncOut, or the left echo line
+    begin_us = float(np.median(result.offsets(captured)))
+    limit_us = 20.0 if kit is Kit.PAPERS else 2.0  # pulses are captured by the timers
+    flight_us, pings = result.worst_flight_us, result.rate("Ping")
+    of_the_kit = {
+        Kit.PAPERS: [stamps("SyncOut stamp", begin_us, 20.0, result.offsets(captured))],
+        Kit.OF_2026: [
+            Figure("worst time of flight", f"{flight_us} us", "<= 2 us", flight_us <= 2),
+            rate("samples of all axes", result.rate("Motion"), 200.0, 1.0),
+            rate("magnetic fields", result.rate("Magnetic"), 10.0, 0.2),
+            rate("pressures", result.rate("Pressure"), 12.5, 0.5),
+        ],
+    }
     return [
-        ("foot samples/s", f"{rate:.1f}", "225 within 1 %", abs(rate / 225.0 - 1.0) < 0.0105),
-        ("worst stamp of a sample", f"{worst:.1f} us (sd {sd:.2f})", "<= 20 us", worst <= 20.0),
-        (f"frames lost in {seconds / 60:.0f} min", str(lost), "0", lost == 0),
-        ("static RAM and deepest stack", f"{memory} B", "< 2200 B", memory < 2200),
+        Figure("pings/s, both rangers at once", f"{pings:.1f}", ">= 28", pings >= 28.0),
+        Figure("pings/s, in turn", f"{slow:.1f}", "14.3 by design", slow > 13.5),
+        rate("gyro samples", result.rate("Gyros"), 200.0, 1.0),
+        stamps("trigger stamp", begin_us, limit_us, *map(result.offsets, TRIGGERS)),
+        *of_the_kit[kit],
+        *result.losses(),
+    ]
+
+
+def foot_figures(seconds: int) -> list[Figure]:
+    """Every figure of the foot board. A constant error of its stamps would not be seen: there is no other stamp."""
+    result = run(seconds, "the foot board", "foot", foot_rows(), SUBSCRIBE)
+    offsets, per_s = result.offsets("foot"), result.rate("Foot")
+    return [
+        Figure("foot samples/s", f"{per_s:.1f}", "225 within 1 %", abs(per_s / 225.0 - 1.0) < 0.0105),
+        stamps("stamp of a sample", float(np.median(offsets)), 20.0, offsets),
+        *result.losses(),
     ]
 
 
 def main() -> int:
     seconds = max(5, round(60 * options(__doc__, minutes=(10.0, "simulated")).minutes))
     tables: dict[str, Callable[[], list[Figure]]] = {
-        "parts of the papers": lambda: figures(seconds, Kit.PAPERS),
-        "parts of 2026, not built yet": lambda: figures(seconds, Kit.OF_2026),
+        "parts of the papers": lambda: belt_figures(seconds, Kit.PAPERS),
+        "parts of 2026, not built yet": lambda: belt_figures(seconds, Kit.OF_2026),
         "the foot board of 2026, not built yet": lambda: foot_figures(seconds),
     }
     title = "The real firmware in the twin, {} (simulated hardware)"

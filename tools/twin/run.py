@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import itertools
 import os
 import re
 import signal
@@ -20,14 +21,13 @@ import threading
 import time
 import tty
 from collections.abc import Callable, Iterator
-from importlib.resources import as_file, files
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.plan import Plan, load_plan
+from echostep.plan import load_plan
 from echostep.xsens import MtxReader
 from echostep.xsens.reader import warm_up
 from echostep_app.commands.actions.beacon_player import simulate_gateway
@@ -40,12 +40,13 @@ from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 from echostep_studies.simulation.devices.mtx_setup import MtxDevice
 from echostep_studies.simulation.devices.poses import LyingParts
 from echostep_studies.simulation.devices.rehearsal import Act, Rehearsal
-from places import OUT, TWIN
+from places import OUT, PLAN, TWIN
 
 BLOCK_MS, IDLE_MS = 10, 50
 FOOT_BOARD = 2  # seed of the one on the foot
 LEFT = "the board's port was closed: its next opening begins the walk anew"
 LATE_S = 0.5  # a delay behind real time that is reported
+CALIBRATION = "out/twin/calibration.toml"
 
 
 class PtyBoard:
@@ -53,8 +54,8 @@ class PtyBoard:
 
     def __init__(self, seed: int = 1) -> None:
         """`seed`: which of all boards it is."""
-        command = [*TWIN, "--pty", "--seed", str(seed)]
-        self._child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        pipe = subprocess.PIPE
+        self._child = subprocess.Popen([*TWIN, "--pty", "--seed", str(seed)], stdin=pipe, stdout=pipe, stderr=pipe)
         assert self._child.stdin
         assert self._child.stdout
         assert self._child.stderr
@@ -67,10 +68,9 @@ class PtyBoard:
 
     def _told_port(self) -> str:
         """The name of the pseudo terminal, which the twin prints when it makes one."""
-        match = re.match(rb"board port: (\S+)", self._log.readline())
-        if not match:
-            raise SystemExit("the twin made no port")
-        return match[1].decode()
+        if match := re.match(rb"board port: (\S+)", self._log.readline()):
+            return match[1].decode()
+        raise SystemExit("the twin made no port")
 
     def advance(self, rows: NDArray[Any]) -> Sent:
         """Run the firmware for one millisecond per row. The list is empty: the bytes go to the terminal."""
@@ -169,6 +169,24 @@ class PtyMtx:
                 os.write(self._ends[0], sent)
 
 
+def in_real_time() -> Iterator[int]:
+    """The milliseconds at which blocks of BLOCK_MS begin, each at its time; a simulation that is too late goes on from where it is."""
+    due_s = time.monotonic()
+    for begin_ms in itertools.count(0, BLOCK_MS):
+        yield begin_ms
+        due_s += BLOCK_MS * 1e-3
+        late_s = time.monotonic() - due_s
+        if late_s > LATE_S:
+            print(f"the simulation is {late_s:.1f} s behind real time", file=sys.stderr)
+            due_s += late_s
+        time.sleep(max(0.0, -late_s))
+
+
+def during(scenario: Scenario) -> Iterator[int]:
+    """The same for as long as a walk takes."""
+    return itertools.takewhile(lambda begin_ms: begin_ms < len(scenario.walk.t_s), in_real_time())
+
+
 def wait_for_opening(board: PtyBoard, mtx: PtyMtx, expected: Callable[[], bool] = lambda: True) -> None:
     """Run the board with empty rows, in real time, until a program opens its port, or is no longer `expected` to."""
     idle = np.zeros(IDLE_MS, ROW)
@@ -177,6 +195,14 @@ def wait_for_opening(board: PtyBoard, mtx: PtyMtx, expected: Callable[[], bool] 
         board.advance(idle)
         mtx.answer_requests()
         time.sleep(IDLE_MS * 1e-3)
+
+
+def advance(board: PtyBoard, mtx: PtyMtx, rows: NDArray[Any]) -> None:
+    """Run the board, whose SyncOut comes from the MTx."""
+    if not mtx.device.pulses:
+        rows["sync_us"] = NO_SYNC
+    board.advance(rows)
+    mtx.answer_requests()
 
 
 def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> bool:
@@ -188,87 +214,77 @@ def playing(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> Iterator[float]
     """Play one walk in real time; gives the time of the walk (s) after each block."""
     frames = iter(zip(scenario.mtx.arrival_s.tolist(), scenario.mtx.frames, strict=True))
     waiting = next(frames, None)
-    began = time.monotonic()
-    for start in range(0, len(scenario.walk.t_s), BLOCK_MS):
-        rows = scenario.sensors.rows(start, start + BLOCK_MS).copy()
-        if not mtx.device.pulses:
-            rows["sync_us"] = NO_SYNC
-        board.advance(rows)
-        mtx.answer_requests()
-        now_s = (start + BLOCK_MS) * 1e-3
+    for begin_ms in during(scenario):
+        advance(board, mtx, scenario.sensors.rows(begin_ms, begin_ms + BLOCK_MS).copy())
+        now_s = (begin_ms + BLOCK_MS) * 1e-3
         while waiting is not None and waiting[0] <= now_s:
             mtx.measure(waiting[1])
             waiting = next(frames, None)
-        ahead = began + now_s - time.monotonic()
-        if ahead > 0:
-            time.sleep(ahead)
-        elif ahead < -LATE_S:
-            print(f"the simulation is {-ahead:.1f} s behind real time", file=sys.stderr)
-            began = time.monotonic() - now_s
         yield now_s
 
 
-def play_2026(plan: Plan, seed: int, board: PtyBoard, foot_board: PtyBoard, truth: Path) -> bool:
-    """Wait for an opening of the board's port, then play one walk with both boards of 2026 in real time; returns as `play` does."""
-    scenario = Scenario(plan, DEMO_WAYPOINTS, seed, board, kit=Kit.OF_2026, foot_board=foot_board)
-    foot = scenario.foot
-    assert isinstance(foot, FootBoardPort)
-    while not board.is_open:
-        board.advance(scenario.sensors.rows(0, IDLE_MS))
-        foot_board.advance(foot.sensors.rows(0, IDLE_MS))
-        time.sleep(IDLE_MS * 1e-3)
-    scenario.write_truth(truth, board.t_s)
-    due_s = time.monotonic()
-    for start in range(0, len(scenario.walk.t_s), BLOCK_MS):
-        board.advance(scenario.sensors.rows(start, start + BLOCK_MS))
-        foot_board.advance(foot.sensors.rows(start, start + BLOCK_MS))
-        if not board.is_open:
-            return False
-        due_s = max(due_s + BLOCK_MS * 1e-3, time.monotonic() - LATE_S)
-        time.sleep(max(0.0, due_s - time.monotonic()))
-    return True
+def announce(command: str, hint: str = "", **ports: str) -> None:
+    """Print the ports, and what to start, and then to do, in another terminal."""
+    for name, port in ports.items():
+        print(f"{name:5} {port}")
+    print(f"\nIn another terminal:\n  .venv/bin/echostep {command}\n\n{hint}Ctrl-C ends.", flush=True)
 
 
-def run_2026(seed: int, out: Path, *, once: bool) -> int:
-    """Play the two boards of 2026 until Ctrl-C."""
-    boards = PtyBoard(), PtyBoard(FOOT_BOARD)
-    with as_file(files("echostep") / "plans" / "demo.json") as path:
-        plan = load_plan(path)
-        out.mkdir(parents=True, exist_ok=True)
-        print(f"board {boards[0].port}\nfoot  {boards[1].port}\n\nIn another terminal:\n"
-              f"  .venv/bin/echostep live --plan {path} --board {boards[0].port} --foot {boards[1].port}\n\nCtrl-C ends.", flush=True)  # fmt: skip
-    try:
+def walk_with_mtx(options: argparse.Namespace) -> None:
+    """Play the walk with the parts of the papers, and a gateway if one is wanted, anew at each opening of the board's port."""
+    truth = options.out / "truth.csv"
+    more = f" --beacons {options.beacons} --guide Meeting" if options.beacons else ""
+    with contextlib.closing(PtyBoard()) as board:
+        mtx = PtyMtx()
+        announce(f"live --plan {PLAN} --board {board.port} --mtx {mtx.port}{more}", board=board.port, mtx=mtx.port)
         while True:
-            ended = play_2026(plan, seed, *boards, out / "truth.csv")
-            if ended and once:
-                break
-            if not ended:
+            scenario, gateway = demo_scenario(load_plan(PLAN), options.seed, board), Gateway(board)
+            wait_for_opening(board, mtx)
+            scenario.write_truth(truth, board.t_s)
+            if options.beacons:
+                arguments = (PLAN, truth, options.beacons, SPACING_M, 1.0, options.seed, gateway.now_s)
+                threading.Thread(target=simulate_gateway, args=arguments, daemon=True).start()
+            gateway.left = not play(scenario, board, mtx)
+            if gateway.left:
                 print(LEFT, flush=True)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        for board in boards:
-            board.close()
-    return 0
 
 
-def rehearse(rehearsal: Rehearsal, board: PtyBoard, mtx: PtyMtx) -> None:
-    """Play the poses and movements of `echostep calibrate` in real time, the next one at each opening of the board's port, until Ctrl-C."""
-    act, at_ms, was_open = Act.WALK, 0, False
-    due_s = time.monotonic()
-    while True:
-        if board.is_open and not was_open:
-            act, at_ms = Act((act + 1) % len(Act)), 0
-            print(f"the wearer: {act.name.lower()}", flush=True)
-        was_open = board.is_open
-        rows = rehearsal.rows(act if was_open else Act.STAND, at_ms, BLOCK_MS)
-        if not mtx.device.pulses:
-            rows["sync_us"] = NO_SYNC
-        board.advance(rows)
-        mtx.answer_requests()
-        at_ms += BLOCK_MS
-        due_s = max(due_s + BLOCK_MS * 1e-3, time.monotonic() - LATE_S)
-        time.sleep(max(0.0, due_s - time.monotonic()))
+def walk_with_two_boards(options: argparse.Namespace) -> None:
+    """Play the walk with both boards of 2026, anew at each opening of the belt board's port."""
+    with contextlib.closing(PtyBoard()) as board, contextlib.closing(PtyBoard(FOOT_BOARD)) as foot_board:
+        announce(
+            f"live --plan {PLAN} --board {board.port} --foot {foot_board.port}", board=board.port, foot=foot_board.port
+        )
+        while True:
+            scenario = Scenario(
+                load_plan(PLAN), DEMO_WAYPOINTS, options.seed, board, kit=Kit.OF_2026, foot_board=foot_board
+            )
+            foot = scenario.foot
+            assert isinstance(foot, FootBoardPort)
+            while not board.is_open:
+                board.advance(scenario.sensors.rows(0, IDLE_MS))
+                foot_board.advance(foot.sensors.rows(0, IDLE_MS))
+                time.sleep(IDLE_MS * 1e-3)
+            scenario.write_truth(options.out / "truth.csv", board.t_s)
+            for begin_ms in itertools.takewhile(lambda _: board.is_open, during(scenario)):
+                board.advance(scenario.sensors.rows(begin_ms, begin_ms + BLOCK_MS))
+                foot_board.advance(foot.sensors.rows(begin_ms, begin_ms + BLOCK_MS))
+            if not board.is_open:
+                print(LEFT, flush=True)
+
+
+def rehearse(options: argparse.Namespace) -> None:
+    """Play the poses and movements of `echostep calibrate`, the next one at each opening of the board's port."""
+    with contextlib.closing(PtyBoard()) as board:
+        mtx, rehearsal = PtyMtx(), Rehearsal(load_plan(PLAN), options.seed, board)
+        announce(f"calibrate --board {board.port} --out {CALIBRATION}", board=board.port, mtx=mtx.port)
+        act, began_ms, was_open = Act.WALK, 0, False
+        for now_ms in in_real_time():
+            if board.is_open and not was_open:
+                act, began_ms = Act((act + 1) % len(Act)), now_ms
+                print(f"the wearer: {act.name.lower()}", flush=True)
+            was_open = board.is_open
+            advance(board, mtx, rehearsal.rows(act if was_open else Act.STAND, now_ms - began_ms, BLOCK_MS))
 
 
 class LyingBoard:
@@ -285,33 +301,32 @@ class LyingBoard:
         self.board.advance(self.parts.rows(self.pose, BLOCK_MS))
 
 
-def run_poses(seed: int) -> int:
-    """Lay the parts of both boards of 2026 on another side whenever a program has closed their port, until Ctrl-C."""
-    boards = LyingBoard(seed, foot=False), LyingBoard(seed, foot=True)
-    ports = [lying.board.port for lying in boards]
-    print(f"board {ports[0]}\nfoot  {ports[1]}\n\nIn another terminal:\n  .venv/bin/echostep calibrate accelerometers "
-          f"--board {ports[0]} --foot {ports[1]} --out out/twin/calibration.toml\n\nCtrl-C ends.", flush=True)  # fmt: skip
-    due_s = time.monotonic()
-    try:
-        while True:
-            for lying in boards:
+def turn_boxes(options: argparse.Namespace) -> None:
+    """Lay the parts of both boards of 2026 on another side whenever a program has closed their port."""
+    belt, foot = (LyingBoard(options.seed, foot=foot) for foot in (False, True))
+    with contextlib.closing(belt.board), contextlib.closing(foot.board):
+        ports = {"board": belt.board.port, "foot": foot.board.port}
+        command = " ".join(f"--{name} {port}" for name, port in ports.items())
+        announce(f"calibrate accelerometers {command} --out {CALIBRATION}", **ports)
+        for _ in in_real_time():
+            for lying in (belt, foot):
                 was_open = lying.board.is_open
                 lying.advance()
                 lying.pose += was_open and not lying.board.is_open
-            due_s = max(due_s + BLOCK_MS * 1e-3, time.monotonic() - LATE_S)
-            time.sleep(max(0.0, due_s - time.monotonic()))
-    except KeyboardInterrupt:
-        pass
-    finally:
-        for lying in boards:
-            lying.board.close()
+
+
+def until_interrupted(work: Callable[[], None]) -> int:
+    """Work until its end, Ctrl-C or SIGTERM."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
+    with contextlib.suppress(KeyboardInterrupt):
+        work()
     return 0
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--once", action="store_true", help="end after one walk")
     parser.add_argument("--out", type=Path, default=OUT / "twin", metavar="DIR")
     parser.add_argument("--beacons", metavar="PORT", help="play a beacon gateway to this port, in step with the walk")
     parser.add_argument(
@@ -319,47 +334,9 @@ def main() -> int:
     )
     parser.add_argument("--still", action="store_true", help="a wearer who does what echostep calibrate asks")
     options = parser.parse_args()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)
-    if options.kit == Kit.OF_2026.value and options.still:
-        return run_poses(options.seed)
-    if options.kit == Kit.OF_2026.value:
-        return run_2026(options.seed, options.out, once=options.once)
-    with as_file(files("echostep") / "plans" / "demo.json") as path:
-        plan = load_plan(path)
-        board = PtyBoard()
-        mtx = PtyMtx()
-        options.out.mkdir(parents=True, exist_ok=True)
-        more = f" --beacons {options.beacons} --guide Meeting" if options.beacons else ""
-        command = f"live --plan {path} --board {board.port} --mtx {mtx.port}{more}"
-        if options.still:
-            command = f"calibrate --board {board.port} --out out/twin/calibration.toml"
-        print(f"board {board.port}\nmtx   {mtx.port}\n\nIn another terminal:\n"
-              f"  .venv/bin/echostep {command}\n\nCtrl-C ends.", flush=True)  # fmt: skip
-    try:
-        if options.still:
-            rehearse(Rehearsal(plan, options.seed, board), board, mtx)
-        while True:
-            scenario, gateway = demo_scenario(plan, options.seed, board), None
-            wait_for_opening(board, mtx)
-            truth = options.out / "truth.csv"
-            scenario.write_truth(truth, board.t_s)
-            if options.beacons:
-                gateway = Gateway(board)
-                arguments = (path, truth, options.beacons, SPACING_M, 1.0, options.seed, gateway.now_s)
-                threading.Thread(target=simulate_gateway, args=arguments, daemon=True).start()
-            ended = play(scenario, board, mtx)
-            if gateway:
-                gateway.left = not ended
-            if ended and options.once:
-                break
-            if not ended:
-                print(LEFT, flush=True)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        board.close()
-    return 0
+    options.out.mkdir(parents=True, exist_ok=True)
+    plays = (walk_with_two_boards, turn_boxes) if options.kit == Kit.OF_2026.value else (walk_with_mtx, rehearse)
+    return until_interrupted(lambda: plays[options.still](options))
 
 
 if __name__ == "__main__":

@@ -4,75 +4,49 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include <simavr/sim_cycle_timers.h>
 
-#include "twin.h"
+#include "parts/parts.h"
 
 #define MAX_RECORD (1u << 20)
 #define SYNC_PULSE US(1000)
-
 #define COUNTS_PER_GYRO_COUNT (0.2439 / 0.035)
 #define COUNTS_PER_G 4098
 #define NORTH_COUNTS 1368 /* 0.2 gauss to the north, level */
 
-struct row row;
-struct axes motion[3], motion_before[3];
-int16_t field[3];
+enum { NONE, RANGERS, THIGH_CALF, THIGH_BELT, CALF_BELT };
+FAULT_SWITCH(swapped, "none rangers thigh_calf thigh_belt calf_belt", NULL, NONE)
 
-static enum pair { NONE, RANGERS, THIGH_CALF, THIGH_BELT, CALF_BELT, PAIRS } swapped;
-
-static uint8_t out_buffer[1 << 16];
-static unsigned out_length;
-static int out_fd;
-
-static void flush(void)
-{
-	unsigned written = 0;
-
-	while (written < out_length) {
-		ssize_t n = write(out_fd, out_buffer + written, out_length - written);
-
-		if (n < 0 && errno == EINTR)
-			continue;
-		if (n <= 0)
-			fail("cannot write the output: %s", strerror(errno));
-		written += (unsigned)n;
-	}
-	out_length = 0;
-}
+struct extended_row input, previous;
+static FILE *out;
 
 static void put_record(char kind, const void *bytes, unsigned length)
 {
-	uint64_t now = time_ns();
-	uint32_t size = length + 8;
+	struct {
+		char kind;
+		uint32_t size;
+		uint64_t t_ns;
+	} __attribute__((packed)) head = { kind, length + 8, time_ns() };
 
-	if (out_length + 13 + length > sizeof out_buffer)
-		flush();
-	out_buffer[out_length++] = (uint8_t)kind;
-	memcpy(out_buffer + out_length, &size, 4);
-	memcpy(out_buffer + out_length + 4, &now, 8);
-	if (length)
-		memcpy(out_buffer + out_length + 12, bytes, length);
-	out_length += 12 + length;
+	fwrite(&head, sizeof head, 1, out);
+	fwrite(bytes, 1, length, out);
+}
+
+static void flush(void)
+{
+	if (fflush(out) || ferror(out))
+		fail("cannot write the output: %s", strerror(errno));
 }
 
 void bench_sent(const uint8_t *bytes, unsigned length)
 {
-	if (!length)
-		return;
-	if (pty_wanted())
+	if (length && pty_wanted())
 		pty_write(bytes, length);
-	else
+	else if (length)
 		put_record('B', bytes, length);
-}
-
-bool bench_has_room(void)
-{
-	return !pty_wanted() || pty_has_room();
 }
 
 void bench_trace(const char *format, ...)
@@ -87,55 +61,34 @@ void bench_trace(const char *format, ...)
 }
 
 /* Reads exactly `length` bytes; false: the input ended before the first of them. */
-static bool read_all(int fd, void *into, size_t length)
+static bool read_all(void *into, size_t length)
 {
-	size_t done = 0;
+	size_t done = fread(into, 1, length, stdin);
 
-	while (done < length) {
-		ssize_t n = read(fd, (char *)into + done, length - done);
-
-		if (n < 0 && errno == EINTR)
-			continue;
-		if (n < 0)
-			fail("cannot read the input: %s", strerror(errno));
-		if (n == 0) {
-			if (done == 0)
-				return false;
-			fail("the input ends in the middle of a record");
-		}
-		done += (size_t)n;
-	}
-	return true;
+	if (ferror(stdin))
+		fail("cannot read the input: %s", strerror(errno));
+	if (done && done < length)
+		fail("the input ends in the middle of a record");
+	return done == length;
 }
 
 /* With a pulse ranger on the left, its echo line is where SyncOut would be; on a foot board it is the data-ready line. */
-static void set_sync(bool level)
+void bench_sync(bool level)
 {
-	if (kit_of_papers(PLACE_RANGER_LEFT))
+	if (place_has(PLACE_RANGER_LEFT, OF_PAPERS))
 		drive_pin('D', 4, level);
-}
-
-/* Ends the SyncOut pulse under way, whose timer the reset has removed. */
-void bench_reset(void)
-{
-	set_sync(false);
 }
 
 static avr_cycle_count_t sync_fall(avr_t *a, avr_cycle_count_t when, void *param)
 {
-	(void)a;
-	(void)when;
-	(void)param;
-	set_sync(false);
+	bench_sync(false);
 	return 0;
 }
 
 static avr_cycle_count_t sync_rise(avr_t *a, avr_cycle_count_t when, void *param)
 {
-	(void)when;
-	(void)param;
-	set_sync(true);
-	if (kit_of_papers(PLACE_RANGER_LEFT))
+	bench_sync(true);
+	if (place_has(PLACE_RANGER_LEFT, OF_PAPERS))
 		bench_trace("sync");
 	avr_cycle_timer_register(a, SYNC_PULSE, sync_fall, NULL);
 	return 0;
@@ -144,9 +97,6 @@ static avr_cycle_count_t sync_rise(avr_t *a, avr_cycle_count_t when, void *param
 /* A sleeping processor passes time up to the next timer: none may lie beyond the end of the millisecond. */
 static avr_cycle_count_t millisecond_ended(avr_t *a, avr_cycle_count_t when, void *param)
 {
-	(void)a;
-	(void)when;
-	(void)param;
 	return 0;
 }
 
@@ -157,8 +107,8 @@ static void run_millisecond(avr_cycle_count_t end)
 		return;
 	}
 	miso_millisecond();
-	if (row.sync_us != NO_SYNC)
-		avr_cycle_timer_register(avr, clock_cycles(row.sync_us) + 1, sync_rise, NULL);
+	if (input.row.sync_us != NO_SYNC)
+		avr_cycle_timer_register(avr, clock_cycles(input.row.sync_us) + 1, sync_rise, NULL);
 	if (avr->cycle < end)
 		avr_cycle_timer_register(avr, end - avr->cycle, millisecond_ended, NULL);
 	while (avr->cycle < end) {
@@ -169,123 +119,93 @@ static void run_millisecond(avr_cycle_count_t end)
 	}
 }
 
-static void swap16(void *a, void *b)
+static void swap(void *a, void *b, size_t size)
 {
-	uint16_t kept;
+	char kept[sizeof(struct axes)];
 
-	memcpy(&kept, a, 2);
-	memcpy(a, b, 2);
-	memcpy(b, &kept, 2);
-}
-
-static void swap_gyros(int a, int b)
-{
-	struct axes kept = motion[a];
-
-	motion[a] = motion[b];
-	motion[b] = kept;
-	swap16(&row.rate[a], &row.rate[b]);
+	memcpy(kept, a, size);
+	memcpy(a, b, size);
+	memcpy(b, kept, size);
 }
 
 /* The plugs of two sensors are exchanged. */
 static void swap_sensors(void)
 {
-	switch (swapped) {
-	case RANGERS:
-		swap16(&row.own_us[0], &row.own_us[1]);
-		swap16(&row.cross_us[0], &row.cross_us[1]);
-		break;
-	case THIGH_CALF: swap_gyros(0, 1); break;
-	case THIGH_BELT: swap_gyros(0, 2); break;
-	case CALF_BELT: swap_gyros(1, 2); break;
-	default: break;
+	static const int gyros[][2] = { [THIGH_CALF] = { 0, 1 }, [THIGH_BELT] = { 0, 2 }, [CALF_BELT] = { 1, 2 } };
+	int a = gyros[swapped.value][0], b = gyros[swapped.value][1];
+
+	if (swapped.value == RANGERS) {
+		swap(&input.row.own_us[0], &input.row.own_us[1], sizeof *input.row.own_us);
+		swap(&input.row.cross_us[0], &input.row.cross_us[1], sizeof *input.row.cross_us);
+	} else if (swapped.value != NONE) {
+		swap(&input.motion[a], &input.motion[b], sizeof *input.motion);
+		swap(&input.row.rate[a], &input.row.rate[b], sizeof *input.row.rate);
 	}
-}
-
-bool bench_swap(const char *value)
-{
-	static const char *const names[PAIRS] = { "none", "rangers", "thigh_calf", "thigh_belt", "calf_belt" };
-
-	for (int k = 0; k < PAIRS; k++)
-		if (!strcmp(value, names[k])) {
-			swapped = (enum pair)k;
-			return true;
-		}
-	return false;
 }
 
 /* What parts of more axes measure where the row has only those of the papers: rates about z, z up, a field by the bearing. */
 static void extend_row(void)
 {
-	double bearing = row.bearing * 3.14159265358979 / 1800.0;
+	double bearing = input.row.bearing * 3.14159265358979 / 1800.0;
 
-	memset(motion, 0, sizeof motion);
+	memset(input.motion, 0, sizeof input.motion);
 	for (int k = 0; k < 3; k++) {
-		motion[k].rate[2] = (int16_t)lround(row.rate[k] * COUNTS_PER_GYRO_COUNT);
-		motion[k].force[2] = COUNTS_PER_G;
+		input.motion[k].rate[2] = (int16_t)lround(input.row.rate[k] * COUNTS_PER_GYRO_COUNT);
+		input.motion[k].force[2] = COUNTS_PER_G;
 	}
-	field[0] = (int16_t)lround(NORTH_COUNTS * cos(bearing));
-	field[1] = (int16_t)lround(NORTH_COUNTS * sin(bearing));
-	field[2] = -2 * NORTH_COUNTS;
+	input.field[0] = (int16_t)lround(NORTH_COUNTS * cos(bearing));
+	input.field[1] = (int16_t)lround(NORTH_COUNTS * sin(bearing));
+	input.field[2] = -2 * NORTH_COUNTS;
 }
 
-static void take_extended_row(const uint8_t *bytes)
+/* Runs one millisecond per row; they are plain or extended ones. */
+static void advance(const char *rows, uint32_t length, size_t size)
 {
-	struct extended_row whole;
-
-	memcpy(&whole, bytes, sizeof whole);
-	row = whole.row;
-	memcpy(motion, whole.motion, sizeof motion);
-	memcpy(field, whole.field, sizeof field);
-}
-
-/* Runs one millisecond per row. */
-static void advance(const uint8_t *rows, uint32_t length, bool extended)
-{
-	uint32_t size = extended ? sizeof(struct extended_row) : ROW_SIZE;
-
 	if (length % size)
-		fail("a record of rows has %u bytes, not a multiple of %u", length, size);
-	for (uint32_t offset = 0; offset < length; offset += size) {
-		memcpy(motion_before, motion, sizeof motion);
-		if (extended) {
-			take_extended_row(rows + offset);
-		} else {
-			memcpy(&row, rows + offset, ROW_SIZE);
+		fail("a record of rows has %u bytes, not a multiple of %zu", length, size);
+	for (const char *next = rows; next < rows + length; next += size) {
+		previous = input;
+		memcpy(&input, next, size);
+		if (size == sizeof input.row)
 			extend_row();
-		}
 		swap_sensors();
 		run_millisecond(clock_next_millisecond());
-		if (pty_wanted())
-			pty_poll();
+		pty_poll();
 	}
-	put_record('A', NULL, 0);
+	put_record('A', "", 0);
 	flush();
 }
 
-void bench_run(int in, int out)
+void bench_run(void)
 {
-	static uint8_t body[MAX_RECORD + 1];
+	static char body[MAX_RECORD + 1];
 	struct {
 		uint8_t kind;
 		uint32_t length;
 	} __attribute__((packed)) head;
 
-	out_fd = out;
-	while (read_all(in, &head, sizeof head)) {
+	while (read_all(&head, sizeof head)) {
 		if (head.length > MAX_RECORD)
 			fail("a record of %u bytes is too long", head.length);
-		if (head.length && !read_all(in, body, head.length))
+		if (!read_all(body, head.length))
 			fail("the input ends in the middle of a record");
 		body[head.length] = 0;
 		switch (head.kind) {
-		case 'R': advance(body, head.length, false); break;
-		case 'E': advance(body, head.length, true); break;
-		case 'H': usb_host_send(body, head.length); break;
-		case 'F': switch_fault((char *)body); break;
+		case 'R': advance(body, head.length, sizeof input.row); break;
+		case 'E': advance(body, head.length, sizeof input); break;
+		case 'H': usb_host_send((uint8_t *)body, head.length); break;
+		case 'F': switch_fault(body); break;
 		case 'Q': flush(); return;
 		default: fail("unknown record 0x%02x", head.kind);
 		}
 	}
 	fail("the input ends without a record Q");
+}
+
+/* simavr prints on stdout: its text must not get into the protocol. */
+void bench_init(void)
+{
+	out = fdopen(dup(STDOUT_FILENO), "wb");
+	if (!out || setvbuf(out, NULL, _IOFBF, 1 << 16) || !freopen("/dev/null", "w", stdout))
+		fail("cannot set up the output");
 }

@@ -35,7 +35,7 @@ void fail(const char *format, ...)
 	vfprintf(stderr, format, arguments);
 	va_end(arguments);
 	fprintf(stderr, "\n");
-	exit(2);
+	_exit(2); /* without the rest of the output */
 }
 
 /* splitmix64 [Steele, Lea, Flood 2014] */
@@ -51,17 +51,6 @@ uint32_t random_below(uint32_t limit)
 uint8_t disturbed(uint8_t byte, unsigned errors)
 {
 	return errors && random_below(1000) < errors ? byte ^ (uint8_t)(1u << random_below(8)) : byte;
-}
-
-bool set_errors(unsigned *errors, const char *value)
-{
-	char *end;
-	unsigned long wanted = strtoul(value, &end, 10);
-
-	if (end == value || *end || wanted > 1000)
-		return false;
-	*errors = (unsigned)wanted;
-	return true;
 }
 
 avr_int_vector_t *vector(int number)
@@ -80,48 +69,42 @@ static const uint8_t *port_registers(char port)
 
 bool pin_is_output(char port, uint8_t pin)
 {
-	return port_registers(port)[0] & (1u << pin);
+	return port_registers(port)[0] >> pin & 1;
 }
 
 bool pin_is_pulled_up(char port, uint8_t pin)
 {
-	return !pin_is_output(port, pin) && (port_registers(port)[1] & (1u << pin));
+	return !pin_is_output(port, pin) && (port_registers(port)[1] >> pin & 1);
 }
 
-/* Pins of a port that chips drive, and their levels: simavr wants all of a port at once. */
-static struct {
-	uint8_t mask, value;
-} driven[PORTS];
+/* Pins of the ports that chips drive, and their levels: simavr wants all of a port at once. */
+static avr_ioport_external_t driven[PORTS];
 
-static void apply_driven(char port)
-{
-	avr_ioport_external_t outside = {
-		.name = (unsigned)port & 0x7Fu,
-		.mask = driven[port - 'B'].mask,
-		.value = driven[port - 'B'].value,
-	};
-
-	avr_ioctl(avr, (uint32_t)AVR_IOCTL_IOPORT_SET_EXTERNAL(port), &outside);
-}
-
-static void raise_level(char port, uint8_t pin, bool level)
+void set_pin(char port, uint8_t pin, bool level)
 {
 	avr_raise_irq(avr_io_getirq(avr, (uint32_t)AVR_IOCTL_IOPORT_GETIRQ(port), pin), level);
 }
 
-/* The level is set in two ways: when the program writes to the port with the pull-up on, simavr keeps only an external level. A pin that the
- * processor drives keeps the processor's level; two different ones are a short circuit through both. */
+/* The level is set in two ways: when the program writes to the port with the pull-up on, simavr keeps only an external level. */
+static void set_driven(char port, uint8_t pin, bool by_chip, bool level)
+{
+	avr_ioport_external_t *d = &driven[port - 'B'];
+	unsigned bit = 1u << pin;
+
+	d->name = (unsigned)port & 0x7Fu;
+	d->mask = (by_chip ? d->mask | bit : d->mask & ~bit) & 0xFFu;
+	d->value = (by_chip && level ? d->value | bit : d->value & ~bit) & 0xFFu;
+	avr_ioctl(avr, (uint32_t)AVR_IOCTL_IOPORT_SET_EXTERNAL(port), d);
+	if (!pin_is_output(port, pin))
+		set_pin(port, pin, level);
+}
+
+/* A pin that the processor drives keeps the processor's level; two different ones are a short circuit through both. */
 void drive_pin(char port, uint8_t pin, bool level)
 {
-	uint8_t bit = (uint8_t)(1u << pin);
-
 	floating_pin(port, pin, false);
-	driven[port - 'B'].mask |= bit;
-	driven[port - 'B'].value = (uint8_t)((driven[port - 'B'].value & ~bit) | (level ? bit : 0));
-	apply_driven(port);
-	if (!pin_is_output(port, pin))
-		raise_level(port, pin, level);
-	else if (level != !!(port_registers(port)[1] & bit) && !has_series_resistor(port, pin))
+	set_driven(port, pin, true, level);
+	if (pin_is_output(port, pin) && level != (port_registers(port)[1] >> pin & 1) && !has_series_resistor(port, pin))
 		bench_trace("contention on P%c%u", port, pin);
 }
 
@@ -132,47 +115,32 @@ bool pin_is_held(char port, uint8_t pin, bool level)
 
 void release_pin(char port, uint8_t pin)
 {
-	driven[port - 'B'].mask &= (uint8_t)~(1u << pin);
-	driven[port - 'B'].value &= (uint8_t)~(1u << pin);
-	apply_driven(port);
-	if (!pin_is_output(port, pin))
-		raise_level(port, pin, pin_is_pulled_up(port, pin));
+	set_driven(port, pin, false, pin_is_pulled_up(port, pin));
 }
 
 void take_register(avr_io_addr_t address, avr_io_read_t read, avr_io_write_t write)
 {
 	avr_io_addr_t io = AVR_DATA_TO_IO(address);
 
-	if (read) {
+	if (read)
 		avr->io[io].r.c = read;
-		avr->io[io].r.param = NULL;
-	}
-	if (write) {
+	if (write)
 		avr->io[io].w.c = write;
-		avr->io[io].w.param = NULL;
-	}
 }
 
 /* simavr's messages are not printed; errors are reported by `fail`. */
 static void no_log(avr_t *a, const int level, const char *format, va_list arguments)
 {
-	(void)a;
-	(void)level;
-	(void)format;
-	(void)arguments;
 }
 
+/* Simulated time jumps over a sleep. */
 static void no_sleep(avr_t *a, avr_cycle_count_t cycles)
 {
-	(void)a;
-	(void)cycles; /* simulated time jumps over the sleep */
 }
 
 /* Entering an interrupt takes 4 cycles on the chip and none in simavr. */
 static void add_entry_cycles(struct avr_irq_t *irq, uint32_t running, void *param)
 {
-	(void)irq;
-	(void)param;
 	if (running)
 		avr->cycle += 4;
 }
@@ -195,23 +163,21 @@ static void make_board(const char *path)
 	check_elf(path);
 	if (elf_read_firmware(path, &firmware) || !firmware.flashsize)
 		fail("%s: holds no program", path);
-	strcpy(firmware.mmcu, MCU);
-	firmware.frequency = FREQUENCY;
 	avr = avr_make_mcu_by_name(MCU);
 	if (!avr)
 		fail("this simavr does not know the " MCU);
 	avr_init(avr);
 	avr_global_logger_set(no_log);
-	avr->frequency = FREQUENCY;
 	if (firmware.flashsize > avr->flashend + 1)
 		fail("%s: %u bytes do not fit into the flash", path, firmware.flashsize);
 	avr_load_firmware(avr, &firmware);
+	avr->frequency = FREQUENCY;
 	avr->sleep = no_sleep;
 	usb_device_init();
 	twi_init();
 	spi_init();
 	watchdog_init();
-	timer_flags_init();
+	chip_init();
 	for (int i = 0; i < avr->interrupts.vector_count; i++)
 		avr_irq_register_notify(avr->interrupts.vector[i]->irq + AVR_INT_IRQ_RUNNING, add_entry_cycles, NULL);
 	for (uint8_t i = 0; i < EXTERNAL_INTERRUPTS; i++)
@@ -258,15 +224,11 @@ int main(int argc, char **argv)
 	if (!elf)
 		fail("no firmware given: use --elf firmware/build/echostep.elf");
 	signal(SIGPIPE, SIG_IGN);
-
-	int out = dup(STDOUT_FILENO); /* simavr prints on stdout: its text must not get into the protocol */
-
-	if (out < 0 || !freopen("/dev/null", "w", stdout))
-		fail("cannot set up the output");
+	bench_init();
 	usb_host_open(!with_pty);
 	make_board(elf);
 	if (with_pty)
 		pty_open();
-	bench_run(STDIN_FILENO, out);
+	bench_run();
 	return 0;
 }

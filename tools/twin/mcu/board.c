@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * Power and resets of the board, and what the bootloader Caterina does after a reset.
+ * Power, supply voltage and resets of the board, and what the bootloader Caterina does after a reset.
  *
  * Caterina [its source, Arduino 1.8] clears MCUSR and its key, starts the program at once after a loss of power, or after a watchdog reset
  * without the key, and else waits for 8 s as another USB device. Then it detaches, leaves the controller on, and jumps to the program.
@@ -12,7 +12,6 @@
 
 enum { MCUSR = 0x54, USBCON = 0xD8, USBE = 0x80 };
 enum { DDRB = 0x24, PORTB, DDRC = 0x27, PORTC, DDRD = 0x2A, PORTD, RX_LED = 0x01, L_LED = 0x80, TX_LED = 0x20 };
-enum { POWER_ON = 1, EXTERNAL = 2, BROWN_OUT = 4, WATCHDOG = 8 };
 
 #define BOOTLOADER_MS 8000u
 #define BOOTLOADER_DATA 0x100 /* its variables: 256 bytes or less */
@@ -20,36 +19,27 @@ enum { POWER_ON = 1, EXTERNAL = 2, BROWN_OUT = 4, WATCHDOG = 8 };
 #define BOOTLOADER_STACK 0x80
 #define KEY 0x7777u
 #define KEY_ADDRESS_OLD 0x800 /* the key's place differs between versions; here both are cleared */
+#define REFERENCE_MV 1100
+#define REFERENCE_SPREAD_MV 33 /* 3 %, from chip to chip; the data sheet allows 9 % */
+#define MEMORY_MV 1300         /* below it, memory is lost and the next reset is one of power-on */
+#define CHIPS_MV 3000          /* below it, the sensors start anew */
+#define RELIABLE_MV 3600       /* below it, a processor at 16 MHz hangs; an example of what may happen below the specified 4500 */
+#define BROWN_OUT_HYSTERESIS_MV 50
 
-static bool with_bootloader = true, plugged = true;
+static void supply_changed(void *self, unsigned before);
+FAULT_SWITCH(supply, "<=6000", supply_changed, 5000)
+FAULT_SWITCH(brown_out_fuse, "0 2600 4300", NULL, 1) /* of the boards as sold */
+FAULT_SWITCH(bootloader, "none caterina", NULL, 1)
+FAULT_SWITCH(echo_resistor, "none 1000", NULL, 1) /* in series in ECHO_R, as wired in firmware/hardware */
+
+static bool plugged = true, in_brown_out, memory_lost, chips_lost;
 static uint8_t next_cause = POWER_ON;
 static unsigned bootloader_ms; /* left */
-static bool echo_resistor = true; /* in series in ECHO_R, as wired in firmware/hardware */
 static bool led_shorted;
-
-static void power_devices(void)
-{
-	srf02_power();
-	adis16100_power();
-	scp1000_power();
-	compass_power();
-	bmp390_power();
-	lis3mdl_power();
-	lsm6dso_power();
-	pulse_power();
-	maxsonar_power();
-	icm20649_power();
-}
 
 static void fill(unsigned from, unsigned size)
 {
 	memset(avr->data + from, 0xA5, size);
-}
-
-/* The content of RAM after power-up is undefined. */
-static void scramble_memory(void)
-{
-	fill(avr->ioend + 1u, (unsigned)(avr->ramend - avr->ioend));
 }
 
 static const char *name_of(uint8_t cause)
@@ -83,12 +73,8 @@ static void start_program(void)
 	usb_device_reset();
 	twi_reset();
 	spi_reset();
-	scp1000_resume();
-	bmp390_resume();
-	pulse_resume();
+	parts_resume();
 	floating_resume();
-	icm20649_resume();
-	adis16100_resume();
 	usb_host_start();
 }
 
@@ -97,19 +83,20 @@ static void after_reset(avr_t *a)
 	uint8_t cause = next_cause;
 
 	hang_end();
-	jtag_reset();
+	chip_reset();
 	led_shorted = false;
-	if (supply_took_memory() || (cause & POWER_ON)) {
-		scramble_memory();
+	if (memory_lost || (cause & POWER_ON)) {
+		fill(avr->ioend + 1u, (unsigned)(avr->ramend - avr->ioend)); /* what is in RAM is undefined */
 		cause = POWER_ON;
 	}
-	if (supply_took_chips() || (cause & POWER_ON))
-		power_devices();
+	if (chips_lost || (cause & POWER_ON))
+		parts_power();
+	memory_lost = chips_lost = false;
 	a->data[MCUSR] = cause;
 	bench_trace("reset %s", name_of(cause));
-	bench_reset();
-	bootloader_ms = with_bootloader && bootloader_stays(cause) ? BOOTLOADER_MS : 0;
-	if (with_bootloader) {
+	bench_sync(false); /* simavr has lost the timer of its pulse */
+	bootloader_ms = bootloader.value && bootloader_stays(cause) ? BOOTLOADER_MS : 0;
+	if (bootloader.value) {
 		a->data[PORTB] |= RX_LED;
 		a->data[PORTD] |= TX_LED;
 	}
@@ -129,7 +116,7 @@ static void drive_leds(void)
 
 bool has_series_resistor(char port, uint8_t pin)
 {
-	return echo_resistor && port == 'C' && pin == 7;
+	return echo_resistor.value && port == 'C' && pin == 7;
 }
 
 /* While the bootloader waits, its LED breathes: PC7 is driven high and low by turns, against what drives the right echo line. */
@@ -139,7 +126,7 @@ static void breathe(void)
 
 	drive_leds();
 	avr->data[PORTC] = (uint8_t)((avr->data[PORTC] & ~L_LED) | (level ? L_LED : 0));
-	if (echo_resistor || led_shorted || !pin_is_held('C', 7, !level))
+	if (echo_resistor.value || led_shorted || !pin_is_held('C', 7, !level))
 		return;
 	led_shorted = true;
 	bench_trace("contention on PC7, by the bootloader");
@@ -149,11 +136,6 @@ void board_reset(uint8_t cause)
 {
 	next_cause = cause;
 	avr_reset(avr);
-}
-
-void board_watchdog(void)
-{
-	board_reset(WATCHDOG);
 }
 
 static void end_bootloader(void)
@@ -168,16 +150,44 @@ static void end_bootloader(void)
 
 bool board_runs(void)
 {
-	if (bootloader_ms && plugged && !supply_in_brown_out() && --bootloader_ms == 0)
+	if (bootloader_ms && plugged && !in_brown_out && --bootloader_ms == 0)
 		end_bootloader();
 	if (bootloader_ms && plugged)
 		breathe();
-	if (!plugged || supply_in_brown_out() || bootloader_ms)
+	if (!plugged || in_brown_out || bootloader_ms)
 		return false;
-	if (supply_is_unreliable())
+	if (supply.value < RELIABLE_MV)
 		hang_now();
 	hang_millisecond();
 	return true;
+}
+
+/* The converter measures the reference against the supply; simavr knows the reference only as 1100 mV. */
+static void apply_supply(void)
+{
+	static unsigned reference_mv;
+
+	if (!reference_mv)
+		reference_mv = REFERENCE_MV - REFERENCE_SPREAD_MV + (unsigned)(random_state % (2 * REFERENCE_SPREAD_MV + 1));
+	avr->vcc = avr->avcc = supply.value * REFERENCE_MV / reference_mv;
+}
+
+static void supply_changed(void *self, unsigned before)
+{
+	static const unsigned brown_outs_mv[] = { 0, 2600, 4300 };
+	unsigned mv = supply.value, brown_out_mv = brown_outs_mv[brown_out_fuse.value];
+
+	memory_lost |= mv < MEMORY_MV;
+	chips_lost |= mv < CHIPS_MV;
+	bench_trace("supply %u", mv);
+	if (mv < brown_out_mv || mv < MEMORY_MV) {
+		in_brown_out = true;
+		usb_host_unplug();
+	} else if (in_brown_out && mv >= brown_out_mv + BROWN_OUT_HYSTERESIS_MV) {
+		in_brown_out = false;
+		board_reset(BROWN_OUT);
+	}
+	apply_supply();
 }
 
 void board_power(bool on)
@@ -192,47 +202,22 @@ void board_power(bool on)
 		board_reset(POWER_ON);
 }
 
-static bool reset_by(const char *value)
+static void reset_by(void *self, unsigned before)
 {
-	if (!strcmp(value, "watchdog"))
-		hang_soon(); /* the program's own watchdog does the rest */
-	else if (!strcmp(value, "power"))
-		board_reset(POWER_ON);
-	else if (!strcmp(value, "external"))
-		board_reset(EXTERNAL);
-	else
-		return false;
-	return true;
-}
+	static const uint8_t causes[] = { WATCHDOG, POWER_ON, EXTERNAL };
+	uint8_t cause = causes[((struct fault_switch *)self)->value];
 
-bool board_fault(const char *name, const char *value)
-{
-	if (!strcmp(name, "reset"))
-		return reset_by(value);
-	if (!strcmp(name, "supply"))
-		return supply_fault(value);
-	if (!strcmp(name, "brown_out_fuse"))
-		return supply_fuse(value);
-	if (!strcmp(name, "cpu"))
-		return hang_fault(value);
-	if (!strcmp(name, "jtag_fuse"))
-		return jtag_fault(value);
-	if (!strcmp(name, "echo_resistor")) {
-		echo_resistor = !strcmp(value, "1000");
-		return echo_resistor || !strcmp(value, "none");
-	}
-	if (!strcmp(name, "bootloader")) {
-		with_bootloader = !strcmp(value, "caterina");
-		return with_bootloader || !strcmp(value, "none");
-	}
-	return false;
+	if (cause == WATCHDOG)
+		hang_soon(); /* the program's own watchdog does the rest */
+	else
+		board_reset(cause);
 }
+FAULT_SWITCH(reset, "watchdog power external", reset_by, 0)
 
 void board_init(void)
 {
-	signature_init();
-	jtag_init();
-	supply_init();
+	apply_supply();
+	parts_init();
 	avr->reset = after_reset;
 	after_reset(avr);
 }

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * True time against the processor's cycles: its crystal is off, by an amount that varies with the temperature. */
 #include <math.h>
-#include <string.h>
 
 #include "twin.h"
 
-static enum { EXACT, CRYSTAL, RESONATOR } kind;
+enum { EXACT, CRYSTAL, RESONATOR };
+FAULT_SWITCH(crystal, "ok drift resonator", NULL, EXACT)
+
 static double cycles = CYCLES_PER_MS; /* in the millisecond under way */
 static double begin, end;             /* of it, in cycles */
 static uint64_t begin_ns;
@@ -14,11 +15,11 @@ static uint64_t begin_ns;
  * ceramic resonator is two orders of magnitude worse [both: typical curves of makers' data sheets]. */
 static double fast_ppm(void)
 {
-	double t = row.temperature / 20.0 - 25.0;
+	double t = input.row.temperature / 20.0 - 25.0;
 
-	if (kind == CRYSTAL)
+	if (crystal.value == CRYSTAL)
 		return 30.0 - 0.2 * t + 1.05e-4 * pow(t, 3.0);
-	return kind == RESONATOR ? 3000.0 - 1.0 * t * t : 0.0;
+	return crystal.value == RESONATOR ? 3000.0 - 1.0 * t * t : 0.0;
 }
 
 avr_cycle_count_t clock_next_millisecond(void)
@@ -45,10 +46,4 @@ uint64_t time_ns(void)
 	double since = (double)avr->cycle - begin;
 
 	return begin_ns + (uint64_t)(since * 1e6 / cycles);
-}
-
-bool clock_fault(const char *value)
-{
-	kind = !strcmp(value, "drift") ? CRYSTAL : !strcmp(value, "resonator") ? RESONATOR : EXACT;
-	return kind != EXACT || !strcmp(value, "ok");
 }

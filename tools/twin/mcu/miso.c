@@ -4,43 +4,40 @@
  *
  * An input reads a zero up to 0.2 VCC - 0.1 V and a one from 0.2 VCC + 0.9 V on [ATmega32U4 data sheet, table 29-1, from memory]. Between the two
  * it may read either, or change from bit to bit: the fault `miso_undefined` chooses. */
-#include <string.h>
-
-#include "twin.h"
+#include "parts/parts.h"
 
 #define PROCESSOR_OHM 35000.0 /* pull-up of 20 to 50 kohm [table 29-1] */
 #define BOARD_OHM 10000.0
+#define WIRED_OHM 2200.0
 #define SUPPLY_V 5.0
+#define LOGIC_V 3.3
 #define LOW_MAX_V (0.2 * SUPPLY_V - 0.1)
 #define HIGH_MIN_V (0.2 * SUPPLY_V + 0.9)
 #define MISO 3 /* of port B */
 
-static enum kind { ZEROS, ONES, NOISE, KINDS } undefined;
-static double resistor_ohm; /* between MISO and 3.3 V, 0: none */
+enum { ZEROS, ONES, NOISE };
+FAULT_SWITCH(miso_undefined, "zeros ones noise", NULL, ZEROS)
+FAULT_SWITCH(miso_resistor, "none 2200", NULL, 0)
 
 /* The Thevenin voltage of all resistors; 0 without any. */
 static double idle_volts(void)
 {
+	const struct {
+		double volts, ohm;
+		unsigned count;
+	} resistors[] = {
+		{ SUPPLY_V, PROCESSOR_OHM, pin_is_pulled_up('B', MISO) },
+		{ SUPPLY_V, BOARD_OHM, place_has(PLACE_PRESSURE, OF_PAPERS) }, /* the level shifter */
+		{ LOGIC_V, BOARD_OHM, parts_here(&bmp390) },
+		{ LOGIC_V, WIRED_OHM, miso_resistor.value },
+		{ 0.0, BOARD_OHM, parts_here(&lsm6dso) + parts_here(&icm20649) },
+	};
 	double siemens = 0.0, amperes = 0.0;
-	unsigned to_ground = lsm6dso_plugged() + icm20649_plugged();
 
-	if (pin_is_pulled_up('B', MISO)) {
-		siemens += 1.0 / PROCESSOR_OHM;
-		amperes += SUPPLY_V / PROCESSOR_OHM;
+	for (size_t k = 0; k < sizeof resistors / sizeof *resistors; k++) {
+		siemens += resistors[k].count / resistors[k].ohm;
+		amperes += resistors[k].count * resistors[k].volts / resistors[k].ohm;
 	}
-	if (kit_of_papers(PLACE_PRESSURE)) { /* the level shifter */
-		siemens += 1.0 / BOARD_OHM;
-		amperes += SUPPLY_V / BOARD_OHM;
-	}
-	if (bmp390_plugged()) {
-		siemens += 1.0 / BOARD_OHM;
-		amperes += 3.3 / BOARD_OHM;
-	}
-	if (resistor_ohm > 0.0) {
-		siemens += 1.0 / resistor_ohm;
-		amperes += 3.3 / resistor_ohm;
-	}
-	siemens += to_ground / BOARD_OHM;
 	return siemens > 0.0 ? amperes / siemens : 0.0;
 }
 
@@ -48,29 +45,13 @@ uint8_t miso_idle(void)
 {
 	double volts = idle_volts();
 
-	if (volts <= LOW_MAX_V || (volts < HIGH_MIN_V && undefined == ZEROS))
+	if (volts <= LOW_MAX_V || (volts < HIGH_MIN_V && miso_undefined.value == ZEROS))
 		return 0x00;
-	return volts < HIGH_MIN_V && undefined == NOISE ? (uint8_t)random_below(256) : 0xFF;
+	return volts < HIGH_MIN_V && miso_undefined.value == NOISE ? (uint8_t)random_below(256) : 0xFF;
 }
 
 /* The pin itself, which the program may read while no chip is selected. */
 void miso_millisecond(void)
 {
 	drive_pin('B', MISO, miso_idle() & 1);
-}
-
-bool miso_fault(const char *name, const char *value)
-{
-	static const char *const kinds[KINDS] = { "zeros", "ones", "noise" };
-
-	if (!strcmp(name, "miso_resistor")) { /* to 3.3 V */
-		resistor_ohm = !strcmp(value, "2200") ? 2200.0 : 0.0;
-		return resistor_ohm > 0.0 || !strcmp(value, "none");
-	}
-	for (enum kind k = ZEROS; !strcmp(name, "miso_undefined") && k < KINDS; k++)
-		if (!strcmp(value, kinds[k])) {
-			undefined = k;
-			return true;
-		}
-	return false;
 }

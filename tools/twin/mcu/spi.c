@@ -9,16 +9,16 @@
 #include <simavr/sim_cycle_timers.h>
 #include <simavr/sim_interrupts.h>
 
-#include "twin.h"
+#include "parts/parts.h"
 
 enum { SPCR = 0x4C, SPSR, SPDR };
 enum { SPE = 0x40, MSTR = 0x10 };
 #define VECTOR 24
 
 static struct spi_device *devices;
-static avr_irq_t *input;
+static avr_irq_t *miso;
 static uint8_t outgoing;
-static unsigned errors; /* bytes in 1000 that a part sends and that arrive with a wrong bit */
+FAULT_SWITCH(spi_errors, "<=1000", NULL, 0) /* bytes in 1000 that a part sends and that arrive with a wrong bit */
 
 static unsigned divisor(void)
 {
@@ -28,7 +28,7 @@ static unsigned divisor(void)
 	return avr->data[SPSR] & 1 ? d / 2 : d;
 }
 
-unsigned spi_hertz(void)
+static unsigned hertz(void)
 {
 	return 16000000u / divisor();
 }
@@ -48,25 +48,31 @@ uint8_t spi_at_rising_edges(uint8_t out)
 	return shifts_at_rising_edges() ? out & (uint8_t)(out << 1) : out;
 }
 
-int spi_answer(uint8_t answer)
+int spi_answer(int answer)
 {
-	return shifts_at_rising_edges() ? answer >> 1 : answer;
+	return answer != SPI_OPEN && shifts_at_rising_edges() ? answer >> 1 : answer;
 }
 
 bool spi_outruns(unsigned rise_ns)
 {
-	return 500000000u / spi_hertz() < rise_ns;
+	return 500000000u / hertz() < rise_ns;
+}
+
+bool spi_garbles(const char *chip, unsigned most_hertz, bool right_mode)
+{
+	bool too_fast = hertz() > most_hertz;
+
+	if (too_fast || !right_mode)
+		bench_trace("%s %s", chip, too_fast ? "too fast" : "wrong mode");
+	return too_fast || !right_mode;
 }
 
 static avr_cycle_count_t done(avr_t *a, avr_cycle_count_t when, void *param)
 {
 	int answer = SPI_OPEN;
 
-	(void)a;
-	(void)when;
-	(void)param;
 	for (struct spi_device *d = devices; d; d = d->next) {
-		int driven = d->selected ? d->exchange(d, outgoing) : SPI_OPEN;
+		int driven = d->selected ? d->part.model->exchange(d, outgoing) : SPI_OPEN;
 
 		if (driven != SPI_OPEN && answer != SPI_OPEN)
 			bench_trace("contention on MISO");
@@ -74,15 +80,13 @@ static avr_cycle_count_t done(avr_t *a, avr_cycle_count_t when, void *param)
 			answer = driven;
 	}
 	if (answer != SPI_OPEN)
-		answer = disturbed((uint8_t)answer, errors);
-	avr_raise_irq(input, answer == SPI_OPEN ? miso_idle() : (uint32_t)answer);
+		answer = disturbed((uint8_t)answer, spi_errors.value);
+	avr_raise_irq(miso, answer == SPI_OPEN ? miso_idle() : (uint32_t)answer);
 	return 0;
 }
 
 static void write_byte(avr_t *a, avr_io_addr_t address, uint8_t value, void *param)
 {
-	(void)address;
-	(void)param;
 	if ((a->data[SPCR] & (SPE | MSTR)) != (SPE | MSTR))
 		return;
 	avr_regbit_clear(a, vector(VECTOR)->raised);
@@ -94,24 +98,18 @@ static void select_changed(struct avr_irq_t *irq, uint32_t level, void *param)
 {
 	struct spi_device *d = param;
 
-	(void)irq;
 	if (d->selected != !level) {
 		d->selected = !level;
-		d->select(d, d->selected);
+		d->part.model->select(d, d->selected);
 		if (d->selected)
 			hang_spi_selected();
 	}
 }
 
-bool spi_errors(const char *value)
-{
-	return set_errors(&errors, value);
-}
-
 void spi_init(void)
 {
 	take_register(SPDR, NULL, write_byte);
-	input = avr_io_getirq(avr, AVR_IOCTL_SPI_GETIRQ(0), SPI_IRQ_INPUT);
+	miso = avr_io_getirq(avr, AVR_IOCTL_SPI_GETIRQ(0), SPI_IRQ_INPUT);
 }
 
 void spi_reset(void)

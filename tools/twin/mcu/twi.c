@@ -5,37 +5,34 @@
 #include <simavr/sim_cycle_timers.h>
 #include <simavr/sim_interrupts.h>
 
-#include "twin.h"
+#include "parts/parts.h"
 
 enum { TWBR = 0xB8, TWSR, TWAR, TWDR, TWCR };
 enum { TWINT = 0x80, TWEA = 0x40, TWSTA = 0x20, TWSTO = 0x10, TWEN = 4, TWIE = 1 };
-enum { DDRD = 0x2A, SCL = 1, SDA = 2 };
+#define SCL 1u /* of port D */
 enum { /* status codes [data sheet, tables 20-3 and 20-4] */
 	STATUS_START = 0x08,
 	STATUS_REPEATED_START = 0x10,
-	STATUS_WRITE_ADDRESS_ACK = 0x18,
-	STATUS_WRITE_ADDRESS_NACK = 0x20,
-	STATUS_WRITE_ACK = 0x28,
-	STATUS_WRITE_NACK = 0x30,
+	STATUS_WRITE_ADDRESS = 0x18,
+	STATUS_WRITE = 0x28,
 	STATUS_LOST = 0x38,
-	STATUS_READ_ADDRESS_ACK = 0x40,
-	STATUS_READ_ADDRESS_NACK = 0x48,
-	STATUS_READ_ACK = 0x50,
-	STATUS_READ_NACK = 0x58,
+	STATUS_READ_ADDRESS = 0x40,
+	STATUS_READ = 0x50,
 	STATUS_IDLE = 0xF8,
+	NOT_ACKNOWLEDGED = 0x08, /* is added */
 };
 #define VECTOR 36
 #define BITS_PER_BYTE 9 /* with the acknowledge */
 #define CLOCKS_TO_FREE 9
 
 static struct twi_device *devices, *active, *stopping;
-static unsigned errors; /* bytes in 1000 that arrive with a wrong bit */
-static enum { IDLE, ADDRESS, WRITING, READING, REFUSED } phase;
+FAULT_SWITCH(twi_errors, "<=1000", NULL, 0) /* bytes in 1000 that arrive with a wrong bit */
+static enum { IDLE, ADDRESS, WRITING_FIRST, WRITING, READING, REFUSED } phase;
 static bool owns_bus;    /* a start condition was sent */
 static uint8_t status;   /* at the end of the operation under way */
 static int read_byte = -1; /* for TWDR at the end of the operation; -1: none */
 static avr_cycle_count_t bus_free_at;
-static enum twi_fault line;
+static enum { GOOD_LINES, DATA_STUCK, DATA_STUCK_FOREVER, CLOCK_STUCK } line;
 static unsigned clocks; /* made by hand while the TWI is off */
 
 static unsigned bit_cycles(void)
@@ -60,9 +57,7 @@ static void release(void)
 
 static avr_cycle_count_t done(avr_t *a, avr_cycle_count_t when, void *param)
 {
-	(void)when;
-	(void)param;
-	if (line != TWI_GOOD && status == STATUS_READ_NACK) {
+	if (line != GOOD_LINES && status == STATUS_READ + NOT_ACKNOWLEDGED) {
 		release(); /* the master's NACK reads back as an ACK */
 		status = STATUS_LOST;
 	}
@@ -76,30 +71,30 @@ static avr_cycle_count_t done(avr_t *a, avr_cycle_count_t when, void *param)
 
 static avr_cycle_count_t stopped(avr_t *a, avr_cycle_count_t when, void *param)
 {
-	(void)when;
-	(void)param;
 	a->data[TWCR] &= (uint8_t)~TWSTO;
-	if (stopping && stopping->stop)
-		stopping->stop(stopping);
+	if (stopping && stopping->part.model->stop)
+		stopping->part.model->stop(stopping);
 	stopping = NULL;
 	return 0;
 }
 
 static void operate(unsigned bits, uint8_t result)
 {
-	uint32_t stretch = active ? active->stretch : 0;
-
 	status = result;
-	if (line == TWI_CLOCK_STUCK)
-		return; /* it never ends */
-	avr_cycle_timer_register(avr, bits * bit_cycles() + stretch, done, NULL);
+	if (line != CLOCK_STUCK) /* else it never ends */
+		avr_cycle_timer_register(avr, bits * bit_cycles() + (active ? active->stretch : 0), done, NULL);
+}
+
+static void operate_byte(uint8_t result, bool acknowledged)
+{
+	operate(BITS_PER_BYTE, acknowledged ? result : result + NOT_ACKNOWLEDGED);
 }
 
 static void start(void)
 {
 	unsigned wait = 0;
 
-	if (line != TWI_GOOD)
+	if (line != GOOD_LINES)
 		return; /* SDA does not rise: no start condition */
 	if (!owns_bus && avr->cycle < bus_free_at)
 		wait = (unsigned)((bus_free_at - avr->cycle + bit_cycles() - 1) / bit_cycles());
@@ -113,31 +108,31 @@ static void stop(void)
 {
 	stopping = active;
 	release();
-	if (line != TWI_GOOD)
+	if (line != GOOD_LINES)
 		return; /* SDA does not rise: no stop condition */
 	avr_cycle_timer_register(avr, bit_cycles(), stopped, NULL);
 	bus_free_at = avr->cycle + bit_cycles() + bit_cycles() / 2;
 }
 
-bool twi_errors(const char *value)
+static bool acknowledges(struct twi_device *d, uint8_t called, bool reading)
 {
-	return set_errors(&errors, value);
+	const struct model *m = d->part.model;
+
+	if (d->address != called || !part_is_here(&d->part) || (m->start && !m->start(d, reading)))
+		return false;
+	d->stretch = US(d->part.fault.value == STRETCH ? m->fault_stretch_us : m->stretch_us);
+	return true;
 }
 
 static void address(uint8_t byte)
 {
-	bool reading = byte & 1, ack = false;
+	bool reading = byte & 1;
 
-	for (struct twi_device *d = devices; d && !ack; d = d->next)
-		if (d->address == byte >> 1 && d->start(d, reading)) {
+	for (struct twi_device *d = devices; d && !active; d = d->next)
+		if (acknowledges(d, byte >> 1, reading))
 			active = d;
-			ack = true;
-		}
-	phase = !ack ? REFUSED : reading ? READING : WRITING;
-	if (reading)
-		operate(BITS_PER_BYTE, ack ? STATUS_READ_ADDRESS_ACK : STATUS_READ_ADDRESS_NACK);
-	else
-		operate(BITS_PER_BYTE, ack ? STATUS_WRITE_ADDRESS_ACK : STATUS_WRITE_ADDRESS_NACK);
+	phase = !active ? REFUSED : reading ? READING : WRITING_FIRST;
+	operate_byte(reading ? STATUS_READ_ADDRESS : STATUS_WRITE_ADDRESS, active);
 }
 
 /* A device holds SDA low: a one that the master sends reads back as a zero, as if another master had won the arbitration. */
@@ -147,9 +142,7 @@ static void lose_arbitration(uint8_t byte)
 
 	while (!(byte & (0x80u >> zeros)))
 		zeros++;
-	active = NULL;
-	owns_bus = false;
-	phase = IDLE;
+	release();
 	operate(zeros + 1, STATUS_LOST);
 }
 
@@ -157,18 +150,22 @@ static void transfer(uint8_t control)
 {
 	uint8_t byte = avr->data[TWDR];
 
-	if ((line == TWI_STUCK || line == TWI_STUCK_FOREVER) && phase != READING && byte) {
+	if ((line == DATA_STUCK || line == DATA_STUCK_FOREVER) && phase != READING && byte) {
 		lose_arbitration(byte);
 		return;
 	}
 	switch (phase) {
 	case ADDRESS: address(byte); break;
-	case WRITING: operate(BITS_PER_BYTE, active->write(active, disturbed(byte, errors)) ? STATUS_WRITE_ACK : STATUS_WRITE_NACK); break;
-	case READING:
-		read_byte = line == TWI_GOOD ? disturbed(active->read(active), errors) : 0;
-		operate(BITS_PER_BYTE, control & TWEA ? STATUS_READ_ACK : STATUS_READ_NACK);
+	case WRITING_FIRST:
+	case WRITING:
+		operate_byte(STATUS_WRITE, active->part.model->write(active, disturbed(byte, twi_errors.value), phase == WRITING_FIRST));
+		phase = WRITING;
 		break;
-	case REFUSED: operate(BITS_PER_BYTE, STATUS_WRITE_NACK); break;
+	case READING:
+		read_byte = line == GOOD_LINES ? disturbed(active->part.model->read(active), twi_errors.value) : 0;
+		operate_byte(STATUS_READ, control & TWEA);
+		break;
+	case REFUSED: operate_byte(STATUS_WRITE, false); break;
 	case IDLE: break;
 	}
 }
@@ -188,8 +185,6 @@ static void write_control(avr_t *a, avr_io_addr_t register_address, uint8_t valu
 {
 	uint8_t flag = a->data[TWCR] & TWINT;
 
-	(void)register_address;
-	(void)param;
 	a->data[TWCR] = (uint8_t)((value & 0x75) | (value & TWINT ? 0 : flag));
 	if (!(value & TWEN)) {
 		disable();
@@ -210,57 +205,44 @@ static void write_control(avr_t *a, avr_io_addr_t register_address, uint8_t valu
 
 static void write_status(avr_t *a, avr_io_addr_t register_address, uint8_t value, void *param)
 {
-	(void)param;
 	a->data[register_address] = (uint8_t)((a->data[register_address] & 0xF8) | (value & 3));
 }
 
-static void write_plain(avr_t *a, avr_io_addr_t register_address, uint8_t value, void *param)
+/* A part holds a line low, or leaves it to its pull-up. */
+static void hold(uint8_t pin, bool low)
 {
-	(void)param;
-	a->data[register_address] = value;
+	if (low)
+		drive_pin('D', pin, false);
+	else
+		release_pin('D', pin);
 }
 
-static uint8_t read_plain(avr_t *a, avr_io_addr_t register_address, void *param)
-{
-	(void)a;
-	(void)param;
-	return avr->data[register_address];
-}
-
-/* The pins: a part that holds a line low; else the pull-ups. */
-static void set_line(enum twi_fault fault)
+static void set_line(unsigned fault)
 {
 	line = fault;
-	if (fault == TWI_STUCK || fault == TWI_STUCK_FOREVER)
-		drive_pin('D', 1, false);
-	else
-		release_pin('D', 1);
-	if (fault == TWI_CLOCK_STUCK)
-		drive_pin('D', 0, false);
-	else
-		release_pin('D', 0);
+	hold(1, fault == DATA_STUCK || fault == DATA_STUCK_FOREVER);
+	hold(0, fault == CLOCK_STUCK);
 }
 
 /* With the TWI off, the program can clock the bus by hand: a one in DDRD drives a line low. */
 static void lines_changed(struct avr_irq_t *irq, uint32_t value, void *param)
 {
-	static uint8_t before;
-	uint8_t driven = (uint8_t)value;
+	static bool was_low;
+	bool low = value & SCL;
 
-	(void)irq;
-	(void)param;
-	if (!(avr->data[TWCR] & TWEN) && (before & SCL) && !(driven & SCL) && ++clocks >= CLOCKS_TO_FREE && line == TWI_STUCK) {
-		set_line(TWI_GOOD);
+	if (!(avr->data[TWCR] & TWEN) && was_low && !low && ++clocks >= CLOCKS_TO_FREE && line == DATA_STUCK) {
+		set_line(GOOD_LINES);
 		bench_trace("sda released");
 	}
-	before = driven;
+	was_low = low;
 }
 
 void twi_init(void)
 {
 	take_register(TWCR, NULL, write_control);
 	take_register(TWSR, NULL, write_status);
-	take_register(TWDR, read_plain, write_plain);
+	avr->io[AVR_DATA_TO_IO(TWDR)].r.c = NULL; /* a byte of memory */
+	avr->io[AVR_DATA_TO_IO(TWDR)].w.c = NULL;
 	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), IOPORT_IRQ_DIRECTION_ALL), lines_changed, NULL);
 }
 
@@ -280,15 +262,28 @@ void twi_add(struct twi_device *device)
 	devices = device;
 }
 
-void twi_fault(enum twi_fault fault)
+/* A stop or start that waited for SDA to rise goes on when the lines are good. */
+static void change_line(unsigned fault)
 {
 	uint8_t control = avr->data[TWCR];
 
 	set_line(fault);
-	if (fault != TWI_GOOD || !(control & TWEN))
+	if (fault != GOOD_LINES || !(control & TWEN))
 		return;
-	if (control & TWSTO) /* a stop or start that waited for SDA to rise */
+	if (control & TWSTO)
 		stop();
 	if ((control & TWSTA) && !owns_bus)
 		start();
 }
+
+static void data_changed(void *self, unsigned before)
+{
+	change_line(((struct fault_switch *)self)->value);
+}
+FAULT_SWITCH(sda, "ok stuck stuck_forever", data_changed, GOOD_LINES)
+
+static void clock_changed(void *self, unsigned before)
+{
+	change_line(((struct fault_switch *)self)->value ? CLOCK_STUCK : GOOD_LINES);
+}
+FAULT_SWITCH(scl, "ok stuck", clock_changed, GOOD_LINES)

@@ -24,7 +24,7 @@ static avr_cycle_count_t period(void)
 static void reset_processor(avr_t *a)
 {
 	a->run = plain_run;
-	board_watchdog();
+	board_reset(WATCHDOG);
 }
 
 /* The interrupt comes first; without it, or when it was not served for a whole period, the reset. */
@@ -32,7 +32,6 @@ static avr_cycle_count_t expired(avr_t *a, avr_cycle_count_t when, void *param)
 {
 	uint8_t control = a->data[WDTCSR];
 
-	(void)param;
 	if ((control & WDIE) && !vector(VECTOR)->pending) {
 		avr_raise_interrupt(a, vector(VECTOR));
 		return when + period();
@@ -56,7 +55,6 @@ static void write_control(avr_t *a, avr_io_addr_t address, uint8_t value, void *
 {
 	uint8_t old = a->data[address];
 
-	(void)param;
 	if ((value & (WDCE | WDE)) == (WDCE | WDE)) {
 		change_until = a->cycle + CHANGE_CYCLES;
 		a->data[address] = old | WDE;
@@ -72,16 +70,12 @@ static void write_control(avr_t *a, avr_io_addr_t address, uint8_t value, void *
 /* Serving the interrupt leaves only the reset. */
 static void served(struct avr_irq_t *irq, uint32_t running, void *param)
 {
-	(void)irq;
-	(void)param;
 	if (running)
 		avr->data[WDTCSR] &= (uint8_t)~(WDIE | WDIF);
 }
 
 static int on_ioctl(avr_io_t *port, uint32_t control, void *param)
 {
-	(void)port;
-	(void)param;
 	if (control != AVR_IOCTL_WATCHDOG_RESET)
 		return -1;
 	restart();

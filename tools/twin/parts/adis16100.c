@@ -31,9 +31,9 @@ static struct gyro {
 	uint16_t control, answer, incoming, count;
 	bool garbled; /* the processor uses the wrong clock edge or a too fast clock */
 } gyros[3] = {
-	{ .spi = { .part = PART(adis16100, "thigh", PLACE_THIGH), .port = 'B', .pin = 4 } },
-	{ .spi = { .part = PART(adis16100, "calf", PLACE_CALF), .port = 'B', .pin = 5 } },
-	{ .spi = { .part = PART(adis16100, "belt", PLACE_BELT), .port = 'B', .pin = 6 } },
+	{ .spi = { .part = PART(adis16100, PLACE_THIGH, "thigh"), .port = 'B', .pin = 4 } },
+	{ .spi = { .part = PART(adis16100, PLACE_CALF, "calf"), .port = 'B', .pin = 5 } },
+	{ .spi = { .part = PART(adis16100, PLACE_BELT, "belt"), .port = 'B', .pin = 6 } },
 };
 static bool inputs[2]; /* ST1, ST2 */
 static avr_cycle_count_t excited_at;
@@ -41,7 +41,7 @@ static avr_cycle_count_t excited_at;
 /* Counts that the self-test inputs add once the filter has settled. */
 static double target(const struct gyro *g)
 {
-	double response = g->spi.part.fault == WEAK ? g->response * 0.1 : g->response;
+	double response = g->spi.part.fault.value == WEAK ? g->response * 0.1 : g->response;
 
 	return (inputs[1] ? response : 0.0) - (inputs[0] ? response : 0.0);
 }
@@ -49,9 +49,7 @@ static double target(const struct gyro *g)
 /* Counts that the self-test inputs add now. */
 static double excitation(const struct gyro *g)
 {
-	double elapsed_s = (double)(avr->cycle - excited_at) / 16e6;
-
-	return target(g) + (g->excited - target(g)) * exp(-elapsed_s / FILTER_S);
+	return target(g) + (g->excited - target(g)) * exp(-(double)(avr->cycle - excited_at) / 16e6 / FILTER_S);
 }
 
 static void input_changed(struct avr_irq_t *irq, uint32_t level, void *param)
@@ -64,35 +62,30 @@ static void input_changed(struct avr_irq_t *irq, uint32_t level, void *param)
 
 static int rate_of(const struct gyro *g)
 {
-	int rate = row.rate[g - gyros] + (int)lround(excitation(g));
+	int rate = input.row.rate[g - gyros] + (int)lround(excitation(g));
 
-	if (g->spi.part.fault == STUCK)
+	if (g->spi.part.fault.value == STUCK)
 		return g->stuck_rate;
 	return rate > FULL_SCALE ? FULL_SCALE : rate < -MID_SCALE ? -MID_SCALE : rate;
-}
-
-static int temperature(void)
-{
-	return (int)lround((row.temperature / 20.0 - 25.0) * 6.88);
 }
 
 static uint16_t convert(const struct gyro *g)
 {
 	unsigned channel = (g->control >> 10) & 3;
-	int value = channel == 0 ? rate_of(g) : channel == 1 ? temperature() : 0;
+	int value = channel == 0 ? rate_of(g) : channel == 1 ? (int)lround((input.row.temperature / 20.0 - 25.0) * 6.88) : 0;
 
 	if ((g->control & POWER_ON) != POWER_ON)
 		return 0;
 	if (g->control & OFFSET_BINARY)
 		value += MID_SCALE;
-	if (g->spi.part.fault == WRONG_CHANNEL)
+	if (g->spi.part.fault.value == WRONG_CHANNEL)
 		channel ^= 1u;
 	return (uint16_t)((channel << 12) | ((unsigned)value & 0xFFFu));
 }
 
-static void on_select(struct spi_device *self, bool on)
+static void on_select(void *self, bool on)
 {
-	struct gyro *g = (struct gyro *)self;
+	struct gyro *g = self;
 
 	if (!on && g->count == 2) {
 		if (g->incoming & WRITE)
@@ -100,27 +93,26 @@ static void on_select(struct spi_device *self, bool on)
 		g->answer = convert(g);
 	}
 	g->count = 0;
-	if (on && part_is_plugged(&self->part))
+	if (on && part_is_plugged(self))
 		g->garbled = spi_garbles("adis16100", MAX_HERTZ, spi_mode() == 1 || spi_mode() == 2);
 }
 
-static int on_exchange(struct spi_device *self, uint8_t out)
+static int on_exchange(void *self, uint8_t out)
 {
-	struct gyro *g = (struct gyro *)self;
+	struct gyro *g = self;
 	uint8_t in = (uint8_t)(g->count == 0 ? g->answer >> 8 : g->answer);
 
 	g->incoming = (uint16_t)(g->incoming << 8 | out >> g->garbled);
 	g->count++;
-	if (!part_is_here(&self->part))
+	if (!part_is_here(self))
 		return SPI_OPEN;
-	return self->part.fault == ZEROS ? 0 : in >> g->garbled;
+	return g->spi.part.fault.value == ZEROS ? 0 : in >> g->garbled;
 }
 
-static void wire(struct part *self)
+static void wire(void *self)
 {
-	struct gyro *g = (struct gyro *)self;
+	struct gyro *g = self;
 
-	spi_wire(self);
 	g->response = 199 + (int)random_below(45);
 	if (g != gyros)
 		return;
@@ -128,26 +120,26 @@ static void wire(struct part *self)
 	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('F'), ST2), input_changed, &inputs[1]);
 }
 
-static void power(struct part *self)
+static void power(void *self)
 {
-	struct gyro *g = (struct gyro *)self;
+	struct gyro *g = self;
 
 	g->excited = 0.0;
 	g->control = g->answer = g->count = 0;
 }
 
 /* The processor's pins are inputs, and the chips pull ST1 and ST2 low. */
-static void resume(struct part *self)
+static void resume(void *self)
 {
 	memset(inputs, 0, sizeof inputs);
 	excited_at = avr->cycle;
 }
 
-static void changed(struct part *self, unsigned before)
+static void changed(void *self, unsigned before)
 {
-	struct gyro *g = (struct gyro *)self;
+	struct gyro *g = self;
 
-	g->stuck_rate = row.rate[g - gyros];
+	g->stuck_rate = input.row.rate[g - gyros];
 }
 
 const struct model adis16100 = {

@@ -6,8 +6,6 @@
 #include <math.h>
 #include <string.h>
 
-#include <simavr/sim_cycle_timers.h>
-
 #include "parts/parts.h"
 
 enum { CHIP_ID = 0x00, REV_ID, ERR_REG, STATUS, DATA, IF_CONF = 0x1A, PWR_CTRL, OSR, ODR, COEFFICIENTS = 0x31, CMD = 0x7E, REGISTERS = 0x80 };
@@ -19,9 +17,8 @@ enum { ZEROS = OTHER_FAULTS, WRONG_IDENTITY, EMPTY, STUCK_READY, NEVER_READY };
 #define FASTEST US(5000)
 #define FULL_SCALE 0xFFFFFFu
 
-static struct register_file barometers[] = { { .spi = { .part = PART(bmp390, "bmp390", PLACE_PRESSURE), .port = 'D', .pin = 7 } } };
+static struct register_file chips[] = { { .spi = { .part = PART(bmp390, PLACE_PRESSURE, "bmp390"), .port = 'D', .pin = 7 } } };
 static uint8_t registers[REGISTERS];
-static avr_cycle_count_t sample_at;
 
 /* PAR_T1 ... PAR_P11 of a typical part, as integers, and their powers of two [8.4]. */
 enum { T1, T2, T3, P1, P2, P3, P4, P5, P6, P7, P8, P9, P10, P11, PARAMETERS };
@@ -77,24 +74,17 @@ static void put24(uint8_t at, uint32_t value)
 		registers[at + k] = (uint8_t)(value >> 8 * k);
 }
 
-static avr_cycle_count_t sample(avr_t *a, avr_cycle_count_t when, void *param)
+static avr_cycle_count_t sample(void *self)
 {
-	uint32_t raw_temperature = counts_at(celsius_of, row.temperature / 20.0, 0);
+	uint32_t raw_temperature = counts_at(celsius_of, input.row.temperature / 20.0, 0);
 
-	put24(DATA, counts_at(pascal_of, row.pressure / 4.0, celsius_of(raw_temperature, 0)));
+	put24(DATA, counts_at(pascal_of, input.row.pressure / 4.0, celsius_of(raw_temperature, 0)));
 	put24(DATA + 3, raw_temperature);
 	registers[STATUS] |= PRESSURE_READY | TEMPERATURE_READY;
-	sample_at = when + (FASTEST << registers[ODR]);
-	return sample_at;
+	return FASTEST << registers[ODR];
 }
 
-static void plan_sample(avr_cycle_count_t when)
-{
-	sample_at = when;
-	avr_cycle_timer_register(avr, when - avr->cycle, sample, NULL);
-}
-
-static void power(struct part *self)
+static void power(void *self)
 {
 	uint8_t *c = registers + COEFFICIENTS;
 
@@ -107,20 +97,17 @@ static void power(struct part *self)
 	for (int k = 0; k < PARAMETERS; k++)
 		for (int byte = 0; byte < parameters[k].size; byte++)
 			*c++ = (uint8_t)((unsigned)parameters[k].value >> 8 * byte);
-	sample_at = 0;
-	avr_cycle_timer_cancel(avr, sample, NULL);
-	barometers->up_at = avr->cycle + START_UP;
+	part_sample_after(self, 0);
+	chips->up_at = avr->cycle + START_UP;
 }
 
-static int get(struct register_file *self, uint8_t at)
+static int get(void *self, uint8_t at)
 {
-	unsigned fault = self->part.fault;
+	unsigned fault = chips->part.fault.value;
 	uint8_t value = registers[at];
 
 	if (fault == ZEROS)
 		return 0;
-	if (registers[IF_CONF] & THREE_WIRES)
-		return SPI_OPEN;
 	if (at == CHIP_ID)
 		return fault == WRONG_IDENTITY ? OTHER_IDENTITY : IDENTITY;
 	if (at >= COEFFICIENTS && at < COEFFICIENTS + 21 && fault == EMPTY)
@@ -132,35 +119,35 @@ static int get(struct register_file *self, uint8_t at)
 	return value;
 }
 
-static void set(struct register_file *self, uint8_t at, uint8_t value)
+static void set(void *self, uint8_t at, uint8_t value)
 {
-	if (self->count > 2)
+	if (chips->count > 2)
 		return;
 	if (at == CMD && value == SOFT_RESET)
-		power(&self->part);
+		power(self);
 	if (at < IF_CONF || at >= COEFFICIENTS) /* read only */
 		return;
 	registers[at] = value;
 	if (at == PWR_CTRL && (value & NORMAL) == NORMAL)
-		plan_sample(avr->cycle + (FASTEST << registers[ODR]));
+		part_sample_after(self, FASTEST << registers[ODR]);
 }
 
-static void resume(struct part *self)
+static int exchange(void *self, uint8_t sent)
 {
-	if (sample_at > avr->cycle)
-		plan_sample(sample_at);
+	int answer = registers_exchange(self, sent);
+
+	return (registers[IF_CONF] & THREE_WIRES) && chips->part.fault.value != ZEROS ? SPI_OPEN : answer;
 }
 
 const struct model bmp390 = {
 	.kind = OF_2026,
 	.faults = "ok absent zeros wrong_identity empty stuck_ready never_ready",
-	PARTS(barometers),
-	.wire = spi_wire,
+	PARTS(chips),
 	.power = power,
-	.resume = resume,
 	.changed = part_returned,
+	.sample = sample,
 	.select = registers_select,
-	.exchange = registers_exchange,
+	.exchange = exchange,
 	.get = get,
 	.set = set,
 	.dummy_bytes = 1,

@@ -5,17 +5,19 @@
 enum { BAD_VALUE = OTHER_TWI_FAULTS };
 #define VERSION 13
 
-static struct register_file compasses[] = { { .twi = { .part = PART(compass, "compass", PLACE_COMPASS), .address = 0x60 } } };
+static struct register_file chips[] = {
+	{ .twi = { .part = PART(compass, PLACE_COMPASS, "compass"), .address = 0x60 }, .counts_up = true },
+};
 
-static int get(struct register_file *self, uint8_t at)
+static int get(void *self, uint8_t at)
 {
-	if (self->part.fault == BAD_VALUE)
+	if (chips->part.fault.value == BAD_VALUE)
 		return 0xFF;
 	switch (at) {
 	case 0: return VERSION;
-	case 1: return (uint8_t)(row.bearing * 256u / 3600u);
-	case 2: return row.bearing >> 8;
-	case 3: return (uint8_t)row.bearing;
+	case 1: return (uint8_t)(input.row.bearing * 256u / 3600u);
+	case 2: return input.row.bearing >> 8;
+	case 3: return (uint8_t)input.row.bearing;
 	default: return 0;
 	}
 }
@@ -23,9 +25,7 @@ static int get(struct register_file *self, uint8_t at)
 const struct model compass = {
 	.kind = OF_PAPERS,
 	.faults = "ok absent nack stretch bad_value",
-	PARTS(compasses),
-	.wire = twi_wire,
-	.start = registers_start,
+	PARTS(chips),
 	.write = registers_write,
 	.read = registers_read,
 	.get = get,

@@ -25,7 +25,7 @@ enum { ZEROS = OTHER_FAULTS, WRONG_IDENTITY, NEVER_READY, STUCK_READY, STUCK, SA
 #define FULL_SCALE 32767
 #define FULL_SCALE_30_G 30720
 
-static struct register_file imus[] = { { .spi = { .part = PART(icm20649, "icm20649", PLACE_FOOT), .port = 'B', .pin = 4 } } };
+static struct register_file chips[] = { { .spi = { .part = PART(icm20649, PLACE_FOOT, "icm20649"), .port = 'B', .pin = 4 } } };
 static uint8_t registers[BANKS][REGISTERS], out[14];
 static uint8_t bank;
 static bool sampling;
@@ -33,14 +33,14 @@ static double own_clock; /* cycles of the processor for each of its own, drawn w
 
 static unsigned fault(void)
 {
-	return imus->part.fault;
+	return chips->part.fault.value;
 }
 
 static void set_line(bool level)
 {
-	if (part_is_here(&imus->part))
+	if (part_is_here(&chips->part))
 		drive_pin('D', 4, level || fault() == STUCK_READY);
-	else if (part_is_plugged(&imus->part))
+	else if (part_is_plugged(&chips->part))
 		floating_pin('D', 4, true);
 }
 
@@ -68,13 +68,13 @@ static void sample(void)
 	int force_limit = registers[2][ACCEL_CONFIG] & 6 ? FULL_SCALE_30_G : FULL_SCALE;
 
 	for (int k = 0; k < 3; k++) {
-		double force = scale(ACCEL_CONFIG) * between(motion_before[0].force[k], motion[0].force[k]);
-		double rate = scale(GYRO_CONFIG_1) * between(motion_before[0].rate[k], motion[0].rate[k]);
+		double force = scale(ACCEL_CONFIG) * between(previous.motion[0].force[k], input.motion[0].force[k]);
+		double rate = scale(GYRO_CONFIG_1) * between(previous.motion[0].rate[k], input.motion[0].rate[k]);
 
 		put(k, fault() == SATURATED ? 1e6 : force, force_limit);
 		put(3 + k, fault() == SATURATED ? 1e6 : rate, FULL_SCALE);
 	}
-	put(6, (row.temperature / 20.0 - 21.0) * 333.87, FULL_SCALE);
+	put(6, (input.row.temperature / 20.0 - 21.0) * 333.87, FULL_SCALE);
 }
 
 static avr_cycle_count_t line_falls(avr_t *a, avr_cycle_count_t when, void *param)
@@ -97,7 +97,7 @@ static avr_cycle_count_t next_sample(avr_t *a, avr_cycle_count_t when, void *par
 		return 0;
 	if (fault() != STUCK)
 		sample();
-	if (shows && registers_answer(imus)) {
+	if (shows && registers_answer(chips)) {
 		set_line(true);
 		bench_trace("foot");
 		avr_cycle_timer_register(a, INT_PULSE, line_falls, NULL);
@@ -113,10 +113,10 @@ static void restart(void)
 	bank = 0;
 	sampling = false;
 	avr_cycle_timer_cancel(avr, next_sample, NULL);
-	imus->up_at = avr->cycle + START_UP;
+	chips->up_at = avr->cycle + START_UP;
 }
 
-static void set(struct register_file *self, uint8_t at, uint8_t value)
+static void set(void *self, uint8_t at, uint8_t value)
 {
 	if (at == BANK_SEL)
 		bank = (value >> 4) & 3;
@@ -132,7 +132,7 @@ static void set(struct register_file *self, uint8_t at, uint8_t value)
 	}
 }
 
-static int get(struct register_file *self, uint8_t at)
+static int get(void *self, uint8_t at)
 {
 	if (at == BANK_SEL)
 		return bank << 4;
@@ -143,7 +143,7 @@ static int get(struct register_file *self, uint8_t at)
 	return registers[bank][at];
 }
 
-static void power(struct part *self)
+static void power(void *self)
 {
 	if (own_clock == 0.0 && part_is_plugged(self))
 		own_clock = 1.0 + OWN_CLOCK * ((int)random_below(2001) - 1000) / 1000.0;
@@ -152,16 +152,16 @@ static void power(struct part *self)
 }
 
 /* The part itself goes on. */
-static void resume(struct part *self)
+static void resume(void *self)
 {
 	set_line(false);
 	if (sampling && part_is_plugged(self))
 		avr_cycle_timer_register(avr, period(), next_sample, NULL);
 }
 
-static void changed(struct part *self, unsigned before)
+static void changed(void *self, unsigned before)
 {
-	if (before == ABSENT || self->fault == ABSENT)
+	if (before == ABSENT || fault() == ABSENT)
 		restart();
 	set_line(false);
 }
@@ -169,8 +169,7 @@ static void changed(struct part *self, unsigned before)
 const struct model icm20649 = {
 	.kind = OF_FOOT,
 	.faults = "ok absent zeros wrong_identity never_ready stuck_ready stuck saturated",
-	PARTS(imus),
-	.wire = spi_wire,
+	PARTS(chips),
 	.power = power,
 	.resume = resume,
 	.changed = changed,

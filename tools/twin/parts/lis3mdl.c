@@ -13,11 +13,11 @@ enum { WRONG_IDENTITY = OTHER_TWI_FAULTS, NEVER_READY, SATURATED };
 #define FIRST_SAMPLE US(12500)
 #define FULL_SCALE 32767
 
-static struct register_file magnetometers[] = { { .twi = { .part = PART(lis3mdl, "lis3mdl", PLACE_COMPASS), .address = 0x1C } } };
+static struct register_file chips[] = { { .twi = { .part = PART(lis3mdl, PLACE_COMPASS, "lis3mdl"), .address = 0x1C } } };
 static uint8_t registers[REGISTERS];
 static avr_cycle_count_t ready_at;
 
-static void set(struct register_file *self, uint8_t at, uint8_t value)
+static void set(void *self, uint8_t at, uint8_t value)
 {
 	if (at < CTRL_REG1 || at >= STATUS)
 		return;
@@ -29,26 +29,26 @@ static void set(struct register_file *self, uint8_t at, uint8_t value)
 static void sample(unsigned fault)
 {
 	for (int k = 0; k < 3; k++) {
-		int counts = fault == SATURATED ? FULL_SCALE : field[k];
+		int counts = fault == SATURATED ? FULL_SCALE : input.field[k];
 
 		registers[OUT + 2 * k] = (uint8_t)counts;
 		registers[OUT + 2 * k + 1] = (uint8_t)((unsigned)counts >> 8);
 	}
 }
 
-static int get(struct register_file *self, uint8_t at)
+static int get(void *self, uint8_t at)
 {
-	bool measures = !(registers[CTRL_REG3] & POWER_DOWN) && avr->cycle >= ready_at && self->part.fault != NEVER_READY;
+	unsigned fault = chips->part.fault.value;
 
 	if (at == WHO_AM_I)
-		return self->part.fault == WRONG_IDENTITY ? OTHER_IDENTITY : IDENTITY;
+		return fault == WRONG_IDENTITY ? OTHER_IDENTITY : IDENTITY;
 	if (at != STATUS)
 		return registers[at];
-	sample(self->part.fault);
-	return measures ? READY : 0;
+	sample(fault);
+	return !(registers[CTRL_REG3] & POWER_DOWN) && avr->cycle >= ready_at && fault != NEVER_READY ? READY : 0;
 }
 
-static void power(struct part *self)
+static void power(void *self)
 {
 	memset(registers, 0, sizeof registers);
 	registers[CTRL_REG3] = POWER_DOWN;
@@ -57,11 +57,9 @@ static void power(struct part *self)
 const struct model lis3mdl = {
 	.kind = OF_2026,
 	.faults = "ok absent nack stretch wrong_identity never_ready saturated",
-	PARTS(magnetometers),
-	.wire = twi_wire,
+	PARTS(chips),
 	.power = power,
 	.changed = part_returned,
-	.start = registers_start,
 	.write = registers_write,
 	.read = registers_read,
 	.get = get,

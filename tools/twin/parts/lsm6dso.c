@@ -33,9 +33,9 @@ static struct imu {
 	int response;
 	struct axes kept; /* of a part that is stuck */
 } imus[3] = {
-	{ .file.spi = { .part = PART(lsm6dso, "imu_thigh", PLACE_THIGH), .port = 'B', .pin = 4 } },
-	{ .file.spi = { .part = PART(lsm6dso, "imu_calf", PLACE_CALF), .port = 'B', .pin = 5 } },
-	{ .file.spi = { .part = PART(lsm6dso, "imu_belt", PLACE_BELT), .port = 'B', .pin = 6 } },
+	{ .file.spi = { .part = PART(lsm6dso, PLACE_THIGH, "imu_thigh"), .port = 'B', .pin = 4 } },
+	{ .file.spi = { .part = PART(lsm6dso, PLACE_CALF, "imu_calf"), .port = 'B', .pin = 5 } },
+	{ .file.spi = { .part = PART(lsm6dso, PLACE_BELT, "imu_belt"), .port = 'B', .pin = 6 } },
 };
 
 static double full_scale_dps(const struct imu *u)
@@ -49,7 +49,7 @@ static double full_scale_dps(const struct imu *u)
 static double target(const struct imu *u)
 {
 	unsigned mode = (u->registers[CTRL5_C] >> 2) & 3;
-	double response = u->file.part.fault == WEAK ? u->response * 0.05 : u->response;
+	double response = u->file.part.fault.value == WEAK ? u->response * 0.05 : u->response;
 
 	response *= full_scale_dps(u) / 2000.0;
 	return mode == 1 ? response : mode == 3 ? -response : 0.0;
@@ -67,7 +67,7 @@ static double vibration(const struct imu *u)
 	static const double shares[8] = { 4.0, 10.0, 20.0, 45.0, 100.0, 200.0, 400.0, 800.0 };
 	double cut = 1667.0 / (u->registers[CTRL1_XL] & 2 ? shares[u->registers[CTRL8_XL] >> 5] : 2.0), r = VIBRATION_HERTZ / cut;
 
-	if (u->file.part.fault != VIBRATING)
+	if (u->file.part.fault.value != VIBRATING)
 		return 0.0;
 	return VIBRATION_COUNTS / sqrt(1.0 + r * r * r * r) * sin(6.283185307 * VIBRATION_HERTZ * (double)avr->cycle / 16e6);
 }
@@ -82,10 +82,10 @@ static void put(struct imu *u, int at, double value)
 
 static void sample(struct imu *u)
 {
-	unsigned fault = u->file.part.fault;
-	const struct axes *a = fault == STUCK ? &u->kept : &motion[u - imus];
+	unsigned fault = u->file.part.fault.value;
+	const struct axes *a = fault == STUCK ? &u->kept : &input.motion[u - imus];
 
-	put(u, OUT_TEMP, (row.temperature / 20.0 - 25.0) * 256.0);
+	put(u, OUT_TEMP, (input.row.temperature / 20.0 - 25.0) * 256.0);
 	for (int k = 0; k < 3; k++) {
 		double rate = fault == SATURATED ? 1e6 : (a->rate[k] + excitation(u)) * 1000.0 / full_scale_dps(u);
 
@@ -98,15 +98,15 @@ static uint8_t status(const struct imu *u)
 {
 	bool rates = u->registers[CTRL2_G] >> 4 && avr->cycle >= u->rates_at && avr->cycle >= u->read_at + FASTEST_READY;
 
-	return u->file.part.fault == NEVER_READY ? 0 : (uint8_t)((rates ? RATE_READY : 0) | (u->registers[CTRL1_XL] >> 4 ? FORCE_READY : 0));
+	return u->file.part.fault.value == NEVER_READY ? 0 : (uint8_t)((rates ? RATE_READY : 0) | (u->registers[CTRL1_XL] >> 4 ? FORCE_READY : 0));
 }
 
-static int get(struct register_file *self, uint8_t at)
+static int get(void *self, uint8_t at)
 {
-	struct imu *u = (struct imu *)self;
+	struct imu *u = self;
 
 	if (at == WHO_AM_I)
-		return self->part.fault == WRONG_IDENTITY ? OTHER_IDENTITY : IDENTITY;
+		return u->file.part.fault.value == WRONG_IDENTITY ? OTHER_IDENTITY : IDENTITY;
 	if (at == STATUS) {
 		sample(u);
 		return status(u);
@@ -116,9 +116,9 @@ static int get(struct register_file *self, uint8_t at)
 	return u->registers[at];
 }
 
-static void set(struct register_file *self, uint8_t at, uint8_t value)
+static void set(void *self, uint8_t at, uint8_t value)
 {
-	struct imu *u = (struct imu *)self;
+	struct imu *u = self;
 
 	if (at == WHO_AM_I || at >= STATUS)
 		return;
@@ -131,9 +131,9 @@ static void set(struct register_file *self, uint8_t at, uint8_t value)
 	u->registers[at] = value;
 }
 
-static void power(struct part *self)
+static void power(void *self)
 {
-	struct imu *u = (struct imu *)self;
+	struct imu *u = self;
 
 	memset(u->registers, 0, STATUS);
 	u->registers[CTRL3_C] = 0x04;
@@ -144,19 +144,18 @@ static void power(struct part *self)
 	u->read_at = 0;
 }
 
-static void changed(struct part *self, unsigned before)
+static void changed(void *self, unsigned before)
 {
-	struct imu *u = (struct imu *)self;
+	struct imu *u = self;
 
 	part_returned(self, before);
-	u->kept = motion[u - imus];
+	u->kept = input.motion[u - imus];
 }
 
 const struct model lsm6dso = {
 	.kind = OF_2026,
 	.faults = "ok absent zeros wrong_identity never_ready stuck saturated no_self_test vibrating",
 	PARTS(imus),
-	.wire = spi_wire,
 	.power = power,
 	.changed = changed,
 	.select = registers_select,

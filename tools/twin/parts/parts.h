@@ -13,13 +13,13 @@ enum { GOOD, ABSENT, OTHER_FAULTS, NACK = OTHER_FAULTS, STRETCH, OTHER_TWI_FAULT
 
 /* One chip; the structs of all models begin with it. */
 struct part {
+	struct fault_switch fault;
 	const struct model *model;
-	const char *name; /* of its fault switch */
 	enum place place;
-	unsigned fault; /* which of its model's */
+	avr_cycle_count_t sample_at; /* its next measurement; 0: none */
 	struct part *next;
 };
-#define PART(of, switch_name, in) { .model = &(of), .name = (switch_name), .place = (in) }
+#define PART(of, in, switch_name) { .model = &(of), .place = (in), .fault.name = (switch_name) }
 
 struct spi_device {
 	struct part part;
@@ -37,7 +37,7 @@ struct twi_device {
 	struct twi_device *next;
 };
 
-/* A file of registers, of which a frame chooses one; then their addresses count up. */
+/* A file of registers: the first byte of a frame has the address, and the addresses of the bytes that follow count up. */
 struct register_file {
 	union {
 		struct part part;
@@ -45,27 +45,30 @@ struct register_file {
 		struct twi_device twi;
 	};
 	uint8_t address; /* of the next byte */
-	unsigned count;  /* bytes of the frame so far */
+	unsigned count;  /* bytes of the frame so far, on SPI */
 	bool reading, counts_up, garbled;
 	avr_cycle_count_t up_at; /* it does not answer before */
+};
+
+/* The last bursts of a ranger, for the other one hears them too. */
+struct bursts {
+	struct burst {
+		avr_cycle_count_t at;
+		uint16_t cross_us; /* when it reaches the other ranger, 0: never */
+	} last[4];
+	unsigned count;
 };
 
 /* A ranger on I2C. */
 struct ranger {
 	struct twi_device twi;
-	struct bursts {
-		struct burst {
-			avr_cycle_count_t at;
-			uint16_t cross_us; /* when it reaches the other ranger, 0: never */
-		} last[4];
-		unsigned count;
-	} bursts;
+	struct bursts bursts;
 	avr_cycle_count_t began, busy_until; /* of the newest ranging */
 	bool listening;                      /* its result is not known yet */
-	uint16_t own_us, result;             /* its own echo, 0: none; the last result */
-	uint8_t written[3], count;           /* bytes of the write under way */
+	uint16_t own_us;                     /* its own echo; 0: none */
+	uint32_t result_us;                  /* of the last ranging that has ended */
+	uint8_t written[2], count;           /* bytes of the write under way */
 	uint8_t pointer;                     /* to what is read next */
-	uint8_t unit, sequence;              /* of an SRF02 */
 };
 
 /* A kind of chip: what it is and does; NULL where it does nothing. */
@@ -74,29 +77,29 @@ struct model {
 	const char *faults; /* their names, with blanks between them */
 	void *parts;        /* an array */
 	size_t count, size;
-	void (*wire)(struct part *self);                     /* once: to its bus and pins */
-	void (*power)(struct part *self);                    /* it gets power */
-	void (*resume)(struct part *self);                   /* the processor was reset: simavr has lost all timers */
-	void (*changed)(struct part *self, unsigned before); /* it has another fault */
+	void (*wire)(void *self);   /* once: to pins */
+	void (*power)(void *self);  /* it gets power */
+	void (*resume)(void *self); /* the processor was reset: simavr has lost all timers but those of `sample` */
+	void (*changed)(void *self, unsigned before); /* it has another fault */
+	avr_cycle_count_t (*sample)(void *self);      /* it measures; returns the time to the next measurement, 0: none */
 
-	void (*select)(struct spi_device *self, bool on);
-	int (*exchange)(struct spi_device *self, uint8_t out); /* SPI_OPEN: it does not drive MISO */
+	void (*select)(void *self, bool on);         /* on SPI */
+	int (*exchange)(void *self, uint8_t out);    /* SPI_OPEN: it does not drive MISO */
 
-	bool (*start)(struct twi_device *self, bool read);    /* acknowledge? */
-	bool (*write)(struct twi_device *self, uint8_t byte); /* acknowledge? */
-	uint8_t (*read)(struct twi_device *self);
-	void (*stop)(struct twi_device *self);
+	bool (*start)(void *self, bool read);               /* on I2C: acknowledge? */
+	bool (*write)(void *self, uint8_t byte, bool first); /* acknowledge? */
+	uint8_t (*read)(void *self);
+	void (*stop)(void *self);
 	unsigned stretch_us, fault_stretch_us; /* always; with the fault STRETCH */
 
-	int (*get)(struct register_file *self, uint8_t at);
-	void (*set)(struct register_file *self, uint8_t at, uint8_t value);
+	int (*get)(void *self, uint8_t at);      /* a register */
+	void (*set)(void *self, uint8_t at, uint8_t value);
 	unsigned rise_ns;     /* of the level shifter of its clock */
 	unsigned zeros;       /* the fault that holds MISO low; 0: none */
 	unsigned dummy_bytes; /* before the first that is read */
 	uint8_t address_mask; /* on I2C; the bit 0x80, where it is none of an address, makes these count up */
 
-	uint16_t (*result_of)(const struct ranger *self, uint32_t us); /* of a time of flight; 0: no echo */
-	uint32_t least_us, window_us;                                  /* first and last time at which it hears an echo */
+	uint32_t least_us, window_us; /* first and last time at which a ranger hears an echo */
 };
 #define PARTS(array) .parts = (array), .count = sizeof(array) / sizeof *(array), .size = sizeof *(array)
 
@@ -107,38 +110,34 @@ bool place_has(enum place place, enum kind kind);
 bool part_is_plugged(const struct part *part);
 bool part_is_here(const struct part *part); /* and not absent by its fault */
 unsigned parts_here(const struct model *model);
-void part_returned(struct part *part, unsigned before); /* `changed` of a part that loses its settings while it is absent */
+void part_sample_after(void *self, avr_cycle_count_t cycles); /* its next measurement; 0: none */
+void part_returned(void *self, unsigned before); /* `changed` of a part that loses its settings while it is absent */
 
-/* spi.c */
-void spi_wire(struct part *part);
-unsigned spi_hertz(void);
+/* spi.c, twi.c */
+void spi_add(struct spi_device *device);
 unsigned spi_mode(void);
 uint8_t spi_at_rising_edges(uint8_t out); /* what a part of modes 0 and 3 reads of a byte */
 int spi_answer(int answer);               /* what the processor reads of such a part's byte */
 bool spi_outruns(unsigned rise_ns);       /* half a bit is shorter than a level shifter's rise */
 bool spi_garbles(const char *chip, unsigned most_hertz, bool right_mode); /* all bits arrive one bit late; the trace names the cause */
-
-/* twi.c */
-void twi_wire(struct part *part);
+void twi_add(struct twi_device *device);
 
 /* registers.c: the frames of SPI modes 0 and 3, and those of I2C */
-void registers_select(struct spi_device *self, bool on);
+void registers_select(void *self, bool on);
 bool registers_answer(const struct register_file *f); /* on SPI */
-int registers_exchange(struct spi_device *self, uint8_t sent);
-bool registers_start(struct twi_device *self, bool read);
-bool registers_write(struct twi_device *self, uint8_t byte);
-uint8_t registers_read(struct twi_device *self);
+int registers_exchange(void *self, uint8_t sent);
+bool registers_write(void *self, uint8_t byte, bool first);
+uint8_t registers_read(void *self);
 
 /* rangers.c */
 enum { MUTE = OTHER_TWI_FAULTS, DEAF, MISREADS };
-void bursts_add(struct bursts *own, avr_cycle_count_t at, uint16_t cross_us);
-/* The first echo after `began`, from `least_us` on and within the window, in us: of the own burst, or of the other ranger's; 0: none. */
-uint32_t bursts_first_echo(const struct bursts *others, avr_cycle_count_t began, uint16_t own_us, uint32_t least_us, uint32_t window_us);
-unsigned ranger_side(const struct part *part); /* 0 left, 1 right */
-void ranger_power(struct part *part);
-bool ranger_start(struct twi_device *self, bool read);
-bool ranger_write(struct twi_device *self, uint8_t byte);
-void ranger_begin(struct ranger *r, bool burst);
-void ranger_listen(struct ranger *r, uint16_t own_us, avr_cycle_count_t until);
+extern const char *const sides[2];
+/* The first echo after `began` within the model's window, in us: of the own burst, or of the other ranger's; 0: none. */
+uint32_t bursts_first_echo(const struct model *model, const struct bursts *others, avr_cycle_count_t began, uint16_t own_us);
+void bursts_add(struct bursts *own, unsigned side, avr_cycle_count_t at); /* and traces it */
+void ranger_power(void *self);
+bool ranger_start(void *self, bool read);
+bool ranger_write(void *self, uint8_t byte, bool first);
+void ranger_ping(struct ranger *r, avr_cycle_count_t busy_until);
 
 #endif

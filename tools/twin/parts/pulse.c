@@ -11,8 +11,6 @@
 #define TRIGGER_LEAST US(10)
 #define BURST_US 450u   /* from the end of the trigger to the rising edge, 8 cycles of 40 kHz and the module's own program */
 #define SPREAD_US 30u   /* random part of it */
-#define BLANKED_US 116u /* 2 cm, out and back */
-#define WINDOW_US 26200u /* 4.5 m */
 #define NO_ECHO_US 38000u
 #define GLITCH US(3000)
 #define HELD_US 70000u /* measured at HC-SR04 modules [forum.arduino.cc 613370: "approximately 70000"] */
@@ -28,14 +26,14 @@ static struct pulse_ranger {
 	avr_cycle_count_t triggered_at;
 	struct bursts bursts;
 } rangers[] = {
-	{ .part = PART(pulse, "pulse_left", PLACE_RANGER_LEFT), .echo_port = 'D', .echo_pin = 4 },
-	{ .part = PART(pulse, "pulse_right", PLACE_RANGER_RIGHT), .echo_port = 'C', .echo_pin = 7 },
+	{ .part = PART(pulse, PLACE_RANGER_LEFT, "pulse_left"), .echo_port = 'D', .echo_pin = 4 },
+	{ .part = PART(pulse, PLACE_RANGER_RIGHT, "pulse_right"), .echo_port = 'C', .echo_pin = 7 },
 };
 
 /* Without a module the line is open, but for the left one's where SyncOut's buffer or a foot's part drives it. */
 static void set_line(struct pulse_ranger *r, bool level)
 {
-	unsigned fault = r->part.fault;
+	unsigned fault = r->part.fault.value;
 	enum place place = r->part.place;
 
 	r->line = level;
@@ -61,12 +59,11 @@ static uint32_t longest_us(unsigned fault)
 static avr_cycle_count_t rise(avr_t *a, avr_cycle_count_t when, void *param)
 {
 	struct pulse_ranger *r = param;
-	unsigned side = ranger_side(&r->part), fault = r->part.fault;
-	uint32_t us = bursts_first_echo(&rangers[!side].bursts, when, row.own_us[side], BLANKED_US, WINDOW_US);
+	unsigned side = r != rangers, fault = r->part.fault.value;
+	uint32_t us = bursts_first_echo(&pulse, &rangers[!side].bursts, when, input.row.own_us[side]);
 
-	bursts_add(&r->bursts, when, row.cross_us[!side]);
 	set_line(r, true);
-	bench_trace("trigger %s", side ? "right" : "left");
+	bursts_add(&r->bursts, side, when);
 	avr_cycle_timer_register(a, US(us && fault != UNECHOED ? us : longest_us(fault)), fall, r);
 	return 0;
 }
@@ -82,20 +79,20 @@ static void trigger_changed(struct avr_irq_t *irq, uint32_t level, void *param)
 	if (r->trigger || !was || r->line || !part_is_here(&r->part))
 		return;
 	if (avr->cycle - r->triggered_at < TRIGGER_LEAST)
-		bench_trace("pulse %s trigger too short", ranger_side(&r->part) ? "right" : "left");
+		bench_trace("pulse %s trigger too short", sides[r != rangers]);
 	else
 		avr_cycle_timer_register(avr, US(BURST_US + random_below(SPREAD_US)), rise, r);
 }
 
-static void wire(struct part *self)
+static void wire(void *self)
 {
-	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('F'), ranger_side(self) ? 4 : 5), trigger_changed, self);
+	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('F'), self == rangers ? 5 : 4), trigger_changed, self);
 }
 
 /* A ping under way is over. */
-static void power(struct part *self)
+static void power(void *self)
 {
-	struct pulse_ranger *r = (struct pulse_ranger *)self;
+	struct pulse_ranger *r = self;
 
 	avr_cycle_timer_cancel(avr, rise, r);
 	avr_cycle_timer_cancel(avr, fall, r);
@@ -113,19 +110,20 @@ static avr_cycle_count_t glitch_ends(avr_t *a, avr_cycle_count_t when, void *par
 	return 0;
 }
 
-void pulse_glitch(unsigned side)
+static void disturb(void *self, unsigned before)
 {
-	struct pulse_ranger *r = &rangers[side];
+	struct pulse_ranger *r = &rangers[((struct fault_switch *)self)->value];
 
 	if (r->line)
 		return;
 	drive_pin(r->echo_port, r->echo_pin, true);
 	avr_cycle_timer_register(avr, GLITCH, glitch_ends, r);
 }
+FAULT_SWITCH(glitch, "left right", disturb, 0)
 
-static void changed(struct part *self, unsigned before)
+static void changed(void *self, unsigned before)
 {
-	struct pulse_ranger *r = (struct pulse_ranger *)self;
+	struct pulse_ranger *r = self;
 
 	set_line(r, r->line);
 }
@@ -138,4 +136,6 @@ const struct model pulse = {
 	.power = power,
 	.resume = power, /* simavr has lost its timers */
 	.changed = changed,
+	.least_us = 116,    /* 2 cm, out and back */
+	.window_us = 26200, /* 4.5 m */
 };

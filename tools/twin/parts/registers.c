@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * Chips with files of registers. On SPI in mode 0 or 3 the first byte of a frame has the address, and the bit 0x80 of a read; on I2C the first
- * byte of a write has it. The addresses of the bytes that follow count up. */
+ * Chips with a file of registers. On SPI, in mode 0 or 3, the first byte of a frame has the address and the bit 0x80 of a read; on I2C the first
+ * byte of a write has the address. */
 #include "parts/parts.h"
 
 #define READ 0x80
 #define COUNTS_UP 0x80
 #define REGISTERS 0x80
 
-void registers_select(struct spi_device *self, bool on)
+void registers_select(void *self, bool on)
 {
-	struct register_file *f = (struct register_file *)self;
+	struct register_file *f = self;
 
 	f->count = 0;
-	f->garbled = spi_outruns(self->part.model->rise_ns);
-	if (on && f->garbled && part_is_plugged(&self->part))
-		bench_trace("%s clock too fast", self->part.name);
+	f->garbled = spi_outruns(f->part.model->rise_ns);
+	if (on && f->garbled && part_is_plugged(&f->part))
+		bench_trace("%s clock too fast", f->part.fault.name);
 }
 
 bool registers_answer(const struct register_file *f)
@@ -22,50 +22,41 @@ bool registers_answer(const struct register_file *f)
 	return part_is_here(&f->part) && avr->cycle >= f->up_at && !f->garbled;
 }
 
-static int read_register(struct register_file *f)
+static int read_byte(struct register_file *f)
 {
 	const struct model *m = f->part.model;
 
-	if (f->count <= 1 + m->dummy_bytes)
+	if (f->count <= 1 + m->dummy_bytes || f->address >= REGISTERS)
 		return 0;
-	return f->address < REGISTERS ? spi_answer(m->get(f, f->address++)) : 0;
+	return spi_answer(m->get(f, f->address++));
 }
 
-static void write_register(struct register_file *f, uint8_t byte)
+static void write_byte(struct register_file *f, uint8_t byte)
 {
 	if (spi_mode() != 0 && spi_mode() != 3)
-		bench_trace("%s misreads a frame: 0x%02x to register 0x%02x", f->part.name, byte, f->address);
+		bench_trace("%s misreads a frame: 0x%02x to register 0x%02x", f->part.fault.name, byte, f->address);
 	if (f->address < REGISTERS)
 		f->part.model->set(f, f->address++, byte);
 }
 
-int registers_exchange(struct spi_device *self, uint8_t sent)
+int registers_exchange(void *self, uint8_t sent)
 {
-	struct register_file *f = (struct register_file *)self;
+	struct register_file *f = self;
 	uint8_t byte = spi_at_rising_edges(sent);
 
-	if (f->part.fault && f->part.fault == f->part.model->zeros && part_is_plugged(&f->part))
+	if (f->part.fault.value && f->part.fault.value == f->part.model->zeros && part_is_plugged(&f->part))
 		return 0;
 	if (!registers_answer(f))
 		return SPI_OPEN;
 	if (f->count++ == 0) {
 		f->reading = byte & READ;
-		f->address = byte & ~READ;
+		f->address = byte & (REGISTERS - 1);
 		return SPI_OPEN;
 	}
 	if (f->reading)
-		return read_register(f);
-	write_register(f, byte);
+		return read_byte(f);
+	write_byte(f, byte);
 	return SPI_OPEN;
-}
-
-bool registers_start(struct twi_device *self, bool read)
-{
-	struct register_file *f = (struct register_file *)self;
-
-	f->reading = read;
-	f->count = 0;
-	return true;
 }
 
 static uint8_t next_address(struct register_file *f)
@@ -77,23 +68,23 @@ static uint8_t next_address(struct register_file *f)
 	return address;
 }
 
-bool registers_write(struct twi_device *self, uint8_t byte)
+bool registers_write(void *self, uint8_t byte, bool first)
 {
-	struct register_file *f = (struct register_file *)self;
-	const struct model *m = self->part.model;
+	struct register_file *f = self;
+	const struct model *m = f->part.model;
 
-	if (f->count++ == 0) {
+	if (first) {
 		f->address = byte & m->address_mask;
 		f->counts_up = (byte | m->address_mask) & COUNTS_UP;
 	} else if (m->set) {
 		m->set(f, next_address(f), byte);
 	}
-	return self->part.fault != NACK;
+	return f->part.fault.value != NACK;
 }
 
-uint8_t registers_read(struct twi_device *self)
+uint8_t registers_read(void *self)
 {
-	struct register_file *f = (struct register_file *)self;
+	struct register_file *f = self;
 
-	return (uint8_t)self->part.model->get(f, next_address(f));
+	return (uint8_t)f->part.model->get(f, next_address(f));
 }

@@ -3,8 +3,6 @@
  *
  * After power-up it is busy for 60 ms; OPERATION 0x09 measures at 9 Hz, 0x0A at 1.8 Hz; DRDY rises with each sample and falls when
  * DATARD16 is read. Writing 1 to RSTR restarts it. DRDY is wired to PE6. */
-#include <simavr/sim_cycle_timers.h>
-
 #include "parts/parts.h"
 
 enum { NO_EEPROM = OTHER_FAULTS, NO_START, DRDY_STUCK, DRDY_LOW, ZEROS };
@@ -16,36 +14,39 @@ enum { REVISION = 0x00, OPERATION = 0x03, RSTR = 0x06, STATUS = 0x07, DATARD8 = 
 #define FAST US(111000)
 #define SLOW US(556000)
 
-static struct spi_device barometers[] = { { .part = PART(scp1000, "scp1000", PLACE_PRESSURE), .port = 'D', .pin = 7 } };
+static struct spi_device chips[] = { { .part = PART(scp1000, PLACE_PRESSURE, "scp1000"), .port = 'D', .pin = 7 } };
 static bool ready, garbled;
 static uint8_t command, count, answer[2], mode;
-static avr_cycle_count_t up_at, sample_at;
+static avr_cycle_count_t up_at;
 static uint32_t pressure;
 static int16_t temperature;
 
 static unsigned fault(void)
 {
-	return barometers->part.fault;
+	return chips->part.fault.value;
 }
 
 static void set_ready(bool on)
 {
-	bool shown = part_is_here(&barometers->part) && fault() != DRDY_LOW && fault() != ZEROS;
+	bool shown = part_is_here(&chips->part) && fault() != DRDY_LOW && fault() != ZEROS;
 
 	ready = on;
 	drive_pin('E', 6, shown && (on || fault() == DRDY_STUCK));
 }
 
-static avr_cycle_count_t sample(avr_t *a, avr_cycle_count_t when, void *param)
+static avr_cycle_count_t period(void)
 {
-	sample_at = 0;
+	return mode == SLOW_MODE ? SLOW : FAST;
+}
+
+static avr_cycle_count_t sample(void *self)
+{
 	if (mode != FAST_MODE && mode != SLOW_MODE)
 		return 0;
-	pressure = mode == FAST_MODE ? row.pressure & ~15u : row.pressure & ~3u; /* 15 and 17 bits of the 19 */
-	temperature = row.temperature;
+	pressure = mode == FAST_MODE ? input.row.pressure & ~15u : input.row.pressure & ~3u; /* 15 and 17 bits of the 19 */
+	temperature = input.row.temperature;
 	set_ready(true);
-	sample_at = when + (mode == FAST_MODE ? FAST : SLOW);
-	return sample_at;
+	return period();
 }
 
 static void load(uint8_t address)
@@ -67,31 +68,26 @@ static void load(uint8_t address)
 	answer[1] = (uint8_t)word;
 }
 
-static void on_select(struct spi_device *self, bool on)
+static void on_select(void *self, bool on)
 {
 	count = 0;
-	if (on && part_is_plugged(&self->part))
+	if (on && part_is_plugged(self))
 		garbled = spi_garbles("scp1000", MAX_HERTZ, spi_mode() == 0);
 }
 
-static void plan_sample(avr_cycle_count_t when)
-{
-	sample_at = when;
-	avr_cycle_timer_register(avr, when - avr->cycle, sample, NULL);
-}
-
-static void power(struct part *self)
+static void power(void *self)
 {
 	mode = 0;
-	sample_at = 0;
 	up_at = avr->cycle + START_UP;
-	avr_cycle_timer_cancel(avr, sample, NULL);
+	part_sample_after(self, 0);
 	set_ready(false);
 }
 
-static int exchange(uint8_t out)
+static int on_exchange(void *self, uint8_t sent)
 {
-	if (!part_is_here(&barometers->part))
+	uint8_t out = sent >> garbled;
+
+	if (!part_is_here(&chips->part))
 		return SPI_OPEN;
 	if (fault() == ZEROS)
 		return 0;
@@ -103,35 +99,25 @@ static int exchange(uint8_t out)
 	}
 	if (command & 2) {
 		if (command >> 2 == RSTR && out == 1) {
-			power(&barometers->part);
+			power(self);
 		} else if (command >> 2 == OPERATION && out != mode) {
 			mode = out;
-			avr_cycle_timer_cancel(avr, sample, NULL);
-			plan_sample(avr->cycle + (mode == SLOW_MODE ? SLOW : FAST));
+			part_sample_after(self, period());
 		}
 		return 0;
 	}
-	return count <= 3 ? answer[count - 2] : 0;
+	return count <= 3 ? answer[count - 2] >> garbled : 0;
 }
 
-static int on_exchange(struct spi_device *self, uint8_t out)
-{
-	int in = exchange(out >> garbled);
-
-	return in == SPI_OPEN ? in : in >> garbled;
-}
-
-static void resume(struct part *self)
+static void resume(void *self)
 {
 	bool level = ready;
 
 	set_ready(false);
 	set_ready(level);
-	if (sample_at > avr->cycle)
-		plan_sample(sample_at);
 }
 
-static void changed(struct part *self, unsigned before)
+static void changed(void *self, unsigned before)
 {
 	set_ready(ready);
 }
@@ -139,11 +125,11 @@ static void changed(struct part *self, unsigned before)
 const struct model scp1000 = {
 	.kind = OF_PAPERS,
 	.faults = "ok absent no_eeprom no_start drdy_stuck drdy_low zeros",
-	PARTS(barometers),
-	.wire = spi_wire,
+	PARTS(chips),
 	.power = power,
 	.resume = resume,
 	.changed = changed,
+	.sample = sample,
 	.select = on_select,
 	.exchange = on_exchange,
 };

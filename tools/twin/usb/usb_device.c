@@ -6,7 +6,6 @@
 
 #include <simavr/sim_interrupts.h>
 
-#include "twin.h"
 #include "usb/usb_endpoints.h"
 
 #define VECTOR_GENERAL 10
@@ -68,8 +67,6 @@ static uint8_t read_register(avr_t *a, avr_io_addr_t address, void *param)
 	struct endpoint *e = selected();
 	struct bank *b = bank_of_cpu(e);
 
-	(void)a;
-	(void)param;
 	switch (address) {
 	case UEINTX: return interrupts_of(e);
 	case UECONX: return (uint8_t)((e->conx & EPEN) | (e->stalled ? STALLRQ : 0));
@@ -91,38 +88,40 @@ static void write_byte(struct endpoint *e, uint8_t value)
 		b->bytes[b->length++] = value;
 }
 
+static void clear_control_flags(struct endpoint *e, uint8_t cleared)
+{
+	if (cleared & RXSTPI) {
+		memset(e->bank, 0, sizeof e->bank);
+		e->flags |= TXINI;
+	} else if (cleared & TXINI) {
+		e->bank[1].full = true;
+	}
+	if (cleared & RXOUTI) {
+		e->bank[0].length = e->bank[0].read = 0;
+		e->bank[0].full = false;
+	}
+}
+
+static void hand_over(struct endpoint *e)
+{
+	struct bank *b = &e->bank[e->cpu];
+
+	e->flags &= (uint8_t)~(is_in(e) ? TXINI : RXOUTI);
+	b->full = is_in(e);
+	if (!is_in(e))
+		b->length = b->read = 0;
+	e->cpu = (e->cpu + 1) % banks_of(e);
+	usb_offer_bank(e);
+}
+
 /* UEINTX: bits written as zero are cleared; some of them hand over a bank. */
 static void clear_flags(struct endpoint *e, uint8_t cleared)
 {
-	e->flags &= (uint8_t)~(cleared & (STALLEDI | NAKOUTI | NAKINI));
-	if (is_control(e)) {
-		if (cleared & RXSTPI) {
-			e->flags &= (uint8_t)~RXSTPI;
-			memset(e->bank, 0, sizeof e->bank);
-			e->flags |= TXINI;
-		}
-		if (cleared & RXOUTI) {
-			e->flags &= (uint8_t)~RXOUTI;
-			e->bank[0].length = e->bank[0].read = 0;
-			e->bank[0].full = false;
-		}
-		if ((cleared & TXINI) && !(cleared & RXSTPI)) {
-			e->flags &= (uint8_t)~TXINI;
-			e->bank[1].full = true;
-		}
-		return;
-	}
-	e->flags &= (uint8_t)~(cleared & (is_in(e) ? TXINI : RXOUTI));
-	if (cleared & FIFOCON) {
-		struct bank *b = &e->bank[e->cpu];
-
-		e->flags &= (uint8_t)~(FIFOCON | (is_in(e) ? TXINI : RXOUTI));
-		b->full = is_in(e);
-		if (!is_in(e))
-			b->length = b->read = 0;
-		e->cpu = (e->cpu + 1) % banks_of(e);
-		usb_offer_bank(e);
-	}
+	e->flags &= (uint8_t)~cleared;
+	if (is_control(e))
+		clear_control_flags(e, cleared);
+	else if (cleared & FIFOCON)
+		hand_over(e);
 }
 
 /* On an IN endpoint, a one in the bit of RXOUTI is KILLBK: it takes back the bank that was handed over last. */
@@ -156,7 +155,6 @@ static void write_device_register(avr_io_addr_t address, uint8_t value)
 
 	switch (address) {
 	case USBCON:
-		avr->data[address] = value;
 		if ((value & OTGPADE) && !(old & OTGPADE)) {
 			avr->data[USBSTA] |= VBUS;
 			avr->data[USBINT] |= VBUSTI;
@@ -165,26 +163,24 @@ static void write_device_register(avr_io_addr_t address, uint8_t value)
 			memset(usb_endpoints, 0, sizeof usb_endpoints);
 		break;
 	case USBINT:
-	case UDINT: avr->data[address] &= value; break;
-	case UENUM: avr->data[address] = value & 7; break;
+	case UDINT: value &= old; break;
+	case UENUM: value &= 7; break;
 	case UERST:
 		for (int i = 1; i < ENDPOINTS; i++)
 			if ((old & ~value) & (1 << i))
 				reset_fifo(&usb_endpoints[i]);
-		avr->data[address] = value;
 		break;
-	case UEINT:
-	case UDFNUML:
-	case UDFNUMH: break; /* read only */
 	case UDADDR:
 		if ((value & ADDEN) && !(old & ADDEN) && ((value ^ old) & 0x7F)) {
 			bench_trace("usb: address and its enable bit written at once");
 			value &= 0x7F;
 		}
-		avr->data[address] = value;
 		break;
-	default: avr->data[address] = value;
+	case UEINT:
+	case UDFNUML:
+	case UDFNUMH: return; /* read only */
 	}
+	avr->data[address] = value;
 }
 
 /* Registers of the selected endpoint, and those of the whole device. */
@@ -192,17 +188,11 @@ static void write_register(avr_t *a, avr_io_addr_t address, uint8_t value, void 
 {
 	struct endpoint *e = selected();
 
-	(void)a;
-	(void)param;
 	switch (address) {
 	case UECONX:
 		e->conx = value & EPEN;
-		if (value & STALLRQ)
-			e->stalled = true;
-		if (value & STALLRQC)
-			e->stalled = false;
-		if (value & RSTDT)
-			e->toggle = false;
+		e->stalled = !(value & STALLRQC) && (e->stalled || (value & STALLRQ));
+		e->toggle = e->toggle && !(value & RSTDT);
 		break;
 	case UECFG0X: e->cfg0 = value; break;
 	case UECFG1X:
@@ -228,8 +218,6 @@ static void write_register(avr_t *a, avr_io_addr_t address, uint8_t value, void 
 
 static void after_interrupt(struct avr_irq_t *irq, uint32_t running, void *param)
 {
-	(void)irq;
-	(void)param;
 	if (!running)
 		usb_refresh();
 }
@@ -256,30 +244,16 @@ bool usb_device_attached(void)
 	return running && (avr->data[UHWCON] & UVREGE) && !(avr->data[UDCON] & DETACH);
 }
 
-void usb_bus_reset(void)
+void usb_bus_event(enum usb_event event, uint16_t frame)
 {
-	memset(usb_endpoints, 0, sizeof usb_endpoints);
-	avr->data[UDADDR] = 0;
-	avr->data[UDINT] |= EORSTI;
-	usb_refresh();
-}
-
-void usb_bus_suspend(void)
-{
-	avr->data[UDINT] |= SUSPI;
-	usb_refresh();
-}
-
-void usb_bus_resume(void)
-{
-	avr->data[UDINT] |= WAKEUPI;
-	usb_refresh();
-}
-
-void usb_frame(uint16_t number)
-{
-	avr->data[UDFNUML] = (uint8_t)number;
-	avr->data[UDFNUMH] = (number >> 8) & 7;
-	avr->data[UDINT] |= SOFI;
+	if (event == USB_RESET) {
+		memset(usb_endpoints, 0, sizeof usb_endpoints);
+		avr->data[UDADDR] = 0;
+	}
+	if (event == USB_FRAME) {
+		avr->data[UDFNUML] = (uint8_t)frame;
+		avr->data[UDFNUMH] = (frame >> 8) & 7;
+	}
+	avr->data[UDINT] |= (uint8_t)event;
 	usb_refresh();
 }

@@ -12,11 +12,20 @@
 #define DEBOUNCE_MS 20
 #define IDLE_MS 3    /* without traffic, then a device is suspended */
 #define RESUME_MS 30 /* resume signal and recovery */
+#define RECOVERY_MS 10       /* before each request of an enumeration */
 #define STAGE_LIMIT_MS 500   /* for each stage of a request */
 #define DTR_RTS 3
 #define TWIGGLE_MS 50
+#define PACKET 64
+
+/* The begin of requests [USB 2.0, 9.4; CDC 1.2], and types of descriptors. */
+enum { TO_DEVICE = 0x00, TO_INTERFACE = 0x01, CLASS = 0x21, FROM_DEVICE = 0x80 };
+enum { SET_ADDRESS = 5, GET_DESCRIPTOR, SET_CONFIGURATION = 9, SET_INTERFACE = 11, SET_LINE_CODING = 0x20, SET_CONTROL_LINE_STATE = 0x22 };
+enum { DEVICE = 1, CONFIGURATION, STRING, ENDPOINT = 5 };
 
 enum stage { SETUP, DATA_IN, DATA_OUT, STATUS_IN, STATUS_OUT };
+
+FAULT_SWITCH(host, "read stall", NULL, 0)
 
 static enum { DETACHED, DEBOUNCING, ENUMERATING, RUNNING, SUSPENDED, RESUMING } state;
 static unsigned step;
@@ -25,7 +34,7 @@ static uint8_t request[16]; /* under way */
 static bool requesting;
 static unsigned received, stage_ms, waited_ms;
 static uint8_t in_endpoint, out_endpoint;
-static bool stalled, wanted_open, is_open;
+static bool wanted_open, is_open;
 static enum { NOT_CLOSING, CLOSE_RATE, CLOSE_PORT, CLOSED } closing;
 static bool closing_twiggles;
 static unsigned closed_ms;
@@ -33,18 +42,21 @@ static uint16_t frame_number;
 static uint8_t outbox[1 << 16];
 static unsigned outbox_length;
 static uint8_t descriptor[256];
-static int control_size = 8;
+static int control_size;
 
 /* Finds the bulk endpoints in the configuration descriptor, as a driver does. */
-static void find_endpoints(unsigned length)
+static void find_endpoints(void)
 {
-	for (unsigned start = 0; start + 1 < length && descriptor[start]; start += descriptor[start])
-		if (descriptor[start + 1] == 5 && start + 3 < length && (descriptor[start + 3] & 3) == 2) {
-			if (descriptor[start + 2] & 0x80)
-				in_endpoint = descriptor[start + 2] & 0x7F;
-			else
-				out_endpoint = descriptor[start + 2];
-		}
+	for (unsigned start = 0; start + 3 < received && descriptor[start]; start += descriptor[start]) {
+		const uint8_t *d = descriptor + start;
+
+		if (d[1] != ENDPOINT || (d[3] & 3) != 2)
+			continue;
+		if (d[2] & 0x80)
+			in_endpoint = d[2] & 0x7F;
+		else
+			out_endpoint = d[2];
+	}
 }
 
 static void begin_request(const uint8_t *bytes)
@@ -58,7 +70,7 @@ static void begin_request(const uint8_t *bytes)
 
 static void set_line_state(bool open)
 {
-	const uint8_t bytes[16] = { 0x21, 0x22, open ? DTR_RTS : 0 };
+	const uint8_t bytes[16] = { CLASS, SET_CONTROL_LINE_STATE, open ? DTR_RTS : 0 };
 
 	is_open = open;
 	bench_trace(open ? "port opened" : "port closed");
@@ -66,42 +78,38 @@ static void set_line_state(bool open)
 }
 
 /* What a host shows of a device: its class, by which Windows chooses a driver, and its serial number. */
-static void trace_descriptor(void)
+static void take_descriptor(void)
 {
-	char text[64] = "";
+	char text[PACKET] = "";
+	const uint8_t *d = descriptor;
 
-	if (request[3] == 1 && received >= 18)
-		bench_trace("usb release %x.%02x", descriptor[13], descriptor[12]);
-	if (request[3] == 2 && received >= 18)
-		bench_trace("usb first interface: class %02x protocol %02x", descriptor[14], descriptor[16]);
-	if (request[3] == 1 && received >= 18)
-		bench_trace("usb class %02x subclass %02x serial string %u", descriptor[4], descriptor[5], descriptor[16]);
-	if (request[3] != 3 || request[2] != 3)
+	if (request[3] == DEVICE && received >= 8)
+		control_size = d[7];
+	if (request[3] == DEVICE && received >= 18) {
+		bench_trace("usb release %x.%02x", d[13], d[12]);
+		bench_trace("usb class %02x subclass %02x serial string %u", d[4], d[5], d[16]);
+	}
+	if (request[3] == CONFIGURATION)
+		find_endpoints();
+	if (request[3] == CONFIGURATION && received >= 18)
+		bench_trace("usb first interface: class %02x protocol %02x", d[14], d[16]);
+	if (request[3] != STRING || request[2] != 3)
 		return;
 	for (unsigned k = 2; k + 1 < received && k / 2 < sizeof text; k += 2)
-		text[k / 2 - 1] = (char)descriptor[k];
+		text[k / 2 - 1] = (char)d[k];
 	bench_trace("usb serial number %s", text);
 }
 
 /* Requests that change the address or the data toggles take effect on both ends. */
-static void apply_request(void)
-{
-	if (request[0] == 0 && request[1] == 5)
-		usb_target(request[2]);
-	if ((request[0] == 0 && request[1] == 9) || (request[0] == 1 && request[1] == 11))
-		usb_cable_reset_toggles();
-}
-
 static void finish_request(void)
 {
 	requesting = false;
-	apply_request();
-	if (request[0] == 0x80 && request[1] == 6)
-		trace_descriptor();
-	if (request[0] == 0x80 && request[1] == 6 && request[3] == 1 && received >= 8)
-		control_size = descriptor[7];
-	if (request[0] == 0x80 && request[1] == 6 && request[3] == 2)
-		find_endpoints(received);
+	if (request[0] == TO_DEVICE && request[1] == SET_ADDRESS)
+		usb_target(request[2]);
+	if ((request[0] == TO_DEVICE && request[1] == SET_CONFIGURATION) || (request[0] == TO_INTERFACE && request[1] == SET_INTERFACE))
+		usb_reset_toggles();
+	if (request[0] == FROM_DEVICE && request[1] == GET_DESCRIPTOR)
+		take_descriptor();
 	if (state == ENUMERATING && usb_system_step(++step)[0] == USB_STEPS_END) {
 		state = RUNNING;
 		bench_trace("enumerated");
@@ -114,57 +122,44 @@ static void next_stage(enum stage next)
 	stage_ms = 0;
 }
 
-/* Tries the stage under way once; true: the request went on to its next stage, or ended. */
-static bool advance_request(void)
+static void take_data(const uint8_t *bytes, int count, unsigned length)
 {
-	uint8_t bytes[64];
+	for (int k = 0; k < count && received < length; k++)
+		descriptor[received++] = bytes[k];
+	if (count < control_size || received >= length)
+		next_stage(STATUS_OUT);
+}
+
+/* Tries the stage under way once: the request goes on to its next stage, or ends; a stall ends it, too. */
+static void advance_request(void)
+{
+	uint8_t bytes[PACKET];
 	unsigned length = request[6] | (unsigned)request[7] << 8;
-	int answer;
+	int answer = USB_SILENCE;
 
 	switch (stage) {
 	case SETUP:
-		if (usb_cable_setup(request) != USB_ACK)
-			return false;
-		next_stage(!length ? STATUS_IN : request[0] & 0x80 ? DATA_IN : DATA_OUT);
-		return true;
+		if (usb_setup(request) == USB_ACK)
+			next_stage(!length ? STATUS_IN : request[0] & FROM_DEVICE ? DATA_IN : DATA_OUT);
+		return;
 	case DATA_IN:
-		answer = usb_cable_in(0, bytes);
-		if (answer == USB_STALL) {
-			finish_request();
-			return true;
-		}
-		if (answer < 0)
-			return false;
-		for (int k = 0; k < answer && received < length; k++)
-			descriptor[received++] = bytes[k];
-		if (answer < control_size || received >= length)
-			next_stage(STATUS_OUT);
-		return true;
-	case DATA_OUT:
-		answer = usb_cable_out(0, request + 8, length);
-		if (answer == USB_ACK)
-			next_stage(STATUS_IN);
-		else if (answer == USB_STALL)
-			finish_request();
-		return answer == USB_ACK || answer == USB_STALL;
-	case STATUS_IN:
-		answer = usb_cable_in(0, bytes);
-		if (answer < 0 && answer != USB_STALL)
-			return false;
-		finish_request();
-		return true;
-	case STATUS_OUT:
-		if (usb_cable_out(0, NULL, 0) != USB_ACK)
-			return false;
-		finish_request();
-		return true;
+	case STATUS_IN: answer = usb_in(0, bytes); break;
+	case DATA_OUT: answer = usb_out(0, request + 8, length); break;
+	case STATUS_OUT: answer = usb_out(0, NULL, 0) == USB_ACK ? USB_ACK : USB_NAK; break;
 	}
-	return false;
+	if (answer < 0 && answer != USB_STALL)
+		return;
+	if (answer == USB_STALL || stage == STATUS_IN || stage == STATUS_OUT)
+		finish_request();
+	else if (stage == DATA_IN)
+		take_data(bytes, answer, length);
+	else
+		next_stage(STATUS_IN);
 }
 
 static void close_at_1200_baud(void)
 {
-	static const uint8_t rate[16] = { 0x21, 0x20, 0, 0, 0, 0, 7, 0, 0xB0, 0x04, 0, 0, 0, 0, 8 };
+	static const uint8_t rate[16] = { CLASS, SET_LINE_CODING, 0, 0, 0, 0, 7, 0, 0xB0, 0x04, 0, 0, 0, 0, 8 };
 
 	if (closing == CLOSE_RATE) {
 		begin_request(rate);
@@ -181,41 +176,53 @@ static void close_at_1200_baud(void)
 
 static void move_bulk(void)
 {
-	uint8_t bytes[64];
+	uint8_t bytes[PACKET];
 
 	while (outbox_length) {
-		unsigned part = outbox_length < 64 ? outbox_length : 64;
+		unsigned part = outbox_length < PACKET ? outbox_length : PACKET;
 
-		if (usb_cable_out(out_endpoint, outbox, part) != USB_ACK)
+		if (usb_out(out_endpoint, outbox, part) != USB_ACK)
 			break;
 		outbox_length -= part;
 		memmove(outbox, outbox + part, outbox_length);
 	}
-	if (!is_open || stalled)
+	if (!is_open || host.value)
 		return;
-	for (unsigned k = usb_hub_frame(); k && bench_has_room(); k--) {
-		int length = usb_cable_in(in_endpoint, bytes);
+	for (unsigned k = usb_hub_frame(); k && pty_has_room(); k--) {
+		int length = usb_in(in_endpoint, bytes);
 
-		if (length == USB_REPEATED || length == USB_SILENCE)
-			continue;
-		if (length < 0)
+		if (length >= 0)
+			usb_hub_take(bytes, (unsigned)length);
+		else if (length != USB_REPEATED && length != USB_SILENCE)
 			break;
-		usb_hub_take(bytes, (unsigned)length);
 	}
+}
+
+static void wait_as(unsigned next)
+{
+	state = next;
+	waited_ms = 0;
+}
+
+/* No request is under way any more, and the port is closed. */
+static void go(unsigned next)
+{
+	wait_as(next);
+	requesting = is_open = false;
 }
 
 static void reset_bus(void)
 {
-	usb_bus_reset();
+	usb_bus_event(USB_RESET, 0);
 	usb_target(0);
-	usb_cable_reset_toggles();
+	usb_reset_toggles();
+	waited_ms = 0;
 }
 
 static void next_step(void)
 {
 	if (usb_system_step(step)[0] == USB_STEP_BUS_RESET) {
 		reset_bus();
-		waited_ms = 0;
 		step++;
 	} else {
 		begin_request(usb_system_step(step));
@@ -226,21 +233,17 @@ static void next_step(void)
 static void watch(void)
 {
 	if (!usb_device_attached()) {
-		state = DETACHED;
-		requesting = is_open = false;
+		go(DETACHED);
 	} else if (state == DETACHED) {
-		state = DEBOUNCING;
-		waited_ms = 0;
+		go(DEBOUNCING);
 	} else if (state == DEBOUNCING && ++waited_ms >= DEBOUNCE_MS + usb_hub_debounce_ms()) {
 		reset_bus();
-		state = ENUMERATING;
+		go(ENUMERATING);
 		step = 0;
-		control_size = usb_system_first_size();
-		requesting = is_open = false;
-		waited_ms = 0;
+		control_size = usb_system_step(0)[6]; /* before the device has named it: Windows reads 64 bytes at once */
 	}
 	if (waited_ms == IDLE_MS && (state == DEBOUNCING || state == SUSPENDED))
-		usb_bus_suspend();
+		usb_bus_event(USB_SUSPEND, 0);
 	if (state == SUSPENDED && waited_ms <= IDLE_MS)
 		waited_ms++;
 	if (state == RESUMING && ++waited_ms > RESUME_MS)
@@ -252,98 +255,86 @@ static void watch(void)
 	}
 }
 
-static avr_cycle_count_t poll(avr_t *a, avr_cycle_count_t when, void *param)
+static void run_frame(void)
 {
-	(void)a;
-	(void)param;
-	if (avr->cycle % FRAME < CONTROL_POLL || !requesting) {
-		watch();
-		if (state == ENUMERATING || state == RUNNING)
-			usb_frame(frame_number++);
-		if (state == RUNNING && !requesting) {
-			if (closing)
-				close_at_1200_baud();
-			else if (wanted_open != is_open)
-				set_line_state(wanted_open);
-			else
-				move_bulk();
-		}
-		if (state == ENUMERATING && !requesting && ++waited_ms > 10)
-			next_step();
-	}
-	if (requesting) {
-		advance_request();
-		return when + CONTROL_POLL;
-	}
-	return when - when % FRAME + FRAME;
+	watch();
+	if (state == ENUMERATING || state == RUNNING)
+		usb_bus_event(USB_FRAME, frame_number++);
+	if (requesting)
+		return;
+	if (state == ENUMERATING && ++waited_ms > RECOVERY_MS)
+		next_step();
+	if (state != RUNNING)
+		return;
+	if (closing)
+		close_at_1200_baud();
+	else if (wanted_open != is_open)
+		set_line_state(wanted_open);
+	else
+		move_bulk();
 }
 
-void usb_host_start(void)
+static avr_cycle_count_t poll(avr_t *a, avr_cycle_count_t when, void *param)
 {
-	usb_hub_clear();
-	state = DETACHED;
-	requesting = is_open = false;
-	outbox_length = 0;
-	avr_cycle_timer_register(avr, FRAME - avr->cycle % FRAME, poll, NULL);
+	if (avr->cycle % FRAME < CONTROL_POLL || !requesting)
+		run_frame();
+	if (!requesting)
+		return when - when % FRAME + FRAME;
+	advance_request();
+	return when + CONTROL_POLL;
 }
 
 void usb_host_unplug(void)
 {
 	usb_hub_clear();
-	state = DETACHED;
-	requesting = is_open = false;
+	go(DETACHED);
 	outbox_length = 0;
 }
 
-void usb_host_reset(void)
+void usb_host_start(void)
 {
-	usb_hub_clear();
-	if (state != DETACHED)
-		state = DEBOUNCING;
-	waited_ms = 0;
-	requesting = is_open = false;
+	usb_host_unplug();
+	avr_cycle_timer_register(avr, FRAME - avr->cycle % FRAME, poll, NULL);
 }
 
-void usb_host_suspend(bool on)
+enum { UNPLUG, PLUG, RESET, CONFIGURE, INTERFACE, TOUCH, TWIGGLE, SUSPEND, RESUME };
+
+static void act(void *self, unsigned before)
 {
-	if (on && state == RUNNING && !requesting) {
-		state = SUSPENDED;
-		waited_ms = 0;
-	} else if (!on && state == SUSPENDED) {
-		usb_bus_resume();
-		state = RESUMING;
-		waited_ms = 0;
+	static const uint8_t configuration_1[16] = { TO_DEVICE, SET_CONFIGURATION, 1 };
+	static const uint8_t data_interface[16] = { TO_INTERFACE, SET_INTERFACE, 0, 0, 1 };
+	unsigned action = ((struct fault_switch *)self)->value;
+	bool idle = state == RUNNING && !requesting;
+
+	switch (action) {
+	case UNPLUG:
+	case PLUG: board_power(action == PLUG); break;
+	case RESET: /* of the bus: the device is enumerated again */
+		usb_hub_clear();
+		go(state == DETACHED ? DETACHED : DEBOUNCING);
+		break;
+	case CONFIGURE:
+	case INTERFACE: /* some hosts choose the setting of an interface that has only one; it too resets the data toggles [USB 2.0, 9.1.1.5] */
+		if (idle)
+			begin_request(action == INTERFACE ? data_interface : configuration_1);
+		break;
+	case TOUCH: /* a program sets 1200 Bd and closes the port */
+	case TWIGGLE: /* the same, but DTR returns after 50 ms, as it does when some hosts change the rate */
+		closing = CLOSE_RATE;
+		closing_twiggles = action == TWIGGLE;
+		break;
+	case SUSPEND:
+		if (idle)
+			wait_as(SUSPENDED);
+		break;
+	default:
+		if (state == SUSPENDED) {
+			usb_bus_event(USB_RESUME, 0);
+			wait_as(RESUMING);
+		}
 	}
 }
-
-void usb_host_configure(void)
-{
-	static const uint8_t again[16] = { 0x00, 9, 1, 0, 0, 0, 0, 0 };
-
-	if (state == RUNNING && !requesting)
-		begin_request(again);
-}
-
-/* Some hosts choose the setting of an interface that has only one; it too resets the data toggles [USB 2.0, 9.1.1.5]. */
-void usb_host_interface(void)
-{
-	static const uint8_t data_interface[16] = { 0x01, 11, 0, 0, 1, 0, 0, 0 };
-
-	if (state == RUNNING && !requesting)
-		begin_request(data_interface);
-}
-
-/* A program sets 1200 Bd and closes the port; `twiggle`: DTR returns after 50 ms, as it does when some hosts change the rate. */
-void usb_host_touch(bool twiggle)
-{
-	closing = CLOSE_RATE;
-	closing_twiggles = twiggle;
-}
-
-void usb_host_stall(bool on)
-{
-	stalled = on;
-}
+FAULT_SWITCH(usb, "unplug plug reset configure interface touch twiggle suspend resume", act, PLUG)
 
 void usb_host_open(bool on)
 {

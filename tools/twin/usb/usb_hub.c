@@ -10,21 +10,26 @@
 #define DEBOUNCE_MS 100
 #define PACKET 64
 
-static bool present;
+static void changed(void *self, unsigned before)
+{
+	usb_hub_clear();
+}
+FAULT_SWITCH(host_hub, "off on", changed, 0)
+
 static uint8_t held[PACKETS_SHARED * PACKET]; /* on the way to the host */
 static unsigned held_length;
 
 unsigned usb_hub_debounce_ms(void)
 {
-	return present ? DEBOUNCE_MS : 0;
+	return host_hub.value ? DEBOUNCE_MS : 0;
 }
 
 /* Begins a frame: how many packets it has room for. */
 unsigned usb_hub_frame(void)
 {
-	if (!present)
+	if (!host_hub.value)
 		return PACKETS_ALONE;
-	if (!bench_has_room())
+	if (!pty_has_room())
 		return 0;
 	if (held_length)
 		bench_sent(held, held_length);
@@ -34,7 +39,7 @@ unsigned usb_hub_frame(void)
 
 void usb_hub_take(const uint8_t *bytes, unsigned length)
 {
-	if (!present) {
+	if (!host_hub.value) {
 		bench_sent(bytes, length);
 		return;
 	}
@@ -45,11 +50,4 @@ void usb_hub_take(const uint8_t *bytes, unsigned length)
 void usb_hub_clear(void)
 {
 	held_length = 0;
-}
-
-bool usb_hub_fault(const char *value)
-{
-	present = !strcmp(value, "on");
-	usb_hub_clear();
-	return present || !strcmp(value, "off");
 }

@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * The requests with which Linux, Windows and macOS enumerate a CDC-ACM port, in their order. */
-#include <string.h>
-
 #include "twin.h"
 
 #define DEVICE_START(length) { 0x80, 6, 0, 1, 0, 0, length, 0 } /* of the device descriptor, for the size of control packets */
@@ -28,26 +26,9 @@ static const uint8_t scripts[][24][16] = {
 	  STRING(3, 9, 2), STRING(3, 9, 42), CONFIGURATION(9), CONFIGURATION(67), CONFIGURATION_1, { 0x01, 11, 0, 0, 1, 0, 0, 0 }, GET_RATE,
 	  RATE_115200, DTR_OFF, END },
 };
-static const char *const systems[] = { "linux", "windows", "macos" };
-static unsigned chosen;
+FAULT_SWITCH(host_system, "linux windows macos", NULL, 0)
 
 const uint8_t *usb_system_step(unsigned step)
 {
-	return scripts[chosen][step];
-}
-
-/* Of control packets, before the device has named it: Windows reads 64 bytes at once. */
-int usb_system_first_size(void)
-{
-	return scripts[chosen][0][6];
-}
-
-bool usb_host_system(const char *value)
-{
-	for (unsigned k = 0; k < sizeof systems / sizeof *systems; k++)
-		if (!strcmp(value, systems[k])) {
-			chosen = k;
-			return true;
-		}
-	return false;
+	return scripts[host_system.value][step];
 }
