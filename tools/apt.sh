@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Install Debian packages that are missing; where that fails, say why in one line and exit 1.
+# Install the Debian packages that are missing, each that can be had; where one cannot, say why in one line and exit 1.
 missing=""
 for package in "$@"; do
 	dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q "ok installed" || missing="$missing $package"
@@ -24,7 +24,17 @@ echo "Installing:$missing"
 export DEBIAN_FRONTEND=noninteractive
 # A list that cannot be renewed may still name packages that can be fetched.
 $as_root apt-get update >"$log" 2>&1
-$as_root apt-get install -y --no-install-recommends $missing >>"$log" 2>&1 && exit 0
+install() {
+	$as_root apt-get install -y --no-install-recommends "$@" >>"$log" 2>&1
+}
+install $missing && exit 0
+# One that this system does not have keeps apt from installing the others.
+refused=""
+for package in $missing; do
+	install "$package" || refused="$refused $package"
+done
+missing=$refused
+[ -z "$missing" ] && exit 0
 if grep -q "is expired" "$log"; then
 	fail "apt's package list has expired."
 fi

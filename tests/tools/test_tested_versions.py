@@ -109,16 +109,27 @@ def test_a_python_that_is_too_new_is_named(monkeypatch: pytest.MonkeyPatch) -> N
 )
 def test_apts_own_reason_is_told(tmp_path: Path, user: str, apt: str, words: str) -> None:
     """With an apt that fails so."""
-    stubs = {"dpkg-query": "exit 1", "apt-get": apt, "id": f"echo {user}", "sudo": "exit 1"}
-    for name, body in stubs.items():
-        (tmp_path / name).write_text(f"#!/bin/sh\n{body}\n")
-        (tmp_path / name).chmod(0o755)
-    done = subprocess.run(
-        [ROOT / "tools/apt.sh", "x"],
-        env={"PATH": f"{tmp_path}:/usr/bin:/bin"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = _installed(tmp_path, apt, user, "x")
     assert words in done.stdout
     assert done.returncode == int("Installing" not in words)
+
+
+@pytest.mark.process
+def test_a_package_that_a_system_lacks_keeps_no_other_from_it(tmp_path: Path) -> None:
+    """With an apt that does not know `y`."""
+    log = tmp_path / "log"
+    apt = f"case \"$*\" in *y*) echo 'E: Unable to locate package y' >&2; exit 100;; esac; echo $* >>{log}"
+    done = _installed(tmp_path, apt, "0", "x", "y", "z")
+    assert "Not installed: y: apt says: Unable to locate package y" in done.stdout
+    assert done.returncode == 1
+    assert [line.split()[-1] for line in log.read_text().splitlines()] == ["update", "x", "z"]
+
+
+def _installed(folder: Path, apt: str, user: str, *packages: str) -> subprocess.CompletedProcess[str]:
+    """`tools/apt.sh` with this apt, none of the packages there."""
+    stubs = {"dpkg-query": "exit 1", "apt-get": apt, "id": f"echo {user}", "sudo": "exit 1"}
+    for name, body in stubs.items():
+        (folder / name).write_text(f"#!/bin/sh\n{body}\n")
+        (folder / name).chmod(0o755)
+    command, env = [ROOT / "tools/apt.sh", *packages], {"PATH": f"{folder}:/usr/bin:/bin"}
+    return subprocess.run(command, env=env, capture_output=True, text=True, check=False)
