@@ -172,7 +172,7 @@ class MapFilter:
         """A cloud from a start; a search, if the place is unknown."""
         s, b = self._settings, self._building
         start = b.drawn.widened(start)
-        cloud = Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor)
+        cloud = Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor, b.walls.index)
         if is_unknown(start) and len(b.floor.x_m):
             cloud.grid = grid_of(start, walk_heading_rad, *self._table(), b.floor, b.sheet, s, self._rng)
         return cloud

@@ -15,7 +15,7 @@ import numpy as np
 from numba.core import types
 from numba.extending import typeof_impl
 
-from echostep.arrays import Floats, Int32s
+from echostep.arrays import Bools, Floats, Int32s
 from echostep.errors import EchostepError
 from echostep.jit import inline_part, kernel, lean_kernel, part
 
@@ -111,6 +111,9 @@ def build_index(walls: Floats, slant_rad: float = 0.0) -> WallIndex:
     return WallIndex(float(low[0]), float(low[1]), columns, rows, walls, start, ids, slant, tile_number, 0, *tables)
 
 
+NO_WALLS = build_index(np.zeros((0, 4)))
+
+
 @kernel
 def _walls_by_tile(walls: Floats, x0: float, y0: float, columns: int, rows: int) -> tuple[Int32s, Int32s]:
     """For each tile, the walls that come within JOIN_M of it, as starts and ids in order."""
@@ -197,6 +200,13 @@ def crosses_wall(ax: float, ay: float, bx: float, by: float, index: WallIndex) -
                     return True
         c0, r0 = c0 + c1, r0 + r1
     return False
+
+
+@lean_kernel
+def mark_crossings(from_x: Floats, from_y: Floats, to_x: Floats, to_y: Floats, index: WallIndex, crosses: Bools) -> None:
+    """Mark which moves (n,) cross a wall in `crosses` (n,)."""
+    for i in range(len(to_x)):
+        crosses[i] = crosses_wall(from_x[i], from_y[i], to_x[i], to_y[i], index)
 
 
 @part

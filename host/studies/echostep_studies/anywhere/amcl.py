@@ -105,7 +105,7 @@ class AugmentedMcl:
 
     def _draw(self, start: Start, count: int) -> tuple[Floats, Floats, Floats]:
         sheet = self._sheet if len(self._sheet.height_m) > 1 else None
-        return draw_poses(start, count, self._floor, sheet, self._rng)
+        return draw_poses(start, count, self._floor, sheet, self._rng)[:3]
 
     def _move(self, segment: PathSegment, share: float) -> None:
         """A share of a segment, with the noise that the filter of this project adds."""

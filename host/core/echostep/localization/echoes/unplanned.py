@@ -228,13 +228,16 @@ def _loss(turn_rad: float, half_rad: float) -> float:
 
 
 class UsablePings:
-    """Pings from nearly one place repeat each other's errors: each counts by the path since the one before, up to `own` after `correlation_m`."""
+    """Pings from nearly one place repeat each other's errors: each counts by the path since the one before, up to `own` after `correlation_m`.
+
+    An echo that was missed has another error than one that was heard: each counts by the path since the last one of its kind.
+    """
 
     def __init__(self, background: Background, echo: EchoSettings) -> None:
         self.odometer = Odometer()
         self.set_ranger_model(background, echo)
         self._x_m, self._y_m = 0.0, 0.0  # end of the path in the walk frame
-        self._last_ping_m = [-math.inf, -math.inf]  # mark on the path at each ranger's last ping
+        self._last_ping_m = np.full((2, 2), -math.inf)  # mark on the path at the last ping of each ranger, heard and silent
 
     def set_ranger_model(self, background: Background, echo: EchoSettings) -> None:
         """Use these ranger settings, and this density of echoes without a plan, from the next segment on."""
@@ -244,7 +247,7 @@ class UsablePings:
     @property
     def silent_m(self) -> float:
         """Length of the path since the last ping."""
-        return self.odometer.since_m(max(self._last_ping_m))
+        return self.odometer.since_m(float(self._last_ping_m.max()))
 
     def take(self, measured: MeasuredSegment) -> tuple[PingBatch, UnplannedDensities]:
         """The pings that bring information, with their share of the segment and their axis in the walk frame, and their densities without a plan."""
@@ -255,8 +258,9 @@ class UsablePings:
             share = np.clip((measured.t_s - segment.t0_s) / span_s, 0.0, 1.0)
         axis = segment.heading0_rad + share * segment.turn_rad + measured.off_heading_rad
         range_m = np.where(np.isnan(measured.range_m), 0.0, measured.range_m)
-        travel_m = self._travels(measured.ranger, self.odometer.path_m + share * length)
-        power = self._own * np.minimum(travel_m / self._correlation_m, 1.0) / _loss(segment.turn_rad, TURNING_RAD)
+        path_m = self.odometer.path_m + share * length
+        travel_m, alike_m = self._travels(measured.ranger, (range_m <= 0.0).astype(np.int64), path_m)
+        power = self._own * np.minimum(alike_m / self._correlation_m, 1.0) / _loss(segment.turn_rad, TURNING_RAD)
         self.odometer.add(length)
         used = power > LEAST_POWER
         way_x_m, way_y_m = segment.way_m(share)
@@ -269,15 +273,10 @@ class UsablePings:
             unplanned.stray, unplanned.missed, unplanned.alike, np.exp(unplanned.either),
         ), unplanned  # fmt: skip
 
-    def _travels(self, ranger: Ints, path_m: Floats) -> Floats:
-        """Length of the path (k,) between each ping and the one before it of the same ranger."""
-        travel_m = np.zeros(len(path_m))
-        for which in (0, 1):
-            own = np.flatnonzero(ranger == which)
-            if len(own):
-                travel = path_m[own]
-                last_m, self._last_ping_m[which] = self._last_ping_m[which], float(travel[-1])
-                travel[1:] -= travel[:-1].copy()
-                travel[0] -= last_m
-                travel_m[own] = travel
-        return travel_m
+    def _travels(self, ranger: Ints, silent: Ints, path_m: Floats) -> tuple[Floats, Floats]:
+        """Length of the path (k,) between each ping and the one before it of the same ranger, and the one before it of the same kind."""
+        last_m, since_m, alike_m = self._last_ping_m, np.empty(len(path_m)), np.empty(len(path_m))
+        for k, (which, kind, mark_m) in enumerate(zip(ranger.tolist(), silent.tolist(), path_m.tolist(), strict=True)):
+            since_m[k], alike_m[k] = mark_m - last_m[which].max(), mark_m - last_m[which, kind]
+            last_m[which, kind] = mark_m
+        return since_m, alike_m

@@ -54,6 +54,6 @@ def grid_of(
     )
     count, share = (DRAWN, 1.0) if start.pose is not None else (near_count(DRAWN), NEAR_SHARE)
     if start.pose is not None or start.near is not None:
-        x, y, heading = (drawn[:count] for drawn in draw_poses(start, DRAWN, allowed, sheet, rng))
+        x, y, heading = (drawn[:count] for drawn in draw_poses(start, DRAWN, allowed, sheet, rng)[:3])
         grid.begin_about(x, y, heading - walk_heading_rad, share)
     return grid

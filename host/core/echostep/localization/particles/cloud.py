@@ -47,6 +47,7 @@ from echostep.localization.particles.start import ANY_LEVEL, Air, Start, draw_po
 from echostep.localization.settings import CloudSettings
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
+from echostep.walls.index import NO_WALLS, WallIndex
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never that large
@@ -82,11 +83,11 @@ class Cloud(Particles):
 
     def __init__(
         self, settings: CloudSettings, start: Start, walk_heading_rad: float, rng: np.random.Generator,
-        sheet: LevelSheet | None = None, climbing: ClimbSettings | None = None, floor: Floor = NO_FLOOR,
+        sheet: LevelSheet | None = None, climbing: ClimbSettings | None = None, floor: Floor = NO_FLOOR, walls: WallIndex = NO_WALLS,
     ) -> None:  # fmt: skip
         """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at `start`; without `sheet` there is one level.
 
-        `floor`: for a start that is anywhere.
+        `floor`: for a start that is anywhere. `walls`: a start lies on one side of them.
         """
         self.sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
         self._climbing = climbing or ClimbSettings()
@@ -99,13 +100,13 @@ class Cloud(Particles):
         self.is_on_any_level = (
             self.sheet is not None and start.pose is None and start.level == ANY_LEVEL and start.air is None
         )
-        x_m, y_m, heading = draw_poses(start, settings.largest, floor, self.sheet, rng)
+        x_m, y_m, heading, log_weight = draw_poses(start, settings.largest, floor, self.sheet, rng, walls)
         z_m = self.sheet.height_m[level_of(x_m, self.sheet)] if self.sheet else np.zeros(len(x_m))
         lag_m = np.full(len(x_m), 0.0 if start.air is None else start.air.zero_m)
         self._put(DrawnPoses(x_m, y_m, heading - walk_heading_rad, z_m, lag_m))
-        wanted = max(self._wanted_size(), START_SIZE)
-        if wanted < settings.largest:
-            self.keep(np.arange(min(wanted, len(self.x_m))))
+        count = min(max(self._wanted_size(), START_SIZE), len(self.x_m))
+        self.keep(np.arange(count))
+        self.log_weight = log_weight[:count]
         self.draw_veer()
 
     def _put(self, poses: DrawnPoses) -> None:

@@ -12,14 +12,17 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from echostep.arrays import Floats, Ints
+from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.plan import Pose
 from echostep.walls.floor import Floor
+from echostep.walls.index import NO_WALLS, WallIndex, mark_crossings
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 ANY_LEVEL = -1  # level of a start that is not known
-# A stated start is sometimes wrong: a tap beside the place, a body that does not face the way the toes point
-WIDE_SHARE = 0.07  # of the particles have these standard deviations besides the stated ones, assumed:
-WIDE_SD_M, WIDE_SD_RAD = 0.9, math.radians(30.0)  # a stride, a foot that is set down turned
+# A stated start is sometimes wrong: a tap beside the place, a body that does not face the way the toes point. Assumed:
+WIDE = 0.01  # its probability
+WIDE_SD_M, WIDE_SD_RAD = 0.9, math.radians(30.0)  # its standard deviations besides the stated ones: a stride, a foot that is set down turned
+WIDE_SHARE = 0.07  # of the particles are such: enough to be found by the first echoes
 # Of a search, this share is drawn about where the wearer was believed: errors are mostly small; assumed
 NEAR_SHARE, NEAR_SD_M, NEAR_SD_RAD = 0.6, 2.0, math.radians(20.0)
 TURN_AROUND_RAD = 1.5  # a heading with a greater standard deviation is drawn evenly from all
@@ -70,12 +73,14 @@ class Start:
 
 
 def draw_poses(
-    start: Start, count: int, floor: Floor, sheet: LevelSheet | None, rng: np.random.Generator
-) -> tuple[Floats, Floats, Floats]:
-    """x, y on the sheet (m) and heading (rad), each (count,)."""
+    start: Start, count: int, floor: Floor, sheet: LevelSheet | None, rng: np.random.Generator, walls: WallIndex = NO_WALLS
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """x, y on the sheet (m), heading (rad) and log-weight, each (count,); behind a wall from a pose is as improbable as a way through it."""
     if start.pose is None:
         x, y, heading = _on_floor(allowed_floor(floor, start, sheet), count, rng)
-        return (x, y, heading) if start.near is None else _drawn_near(start.near, x, y, heading, sheet, rng)
+        if start.near is not None:
+            x, y, heading = _drawn_near(start.near, x, y, heading, sheet, rng)
+        return x, y, heading, np.zeros(count)
     is_wide = rng.random(count) < (WIDE_SHARE if len(floor.x_m) else 0.0)  # without walls nothing would correct it
     sd_m = np.where(is_wide, math.hypot(start.sd_m, WIDE_SD_M), start.sd_m)
     sd_rad = np.where(is_wide, math.hypot(start.heading_sd_rad, WIDE_SD_RAD), start.heading_sd_rad)
@@ -84,9 +89,14 @@ def draw_poses(
     heading = pose.heading_rad + sd_rad * noise[2]
     if start.heading_sd_rad > TURN_AROUND_RAD:
         heading = 2.0 * math.pi * rng.random(count)
+    east = np.full(count, pose.x_m)
     if sheet is not None:
-        x = x + _levels(pose.level, count, sheet) * sheet.pitch_m
-    return x, y, heading
+        on_sheet = _levels(pose.level, count, sheet) * sheet.pitch_m
+        x, east = x + on_sheet, east + on_sheet
+    log_weight = np.where(is_wide, math.log(WIDE / WIDE_SHARE), math.log((1.0 - WIDE) / (1.0 - WIDE_SHARE)))
+    is_behind = np.zeros(count, np.bool_)
+    mark_crossings(east, np.full(count, pose.y_m), x, y, walls, is_behind)
+    return x, y, heading, log_weight + UNPLANNED_DOOR * is_behind
 
 
 def near_count(count: int) -> int:
