@@ -43,6 +43,7 @@ TURN_SD_RAD = 0.05  # change of the normal on a metre of path
 VIEW_M = 2.5  # mean length of the path between two changes of a view: walls, doors, corners
 POSES = 400  # drawn on the floor: their mean is then good to 5 %
 BIN_M = 0.05  # width of a bin of ranges
+HEARD = 0  # kind of a ping with an echo; 1: silent
 LEAST_POWER = 0.01  # share of independent information below which a ping is left out: it changes nothing
 # Turns on a segment at which its pings count half: headings between its ends are interpolated
 TURNING_RAD = math.radians(45.0)  # as weights of particles
@@ -112,11 +113,14 @@ class UnplannedView:
             self._wall.move(dx_m, dy_m)
         return math.hypot(dx_m, dy_m)
 
-    def density(self, range_m: float, axis_rad: float) -> float:
-        """Density (1/m) of a range if the view goes on; range 0: the probability of no echo."""
-        if range_m <= 0.0:
-            return 1.0 if self._wall is None else 0.0
-        return 0.0 if self._wall is None else self._wall.density(range_m, axis_rad)
+    def density(self, range_m: float, axis_rad: float, stray: float) -> float:
+        """Density (1/m) of a range if the view goes on; range 0: the probability of no echo.
+
+        `stray`: probability of a second reflection where nothing answers.
+        """
+        if self._wall is None:
+            return 1.0 - stray if range_m <= 0.0 else stray / (self._echo.maximum_m - self._echo.minimum_m)
+        return 0.0 if range_m <= 0.0 else self._wall.density(range_m, axis_rad)
 
     def update(self, range_m: float, axis_rad: float, power: float, goes_on: bool) -> None:
         """Take in a ping; `goes_on`: whether the view goes on, by the densities."""
@@ -197,7 +201,7 @@ class RangeMemory:
             self._missed.update(which, range_m)
             travel_m = view.move(float(pings.x_m[k]), float(pings.y_m[k]))
             changed[k] = 1.0 - (1.0 - self._echo.outlier) * math.exp(-travel_m / VIEW_M)
-            alike[k] = view.density(range_m, float(pings.axis_rad[k]))
+            alike[k] = view.density(range_m, float(pings.axis_rad[k]), float(stray[k]))
             goes_on = (1.0 - changed[k]) * (alike[k] + missed[k]) > changed[k] * anywhere[k]
             view.update(range_m, float(pings.axis_rad[k]), float(pings.power[k]), goes_on)
         either = changed * (anywhere + missed) ** pings.power + (1.0 - changed) * (alike + missed) ** pings.power
@@ -230,7 +234,8 @@ def _loss(turn_rad: float, half_rad: float) -> float:
 class UsablePings:
     """Pings from nearly one place repeat each other's errors: each counts by the path since the one before, up to `own` after `correlation_m`.
 
-    An echo that was missed has another error than one that was heard: each counts by the path since the last one of its kind.
+    An echo that was missed has another error than one that was heard: each counts by the path since the last one of its kind. Before a ranger was
+    heard nothing tells that it works: its silence counts from its first echo on.
     """
 
     def __init__(self, background: Background, echo: EchoSettings) -> None:
@@ -278,5 +283,8 @@ class UsablePings:
         last_m, since_m, alike_m = self._last_ping_m, np.empty(len(path_m)), np.empty(len(path_m))
         for k, (which, kind, mark_m) in enumerate(zip(ranger.tolist(), silent.tolist(), path_m.tolist(), strict=True)):
             since_m[k], alike_m[k] = mark_m - last_m[which].max(), mark_m - last_m[which, kind]
-            last_m[which, kind] = mark_m
+            if kind == HEARD or last_m[which, HEARD] > -math.inf:
+                last_m[which, kind] = mark_m
+            else:
+                alike_m[k] = 0.0
         return since_m, alike_m
