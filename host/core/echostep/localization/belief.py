@@ -66,14 +66,17 @@ class CloudHypothesis:
 
 
 class CrossedWalls:
-    """Walls of the plan that a believed cloud has gone through: each costs its price once."""
+    """Walls of the plan that the tracked cloud has gone through as a whole: each costs its price once.
+
+    What walls cut off an edge of the cloud costs nothing: they gather it, and show it right as much as wrong.
+    """
 
     def __init__(self) -> None:
         self._crossed: list[Pose] = []
         self._log_passed = 0.0  # of the last CROSSED_M
 
     def charge(self, at: Pose, path_m: float, log_passed: float) -> float:
-        """The part of `log_passed` that counts for a cloud that has moved by `path_m` to `at`; the log of the share that crossed no wall."""
+        """What counts for a cloud that has moved by `path_m` to `at`; `log_passed`: log of the share that crossed no wall."""
         if any(
             was.level == at.level and math.hypot(was.x_m - at.x_m, was.y_m - at.y_m) < CROSSED_M
             for was in self._crossed
@@ -81,9 +84,11 @@ class CrossedWalls:
             self._log_passed = 0.0
             return 0.0
         self._log_passed = self._log_passed * math.exp(-path_m / CROSSED_M) + log_passed
-        if self._log_passed < THROUGH:
-            self._crossed.append(at)
-        return log_passed
+        if self._log_passed > THROUGH:
+            return 0.0
+        self._crossed.append(at)
+        through, self._log_passed = self._log_passed, 0.0
+        return through
 
 
 class Belief:

@@ -292,7 +292,7 @@ class MapFilter:
 
     def _passed(self, each: CloudHypothesis, move: Move, log_passed: float) -> float:
         """The part that counts of the log of a cloud's share that crossed no wall."""
-        if self.belief.search is not None or self.belief.probability(each) < BELIEVED:
+        if self.belief.search is not None:
             return log_passed
         return self._crossed.charge(self._believed(0.0), math.hypot(move.dx_m, move.dy_m), log_passed)
 
