@@ -131,5 +131,5 @@ def _installed(folder: Path, apt: str, user: str, *packages: str) -> subprocess.
     for name, body in stubs.items():
         (folder / name).write_text(f"#!/bin/sh\n{body}\n")
         (folder / name).chmod(0o755)
-    command, env = [ROOT / "tools/apt.sh", *packages], {"PATH": f"{folder}:/usr/bin:/bin"}
+    command, env = [str(ROOT / "tools/apt.sh"), *packages], {"PATH": f"{folder}:/usr/bin:/bin"}
     return subprocess.run(command, env=env, capture_output=True, text=True, check=False)

@@ -72,11 +72,10 @@ def test_after_a_change_of_the_storey_meanwhile_the_last_one_is_not_claimed(stor
     """The search beside the last place is on the storey of the pressure; the last place is believed only there."""
     resumed = filter_of(start_after(LastPlace(LIFT_AT[0] + 4.0, LIFT_AT[1], 0.1, 0, Air(ZERO_M, 0.1)), 20.0, CLIMBING))
     for k in range(6):
-        right = resumed.update(standing(k, ZERO_M + storey * STOREY_M)).right
-    assert resumed.belief.search is not None
-    search = resumed.belief.search.cloud
+        estimate = resumed.update(standing(k, ZERO_M + storey * STOREY_M))
+    search = next(each.cloud for each in resumed.belief.clouds if each.cloud.is_searching)
     assert np.bincount(search.level, search.weight, 3)[storey] > 0.99
     if storey == 0:
-        assert right > PLAN_FITS * STATED * (1.0 - UNOBSERVED_DOUBT)
+        assert estimate.right > PLAN_FITS * STATED * (1.0 - UNOBSERVED_DOUBT)
     else:
-        assert right < 0.1
+        assert estimate.status == "lost"

@@ -12,7 +12,6 @@ from echostep.additions import face
 if TYPE_CHECKING:
     from echostep.localization.beacon_map import BeaconPlace, BeaconState
     from echostep.localization.beacons.model import BeaconSettings
-    from echostep.localization.belief import STATED
     from echostep.localization.building import Building
     from echostep.localization.cloud_estimate import Right, estimate_of
     from echostep.localization.drawn_places import DrawnPlaces
@@ -43,7 +42,7 @@ if TYPE_CHECKING:
     from echostep.localization.limits import BELIEVED, PROBABLE, TRACKING_M
     from echostep.localization.map_filter import MapFilter, call_kernels
     from echostep.localization.particles.places import LikelyPlace
-    from echostep.localization.particles.start import ANY_LEVEL, Air, Start
+    from echostep.localization.particles.start import ANY_LEVEL, STATED, Air, Start
     from echostep.localization.settings import CloudSettings, FilterSettings
     from echostep.localization.team.meeting import TimedMeeting, carries_position, on_the_way, start_at
     from echostep.localization.team.meeting_memory import MeetingEffect, MeetingNews, MeetingQueue
@@ -54,7 +53,6 @@ __getattr__ = face(
     {
         "beacon_map": "BeaconPlace BeaconState",
         "beacons.model": "BeaconSettings",
-        "belief": "STATED",
         "building": "Building",
         "cloud_estimate": "Right estimate_of",
         "drawn_places": "DrawnPlaces",
@@ -65,7 +63,7 @@ __getattr__ = face(
         "limits": "BELIEVED PROBABLE TRACKING_M",
         "map_filter": "MapFilter call_kernels",
         "particles.places": "LikelyPlace",
-        "particles.start": "ANY_LEVEL Air Start",
+        "particles.start": "ANY_LEVEL STATED Air Start",
         "settings": "CloudSettings FilterSettings",
         "team.meeting": "TimedMeeting carries_position on_the_way start_at",
         "team.meeting_memory": "MeetingEffect MeetingNews MeetingQueue",

@@ -25,7 +25,6 @@ from echostep.plan import Pose
 
 # Assumed, not measured.
 PLAN_FITS = 0.99  # prior probability that the plan is the building's
-STATED = 0.99  # prior probability of a stated start, if the plan fits
 # Mean lengths of the path on which a cloud predicts the echoes, and on which none does. In this building until one goes wrong (a turn that is
 # measured badly: once in 1.8 km of simulated soak), and until a search has found (95 % within 40 m); in another while parts are alike (wings, levels)
 HERE_M, ANOTHER_M = (2000.0, 13.0), (30.0, 60.0)

@@ -16,7 +16,7 @@ import numpy as np
 from echostep.angles import mean_angle
 from echostep.board.gateway import BeaconReading
 from echostep.localization.beacon_map import BeaconMap
-from echostep.localization.belief import PLAN_FITS, STATED, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
+from echostep.localization.belief import PLAN_FITS, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
 from echostep.localization.building import Building
 from echostep.localization.cloud_estimate import Right, estimate_of, weight_about
 from echostep.localization.echoes.likelihood import EchoSettings
@@ -32,7 +32,7 @@ from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, 
 from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.kernels import systematic
-from echostep.localization.particles.start import ANY_LEVEL, Air, Start
+from echostep.localization.particles.start import ANY_LEVEL, STATED, Air, Start
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
 from echostep.localization.team.meeting import WRONG, Meeting, start_at
 from echostep.localization.team.meeting_memory import MeetingEffect, MeetingMemory, moved_by
@@ -174,7 +174,7 @@ class MapFilter:
         start = b.drawn.widened(start)
         cloud = Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor, b.walls.index)
         if is_unknown(start) and len(b.floor.x_m):
-            cloud.grid = grid_of(start, walk_heading_rad, *self._table(), b.floor, b.sheet, s, self._rng)
+            cloud.grid = grid_of(start, walk_heading_rad, *self._table(), b.floor, b.sheet, s)
         return cloud
 
     def _table(self) -> tuple[GridCells, RangeMemory]:
@@ -288,9 +288,9 @@ class MapFilter:
             each.weigh(share * each.table.advance(move, pings, self._model), evidence.log_path)
         elif self._building.has_walls:
             log_ratio = float((evidence.log_pings - unplanned.either).sum())
-            each.weigh(share * log_ratio, self._passed(each, move, evidence.log_path))
+            each.weigh(share * log_ratio, self._passed(move, evidence.log_path))
 
-    def _passed(self, each: CloudHypothesis, move: Move, log_passed: float) -> float:
+    def _passed(self, move: Move, log_passed: float) -> float:
         """The part that counts of the log of a cloud's share that crossed no wall."""
         if self.belief.search is not None:
             return log_passed

@@ -126,6 +126,13 @@ def _from_anywhere(walk: SimulatedWalk) -> Trial:
     return Trial(walk, walk.built, Start())
 
 
+def _wide(walk: SimulatedWalk) -> Trial:
+    """From the middle of the plan, with a third of its size as standard deviation and any heading."""
+    low, high = (f(walk.built.levels[0].walls.reshape(-1, 2), axis=0) for f in (np.min, np.max))
+    x, y = (0.5 * (low + high)).tolist()
+    return Trial(walk, walk.built, Start(Pose(x, y, 0.0), float((high - low).max()) / 3.0, math.pi))
+
+
 def _from_room(walk: SimulatedWalk) -> Trial:
     """From somewhere in the room of the start, on the lowest floor of the building of three storeys."""
     pose = _exact(walk)
@@ -172,6 +179,7 @@ TRIALS: dict[str, Callable[[Walks], Trial]] = {
     "start/1m20deg": lambda w: _off(w, 1.0, 20.0),
     "start/1m20deg-told": lambda w: _off(w, 1.0, 20.0, stated=True),
     "start/room": lambda w: _from_room(w.floor),
+    "start/wide": lambda w: _wide(w.office),
     "start/unknown-office": lambda w: _from_anywhere(w.office),
     "start/unknown-3-floors": lambda w: _from_anywhere(w.floors),
     "start/unknown-westport-house": lambda w: _from_anywhere(w.westport_house),

@@ -242,7 +242,9 @@ class UsablePings:
         self.odometer = Odometer()
         self.set_ranger_model(background, echo)
         self._x_m, self._y_m = 0.0, 0.0  # end of the path in the walk frame
-        self._last_ping_m = np.full((2, 2), -math.inf)  # mark on the path at the last ping of each ranger, heard and silent
+        self._last_ping_m = np.full(
+            (2, 2), -math.inf
+        )  # mark on the path at the last ping of each ranger, heard and silent
 
     def set_ranger_model(self, background: Background, echo: EchoSettings) -> None:
         """Use these ranger settings, and this density of echoes without a plan, from the next segment on."""

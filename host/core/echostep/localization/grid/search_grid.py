@@ -88,6 +88,14 @@ class SearchGrid:
         )  # fmt: skip
         self._note_least(1.0)
 
+    def begin_with(self, place: Floats, turn: Floats, share: float) -> None:
+        """Begin with this share of the weight by densities over the places (n,) and over the rotations (SECTORS,), and the rest evenly."""
+        s, density = self._states, np.outer(turn, place).ravel()
+        total = float(density.sum())
+        if total > 0.0:  # otherwise all of it is far from the floor
+            weight = density * (share / total) + (1.0 - share) / len(density)
+            self._states = s._replace(weight=(weight / weight.max()).astype(np.float32))
+
     def begin_about(self, x_m: Floats, y_m: Floats, turn_rad: Floats, share: float) -> None:
         """Begin again, with this share of the weight at these poses (n,), and the rest evenly."""
         self._begin()

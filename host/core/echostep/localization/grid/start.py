@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The grid of an unknown start: evenly over the floor, and about a place if one is given.
 
-In: a `Start`, the cells of the building, its floor. Out: a `SearchGrid`. Owns nothing.
+In: a `Start`, the cells of the building, its floor. Out: a `SearchGrid`. Owns nothing. The weight of each state is computed, none is drawn.
 """
 
 from __future__ import annotations
@@ -10,19 +10,24 @@ import math
 
 import numpy as np
 
+from echostep.angles import wrap
+from echostep.arrays import Floats
+from echostep.localization.echoes.range_table import SECTORS
 from echostep.localization.echoes.unplanned import RangeMemory
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.heights import GridHeights
 from echostep.localization.grid.search_grid import SearchGrid
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.kernels import systematic
-from echostep.localization.particles.start import NEAR_SHARE, Start, allowed_floor, draw_poses, near_count
+from echostep.localization.particles.start import ANY_LEVEL, STATED, TURN_AROUND_RAD, Start, allowed_floor
 from echostep.localization.settings import FilterSettings
-from echostep.walls.floor import Floor
-from echostep.walls.level_sheet import LevelSheet
+from echostep.plan import Pose
+from echostep.walls.floor import CELL_M, Floor
+from echostep.walls.level_sheet import LevelSheet, level_of
 
+# Of a search, this share is about where the wearer was believed: errors are mostly small; assumed
+NEAR_SHARE, NEAR_SD_M, NEAR_SD_RAD = 0.6, 2.0, math.radians(20.0)
 ROOM_SD_M = 3.0  # standard deviation of a start's place above which it is searched: a room
-DRAWN = 20_000  # poses that stand for a place with a spread
 
 
 def is_unknown(start: Start) -> bool:
@@ -43,7 +48,7 @@ def grid_about(
 
 def grid_of(
     start: Start, walk_heading_rad: float, cells: GridCells, unplanned: RangeMemory, floor: Floor, sheet: LevelSheet | None,
-    settings: FilterSettings, rng: np.random.Generator,
+    settings: FilterSettings,
 ) -> SearchGrid:  # fmt: skip
     """The grid of an unknown start. `walk_heading_rad`: the trunk's heading in the walk frame at the start."""
     sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
@@ -52,8 +57,28 @@ def grid_of(
     grid = SearchGrid(
         cells, (allowed.x_m, allowed.y_m), unplanned, heights, math.radians(settings.cloud.start_veer_sd_deg)
     )
-    count, share = (DRAWN, 1.0) if start.pose is not None else (near_count(DRAWN), NEAR_SHARE)
-    if start.pose is not None or start.near is not None:
-        x, y, heading = (drawn[:count] for drawn in draw_poses(start, DRAWN, allowed, sheet, rng)[:3])
-        grid.begin_about(x, y, heading - walk_heading_rad, share)
+    if start.pose is not None:
+        place = _near(allowed, start.pose, start.sd_m, sheet)
+        grid.begin_with(place, _facing(start.pose.heading_rad - walk_heading_rad, start.heading_sd_rad), STATED)
+    elif start.near is not None:
+        heading_sd_rad = NEAR_SD_RAD if start.near.level != ANY_LEVEL else math.pi
+        place = _near(allowed, start.near, NEAR_SD_M, sheet)
+        grid.begin_with(place, _facing(start.near.heading_rad - walk_heading_rad, heading_sd_rad), NEAR_SHARE)
     return grid
+
+
+def _near(floor: Floor, pose: Pose, sd_m: float, sheet: LevelSheet | None) -> Floats:
+    """Density in the cells of a floor (n,) about a pose on its level, or on all if that is not known."""
+    level = np.zeros(len(floor.x_m), np.int64) if sheet is None else level_of(floor.x_m, sheet)
+    map_x_m = floor.x_m - (0.0 if sheet is None else level * sheet.pitch_m)
+    away2 = (map_x_m - pose.x_m) ** 2 + (floor.y_m - pose.y_m) ** 2
+    on = (level == pose.level) | (pose.level == ANY_LEVEL) if sheet is not None else np.ones(len(level), np.bool_)
+    return np.asarray(on * np.exp(-0.5 * away2 / (sd_m**2 + CELL_M**2)))
+
+
+def _facing(turn_rad: float, sd_rad: float) -> Floats:
+    """Density in the sectors of the rotation walk -> map (SECTORS,) about one of them; even above TURN_AROUND_RAD."""
+    sector_rad = 2.0 * math.pi / SECTORS
+    off_rad: Floats = wrap(np.asarray((np.arange(SECTORS) + 0.5) * sector_rad - turn_rad))
+    even = np.ones(SECTORS)
+    return even if sd_rad > TURN_AROUND_RAD else np.exp(-0.5 * off_rad**2 / (sd_rad**2 + sector_rad**2))

@@ -20,11 +20,12 @@ from echostep.walls.level_sheet import LevelSheet, level_of
 
 ANY_LEVEL = -1  # level of a start that is not known
 # A stated start is sometimes wrong: a tap beside the place, a body that does not face the way the toes point. Assumed:
-WIDE = 0.01  # its probability
-WIDE_SD_M, WIDE_SD_RAD = 0.9, math.radians(30.0)  # its standard deviations besides the stated ones: a stride, a foot that is set down turned
+STATED = 0.99  # probability that a stated start is right: its spread is never all that is possible
+WIDE_SD_M, WIDE_SD_RAD = (
+    0.9,
+    math.radians(30.0),
+)  # its standard deviations besides the stated ones: a stride, a foot that is set down turned
 WIDE_SHARE = 0.07  # of the particles are such: enough to be found by the first echoes
-# Of a search, this share is drawn about where the wearer was believed: errors are mostly small; assumed
-NEAR_SHARE, NEAR_SD_M, NEAR_SD_RAD = 0.6, 2.0, math.radians(20.0)
 TURN_AROUND_RAD = 1.5  # a heading with a greater standard deviation is drawn evenly from all
 
 
@@ -73,13 +74,16 @@ class Start:
 
 
 def draw_poses(
-    start: Start, count: int, floor: Floor, sheet: LevelSheet | None, rng: np.random.Generator, walls: WallIndex = NO_WALLS
+    start: Start,
+    count: int,
+    floor: Floor,
+    sheet: LevelSheet | None,
+    rng: np.random.Generator,
+    walls: WallIndex = NO_WALLS,
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """x, y on the sheet (m), heading (rad) and log-weight, each (count,); behind a wall from a pose is as improbable as a way through it."""
     if start.pose is None:
         x, y, heading = _on_floor(allowed_floor(floor, start, sheet), count, rng)
-        if start.near is not None:
-            x, y, heading = _drawn_near(start.near, x, y, heading, sheet, rng)
         return x, y, heading, np.zeros(count)
     is_wide = rng.random(count) < (WIDE_SHARE if len(floor.x_m) else 0.0)  # without walls nothing would correct it
     sd_m = np.where(is_wide, math.hypot(start.sd_m, WIDE_SD_M), start.sd_m)
@@ -93,28 +97,10 @@ def draw_poses(
     if sheet is not None:
         on_sheet = _levels(pose.level, count, sheet) * sheet.pitch_m
         x, east = x + on_sheet, east + on_sheet
-    log_weight = np.where(is_wide, math.log(WIDE / WIDE_SHARE), math.log((1.0 - WIDE) / (1.0 - WIDE_SHARE)))
+    log_weight = np.where(is_wide, math.log((1.0 - STATED) / WIDE_SHARE), math.log(STATED / (1.0 - WIDE_SHARE)))
     is_behind = np.zeros(count, np.bool_)
     mark_crossings(east, np.full(count, pose.y_m), x, y, walls, is_behind)
     return x, y, heading, log_weight + UNPLANNED_DOOR * is_behind
-
-
-def near_count(count: int) -> int:
-    """How many of `count` particles, the first ones, are drawn near a pose."""
-    return round(NEAR_SHARE * count)
-
-
-def _drawn_near(
-    near: Pose, x: Floats, y: Floats, heading: Floats, sheet: LevelSheet | None, rng: np.random.Generator
-) -> tuple[Floats, Floats, Floats]:
-    """The same poses, the first NEAR_SHARE of them about a pose instead; on any level, with any heading, if its level is not known."""
-    count = near_count(len(x))
-    noise = rng.standard_normal((3, count))
-    east = near.x_m if sheet is None else near.x_m + _levels(near.level, count, sheet) * sheet.pitch_m
-    x[:count], y[:count] = east + NEAR_SD_M * noise[0], near.y_m + NEAR_SD_M * noise[1]
-    if near.level != ANY_LEVEL:
-        heading[:count] = near.heading_rad + NEAR_SD_RAD * noise[2]
-    return x, y, heading
 
 
 def _levels(level: int, count: int, sheet: LevelSheet) -> Ints:
