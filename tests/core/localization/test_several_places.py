@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from echostep.localization import (
     Right,
     Start,
     TrackStatus,
+    claims_place,
     echo_model,
     estimate_of,
 )
@@ -71,3 +73,20 @@ def test_a_wide_cloud_of_one_place_has_its_mean() -> None:
 @pytest.mark.parametrize(("here", "status"), [(0.9, TrackStatus.UNCERTAIN), (0.7, TrackStatus.LOST)])
 def test_a_place_is_as_probable_as_its_cloud(here: float, status: TrackStatus) -> None:
     assert _in_two_places(0.4, here=here).status == status
+
+
+@pytest.mark.parametrize(("apart_m", "claimed"), [(30.0, False), (6.0, False), (3.2, False), (0.5, True)])
+def test_the_mean_of_two_places_is_claimed_where_it_lies_in_one(apart_m: float, claimed: bool) -> None:
+    """Both are as likely."""
+    cloud = Cloud(CloudSettings(), Start(Pose(0.0, 0.0, 0.0), 0.1), 0.0, np.random.default_rng(1))
+    cloud.x_m = cloud.x_m + apart_m * (np.arange(len(cloud.x_m)) % 2)
+    found = replace(estimate_of(cloud, 0.0, 0.0, 0), status=TrackStatus.UNCERTAIN)
+    assert found.x_m == pytest.approx(0.5 * apart_m, abs=0.1)
+    assert claims_place(found) == claimed
+    assert not claims_place(replace(found, status=TrackStatus.LOST))
+
+
+def test_the_likelier_place_is_claimed_beside_others() -> None:
+    assert claims_place(_in_two_places(0.2))
+    other_level = tuple(replace(place, level=1) for place in _in_two_places(0.2).hypotheses)
+    assert not claims_place(replace(_in_two_places(0.2), hypotheses=other_level))

@@ -16,7 +16,7 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Floats
-from echostep.localization import Estimate, TrackStatus
+from echostep.localization import Estimate, TrackStatus, claims_place
 from echostep.path import MeasuredSegment, Odometer
 from echostep.tracker import Tracker
 from echostep_app.guidance.cue_list import CueList
@@ -65,7 +65,7 @@ class GuidedReturn(CueList):
 
     def _cue_in(self, e: Estimate) -> Cue:
         """The cue on the way in: direction and length of the way back; the return's cue when it begins here."""
-        if e.status is not TrackStatus.LOST:
+        if claims_place(e):
             self._since_end.add(self._way.add(e.x_m, e.y_m, e.z_m))
             progress_m, off_m = _nearest(self._line, e)
             if progress_m > TURN_M and off_m < _limit_m(e):
@@ -85,7 +85,7 @@ class GuidedReturn(CueList):
 
     def _cue_back(self, e: Estimate, guide: Guide) -> Cue:
         """The cue on the return, or on its end when the way back has grown."""
-        if e.status is not TrackStatus.LOST:
+        if claims_place(e):
             line = self._way.line_m()
             progress_m, off_m = _nearest(line, e)
             if off_m < _limit_m(e):

@@ -188,7 +188,7 @@ class Derived:
 
     def _location(self, e: Estimate, t_ns: int) -> list[DerivedMessage]:
         georeference = self._tracker.plan.georeference
-        if self._earth is None or georeference is None or not claims_place(e.status):
+        if self._earth is None or georeference is None or not claims_place(e):
             return []
         longitude, latitude = self._earth.degrees(np.array([[e.x_m, e.y_m]]))[0].tolist()
         ee, en, nn = east_north(georeference.rotation_rad, e.xx_m2, e.xy_m2, e.yy_m2)

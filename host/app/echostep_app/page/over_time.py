@@ -55,7 +55,7 @@ class OverTime:
                 ranges[line.ranger] = line.measured_m
         rates = (scene.streams.mtx_hz, scene.streams.pings_hz) if scene.streams else (None, None)
         known = [math.nan if rate is None else rate for rate in rates]
-        heading = math.degrees(scene.estimate.heading_rad) if claims_place(scene.estimate.status) else math.nan
+        heading = math.degrees(scene.estimate.heading_rad) if claims_place(scene.estimate) else math.nan
         self._rows.extend((scene.t_s, *ranges, *known, heading))
         if self._last is not None and (new := list(self._news(self._last, scene))):
             self.events = (*self.events, *new)[:MOST_EVENTS]

@@ -14,6 +14,6 @@ def running_note(segment: PathSegment | None, estimate: Estimate | None) -> str:
     """That the foot runs, with the 95 % radius of a position that may be named; empty while it walks or stands, or is not worn."""
     if segment is None or estimate is None or not segment.running:
         return ""
-    if not claims_place(estimate.status):
+    if not claims_place(estimate):
         return "running"
     return f"running: position good to about {estimate.ellipse95.major_m:.1f} m"

@@ -117,7 +117,7 @@ def _print_summary(result: Result, plan: Plan, deviation: Errors | None) -> None
     estimates, end = result.estimates, result.estimates[-1]
     if result.losses:
         console.print(f"walk: {result.losses}", highlight=False)
-    if not claims_place(end.status):
+    if not claims_place(end):
         console.print("end: place not known")
     elif words := Whereabouts(plan).words(end.x_m, end.y_m, end.level):
         floor = f", {plan.levels[end.level].name}" if len(plan.levels) > 1 else ""

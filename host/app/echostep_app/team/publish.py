@@ -92,7 +92,7 @@ class Publishing:
             report = report_of(self._empty, self._levels, self._ground, estimate, motion, streams)
             assert report.position
             report = replace(report, position=replace(report.position, where=where))
-            if claims_place(report.status):
+            if claims_place(estimate):
                 self._known = report.position
             else:
                 report = without_place(report, self._last_place(estimate.t_s))

@@ -117,12 +117,19 @@ def ellipse95(xx_m2: float, xy_m2: float, yy_m2: float) -> Ellipse:
     return Ellipse(major, minor, 0.5 * math.atan2(2.0 * xy_m2, xx_m2 - yy_m2))
 
 
-def claims_place(status: str) -> bool:
-    """Whether a position of this status is a place that may be named, drawn or sent; a lost position may lie in none of the places that fit.
+def claims_place(estimate: Estimate) -> bool:
+    """Whether a position is a place that may be named, drawn or sent: it is not lost, and the mean of several places lies in one of them.
 
     The one rule for page, terminal, reports, TAK, maps and the summary of a run. Without a plan only the page differs: it draws the end of the path.
     """
-    return status != TrackStatus.LOST
+    places, e = estimate.hypotheses, estimate
+    return e.status is not TrackStatus.LOST and (not places or any(_lies_in(place, e) for place in places))
+
+
+def _lies_in(place: LikelyPlace, e: Estimate) -> bool:
+    """Whether a position is within TRACKING_M of a place, or in the circle that holds 95 % of it."""
+    reach_m = max(TRACKING_M, math.sqrt(CHI2_95) * place.sd_m)
+    return place.level == e.level and math.hypot(place.x_m - e.x_m, place.y_m - e.y_m) <= reach_m
 
 
 def unobserved(last: Estimate, t_s: float) -> Estimate:

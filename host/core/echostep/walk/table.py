@@ -56,7 +56,7 @@ def columns_of(estimates: list[Estimate], plan: Plan) -> Columns:
     if earth_of and (earth := earth_of(plan)):
         degrees = earth.degrees(np.array([(e.x_m, e.y_m) for e in estimates]))
         for name, column in zip(PLACE, degrees.T.tolist(), strict=True):
-            columns[name] = [v if claims_place(e.status) else None for v, e in zip(column, estimates, strict=True)]
+            columns[name] = [v if claims_place(e) else None for v, e in zip(column, estimates, strict=True)]
     return columns
 
 

@@ -98,7 +98,7 @@ def frames(walk: Sequence[Moment], plan: Plan) -> list[Image]:
         x_m, y_m = moment.estimate.x_m, moment.estimate.y_m
         near.set(xlim=(x_m - NEAR_M, x_m + NEAR_M), ylim=(y_m - NEAR_M, y_m + NEAR_M))
         off_m = math.dist((x_m, y_m), moment.truth_m)
-        error = f"error {off_m:.2f} m" if claims_place(moment.estimate.status) else "no position is claimed"
+        error = f"error {off_m:.2f} m" if claims_place(moment.estimate) else "no position is claimed"
         whole.set_title(f"a simulated walk, {moment.estimate.t_s:.0f} s", fontsize=12)
         near.set_title(f"{2 * NEAR_M:g} m of it: {error}", fontsize=12)
         canvas.draw()
@@ -147,10 +147,10 @@ def _update(artists: dict[str, Any], walked: Sequence[Moment]) -> None:
     now = walked[-1]
     shape = now.estimate.ellipse95
     claimed = np.array(
-        [(m.estimate.x_m, m.estimate.y_m) if claims_place(m.estimate.status) else (np.nan,) * 2 for m in walked]
+        [(m.estimate.x_m, m.estimate.y_m) if claims_place(m.estimate) else (np.nan,) * 2 for m in walked]
     )
     for name in ("position", "ellipse"):  # as on the page: without a place nothing is drawn that looks like one
-        artists[name].set_visible(claims_place(now.estimate.status))
+        artists[name].set_visible(claims_place(now.estimate))
     artists["truth"].set_data(*np.array([m.truth_m for m in walked]).T)
     artists["estimate"].set_data(*claimed.T)
     artists["particles"].set_data(*now.particles_m.T)

@@ -14,7 +14,7 @@ from echostep.plan import Plan
 
 def shown_places(estimate: Estimate) -> tuple[LikelyPlace, ...]:
     """The hypotheses that are listed and ringed: not a single one where the position, which has its ellipse, is claimed."""
-    is_position = len(estimate.hypotheses) == 1 and claims_place(estimate.status)
+    is_position = len(estimate.hypotheses) == 1 and claims_place(estimate)
     return () if is_position else estimate.hypotheses
 
 

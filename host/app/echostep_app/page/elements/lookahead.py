@@ -23,7 +23,7 @@ def moves_as_one(estimate: Estimate) -> bool:
 
     In a search each has its own heading; the step of their mean would move them through walls.
     """
-    return not estimate.hypotheses and claims_place(estimate.status) and estimate.heading_sd_rad <= KNOWN_HEADING_RAD
+    return not estimate.hypotheses and claims_place(estimate) and estimate.heading_sd_rad <= KNOWN_HEADING_RAD
 
 
 def extrapolate(estimate: Estimate, segment: PathSegment, later: Sequence[PathSegment]) -> Estimate:

@@ -72,7 +72,7 @@ class PageScene:
 
 def is_placed(estimate: Estimate, plan: Plan) -> bool:
     """Whether an estimate is shown as a place; without a plan it is the end of the drawn path in any case."""
-    return claims_place(estimate.status) or not plan.is_drawn
+    return claims_place(estimate) or not plan.is_drawn
 
 
 def sample_of(particles: ParticleSnapshot) -> ParticleSample:

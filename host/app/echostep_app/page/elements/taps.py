@@ -89,7 +89,7 @@ class Taps:
             words = self.whereabouts.words
             shown = shown_places(estimate)
             places = tuple(words(h.x_m, h.y_m, h.level) for h in shown)
-            where = words(estimate.x_m, estimate.y_m, estimate.level) if claims_place(estimate.status) else ""
+            where = words(estimate.x_m, estimate.y_m, estimate.level) if claims_place(estimate) else ""
             self._last = estimate, where, places_text(shown, places, self._plan)
         return self._last[1:]
 
@@ -126,7 +126,7 @@ class Taps:
             heading = "Your direction stays: drag to change it."
         else:
             heading = "Drag to where you look, or your direction is found while you walk."
-        if scene is None or estimate is None or not claims_place(estimate.status):
+        if scene is None or estimate is None or not claims_place(estimate):
             return [heading]
         away_m = math.dist((x_m, y_m), (estimate.x_m, estimate.y_m))
         moved = estimate.level != check_in.level or away_m > estimate.ellipse95.major_m + DOUBTED_M
