@@ -82,7 +82,7 @@ def test_the_sentence_names_each_place_once_with_the_numbers_of_its_rings() -> N
 @pytest.mark.parametrize(("status", "shown"), [(TrackStatus.UNCERTAIN, 0), (TrackStatus.LOST, 1)])
 def test_a_single_place_is_listed_where_no_position_is_claimed(status: TrackStatus, shown: int) -> None:
     """As on a walk without a plan, whose position is uncertain after some minutes; of a search the likeliest place may be the only one."""
-    estimate = replace(told(status=status), hypotheses=PLACES[:1])
+    estimate = replace(told(PLACES[0].x_m, PLACES[0].y_m, status=status), hypotheses=PLACES[:1])
     assert len(shown_places(estimate)) == shown
     assert len(shown_places(replace(estimate, hypotheses=PLACES))) == len(PLACES)
 
