@@ -25,9 +25,9 @@ CORRIDOR, ROUNDS = "8x2", 2
 
 
 @cache
-def walk(*, twin: bool = False) -> tuple[Protocol, tuple[Chunk, ...], tuple[Chunk, ...]]:
-    """The protocol, the chunks of both ports, and the taps at the moments when the trunk is at the points. `twin`: of the real firmware."""
-    protocol = corridor(CORRIDOR)
+def walk(lengths: str = CORRIDOR, *, twin: bool = False) -> tuple[Protocol, tuple[Chunk, ...], tuple[Chunk, ...]]:
+    """The protocol of a corridor, the chunks of both ports, the taps when the trunk is at the points. `twin`: of the real firmware."""
+    protocol = corridor(lengths)
     plan, visits = protocol.plan(), protocol.visits(ROUNDS)
     board = BoardProcess([str(TWIN), "--elf", str(ELF)]) if twin else PythonBoard(3)
     if twin:

@@ -16,6 +16,7 @@ from echostep.walk.recorded import is_simulated
 from echostep_app.output.score_page import document, picture
 from echostep_app.output.score_plots import draw_on_plan
 from echostep_app.printing.lines import as_error
+from echostep_app.printing.progress import progress_line
 from echostep_app.scorecard.card import Scored
 from echostep_app.scorecard.definitions import METRICS, as_text
 from echostep_app.session.acceptance.errors import by_point, score_taps
@@ -36,7 +37,8 @@ def write_page(recording: Path) -> list[str]:
     """Track a recording again and write its page beside it; returns the most important figures, and where the page is. Raises EchostepError."""
     walked = walk_again(recording)
     scored = score_taps(walked, walked.timed)
-    text, out = page(walked, scored), recording.with_suffix(".html")
+    with progress_line("drawing the page"):
+        text, out = page(walked, scored), recording.with_suffix(".html")
     with as_error(f"{out}: cannot write the page", "; copy the recording into a folder of yours"):
         out.write_text(text, encoding="utf-8")
     card = scored.card
