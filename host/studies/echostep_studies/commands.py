@@ -224,6 +224,14 @@ STUDIES = (
         lambda _request, given: _of("anywhere.study").anywhere_study(given["data"], given["rows"]),
     ),
     StudyCommand(
+        "simple",
+        OURS,
+        "Known starts in corridors, rooms, a flat and a hall, with the small faults of a first day (simulated).",
+        "minutes",
+        _usual("simple", 20, "Walks of each row.", _rows("corridor-20*")),
+        lambda _request, given: _of("simple.study").simple_study(given["rows"]),
+    ),
+    StudyCommand(
         "operation",
         OURS,
         "Three storeys in every manner of moving, a battery changed on the way, scored by ISO/IEC 18305 (simulated).",

@@ -15,7 +15,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.path import MeasuredSegment
 from echostep.plan import Plan, Pose
-from echostep.ports.chunks import Chunk, portion_of
+from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.settings import Settings
 from echostep.tracker import Tracker
 from echostep_app.simulation.devices.board import PythonBoard
@@ -63,6 +63,12 @@ def way_m(truth: Floats) -> Floats:
 def simulate(site: Site, seed: int, model: MtxModel | None = None, worn: WornGyro | None = None) -> SimulatedWalk:
     """The walk of a site, with another MTx and belt gyro than usual."""
     return walk_of(site.built, *_chunks(site, seed, model, worn))
+
+
+def simulate_by_legs(site: Site, seed: int) -> SimulatedWalk:
+    """The same walk without an MTx, by the gyros of a leg."""
+    chunks, truth = _chunks(site, seed)
+    return walk_of(site.built, [c for c in chunks if c.port != MTX], truth)
 
 
 def simulate_with_gap(site: Site, seed: int, from_m: float, gap_s: float) -> tuple[SimulatedWalk, float]:
