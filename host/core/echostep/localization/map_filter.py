@@ -41,6 +41,7 @@ from echostep.localization.window import RecentWay
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
+from echostep.walls.index import NO_WALLS
 
 SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports the cloud, assumed
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate: no plan is more exact
@@ -63,7 +64,7 @@ class MapFilter:
         self._rng = rng
         self._model, self._blurred = echo_models(self._settings)
         echo = with_plan_error(self._settings)
-        self._pings = UsablePings(building.background(self._model), echo)
+        self._pings = UsablePings(building.background(self._model), echo, self._settings.cloud.rough_m)
         self._bias = RangeBias(self.echo.sd_m)
         cloud = self._new_cloud(start, walk_heading_rad)
         prior = (1.0 if cloud.is_searching else STATED) if building.has_walls else BY_DEFINITION
@@ -107,7 +108,7 @@ class MapFilter:
         if self._height is not None:
             self._height.update(change)
         if segment.unobserved:
-            self._scatter(segment, change)
+            self._scatter(segment, change, is_long=gap is Gap.UNOBSERVED)
         if gap is not None:
             if gap is not Gap.UNOBSERVED:  # a rest, a ride in a lift, or a walk
                 belief.leave(UNOBSERVED_DOUBT)
@@ -234,11 +235,13 @@ class MapFilter:
                 self._height.forget_lag()
         self._riding.add(measured.height_m, self._gaps.pause_s + measured.segment.t1_s - measured.segment.t0_s)
 
-    def _scatter(self, segment: PathSegment, change: HeightChange) -> None:
-        """Spread the clouds over an unobserved segment."""
+    def _scatter(self, segment: PathSegment, change: HeightChange, *, is_long: bool) -> None:
+        """Spread the clouds over an unobserved segment: straight through the building, or over a long way that nobody knows."""
+        walls = NO_WALLS if is_long else self._building.walls.index
         for each in self.belief.clouds:
-            each.cloud.scatter(move_of(segment), change)
-        self.belief.leave(UNOBSERVED_DOUBT)
+            each.cloud.scatter(move_of(segment), walls, change)
+        if is_long:
+            self.belief.leave(UNOBSERVED_DOUBT)
         self._way.clear()
 
     def _follow(self, measured: MeasuredSegment, change: HeightChange) -> None:
@@ -265,7 +268,7 @@ class MapFilter:
                 each.cloud.reweight(loss)
         if self._building.has_walls:
             self._compare(path_m)
-            if len(pings.share) and self.plan_supports:
+            if len(pings.share) and self.belief.probability(self.belief.tracked) > PROBABLE:  # bounded by its prior
                 self._bias.learn_behind(
                     self.cloud.arrays, self.cloud.weight, move, pings, self._building.walls, self._model
                 )
@@ -278,7 +281,10 @@ class MapFilter:
         if cloud.is_searching:
             each.weigh(share * cloud.search(move, pings, self._model), 0.0)
             return
-        model = self._blurred if cloud.is_scattered else self._model  # by the spacing of sparse particles
+        # By the spacing of sparse particles
+        model, alone = (
+            (self._blurred, unplanned.blurred) if cloud.is_scattered else (self._model, unplanned.either)
+        )
         evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
         # Where there were several places, a light one may have lost its particles on one level by chance.
         if cloud.is_on_any_level and cloud.is_in_one_place:
@@ -287,7 +293,7 @@ class MapFilter:
         if each.table is not None:
             each.weigh(share * each.table.advance(move, pings, self._model), evidence.log_path)
         elif self._building.has_walls:
-            log_ratio = float((evidence.log_pings - unplanned.either).sum())
+            log_ratio = float((evidence.log_pings - alone).sum())
             each.weigh(share * log_ratio, self._passed(move, evidence.log_path))
 
     def _passed(self, move: Move, log_passed: float) -> float:

@@ -181,7 +181,7 @@ def test_pings_count_where_they_were_triggered() -> None:
 
 def test_an_unwatched_move_grows_the_cloud_and_it_shrinks_again() -> None:
     found = cloud(300)
-    found.scatter(Move(0.0, 0.0, 6.0, 3.0))
+    found.scatter(Move(0.0, 0.0, 6.0, 3.0), NO_WALLS)
     assert len(found.x_m) == CloudSettings().largest
     assert estimate_of(found, 0.0, 0.0, 0).status == TrackStatus.LOST
     found.x_m[:] = 1.0 + 0.02 * np.random.default_rng(3).standard_normal(len(found.y_m))

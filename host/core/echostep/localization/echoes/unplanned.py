@@ -68,11 +68,12 @@ class LastWall:
         self._covariance_m += across * self._var_rad2
         self._var_rad2 += TURN_SD_RAD**2 * math.hypot(dx_m, dy_m)
 
-    def density(self, range_m: float, axis_rad: float) -> float:
-        """Density (1/m) of an echo of this wall; 0 when it is out of the ranger's sight."""
+    def density(self, range_m: float, axis_rad: float, blur_m: float) -> float:
+        """Density (1/m) of an echo of this wall, blurred by a standard deviation; 0 when it is out of the ranger's sight."""
         if abs(wrap(self.normal_rad - axis_rad)) > SEEN_RAD:
             return 0.0
-        return normal(range_m - self.distance_m, math.sqrt(self._var_m2 + self._error_m(axis_rad) ** 2))
+        variance_m2 = self._var_m2 + self._error_m(axis_rad) ** 2 + blur_m**2
+        return normal(range_m - self.distance_m, math.sqrt(variance_m2))
 
     def update(self, range_m: float, axis_rad: float, power: float) -> None:
         """Correct the line by an echo, whose error counts by `power`: errors of successive echoes are alike."""
@@ -113,14 +114,14 @@ class UnplannedView:
             self._wall.move(dx_m, dy_m)
         return math.hypot(dx_m, dy_m)
 
-    def density(self, range_m: float, axis_rad: float, stray: float) -> float:
-        """Density (1/m) of a range if the view goes on; range 0: the probability of no echo.
+    def density(self, range_m: float, axis_rad: float, stray: float, blur_m: float = 0.0) -> float:
+        """Density (1/m) of a range if the view goes on, blurred by a standard deviation; range 0: the probability of no echo.
 
         `stray`: probability of a second reflection where nothing answers.
         """
         if self._wall is None:
             return 1.0 - stray if range_m <= 0.0 else stray / (self._echo.maximum_m - self._echo.minimum_m)
-        return 0.0 if range_m <= 0.0 else self._wall.density(range_m, axis_rad)
+        return 0.0 if range_m <= 0.0 else self._wall.density(range_m, axis_rad, blur_m)
 
     def update(self, range_m: float, axis_rad: float, power: float, goes_on: bool) -> None:
         """Take in a ping; `goes_on`: whether the view goes on, by the densities."""
@@ -171,29 +172,28 @@ class UnplannedDensities(NamedTuple):
     """Of pings (k,): `stray`, probability of a second reflection where nothing answers, by the one before; `missed`, odds that a silent ping missed
     its echo, 0 for an echo; `alike`, the density if like the ping before, without these two.
 
-    Logs of densities to the pings' power, with both: `anywhere` in the building, `either` anywhere or like the ping before.
+    Logs of densities to the pings' power, anywhere in the building or like the ping before: `either`, and `blurred` as for a scattered cloud.
     """
 
     stray: Floats
     missed: Floats
     alike: Floats
-    anywhere: Floats
     either: Floats
+    blurred: Floats
 
 
 class RangeMemory:
     """The density of echoes without any plan: the view of the same ranger goes on, or it has changed to any in the building."""
 
-    def __init__(self, background: Background, echo: EchoSettings) -> None:
-        self._background, self._echo = background, echo
+    def __init__(self, background: Background, echo: EchoSettings, blur_m: float = 0.0) -> None:
+        self._background, self._echo, self._blur_m = background, echo, blur_m
         self._missed = MissedEchoes()
         self._views = [UnplannedView(echo), UnplannedView(echo)]
 
     def densities(self, pings: PlacedPings) -> UnplannedDensities:
         """For pings (k,) in order of time."""
-        log_anywhere = self._background.of(pings.range_m)
-        anywhere = np.exp(log_anywhere)
-        stray, missed, alike, changed = (np.zeros(len(anywhere)) for _ in range(4))
+        anywhere = np.exp(self._background.of(pings.range_m))
+        stray, missed, alike, blurred, changed = (np.zeros(len(anywhere)) for _ in range(5))
         for k, which in enumerate(pings.ranger.tolist()):
             view, range_m = self._views[which], float(pings.range_m[k])
             stray[k] = self._echo.stray * (STRAY_ON if view.is_silent else 1.0)
@@ -201,11 +201,16 @@ class RangeMemory:
             self._missed.update(which, range_m)
             travel_m = view.move(float(pings.x_m[k]), float(pings.y_m[k]))
             changed[k] = 1.0 - (1.0 - self._echo.outlier) * math.exp(-travel_m / VIEW_M)
-            alike[k] = view.density(range_m, float(pings.axis_rad[k]), float(stray[k]))
+            axis_rad = float(pings.axis_rad[k])
+            alike[k] = view.density(range_m, axis_rad, float(stray[k]))
+            blurred[k] = view.density(range_m, axis_rad, float(stray[k]), self._blur_m)
             goes_on = (1.0 - changed[k]) * (alike[k] + missed[k]) > changed[k] * anywhere[k]
-            view.update(range_m, float(pings.axis_rad[k]), float(pings.power[k]), goes_on)
-        either = changed * (anywhere + missed) ** pings.power + (1.0 - changed) * (alike + missed) ** pings.power
-        return UnplannedDensities(stray, missed, alike, pings.power * np.log(anywhere + missed), np.log(either))
+            view.update(range_m, axis_rad, float(pings.power[k]), goes_on)
+        either, either_blurred = (
+            changed * (anywhere + missed) ** pings.power + (1.0 - changed) * (like + missed) ** pings.power
+            for like in (alike, blurred)
+        )
+        return UnplannedDensities(stray, missed, alike, np.log(either), np.log(either_blurred))
 
 
 @kernel
@@ -238,7 +243,9 @@ class UsablePings:
     heard nothing tells that it works: its silence counts from its first echo on.
     """
 
-    def __init__(self, background: Background, echo: EchoSettings) -> None:
+    def __init__(self, background: Background, echo: EchoSettings, blur_m: float = 0.0) -> None:
+        """`blur_m`: of the ranges, for scattered clouds."""
+        self._blur_m = blur_m
         self.odometer = Odometer()
         self.set_ranger_model(background, echo)
         self._x_m, self._y_m = 0.0, 0.0  # end of the path in the walk frame
@@ -249,7 +256,7 @@ class UsablePings:
     def set_ranger_model(self, background: Background, echo: EchoSettings) -> None:
         """Use these ranger settings, and this density of echoes without a plan, from the next segment on."""
         self._correlation_m, self._own = echo.correlation_m, echo.own
-        self._ranges = RangeMemory(background, echo)
+        self._ranges = RangeMemory(background, echo, self._blur_m)
 
     @property
     def silent_m(self) -> float:

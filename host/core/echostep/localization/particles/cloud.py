@@ -47,7 +47,7 @@ from echostep.localization.particles.start import ANY_LEVEL, Air, Start, draw_po
 from echostep.localization.settings import CloudSettings
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
-from echostep.walls.index import NO_WALLS, WallIndex
+from echostep.walls.index import NO_WALLS, WallIndex, mark_crossings
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never that large
@@ -262,18 +262,21 @@ class Cloud(Particles):
         mean = float(weight @ self.lag_m)
         return Air(mean, math.sqrt(self.lag_variance + float(weight @ (self.lag_m - mean) ** 2)))
 
-    def scatter(self, move: Move, change: HeightChange | None = None) -> None:
-        """Spread by an unobserved move without regard to walls, since its path is unknown. The level follows the height by pressure, if any.
+    def scatter(self, move: Move, walls: WallIndex, change: HeightChange | None = None) -> None:
+        """Spread by an unobserved move. `walls`: those that it would have to cross. The level follows the height by pressure, if any.
 
         A search begins again about the places reached.
         """
         self.keep(systematic(np.exp(self.log_weight), float(self._rng.random()), self._settings.largest))
         self.is_gathered = False
-        noise = self._rng.standard_normal((3, len(self.x_m)))
+        noise, from_x_m, from_y_m = self._rng.standard_normal((3, len(self.x_m))), self.x_m, self.y_m
         self.turn_rad += move.turn_sd_rad * noise[2]
         c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
-        self.x_m += c * move.dx_m - s * move.dy_m + move.sd_m * noise[0]
-        self.y_m += s * move.dx_m + c * move.dy_m + move.sd_m * noise[1]
+        self.x_m = from_x_m + c * move.dx_m - s * move.dy_m + move.sd_m * noise[0]
+        self.y_m = from_y_m + s * move.dx_m + c * move.dy_m + move.sd_m * noise[1]
+        crosses = np.zeros(len(self.x_m), np.bool_)
+        mark_crossings(from_x_m, from_y_m, self.x_m, self.y_m, walls, crosses)
+        self.log_weight = -self._settings.wall_cost * crosses
         if self.sheet and change and math.isfinite(change.height_sd_m):
             set_levels_by_pressure(self.x_m, HeightArrays(self.z_m, self.lag_m), change.height_m, self.sheet)
         if self.grid is not None:
