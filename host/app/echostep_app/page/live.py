@@ -191,6 +191,11 @@ class LivePage:
         """Call `take` with each tap at a surveyed point, in the server's thread; it returns whether the tap was accepted."""
         self._mailbox.on_press = take
 
+    def note_alive(self) -> None:
+        """The run goes on; a live page says when it no longer does."""
+        if not self._replay:
+            self._mailbox.exchange.note_alive()
+
     def note_arrival(self) -> None:
         """Bytes have arrived: their time is the start of the latency of the scenes that follow."""
         self._bytes_arrived_ns = time.monotonic_ns()

@@ -21,6 +21,7 @@ from echostep_app.page.elements.marks import ShownMark
 from echostep_app.page.elements.scene import PageScene
 from echostep_app.page.elements.taps import PointPress, ShownPoints
 from echostep_app.page.over_time import OverTime
+from echostep_app.page.web.exchange import Exchange
 from echostep_app.plan.routing import RoutePlace
 
 MOST_CHECK_INS = 16  # in the queue to the tracker; further ones are refused: a person makes a few in a minute
@@ -100,6 +101,7 @@ class Mailbox:
             None  # takes taps at points at once, in the server's thread
         )
         self.on_publish: Callable[[], None] | None = None
+        self.exchange = Exchange()
         self._check_ins: queue.Queue[CheckIn | Undo | Call] = queue.Queue(MOST_CHECK_INS)
         self._met: queue.Queue[str] = queue.Queue(MOST_CHECK_INS)
 
@@ -151,6 +153,7 @@ class Mailbox:
     def end(self, summary: str) -> None:
         """The run is over; a history that was kept is played from now on."""
         self.summary = summary
+        self.exchange.rest()
         self.replay = self.replay or (self._keeps and len(self.history) > 0)
         self._announce()
 

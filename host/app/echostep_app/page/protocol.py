@@ -77,13 +77,34 @@ class PlanLabels:
 
 @dataclass(frozen=True, slots=True)
 class Hello:
-    """The first message to a page. `replay`: the run is a replay. `takes_files`: the page plays recordings that are dropped onto it."""
+    """The first message to a page. `replay`: the run is a replay. `takes_files`: the page plays recordings that are dropped onto it.
+
+    `run`: a name of this run, which another one on the same address does not have.
+    """
 
     title: str
     replay: bool
     plan: PlanLabels
     takes_files: bool = False
+    run: str = ""
     kind: Literal["hello"] = "hello"
+
+
+@dataclass(frozen=True, slots=True)
+class Beat:
+    """The server is there; the run behind it was so `age_s` seconds ago."""
+
+    age_s: float
+    kind: Literal["beat"] = "beat"
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """The request of this identity has been taken; or it was refused, and why."""
+
+    request: str
+    reason: str
+    kind: Literal["answered"] = "answered"
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +226,7 @@ class FrameHeader:
     kind: Literal["frame"] = "frame"
 
 
-Message = Hello | Refused | Failed | Considered
+Message = Hello | Beat | Answered | Refused | Failed | Considered
 
 
 def _plain(value: Any) -> Any:
@@ -223,11 +244,11 @@ def encode(message: Message) -> str:
     return _ENCODER.encode(message).decode()
 
 
-def hello(plan: Plan, title: str, *, replay: bool, takes_files: bool = False) -> Hello:
+def hello(plan: Plan, title: str, run: str, *, replay: bool, takes_files: bool = False) -> Hello:
     """The first message of a run on this plan."""
     levels = tuple(_labels(plan, k) for k in range(len(plan.levels)))
     shown = PlanLabels(plan.name, plan.digest, north_rad(plan), levels, globe_of(plan))
-    return Hello(title, replay, shown, takes_files)
+    return Hello(title, replay, shown, takes_files, run)
 
 
 def _labels(plan: Plan, k: int) -> LevelLabels:

@@ -24,13 +24,13 @@ const TAP_PX = 28;  // a wearer within this distance of a tap is chosen
 const $ = (id) => document.getElementById(id);
 localise(document.body);
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas')), trails = new Trails($('trails'), $('trails-next'));
-const scene = { places: new Map(), rows: [], marks: [], level: 0, chosen: null };
+const scene = { places: new Map(), rows: [], marks: [], level: 0, chosen: null, isOld: false };
 const floors = new Floors((level) => showLevel(level));
 const list = new List(choose, (id) => sheet.signed((by) => link.send('send', { id, to: scene.chosen, by })));
 const alarm = new Alarm(view, { show: goTo, open: (id) => list.choose(id), level: () => wantedLevel, showLevel, floor: (level) => plan.levels[level].name });
 let plan = null, wantedLevel = 0, fitted = false, isAsked = false, drawnStamp = -1, undrawn = [], found = false;
 
-const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onState: connection, parse: parseFrame });
+const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onAge: connection, onUnsent: () => {}, isLive: () => scene.frame?.time?.live !== false && !timeBar.isPast, parse: parseFrame });
 const sheet = new Sheet((kind, fields) => link.send(kind, fields), hint);
 const showLegend = startLegend($('legend-button'), COMMAND, COMMAND_KEYS), crews = new Crews((act) => sheet.signed(act), (kind, fields) => link.send(kind, fields));
 const timeBar = new TimeBar((kind, fields) => link.send(kind, fields));
@@ -67,12 +67,22 @@ async function showLevel(level) {
   view.changed();
 }
 
-function connection(open) {
-  if (open) return;
+// What is left of the last frame while no other one comes: nobody is heard now, and the radii are of then.
+function connection() {
+  const { pulse, isOpen } = link, isOld = pulse.isSilent && pulse.isLive();
+  if (scene.frame && scene.isOld !== isOld) {
+    scene.isOld = isOld;
+    list.show(isOld ? scene.rows.map(then) : scene.rows, timeBar.isPast);
+    timeBar.show(scene.frame.time, scene.frame.unix_s, isOld);
+    ask();
+  }
+  if (!pulse.isSilent && isOpen) return scene.frame && status(scene.frame);
   $('words').dataset.status = 'broken';
-  $('mark').textContent = '✕';
-  say($('status-text'), 'this page is not connected');
+  put($('mark'), '✕');
+  say($('status-text'), isOld ? `no news for ${pulse.ago}` : 'this page is not connected');
 }
+
+const then = (row) => ({ ...row, state: ['mayday', 'asked'].includes(row.state) ? row.state : 'stale', words: row.words.replace(/(, )?heard now$/, '') });
 
 // Store a frame; it is drawn with the next animation frame. A hidden page draws nothing, so it reports no frame as drawn and gets no more of them.
 function frame(received) {
@@ -90,8 +100,8 @@ function frame(received) {
   if (received.marks) scene.marks = received.marks;
   crews.show(received.crews, received.unix_s, timeBar.isPast);
   list.details(received.details, received.distress);
-  status(received);
   scene.frame = received;
+  if (!link.pulse.isSilent) status(received);
   if (document.hidden) link.send('drawn', { seq: received.seq });  // nothing is drawn, but a mayday must still sound
   else undrawn.push(received.seq);
   ask();
@@ -146,7 +156,10 @@ function draw() {
     planView.draw(view);
     scale();
   }
-  const here = scene.rows.filter(({ id }) => scene.places.get(id)?.level === scene.level).map((row) => ({ ...row, place: scene.places.get(row.id) }));
+  const here = scene.rows.filter(({ id }) => scene.places.get(id)?.level === scene.level).map((row) => {
+    const place = scene.places.get(row.id);
+    return scene.isOld ? { ...then(row), place: { ...place, heading: NaN, radius: NaN, protection: NaN } } : { ...row, place };
+  });
   trails.paint(view, scene.level, painter.colour.trail);
   painter.paint(view, here, scene.chosen, trails.points(scene.chosen), scene.marks, scene.level);
   [drawnStamp, drawn.last] = [view.stamp, scene.frame ?? null];

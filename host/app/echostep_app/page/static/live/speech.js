@@ -61,6 +61,12 @@ export class Speech {
     this.bell.ring();
   }
 
+  // A call for help that has not gone out, whether speech is switched on or not.
+  unsent(text) {
+    this.say(text);
+    this.bell.ring();
+  }
+
   say(text) {
     clearTimeout(this.late);
     if (!window.speechSynthesis) return text && this.fail('this browser cannot speak');
