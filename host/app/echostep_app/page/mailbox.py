@@ -22,6 +22,7 @@ from echostep_app.page.elements.scene import PageScene
 from echostep_app.page.elements.taps import PointPress, ShownPoints
 from echostep_app.page.over_time import OverTime
 from echostep_app.page.web.exchange import Exchange
+from echostep_app.plan.places.bearing import north_rad
 from echostep_app.plan.routing import RoutePlace
 
 MOST_CHECK_INS = 16  # in the queue to the tracker; further ones are refused: a person makes a few in a minute
@@ -83,7 +84,7 @@ class Mailbox:
         self.title = title
         self.trail = PageTrail()
         self.history = SceneHistory()
-        self.over_time = OverTime(tuple(level.name for level in plan.levels))
+        self.over_time = OverTime(tuple(level.name for level in plan.levels), north_rad(plan))
         self.replay = replay
         self.summary: str | None = None  # how well the run went, once it is over
         self.failure = ""  # the error that ends the run, in words

@@ -25,7 +25,7 @@ from echostep_app.page.elements.alarm import ShownAlarm
 from echostep_app.page.elements.drawn_walls import ShownDrawing
 from echostep_app.page.elements.echo_lines import EchoLine
 from echostep_app.page.elements.guidance import ShownGuidance
-from echostep_app.page.elements.likely_places import shown_places
+from echostep_app.page.elements.likely_places import numbered
 from echostep_app.page.elements.marks import BeaconMark, ShownMark, ShownMeeting
 from echostep_app.page.elements.scene import PageScene, ParticleSample
 from echostep_app.page.elements.stream_rates import StreamRates
@@ -370,7 +370,7 @@ def _estimate(scene: PageScene, parts: FrameParts) -> ShownEstimate | None:
         z_sd_m=e.z_sd_m,
         protection_m=e.protection_m if np.isfinite(e.protection_m) else None,
         hypotheses=tuple(
-            ShownHypothesis(k + 1, h.probability, h.x_m, h.y_m, h.level) for k, h in enumerate(shown_places(e))
+            ShownHypothesis(n, h.probability, h.x_m, h.y_m, h.level) for n, h in numbered(e, scene.numbers)
         ),
         places=parts.places,
     )

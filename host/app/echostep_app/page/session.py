@@ -182,7 +182,7 @@ class PageSession(GuardedSocket):
             where=self._shared.taps.where(scene.estimate) if scene.estimate else "",
             heading=self._heading(scene.estimate) if scene.estimate else "",
             placed=scene.estimate is not None and is_placed(scene.estimate, self._mailbox.plan),
-            places=self._shared.taps.places(scene.estimate) if scene.estimate else "",
+            places=self._shared.taps.places(scene.estimate, scene.numbers) if scene.estimate else "",
             trail=self._mailbox.trail.part(begin, scene.trail_count),
             trail_from=begin,
             particles=scene.particles if scene.particles is not self._particles else None,

@@ -8,6 +8,7 @@ import { PlanView } from '../static/plan.js';
 import { startTheme } from '../static/theme.js';
 import { View } from '../static/view.js';
 import { localise, missing, tr } from '../static/language.js';
+import { stayAwake } from '../static/live/awake.js';
 import { titled } from '../static/tools/titles.js';
 import { Alarm } from './alarm.js';
 import { Crews } from './crews.js';
@@ -97,6 +98,7 @@ function frame(received) {
     findFirst();
   }
   if (received.list) alarm.update(received.list, scene.places, received.time, timeBar.isPast);
+  alarm.keep(scene.places);
   if (received.marks) scene.marks = received.marks;
   crews.show(received.crews, received.unix_s, timeBar.isPast);
   list.details(received.details, received.distress);
@@ -160,6 +162,7 @@ function draw() {
     const place = scene.places.get(row.id);
     return scene.isOld ? { ...then(row), place: { ...place, heading: NaN, radius: NaN, protection: NaN } } : { ...row, place };
   });
+  planView.names(view, here.map(({ place }) => view.toScreen(place.x, place.y)));
   trails.paint(view, scene.level, painter.colour.trail);
   painter.paint(view, here, scene.chosen, trails.points(scene.chosen), scene.marks, scene.level);
   [drawnStamp, drawn.last] = [view.stamp, scene.frame ?? null];
@@ -209,7 +212,7 @@ function key(name) {
   return Boolean(does);
 }
 
-new Gestures($('map'), view, { takesPose: () => false, tapped, posing: () => {}, posed: () => {}, moved: () => sheet.close(), key });
+new Gestures($('map'), view, { takesPose: () => false, tapped, posing: () => {}, posed: () => {}, moved: () => { sheet.close(); alarm.isLeft = true; }, key });
 $('acknowledge').onclick = () => sheet.signed((by) => link.send('acknowledge', { id: scene.chosen, by }));
 $('closer').onclick = () => view.zoom(1.4);
 $('farther').onclick = () => view.zoom(1 / 1.4);
@@ -218,7 +221,9 @@ $('north').onclick = () => view.northUp();
 window.addEventListener('error', ({ message }) => fault(`This page has a fault: ${message}. Reload it.`));
 window.addEventListener('unhandledrejection', ({ reason }) => fault(`This page has a fault: ${reason?.message ?? reason}. Reload it.`));
 view.onChanged = ask;
+view.layOver(...['messages', 'floors', 'floor'].map($));
 startTheme($('theme'), () => { painter.recolour(); view.changed(); });
 view.resize($('map').clientWidth, $('map').clientHeight);
 new ResizeObserver(([{ contentRect }]) => view.resize(contentRect.width, contentRect.height)).observe($('map'));
+stayAwake();
 titled({ 'legend-button': 'L, ?', north: 'N', whole: 'W', 'crews-button': 'P' });

@@ -32,7 +32,7 @@ localise(document.body);
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas'));
 const panel = new Panel((level) => { setFollows(false); showLevel(level); });
 const scene = { frame: null, cloud: null, drawing: null, marks: [], trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0, isOld: false, layers: new Layers(), measure: new Measure() };
-let plan = null, title = '', mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, metNumber = 0, invited = false, isLive = true, broken = false, awake = false, globe = null, linked = readLink(location.hash), moment = linked?.t_s ?? null;
+let plan = null, title = '', mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, arrived = false, fittedScale = 0, wantedLevel = 0, metNumber = 0, invited = false, isLive = true, broken = false, awake = false, globe = null, linked = readLink(location.hash), moment = linked?.t_s ?? null;
 
 const taps = new Taps(view, {
   send: (kind, fields) => link.send(kind, fields), changed: () => { scene.tapped = taps.ghost; dirty = true; }, mayCheckIn: () => !$('here').hidden,
@@ -103,7 +103,7 @@ function redraw() {
 // Another run on another plan answers at this address: what was chosen on the old plan means nothing on it.
 function startAnew() {
   Object.assign(scene, { frame: null, cloud: null, level: 0 });
-  fitted = false;
+  fitted = arrived = false;
   taps.drop();
   scene.measure.clear();
   replay.forget();
@@ -118,10 +118,21 @@ async function showLevel(level) {
   if (level !== wantedLevel) return;
   scene.level = level;
   planView.show(lines, plan.levels[level]);
-  if (!fitted) view.fit(planView.box);
-  fitted = true;
+  if (!fitted) {
+    view.fit(planView.box);
+    fitted = true;
+    fittedScale = view.scale;
+    arrive(scene.frame?.told);
+  }
   panel.floors(level, scene.frame?.told);
   view.changed();
+}
+
+// The first estimate in a view that nobody has moved yet.
+function arrive(estimate) {
+  if (arrived || !fitted || !estimate?.placed) return;
+  arrived = true;
+  if (view.scale === fittedScale && !linked) view.approach(estimate.x_m, estimate.y_m, planView.box);
 }
 
 function refused(reason) {
@@ -188,6 +199,7 @@ function draw() {
   requestAnimationFrame(draw);
   const { told: estimate } = scene.frame ?? {};
   if (dirty && estimate && follows && !mode && !taps.ghost) {
+    arrive(estimate);
     if (estimate.placed && !view.shows(planView.box)) view.keep(estimate.x_m, estimate.y_m);
     if (estimate.level !== scene.level && estimate.level !== wantedLevel) showLevel(estimate.level);
   }
@@ -200,7 +212,7 @@ function draw() {
   }
   if (mode && mode !== 'measure' && !$('cross').hidden) aim(view.toMap(view.width / 2, view.height / 2), mode === 'here' ? turned : null);
   $('rooms').toggleAttribute('hidden', !scene.layers.shows('names'));
-  planView.names(view, estimate?.placed && estimate.level === scene.level ? view.toScreen(estimate.x_m, estimate.y_m) : null);
+  planView.names(view, [...(estimate?.placed ? [estimate] : []), ...(estimate?.hypotheses ?? [])].filter(({ level }) => level === scene.level).map(({ x_m, y_m }) => view.toScreen(x_m, y_m)));
   painter.paint(view, scene);
   if (dirty && scene.frame && plan) {
     panel.frame(scene.frame);
@@ -329,6 +341,7 @@ $('sheet-go').onclick = () => {
 };
 window.addEventListener('error', ({ message }) => panel.fault(`This page has a fault: ${message}. Reload it.`));
 window.addEventListener('unhandledrejection', ({ reason }) => panel.fault(`This page has a fault: ${reason?.message ?? reason}. Reload it.`));
+view.layOver(...['messages', 'floors', 'floor'].map($));
 startTheme($('theme'), () => { painter.recolour(); charts.paint(); redraw(); });
 view.resize($('map').clientWidth, $('map').clientHeight);
 new ResizeObserver(([{ contentRect }]) => view.resize(contentRect.width, contentRect.height)).observe($('map'));
