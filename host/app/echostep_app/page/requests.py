@@ -121,4 +121,4 @@ def parse_request(text: str) -> Request | None:
 def identity(text: str) -> str | None:
     """The identity of a request in a text from a page; None when it has none."""
     kept = decoded(text, _KEPT, MOST_REQUEST)
-    return kept and kept.request
+    return kept.request if kept else None
