@@ -22,6 +22,7 @@ from echostep_app.page.web.faults import Faults
 MOST_UNDRAWN = 2  # frames that are sent but not reported as drawn
 BEAT_S = 1.0  # between two signs of life
 UNKNOWN = "This page is of another version than the program: load it again."
+TOO_LATE = "It came too late: do it again."
 MOST_REQUESTS_A_SECOND = 240  # a page that sends more is disconnected
 POLICY_VIOLATION, INTERNAL_ERROR = 1008, 1011  # WebSocket close codes [RFC 6455, 7.4.1]
 SERVICE_RESTART = 1012  # [IANA]
@@ -108,20 +109,24 @@ class GuardedSocket(ABC):
 
     async def _answer(self, text: str | None) -> None:
         """Handle a request, one with an identity only once, and tell the page what came of it."""
-        identity = text and requests.identity(text)
-        if identity:
-            reason = await self._exchange.once(identity, lambda: self._handle(text))
-        else:
+        kept = requests.kept_request(text)
+        if kept is None:
             reason = await self._handle(text)
+        elif (
+            kept.until_s is not None and time.monotonic() > kept.until_s
+        ):  # it lay in a wire, or in this computer while it slept
+            reason = TOO_LATE
+        else:
+            reason = await self._exchange.once(kept.request, lambda: self._handle(text))
         if reason and reason != UNKNOWN:
             self._counts.refused += 1
-        if identity:
-            await self.tell(protocol.encode(protocol.Answered(identity, reason)))
+        if kept:
+            await self.tell(protocol.encode(protocol.Answered(kept.request, reason)))
         elif reason and reason != UNKNOWN:
             await self.tell(protocol.encode(protocol.Refused(reason)))
 
     async def _beat(self) -> None:
         """Tell the page each second that the server is there, and how long ago the run was."""
         while True:
-            await self.tell(protocol.encode(protocol.Beat(round(self._exchange.age_s, 1))))
+            await self.tell(protocol.encode(protocol.Beat(round(self._exchange.age_s, 1), time.monotonic())))
             await asyncio.sleep(BEAT_S)

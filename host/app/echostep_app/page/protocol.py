@@ -92,9 +92,10 @@ class Hello:
 
 @dataclass(frozen=True, slots=True)
 class Beat:
-    """The server is there; the run behind it was so `age_s` seconds ago."""
+    """The server is there, at `now_s` of its monotonic clock; the run behind it was so `age_s` seconds ago."""
 
     age_s: float
+    now_s: float
     kind: Literal["beat"] = "beat"
 
 

@@ -25,9 +25,10 @@ Count = Annotated[int, Meta(ge=0, lt=1 << 31)]
 
 
 class Kept(msgspec.Struct, frozen=True):
-    """A request that the page keeps until it is answered has an identity."""
+    """A request that the page keeps until it is answered has an identity; it holds until `until_s` of the server's clock."""
 
     request: Identity
+    until_s: float | None = None
 
 
 class Entered(EnteredPlace, frozen=True, tag_field="kind", tag="check_in"):
@@ -118,7 +119,6 @@ def parse_request(text: str) -> Request | None:
     return request.check_in if isinstance(request, Entered) else request
 
 
-def identity(text: str) -> str | None:
+def kept_request(text: str | None) -> Kept | None:
     """The identity of a request in a text from a page; None when it has none."""
-    kept = decoded(text, _KEPT, MOST_REQUEST)
-    return kept.request if kept else None
+    return None if text is None else decoded(text, _KEPT, MOST_REQUEST)

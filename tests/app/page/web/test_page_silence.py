@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -174,6 +175,19 @@ def test_a_beat_comes_at_once_and_a_request_is_carried_out_once() -> None:
         assert list(mailbox.pop_check_ins()) == [Call(help=True)]
         page.send(json.dumps(call | {"help": "please", "request": "12-34-56-79"}))
         assert "another version" in json.loads(page.recv(timeout=PATIENCE_S))["reason"]
+        late = {
+            "kind": "check_in",
+            "x_m": 2,
+            "y_m": 7.5,
+            "sd_m": 0.5,
+            "request": "12-34-56-81",
+            "until_s": time.monotonic() - 0.1,
+        }
+        page.send(json.dumps(late))
+        assert json.loads(page.recv(timeout=PATIENCE_S))["reason"].startswith("It came too late")
+        page.send(json.dumps(late | {"request": "12-34-56-82", "until_s": time.monotonic() + PATIENCE_S}))
+        assert not json.loads(page.recv(timeout=PATIENCE_S))["reason"]
+        assert len(list(mailbox.pop_check_ins())) == 1
         page.send(json.dumps({"kind": "check_in", "x_m": 2, "y_m": 8.5, "sd_m": 0.5, "request": "12-34-56-80"}))
         assert "inside a wall" in json.loads(page.recv(timeout=PATIENCE_S))["reason"]
 

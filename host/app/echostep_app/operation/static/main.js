@@ -10,6 +10,7 @@ import { View } from '../static/view.js';
 import { localise, missing, tr } from '../static/language.js';
 import { stayAwake } from '../static/live/awake.js';
 import { titled } from '../static/tools/titles.js';
+import { scaleBar } from '../static/tools/units.js';
 import { Alarm } from './alarm.js';
 import { Crews } from './crews.js';
 import { Floors } from './floors.js';
@@ -173,9 +174,9 @@ function draw() {
 }
 
 function scale() {
-  const longest = 90 / view.scale, unit = 10 ** Math.floor(Math.log10(longest)), length = [5, 2, 1].find((k) => k * unit <= longest) * unit;
-  $('bar').style.width = `${length * view.scale}px`;
-  $('bar-text').textContent = length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;
+  const { px, text } = scaleBar(view);
+  $('bar').style.width = `${px}px`;
+  $('bar-text').textContent = text;
   $('needle').style.transform = `rotate(${-view.tilt}rad)`;
 }
 

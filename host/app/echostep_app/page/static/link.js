@@ -12,7 +12,7 @@ export class Link {
   constructor({ onHello, onFrame, onRefused, onFailed, onConsidered, onAge, onUnsent, isLive, parse = parseFrame }) {
     Object.assign(this, { onHello, onFrame, onRefused, onFailed, onConsidered, onAge, parse, wait: 250, failures: 0, isOpen: false });
     this.pulse = new Pulse(() => { this.revive(); onAge(); }, isLive);
-    this.outbox = new Outbox((request) => this.transmit(request), onUnsent);
+    this.outbox = new Outbox((request) => this.transmit(request), onUnsent, () => this.pulse.now_s);
     this.open();
   }
 
@@ -42,13 +42,13 @@ export class Link {
   }
 
   onText(message) {
-    if (message.kind === 'beat') this.pulse.hear(message.age_s);
+    if (message.kind === 'beat') this.pulse.hear(message.age_s, message.now_s);
     else if (message.kind === 'hello') {
       this.wait = 250;
       this.failures = 0;
       this.isOpen = true;
       [this.pulse.program] = message.title.split(' (');
-      this.pulse.hear(0);
+      this.pulse.hear(0, null);
       this.onAge();
       this.onHello(message);
       this.outbox.greet(message.run);

@@ -3,6 +3,7 @@
 // again, and the server carries it out once. What came of it is written into #outbox: sending, sent, not sent and why.
 
 import { tr } from './language.js';
+import { remember } from './storage.js';
 
 const LABELS = {
   call: 'Help!', check_in: 'I am here', undo: 'Undo', met: 'I met a teammate', at_point: 'At the point', no_tap: 'Undo', go_to: 'Go here', go_nowhere: 'End of the guidance',
@@ -15,8 +16,9 @@ const $ = (id) => document.getElementById(id);
 
 export class Outbox {
   // `transmit(request)`: sends it if there is a connection; `onUnsent(text)`: a call for help has not gone out, each REMIND_S
-  constructor(transmit, onUnsent) {
-    Object.assign(this, { transmit, onUnsent, prefix: `request ${location.pathname} `, run: null, kept: [], news: [] });
+  // `serverNow_s()`: time of the server's clock
+  constructor(transmit, onUnsent, serverNow_s) {
+    Object.assign(this, { transmit, onUnsent, serverNow_s, prefix: `request ${location.pathname} `, run: null, kept: [], news: [] });
     this.kept = stored(this.prefix).filter((request) => age_s(request) < STORED_S);
     setInterval(() => this.tick(), 1000 * SLOW_S);
   }
@@ -25,8 +27,9 @@ export class Outbox {
 
   put(kind, fields) {
     const request = { ...fields, kind, request: crypto.getRandomValues(new Uint32Array(4)).join('-'), run: this.run, at_ms: Date.now(), reminded: 0 };
+    if (kind in FRESH_S) request.until_s = this.serverNow_s() + FRESH_S[kind];  // it may lie in the wire
     this.kept.push(request);
-    store(this.prefix + request.request, JSON.stringify(request));
+    remember(this.prefix + request.request, JSON.stringify(request));
     this.transmit(request);
     if (kind === 'call') this.show();
   }
@@ -53,7 +56,7 @@ export class Outbox {
 
   drop(request, news) {
     this.kept = this.kept.filter((one) => one !== request);
-    store(this.prefix + request.request, null);
+    remember(this.prefix + request.request, null);
     if (news) this.news.push({ text: `${label(request)}: ${news}`, ends: Date.now() + (news === 'sent' ? SHOWN_MS : REFUSED_MS) });
     this.show();
   }
@@ -63,7 +66,7 @@ export class Outbox {
     const call = this.kept.find(({ kind, reminded, ...request }) => kind === 'call' && age_s(request) - reminded >= REMIND_S);
     if (call) {
       call.reminded = age_s(call);
-      this.onUnsent(`${label(call)} has not been sent yet.`);
+      this.onUnsent(`Not sent yet: ${label(call)}`);
     }
     if (this.kept.length || this.news.length) this.show();
   }
@@ -79,10 +82,6 @@ export class Outbox {
 
 const label = ({ kind, help }) => (kind === 'call' && !help ? 'I am all right' : LABELS[kind]);
 const age_s = ({ at_ms }) => (Date.now() - at_ms) / 1000;
-
-function store(key, text) {
-  try { if (text) localStorage.setItem(key, text); else localStorage.removeItem(key); } catch { /* private browsing */ }
-}
 
 function stored(prefix) {
   try {

@@ -13,17 +13,20 @@ const clocks = () => [performance.now(), Date.now()];  // the first may stand st
 export class Pulse {
   // `onAge()`: the age has changed while there is silence, or the silence is over; `isLive()`: what is shown is the present
   constructor(onAge, isLive) {
-    Object.assign(this, { onAge, isLive, program: 'echostep', off: [], isSilent: false, behind_s: 0, heard: 0, beat: clocks(), ticked: Date.now() });
+    Object.assign(this, { onAge, isLive, program: 'echostep', off: [], isSilent: false, behind_s: 0, server_s: null, heard: 0, beat: clocks(), ticked: Date.now() });
     setInterval(() => this.tick(), TICK_MS);
     document.addEventListener('visibilitychange', () => this.tick());
   }
 
-  hear(behind_s) {
-    Object.assign(this, { beat: clocks(), behind_s, heard: this.heard + 1 });
+  // `server_s`: of the server's clock; null if it is not told.
+  hear(behind_s, server_s) {
+    Object.assign(this, { beat: clocks(), behind_s, server_s, heard: this.heard + 1 });
     if (this.isSilent) this.judge();
   }
 
-  get age_s() { return this.behind_s + Math.max(...clocks().map((now, k) => now - this.beat[k])) / 1000; }
+  get since_s() { return Math.max(...clocks().map((now, k) => now - this.beat[k])) / 1000; }
+  get age_s() { return this.behind_s + this.since_s; }
+  get now_s() { return this.server_s + this.since_s; }  // of the server
   get ago() { return this.age_s < 120 ? `${Math.floor(this.age_s)} s` : `${Math.floor(this.age_s / 60)} min`; }
 
   // After a pause of the browser itself the beats that wait come first.
