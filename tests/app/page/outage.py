@@ -168,10 +168,11 @@ class Wire:
 
 @contextlib.contextmanager
 def outage(kind: str, feeder: Feeder, wire: Wire) -> Iterator[None]:
-    """For a while the process stands still, or the wire passes nothing, or it is cut."""
+    """For a while the process stands still, or the wire passes nothing, as of a computer that sleeps, or it is cut."""
     begin, end = {
         "stopped": (feeder.stop, feeder.go_on),
         "frozen": (wire.freeze, wire.mend),
+        "asleep": (wire.freeze, wire.mend),
         "cut": (wire.cut, wire.mend),
     }[kind]
     begin()
