@@ -28,7 +28,7 @@ export class Alarm {
       if (come.length) this.arrive(come[0], places.get(come[0].id));
       if (this.shown !== null && !this.open_ids.has(this.shown)) this.hide();
     }
-    this.count = count;
+    [this.count, this.first] = [count, isPast ? undefined : open[0]?.id];
     this.named = isPast || !open.length ? '' : ` ${open[0].name}`;
     this.mark();
   }
@@ -43,15 +43,16 @@ export class Alarm {
     if (place) this.show(place);
   }
 
-  // The place stays in view, whatever then comes to lie over the map, until the map is moved.
+  // The place stays in view, whatever comes to lie over the map, until the map is moved.
   keep(places) {
-    const place = this.shown === null || this.isLeft ? null : places.get(this.shown);
+    const place = this.isLeft ? null : places.get(this.shown ?? this.first);
     if (place?.level === this.level()) this.view.keep(place.x, place.y);
   }
 
   back() {
     const { before } = this;
     this.hide();
+    this.isLeft = true;
     if (!before) return;
     const { level, ...seen } = before;
     this.showLevel(level);

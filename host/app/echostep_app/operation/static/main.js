@@ -76,8 +76,8 @@ function connection() {
     scene.isOld = isOld;
     list.show(isOld ? scene.rows.map(then) : scene.rows, timeBar.isPast);
     timeBar.show(scene.frame.time, scene.frame.unix_s, isOld);
-    ask();
   }
+  ask();
   if (!pulse.isSilent && isOpen) return scene.frame && status(scene.frame);
   $('words').dataset.status = 'broken';
   put($('mark'), '✕');
@@ -99,7 +99,6 @@ function frame(received) {
     findFirst();
   }
   if (received.list) alarm.update(received.list, scene.places, received.time, timeBar.isPast);
-  alarm.keep(scene.places);
   if (received.marks) scene.marks = received.marks;
   crews.show(received.crews, received.unix_s, timeBar.isPast);
   list.details(received.details, received.distress);
@@ -155,6 +154,7 @@ function ask() {
 
 function draw() {
   isAsked = false;
+  alarm.keep(scene.places);
   if (drawnStamp !== view.stamp) {
     planView.draw(view);
     scale();

@@ -26,6 +26,7 @@ import { startTheme } from './theme.js';
 import { View } from './view.js';
 import { localise, missing, tr } from './language.js';
 
+const BESIDE = 0.1;  // share of the free part, where only what lies over the map hides some of the plan
 const $ = (id) => document.getElementById(id);
 localise(document.body);
 
@@ -144,10 +145,8 @@ function refused(reason) {
 function connection() {
   const { pulse, isOpen } = link;
   if (isOpen) broken = false;
-  if (scene.isOld !== pulse.isSilent) {
-    scene.isOld = pulse.isSilent;
-    dirty = true;
-  }
+  dirty ||= pulse.isSilent || scene.isOld;
+  scene.isOld = pulse.isSilent;
   if (pulse.isSilent && scene.frame?.guidance && pulse.isLive()) {
     const text = 'Stop. There is nothing from the tracker.', stopped = { ...scene.frame.guidance, kind: 'stop', text, arrow_rad: null, left_m: null, spoken: text, spoken_s: null };
     panel.guidance(stopped);
@@ -200,7 +199,7 @@ function draw() {
   const { told: estimate } = scene.frame ?? {};
   if (dirty && estimate && follows && !mode && !taps.ghost) {
     arrive(estimate);
-    if (estimate.placed && !view.shows(planView.box)) view.keep(estimate.x_m, estimate.y_m);
+    if (estimate.placed && !view.shows(planView.box)) view.keep(estimate.x_m, estimate.y_m, view.shows(planView.box, view.all) ? BESIDE : undefined);
     if (estimate.level !== scene.level && estimate.level !== wantedLevel) showLevel(estimate.level);
   }
   const moved = drawnStamp !== view.stamp;

@@ -73,7 +73,7 @@ export class View {
 
   // The largest part of the map, in pixels [left, top, right, bottom], that no element of `over` covers.
   get free() {
-    let free = [0, 0, this.width, this.height];
+    let free = this.all;
     const map = this.over[0]?.parentElement.getBoundingClientRect(), area = ([l, t, r, b]) => Math.max(r - l, 0) * Math.max(b - t, 0);
     for (const element of this.over) {
       const box = element.getBoundingClientRect(), [l, t, r, b] = free;
@@ -81,7 +81,7 @@ export class View {
       if (!box.width || !box.height || left >= r || right <= l || top >= b || bottom <= t) continue;
       free = [[l, bottom, r, b], [l, t, r, top], [right, t, r, b], [l, t, left, b]].reduce((best, one) => (area(one) > area(best) ? one : best));
     }
-    return area(free) > LEAST_FREE * this.width * this.height ? free : [0, 0, this.width, this.height];
+    return area(free) > LEAST_FREE * this.width * this.height ? free : this.all;
   }
 
   // A box of the map fills the free part.
@@ -108,17 +108,19 @@ export class View {
     this.pan((l + r - this.width) / 2, (t + b - this.height) / 2);
   }
 
-  shows([x0, y0, x1, y1]) {
-    const [l, t, r, b] = this.free;
+  get all() { return [0, 0, this.width, this.height]; }
+
+  // Whether a box of the map is within a part of the screen.
+  shows([x0, y0, x1, y1], [l, t, r, b] = this.free) {
     return [[x0, y0], [x1, y0], [x0, y1], [x1, y1]].every(([x, y]) => {
       const [sx, sy] = this.toScreen(x, y);
       return sx >= l && sy >= t && sx <= r && sy <= b;
     });
   }
 
-  // Pan so that a map point is in the inner part of the free one.
-  keep(x, y) {
-    const [l, t, r, b] = this.free, [sx, sy] = this.toScreen(x, y), mx = 0.3 * (r - l), my = 0.3 * (b - t);
+  // Pan so that a map point is in the free part, a `share` of it away from its edges.
+  keep(x, y, share = 0.3) {
+    const [l, t, r, b] = this.free, [sx, sy] = this.toScreen(x, y), mx = share * (r - l), my = share * (b - t);
     const dx = Math.min(r - mx - sx, 0) + Math.max(l + mx - sx, 0), dy = Math.min(b - my - sy, 0) + Math.max(t + my - sy, 0);
     if (dx || dy) this.pan(dx, dy);
   }
