@@ -45,7 +45,9 @@ export class Outbox {
 
   answered({ request: identity, reason }) {
     const request = this.kept.find(({ request: own }) => own === identity);
-    if (request) this.drop(request, reason ? `not sent: ${reason}` : request.kind === 'call' || age_s(request) > SLOW_S ? 'sent' : '');
+    if (!request) return;
+    const isCall = request.kind === 'call', news = reason ? `not sent: ${reason}` : 'sent';
+    this.drop(request, isCall || (!reason && age_s(request) > SLOW_S) ? news : '');  // other refusals are the page's hint
   }
 
   isFresh(request) {

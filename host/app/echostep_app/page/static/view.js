@@ -2,6 +2,7 @@
 // The view: the part of the map on the screen. Converts map metres (x east, y north) to CSS pixels and back. What lies over the map leaves a free part of it.
 
 const ABOUT_M = 15, MUCH_NEARER = 1.25;  // of the wearer in the first view; than the whole floor, if it is to be shown; assumed
+const SIGN_PX = 24;
 const LEAST_FREE = 0.05;  // share of the map; less is as good as nothing
 
 export class View {
@@ -118,9 +119,9 @@ export class View {
     });
   }
 
-  // Pan so that a map point is in the free part, a `share` of it away from its edges.
+  // Pan so that a map point is in the free part, a `share` of it and a sign's size away from its edges.
   keep(x, y, share = 0.3) {
-    const [l, t, r, b] = this.free, [sx, sy] = this.toScreen(x, y), mx = share * (r - l), my = share * (b - t);
+    const [l, t, r, b] = this.free, [sx, sy] = this.toScreen(x, y), [mx, my] = [r - l, b - t].map((size) => Math.max(share * size, Math.min(SIGN_PX, size / 2)));
     const dx = Math.min(r - mx - sx, 0) + Math.max(l + mx - sx, 0), dy = Math.min(b - my - sy, 0) + Math.max(t + my - sy, 0);
     if (dx || dy) this.pan(dx, dy);
   }
