@@ -112,10 +112,8 @@ class GuardedSocket(ABC):
         kept = requests.kept_request(text)
         if kept is None:
             reason = await self._handle(text)
-        elif (
-            kept.until_s is not None and time.monotonic() > kept.until_s
-        ):  # it lay in a wire, or in this computer while it slept
-            reason = TOO_LATE
+        elif kept.until_s is not None and kept.until_s < time.monotonic() and not self._exchange.knows(kept.request):
+            reason = TOO_LATE  # it lay in a wire, or here while all slept
         else:
             reason = await self._exchange.once(kept.request, lambda: self._handle(text))
         if reason and reason != UNKNOWN:

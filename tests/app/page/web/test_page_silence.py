@@ -191,6 +191,8 @@ def test_a_beat_comes_at_once_and_a_request_is_carried_out_once() -> None:
         page.send(json.dumps(late | {"request": "12-34-56-82", "until_s": time.monotonic() + PATIENCE_S}))
         assert not json.loads(page.recv(timeout=PATIENCE_S))["reason"]
         assert len(list(mailbox.pop_check_ins())) == 1
+        page.send(json.dumps(late | {"request": "12-34-56-82"}))  # again, later: it was carried out
+        assert not json.loads(page.recv(timeout=PATIENCE_S))["reason"]
         page.send(json.dumps({"kind": "check_in", "x_m": 2, "y_m": 8.5, "sd_m": 0.5, "request": "12-34-56-80"}))
         assert "inside a wall" in json.loads(page.recv(timeout=PATIENCE_S))["reason"]
 

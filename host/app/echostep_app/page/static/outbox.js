@@ -15,8 +15,7 @@ const SLOW_S = 1, SHOWN_MS = 6000, REFUSED_MS = 20000, REMIND_S = 10, MOST_NEWS 
 const $ = (id) => document.getElementById(id);
 
 export class Outbox {
-  // `transmit(request)`: sends it if there is a connection; `onUnsent(text)`: a call for help has not gone out, each REMIND_S
-  // `serverNow_s()`: time of the server's clock
+  // `transmit(request)`: sends it if there is a connection; `onUnsent(text)`: a call for help has not gone out, each REMIND_S; `serverNow_s()`: or null
   constructor(transmit, onUnsent, serverNow_s) {
     Object.assign(this, { transmit, onUnsent, serverNow_s, prefix: `request ${location.pathname} `, run: null, kept: [], news: [] });
     this.kept = stored(this.prefix).filter((request) => age_s(request) < STORED_S);
@@ -27,7 +26,8 @@ export class Outbox {
 
   put(kind, fields) {
     const request = { ...fields, kind, request: crypto.getRandomValues(new Uint32Array(4)).join('-'), run: this.run, at_ms: Date.now(), reminded: 0 };
-    if (kind in FRESH_S) request.until_s = this.serverNow_s() + FRESH_S[kind];  // it may lie in the wire
+    const now_s = this.serverNow_s();
+    if (kind in FRESH_S && now_s !== null) request.until_s = now_s + FRESH_S[kind];  // it may lie in the wire
     this.kept.push(request);
     remember(this.prefix + request.request, JSON.stringify(request));
     this.transmit(request);

@@ -4,7 +4,7 @@
 
 import { tr } from './language.js';
 
-export const SILENT_S = 3;
+const SILENT_S = 3;
 const TICK_MS = 500;
 const NEEDS_SERVER = ['', ' button', ' select', ' input'].map((control) => `[data-needs-server]${control}`).join();
 const $ = (id) => document.getElementById(id);
@@ -26,7 +26,7 @@ export class Pulse {
 
   get since_s() { return Math.max(...clocks().map((now, k) => now - this.beat[k])) / 1000; }
   get age_s() { return this.behind_s + this.since_s; }
-  get now_s() { return this.server_s + this.since_s; }  // of the server
+  get now_s() { return this.server_s === null ? null : this.server_s + this.since_s; }  // of the server
   get ago() { return this.age_s < 120 ? `${Math.floor(this.age_s)} s` : `${Math.floor(this.age_s / 60)} min`; }
 
   // After a pause of the browser itself the beats that wait come first.

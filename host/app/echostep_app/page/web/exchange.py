@@ -37,6 +37,10 @@ class Exchange:
         alive_s = self._alive_s
         return 0.0 if alive_s is None else time.monotonic() - alive_s
 
+    def knows(self, identity: str) -> bool:
+        """Whether this request has come before."""
+        return identity in self._answers
+
     async def once(self, identity: str, act: Callable[[], Awaitable[str]]) -> str:
         """The answer to a request, which is carried out when it comes for the first time: the reason of a refusal, or nothing."""
         if identity not in self._answers:
