@@ -20,6 +20,7 @@ from websockets.typing import Origin
 
 from command_line import PROGRAM, echostep
 from operation.teams import ServedTeam, whole_team
+from page.frames import opened_url
 from team.network import box_to
 from team.team_broker import Broker, needs_broker
 from team.team_reports import PLAN, POSITION, report
@@ -48,7 +49,7 @@ def test_the_command_serves_what_a_tracker_reports(tmp_path: Path) -> None:
         assert found
         box = box_to(broker.url)
         box.offer(report("anna", position=replace(POSITION, protection_m=0.4)))
-        with connect(socket_of(found[0]), origin=Origin(found[1])) as page:
+        with opened_url(found[0]) as page:
             hello = json.loads(page.recv(PATIENCE_S))
             assert (hello["kind"], hello["plan"]["name"]) == ("hello", "Demo office")
 
@@ -77,7 +78,7 @@ def test_other_sites_cannot_open_the_socket_and_hostile_requests_do_nothing() ->
         url = served.page.url
         with pytest.raises(InvalidStatus):
             connect(socket_of(url), origin=Origin("http://evil.example")).__enter__()
-        with connect(socket_of(url), origin=Origin(url.rstrip("/"))) as page:
+        with opened_url(url) as page:
             page.recv(PATIENCE_S)
             first = header_of(page.recv(PATIENCE_S))  # type: ignore[arg-type]
             assert len(first["list"]) == 8
@@ -94,7 +95,7 @@ def test_other_sites_cannot_open_the_socket_and_hostile_requests_do_nothing() ->
 def test_a_page_that_draws_nothing_is_sent_two_frames_and_no_more() -> None:
     with ServedTeam(whole_team()) as served:
         url = served.page.url
-        with connect(socket_of(url), origin=Origin(url.rstrip("/"))) as page:
+        with opened_url(url) as page:
             page.recv(PATIENCE_S)
             first = header_of(page.recv(PATIENCE_S))  # type: ignore[arg-type]
             served.show()

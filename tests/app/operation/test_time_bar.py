@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from websockets.sync.client import ClientConnection, connect
-from websockets.typing import Origin
+from websockets.sync.client import ClientConnection
 
 from echostep_app.operation.operation import Operation
 from echostep_app.operation.page import TablePage
@@ -17,9 +16,10 @@ from echostep_app.operation.recorded.player import load
 from echostep_app.operation.recorded.tape import Tape
 from echostep_app.page.server import Address
 from operation.teams import TOWER, Recording, ServedTeam, Team, place, whole_team
-from operation.test_command import header_of, socket_of
+from operation.test_command import header_of
 from operation.test_table_page import LOOKS, shot, table
 from page.browser import overflow, wait_for
+from page.frames import opened_url
 from waiting import PATIENCE_S, until
 
 SHOWN = "document.querySelector('#clock').textContent"
@@ -47,7 +47,7 @@ def test_a_page_goes_back_and_returns_and_cannot_act_on_the_past(tmp_path: Path)
     team, made = two_moments(tmp_path)
     with ServedTeam(team, made.tape) as served:
         url = served.page.url
-        with connect(socket_of(url), origin=Origin(url.rstrip("/"))) as page:
+        with opened_url(url) as page:
             page.recv(PATIENCE_S)
 
             def frames_until(holds: Any) -> dict[str, Any]:

@@ -32,6 +32,7 @@ from waiting import PATIENCE_S, until
 PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
 LOCAL = Address(port=0)
+HELD_MS = 1200  # for which a button is held that a brush must not press
 SKIPPED = 500  # chunks in a portion before the page is opened
 SHOWN = (  # for the error of a test
     "[window.echostep?.scene?.frame && { ...echostep.scene.frame, beams: 0, trail: 0, cloud: 0 }, document.body.innerText]"

@@ -32,6 +32,20 @@ PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 LOCAL = Address(port=0)
 
 
+BEAT = '"kind":"beat"'
+
+
+class PageConnection(ClientConnection):
+    """A page's socket without the beats, which come whenever a second is over."""
+
+    def recv(self, timeout: float | None = None, decode: bool | None = None) -> Any:
+        end_s = None if timeout is None else time.monotonic() + timeout
+        while True:
+            received = super().recv(None if end_s is None else end_s - time.monotonic(), decode)
+            if not (isinstance(received, str) and BEAT in received):
+                return received
+
+
 def told(
     x_m: float = 2.0, y_m: float = 7.5, t_s: float = 1.0, status: TrackStatus = TrackStatus.TRACKING, sd_m: float = 0.1
 ) -> Estimate:
@@ -71,7 +85,9 @@ def fetched(url: str) -> Answer:
 
 def opened_url(url: str) -> ClientConnection:
     origin = Origin("/".join(url.split("/")[:3]))
-    return connect(f"ws{url[4:]}socket", origin=origin, max_size=None, open_timeout=PATIENCE_S)
+    return connect(
+        f"ws{url[4:]}socket", origin=origin, max_size=None, open_timeout=PATIENCE_S, create_connection=PageConnection
+    )
 
 
 def header(received: str | bytes) -> dict[str, Any]:

@@ -33,9 +33,11 @@ MODULES: dict[str, tuple[str, ...] | None] = {
     "page/elements/scene.py": None,
     "page/elements/stream_rates.py": None,
     "page/elements/taps.py": None,
+    "page/guarded_socket.py": ("UNKNOWN", "TOO_LATE"),
     "page/live.py": None,
     "page/over_time.py": None,
     "page/session.py": None,
+    "page/web/exchange.py": ("Exchange",),
     "plan/places/standing.py": ("_reason", "StandingGround"),
     "plan/places/whereabouts.py": None,
     "session/acceptance/guide.py": ("_request", "_manner"),
@@ -61,7 +63,9 @@ WORDS = re.compile(r"[a-z]{2}.* .*[a-z]|^[A-Z][a-z]+[a-z.!?]$")
 NO_WORDS = re.compile(r"[<{/]|system-ui|^\(|^trans(form|late)\b|, select,|^#|^sign |^circle |^name ")
 # Texts that are put together from variables: what a page gets of them.
 WHOLE = {
-    "Take the 7 7": tuple(f"Take the {way} {to}" for way in ("stairs", "lift", "ramp") for to in ("up", "down")),
+    "Take the 7 7": tuple(
+        f"Take the {way}{name} {to}" for way in ("stairs", "lift", "ramp") for name in ("", " 3", " A") for to in ("up", "down")
+    ),
     "7: 7 places fit; walk on, turn into a room7": (
         "lost: 7 places fit; walk on, turn into a room or tap where you are",
         "uncertain: 7 places fit; walk on, turn into a room",

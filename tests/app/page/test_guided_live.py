@@ -23,8 +23,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from websockets.exceptions import InvalidMessage
-from websockets.sync.client import connect
-from websockets.typing import Origin
 
 from board_runs import ROOT
 from echostep.plan import load_plan
@@ -32,7 +30,7 @@ from echostep_app.commands.actions.beacon_player import simulate_gateway
 from echostep_app.simulation.devices.board import PythonBoard, Sent
 from echostep_app.simulation.scenario import Scenario
 from free_ports import free_port
-from page.frames import header
+from page.frames import header, opened_url
 from players import pseudo_terminal
 from walks import walk_chunks
 
@@ -123,7 +121,7 @@ def live(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
 def frames(url: str) -> Generator[dict[str, Any], None, None]:
     """What a page gets that draws at once."""
     ends = time.monotonic() + PATIENCE_S
-    with connect(f"ws{url[4:]}socket", origin=Origin(url.rstrip("/")), max_size=None, open_timeout=PATIENCE_S) as page:
+    with opened_url(url) as page:
         assert json.loads(page.recv(timeout=PATIENCE_S))["kind"] == "hello"
         while time.monotonic() < ends:
             frame = header(page.recv(timeout=PATIENCE_S))

@@ -147,6 +147,9 @@ def test_a_text_without_entry_is_found(browser: Any, url: str) -> None:
     assert page.evaluate("echostep.tr('within 0.4 m · heading SE 135° ±5°')") == "auf 0,4 m genau · Kurs SO 135° ±5°"
     assert page.evaluate("echostep.tr('2 floors up')") == "2 Geschosse höher"
     assert page.evaluate("echostep.tr('1 floor up')") == "1 Geschoss höher"
+    assert page.evaluate("echostep.tr('Take the stairs 3 up')") == "Treppe 3 hinauf"
+    assert page.evaluate("echostep.tr('Take the lift A down.')") == "Aufzug A hinab."
+    assert page.evaluate("echostep.tr('Take the Nordtreppe up')") == "Nordtreppe hinauf"
     page.context.close()
 
 

@@ -140,6 +140,7 @@ def _follow(run: _Run, page: TablePage | None, console: Console, seconds: float,
                 run.look(now_s)
                 print_notices(run.recorder.file.notices, console)
                 if page:
+                    page.feed.exchange.note_alive()
                     print_notices(page.notices, console)
                     receiver = run.receiver
                     fault = ". ".join(filter(None, (receiver.fault, news.words())))

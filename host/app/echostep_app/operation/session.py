@@ -27,10 +27,11 @@ from echostep_app.operation.recorded.past import PastView, ShownTime
 from echostep_app.operation.recorded.tape import Tape
 from echostep_app.operation.words import ShownDetails, ShownWearer
 from echostep_app.page.elements.marks import ShownMark
-from echostep_app.page.guarded_socket import MOST_UNDRAWN, GuardedSocket
-from echostep_app.page.protocol import FRAME_S, Refused, encode, hello, packed
+from echostep_app.page.guarded_socket import MOST_UNDRAWN, UNKNOWN, GuardedSocket
+from echostep_app.page.protocol import FRAME_S, encode, hello, packed
 from echostep_app.page.requests import FrameDrawn, Seek, SetPlaying, SetSpeed
 from echostep_app.page.shared import PageCounts
+from echostep_app.page.web.exchange import Exchange
 from echostep_app.page.web.faults import Faults
 from echostep_app.team.messages.crews import Crew
 
@@ -73,6 +74,7 @@ class TableFeed:
         self.title = title
         self.tape = tape
         self.latest: TableScene | None = None
+        self.exchange = Exchange()
         self.on_publish: Callable[[], None] | None = None
         self.send: Callable[[str, bytes], bool] | None = None  # topic and payload, to the broker
 
@@ -96,7 +98,7 @@ class TableSession(GuardedSocket):
     """Serves one page until it disconnects."""
 
     def __init__(self, socket: WebSocket, feed: TableFeed, faults: Faults, counts: PageCounts) -> None:
-        super().__init__(socket, faults, counts)
+        super().__init__(socket, feed.exchange, faults, counts)
         self._feed = feed
         self._undrawn: set[int] = set()  # numbers of frames
         self._seq = 0
@@ -109,13 +111,16 @@ class TableSession(GuardedSocket):
         self._sent_s = 0.0  # when, on the monotonic clock
 
     async def _greet(self) -> None:
-        await self.tell(encode(hello(self._feed.operation.plan, self._feed.title, replay=False)))
+        await self.tell(
+            encode(hello(self._feed.operation.plan, self._feed.title, self._feed.exchange.run, replay=False))
+        )
 
-    async def _handle(self, text: str | None) -> None:
+    async def _handle(self, text: str | None) -> str:
         request = requests.parse_request(text)
         match request:
             case None:
                 self._counts.unknown += 1
+                return UNKNOWN
             case FrameDrawn(seq):
                 self._undrawn.discard(seq)
                 self._news.set()
@@ -128,12 +133,10 @@ class TableSession(GuardedSocket):
                     self._due = True
                     self._news.set()
             case _ if self._view is not None and self._view.is_past:
-                self._counts.refused += 1
-                await self.tell(encode(Refused(PAST)))
+                return PAST
             case _:
-                if refusal := self._feed.act(request):
-                    self._counts.refused += 1
-                    await self.tell(encode(Refused(refusal)))
+                return self._feed.act(request)
+        return ""
 
     async def _send(self) -> None:
         """Send a frame when there is something new, not before `FRAME_S` after the last one."""

@@ -40,6 +40,7 @@ PAGE = Path(__file__).parent / "edit"
 SHARED = (
     "style.css",
     "icon.svg",
+    "storage.js",
     "theme.js",
     "view.js",
     "language.js",

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The guarded socket of one page: the common part of the sessions of all pages.
 
-In: a WebSocket. Out: texts and frames to the page; its requests, one by one, to the session. Owns the budget of requests and the handling of faults.
+In: a WebSocket. Out: texts, frames and a beat each second to the page; its requests, one by one, to the session. Owns the budget of requests and
+the handling of faults.
 """
 
 from __future__ import annotations
@@ -13,11 +14,15 @@ from abc import ABC, abstractmethod
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from echostep_app.page import protocol
+from echostep_app.page import protocol, requests
 from echostep_app.page.shared import PageCounts
+from echostep_app.page.web.exchange import Exchange
 from echostep_app.page.web.faults import Faults
 
 MOST_UNDRAWN = 2  # frames that are sent but not reported as drawn
+BEAT_S = 1.0  # between two signs of life
+UNKNOWN = "This page is of another version than the program: load it again."
+TOO_LATE = "It came too late: do it again."
 MOST_REQUESTS_A_SECOND = 240  # a page that sends more is disconnected
 POLICY_VIOLATION, INTERNAL_ERROR = 1008, 1011  # WebSocket close codes [RFC 6455, 7.4.1]
 SERVICE_RESTART = 1012  # [IANA]
@@ -26,8 +31,9 @@ SERVICE_RESTART = 1012  # [IANA]
 class GuardedSocket(ABC):
     """A session greets, handles requests, and sends; `run` ends when one of these does."""
 
-    def __init__(self, socket: WebSocket, faults: Faults, counts: PageCounts) -> None:
+    def __init__(self, socket: WebSocket, exchange: Exchange, faults: Faults, counts: PageCounts) -> None:
         self._socket = socket
+        self._exchange = exchange
         self._faults = faults
         self._counts = counts
         self._news = asyncio.Event()
@@ -37,8 +43,8 @@ class GuardedSocket(ABC):
         """Send the first message."""
 
     @abstractmethod
-    async def _handle(self, text: str | None) -> None:
-        """Handle one request; None if it was not a text."""
+    async def _handle(self, text: str | None) -> str:
+        """Handle one request, None if it was not a text; the reason of a refusal, else empty."""
 
     @abstractmethod
     async def _send(self) -> None:
@@ -58,7 +64,7 @@ class GuardedSocket(ABC):
         tasks: list[asyncio.Task[None]] = []
         try:
             await self._greet()
-            tasks = [asyncio.create_task(self._receive()), asyncio.create_task(self._send())]
+            tasks = [asyncio.create_task(work()) for work in (self._receive, self._send, self._beat)]
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
                 task.result()
@@ -99,4 +105,26 @@ class GuardedSocket(ABC):
                 self._counts.flooding += 1
                 await self._socket.close(POLICY_VIOLATION)
                 return
-            await self._handle(event.get("text"))
+            await self._answer(event.get("text"))
+
+    async def _answer(self, text: str | None) -> None:
+        """Handle a request, one with an identity only once, and tell the page what came of it."""
+        kept = requests.kept_request(text)
+        if kept is None:
+            reason = await self._handle(text)
+        elif kept.until_s is not None and kept.until_s < time.monotonic() and not self._exchange.knows(kept.request):
+            reason = TOO_LATE  # it lay in a wire, or here while all slept
+        else:
+            reason = await self._exchange.once(kept.request, lambda: self._handle(text))
+        if reason and reason != UNKNOWN:
+            self._counts.refused += 1
+        if kept:
+            await self.tell(protocol.encode(protocol.Answered(kept.request, reason)))
+        elif reason and reason != UNKNOWN:
+            await self.tell(protocol.encode(protocol.Refused(reason)))
+
+    async def _beat(self) -> None:
+        """Tell the page each second that the server is there, and how long ago the run was."""
+        while True:
+            await self.tell(protocol.encode(protocol.Beat(round(self._exchange.age_s, 1), time.monotonic())))
+            await asyncio.sleep(BEAT_S)

@@ -25,6 +25,7 @@ from echostep_app.page.drawing_process import DrawingProcess
 from echostep_app.page.elements.alarm import shown_alarm
 from echostep_app.page.elements.echo_lines import EchoLine, expected_range, last_echo_lines
 from echostep_app.page.elements.guidance import ShownGuidance, guidance_of_cue
+from echostep_app.page.elements.likely_places import PlaceNumbers
 from echostep_app.page.elements.lookahead import extrapolate, moves_as_one
 from echostep_app.page.elements.marks import ShownMark, beacon_marks, shown_meeting
 from echostep_app.page.elements.scene import MOST_SHOWN, PageScene, is_placed, sample_of, status_text
@@ -100,7 +101,7 @@ class LivePage:
         self._trail_end: Estimate | None = None
         self._trail_breaks = False  # before its next point
         self._check_ins = (0, 0)  # check-ins and undoings
-        self._undo_clock = UndoClock()
+        self._undo_clock, self._numbers = UndoClock(), PlaceNumbers()
         self._drawing: DrawingProcess | None = None  # of a walk without a plan
         if not replay:
             self._mailbox.publish(self._scene)
@@ -190,6 +191,11 @@ class LivePage:
     def take_presses(self, take: Callable[[PointPress], bool]) -> None:
         """Call `take` with each tap at a surveyed point, in the server's thread; it returns whether the tap was accepted."""
         self._mailbox.on_press = take
+
+    def note_alive(self) -> None:
+        """The run goes on; a live page says when it no longer does."""
+        if not self._replay:
+            self._mailbox.exchange.note_alive()
 
     def note_arrival(self) -> None:
         """Bytes have arrived: their time is the start of the latency of the scenes that follow."""
@@ -303,6 +309,7 @@ class LivePage:
             status_text=status_text(estimate, accepts_taps=not self._replay, no_plan=not self._tracker.plan.is_drawn),
             particles=self._scene.particles if published is None else sample_of(published),
             echo_lines=self._echo_lines(measured, estimate),
+            numbers=self._numbers.of(estimate),
             gait=running_note(None if measured is None else measured.segment, estimate),
             guidance=self._guidance(estimate),
             beacons=beacon_marks(self._tracker, estimate.t_s),

@@ -21,6 +21,8 @@ from echostep_app.page.elements.marks import ShownMark
 from echostep_app.page.elements.scene import PageScene
 from echostep_app.page.elements.taps import PointPress, ShownPoints
 from echostep_app.page.over_time import OverTime
+from echostep_app.page.web.exchange import Exchange
+from echostep_app.plan.places.bearing import north_rad
 from echostep_app.plan.routing import RoutePlace
 
 MOST_CHECK_INS = 16  # in the queue to the tracker; further ones are refused: a person makes a few in a minute
@@ -82,7 +84,7 @@ class Mailbox:
         self.title = title
         self.trail = PageTrail()
         self.history = SceneHistory()
-        self.over_time = OverTime(tuple(level.name for level in plan.levels))
+        self.over_time = OverTime(tuple(level.name for level in plan.levels), north_rad(plan))
         self.replay = replay
         self.summary: str | None = None  # how well the run went, once it is over
         self.failure = ""  # the error that ends the run, in words
@@ -100,6 +102,7 @@ class Mailbox:
             None  # takes taps at points at once, in the server's thread
         )
         self.on_publish: Callable[[], None] | None = None
+        self.exchange = Exchange()
         self._check_ins: queue.Queue[CheckIn | Undo | Call] = queue.Queue(MOST_CHECK_INS)
         self._met: queue.Queue[str] = queue.Queue(MOST_CHECK_INS)
 
@@ -151,6 +154,7 @@ class Mailbox:
     def end(self, summary: str) -> None:
         """The run is over; a history that was kept is played from now on."""
         self.summary = summary
+        self.exchange.rest()
         self.replay = self.replay or (self._keeps and len(self.history) > 0)
         self._announce()
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from echostep.localization import claims_place
 from echostep_app.page.elements.scene import PageScene
 
-COLUMNS = 6  # time (s), range to the left and to the right (m), samples of the foot and pings a second, heading (deg); NaN: none
+COLUMNS = 6  # time (s), range to the left and to the right (m), samples of the foot and pings a second, compass heading (deg); NaN: none
 MOST_ROWS = 1 << 18  # 18 hours at four estimates a second, 6 MB; later ones are left out
 MOST_EVENTS = 1000
 
@@ -31,9 +31,9 @@ class Event:
 class OverTime:
     """Rows of float32, and events in order of time."""
 
-    def __init__(self, levels: tuple[str, ...]) -> None:
-        """`levels`: names of the levels."""
-        self._levels = levels
+    def __init__(self, levels: tuple[str, ...], north_rad: float) -> None:
+        """`levels`: names of the levels. `north_rad`: direction of north, counter-clockwise from the map's x axis."""
+        self._levels, self._north_rad = levels, north_rad
         self._rows = array("f")
         self.events: tuple[Event, ...] = ()  # replaced, never changed
         self._last: PageScene | None = None
@@ -55,7 +55,8 @@ class OverTime:
                 ranges[line.ranger] = line.measured_m
         rates = (scene.streams.mtx_hz, scene.streams.pings_hz) if scene.streams else (None, None)
         known = [math.nan if rate is None else rate for rate in rates]
-        heading = math.degrees(scene.estimate.heading_rad) if claims_place(scene.estimate) else math.nan
+        bearing_deg = math.degrees(self._north_rad - scene.estimate.heading_rad) % 360.0
+        heading = bearing_deg if claims_place(scene.estimate) else math.nan
         self._rows.extend((scene.t_s, *ranges, *known, heading))
         if self._last is not None and (new := list(self._news(self._last, scene))):
             self.events = (*self.events, *new)[:MOST_EVENTS]

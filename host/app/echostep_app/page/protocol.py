@@ -25,7 +25,7 @@ from echostep_app.page.elements.alarm import ShownAlarm
 from echostep_app.page.elements.drawn_walls import ShownDrawing
 from echostep_app.page.elements.echo_lines import EchoLine
 from echostep_app.page.elements.guidance import ShownGuidance
-from echostep_app.page.elements.likely_places import shown_places
+from echostep_app.page.elements.likely_places import numbered
 from echostep_app.page.elements.marks import BeaconMark, ShownMark, ShownMeeting
 from echostep_app.page.elements.scene import PageScene, ParticleSample
 from echostep_app.page.elements.stream_rates import StreamRates
@@ -77,13 +77,35 @@ class PlanLabels:
 
 @dataclass(frozen=True, slots=True)
 class Hello:
-    """The first message to a page. `replay`: the run is a replay. `takes_files`: the page plays recordings that are dropped onto it."""
+    """The first message to a page. `replay`: the run is a replay. `takes_files`: the page plays recordings that are dropped onto it.
+
+    `run`: a name of this run, which another one on the same address does not have.
+    """
 
     title: str
     replay: bool
     plan: PlanLabels
     takes_files: bool = False
+    run: str = ""
     kind: Literal["hello"] = "hello"
+
+
+@dataclass(frozen=True, slots=True)
+class Beat:
+    """The server is there, at `now_s` of its monotonic clock; the run behind it was so `age_s` seconds ago."""
+
+    age_s: float
+    now_s: float
+    kind: Literal["beat"] = "beat"
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """The request of this identity has been taken; or it was refused, and why."""
+
+    request: str
+    reason: str
+    kind: Literal["answered"] = "answered"
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +227,7 @@ class FrameHeader:
     kind: Literal["frame"] = "frame"
 
 
-Message = Hello | Refused | Failed | Considered
+Message = Hello | Beat | Answered | Refused | Failed | Considered
 
 
 def _plain(value: Any) -> Any:
@@ -223,11 +245,11 @@ def encode(message: Message) -> str:
     return _ENCODER.encode(message).decode()
 
 
-def hello(plan: Plan, title: str, *, replay: bool, takes_files: bool = False) -> Hello:
+def hello(plan: Plan, title: str, run: str, *, replay: bool, takes_files: bool = False) -> Hello:
     """The first message of a run on this plan."""
     levels = tuple(_labels(plan, k) for k in range(len(plan.levels)))
     shown = PlanLabels(plan.name, plan.digest, north_rad(plan), levels, globe_of(plan))
-    return Hello(title, replay, shown, takes_files)
+    return Hello(title, replay, shown, takes_files, run)
 
 
 def _labels(plan: Plan, k: int) -> LevelLabels:
@@ -349,7 +371,7 @@ def _estimate(scene: PageScene, parts: FrameParts) -> ShownEstimate | None:
         z_sd_m=e.z_sd_m,
         protection_m=e.protection_m if np.isfinite(e.protection_m) else None,
         hypotheses=tuple(
-            ShownHypothesis(k + 1, h.probability, h.x_m, h.y_m, h.level) for k, h in enumerate(shown_places(e))
+            ShownHypothesis(n, h.probability, h.x_m, h.y_m, h.level) for n, h in numbered(e, scene.numbers)
         ),
         places=parts.places,
     )

@@ -19,8 +19,16 @@ from echostep_app.plan.routing import RoutePlace
 MOST_REQUEST = 2048  # characters
 MOST_NAME = 32  # characters of a wearer's name, as in reports
 FASTEST = 32.0  # times as fast as it was recorded
+Identity = Annotated[str, Meta(min_length=8, max_length=64)]
 Integer = Annotated[int, Meta(gt=-(1 << 53), lt=1 << 53)]  # that JavaScript represents exactly
 Count = Annotated[int, Meta(ge=0, lt=1 << 31)]
+
+
+class Kept(msgspec.Struct, frozen=True):
+    """A request that the page keeps until it is answered has an identity; it holds until `until_s` of the server's clock."""
+
+    request: Identity
+    until_s: float | None = None
 
 
 class Entered(EnteredPlace, frozen=True, tag_field="kind", tag="check_in"):
@@ -101,6 +109,7 @@ _OwnRequest = (
     Undo | Call | Consider | Met | AtPoint | NoTap | GoTo | EndGuidance | FrameDrawn | SetPlaying | SetSpeed | Seek | StepBy
 )  # fmt: skip
 Request = CheckIn | _OwnRequest
+_KEPT = msgspec.json.Decoder(Kept)
 _REQUESTS = msgspec.json.Decoder(Entered | _OwnRequest)
 
 
@@ -108,3 +117,8 @@ def parse_request(text: str) -> Request | None:
     """The request in a text from a page; None when the text is not a valid request."""
     request = decoded(text, _REQUESTS, MOST_REQUEST)
     return request.check_in if isinstance(request, Entered) else request
+
+
+def kept_request(text: str | None) -> Kept | None:
+    """The identity of a request in a text from a page; None when it has none."""
+    return None if text is None else decoded(text, _KEPT, MOST_REQUEST)

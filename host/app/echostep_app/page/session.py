@@ -23,7 +23,7 @@ from echostep_app.page.elements.guidance import Destination, ShownGuidance
 from echostep_app.page.elements.marks import ShownMark
 from echostep_app.page.elements.scene import PageScene, ParticleSample, is_placed
 from echostep_app.page.elements.taps import NO_TAP, PointPress, ShownPoints
-from echostep_app.page.guarded_socket import MOST_UNDRAWN, GuardedSocket
+from echostep_app.page.guarded_socket import MOST_UNDRAWN, UNKNOWN, GuardedSocket
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.protocol import FRAME_S
 from echostep_app.page.replay_cursor import ReplayCursor
@@ -41,7 +41,7 @@ class PageSession(GuardedSocket):
         self.latency_s: deque[float] = deque(
             maxlen=512
         )  # from the arrival of an estimate's bytes to its frame being drawn
-        super().__init__(socket, shared.faults, shared.counts)
+        super().__init__(socket, mailbox.exchange, shared.faults, shared.counts)
         self._mailbox = mailbox
         self._shared = shared
         self._cursor = ReplayCursor(mailbox.history) if mailbox.replay else None
@@ -64,7 +64,9 @@ class PageSession(GuardedSocket):
     async def _greet(self) -> None:
         mailbox, shared = self._mailbox, self._shared
         replay = self._cursor is not None
-        hello = protocol.hello(mailbox.plan, mailbox.title, replay=replay, takes_files=shared.takes_files)
+        hello = protocol.hello(
+            mailbox.plan, mailbox.title, mailbox.exchange.run, replay=replay, takes_files=shared.takes_files
+        )
         await self.tell(protocol.encode(hello))
 
     async def _begin_replay(self) -> None:
@@ -73,13 +75,14 @@ class PageSession(GuardedSocket):
         self._trail_count, self._particles, self._drawing, self._frame_due = 0, None, None, True
         await self._greet()
 
-    async def _handle(self, text: str | None) -> None:
+    async def _handle(self, text: str | None) -> str:
+        refusal = ""
         request = None if text is None else requests.parse_request(text)
         levels = len(self._mailbox.plan.levels)
         match request:
             case None:
                 self._counts.unknown += 1
-                return
+                return UNKNOWN
             case requests.FrameDrawn(seq):
                 if (arrived_ns := self._undrawn.pop(seq, None)) is not None:
                     self.latency_s.append((time.monotonic_ns() - arrived_ns) * 1e-9)
@@ -87,15 +90,15 @@ class PageSession(GuardedSocket):
                 answer = self._shared.taps.consider(request.check_in, self._mailbox.latest)
                 await self.tell(protocol.encode(answer))
             case CheckIn() if request.level < levels:
-                await self._take(request, self._shared.taps.refusal(request))
+                refusal = self._shared.taps.refusal(request) or self._take(request)
             case Undo():
                 offer = self._mailbox.latest.undo if self._mailbox.latest else None
                 is_late = offer is None or offer.undo != request.undo
-                await self._take(request, "It is too late to undo this." if is_late else "")
+                refusal = "It is too late to undo this." if is_late else self._take(request)
             case Call():
-                await self._take(request, "")
+                refusal = self._take(request)
             case requests.Met() | requests.AtPoint() | requests.NoTap():
-                await self._pass_on(request)
+                refusal = self._meet(request.name) if isinstance(request, requests.Met) else self._press(request)
             case requests.GoTo() if request.level < levels:
                 self._mailbox.set_goal(request.goal)
             case requests.EndGuidance():
@@ -106,20 +109,11 @@ class PageSession(GuardedSocket):
             case _:
                 self._counts.refused += 1
         self._news.set()
+        return refusal
 
-    async def _take(self, request: CheckIn | Undo | Call, refusal: str) -> None:
-        """Pass a check-in, its undoing or a call on to the tracker, or send the page the reason of a refusal."""
-        if not refusal and not self._mailbox.add_check_in(request):
-            refusal = TOO_BUSY
-        if refusal:
-            self._counts.refused += 1
-            await self.tell(protocol.encode(protocol.Refused(refusal)))
-
-    async def _pass_on(self, request: requests.Met | requests.AtPoint | requests.NoTap) -> None:
-        """Pass a meeting with a teammate or a tap at a surveyed point on, or send the page the reason of a refusal."""
-        if refusal := self._meet(request.name) if isinstance(request, requests.Met) else self._press(request):
-            self._counts.refused += 1
-            await self.tell(protocol.encode(protocol.Refused(refusal)))
+    def _take(self, request: CheckIn | Undo | Call) -> str:
+        """Queue a check-in, its undoing or a call for the tracker; the reason of a refusal, else empty."""
+        return "" if self._mailbox.add_check_in(request) else TOO_BUSY
 
     def _meet(self, name: str) -> str:
         """Queue a meeting; the reason of a refusal, else empty."""
@@ -188,7 +182,7 @@ class PageSession(GuardedSocket):
             where=self._shared.taps.where(scene.estimate) if scene.estimate else "",
             heading=self._heading(scene.estimate) if scene.estimate else "",
             placed=scene.estimate is not None and is_placed(scene.estimate, self._mailbox.plan),
-            places=self._shared.taps.places(scene.estimate) if scene.estimate else "",
+            places=self._shared.taps.places(scene.estimate, scene.numbers) if scene.estimate else "",
             trail=self._mailbox.trail.part(begin, scene.trail_count),
             trail_from=begin,
             particles=scene.particles if scene.particles is not self._particles else None,

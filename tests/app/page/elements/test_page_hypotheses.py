@@ -15,7 +15,7 @@ from echostep.localization import Estimate, LikelyPlace, Start, TrackStatus
 from echostep.tracker import Tracker
 from echostep_app.guidance.cues import Cue, CueKind
 from echostep_app.page.elements.guidance import guidance_of_cue
-from echostep_app.page.elements.likely_places import shown_places
+from echostep_app.page.elements.likely_places import PlaceNumbers, shown_places
 from echostep_app.page.elements.scene import status_text
 from echostep_app.page.elements.taps import Taps
 from echostep_app.page.live import LivePage
@@ -77,6 +77,23 @@ def test_the_sentence_names_each_place_once_with_the_numbers_of_its_rings() -> N
         "places that fit: 1, 3 in North corridor 67 % · 2 in South corridor 31 %"
     )
     assert taps.places(told()) == ""
+
+
+def test_a_place_keeps_its_number_while_it_stays() -> None:
+    """However its rank changes, and while the cloud walks on; what comes later gets a number that none had of late."""
+    numbers, a, b = PlaceNumbers(), *PLACES
+
+    def at(t_s: float, *places: LikelyPlace) -> tuple[int, ...]:
+        return numbers.of(replace(told(t_s=t_s, status=TrackStatus.UNCERTAIN), hypotheses=places))
+
+    assert at(1.0, a, b) == (1, 2)
+    assert at(1.3, replace(b, x_m=b.x_m + 0.5), a) == (2, 1)
+    far = replace(a, x_m=a.x_m + 9.0)
+    assert at(1.6, far, replace(a, level=1), b) == (3, 4, 2)
+    assert at(5.0, a, far) == (1, 3)
+    assert at(30.0, b, a) == (1, 2)
+    estimate = replace(told(status=TrackStatus.UNCERTAIN), hypotheses=PLACES)
+    assert Taps(PLAN).places(estimate, (7, 2)) == "places that fit: 2 in South corridor 31 % · 7 in North corridor 62 %"
 
 
 @pytest.mark.parametrize(("status", "shown"), [(TrackStatus.UNCERTAIN, 0), (TrackStatus.LOST, 1)])

@@ -13,7 +13,7 @@ import pytest
 from echostep.plan import Plan
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.teams import ServedTeam, Team, place
-from page.browser import READY, loaded_page, overflow, wait_for
+from page.browser import HELD_MS, READY, loaded_page, overflow, wait_for
 from page.web.test_page_visit import PLACES, Place, Visit
 from waiting import until
 
@@ -126,7 +126,7 @@ def test_a_responder_is_guided_and_calls(browser: Any, name: str, tmp_path: Path
                 )
                 assert page.inner_text("#errand") == "Ben sends you to Finn, in distress"
             look("1-sent")
-            pages[3].click("#help")  # at 400 %
+            pages[3].click("#help", delay=HELD_MS)  # at 400 %
             assert until(lambda: called(visit, "mayday"))
             visit.walk(0.1)
             for page in pages:

@@ -11,7 +11,7 @@ const $ = (id) => document.getElementById(id);
 export class Alarm {
   // `view` of the map; `show(place)`: its floor and place come into view; `open(id)`: the details; `level()`, `showLevel(level)`: of the map; `floor(level)`: its name
   constructor(view, { show, open, level, showLevel, floor }) {
-    Object.assign(this, { view, show, open, level, showLevel, floor, bell: new Bell($('invitation')), title: document.title, open_ids: null, count: 0, shown: null, before: null, blink: null, isTurned: false, named: '' });
+    Object.assign(this, { view, show, open, level, showLevel, floor, bell: new Bell($('invitation')), title: document.title, open_ids: null, count: 0, shown: null, before: null, blink: null, isTurned: false, isLeft: false, named: '' });
     this.bell.invite(true, 'This page cannot sound before it is tapped: tap here');
     $('mayday-open').onclick = () => this.open(this.shown);
     $('mayday-back').onclick = () => this.back();
@@ -28,7 +28,7 @@ export class Alarm {
       if (come.length) this.arrive(come[0], places.get(come[0].id));
       if (this.shown !== null && !this.open_ids.has(this.shown)) this.hide();
     }
-    this.count = count;
+    [this.count, this.first] = [count, isPast ? undefined : open[0]?.id];
     this.named = isPast || !open.length ? '' : ` ${open[0].name}`;
     this.mark();
   }
@@ -36,16 +36,23 @@ export class Alarm {
   arrive(row, place) {
     this.bell.ring();
     this.before ??= { level: this.level(), x: this.view.x, y: this.view.y, scale: this.view.scale, turn: this.view.turn };
-    this.shown = row.id;
+    Object.assign(this, { shown: row.id, isLeft: false });
     say($('mayday-text'), `▲ ${row.name}: mayday, ${place ? this.floor(place.level) : 'place not known'}`);
     $('mayday').hidden = false;
     $('mayday-back').hidden = !place;
     if (place) this.show(place);
   }
 
+  // The place stays in view, whatever comes to lie over the map, until the map is moved.
+  keep(places) {
+    const place = this.isLeft ? null : places.get(this.shown ?? this.first);
+    if (place?.level === this.level()) this.view.keep(place.x, place.y);
+  }
+
   back() {
     const { before } = this;
     this.hide();
+    this.isLeft = true;
     if (!before) return;
     const { level, ...seen } = before;
     this.showLevel(level);

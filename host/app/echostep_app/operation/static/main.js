@@ -8,7 +8,9 @@ import { PlanView } from '../static/plan.js';
 import { startTheme } from '../static/theme.js';
 import { View } from '../static/view.js';
 import { localise, missing, tr } from '../static/language.js';
+import { stayAwake } from '../static/live/awake.js';
 import { titled } from '../static/tools/titles.js';
+import { scaleBar } from '../static/tools/units.js';
 import { Alarm } from './alarm.js';
 import { Crews } from './crews.js';
 import { Floors } from './floors.js';
@@ -24,13 +26,13 @@ const TAP_PX = 28;  // a wearer within this distance of a tap is chosen
 const $ = (id) => document.getElementById(id);
 localise(document.body);
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas')), trails = new Trails($('trails'), $('trails-next'));
-const scene = { places: new Map(), rows: [], marks: [], level: 0, chosen: null };
+const scene = { places: new Map(), rows: [], marks: [], level: 0, chosen: null, isOld: false };
 const floors = new Floors((level) => showLevel(level));
 const list = new List(choose, (id) => sheet.signed((by) => link.send('send', { id, to: scene.chosen, by })));
 const alarm = new Alarm(view, { show: goTo, open: (id) => list.choose(id), level: () => wantedLevel, showLevel, floor: (level) => plan.levels[level].name });
 let plan = null, wantedLevel = 0, fitted = false, isAsked = false, drawnStamp = -1, undrawn = [], found = false;
 
-const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onState: connection, parse: parseFrame });
+const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onAge: connection, onUnsent: () => {}, isLive: () => scene.frame?.time?.live !== false && !timeBar.isPast, parse: parseFrame });
 const sheet = new Sheet((kind, fields) => link.send(kind, fields), hint);
 const showLegend = startLegend($('legend-button'), COMMAND, COMMAND_KEYS), crews = new Crews((act) => sheet.signed(act), (kind, fields) => link.send(kind, fields));
 const timeBar = new TimeBar((kind, fields) => link.send(kind, fields));
@@ -67,12 +69,22 @@ async function showLevel(level) {
   view.changed();
 }
 
-function connection(open) {
-  if (open) return;
+// What is left of the last frame while no other one comes: nobody is heard now, and the radii are of then.
+function connection() {
+  const { pulse, isOpen } = link, isOld = pulse.isSilent && pulse.isLive();
+  if (scene.frame && scene.isOld !== isOld) {
+    scene.isOld = isOld;
+    list.show(isOld ? scene.rows.map(then) : scene.rows, timeBar.isPast);
+    timeBar.show(scene.frame.time, scene.frame.unix_s, isOld);
+  }
+  ask();
+  if (!pulse.isSilent && isOpen) return scene.frame && status(scene.frame);
   $('words').dataset.status = 'broken';
-  $('mark').textContent = '✕';
-  say($('status-text'), 'this page is not connected');
+  put($('mark'), '✕');
+  say($('status-text'), isOld ? `no news for ${pulse.ago}` : 'this page is not connected');
 }
+
+const then = (row) => ({ ...row, state: ['mayday', 'asked'].includes(row.state) ? row.state : 'stale', words: row.words.replace(/(, )?heard now$/, '') });
 
 // Store a frame; it is drawn with the next animation frame. A hidden page draws nothing, so it reports no frame as drawn and gets no more of them.
 function frame(received) {
@@ -90,8 +102,8 @@ function frame(received) {
   if (received.marks) scene.marks = received.marks;
   crews.show(received.crews, received.unix_s, timeBar.isPast);
   list.details(received.details, received.distress);
-  status(received);
   scene.frame = received;
+  if (!link.pulse.isSilent) status(received);
   if (document.hidden) link.send('drawn', { seq: received.seq });  // nothing is drawn, but a mayday must still sound
   else undrawn.push(received.seq);
   ask();
@@ -142,11 +154,16 @@ function ask() {
 
 function draw() {
   isAsked = false;
+  alarm.keep(scene.places);
   if (drawnStamp !== view.stamp) {
     planView.draw(view);
     scale();
   }
-  const here = scene.rows.filter(({ id }) => scene.places.get(id)?.level === scene.level).map((row) => ({ ...row, place: scene.places.get(row.id) }));
+  const here = scene.rows.filter(({ id }) => scene.places.get(id)?.level === scene.level).map((row) => {
+    const place = scene.places.get(row.id);
+    return scene.isOld ? { ...then(row), place: { ...place, heading: NaN, radius: NaN, protection: NaN } } : { ...row, place };
+  });
+  planView.names(view, here.map(({ place }) => view.toScreen(place.x, place.y)));
   trails.paint(view, scene.level, painter.colour.trail);
   painter.paint(view, here, scene.chosen, trails.points(scene.chosen), scene.marks, scene.level);
   [drawnStamp, drawn.last] = [view.stamp, scene.frame ?? null];
@@ -157,9 +174,9 @@ function draw() {
 }
 
 function scale() {
-  const longest = 90 / view.scale, unit = 10 ** Math.floor(Math.log10(longest)), length = [5, 2, 1].find((k) => k * unit <= longest) * unit;
-  $('bar').style.width = `${length * view.scale}px`;
-  $('bar-text').textContent = length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;
+  const { px, text } = scaleBar(view);
+  $('bar').style.width = `${px}px`;
+  $('bar-text').textContent = text;
   $('needle').style.transform = `rotate(${-view.tilt}rad)`;
 }
 
@@ -196,7 +213,7 @@ function key(name) {
   return Boolean(does);
 }
 
-new Gestures($('map'), view, { takesPose: () => false, tapped, posing: () => {}, posed: () => {}, moved: () => sheet.close(), key });
+new Gestures($('map'), view, { takesPose: () => false, tapped, posing: () => {}, posed: () => {}, moved: () => { sheet.close(); alarm.isLeft = true; }, key });
 $('acknowledge').onclick = () => sheet.signed((by) => link.send('acknowledge', { id: scene.chosen, by }));
 $('closer').onclick = () => view.zoom(1.4);
 $('farther').onclick = () => view.zoom(1 / 1.4);
@@ -205,7 +222,9 @@ $('north').onclick = () => view.northUp();
 window.addEventListener('error', ({ message }) => fault(`This page has a fault: ${message}. Reload it.`));
 window.addEventListener('unhandledrejection', ({ reason }) => fault(`This page has a fault: ${reason?.message ?? reason}. Reload it.`));
 view.onChanged = ask;
+view.layOver(...['messages', 'floors', 'floor'].map($));
 startTheme($('theme'), () => { painter.recolour(); view.changed(); });
 view.resize($('map').clientWidth, $('map').clientHeight);
 new ResizeObserver(([{ contentRect }]) => view.resize(contentRect.width, contentRect.height)).observe($('map'));
+stayAwake();
 titled({ 'legend-button': 'L, ?', north: 'N', whole: 'W', 'crews-button': 'P' });

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What a commander can do at a place of the map: set a mark, or remove the one that is there; and the commander's name, with which marks and acknowledgements are signed.
 
+import { recall, remember } from '../static/storage.js';
 import { markWords } from '../static/marks.js';
 import { tr } from '../static/language.js';
 
@@ -10,8 +11,8 @@ const $ = (id) => document.getElementById(id);
 export class Sheet {
   constructor(send, onHint) {
     Object.assign(this, { send, onHint, at: null, mark: null });
-    $('me').value = stored();
-    $('me').onchange = () => { try { localStorage.setItem('commander', $('me').value); } catch { /* private browsing */ } };
+    $('me').value = recall('commander') ?? '';
+    $('me').onchange = () => remember('commander', $('me').value);
     for (const kind of KINDS) $(`mark-${kind}`).onclick = () => this.signed((by) => this.send('mark', { mark: kind, ...this.at, by })) && this.close();
     $('mark-remove').onclick = () => { this.send('unmark', { id: this.mark.id }); this.close(); };
     $('sheet-close').onclick = () => this.close();
@@ -41,8 +42,4 @@ export class Sheet {
   }
 
   close() { $('sheet').hidden = true; }
-}
-
-function stored() {
-  try { return localStorage.getItem('commander') ?? ''; } catch { return ''; }
 }

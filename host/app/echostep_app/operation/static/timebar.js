@@ -45,7 +45,8 @@ export class TimeBar {
     this.send('play', { playing: last.playing });
   }
 
-  show(time, unix_s) {
+  // `isOld`: no longer now, but the newest that is known.
+  show(time, unix_s, isOld) {
     if ($('bar-of-time').hidden !== !time) $('bar-of-time').hidden = !time;
     this.last = time;
     if (!time) return;
@@ -53,7 +54,7 @@ export class TimeBar {
     bar.max = end_s;
     if (!this.holding && !this.isOnItsWay(t_s)) bar.value = t_s;
     const day = new Date(1000 * unix_s).toLocaleTimeString('en-GB'), behind = live ? `${minutes(end_s - t_s)} ago` : `${minutes(t_s)} / ${minutes(end_s)}`;
-    const text = tr(now ? `${day}, now` : `${day}, ${behind}`);
+    const text = isOld ? day : tr(now ? `${day}, now` : `${day}, ${behind}`);
     put($('clock'), text);
     bar.setAttribute('aria-valuetext', text);
     put($('play'), playing ? '❚❚' : '▶');

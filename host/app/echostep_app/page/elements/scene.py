@@ -49,7 +49,7 @@ class PageScene:
 
     `arrived_ns`: host's monotonic clock when the bytes of the estimate arrived. `trail_count`: number of points of the trail up to this moment.
     `guidance`: of the run; the page's session adds guidance to a destination chosen on the page. `echoes_fit`: the plan explains the last echoes.
-    `truth`: the true position, where it is known. `gait`: that the wearer runs, in words.
+    `truth`: the true position, where it is known. `gait`: that the wearer runs, in words. `numbers`: of the places that fit (`PlaceNumbers`).
     """
 
     arrived_ns: int
@@ -68,6 +68,7 @@ class PageScene:
     alarm: ShownAlarm | None = None
     met: ShownMeeting | None = None
     gait: str = ""
+    numbers: tuple[int, ...] = ()
 
 
 def is_placed(estimate: Estimate, plan: Plan) -> bool:

@@ -8,13 +8,14 @@ One thread asks at a time.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from echostep.localization import Estimate, TrackStatus, claims_place
 from echostep.plan import Plan
 from echostep.ports.people.check_in import CheckIn
-from echostep_app.page.elements.likely_places import places_text, shown_places
+from echostep_app.page.elements.likely_places import numbered, places_text
 from echostep_app.page.elements.scene import PageScene, format_metres
 from echostep_app.plan.places.bearing import KNOWN_HEADING_RAD
 from echostep_app.plan.places.spaces import PlanSpaces
@@ -77,18 +78,18 @@ class Taps:
 
     def where(self, estimate: Estimate) -> str:
         """The place of an estimate in words; cached, because all pages of a live run show the same one."""
-        return self._words(estimate)[0]
+        return self._words(estimate, ())[0]
 
-    def places(self, estimate: Estimate) -> str:
-        """The places of its hypotheses as a sentence."""
-        return self._words(estimate)[1]
+    def places(self, estimate: Estimate, numbers: Sequence[int] = ()) -> str:
+        """The places of its hypotheses as a sentence, with their numbers."""
+        return self._words(estimate, numbers)[1]
 
-    def _words(self, estimate: Estimate) -> tuple[str, str]:
+    def _words(self, estimate: Estimate, numbers: Sequence[int]) -> tuple[str, str]:
         """Both, kept for the next page that asks."""
         if self._last[0] is not estimate:
             words = self.whereabouts.words
-            shown = shown_places(estimate)
-            places = tuple(words(h.x_m, h.y_m, h.level) for h in shown)
+            shown = numbered(estimate, numbers)
+            places = tuple(words(h.x_m, h.y_m, h.level) for _, h in shown)
             where = words(estimate.x_m, estimate.y_m, estimate.level) if claims_place(estimate) else ""
             self._last = estimate, where, places_text(shown, places, self._plan)
         return self._last[1:]

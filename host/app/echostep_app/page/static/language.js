@@ -3,6 +3,8 @@
 // catalogue a language. Key of an entry is the English text, without a full stop at its end: {n}, a single letter, stands for a number, {name} for a text,
 // which is translated too. A text that no entry has as a whole is taken apart at its separators. What has no entry stays as it is: names of rooms and people.
 
+import { recall, remember } from './storage.js';
+
 export const LANGUAGES = { en: 'English', de: 'Deutsch' };
 const PARTS = document.documentElement.dataset.parts?.split(' ') ?? ['pages', 'host'];  // what a page says itself, and what the host sends it; a later entry replaces an earlier one
 const SEPARATORS = [' · ', '; ', ': ', ', '], SENTENCE = /([.?!…]) /g, END = '\n';
@@ -18,7 +20,7 @@ document.documentElement.lang = language;
 
 // The language chosen on this page, by --lang, or in the browser; else English.
 function chosen() {
-  const liked = [stored(), document.documentElement.dataset.lang, ...navigator.languages.map((tag) => tag.split('-')[0])];
+  const liked = [recall('language'), document.documentElement.dataset.lang, ...navigator.languages.map((tag) => tag.split('-')[0])];
   return liked.find((name) => name in LANGUAGES) ?? 'en';
 }
 
@@ -99,11 +101,7 @@ export function startLanguage(select) {
   select.replaceChildren(...Object.entries(LANGUAGES).map(([name, text]) => new Option(text, name)));
   select.value = language;
   select.onchange = () => {
-    try { localStorage.setItem('language', select.value); } catch { /* private browsing */ }
+    remember('language', select.value);
     location.reload();
   };
-}
-
-function stored() {
-  try { return localStorage.getItem('language'); } catch { return null; }
 }

@@ -4,6 +4,7 @@
 import { Gestures } from './gestures.js';
 import { LIVE, LIVE_KEYS, startLegend } from './legend.js';
 import { stayAwake } from './live/awake.js';
+import { onHeld } from './held.js';
 import { Link } from './link.js';
 import { Painter } from './live/paint.js';
 import { Panel } from './live/panel.js';
@@ -25,13 +26,14 @@ import { startTheme } from './theme.js';
 import { View } from './view.js';
 import { localise, missing, tr } from './language.js';
 
+const BESIDE = 0.1;  // share of the free part, where only what lies over the map hides some of the plan
 const $ = (id) => document.getElementById(id);
 localise(document.body);
 
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas'));
 const panel = new Panel((level) => { setFollows(false); showLevel(level); });
-const scene = { frame: null, cloud: null, drawing: null, marks: [], trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0, layers: new Layers(), measure: new Measure() };
-let plan = null, title = '', mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, metNumber = 0, invited = false, connected = false, broken = false, awake = false, globe = null, linked = readLink(location.hash), moment = linked?.t_s ?? null;
+const scene = { frame: null, cloud: null, drawing: null, marks: [], trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0, isOld: false, layers: new Layers(), measure: new Measure() };
+let plan = null, title = '', mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, arrived = false, fittedScale = 0, wantedLevel = 0, metNumber = 0, invited = false, isLive = true, broken = false, awake = false, globe = null, linked = readLink(location.hash), moment = linked?.t_s ?? null;
 
 const taps = new Taps(view, {
   send: (kind, fields) => link.send(kind, fields), changed: () => { scene.tapped = taps.ghost; dirty = true; }, mayCheckIn: () => !$('here').hidden,
@@ -39,7 +41,8 @@ const taps = new Taps(view, {
   keptHeading: () => (scene.frame?.told?.heading_known ? scene.frame.told.heading_rad : null),
 });
 const link = new Link({
-  onHello: hello, onFrame: frame, onRefused: refused, onFailed: failed, onConsidered: (answer) => taps.considered(answer), onState: connection,
+  onHello: hello, onFrame: frame, onRefused: refused, onFailed: failed, onConsidered: (answer) => taps.considered(answer), onAge: connection, onUnsent: (text) => speech.unsent(text),
+  isLive: () => isLive && scene.frame?.ended == null,
 });
 const speech = new Speech($('speech'), $('sentence'), $('invitation'), $('unspoken'));
 const showLegend = startLegend($('legend-button'), LIVE, LIVE_KEYS);
@@ -68,7 +71,7 @@ async function hello(message) {
     view.resize($('map').clientWidth, $('map').clientHeight);
     fitted = false;
   }
-  const isLive = !message.replay && !message.takes_files;
+  isLive = !message.replay && !message.takes_files;
   $('here').hidden = $('sheet-here').hidden = $('help').hidden = !isLive;
   drops.show(message.takes_files, !message.replay);
   if (!isLive) panel.team([]);
@@ -101,7 +104,7 @@ function redraw() {
 // Another run on another plan answers at this address: what was chosen on the old plan means nothing on it.
 function startAnew() {
   Object.assign(scene, { frame: null, cloud: null, level: 0 });
-  fitted = false;
+  fitted = arrived = false;
   taps.drop();
   scene.measure.clear();
   replay.forget();
@@ -116,10 +119,21 @@ async function showLevel(level) {
   if (level !== wantedLevel) return;
   scene.level = level;
   planView.show(lines, plan.levels[level]);
-  if (!fitted) view.fit(planView.box);
-  fitted = true;
+  if (!fitted) {
+    view.fit(planView.box);
+    fitted = true;
+    fittedScale = view.scale;
+    arrive(scene.frame?.told);
+  }
   panel.floors(level, scene.frame?.told);
   view.changed();
+}
+
+// The first estimate in a view that nobody has moved yet.
+function arrive(estimate) {
+  if (arrived || !fitted || !estimate?.placed) return;
+  arrived = true;
+  if (view.scale === fittedScale && !linked) view.approach(estimate.x_m, estimate.y_m, planView.box);
 }
 
 function refused(reason) {
@@ -127,10 +141,20 @@ function refused(reason) {
   hint(reason, 6000);
 }
 
-function connection(open) {
-  connected = open;
-  if (open) broken = false;
-  else panel.status(broken ? 'ended' : 'waiting', broken ? 'ended by an error' : 'not connected');
+// What is left of the last frame while no other one comes: no way to go, no claim.
+function connection() {
+  const { pulse, isOpen } = link;
+  if (isOpen) broken = false;
+  dirty ||= pulse.isSilent || scene.isOld;
+  scene.isOld = pulse.isSilent;
+  if (pulse.isSilent && scene.frame?.guidance && pulse.isLive()) {
+    const text = 'Stop. There is nothing from the tracker.', stopped = { ...scene.frame.guidance, kind: 'stop', text, arrow_rad: null, left_m: null, spoken: text, spoken_s: null };
+    panel.guidance(stopped);
+    speech.update(stopped);
+  }
+  if (broken) panel.status('ended', 'ended by an error');
+  else if (pulse.isSilent && pulse.isLive()) panel.status('lost', `no position for ${pulse.ago}`);
+  else if (!isOpen) panel.status('waiting', 'not connected');
 }
 
 // `ended`: the reason is the error that ended the run.
@@ -174,7 +198,8 @@ function draw() {
   requestAnimationFrame(draw);
   const { told: estimate } = scene.frame ?? {};
   if (dirty && estimate && follows && !mode && !taps.ghost) {
-    if (estimate.placed && !view.shows(planView.box)) view.keep(estimate.x_m, estimate.y_m);
+    arrive(estimate);
+    if (estimate.placed && !view.shows(planView.box)) view.keep(estimate.x_m, estimate.y_m, view.shows(planView.box, view.all) ? BESIDE : undefined);
     if (estimate.level !== scene.level && estimate.level !== wantedLevel) showLevel(estimate.level);
   }
   const moved = drawnStamp !== view.stamp;
@@ -186,11 +211,11 @@ function draw() {
   }
   if (mode && mode !== 'measure' && !$('cross').hidden) aim(view.toMap(view.width / 2, view.height / 2), mode === 'here' ? turned : null);
   $('rooms').toggleAttribute('hidden', !scene.layers.shows('names'));
-  planView.names(view, estimate?.placed && estimate.level === scene.level ? view.toScreen(estimate.x_m, estimate.y_m) : null);
+  planView.names(view, [...(estimate?.placed ? [estimate] : []), ...(estimate?.hypotheses ?? [])].filter(({ level }) => level === scene.level).map(({ x_m, y_m }) => view.toScreen(x_m, y_m)));
   painter.paint(view, scene);
   if (dirty && scene.frame && plan) {
     panel.frame(scene.frame);
-    connection(connected);  // the frame may be older than the end of the connection
+    connection();  // the frame may be older than the end of the connection
     taps.undoable(scene.frame.undo);
     panel.floors(scene.level, estimate);
     replay.frame(scene.frame.play);
@@ -292,7 +317,7 @@ $('closer').onclick = () => view.zoom(1.4);
 $('farther').onclick = () => view.zoom(1 / 1.4);
 $('whole').onclick = fitWhole;
 $('north').onclick = () => view.northUp();
-$('help').onclick = () => link.send('call', { help: true });
+onHeld($('help'), () => link.send('call', { help: true }), () => hint('Hold Help! for a second.', 4000));
 $('fine').onclick = () => link.send('call', { help: false });
 $('end-guidance').onclick = () => link.send('go_nowhere');
 $('met').onchange = () => {
@@ -315,6 +340,7 @@ $('sheet-go').onclick = () => {
 };
 window.addEventListener('error', ({ message }) => panel.fault(`This page has a fault: ${message}. Reload it.`));
 window.addEventListener('unhandledrejection', ({ reason }) => panel.fault(`This page has a fault: ${reason?.message ?? reason}. Reload it.`));
+view.layOver(...['messages', 'floors', 'floor'].map($));
 startTheme($('theme'), () => { painter.recolour(); charts.paint(); redraw(); });
 view.resize($('map').clientWidth, $('map').clientHeight);
 new ResizeObserver(([{ contentRect }]) => view.resize(contentRect.width, contentRect.height)).observe($('map'));

@@ -5,11 +5,11 @@ const SVG = 'http://www.w3.org/2000/svg';
 const TILE_M = 30;  // side of a tile
 const LEAST_PX = { wall: 1, window: 4, door: 2, unknown: 2, stairs: 6, lift: 6, ramp: 6 };  // length of the shortest lines drawn, by kind
 const NOTHING_DRAWN = [-10, -10, 10, 10];  // m about the origin, shown where there is no plan
-const KEPT_PX = 22;  // distance of names from the wearer
+const KEPT_PX = 22;  // distance of names from signs
 
 export class PlanView {
   constructor(wallsGroup, roomsGroup) {
-    Object.assign(this, { wallsGroup, roomsGroup, tiles: [], rooms: [], lines: {}, kept: null, box: [0, 0, 10, 10], isEmpty: true });
+    Object.assign(this, { wallsGroup, roomsGroup, tiles: [], rooms: [], lines: {}, signs: [], box: [0, 0, 10, 10], isEmpty: true });
   }
 
   // `bytes`: of the server's lines/N; stairs and lifts keep their names where a room's would cover one.
@@ -38,14 +38,15 @@ export class PlanView {
     this.names(view);
   }
 
-  // Names of rooms that do not cover each other; one that would cover the pixel `kept` is moved aside.
-  names(view, kept = this.kept) {
-    this.kept = kept;
+  // Names of rooms that do not cover each other; one that would cover a sign, whose pixels are `signs`, is moved aside, or left out.
+  names(view, signs = this.signs) {
+    this.signs = signs;
     const taken = [], isFree = (sx, sy, half) => taken.every(([tx, ty, other]) => Math.abs(tx - sx) > other + half || Math.abs(ty - sy) > 18);
     for (const room of this.rooms) {
-      const [sx, at] = view.toScreen(room.x, room.y), covers = kept && Math.abs(kept[0] - sx) < room.half + KEPT_PX && Math.abs(kept[1] - at) < KEPT_PX;
-      const places = covers ? [-KEPT_PX, KEPT_PX].map((by) => kept[1] + by).sort((a, b) => Math.abs(a - at) - Math.abs(b - at)) : [at];
-      const sy = places.find((place) => isFree(sx, place, room.half));
+      const [sx, at] = view.toScreen(room.x, room.y), beside = signs.filter(([x]) => Math.abs(x - sx) < room.half + KEPT_PX);
+      const covered = (y) => beside.find(([, sign]) => Math.abs(sign - y) < KEPT_PX), sign = covered(at);
+      const places = sign ? [-KEPT_PX, KEPT_PX].map((by) => sign[1] + by).sort((a, b) => Math.abs(a - at) - Math.abs(b - at)) : [at];
+      const sy = places.find((place) => isFree(sx, place, room.half) && !covered(place));
       const shown = sy !== undefined && sx > -room.half && sx < view.width + room.half && sy > -10 && sy < view.height + 10;
       if (shown) taken.push([sx, sy, room.half]);
       setNew(room.text, 'visibility', shown ? 'visible' : 'hidden');

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: MIT
-// The view: the part of the map on the screen. Converts map metres (x east, y north) to CSS pixels and back.
+// The view: the part of the map on the screen. Converts map metres (x east, y north) to CSS pixels and back. What lies over the map leaves a free part of it.
+
+const ABOUT_M = 15, MUCH_NEARER = 1.25;  // of the wearer in the first view; than the whole floor, if it is to be shown; assumed
+const SIGN_PX = 24;
+const LEAST_FREE = 0.05;  // share of the map; less is as good as nothing
 
 export class View {
   constructor() {
-    Object.assign(this, { x: 0, y: 0, scale: 20, turn: 0, north: Math.PI / 2, width: 1, height: 1, stamp: 0, onChanged: () => {} });
+    Object.assign(this, { x: 0, y: 0, scale: 20, turn: 0, north: Math.PI / 2, width: 1, height: 1, stamp: 0, over: [], onChanged: () => {} });
   }
 
   changed() {
@@ -62,31 +66,63 @@ export class View {
 
   pan(dx, dy) { this.grip([0, 0], [dx, dy]); }
 
+  // What lies over the map. Messages that would take too much of it are scrolled, by keys too.
+  layOver(messages, ...others) {
+    this.over = [messages, ...others];
+    new ResizeObserver(() => { messages.tabIndex = messages.scrollHeight > messages.clientHeight ? 0 : -1; }).observe(messages);
+  }
+
+  // The largest part of the map, in pixels [left, top, right, bottom], that no element of `over` covers.
+  get free() {
+    let free = this.all;
+    const map = this.over[0]?.parentElement.getBoundingClientRect(), area = ([l, t, r, b]) => Math.max(r - l, 0) * Math.max(b - t, 0);
+    for (const element of this.over) {
+      const box = element.getBoundingClientRect(), [l, t, r, b] = free;
+      const [left, top, right, bottom] = [box.left - map.left, box.top - map.top, box.right - map.left, box.bottom - map.top];
+      if (!box.width || !box.height || left >= r || right <= l || top >= b || bottom <= t) continue;
+      free = [[l, bottom, r, b], [l, t, r, top], [right, t, r, b], [l, t, left, b]].reduce((best, one) => (area(one) > area(best) ? one : best));
+    }
+    return area(free) > LEAST_FREE * this.width * this.height ? free : this.all;
+  }
+
+  // A box of the map fills the free part.
   fit([x0, y0, x1, y1]) {
-    const c = Math.abs(Math.cos(this.turn)), s = Math.abs(Math.sin(this.turn)), w = x1 - x0, h = y1 - y0;
+    const [l, t, r, b] = this.free, c = Math.abs(Math.cos(this.turn)), s = Math.abs(Math.sin(this.turn)), w = x1 - x0, h = y1 - y0;
     const margin = 16;
-    this.scale = Math.min((this.width - 2 * margin) / Math.max(c * w + s * h, 1), (this.height - 2 * margin) / Math.max(s * w + c * h, 1));
+    this.scale = Math.min((r - l - 2 * margin) / Math.max(c * w + s * h, 1), (b - t - 2 * margin) / Math.max(s * w + c * h, 1));
     this.scale = Math.min(Math.max(this.scale, 0.02), 80);
-    [this.x, this.y] = [(x0 + x1) / 2, (y0 + y1) / 2];
-    this.changed();
+    this.centre((x0 + x1) / 2, (y0 + y1) / 2);
+  }
+
+  // The first view: the whole `box`, or what is about the place where that is much less.
+  approach(x, y, box) {
+    const [l, t, r, b] = this.free, scale = Math.sqrt((r - l) * (b - t)) / (2 * ABOUT_M);
+    this.fit(box);
+    if (scale < MUCH_NEARER * this.scale) return;
+    this.scale = scale;
+    this.centre(x, y);
   }
 
   centre(x, y) {
+    const [l, t, r, b] = this.free;
     [this.x, this.y] = [x, y];
-    this.changed();
+    this.pan((l + r - this.width) / 2, (t + b - this.height) / 2);
   }
 
-  shows([x0, y0, x1, y1]) {
+  get all() { return [0, 0, this.width, this.height]; }
+
+  // Whether a box of the map is within a part of the screen.
+  shows([x0, y0, x1, y1], [l, t, r, b] = this.free) {
     return [[x0, y0], [x1, y0], [x0, y1], [x1, y1]].every(([x, y]) => {
       const [sx, sy] = this.toScreen(x, y);
-      return sx >= 0 && sy >= 0 && sx <= this.width && sy <= this.height;
+      return sx >= l && sy >= t && sx <= r && sy <= b;
     });
   }
 
-  // Pan so that a map point is in the inner part of the screen.
-  keep(x, y) {
-    const [sx, sy] = this.toScreen(x, y), mx = 0.3 * this.width, my = 0.3 * this.height;
-    const dx = Math.min(this.width - mx - sx, 0) + Math.max(mx - sx, 0), dy = Math.min(this.height - my - sy, 0) + Math.max(my - sy, 0);
+  // Pan so that a map point is in the free part, a `share` of it and a sign's size away from its edges.
+  keep(x, y, share = 0.3) {
+    const [l, t, r, b] = this.free, [sx, sy] = this.toScreen(x, y), [mx, my] = [r - l, b - t].map((size) => Math.max(share * size, Math.min(SIGN_PX, size / 2)));
+    const dx = Math.min(r - mx - sx, 0) + Math.max(l + mx - sx, 0), dy = Math.min(b - my - sy, 0) + Math.max(t + my - sy, 0);
     if (dx || dy) this.pan(dx, dy);
   }
 }

@@ -43,9 +43,11 @@ export class Painter {
     else if (path.length && !guidance.own) this.flag(view, path.at(-1));
     if (shows('beacons')) this.beacons(view, (scene.frame?.beacons ?? []).filter((beacon) => beacon.level === scene.level));
     if (estimate?.placed && estimate.level === scene.level) {  // without a place nothing is drawn that looks like one
-      if (shows('echoes')) for (const line of scene.frame.beams) this.echoLine(view, line);
-      this.protection(view, estimate);
-      this.ellipse(view, estimate);
+      if (!scene.isOld) {  // of then only the place
+        if (shows('echoes')) for (const line of scene.frame.beams) this.echoLine(view, line);
+        this.protection(view, estimate);
+        this.ellipse(view, estimate);
+      }
       this.wearer(view, estimate);
     }
     for (const place of estimate?.hypotheses ?? []) if (place.level === scene.level) this.hypothesis(view, place);

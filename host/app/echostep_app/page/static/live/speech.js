@@ -2,6 +2,7 @@
 // Speech: speaks the newest sentence of the guidance when switched on, and alarms always, these with a tone and vibration where the device has them.
 // What a browser has not begun to speak is written on the page with the reason. A screen reader gets each sentence of the guidance in any case.
 
+import { recall, remember } from '../storage.js';
 import { Bell } from '../bell.js';
 import { inUnits } from '../tools/units.js';
 import { language, tr } from '../language.js';
@@ -16,7 +17,7 @@ export class Speech {
     button.hidden = !window.speechSynthesis;
     button.onclick = () => this.set(!this.on, true);
     invitation.onclick = () => this.say('This page can speak now.');
-    this.set(stored() === 'on', false);
+    this.set(recall('speech') === 'on', false);
   }
 
   invite(isLive) {
@@ -27,7 +28,7 @@ export class Speech {
     this.on = on && !this.button.hidden;
     this.button.setAttribute('aria-pressed', String(this.on));
     if (!chosen) return;
-    try { localStorage.setItem('speech', on ? 'on' : 'off'); } catch { /* private browsing */ }
+    remember('speech', on ? 'on' : 'off');
     if (!on) window.speechSynthesis.cancel();
     else if (this.last) this.say(this.last.text);
   }
@@ -61,6 +62,12 @@ export class Speech {
     this.bell.ring();
   }
 
+  // A call for help that has not gone out, whether speech is switched on or not.
+  unsent(text) {
+    this.say(text);
+    this.bell.ring();
+  }
+
   say(text) {
     clearTimeout(this.late);
     if (!window.speechSynthesis) return text && this.fail('this browser cannot speak');
@@ -80,8 +87,4 @@ export class Speech {
     if (this.trouble.textContent !== text) this.trouble.textContent = text;
     this.trouble.hidden = !reason;
   }
-}
-
-function stored() {
-  try { return localStorage.getItem('speech'); } catch { return null; }
 }

@@ -10,7 +10,7 @@ const COLUMNS = ['left', 'right', 'foot', 'pings', 'heading'];
 const CHARTS = [
   { title: 'range, m', series: [['left', 'left', 'left'], ['right', 'right', 'right']], dots: true },
   { title: 'rate, /s', series: [['foot', 'here', 'foot'], ['pings', 'goal', 'pings']] },
-  { title: 'heading, °', series: [['heading', 'ink', 'heading']], dots: true },
+  { title: 'heading from north, °', series: [['heading', 'ink', 'heading']], dots: true },
 ];
 const LEFT_PX = 34, TOP_PX = 15;
 
@@ -74,7 +74,7 @@ export class Charts {
 
   chart({ title, series, dots }, rows, x, top, height, width) {
     const { pen } = this, of = (row, name) => row[1 + COLUMNS.indexOf(name)], values = rows.flatMap((row) => series.map(([name]) => of(row, name))).filter(Number.isFinite);
-    const [low, high] = title.startsWith('heading') ? [-180, 180] : [0, Math.max(1, ...values)], y = (v) => top + TOP_PX + (height - TOP_PX) * (high - v) / (high - low);
+    const [low, high] = title.startsWith('heading') ? [0, 360] : [0, Math.max(1, ...values)], y = (v) => top + TOP_PX + (height - TOP_PX) * (high - v) / (high - low);
     Object.assign(pen, { font: '11px system-ui, sans-serif', textAlign: 'left', fillStyle: this.colours().faint, strokeStyle: this.colours().line, lineWidth: 1 });
     pen.strokeRect(LEFT_PX, top + TOP_PX, width - LEFT_PX, height - TOP_PX);
     pen.fillText(high.toFixed(high < 10 ? 1 : 0), 2, top + TOP_PX + 9);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The dialog "More": colours, layers, charts, measuring, link, picture, GeoJSON, units, full screen; what happened on the walk, and what the page has said.
 
+import { recall, remember } from '../storage.js';
 import { geojson, picture, save } from './export.js';
 import { linkOf } from './hash.js';
 import { Heard } from './heard.js';
@@ -35,7 +36,7 @@ export class Tools {
     new Heard($('messages'), $('heard'));
     this.wire();
     this.wireLayers();
-    this.setCharts(stored() === 'on');
+    this.setCharts(recall('charts') === 'on');
     Object.assign(page.charts, { onEvents: (events) => this.events(events), isWanted: () => dialog.open });
   }
 
@@ -67,7 +68,7 @@ export class Tools {
     charts.on = on;
     $('over-time').hidden = !on;
     $('tool-charts').setAttribute('aria-pressed', String(on));
-    try { localStorage.setItem('charts', on ? 'on' : 'off'); } catch { /* private browsing */ }
+    remember('charts', on ? 'on' : 'off');
     charts.read();
     charts.paint();
   }
@@ -117,8 +118,4 @@ export class Tools {
       return tick;
     }));
   }
-}
-
-function stored() {
-  try { return localStorage.getItem('charts'); } catch { return null; }
 }

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Metres or feet: all lengths are written in metres, and this turns them into what was chosen, in any sentence.
 
+import { recall, remember } from '../storage.js';
+
 const FOOT_M = 0.3048, INCH_CM = 2.54;  // [international yard and pound agreement, 1959]
 const LENGTH = /(-?\d+(?:\.\d+)?) (m|cm|metres?)(?![\w²])/g, PLACE = /x (-?\d+\.\d), y (-?\d+\.\d) m(?!\w)/g;
 
-let isFeet = stored() === 'ft';
+let isFeet = recall('unit') === 'ft';
 export const chosenUnit = () => (isFeet ? 'ft' : 'm');
 
 export function chooseUnit(unit) {
   isFeet = unit === 'ft';
-  try { localStorage.setItem('unit', unit); } catch { /* private browsing */ }
+  remember('unit', unit);
 }
 
 export function inUnits(text) {
@@ -28,8 +30,4 @@ export function scaleBar(view) {
   const length = [5, 2, 1].find((k) => k * ten <= longest) * ten, inches = Math.round(12 * length * 10) / 10;
   const text = isFeet ? (length < 1 ? `${inches} in` : `${length} ft`) : length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;
   return { px: length * unit_m * view.scale, text };
-}
-
-function stored() {
-  try { return localStorage.getItem('unit'); } catch { return null; }
 }

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+// Requests that may not be lost. Each has an identity and is kept, over a reload too, until the server has answered; after each new connection it is sent
+// again, and the server carries it out once. What came of it is written into #outbox: sending, sent, not sent and why.
+
+import { tr } from './language.js';
+import { remember } from './storage.js';
+
+const LABELS = {
+  call: 'Help!', check_in: 'I am here', undo: 'Undo', met: 'I met a teammate', at_point: 'At the point', no_tap: 'Undo', go_to: 'Go here', go_nowhere: 'End of the guidance',
+  acknowledge: 'Acknowledge', send: 'Send', mark: 'Mark', unmark: 'Remove', crew: 'Crew', crew_does: 'Crew',
+};
+const FRESH_S = { check_in: 5, undo: 5, met: 5, at_point: 2, no_tap: 2 };  // what is said of this moment is wrong later; assumed
+const STORED_S = 600;  // what an earlier page left behind is sent for so long; assumed
+const SLOW_S = 1, SHOWN_MS = 6000, REFUSED_MS = 20000, REMIND_S = 10, MOST_NEWS = 2;
+const $ = (id) => document.getElementById(id);
+
+export class Outbox {
+  // `transmit(request)`: sends it if there is a connection; `onUnsent(text)`: a call for help has not gone out, each REMIND_S; `serverNow_s()`: or null
+  constructor(transmit, onUnsent, serverNow_s) {
+    Object.assign(this, { transmit, onUnsent, serverNow_s, prefix: `request ${location.pathname} `, run: null, kept: [], news: [] });
+    this.kept = stored(this.prefix).filter((request) => age_s(request) < STORED_S);
+    setInterval(() => this.tick(), 1000 * SLOW_S);
+  }
+
+  static keeps(kind) { return kind in LABELS; }
+
+  put(kind, fields) {
+    const request = { ...fields, kind, request: crypto.getRandomValues(new Uint32Array(4)).join('-'), run: this.run, at_ms: Date.now(), reminded: 0 };
+    const now_s = this.serverNow_s();
+    if (kind in FRESH_S && now_s !== null) request.until_s = now_s + FRESH_S[kind];  // it may lie in the wire
+    this.kept.push(request);
+    remember(this.prefix + request.request, JSON.stringify(request));
+    this.transmit(request);
+    if (kind === 'call') this.show();
+  }
+
+  // A new connection. Numbers of wearers and places mean nothing in another run; a call for help does.
+  greet(run) {
+    this.run = run;
+    for (const request of [...this.kept]) {
+      if (request.kind !== 'call' && request.run && request.run !== run) this.drop(request, 'not sent: the program has been started anew');
+      else if (this.isFresh(request)) this.transmit(request);
+    }
+  }
+
+  answered({ request: identity, reason }) {
+    const request = this.kept.find(({ request: own }) => own === identity);
+    if (!request) return;
+    const isCall = request.kind === 'call', news = reason ? `not sent: ${reason}` : 'sent';
+    this.drop(request, isCall || (!reason && age_s(request) > SLOW_S) ? news : '');  // other refusals are the page's hint
+  }
+
+  isFresh(request) {
+    const fresh = age_s(request) < (FRESH_S[request.kind] ?? Infinity);
+    if (!fresh) this.drop(request, 'not sent: too late by now, do it again');
+    return fresh;
+  }
+
+  drop(request, news) {
+    this.kept = this.kept.filter((one) => one !== request);
+    remember(this.prefix + request.request, null);
+    if (news) this.news.push({ text: `${label(request)}: ${news}`, ends: Date.now() + (news === 'sent' ? SHOWN_MS : REFUSED_MS) });
+    this.show();
+  }
+
+  tick() {
+    for (const request of [...this.kept]) this.isFresh(request);
+    const call = this.kept.find(({ kind, reminded, ...request }) => kind === 'call' && age_s(request) - reminded >= REMIND_S);
+    if (call) {
+      call.reminded = age_s(call);
+      this.onUnsent(`Not sent yet: ${label(call)}`);
+    }
+    if (this.kept.length || this.news.length) this.show();
+  }
+
+  show() {
+    const waiting = this.kept.filter((request) => request.kind === 'call' || age_s(request) > SLOW_S).map((request) => `${label(request)}: sending for ${Math.round(age_s(request))} s`);
+    this.news = this.news.filter(({ ends }) => ends > Date.now()).slice(-MOST_NEWS);
+    const text = [...waiting, ...this.news.map(({ text: news }) => news)].map(tr).join('. ');
+    if ($('outbox').textContent !== text) $('outbox').textContent = text;
+    $('outbox').hidden = !text;
+  }
+}
+
+const label = ({ kind, help }) => (kind === 'call' && !help ? 'I am all right' : LABELS[kind]);
+const age_s = ({ at_ms }) => (Date.now() - at_ms) / 1000;
+
+function stored(prefix) {
+  try {
+    const keys = Object.keys(localStorage).filter((key) => key.startsWith(prefix));
+    return keys.map((key) => JSON.parse(localStorage[key])).sort((a, b) => a.at_ms - b.at_ms);
+  } catch { return []; }
+}

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: MIT
+"""What feeds a page stands still, or the wire to it does: both pages say so, date what they show, and lose no request, in Chromium."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.sync.client import ClientConnection
+
+from echostep.ports.people.check_in import Call
+from echostep_app.page.mailbox import Mailbox
+from page.browser import HELD_MS, loaded_page, overflow, wait_for
+from page.frames import BEAT, PLAN, opened_url, scene, served
+from page.outage import Feeder, Wire, outage
+from page.web.test_page_sizes import SIZES, UNREACHED
+from waiting import PATIENCE_S, until
+
+READY = {
+    "wearer": "window.echostep?.last?.told && echostep.scene.frame.guidance && document.querySelector('#walls path')",
+    "commander": "window.echostep?.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length",
+}
+FRESH = {"wearer": "tracking, 0.2 m", "commander": "connected"}
+STATUS = "document.querySelector('#status-text').textContent"
+SLEPT_S = 3600
+SLEEPS = f"(() => {{ const now = Date.now; Date.now = () => now() + {1000 * SLEPT_S}; }})()"  # the clock of a browser's computer that slept
+WITHIN_S = 5.0  # of which the tick of the page and the answer of the browser have their share
+DATED = """(id) => getComputedStyle(document.querySelector(id), '::before').content"""
+BEATS = "echostep.link.pulse.heard"
+OUTBOX = "document.querySelector('#outbox').textContent"
+
+
+def shown(page: Any, role: str) -> str:
+    """What a page says that gets nothing any more, and how long it says so."""
+    wait_for(page, "document.body.dataset.silent === 'present'")
+    words = {"wearer": "no position for ", "commander": "no news for "}[role]
+    said = str(page.evaluate(STATUS))
+    assert said.startswith(words)
+    assert page.inner_text("#silence").startswith("No answer from ")
+    return said
+
+
+def dated(page: Any, role: str) -> None:
+    """Nothing is shown as of now, and what cannot act is off and says why."""
+    for part in {"wearer": ("#place", "#health"), "commander": ("#summary", "#list li:nth-child(5) .said")}[role]:
+        assert " ago: " in page.evaluate(DATED, part), part
+    off = {"wearer": "#here", "commander": "#floors button"}[role]
+    assert page.evaluate(f"document.querySelector('{off}').disabled")
+    assert page.get_attribute(off, "title") == "Off while the program does not answer"
+    if role == "wearer":
+        assert page.inner_text("#cue") == "Stop. There is nothing from the tracker."
+        assert page.evaluate("document.querySelector('#words').dataset.status") == "lost"
+    else:
+        assert "heard now" not in page.inner_text("#list")
+        assert not page.locator("#list [data-state='tracking']").count()
+
+
+def ask(page: Any, role: str) -> None:
+    """A call for help, or the acknowledgement of a mayday."""
+    if role == "wearer":
+        page.click("#help", delay=HELD_MS)
+        wait_for(page, f"{OUTBOX}.startsWith('Help!: sending for ')")
+        return
+    page.fill("#me", "Ben")
+    page.click("#list li:first-child button")
+    page.click("#acknowledge")
+    wait_for(page, f"{OUTBOX}.startsWith('Acknowledge: sending for ')")
+
+
+CARRIED_OUT: dict[str, Callable[[str], bool]] = {
+    "wearer": lambda line: line == "Call(help=True)",
+    "commander": lambda line: "/ack/" in line,
+}
+
+
+def check(browser: Any, role: str, kind: str, size: tuple[int, int], tmp_path: Path, *, reloads: bool = True) -> None:
+    with Feeder(role) as feeder, Wire(feeder.url) as wire:
+        page = loaded_page(browser, wire.url, {"viewport": {"width": size[0], "height": size[1]}}, READY[role])
+        wait_for(page, f"{STATUS} === '{FRESH[role]}'")
+        assert page.is_hidden("#silence")
+        with outage(kind, feeder, wire):
+            page.evaluate(SLEEPS if kind == "asleep" else "0")
+            said = shown(page, role)
+            late_s = page.evaluate("echostep.link.pulse.age_s") - SLEPT_S * (kind == "asleep")
+            assert (f"for {SLEPT_S // 60} min" in said) == (kind == "asleep")
+            dated(page, role)
+            ask(page, role)
+            page.screenshot(path=tmp_path / f"{role}-{kind}-{size[0]}.png")
+            assert overflow(page) == (0, 0)
+            assert page.evaluate(UNREACHED) == []
+        wait_for(page, f"{STATUS} === '{FRESH[role]}' && !document.body.dataset.silent")
+        wait_for(page, f"!{OUTBOX}.includes('sending')")
+        assert not page.evaluate("echostep.link.outbox.kept.length")
+        assert until(lambda: any(map(CARRIED_OUT[role], feeder.lines)))
+        if reloads:  # what was answered does not come again
+            page.reload()
+            wait_for(page, f"{READY[role]} && echostep.link.isOpen")
+        assert sum(map(CARRIED_OUT[role], feeder.lines)) == 1
+        assert not [wrong for wrong in page.wrong if "WebSocket" not in wrong and "net::" not in wrong]
+        page.context.close()
+    assert late_s < WITHIN_S
+
+
+@pytest.mark.parametrize("role", READY)
+def test_a_program_that_stands_still_is_told_and_a_request_arrives_once(
+    browser: Any, role: str, tmp_path: Path
+) -> None:
+    check(browser, role, "stopped", (360, 740), tmp_path, reloads=False)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("kind", ["stopped", "frozen", "cut", "asleep"])
+@pytest.mark.parametrize("role", READY)
+def test_every_outage_at_every_size(browser: Any, role: str, kind: str, size: tuple[int, int], tmp_path: Path) -> None:
+    check(browser, role, kind, size, tmp_path)
+
+
+@pytest.mark.long
+def test_a_call_survives_a_reload_and_the_end_of_the_program(browser: Any) -> None:
+    """The page is loaded again from its own computer while nothing answers; what answers then is another run."""
+    with Feeder("wearer") as feeder, Feeder("wearer") as other, Wire(feeder.url) as wire:
+        page = loaded_page(browser, wire.url, {"viewport": {"width": 360, "height": 740}}, READY["wearer"])
+        with outage("stopped", feeder, wire):
+            shown(page, "wearer")
+            page.select_option("#goal", "map")
+            page.keyboard.press("Escape")
+            ask(page, "wearer")
+            page.select_option("#goal", label="Meeting")
+            wire.cut()
+            wire.lead_to(other.url)
+            wire.mend()
+            page.reload()
+            wait_for(page, READY["wearer"])
+            assert until(lambda: other.lines)
+            wait_for(page, f"{OUTBOX}.includes('Go here: not sent: the program has been started anew')")
+            assert other.lines == ["Call(help=True)"]
+        assert not page.evaluate("Object.keys(localStorage).filter((key) => key.startsWith('request')).length")
+        page.context.close()
+
+
+def test_a_run_that_hangs_behind_its_server_is_told_and_what_has_nothing_to_say_is_not_silent(browser: Any) -> None:
+    with served(Mailbox(PLAN, "echostep live", replay=False)) as (server, mailbox):
+        page = loaded_page(browser, server.url, {}, "window.echostep?.link.isOpen")
+        wait_for(page, f"{BEATS} > 3")  # no estimate yet
+        assert page.is_hidden("#silence")
+        mailbox.publish(scene())
+        mailbox.exchange.note_alive()
+        wait_for(page, "document.body.dataset.silent === 'present' && document.querySelector('#here').disabled")
+        mailbox.end("mean error 0.06 m")  # after which nothing new is expected
+        wait_for(page, "!document.body.dataset.silent && echostep.last.ended")
+        assert page.is_hidden("#silence")
+        assert page.is_enabled("#here")
+        assert not page.wrong
+        page.context.close()
+
+
+def test_a_beat_comes_at_once_and_a_request_is_carried_out_once() -> None:
+    with served() as (server, mailbox), opened_url(server.url) as page:
+        page.recv(timeout=PATIENCE_S)  # hello
+        assert BEAT in str(ClientConnection.recv(page, PATIENCE_S))
+        call = {"kind": "call", "help": True, "request": "12-34-56-78"}
+        for _ in range(2):
+            page.send(json.dumps(call))
+            assert json.loads(page.recv(timeout=PATIENCE_S)) == {
+                "kind": "answered",
+                "request": "12-34-56-78",
+                "reason": "",
+            }
+        with opened_url(server.url) as again:  # after a new connection
+            again.recv(timeout=PATIENCE_S)
+            again.send(json.dumps(call))
+            assert json.loads(again.recv(timeout=PATIENCE_S))["reason"] == ""
+        assert list(mailbox.pop_check_ins()) == [Call(help=True)]
+        page.send(json.dumps(call | {"help": "please", "request": "12-34-56-79"}))
+        assert "another version" in json.loads(page.recv(timeout=PATIENCE_S))["reason"]
+        late = {
+            "kind": "check_in",
+            "x_m": 2,
+            "y_m": 7.5,
+            "sd_m": 0.5,
+            "request": "12-34-56-81",
+            "until_s": time.monotonic() - 0.1,
+        }
+        page.send(json.dumps(late))
+        assert json.loads(page.recv(timeout=PATIENCE_S))["reason"].startswith("It came too late")
+        page.send(json.dumps(late | {"request": "12-34-56-82", "until_s": time.monotonic() + PATIENCE_S}))
+        assert not json.loads(page.recv(timeout=PATIENCE_S))["reason"]
+        assert len(list(mailbox.pop_check_ins())) == 1
+        page.send(json.dumps(late | {"request": "12-34-56-82"}))  # again, later: it was carried out
+        assert not json.loads(page.recv(timeout=PATIENCE_S))["reason"]
+        page.send(json.dumps({"kind": "check_in", "x_m": 2, "y_m": 8.5, "sd_m": 0.5, "request": "12-34-56-80"}))
+        assert "inside a wall" in json.loads(page.recv(timeout=PATIENCE_S))["reason"]
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_help_is_held_and_a_brush_is_none(browser: Any, *, held: bool) -> None:
+    with served() as (server, mailbox):
+        mailbox.publish(scene())
+        page = loaded_page(browser, server.url, {}, "window.echostep?.last?.told")
+        if held:
+            page.focus("#help")
+            page.keyboard.press("Enter")  # no glove presses a key
+            wait_for(page, f"{OUTBOX} === 'Help!: sent'")
+        else:
+            page.click("#help")
+            wait_for(page, "document.querySelector('#hint').textContent === 'Hold Help! for a second.'")
+        assert list(mailbox.pop_check_ins()) == [Call(help=True)] * held
+        page.context.close()
