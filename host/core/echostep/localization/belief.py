@@ -35,6 +35,9 @@ BY_CHANCE = 0.3  # of a search's mass, that stays elsewhere when it has found a 
 CROSSED_M = 4.0  # from one way through a wall, within which another is through the same one; path of a cloud through it
 # Log of the share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more
 THROUGH = math.log(1 / 100)
+EDGE = math.log(
+    1 / 2
+)  # log of the share that no wall has cut off on CROSSED_M, above which walls only gather a cloud: the jambs of a door
 LEAST = 1e-4  # probability of a cloud below which it ends
 LEAST_LOG_ODDS = -700.0  # whose exponential is a number
 
@@ -83,11 +86,11 @@ class CrossedWalls:
             self._log_passed = 0.0
             return 0.0
         self._log_passed = self._log_passed * math.exp(-path_m / CROSSED_M) + log_passed
-        if self._log_passed > THROUGH:
+        if self._log_passed > EDGE:
             return 0.0
-        self._crossed.append(at)
-        through, self._log_passed = self._log_passed, 0.0
-        return through
+        if self._log_passed < THROUGH:
+            self._crossed.append(at)
+        return log_passed
 
 
 class Belief:

@@ -282,9 +282,7 @@ class MapFilter:
             each.weigh(share * cloud.search(move, pings, self._model), 0.0)
             return
         # By the spacing of sparse particles
-        model, alone = (
-            (self._blurred, unplanned.blurred) if cloud.is_scattered else (self._model, unplanned.either)
-        )
+        model, alone = (self._blurred, unplanned.blurred) if cloud.is_scattered else (self._model, unplanned.either)
         evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
         # Where there were several places, a light one may have lost its particles on one level by chance.
         if cloud.is_on_any_level and cloud.is_in_one_place:

@@ -33,6 +33,7 @@ from echostep.localization.particles.kernels import (
 )
 from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
+from echostep.walls.index import NO_WALLS
 from echostep.walls.tile_points import CORNER, EDGE
 
 TRAVEL_M, ALIKE, UNPLANNED = 0.05, 0.2, 0.6  # path between two pings; density like the one before, and by no plan

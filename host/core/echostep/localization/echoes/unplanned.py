@@ -43,7 +43,6 @@ TURN_SD_RAD = 0.05  # change of the normal on a metre of path
 VIEW_M = 2.5  # mean length of the path between two changes of a view: walls, doors, corners
 POSES = 400  # drawn on the floor: their mean is then good to 5 %
 BIN_M = 0.05  # width of a bin of ranges
-HEARD = 0  # kind of a ping with an echo; 1: silent
 LEAST_POWER = 0.01  # share of independent information below which a ping is left out: it changes nothing
 # Turns on a segment at which its pings count half: headings between its ends are interpolated
 TURNING_RAD = math.radians(45.0)  # as weights of particles
@@ -239,8 +238,7 @@ def _loss(turn_rad: float, half_rad: float) -> float:
 class UsablePings:
     """Pings from nearly one place repeat each other's errors: each counts by the path since the one before, up to `own` after `correlation_m`.
 
-    An echo that was missed has another error than one that was heard: each counts by the path since the last one of its kind. Before a ranger was
-    heard nothing tells that it works: its silence counts from its first echo on.
+    Before a ranger was heard nothing tells that it works: it counts from its first echo on.
     """
 
     def __init__(self, background: Background, echo: EchoSettings, blur_m: float = 0.0) -> None:
@@ -249,9 +247,10 @@ class UsablePings:
         self.odometer = Odometer()
         self.set_ranger_model(background, echo)
         self._x_m, self._y_m = 0.0, 0.0  # end of the path in the walk frame
-        self._last_ping_m = np.full(
-            (2, 2), -math.inf
-        )  # mark on the path at the last ping of each ranger, heard and silent
+        self._last_ping_m = [
+            -math.inf,
+            -math.inf,
+        ]  # mark on the path at each ranger's last ping, from its first echo on
 
     def set_ranger_model(self, background: Background, echo: EchoSettings) -> None:
         """Use these ranger settings, and this density of echoes without a plan, from the next segment on."""
@@ -261,7 +260,7 @@ class UsablePings:
     @property
     def silent_m(self) -> float:
         """Length of the path since the last ping."""
-        return self.odometer.since_m(float(self._last_ping_m.max()))
+        return self.odometer.since_m(max(self._last_ping_m))
 
     def take(self, measured: MeasuredSegment) -> tuple[PingBatch, UnplannedDensities]:
         """The pings that bring information, with their share of the segment and their axis in the walk frame, and their densities without a plan."""
@@ -272,9 +271,8 @@ class UsablePings:
             share = np.clip((measured.t_s - segment.t0_s) / span_s, 0.0, 1.0)
         axis = segment.heading0_rad + share * segment.turn_rad + measured.off_heading_rad
         range_m = np.where(np.isnan(measured.range_m), 0.0, measured.range_m)
-        path_m = self.odometer.path_m + share * length
-        travel_m, alike_m = self._travels(measured.ranger, (range_m <= 0.0).astype(np.int64), path_m)
-        power = self._own * np.minimum(alike_m / self._correlation_m, 1.0) / _loss(segment.turn_rad, TURNING_RAD)
+        travel_m = self._travels(measured.ranger, range_m, self.odometer.path_m + share * length)
+        power = self._own * np.minimum(travel_m / self._correlation_m, 1.0) / _loss(segment.turn_rad, TURNING_RAD)
         self.odometer.add(length)
         used = power > LEAST_POWER
         way_x_m, way_y_m = segment.way_m(share)
@@ -287,13 +285,12 @@ class UsablePings:
             unplanned.stray, unplanned.missed, unplanned.alike, np.exp(unplanned.either),
         ), unplanned  # fmt: skip
 
-    def _travels(self, ranger: Ints, silent: Ints, path_m: Floats) -> tuple[Floats, Floats]:
-        """Length of the path (k,) between each ping and the one before it of the same ranger, and the one before it of the same kind."""
-        last_m, since_m, alike_m = self._last_ping_m, np.empty(len(path_m)), np.empty(len(path_m))
-        for k, (which, kind, mark_m) in enumerate(zip(ranger.tolist(), silent.tolist(), path_m.tolist(), strict=True)):
-            since_m[k], alike_m[k] = mark_m - last_m[which].max(), mark_m - last_m[which, kind]
-            if kind == HEARD or last_m[which, HEARD] > -math.inf:
-                last_m[which, kind] = mark_m
-            else:
-                alike_m[k] = 0.0
-        return since_m, alike_m
+    def _travels(self, ranger: Ints, range_m: Floats, path_m: Floats) -> Floats:
+        """Length of the path (k,) between each ping and the one before it of the same ranger; 0 before its first echo."""
+        last_m, travel_m = self._last_ping_m, np.zeros(len(path_m))
+        for k, (which, heard_m, mark_m) in enumerate(
+            zip(ranger.tolist(), range_m.tolist(), path_m.tolist(), strict=True)
+        ):
+            if heard_m > 0.0 or last_m[which] > -math.inf:
+                travel_m[k], last_m[which] = mark_m - last_m[which], mark_m
+        return travel_m

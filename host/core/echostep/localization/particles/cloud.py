@@ -269,14 +269,16 @@ class Cloud(Particles):
         """
         self.keep(systematic(np.exp(self.log_weight), float(self._rng.random()), self._settings.largest))
         self.is_gathered = False
-        noise, from_x_m, from_y_m = self._rng.standard_normal((3, len(self.x_m))), self.x_m, self.y_m
+        noise = self._rng.standard_normal((3, len(self.x_m)))
+        from_x_m: Floats = self.x_m
+        from_y_m: Floats = self.y_m
         self.turn_rad += move.turn_sd_rad * noise[2]
         c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
         self.x_m = from_x_m + c * move.dx_m - s * move.dy_m + move.sd_m * noise[0]
         self.y_m = from_y_m + s * move.dx_m + c * move.dy_m + move.sd_m * noise[1]
         crosses = np.zeros(len(self.x_m), np.bool_)
         mark_crossings(from_x_m, from_y_m, self.x_m, self.y_m, walls, crosses)
-        self.log_weight = -self._settings.wall_cost * crosses
+        self.log_weight = np.where(crosses, -self._settings.wall_cost, 0.0)
         if self.sheet and change and math.isfinite(change.height_sd_m):
             set_levels_by_pressure(self.x_m, HeightArrays(self.z_m, self.lag_m), change.height_m, self.sheet)
         if self.grid is not None:
