@@ -50,9 +50,9 @@ class Start:
     >>> import echostep
     >>> echostep.Start()  # anywhere in the building
     Start()
-    >>> at_the_door = echostep.Start(echostep.plan.Pose(2.0, 7.5, 0.0), sd_m=0.5)
+    >>> at_the_door = echostep.Start(echostep.plan.Pose(2.0, 7.5, 0.0), sd_m=0.3)
     >>> at_the_door
-    Start(pose=Pose(x_m=2.0, y_m=7.5, heading_rad=0.0, level=0), sd_m=0.5)
+    Start(pose=Pose(x_m=2.0, y_m=7.5, heading_rad=0.0, level=0), sd_m=0.3)
     >>> echostep.replay("walk.mcap", "demo.json", start=at_the_door)
     <Walk 'walk.mcap': 5 estimates, 2.0 s, 100% tracking, on 'Demo office'>
     """
