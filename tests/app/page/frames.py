@@ -86,7 +86,12 @@ def fetched(url: str) -> Answer:
 def opened_url(url: str) -> ClientConnection:
     origin = Origin("/".join(url.split("/")[:3]))
     return connect(
-        f"ws{url[4:]}socket", origin=origin, max_size=None, open_timeout=PATIENCE_S, create_connection=PageConnection
+        f"ws{url[4:]}socket",
+        origin=origin,
+        max_size=None,
+        max_queue=None,  # as a browser, which reads on whatever its page does: beats would fill a short queue
+        open_timeout=PATIENCE_S,
+        create_connection=PageConnection,
     )
 
 

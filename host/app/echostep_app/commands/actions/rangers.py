@@ -15,7 +15,7 @@ from echostep.localization import echo_of
 from echostep.recording import open_parts
 from echostep.tracker import Tracker
 from echostep_app.commissioning.calibrate import Sections, read_sections, write_sections
-from echostep_app.commissioning.rangers.faults import SWAPPED
+from echostep_app.commissioning.rangers.faults import LEAST_GAIN, SWAPPED, explained
 from echostep_app.commissioning.rangers.poses import PosedPings, SwappedTracker, posed_pings
 from echostep_app.commissioning.rangers.report import RangerReport, report
 from echostep_app.session.metadata import plan_of
@@ -42,7 +42,7 @@ def walk_now(ports: PortOptions, folder: Path, console: Console) -> Path:
 def calibrate_rangers(paths: list[Path], tracking: TrackingOptions, out: Path, console: Console) -> None:
     """Judge and fit the rangers of a walk; raises EchostepError where the walk cannot be used, or a ranger has a fault."""
     tracker, pings = tracked(paths, tracking)
-    if pings.believed < SURELY <= _swapped(paths, tracker).believed:
+    if _fit_better_swapped(paths, tracker, pings):
         raise EchostepError(f"{SWAPPED} {NOTHING}")
     found = report_of(tracker, pings)
     for line in found.lines:
@@ -73,7 +73,14 @@ def merged(sections: Sections, found: RangerReport) -> Sections:
     return sections | {name: sections.get(name, {}) | values for name, values in found.values.items()}
 
 
-def _swapped(paths: list[Path], tracker: Tracker) -> PosedPings:
-    """The same pings if each ranger's are the other one's."""
+def _fit_better_swapped(paths: list[Path], tracker: Tracker, pings: PosedPings) -> bool:
+    """Whether the plan explains a walk surely better if each ranger's pings are the other one's."""
     other = SwappedTracker(tracker.plan, tracker.start, tracker.settings)
-    return posed_pings(other, open_parts(paths).portions())
+    swapped, walls, usual = (
+        posed_pings(other, open_parts(paths).portions()),
+        tracker.laid_out.walls,
+        tracker.settings.echo,
+    )
+    if swapped.believed < SURELY:
+        return False
+    return pings.believed < SURELY or explained(swapped, walls, usual) > explained(pings, walls, usual) + LEAST_GAIN

@@ -60,6 +60,13 @@ def faults_of(pings: PosedPings, known: list[KnownPings], walls: Walls, base: Ec
     return turned or [fault for k, own in enumerate(known) for fault in _echo_faults(own, k, base)]
 
 
+def explained(pings: PosedPings, walls: Walls, base: EchoSettings) -> float:
+    """Mean log-density of the pings by the plan, at the places where they were sent; -inf without one."""
+    wide = replace(base, sd_m=POSE_SD_M)
+    log_p = [_log_p(pings, pings.ranger == which, walls, 0.0, wide) for which in (LEFT, RIGHT)]
+    return float(np.concatenate(log_p).mean()) if len(pings.ranger) else -math.inf
+
+
 def _better_axis(pings: PosedPings, which: int, walls: Walls, settings: EchoSettings) -> int:
     """Degrees ahead of abeam at which a ranger surely explains its pings better; 0 if none."""
     own = pings.ranger == which
