@@ -35,9 +35,8 @@ BY_CHANCE = 0.3  # of a search's mass, that stays elsewhere when it has found a 
 CROSSED_M = 4.0  # from one way through a wall, within which another is through the same one; path of a cloud through it
 # Log of the share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more
 THROUGH = math.log(1 / 100)
-EDGE = math.log(
-    1 / 2
-)  # log of the share that no wall has cut off on CROSSED_M, above which walls only gather a cloud: the jambs of a door
+# Log of the share that no wall has cut off on CROSSED_M, above which walls only gather a cloud: the jambs of a door
+EDGE = math.log(1 / 2)
 LEAST = 1e-4  # probability of a cloud below which it ends
 LEAST_LOG_ODDS = -700.0  # whose exponential is a number
 

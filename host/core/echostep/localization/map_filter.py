@@ -236,7 +236,7 @@ class MapFilter:
         self._riding.add(measured.height_m, self._gaps.pause_s + measured.segment.t1_s - measured.segment.t0_s)
 
     def _scatter(self, segment: PathSegment, change: HeightChange, *, is_long: bool) -> None:
-        """Spread the clouds over an unobserved segment: straight through the building, or over a long way that nobody knows."""
+        """Spread the clouds over an unobserved segment: straight through the building, or over a long way that is not known."""
         walls = NO_WALLS if is_long else self._building.walls.index
         for each in self.belief.clouds:
             each.cloud.scatter(move_of(segment), walls, change)

@@ -202,13 +202,13 @@ def crosses_wall(ax: float, ay: float, bx: float, by: float, index: WallIndex) -
     return False
 
 
-@lean_kernel
-def mark_crossings(
-    from_x: Floats, from_y: Floats, to_x: Floats, to_y: Floats, index: WallIndex, crosses: Bools
-) -> None:
-    """Mark which moves (n,) cross a wall in `crosses` (n,)."""
+@kernel
+def crossings(from_x: Floats, from_y: Floats, to_x: Floats, to_y: Floats, index: WallIndex) -> Bools:
+    """Which moves (n,) cross a wall."""
+    crosses = np.empty(len(to_x), np.bool_)
     for i in range(len(to_x)):
         crosses[i] = crosses_wall(from_x[i], from_y[i], to_x[i], to_y[i], index)
+    return crosses
 
 
 @part

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The small faults of a first day: rangers that wake late, fall silent, are dead or missing, somebody beside the wearer; no foot.
+"""The small faults of a first day: rangers that wake late, fall silent, are dead or missing, a body beside the wearer; no board.
 
 In: a walk as the filter gets it. Out: the same with other pings. Owns nothing.
 """
@@ -16,7 +16,7 @@ from echostep.path import MeasuredSegment
 from echostep_studies.bench.echo_changes import LEFT, RIGHT, one_ranger
 from echostep_studies.bench.walks import SimulatedWalk
 
-PASSER_M, PASSER_S = 0.5, 3.0  # distance of somebody beside the wearer, and for how long
+PASSER_M, PASSER_S = 0.5, 3.0  # distance of a body beside the wearer, and for how long
 
 
 def _numbered(walk: SimulatedWalk, change: Callable[[MeasuredSegment, int], MeasuredSegment]) -> SimulatedWalk:
@@ -44,7 +44,7 @@ def silent_in_the_middle(walk: SimulatedWalk) -> SimulatedWalk:
 
 
 def passer_by(walk: SimulatedWalk) -> SimulatedWalk:
-    """Somebody stands on the left of the wearer at the start."""
+    """A body answers on the left of the wearer at the start."""
     until_s = walk.segments[0].segment.t0_s + PASSER_S
 
     def change(s: MeasuredSegment, _before: int) -> MeasuredSegment:

@@ -38,11 +38,10 @@ NOTES = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SimpleRow:
-    """One walk; shares of its estimates, errors (m)."""
+class SimpleFigures:
+    """Of walks of a name: shares of the estimates, errors (m)."""
 
     name: str
-    seed: int
     tracking: float
     lost: float
     false_tracking: float
@@ -53,18 +52,17 @@ class SimpleRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SimpleSummary:
+class SimpleRow(SimpleFigures):
+    """One walk."""
+
+    seed: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimpleSummary(SimpleFigures):
     """All walks of a name: means, RMS of the RMSE, worst error; shares in percent."""
 
-    name: str
     runs: int
-    tracking: float
-    lost: float
-    false_tracking: float
-    mean_m: float
-    rmse_m: float
-    worst_m: float
-    laid_m: float
 
 
 def simple_run(names: Sequence[str], seed: int) -> list[SimpleRow]:

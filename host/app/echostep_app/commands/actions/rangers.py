@@ -76,11 +76,8 @@ def merged(sections: Sections, found: RangerReport) -> Sections:
 def _fit_better_swapped(paths: list[Path], tracker: Tracker, pings: PosedPings) -> bool:
     """Whether the plan explains a walk surely better if each ranger's pings are the other one's."""
     other = SwappedTracker(tracker.plan, tracker.start, tracker.settings)
-    swapped, walls, usual = (
-        posed_pings(other, open_parts(paths).portions()),
-        tracker.laid_out.walls,
-        tracker.settings.echo,
-    )
+    swapped = posed_pings(other, open_parts(paths).portions())
     if swapped.believed < SURELY:
         return False
+    walls, usual = tracker.laid_out.walls, tracker.settings.echo
     return pings.believed < SURELY or explained(swapped, walls, usual) > explained(pings, walls, usual) + LEAST_GAIN

@@ -69,7 +69,7 @@ async function showLevel(level) {
   view.changed();
 }
 
-// What is left of the last frame while no other one comes: nobody is heard now, and the radii are of then.
+// What is left of the last frame while no other one comes: no row is heard now, and the radii are of then.
 function connection() {
   const { pulse, isOpen } = link, isOld = pulse.isSilent && pulse.isLive();
   if (scene.frame && scene.isOld !== isOld) {

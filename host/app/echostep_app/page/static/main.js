@@ -129,7 +129,7 @@ async function showLevel(level) {
   view.changed();
 }
 
-// The first estimate in a view that nobody has moved yet.
+// The first estimate in a view that is still as it was fitted.
 function arrive(estimate) {
   if (arrived || !fitted || !estimate?.placed) return;
   arrived = true;

@@ -247,10 +247,8 @@ class UsablePings:
         self.odometer = Odometer()
         self.set_ranger_model(background, echo)
         self._x_m, self._y_m = 0.0, 0.0  # end of the path in the walk frame
-        self._last_ping_m = [
-            -math.inf,
-            -math.inf,
-        ]  # mark on the path at each ranger's last ping, from its first echo on
+        # Mark on the path at each ranger's last ping, from its first echo on
+        self._last_ping_m = [-math.inf, -math.inf]
 
     def set_ranger_model(self, background: Background, echo: EchoSettings) -> None:
         """Use these ranger settings, and this density of echoes without a plan, from the next segment on."""

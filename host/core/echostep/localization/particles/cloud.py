@@ -47,7 +47,7 @@ from echostep.localization.particles.start import ANY_LEVEL, Air, Start, draw_po
 from echostep.localization.settings import CloudSettings
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
-from echostep.walls.index import NO_WALLS, WallIndex, mark_crossings
+from echostep.walls.index import NO_WALLS, WallIndex, crossings
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never that large
@@ -276,8 +276,7 @@ class Cloud(Particles):
         c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
         self.x_m = from_x_m + c * move.dx_m - s * move.dy_m + move.sd_m * noise[0]
         self.y_m = from_y_m + s * move.dx_m + c * move.dy_m + move.sd_m * noise[1]
-        crosses = np.zeros(len(self.x_m), np.bool_)
-        mark_crossings(from_x_m, from_y_m, self.x_m, self.y_m, walls, crosses)
+        crosses = crossings(from_x_m, from_y_m, self.x_m, self.y_m, walls)
         self.log_weight = np.where(crosses, -self._settings.wall_cost, 0.0)
         if self.sheet and change and math.isfinite(change.height_sd_m):
             set_levels_by_pressure(self.x_m, HeightArrays(self.z_m, self.lag_m), change.height_m, self.sheet)

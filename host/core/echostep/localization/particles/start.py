@@ -15,16 +15,14 @@ from echostep.arrays import Floats, Ints
 from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.plan import Pose
 from echostep.walls.floor import Floor
-from echostep.walls.index import NO_WALLS, WallIndex, mark_crossings
+from echostep.walls.index import NO_WALLS, WallIndex, crossings
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 ANY_LEVEL = -1  # level of a start that is not known
 # A stated start is sometimes wrong: a tap beside the place, a body that does not face the way the toes point. Assumed:
 STATED = 0.99  # probability that a stated start is right: its spread is never all that is possible
-WIDE_SD_M, WIDE_SD_RAD = (
-    0.9,
-    math.radians(30.0),
-)  # its standard deviations besides the stated ones: a stride, a foot that is set down turned
+# Standard deviations of a wrong start besides the stated ones: a stride, a foot that is set down turned
+WIDE_SD_M, WIDE_SD_RAD = 0.9, math.radians(30.0)
 WIDE_SHARE = 0.07  # of the particles are such: enough to be found by the first echoes
 TURN_AROUND_RAD = 1.5  # a heading with a greater standard deviation is drawn evenly from all
 
@@ -98,8 +96,7 @@ def draw_poses(
         on_sheet = _levels(pose.level, count, sheet) * sheet.pitch_m
         x, east = x + on_sheet, east + on_sheet
     log_weight = np.where(is_wide, math.log((1.0 - STATED) / WIDE_SHARE), math.log(STATED / (1.0 - WIDE_SHARE)))
-    is_behind = np.zeros(count, np.bool_)
-    mark_crossings(east, np.full(count, pose.y_m), x, y, walls, is_behind)
+    is_behind = crossings(east, np.full(count, pose.y_m), x, y, walls)
     return x, y, heading, log_weight + UNPLANNED_DOOR * is_behind
 
 
