@@ -11,9 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from echostep.arrays import Floats
-from echostep.localization.beacons.beliefs import BeaconMeasurement
-from echostep.localization.beacons.initialisation import (
+from echostep.aiding.beacons.beliefs import BeaconMeasurement
+from echostep.aiding.beacons.initialisation import (
     APART_M,
     BEARING_SD_RAD,
     FEWEST,
@@ -24,15 +23,16 @@ from echostep.localization.beacons.initialisation import (
     PATH_M,
     READING_SD_M,
 )
-from echostep.localization.beacons.model import BeaconModel
-from echostep.localization.beacons.slam import (
+from echostep.aiding.beacons.model import BeaconModel
+from echostep.aiding.beacons.slam import (
     ACQUITTED_FIT,
     FIT_SHARE,
     LOST_FIT,
     MISFIT,
     RECOVERED_FIT,
 )
-from echostep.localization.beacons.step import FIRST, LOCATE_EVERY, LOCATED_SD_M, MOST_READINGS
+from echostep.aiding.beacons.step import FIRST, LOCATE_EVERY, LOCATED_SD_M, MOST_READINGS
+from echostep.arrays import Floats
 from echostep.localization.limits import THREE_SD2
 from naive.beacons import Belief, Particle, recover, reweight
 

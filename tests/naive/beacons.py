@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.arrays import Floats
-from echostep.localization.beacons.beliefs import BeaconMeasurement
-from echostep.localization.beacons.model import BeaconModel
-from echostep.localization.beacons.slam import (
+from echostep.aiding.beacons.beliefs import BeaconMeasurement
+from echostep.aiding.beacons.model import BeaconModel
+from echostep.aiding.beacons.slam import (
     CLOSE_BEARING_M2,
     GREATEST_ODDS,
     KNOWN_AXIS_RAD2,
@@ -23,6 +22,7 @@ from echostep.localization.beacons.slam import (
     RECOVERY_WIDTH,
     UNKNOWN_AXIS_RAD2,
 )
+from echostep.arrays import Floats
 from echostep.localization.limits import THREE_SD2
 from naive import walls as naive_walls
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from sys import float_info
 from typing import Any
 
+from echostep.aiding import BeaconSettings
 from echostep.board.calibration import GyroSettings, Imus, ImuSettings, RangerSettings
 from echostep.errors import EchostepError
 from echostep.fields import checked, short
@@ -20,7 +21,7 @@ from echostep.foot.steps import FootSettings
 from echostep.foot.trunk_path import GaitSettings
 from echostep.legs.heading import CompassErrors
 from echostep.legs.trunk_path import WearerSettings
-from echostep.localization import BeaconSettings, ClimbSettings, CloudSettings, EchoSettings
+from echostep.localization import ClimbSettings, CloudSettings, EchoSettings
 from echostep.timing.timeline import MtxTiming
 
 

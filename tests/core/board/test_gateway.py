@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from echostep.aiding.beacons.initialisation import locate_beacon
 from echostep.board.frames import encode
 from echostep.board.gateway import MOST_BEACONS, NEW_CLOCK_MESSAGES, Gateway
 from echostep.board.messages import Beacon, Identity
 from echostep.errors import EchostepError
-from echostep.localization.beacons.initialisation import locate_beacon
 from echostep.ports.chunks import BOARD, GATEWAY, Chunk, portion_of
 from echostep_app.board.gateway_words import gateway_words
 from echostep_app.ports.serial_ports import SerialPorts

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echostep.aiding import BeaconPlace, BeaconState
 from echostep.arrays import Floats
-from echostep.localization import BeaconPlace, BeaconState, Estimate
+from echostep.localization import Estimate
 from echostep.plan import Level, Plan
 from echostep_app.plan.routing import Route
 from echostep_app.printing.picture_files import save_picture

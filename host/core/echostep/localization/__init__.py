@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The particle filter on the plan: path and pings -> position.
 
-In: `MeasuredSegment`s and beacon readings. Out: `Estimate`s: position, covariance, heading, status. Owns the particles and the beacon map.
+In: `MeasuredSegment`s. Out: `Estimate`s: position, covariance, heading, status. Owns the particles.
 The names below are its public interface; only studies and tests look behind it.
 """
 
@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING
 from echostep.additions import face
 
 if TYPE_CHECKING:
-    from echostep.localization.beacon_map import BeaconPlace, BeaconState
-    from echostep.localization.beacons.model import BeaconSettings
     from echostep.localization.building import Building
     from echostep.localization.cloud_estimate import Right, estimate_of
     from echostep.localization.drawn_places import DrawnPlaces
@@ -44,15 +42,10 @@ if TYPE_CHECKING:
     from echostep.localization.particles.places import LikelyPlace
     from echostep.localization.particles.start import ANY_LEVEL, STATED, Air, Start
     from echostep.localization.settings import CloudSettings, FilterSettings
-    from echostep.localization.team.meeting import TimedMeeting, carries_position, on_the_way, start_at
-    from echostep.localization.team.meeting_memory import MeetingEffect, MeetingNews, MeetingQueue
-    from echostep.localization.team.shared_beacons import MOST_TEAMMATES, TeamBeaconMap, shared_beacons
 
 __getattr__ = face(
     __name__,
     {
-        "beacon_map": "BeaconPlace BeaconState",
-        "beacons.model": "BeaconSettings",
         "building": "Building",
         "cloud_estimate": "Right estimate_of",
         "drawn_places": "DrawnPlaces",
@@ -65,8 +58,5 @@ __getattr__ = face(
         "particles.places": "LikelyPlace",
         "particles.start": "ANY_LEVEL STATED Air Start",
         "settings": "CloudSettings FilterSettings",
-        "team.meeting": "TimedMeeting carries_position on_the_way start_at",
-        "team.meeting_memory": "MeetingEffect MeetingNews MeetingQueue",
-        "team.shared_beacons": "MOST_TEAMMATES TeamBeaconMap shared_beacons",
     },
 )

@@ -99,6 +99,7 @@ class Belief:
         """Prior probabilities: that the trunk is in the first cloud, if it is in this building; that the plan is the building's."""
         self.tracked = CloudHypothesis(cloud, _log(prior))
         self.search: CloudHypothesis | None = None
+        self.searches_begun = 0
         self.log_elsewhere = _log(1.0 - prior)
         self._log_odds = _log(plan_fits) - _log(1.0 - plan_fits)
         # Probability that a cloud predicts the echoes, in this building and in another
@@ -159,6 +160,7 @@ class Belief:
 
         It replaces an earlier search that has found nothing.
         """
+        self.searches_begun += 1
         if self.search is not None:
             self._move(self.search, 1.0)
         if self.tracked.cloud.is_searching:

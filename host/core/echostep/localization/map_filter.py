@@ -1,21 +1,18 @@
 # SPDX-License-Identifier: MIT
 """The map filter: measured path segments and beacon readings in, estimates out.
 
-In: `MeasuredSegment`s, each with the pings triggered on it, in order of time; the beacons' readings. Out: an `Estimate` at the end of each segment.
-Owns the clouds, the beacon map, and the probability that each cloud is right.
+In: `MeasuredSegment`s, each with the pings triggered on it, in order of time. Out: an `Estimate` at the end of each segment.
+Owns the clouds, and the probability that each is right.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from echostep.angles import mean_angle
-from echostep.board.gateway import BeaconReading
-from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.belief import PLAN_FITS, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
 from echostep.localization.building import Building
 from echostep.localization.cloud_estimate import Right, estimate_of, weight_about
@@ -34,11 +31,8 @@ from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.kernels import systematic
 from echostep.localization.particles.start import ANY_LEVEL, STATED, Air, Start
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
-from echostep.localization.team.meeting import WRONG, Meeting, start_at
-from echostep.localization.team.meeting_memory import MeetingEffect, MeetingMemory, moved_by
-from echostep.localization.team.meetings import weigh_by
 from echostep.localization.window import RecentWay
-from echostep.path import MeasuredSegment, PathSegment
+from echostep.path import MeasuredSegment, Odometer, PathSegment
 from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import NO_WALLS
@@ -60,13 +54,13 @@ class MapFilter:
     ) -> None:  # fmt: skip
         """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at the start."""
         self._settings = settings or FilterSettings()
-        self._building = building
+        self.building = building
         self._rng = rng
         self._model, self._blurred = echo_models(self._settings)
         echo = with_plan_error(self._settings)
         self._pings = UsablePings(building.background(self._model), echo, self._settings.cloud.rough_m)
         self._bias = RangeBias(self.echo.sd_m)
-        cloud = self._new_cloud(start, walk_heading_rad)
+        cloud = self.new_cloud(start, walk_heading_rad)
         prior = (1.0 if cloud.is_searching else STATED) if building.has_walls else BY_DEFINITION
         self.belief = Belief(cloud, prior, PLAN_FITS if building.has_walls else 1.0)
         self._crossed = CrossedWalls()
@@ -75,8 +69,6 @@ class MapFilter:
         self._way = RecentWay()  # since the last gap
         self._riding = RidingHeight(HEIGHT_SD_M)
         self._barometer_starts = 0  # before the last height by pressure
-        self._met = MeetingMemory(self._pings.odometer)
-        self.beacon_map = BeaconMap(building.walls, self._settings.beacons, rng)
         if start.after_pause:
             self.belief.leave(UNOBSERVED_DOUBT)
             self._search_beside(start.air, walk_heading_rad)
@@ -92,15 +84,20 @@ class MapFilter:
             self._settings = replace(self._settings, echo=echo)
             self._model, self._blurred = echo_models(self._settings)
             self._bias = RangeBias(echo.sd_m)
-            self._pings.set_ranger_model(self._building.background(self._model), with_plan_error(self._settings))
+            self._pings.set_ranger_model(self.building.background(self._model), with_plan_error(self._settings))
+
+    @property
+    def odometer(self) -> Odometer:
+        """Of the wearer's path."""
+        return self._pings.odometer
 
     @property
     def cloud(self) -> Cloud:
         """The cloud that is tracked."""
         return self.belief.tracked.cloud
 
-    def update(self, measured: MeasuredSegment, readings: Sequence[BeaconReading] = ()) -> Estimate:
-        """Propagate along a segment, reweight by its pings, height change and beacon readings, and resample; returns the estimate at its end."""
+    def update(self, measured: MeasuredSegment) -> Estimate:
+        """Propagate along a segment, reweight by its pings and height change, and resample; returns the estimate at its end."""
         segment, belief = measured.segment, self.belief
         gap = self._gaps.ended(measured)
         self._follow_barometer(measured)
@@ -115,53 +112,12 @@ class MapFilter:
             self._search_beside(self.cloud.air, segment.heading1_rad)
         if not segment.unobserved:
             self._follow(measured, change)
-        if not self.cloud.is_searching:
-            self.beacon_map.update(self.cloud, segment, readings, bool(readings) and self.plan_supports)
+        self._aid(segment)
         self._search_if_doubted(segment.heading1_rad)
         return self._estimate(segment)
 
-    def meet(self, meeting: Meeting) -> MeetingEffect:
-        """Weigh the clouds by the place of a teammate beside the wearer, and decide which of them is tracked.
-
-        Agreement raises the cloud's probability to at most the meeting's: both may stem from one source. A contradiction moves a doubted cloud, a
-        believed one only when a second teammate contradicts too and that is likelier. A radio range beyond PLACE_M moves nothing; ranges to two
-        teammates' beacons can begin a search.
-        """
-        area_m2 = self._building.floor.area_m2
-        refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._met.refusal(meeting)
-        if refusal is not None:
-            return refusal
-        searching = [each for each in self.belief.clouds if each.cloud.is_searching]
-        fits = [weigh_by(each, meeting, area_m2) for each in self.belief.clouds]
-        for each in searching:
-            if not each.cloud.is_searching:
-                self.belief.find(each)
-        if meeting.beacon is not None:
-            self.belief.normalise()
-            return MeetingEffect.USED if fits[0] >= PROBABLE else MeetingEffect.CONTRADICTS
-        tracked, wrong = self.belief.tracked, WRONG[meeting.status]
-        if fits[0] >= PROBABLE:
-            self.belief.raise_to(tracked, min(fits[0], 1.0 - wrong))
-            self._met.agree()
-            return MeetingEffect.USED
-        moved = moved_by(meeting, self.belief.probability(tracked), self._met.contradict())
-        if moved is None:
-            return MeetingEffect.CONTRADICTS
-        self._met.agree()
-        self._track_from(meeting, moved, search_fits=fits[-1] >= PROBABLE)
-        return MeetingEffect.MOVED
-
-    def _track_from(self, meeting: Meeting, right: float, *, search_fits: bool) -> None:
-        """Track the search from now on if it agrees with a meeting, otherwise a new cloud about the teammate, with any heading."""
-        belief = self.belief
-        if belief.search is not None and search_fits:
-            belief.tracked, belief.search = belief.search, belief.tracked
-            belief.search.table = None
-        else:
-            at = start_at(meeting)
-            start = Start(Pose(at.x_m, at.y_m, 0.0, at.level), at.sd_m, math.pi)
-            belief.tracked.cloud = self._new_cloud(start, 0.0)
-        belief.raise_to(belief.tracked, right)
+    def _aid(self, segment: PathSegment) -> None:
+        """Weigh the tracked cloud, which is at the end of a segment, by what aids the filter there [`echostep.aiding`]: nothing."""
 
     def turn_walk_frame(self, by_rad: float) -> None:
         """Rotate all particles: the heading in the walk frame has changed while the wearer's heading on the map has not."""
@@ -169,9 +125,9 @@ class MapFilter:
             each.cloud.turn_walk_frame(by_rad)
         self._way.clear()
 
-    def _new_cloud(self, start: Start, walk_heading_rad: float) -> Cloud:
+    def new_cloud(self, start: Start, walk_heading_rad: float) -> Cloud:
         """A cloud from a start; a search, if the place is unknown."""
-        s, b = self._settings, self._building
+        s, b = self._settings, self.building
         start = b.drawn.widened(start)
         cloud = Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor, b.walls.index)
         if is_unknown(start) and len(b.floor.x_m):
@@ -180,14 +136,14 @@ class MapFilter:
 
     def _table(self) -> tuple[GridCells, RangeMemory]:
         """The cells of a grid, and the density of pings without a plan that is as inexact as the cells."""
-        unplanned = RangeMemory(self._building.background(self._model), inexact(self._settings))
-        return self._building.cells(self._model), unplanned
+        unplanned = RangeMemory(self.building.background(self._model), inexact(self._settings))
+        return self.building.cells(self._model), unplanned
 
     @property
     def plan_supports(self) -> bool:
         """Whether the last metres of echoes confirm the cloud by the plan."""
         return (
-            self._building.has_walls
+            self.building.has_walls
             and self.belief.probability(self.belief.tracked) > BELIEVED
             and self._pings.silent_m < SUPPORTED_M
         )
@@ -197,7 +153,7 @@ class MapFilter:
 
         `air`: calibration of the heights by pressure; None if the level is unknown: places above and below are searched more densely than the rest.
         """
-        if self.cloud.is_searching or not len(self._building.floor.x_m):
+        if self.cloud.is_searching or not len(self.building.floor.x_m):
             return
         self._way.clear()
         on_levels = self.cloud.sheet is not None and air is None
@@ -206,17 +162,16 @@ class MapFilter:
 
     def _begin_search(self, start: Start, walk_heading_rad: float) -> None:
         """Search the building along the last metres of the path."""
-        cloud = self._new_cloud(start, walk_heading_rad)
-        self._met.forget_beacons()
+        cloud = self.new_cloud(start, walk_heading_rad)
         self.belief.begin_search(cloud, self._way.search(cloud, self._model))
         if self.belief.search is not None:
             self.belief.tracked.table = grid_about(
-                self.cloud, *self._table(), self._building.floor, self._settings, self._rng
+                self.cloud, *self._table(), self.building.floor, self._settings, self._rng
             )
 
     def _search_if_doubted(self, walk_heading_rad: float) -> None:
         """Search the building if the trunk is probably in no cloud."""
-        if self.belief.is_doubted and len(self._building.floor.x_m):
+        if self.belief.is_doubted and len(self.building.floor.x_m):
             self._begin_search(Start(), walk_heading_rad)
 
     def _follow_barometer(self, measured: MeasuredSegment) -> None:
@@ -237,7 +192,7 @@ class MapFilter:
 
     def _scatter(self, segment: PathSegment, change: HeightChange, *, is_long: bool) -> None:
         """Spread the clouds over an unobserved segment: straight through the building, or over a long way that is not known."""
-        walls = NO_WALLS if is_long else self._building.walls.index
+        walls = NO_WALLS if is_long else self.building.walls.index
         for each in self.belief.clouds:
             each.cloud.scatter(move_of(segment), walls, change)
         if is_long:
@@ -248,7 +203,7 @@ class MapFilter:
         """Propagate along an observed segment; a cloud resamples itself after each reweighting that needs it."""
         segment = measured.segment
         pings, unplanned = self._pings.take(
-            self._bias.corrected(measured) if self._building.has_walls else measured.without_pings
+            self._bias.corrected(measured) if self.building.has_walls else measured.without_pings
         )
         move, path_m = move_of(segment), math.hypot(segment.dx_m, segment.dy_m)
         self._way.add(move, pings, change)
@@ -259,18 +214,18 @@ class MapFilter:
         for each in clouds:
             if each.cloud.is_searching:
                 if each.cloud.show_search():
-                    self._way.pass_again(each.cloud, self._blurred, self._building.walls)
+                    self._way.pass_again(each.cloud, self._blurred, self.building.walls)
                     each.cloud.draw_veer()
                     self.belief.find(each)
                 continue
-            loss = self._building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m) if path_m > 0.0 else None
+            loss = self.building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m) if path_m > 0.0 else None
             if loss is not None:
                 each.cloud.reweight(loss)
-        if self._building.has_walls:
+        if self.building.has_walls:
             self._compare(path_m)
             if len(pings.share) and self.belief.probability(self.belief.tracked) > PROBABLE:  # bounded by its prior
                 self._bias.learn_behind(
-                    self.cloud.arrays, self.cloud.weight, move, pings, self._building.walls, self._model
+                    self.cloud.arrays, self.cloud.weight, move, pings, self.building.walls, self._model
                 )
 
     def _follow_with(
@@ -283,14 +238,14 @@ class MapFilter:
             return
         # By the spacing of sparse particles
         model, alone = (self._blurred, unplanned.blurred) if cloud.is_scattered else (self._model, unplanned.either)
-        evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
+        evidence = cloud.propagate_and_reweight(move, pings, model, self.building.walls)
         # Where there were several places, a light one may have lost its particles on one level by chance.
         if cloud.is_on_any_level and cloud.is_in_one_place:
-            self._way.pass_again(cloud, self._blurred, self._building.walls)
+            self._way.pass_again(cloud, self._blurred, self.building.walls)
             cloud.is_on_any_level = False
         if each.table is not None:
             each.weigh(share * each.table.advance(move, pings, self._model), evidence.log_path)
-        elif self._building.has_walls:
+        elif self.building.has_walls:
             log_ratio = float((evidence.log_pings - alone).sum())
             each.weigh(share * log_ratio, self._passed(move, evidence.log_path))
 
@@ -337,7 +292,7 @@ class MapFilter:
         right = Right(belief.probability(belief.tracked), belief.probability(belief.search))
         search = belief.search.cloud if belief.search else None
         new = estimate_of(
-            self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, self._building.elsewhere, search,
+            self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, self.building.elsewhere, search,
             map_sd_m,
         )  # fmt: skip
         if self._height is not None:
@@ -345,15 +300,15 @@ class MapFilter:
         return replace(
             new,
             plan_fits=belief.plan_fits,
-            outside=self._building.weight_outside(self.cloud.x_m, self.cloud.y_m, self.cloud.weight),
+            outside=self.building.weight_outside(self.cloud.x_m, self.cloud.y_m, self.cloud.weight),
         )
 
     def _map_sd_m(self) -> float:
         """Standard deviation per axis of a drawing where the tracked cloud is; 0 on other plans."""
-        if not self._building.drawn.are_stated:
+        if not self.building.drawn.are_stated:
             return 0.0
         at = self._believed(0.0)
-        return self._building.drawn.sd_m(at.x_m, at.y_m, at.level)
+        return self.building.drawn.sd_m(at.x_m, at.y_m, at.level)
 
 
 def call_kernels() -> None:

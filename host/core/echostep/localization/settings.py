@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
-from echostep.localization.beacons.model import BeaconSettings
 from echostep.localization.echoes.likelihood import EchoModel, EchoSettings, echo_model
 from echostep.localization.echoes.range_table import TABLE_SD_M
 from echostep.localization.height.levels import ClimbSettings
@@ -64,7 +63,6 @@ class FilterSettings:
     cloud: CloudSettings = field(default_factory=CloudSettings)
     echo: EchoSettings = field(default_factory=EchoSettings)
     climb: ClimbSettings = field(default_factory=ClimbSettings)
-    beacons: BeaconSettings = field(default_factory=BeaconSettings)
     plan_sd_m: float = 0.0  # of the walls' positions, per axis
 
 

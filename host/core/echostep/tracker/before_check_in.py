@@ -11,8 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from echostep.aiding import AidedFilter, TimedMeeting
 from echostep.board.gateway import BeaconReading
-from echostep.localization import Estimate, MapFilter, TimedMeeting
+from echostep.localization import Estimate
 from echostep.path import MeasuredSegment
 from echostep.ports.people.check_in import CheckIn
 
@@ -28,7 +29,7 @@ class BeforeCheckIn:
     `since`: segments with their readings and meetings.
     """
 
-    filter: MapFilter | None
+    filter: AidedFilter | None
     check_in: CheckIn | None
     estimate: Estimate | None
     random_state: Any

@@ -10,11 +10,12 @@ from importlib.resources import as_file, files
 
 import numpy as np
 
+from echostep.aiding import AidedFilter
 from echostep.board.frames import encode
 from echostep.board.gateway import BeaconReading
 from echostep.board.messages import Outcome, Ping
 from echostep.foot.steps import walk_track
-from echostep.localization import Building, MapFilter, Start, call_kernels
+from echostep.localization import Building, Start, call_kernels
 from echostep.odometry import FrontEnd
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import NO_PLAN, Plan, Pose, load_plan
@@ -62,9 +63,9 @@ def beacons() -> None:
     followed.beacon_map.places(followed.cloud, 1.0)
 
 
-def _filter(plan: Plan, start: Start) -> MapFilter:
+def _filter(plan: Plan, start: Start) -> AidedFilter:
     laid_out = lay_out_levels(plan)
-    return MapFilter(Building(laid_out.walls, laid_out.sheet), start, 0.0, np.random.default_rng(0))
+    return AidedFilter(Building(laid_out.walls, laid_out.sheet), start, 0.0, np.random.default_rng(0))
 
 
 def measured() -> MeasuredSegment:

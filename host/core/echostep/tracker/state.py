@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from echostep.aiding import MeetingNews
 from echostep.arrays import Floats, Ints
 from echostep.board.frames import FrameCounts
 from echostep.board.gateway import GatewayCounts
 from echostep.board.messages import Identity, Status
 from echostep.board.reports import BoardReports
-from echostep.localization import Estimate, MeetingNews
+from echostep.localization import Estimate
 from echostep.odometry import Alarm, FrontEndCounts
 from echostep.path import PathSegment
 from echostep.ports.people.team_beacons import SharedBeacon

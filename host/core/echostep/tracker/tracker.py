@@ -14,30 +14,32 @@ from dataclasses import replace
 
 import numpy as np
 
+from echostep.aiding import (
+    AidedFilter,
+    BeaconPlace,
+    MeetingEffect,
+    MeetingQueue,
+    TeamBeaconMap,
+    TimedMeeting,
+    carries_position,
+    on_the_way,
+    shared_beacons,
+    start_at,
+)
 from echostep.angles import wrap
 from echostep.board.gateway import BeaconReading, Gateway
 from echostep.errors import EchostepError
 from echostep.localization import (
     STATED,
-    BeaconPlace,
     Building,
     DrawnPlaces,
     Estimate,
     FilterSettings,
-    MapFilter,
-    MeetingEffect,
-    MeetingQueue,
     Right,
     Start,
-    TeamBeaconMap,
-    TimedMeeting,
     TrackStatus,
-    carries_position,
     echo_of,
     estimate_of,
-    on_the_way,
-    shared_beacons,
-    start_at,
     unobserved,
 )
 from echostep.odometry import FrontEnd, WearerWatch
@@ -85,7 +87,7 @@ class Tracker:
         self.front_end = FrontEnd(s.mtx, s.ranger, s.foot, s.gait, s.wearer, s.gyro, s.iron, s.imus)
         self.laid_out = lay_out_levels(plan)
         self._building = Building(self.laid_out.walls, self.laid_out.sheet, DrawnPlaces(plan.levels))
-        self.filter: MapFilter | None = None  # from the first segment on
+        self.filter: AidedFilter | None = None  # from the first segment on
         self.gateway = Gateway()
         self.watchers: list[Watch] = []  # called in this order
         self.team_watchers: list[Callable[[bytes], None]] = []  # called with each chunk of the port TEAM
@@ -258,14 +260,18 @@ class Tracker:
             self._meetings.note(meeting, effect)
         return [self._publish(measured, self._estimate)]
 
-    def _filter_from(self, measured: MeasuredSegment) -> MapFilter | None:
+    def _filter_from(self, measured: MeasuredSegment) -> AidedFilter | None:
         """The filter that a segment moves; None while neither a start nor a check-in is known."""
         self._ranger_part = measured.ranger_part or self._ranger_part
         self.filter = self.filter or self._first_filter(measured.segment.heading0_rad)
         return self.filter
 
     def _step(
-        self, tracked: MapFilter, measured: MeasuredSegment, readings: list[BeaconReading], meetings: list[TimedMeeting]
+        self,
+        tracked: AidedFilter,
+        measured: MeasuredSegment,
+        readings: list[BeaconReading],
+        meetings: list[TimedMeeting],
     ) -> tuple[Estimate, list[MeetingEffect]]:
         """Localization: reweight by meetings, propagate by the segment, reweight by its pings and beacon readings.
 
@@ -362,13 +368,13 @@ class Tracker:
             return []
         return [self._publish(MeasuredSegment(self._segment, *NO_PINGS), self._estimate)]
 
-    def _first_filter(self, walk_heading_rad: float) -> MapFilter | None:
+    def _first_filter(self, walk_heading_rad: float) -> AidedFilter | None:
         """The filter at the first segment; None while neither a start nor a check-in is known."""
         if self._check_in is not None:
             return self._filter_at(self._check_in, walk_heading_rad)
         return None if self.start is None else self._new_filter(self.start, walk_heading_rad, self._rng)
 
-    def _filter_at(self, check_in: CheckIn, walk_heading_rad: float) -> MapFilter:
+    def _filter_at(self, check_in: CheckIn, walk_heading_rad: float) -> AidedFilter:
         """A filter about a check-in; a check-in without a heading takes the last estimate's heading if it is known, else any."""
         heading_rad, sd_rad = check_in.heading_rad, HEADING_SD_RAD
         if heading_rad is None:
@@ -392,9 +398,9 @@ class Tracker:
             raise EchostepError(f"the start is on level {level}, the plan has {len(self.plan.levels)}, counted from 0")
         return start
 
-    def _new_filter(self, start: Start, walk_heading_rad: float, rng: np.random.Generator) -> MapFilter:
+    def _new_filter(self, start: Start, walk_heading_rad: float, rng: np.random.Generator) -> AidedFilter:
         """A filter about a start."""
         s = self.settings
         echo = echo_of(self._ranger_part, s.echo)
-        settings = FilterSettings(s.cloud, echo, s.climb, s.beacons, self.plan.uncertainty_m or 0.0)
-        return MapFilter(self._building, start, walk_heading_rad, rng, settings)
+        settings = FilterSettings(s.cloud, echo, s.climb, self.plan.uncertainty_m or 0.0)
+        return AidedFilter(self._building, start, walk_heading_rad, rng, settings, s.beacons)

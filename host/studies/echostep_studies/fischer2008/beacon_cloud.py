@@ -14,13 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from echostep.aiding import BeaconSettings
+from echostep.aiding.beacons.beliefs import BeaconMeasurement, empty_beliefs, set_beliefs
+from echostep.aiding.beacons.model import BeaconModel, beacon_model
+from echostep.aiding.beacons.slam import initial_health, propose_heading_jumps
+from echostep.aiding.beacons.step import Beacons, no_waiting, update_by_reading
 from echostep.arrays import Floats, Ints
 from echostep.jit import part
-from echostep.localization import BeaconSettings, CloudSettings
-from echostep.localization.beacons.beliefs import BeaconMeasurement, empty_beliefs, set_beliefs
-from echostep.localization.beacons.model import BeaconModel, beacon_model
-from echostep.localization.beacons.slam import initial_health, propose_heading_jumps
-from echostep.localization.beacons.step import Beacons, no_waiting, update_by_reading
+from echostep.localization import CloudSettings
 from echostep.localization.particle_arrays import Move, ParticleArrays
 from echostep.localization.particles.kernels import systematic
 from echostep.walls.echo_sources import Walls

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from echostep.aiding.beacons.step import mean_place
 from echostep.arrays import Floats
 from echostep.jit import part
-from echostep.localization.beacons.step import mean_place
 from echostep_app.guidance.contact import Contact, allowed_silence, update_contact
 from echostep_app.guidance.cues import GuidanceSettings
 from echostep_app.guidance.target import turn_ahead

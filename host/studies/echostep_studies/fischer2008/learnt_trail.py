@@ -12,9 +12,9 @@ import math
 
 import numpy as np
 
+from echostep.aiding.beacons.beliefs import X, Y
 from echostep.arrays import Bools, Floats
 from echostep.jit import kernel, part
-from echostep.localization.beacons.beliefs import X, Y
 from echostep_app.plan.polyline import along, way_m
 from echostep_app.simulation.world.beacon_ground import BeaconGround
 from echostep_studies.fischer2008.beacon_cloud import BeaconCloud, update_by_ultrasound

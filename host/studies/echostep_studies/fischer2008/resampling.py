@@ -6,9 +6,9 @@ In: beliefs, the chosen particles. Out: the beliefs of those. Owns nothing.
 
 from __future__ import annotations
 
+from echostep.aiding.beacons.beliefs import BeaconBeliefs
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel, lean_part
-from echostep.localization.beacons.beliefs import BeaconBeliefs
 
 
 @kernel

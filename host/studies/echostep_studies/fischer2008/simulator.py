@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from echostep.aiding import BeaconSettings
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel, part
-from echostep.localization import BeaconSettings
 from echostep_app.guidance.contact import CONTACT, Contact, start_contact
 from echostep_app.plan.polyline import along, way_m
 from echostep_app.simulation.world.beacon_ground import BeaconGround

@@ -10,7 +10,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.localization import MeetingEffect
+from echostep.aiding import MeetingEffect
 from echostep_app.page.elements.marks import WORDS, ShownMeeting
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.requests import Met, parse_request

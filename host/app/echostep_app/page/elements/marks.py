@@ -10,7 +10,8 @@ import math
 from dataclasses import dataclass
 from itertools import islice
 
-from echostep.localization import CHI2_95, BeaconState, MeetingEffect, ellipse95
+from echostep.aiding import BeaconState, MeetingEffect
+from echostep.localization import CHI2_95, ellipse95
 from echostep.ports.people.team_beacons import MOST_SHARED
 from echostep.tracker import Tracker
 from echostep.tracker.state import TrackerState

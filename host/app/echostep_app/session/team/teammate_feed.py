@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
-from echostep.localization import MOST_TEAMMATES
+from echostep.aiding import MOST_TEAMMATES
 from echostep.plan import Plan
 from echostep.ports.people.team_beacons import BEACONS, SHARE_S, SharedBeacon, TeamBeacons, parse_team_beacons
 from echostep_app.page.shared import SharedDrawing

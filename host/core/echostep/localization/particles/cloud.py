@@ -20,7 +20,6 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.beacons.beliefs import empty_beliefs
 from echostep.localization.echoes.likelihood import EchoModel
 from echostep.localization.grid.search_grid import DrawnPoses, SearchGrid
 from echostep.localization.height.levels import (
@@ -118,7 +117,7 @@ class Cloud(Particles):
         self.log_weight: Floats = np.zeros(count)
         self.hidden: Floats = np.zeros((2, count))
         self.bend: Floats = np.zeros(count)
-        self.beliefs = empty_beliefs(count, 0)
+        self.carried = ()
 
     @property
     def is_searching(self) -> bool:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.localization.beacons.beliefs import BeaconBeliefs
 from echostep.localization.limits import ROOM_M
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.localization.particles.places import LikelyPlace, hypotheses
@@ -20,7 +19,10 @@ GATHERED_REST = 1e-4
 
 
 class Particles:
-    """Flat arrays of n particles on the sheet of levels; `log_weight` is normalised to a maximum of 0."""
+    """Flat arrays of n particles on the sheet of levels; `log_weight` is normalised to a maximum of 0.
+
+    `carried`: arrays (n, ...) of what aids the filter, which each particle carries along.
+    """
 
     sheet: LevelSheet | None
     x_m: Floats
@@ -32,7 +34,7 @@ class Particles:
     log_weight: Floats
     hidden: Floats
     bend: Floats
-    beliefs: BeaconBeliefs
+    carried: tuple[Floats, ...]
     z_m: Floats
 
     @property
@@ -108,6 +110,6 @@ class Particles:
         self.x_m, self.y_m = self.x_m[chosen], self.y_m[chosen]
         self.turn_rad, self.scale, self.veer_rad_m = self.turn_rad[chosen], self.scale[chosen], self.veer_rad_m[chosen]
         self.z_m, self.lag_m, self.bend = self.z_m[chosen], self.lag_m[chosen], self.bend[chosen]
-        self.beliefs = BeaconBeliefs(*(part[chosen] for part in self.beliefs))
+        self.carried = tuple(each[chosen] for each in self.carried)
         self.hidden = np.ascontiguousarray(self.hidden[:, chosen])
         self.log_weight = np.zeros(len(chosen))

@@ -15,10 +15,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
+from echostep.aiding.beacon_map import BeaconMap
+from echostep.aiding.team.meeting import Meeting, TimedMeeting
 from echostep.board.gateway import BeaconReading
-from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.team.meeting import Meeting, TimedMeeting
 from echostep.ports.people.team_beacons import SharedBeacon, parse_team_beacons
 
 MOST_TEAMMATES = 64  # whose beacons are kept, the newest, assumed

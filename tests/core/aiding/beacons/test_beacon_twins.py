@@ -11,18 +11,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.arrays import Floats
-from echostep.localization import BeaconSettings
-from echostep.localization.beacons.beliefs import (
+from echostep.aiding import BeaconSettings
+from echostep.aiding.beacons.beliefs import (
     BeaconBeliefs,
     BeaconMeasurement,
     empty_beliefs,
     moments,
     place_covariance,
 )
-from echostep.localization.beacons.initialisation import locate_beacon
-from echostep.localization.beacons.model import beacon_model
-from echostep.localization.beacons.slam import (
+from echostep.aiding.beacons.initialisation import locate_beacon
+from echostep.aiding.beacons.model import beacon_model
+from echostep.aiding.beacons.slam import (
     CLOUD_FIT,
     LOST_FIT,
     initial_health,
@@ -30,7 +29,8 @@ from echostep.localization.beacons.slam import (
     reweight,
     update_by_measurement,
 )
-from echostep.localization.beacons.step import MOST_READINGS, Beacons, no_waiting, update_by_reading
+from echostep.aiding.beacons.step import MOST_READINGS, Beacons, no_waiting, update_by_reading
+from echostep.arrays import Floats
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.index import build_index
 from echostep_studies.fischer2008.resampling import resample_beliefs

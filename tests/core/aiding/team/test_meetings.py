@@ -12,13 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from board_runs import ROOT
+from echostep.aiding import AidedFilter, MeetingEffect, on_the_way, start_at
+from echostep.aiding.team.meeting import WRONG, Meeting, covariance
+from echostep.aiding.team.meeting_memory import MOST_NAMES, PLACE_M, RENEWED_M, MeetingMemory
+from echostep.aiding.team.meetings import best_omega, information, places_at, weigh
 from echostep.arrays import Floats
-from echostep.localization import STATED, Building, CloudSettings, MapFilter, MeetingEffect, Start, on_the_way, start_at
+from echostep.localization import STATED, Building, CloudSettings, Start
 from echostep.localization.belief import Belief
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.team.meeting import WRONG, Meeting, covariance
-from echostep.localization.team.meeting_memory import MOST_NAMES, PLACE_M, RENEWED_M, MeetingMemory
-from echostep.localization.team.meetings import best_omega, information, places_at, weigh
 from echostep.path import Odometer, PathSegment
 from echostep.plan import Plan, Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
@@ -59,8 +60,8 @@ def building(plan: Plan = PLAN) -> Building:
 BUILDING = building()
 
 
-def filter_at(x_m: float, y_m: float, right: float) -> MapFilter:
-    made = MapFilter(BUILDING, Start(Pose(x_m, y_m, 0.0)), 0.0, np.random.default_rng(3))
+def filter_at(x_m: float, y_m: float, right: float) -> AidedFilter:
+    made = AidedFilter(BUILDING, Start(Pose(x_m, y_m, 0.0)), 0.0, np.random.default_rng(3))
     made.belief = Belief(made.cloud, right, 1.0)
     return made
 
@@ -207,7 +208,7 @@ def test_a_doubted_cloud_moves_to_the_teammate_after_a_tap() -> None:
 
 
 def test_an_unknown_start_is_found_by_a_meeting() -> None:
-    lost = MapFilter(BUILDING, Start(), 0.0, np.random.default_rng(4))
+    lost = AidedFilter(BUILDING, Start(), 0.0, np.random.default_rng(4))
     assert lost.cloud.is_searching
     assert lost.meet(FAR) is MeetingEffect.USED
     near = np.hypot(lost.cloud.map_x_m - 20.0, lost.cloud.y_m - 2.0) < 2.5

@@ -25,11 +25,11 @@ import math
 
 import numpy as np
 
+from echostep.aiding.team.meeting import RANGE_BODY_SD_M, WRONG, Meeting, covariance
 from echostep.arrays import Bools, Floats
 from echostep.localization.belief import CloudHypothesis
 from echostep.localization.limits import HALF_STOREY_M, PROBABLE
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.team.meeting import RANGE_BODY_SD_M, WRONG, Meeting, covariance
 
 # Assumed, not measured.
 MOST_DOUBT = math.log(WRONG["tracking"])  # of all ranges of one teammate: then this teammate is wrong

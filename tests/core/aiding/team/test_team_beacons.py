@@ -15,21 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from board_runs import ROOT
+from echostep.aiding import MOST_TEAMMATES, AidedFilter, MeetingEffect, MeetingQueue, TeamBeaconMap
+from echostep.aiding.team.meeting import Meeting
+from echostep.aiding.team.meeting_memory import RENEWED_M, MeetingMemory
 from echostep.board.gateway import BeaconReading
-from echostep.localization import (
-    MOST_TEAMMATES,
-    Building,
-    Estimate,
-    MapFilter,
-    MeetingEffect,
-    MeetingQueue,
-    Start,
-    TeamBeaconMap,
-    digest,
-)
+from echostep.localization import Building, Estimate, Start, digest
 from echostep.localization.belief import Belief
-from echostep.localization.team.meeting import Meeting
-from echostep.localization.team.meeting_memory import RENEWED_M, MeetingMemory
 from echostep.path import Odometer
 from echostep.plan import Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
@@ -57,13 +48,13 @@ def a_range(range_m: float, number: int = 7, name: str = "kim") -> Meeting:
     return Meeting(name, "uncertain", 4.0, 7.5, 0, 0.01, 0.0, 0.01, range_m=range_m, range_sd_m=0.4, beacon=number)
 
 
-def filter_at(x_m: float, y_m: float, sd_m: float, right: float = 0.99) -> MapFilter:
-    made = MapFilter(BUILDING, Start(Pose(x_m, y_m, 0.0), sd_m), 0.0, np.random.default_rng(3))
+def filter_at(x_m: float, y_m: float, sd_m: float, right: float = 0.99) -> AidedFilter:
+    made = AidedFilter(BUILDING, Start(Pose(x_m, y_m, 0.0), sd_m), 0.0, np.random.default_rng(3))
     made.belief = Belief(made.cloud, right, 1.0)
     return made
 
 
-def spread_along(f: MapFilter) -> float:
+def spread_along(f: AidedFilter) -> float:
     """Standard deviation of the cloud along x."""
     return math.sqrt(float(np.cov(f.cloud.map_x_m, aweights=f.cloud.weight)))
 
@@ -110,7 +101,7 @@ def test_ranges_that_fit_take_back_doubt_and_give_nothing_more() -> None:
 
 def test_a_search_is_narrowed_by_ranges_of_two_beacons_that_it_fits_badly_at_first() -> None:
     """Of a whole building, a short range leaves a small ring: less than chance explains, and yet the ring."""
-    lost = MapFilter(BUILDING, Start(), 0.0, np.random.default_rng(4))
+    lost = AidedFilter(BUILDING, Start(), 0.0, np.random.default_rng(4))
     assert lost.cloud.is_searching
     for range_m, number in ((0.5, 7), (0.5, 8)):
         lost.meet(a_range(range_m, number))

@@ -12,9 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats
-from echostep.jit import kernel, lean_kernel, lean_part, part
-from echostep.localization.beacons.beliefs import (
+from echostep.aiding.beacons.beliefs import (
     AXIS,
     AXIS_AXIS,
     TWO_PI,
@@ -30,7 +28,9 @@ from echostep.localization.beacons.beliefs import (
     correct,
     wrap_angle,
 )
-from echostep.localization.beacons.model import BeaconModel
+from echostep.aiding.beacons.model import BeaconModel
+from echostep.arrays import Bools, Floats
+from echostep.jit import kernel, lean_kernel, lean_part, part
 from echostep.localization.limits import THREE_SD2
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.index import WallIndex, crosses_wall

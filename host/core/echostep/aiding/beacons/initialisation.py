@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from echostep.aiding.beacons.beliefs import wrap_angle
 from echostep.arrays import Floats
 from echostep.jit import kernel, part
-from echostep.localization.beacons.beliefs import wrap_angle
 from echostep.localization.limits import THREE_SD2
 
 # Columns of readings (n, 4): place of the boot (m), range (m), bearing (rad, NaN: not measured)

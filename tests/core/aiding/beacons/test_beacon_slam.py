@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.localization import BeaconSettings
-from echostep.localization.beacons.beliefs import (
+from echostep.aiding import BeaconSettings
+from echostep.aiding.beacons.beliefs import (
     BeaconBeliefs,
     BeaconMeasurement,
     empty_beliefs,
     set_beliefs,
     wrap_angle,
 )
-from echostep.localization.beacons.model import beacon_model
-from echostep.localization.beacons.slam import (
+from echostep.aiding.beacons.model import beacon_model
+from echostep.aiding.beacons.slam import (
     CLOUD_FIT,
     SUSPECT,
     TIMES_MOVED,
@@ -28,7 +28,7 @@ from echostep.localization.beacons.slam import (
     reweight,
     update_by_measurement,
 )
-from echostep.localization.beacons.step import Beacons, no_waiting, update_by_reading
+from echostep.aiding.beacons.step import Beacons, no_waiting, update_by_reading
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex

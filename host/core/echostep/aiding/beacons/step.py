@@ -17,12 +17,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from echostep.aiding.beacons.beliefs import BeaconBeliefs, BeaconMeasurement, X, Y, place_dropped, set_beliefs
+from echostep.aiding.beacons.initialisation import locate_beacon
+from echostep.aiding.beacons.model import BeaconModel
+from echostep.aiding.beacons.slam import IN_PLACE, RECOVERIES, SUSPECT, BeaconHealth, update_by_measurement
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel, part
-from echostep.localization.beacons.beliefs import BeaconBeliefs, BeaconMeasurement, X, Y, place_dropped, set_beliefs
-from echostep.localization.beacons.initialisation import locate_beacon
-from echostep.localization.beacons.model import BeaconModel
-from echostep.localization.beacons.slam import IN_PLACE, RECOVERIES, SUSPECT, BeaconHealth, update_by_measurement
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.index import WallIndex
 

@@ -14,18 +14,18 @@ from enum import StrEnum
 
 import numpy as np
 
-from echostep.arrays import Floats
-from echostep.board.gateway import BeaconReading
-from echostep.localization.beacons.beliefs import (
+from echostep.aiding.beacons.beliefs import (
     BeaconBeliefs,
     BeaconMeasurement,
     empty_beliefs,
     moments,
     place_covariance,
 )
-from echostep.localization.beacons.model import BeaconSettings, beacon_model
-from echostep.localization.beacons.slam import SUSPECT, TIMES_MOVED, BeaconHealth, initial_health, propose_heading_jumps
-from echostep.localization.beacons.step import Beacons, Waiting, no_waiting, update_by_reading
+from echostep.aiding.beacons.model import BeaconSettings, beacon_model
+from echostep.aiding.beacons.slam import SUSPECT, TIMES_MOVED, BeaconHealth, initial_health, propose_heading_jumps
+from echostep.aiding.beacons.step import Beacons, Waiting, no_waiting, update_by_reading
+from echostep.arrays import Floats
+from echostep.board.gateway import BeaconReading
 from echostep.localization.particles.cloud import Cloud
 from echostep.path import PathSegment
 from echostep.walls.echo_sources import Walls
@@ -98,13 +98,13 @@ class BeaconMap:
         """Every beacon with a place, by slot. A moved beacon has none until it is located again, and none has one once another cloud is tracked."""
         if not self._is_of(cloud):
             return []
-        beacons = moments(cloud.beliefs, cloud.weight)
+        beacons = moments(_beliefs(cloud), cloud.weight)
         placed = np.flatnonzero(self._health.known & (self._health.each[:, SUSPECT] == 0.0)).tolist()
         return [self._place(cloud, slot, beacons[slot].tolist(), t_s) for slot in placed]
 
     def covariance(self, cloud: Cloud, slot: int) -> Floats:
         """Covariance (2, 2) of a placed beacon's place (m2), the cloud's own error included."""
-        return place_covariance(cloud.beliefs, slot, cloud.weight)
+        return place_covariance(_beliefs(cloud), slot, cloud.weight)
 
     def _place(self, cloud: Cloud, slot: int, moments_of_it: list[float], t_s: float) -> BeaconPlace:
         x, y, sd, axis = moments_of_it
@@ -119,7 +119,7 @@ class BeaconMap:
         """Note the time for each beacon whose reception is not expected at the cloud's mean place."""
         weight = cloud.weight
         x, y = float(weight @ cloud.x_m), float(weight @ cloud.y_m)
-        beacons = moments(cloud.beliefs, weight)
+        beacons = moments(_beliefs(cloud), weight)
         index = self._walls.index
         for slot in np.flatnonzero(self._health.known).tolist():
             bx, by = float(beacons[slot, 0]), float(beacons[slot, 1])
@@ -133,20 +133,20 @@ class BeaconMap:
         since_x, since_y = cloud.x_m - x, cloud.y_m - y
         index = self._walls.near(cloud.x_m, cloud.y_m, reading.range_m)
         measurement = BeaconMeasurement(reading.slot, reading.range_m, reading.bearing_rad)
-        beacons = Beacons(cloud.beliefs, self._health, self._waiting)
+        beacons = Beacons(_beliefs(cloud), self._health, self._waiting)
         particles = cloud.arrays._replace(x_m=x, y_m=y)
         update_by_reading(particles, beacons, measurement, self._model, index, plan_supports, self._rng)
         cloud.x_m, cloud.y_m = x + since_x, y + since_y
 
     def _is_of(self, cloud: Cloud) -> bool:
         """Whether this cloud has placed the beacons: a search that is followed, or a cloud about a teammate, has placed none."""
-        return cloud.beliefs.mean.shape[1] == len(self._heard_s)
+        return _beliefs(cloud).mean.shape[1] == len(self._heard_s)
 
     def _begin_anew(self, cloud: Cloud) -> None:
         """Forget the places, which came from a wrong cloud, and when each beacon was last received."""
         self._health, self._waiting = initial_health(0), no_waiting(0)
         self._heard_s, self._reach_m, self._unexpected_s = [], [], []
-        cloud.beliefs = empty_beliefs(len(cloud.x_m), 0)
+        cloud.carried = ()
 
     def _make_room(self, cloud: Cloud, slot: int) -> None:
         """Extend the cloud's beliefs and the lists here, so that they hold this slot."""
@@ -154,8 +154,8 @@ class BeaconMap:
         if slot < known:
             return
         n, more = len(cloud.x_m), slot + 1 - known
-        mean, cov, doubt = cloud.beliefs
-        cloud.beliefs = BeaconBeliefs(
+        mean, cov, doubt = _beliefs(cloud)
+        cloud.carried = (
             np.concatenate([mean, np.zeros((n, more, 3))], axis=1),
             np.concatenate([cov, np.zeros((n, more, 6))], axis=1),
             np.concatenate([doubt, np.ones((n, more))], axis=1),
@@ -168,6 +168,11 @@ class BeaconMap:
         self._heard_s += [-math.inf] * more
         self._reach_m += [0.0] * more
         self._unexpected_s += [-math.inf] * more
+
+
+def _beliefs(cloud: Cloud) -> BeaconBeliefs:
+    """What each particle believes of the beacons' places: these arrays, not copies."""
+    return BeaconBeliefs(*cloud.carried) if cloud.carried else empty_beliefs(len(cloud.x_m), 0)
 
 
 def _places_at(cloud: Cloud, segment: PathSegment, t_s: float) -> tuple[Floats, Floats]:
