@@ -33,8 +33,9 @@ from echostep.localization.belief import (
     CloudHypothesis,
     CrossedWalls,
 )
+from echostep.localization.grid.search import Search
 from echostep.localization.limits import SURE
-from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose
@@ -47,9 +48,14 @@ SMALL = CloudSettings(size=100, largest=1000)
 NONE, NO_RANGERS = np.zeros(0), np.zeros(0, np.int64)
 
 
-def no_cloud(*, is_searching: bool) -> Cloud:
+def no_cloud() -> Cloud:
     """All of a cloud that a belief looks at."""
-    return cast(Cloud, SimpleNamespace(is_searching=is_searching))
+    return cast(Cloud, SimpleNamespace(is_searching=False))
+
+
+def no_search() -> Search:
+    """All of a search that a belief looks at."""
+    return cast(Search, SimpleNamespace(is_searching=True))
 
 
 def total(belief: Belief) -> float:
@@ -74,7 +80,7 @@ def test_probabilities_are_those_without_logarithms(
     prior: float, fits: float, taken: list[tuple[str, float, float]]
 ) -> None:
     belief, naive = (
-        Belief(no_cloud(is_searching=False), prior, fits),
+        Belief(no_cloud(), prior, fits),
         NaiveBelief(prior, fits, {THIS: HERE_M, ANOTHER: ANOTHER_M}),
     )
     for name, one, other in taken:
@@ -90,7 +96,7 @@ def test_probabilities_are_those_without_logarithms(
             belief.leave(one)
             naive.leave(one)
         else:
-            belief.begin_search(no_cloud(is_searching=True), one / TEMPER)
+            belief.begin_search(no_search(), one / TEMPER)
             naive.begin_search(math.exp(one))
     p = naive.place
     given = belief.plan_fits if belief.plan_fits < SURE else 1.0
@@ -102,7 +108,7 @@ def test_probabilities_are_those_without_logarithms(
 
 @pytest.mark.parametrize(("log_ratio", "is_tracked"), [(-3.0, False), (3.0, True)])
 def test_a_place_that_is_found_is_tracked_if_it_is_likelier(log_ratio: float, is_tracked: bool) -> None:
-    cloud, search = no_cloud(is_searching=False), no_cloud(is_searching=True)
+    cloud, search = no_cloud(), no_search()
     belief = Belief(cloud, 0.5, PLAN_FITS)
     belief.begin_search(search, 0.0)
     assert belief.search is not None
@@ -110,11 +116,11 @@ def test_a_place_that_is_found_is_tracked_if_it_is_likelier(log_ratio: float, is
     belief.judge_plan()
     belief.prune()
     assert belief.tracked.cloud is cloud  # a search that has found nothing yet is no place
-    search.is_searching = False  # type: ignore[misc]
-    belief.find(belief.search)
+    found = no_cloud()
+    belief.find(belief.search, found)
     assert math.exp(belief.log_elsewhere) == pytest.approx(BY_CHANCE / (1.0 + math.exp(-log_ratio)), rel=1e-6)
     belief.prune()
-    assert (belief.tracked.cloud is search) == is_tracked
+    assert (belief.tracked.cloud is found) == is_tracked
     assert total(belief) == pytest.approx(1.0)
     belief.merge()
     assert belief.search is None
@@ -123,7 +129,7 @@ def test_a_place_that_is_found_is_tracked_if_it_is_likelier(log_ratio: float, is
 
 def test_a_search_that_is_improbable_ends_and_a_cloud_that_is_lets_the_search_be_tracked() -> None:
     for log_ratio, survivor in ((1.1 * math.log(LEAST), 0), (-1.1 * math.log(LEAST), 1)):
-        clouds = no_cloud(is_searching=False), no_cloud(is_searching=True)
+        clouds = no_cloud(), no_search()
         belief = Belief(clouds[0], 0.5, PLAN_FITS)
         belief.begin_search(clouds[1], 0.0)
         belief.clouds[1].weigh(log_ratio / TEMPER, 0.0)
@@ -135,8 +141,8 @@ def test_a_search_that_is_improbable_ends_and_a_cloud_that_is_lets_the_search_be
 
 
 def test_a_new_search_takes_the_place_of_one_that_is_tracked() -> None:
-    belief = Belief(no_cloud(is_searching=True), 0.4, PLAN_FITS)
-    begun = no_cloud(is_searching=True)
+    belief = Belief(no_search(), 0.4, PLAN_FITS)
+    begun = no_search()
     belief.begin_search(begun, 0.0)
     assert belief.tracked.cloud is begun
     assert belief.search is None
@@ -145,7 +151,7 @@ def test_a_new_search_takes_the_place_of_one_that_is_tracked() -> None:
 
 
 def test_what_is_told_of_a_cloud_says_nothing_of_the_plan() -> None:
-    belief = Belief(no_cloud(is_searching=False), 0.3, PLAN_FITS)
+    belief = Belief(no_cloud(), 0.3, PLAN_FITS)
     belief.raise_to(belief.tracked, 0.2)
     assert math.exp(belief.tracked.log_weight) == pytest.approx(0.3)
     belief.raise_to(belief.tracked, 0.8)
@@ -156,11 +162,11 @@ def test_what_is_told_of_a_cloud_says_nothing_of_the_plan() -> None:
 
 def test_a_plan_on_which_nothing_is_explained_is_another_buildings() -> None:
     """However long: the probability stays a number."""
-    belief = Belief(no_cloud(is_searching=False), STATED, PLAN_FITS)
+    belief = Belief(no_cloud(), STATED, PLAN_FITS)
     for _ in range(100):
         belief.tracked.weigh(-50.0, -6.0)
         belief.judge_plan(5.0)
-        belief.begin_search(no_cloud(is_searching=True), -50.0)
+        belief.begin_search(no_search(), -50.0)
     assert belief.plan_fits < 1e-6
     assert total(belief) == pytest.approx(1.0)
 
@@ -197,7 +203,7 @@ def after_a_step(of: MapFilter) -> Estimate:
 def with_found(at: Pose, weight: float) -> MapFilter:
     """A filter that tracks HERE, and whose search has found `at` with this weight."""
     two = filter_at(HERE)
-    found = Cloud(SMALL, Start(at, 0.1, 0.05), 0.0, np.random.default_rng(1))
+    found = cloud_about(SMALL, Start(at, 0.1, 0.05), 0.0, np.random.default_rng(1))
     two.belief.tracked.log_weight = math.log(1.0 - weight)
     two.belief.search = CloudHypothesis(found, math.log(weight))
     two.belief.log_elsewhere = -math.inf

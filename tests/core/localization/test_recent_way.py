@@ -24,7 +24,7 @@ from echostep.localization import (
 from echostep.localization.echoes.unplanned import UsablePings
 from echostep.localization.motion import height_change, move_of
 from echostep.localization.particle_arrays import Move
-from echostep.localization.particles.cloud import PASSING, Cloud
+from echostep.localization.particles.cloud import PASSING, cloud_about
 from echostep.localization.window import MOST_PIECES, PAST_M, RecentWay
 from echostep.path import MeasuredSegment
 from echostep.plan import Plan, Pose
@@ -90,8 +90,8 @@ def level_shares(where: Building, start: Start = ANYWHERE) -> list[float]:
     """Probability of each level after the second pass of a cloud that has gathered at the true place, but on level WRONG; `start`: of the search."""
     pose, walk_heading_rad = true_end(WRONG)
     rng = np.random.default_rng(1)
-    cloud = Cloud(SETTINGS, Start(pose, 0.2), walk_heading_rad, rng, where.sheet, None, where.floor)
-    cloud.is_on_any_level = Cloud(SETTINGS, start, 0.0, rng, where.sheet, None, where.floor).is_on_any_level
+    cloud = cloud_about(SETTINGS, Start(pose, 0.2), walk_heading_rad, rng, where.sheet, None, where.floor)
+    cloud.is_on_any_level = start.is_on_any_level
     way_in(where).pass_again(cloud, MODEL, where.walls)
     assert (len(cloud.x_m) <= PASSING) == cloud.is_on_any_level
     true, _ = true_end(TRUE)

@@ -10,9 +10,10 @@ import pytest
 
 from echostep.localization import Building, CloudSettings, MapFilter, Start
 from echostep.localization.echoes.range_table import AFTER_ECHO, AFTER_SILENCE, INDEPENDENT_M, USED_M, TablePings
+from echostep.localization.grid.search import FOUND_REST, Search
 from echostep.localization.grid.search_grid import SearchGrid
 from echostep.localization.particle_arrays import PingBatch
-from echostep.localization.particles.cloud import FOUND_REST, Cloud
+from echostep.localization.particles.cloud import cloud_about
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 from echostep.walls.echo_sources import Walls
 
@@ -33,9 +34,9 @@ def gather(grid: SearchGrid, share: float) -> None:
     grid.begin_about(*there, share)
 
 
-def searching(map_filter: MapFilter) -> SearchGrid:
-    assert map_filter.cloud.grid is not None
-    return map_filter.cloud.grid
+def searching(map_filter: MapFilter) -> Search:
+    assert isinstance(map_filter.cloud, Search)
+    return map_filter.cloud
 
 
 def test_a_ping_counts_by_the_way_since_the_one_before() -> None:
@@ -67,21 +68,22 @@ def test_a_ping_knows_whether_that_before_it_was_silent() -> None:
 
 @pytest.mark.parametrize(("share", "is_searching"), [(0.8, True), (1.0 - 0.3 * FOUND_REST, False)])
 def test_a_search_is_over_when_nearly_all_of_its_weight_is_in_one_place(share: float, is_searching: bool) -> None:
-    map_filter = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
-    gather(searching(map_filter), share)
-    map_filter.cloud.show_search()
-    assert map_filter.cloud.is_searching == is_searching
-    near = np.hypot(map_filter.cloud.x_m - 6.05, map_filter.cloud.y_m - 4.05) < 0.5
-    assert float(map_filter.cloud.weight @ near) == pytest.approx(share, abs=0.02)
+    search = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
+    gather(search.grid, share)
+    found = search.found()
+    assert (found is None) == is_searching
+    shown = found or search
+    near = np.hypot(shown.x_m - 6.05, shown.y_m - 4.05) < 0.5
+    assert float(shown.weight @ near) == pytest.approx(share, abs=0.02)
 
 
 def test_particles_show_a_search_as_it_is_weighed() -> None:
     """As a meeting does: by every state of the grid."""
-    cloud = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)).cloud
-    assert cloud.grid is not None
+    cloud = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
     cloud.show_every_state()
     assert len(cloud.x_m) == len(cloud.grid)
     cloud.reweight(np.where(cloud.x_m < 6.0, -3.0, 0.0))
+    assert cloud.found() is None
     east = float(cloud.weight @ (cloud.x_m > 6.0))
     assert east == pytest.approx(1.0 / (1.0 + math.exp(-3.0)), abs=0.02)
 
@@ -89,7 +91,7 @@ def test_particles_show_a_search_as_it_is_weighed() -> None:
 def test_a_search_turns_with_the_walk_frame() -> None:
     """Straight ahead is where it was on the map, and so is the heading."""
     map_filter = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
-    grid = searching(map_filter)
+    grid = searching(map_filter).grid
     grid.begin_about(np.full(9, 6.05), np.full(9, 4.05), np.full(9, 0.1), 1.0)
     map_filter.turn_walk_frame(0.5 * math.pi)
     map_filter.update(MeasuredSegment(a_step(0.0, -1.0), NONE, NO_RANGERS, NONE))
@@ -111,24 +113,22 @@ def test_a_search_that_has_left_all_ground_begins_anew() -> None:
 
 
 def test_a_search_that_moves_unobserved_begins_about_where_it_was() -> None:
-    cloud = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)).cloud
-    assert cloud.grid is not None
+    cloud = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
     gather(cloud.grid, 0.9)
-    cloud.show_search()
     step = PathSegment(0.0, 2.0, 0.0, 0.0, 0.0, 0.0, sd_m=1.1 * UNOBSERVED_SD_M, turn_sd_rad=0.1, step=0)
     assert step.unobserved
     after = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
     after.belief.tracked.cloud = cloud
     after.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE))
-    cloud.show_search()
+    assert cloud.found() is None
     assert 0.5 < float(cloud.weight @ (np.hypot(cloud.x_m - 6.05, cloud.y_m - 4.05) < 3.0 * step.sd_m)) < 0.95
 
 
 def test_a_search_in_a_room_begins_there() -> None:
     outline = np.array([[0, 0], [6, 0], [6, 8], [0, 8]], float)
-    grid = searching(MapFilter(ROOM, Start(room_m=outline), 0.0, np.random.default_rng(1)))
+    grid = searching(MapFilter(ROOM, Start(room_m=outline), 0.0, np.random.default_rng(1))).grid
     assert grid.draw(1000, np.random.default_rng(1)).x_m.max() < 6.3
 
 
 def test_a_start_that_is_a_place_is_no_search() -> None:
-    assert not Cloud(CloudSettings(), Start(), 0.0, np.random.default_rng(1)).is_searching
+    assert not cloud_about(CloudSettings(), Start(), 0.0, np.random.default_rng(1)).is_searching

@@ -10,37 +10,27 @@ import numpy as np
 import pytest
 
 from echostep.localization import (
-    Building,
     CloudSettings,
-    EchoSettings,
     Estimate,
     Right,
     Start,
     TrackStatus,
     claims_place,
-    echo_model,
     estimate_of,
 )
-from echostep.localization.echoes.unplanned import RangeMemory
-from echostep.localization.grid.search_grid import SearchGrid
-from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.cloud import cloud_about
 from echostep.plan import Pose
-from echostep.walls.echo_sources import Walls
 
 APART_M = 30.0
-ROOM = Building(Walls(np.array([[-9, -9, 9, -9], [9, -9, 9, 9], [9, 9, -9, 9], [-9, 9, -9, -9]], float)), None)
-MODEL = echo_model(EchoSettings())
-CELLS, UNPLANNED = ROOM.cells(MODEL), RangeMemory(ROOM.background(MODEL), EchoSettings())
 
 
-def _in_two_places(second: float, sd_m: float = 0.1, here: float = 0.9, *, is_searching: bool = True) -> Estimate:
+def _in_two_places(second: float, sd_m: float = 0.1, here: float = 0.9) -> Estimate:
     """Of a cloud at the origin looking along x, with this share of its weight APART_M further east, looking along y."""
-    cloud = Cloud(CloudSettings(), Start(Pose(0.0, 0.0, 0.0), sd_m), 0.0, np.random.default_rng(1))
+    cloud = cloud_about(CloudSettings(), Start(Pose(0.0, 0.0, 0.0), sd_m), 0.0, np.random.default_rng(1))
     there = np.arange(len(cloud.x_m)) % 2 == 1
     cloud.x_m = cloud.x_m + APART_M * there
     cloud.turn_rad = cloud.turn_rad + 0.5 * math.pi * there
     cloud.log_weight = np.log(np.where(there, max(second, 1e-9), 1.0 - second))
-    cloud.grid = SearchGrid(CELLS, (np.zeros(1), np.zeros(1)), UNPLANNED) if is_searching else None
     return estimate_of(cloud, 0.0, 0.0, 0, right=Right(here))
 
 
@@ -56,7 +46,7 @@ def test_the_position_is_that_of_the_likelier_place(second: float, x_m: float, h
 
 def test_no_place_that_has_half_of_the_weight_is_the_position() -> None:
     """Three places alike: the mean is as good as any of them."""
-    cloud = Cloud(CloudSettings(), Start(Pose(0.0, 0.0, 0.0), 0.1), 0.0, np.random.default_rng(1))
+    cloud = cloud_about(CloudSettings(), Start(Pose(0.0, 0.0, 0.0), 0.1), 0.0, np.random.default_rng(1))
     cloud.x_m = cloud.x_m + APART_M * (np.arange(len(cloud.x_m)) % 3)
     found = estimate_of(cloud, 0.0, 0.0, 0)
     assert found.x_m == pytest.approx(APART_M, abs=1.0)
@@ -78,7 +68,7 @@ def test_a_place_is_as_probable_as_its_cloud(here: float, status: TrackStatus) -
 @pytest.mark.parametrize(("apart_m", "claimed"), [(30.0, False), (6.0, False), (3.2, False), (0.5, True)])
 def test_the_mean_of_two_places_is_claimed_where_it_lies_in_one(apart_m: float, claimed: bool) -> None:
     """Both are as likely."""
-    cloud = Cloud(CloudSettings(), Start(Pose(0.0, 0.0, 0.0), 0.1), 0.0, np.random.default_rng(1))
+    cloud = cloud_about(CloudSettings(), Start(Pose(0.0, 0.0, 0.0), 0.1), 0.0, np.random.default_rng(1))
     cloud.x_m = cloud.x_m + apart_m * (np.arange(len(cloud.x_m)) % 2)
     found = replace(estimate_of(cloud, 0.0, 0.0, 0), status=TrackStatus.UNCERTAIN)
     assert found.x_m == pytest.approx(0.5 * apart_m, abs=0.1)

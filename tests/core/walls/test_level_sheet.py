@@ -19,7 +19,7 @@ from echostep.board import messages as m
 from echostep.localization import ANY_LEVEL, ClimbSettings, CloudSettings, Estimate, Start, TrackStatus
 from echostep.localization.height.levels import HeightArrays, HeightChange, change_levels, level_change_model
 from echostep.localization.particle_arrays import Move, ParticleArrays
-from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.plan import Connector, Level, Plan, Pose
 from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.tracker import Tracker
@@ -186,7 +186,7 @@ def test_heights_are_those_of_the_obvious_way(felt_m: float, height_sd_m: float)
 
 
 def cloud(storeys: LevelSheet, start: Pose) -> Cloud:
-    return Cloud(CloudSettings(), Start(start), 0.0, np.random.default_rng(1), storeys)
+    return cloud_about(CloudSettings(), Start(start), 0.0, np.random.default_rng(1), storeys)
 
 
 def test_who_stays_on_the_flat_stays_on_his_level_whatever_the_weather_does() -> None:
@@ -204,7 +204,7 @@ def test_who_stays_on_the_flat_stays_on_his_level_whatever_the_weather_does() ->
 def test_a_lift_carries_those_who_are_in_it() -> None:
     plan = tower(3)
     storeys = level_sheet_of(plan)
-    riding = Cloud(CloudSettings(), Start(Pose(*LIFT_AT, 0.0, 0), 0.05), 0.0, np.random.default_rng(1), storeys)
+    riding = cloud_about(CloudSettings(), Start(Pose(*LIFT_AT, 0.0, 0), 0.05), 0.0, np.random.default_rng(1), storeys)
     for half in range(20):
         height_m = 100.0 + min(0.5 * half, 7.0)
         riding.change_levels(Move(0.0, 0.0, 0.0, 0.0), HeightChange(0.0, 0.0, height_m, 0.15, height_m, 0.5))

@@ -19,8 +19,10 @@ from echostep.aiding.team.meetings import weigh_by
 from echostep.board.gateway import BeaconReading
 from echostep.localization.building import Building
 from echostep.localization.estimate import Estimate
+from echostep.localization.grid.search import Search
 from echostep.localization.limits import PROBABLE
 from echostep.localization.map_filter import MapFilter
+from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import FilterSettings
 from echostep.path import MeasuredSegment, PathSegment
@@ -48,8 +50,8 @@ class AidedFilter(MapFilter):
 
     def _aid(self, segment: PathSegment) -> None:
         """Weigh the tracked cloud, which is at the end of a segment, by the readings on it."""
-        if not self.cloud.is_searching:
-            readings = self._readings
+        readings = self._readings
+        if isinstance(self.cloud, Cloud):
             self.beacon_map.update(self.cloud, segment, readings, bool(readings) and self.plan_supports)
 
     def meet(self, meeting: Meeting) -> MeetingEffect:
@@ -63,11 +65,11 @@ class AidedFilter(MapFilter):
         refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._refusal(meeting)
         if refusal is not None:
             return refusal
-        searching = [each for each in self.belief.clouds if each.cloud.is_searching]
         fits = [weigh_by(each, meeting, area_m2) for each in self.belief.clouds]
-        for each in searching:
-            if not each.cloud.is_searching:
-                self.belief.find(each)
+        for each in self.belief.clouds:
+            found = each.cloud.found() if isinstance(each.cloud, Search) else None
+            if found is not None:
+                self.belief.find(each, found)
         if meeting.beacon is not None:
             self.belief.normalise()
             return MeetingEffect.USED if fits[0] >= PROBABLE else MeetingEffect.CONTRADICTS

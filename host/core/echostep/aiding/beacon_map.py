@@ -27,6 +27,7 @@ from echostep.aiding.beacons.step import Beacons, Waiting, no_waiting, update_by
 from echostep.arrays import Floats
 from echostep.board.gateway import BeaconReading
 from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.particles import Particles
 from echostep.path import PathSegment
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import crosses_wall
@@ -94,7 +95,7 @@ class BeaconMap:
         if self._health.known.any():
             self._note_unexpected(cloud, segment.t1_s)
 
-    def places(self, cloud: Cloud, t_s: float) -> list[BeaconPlace]:
+    def places(self, cloud: Particles, t_s: float) -> list[BeaconPlace]:
         """Every beacon with a place, by slot. A moved beacon has none until it is located again, and none has one once another cloud is tracked."""
         if not self._is_of(cloud):
             return []
@@ -102,11 +103,11 @@ class BeaconMap:
         placed = np.flatnonzero(self._health.known & (self._health.each[:, SUSPECT] == 0.0)).tolist()
         return [self._place(cloud, slot, beacons[slot].tolist(), t_s) for slot in placed]
 
-    def covariance(self, cloud: Cloud, slot: int) -> Floats:
+    def covariance(self, cloud: Particles, slot: int) -> Floats:
         """Covariance (2, 2) of a placed beacon's place (m2), the cloud's own error included."""
         return place_covariance(_beliefs(cloud), slot, cloud.weight)
 
-    def _place(self, cloud: Cloud, slot: int, moments_of_it: list[float], t_s: float) -> BeaconPlace:
+    def _place(self, cloud: Particles, slot: int, moments_of_it: list[float], t_s: float) -> BeaconPlace:
         x, y, sd, axis = moments_of_it
         state = BeaconState.MOVED if self._health.each[slot, TIMES_MOVED] else BeaconState.WELL
         any_heard = self.heard_s is not None and t_s - self.heard_s < SILENT_S
@@ -138,7 +139,7 @@ class BeaconMap:
         update_by_reading(particles, beacons, measurement, self._model, index, plan_supports, self._rng)
         cloud.x_m, cloud.y_m = x + since_x, y + since_y
 
-    def _is_of(self, cloud: Cloud) -> bool:
+    def _is_of(self, cloud: Particles) -> bool:
         """Whether this cloud has placed the beacons: a search that is followed, or a cloud about a teammate, has placed none."""
         return _beliefs(cloud).mean.shape[1] == len(self._heard_s)
 
@@ -170,7 +171,7 @@ class BeaconMap:
         self._unexpected_s += [-math.inf] * more
 
 
-def _beliefs(cloud: Cloud) -> BeaconBeliefs:
+def _beliefs(cloud: Particles) -> BeaconBeliefs:
     """What each particle believes of the beacons' places: these arrays, not copies."""
     return BeaconBeliefs(*cloud.carried) if cloud.carried else empty_beliefs(len(cloud.x_m), 0)
 

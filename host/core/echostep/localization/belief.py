@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from echostep.localization.grid.search import Search
 from echostep.localization.grid.search_grid import SearchGrid
 from echostep.localization.height.levels import HeightChange
 from echostep.localization.limits import PROBABLE, SURE
@@ -49,7 +50,7 @@ class CloudHypothesis:
     ranges to beacons of each teammate have taken from it.
     """
 
-    cloud: Cloud
+    cloud: Cloud | Search
     log_weight: float
     table: SearchGrid | None = None
     doubts: dict[str, float] = field(default_factory=dict)
@@ -95,7 +96,7 @@ class CrossedWalls:
 class Belief:
     """Log-weights of the clouds' hypotheses and of `elsewhere`, which sum to 1, and the log-odds of their building against another."""
 
-    def __init__(self, cloud: Cloud, prior: float, plan_fits: float) -> None:
+    def __init__(self, cloud: Cloud | Search, prior: float, plan_fits: float) -> None:
         """Prior probabilities: that the trunk is in the first cloud, if it is in this building; that the plan is the building's."""
         self.tracked = CloudHypothesis(cloud, _log(prior))
         self.search: CloudHypothesis | None = None
@@ -155,7 +156,7 @@ class Belief:
         for each in self.clouds:
             self._move(each, share)
 
-    def begin_search(self, cloud: Cloud, log_pings: float) -> None:
+    def begin_search(self, cloud: Search, log_pings: float) -> None:
         """Let a cloud search elsewhere; `log_pings`: log of its density of the path that it has searched over the density without a plan.
 
         It replaces an earlier search that has found nothing.
@@ -173,8 +174,9 @@ class Belief:
         self.log_elsewhere = -math.inf
         self.judge_plan()
 
-    def find(self, each: CloudHypothesis) -> None:
+    def find(self, each: CloudHypothesis, found: Cloud) -> None:
         """A search has found a place; from then on it and the tracked cloud are compared by traced echoes."""
+        each.cloud = found
         self._move(each, BY_CHANCE)
         self.tracked.table = None
 

@@ -62,7 +62,7 @@ class Building:
 
     def log_loss_in_air(self, x_m: Floats, y_m: Floats, path_m: float) -> Floats | None:
         """Loss of log-weight (n,) on this length of path, of particles in the air beside an upper level; None if there are none."""
-        return None if self.upper_levels is None else self.upper_levels.log_loss(x_m, y_m, path_m)
+        return None if self.upper_levels is None or path_m <= 0.0 else self.upper_levels.log_loss(x_m, y_m, path_m)
 
     def weight_outside(self, x_m: Floats, y_m: Floats, weight: Floats) -> float:
         """Weight of particles (n,) outside of the building; 0 where walls enclose no floor."""

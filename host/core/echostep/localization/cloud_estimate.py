@@ -15,7 +15,7 @@ from echostep.arrays import Floats
 from echostep.jit import inline_part, lean_kernel
 from echostep.localization.estimate import CHI2_95, RISK, TAIL, Estimate, TrackStatus, ellipse95
 from echostep.localization.limits import BELIEVED, HALF_STOREY_M, LOST_M, PROBABLE, SURE, TRACKING_M
-from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.particles import Particles
 from echostep.localization.particles.places import LikelyPlace, hypotheses
 
 # Times the weight near the mean of a cloud of several places, with which the likeliest of them is its position, assumed
@@ -97,8 +97,8 @@ SURELY = Right(1.0)
 
 
 def estimate_of(
-    cloud: Cloud, t_s: float, walk_heading_rad: float, step: int, sd_m: float = 0.0, right: Right = SURELY,
-    elsewhere: Elsewhere | None = None, search: Cloud | None = None, map_sd_m: float = 0.0,
+    cloud: Particles, t_s: float, walk_heading_rad: float, step: int, sd_m: float = 0.0, right: Right = SURELY,
+    elsewhere: Elsewhere | None = None, search: Particles | None = None, map_sd_m: float = 0.0,
 ) -> Estimate:  # fmt: skip
     """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean], and how likely small errors are.
 
@@ -141,7 +141,9 @@ def estimate_of(
     )  # fmt: skip
 
 
-def places_of_both(cloud: Cloud, search: Cloud, right: Right, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:
+def places_of_both(
+    cloud: Particles, search: Particles, right: Right, walk_heading_rad: float
+) -> tuple[LikelyPlace, ...]:
     """The likely places of the tracked cloud and of a search, if the trunk is in one of them."""
     both = (cloud, search)
     weight = np.concatenate([cloud.weight * right.here, search.weight * right.search])
@@ -150,7 +152,7 @@ def places_of_both(cloud: Cloud, search: Cloud, right: Right, walk_heading_rad: 
     return hypotheses(x, y, level, turn + walk_heading_rad, weight / weight.sum())
 
 
-def _moments_at(place: LikelyPlace, mean: Moments, cloud: Cloud, weight: Floats) -> Moments:
+def _moments_at(place: LikelyPlace, mean: Moments, cloud: Particles, weight: Floats) -> Moments:
     """The moments about a place, with its heading; the moments about the mean, if half as much weight is near the mean."""
     distance_m = np.hypot(cloud.map_x_m - place.x_m, cloud.y_m - place.y_m)
     near, about = (float(weight[distance_m < limit_m].sum()) for limit_m in (TRACKING_M, LOST_M))
@@ -206,7 +208,7 @@ def _levels_of_both(one: tuple[float, ...], other: tuple[float, ...], right: Rig
     return tuple(p / sum(both) for p in both)
 
 
-def _heights(cloud: Cloud, weight: Floats) -> tuple[tuple[float, ...], float, float]:
+def _heights(cloud: Particles, weight: Floats) -> tuple[tuple[float, ...], float, float]:
     """Probability of each level; mean and standard deviation of the height."""
     if cloud.sheet is None:
         return (1.0,), 0.0, 0.0

@@ -21,13 +21,14 @@ from echostep.localization.echoes.range_bias import RangeBias
 from echostep.localization.echoes.unplanned import RangeMemory, UnplannedDensities, UsablePings, evidence_share
 from echostep.localization.estimate import Estimate
 from echostep.localization.grid.cells import GridCells
-from echostep.localization.grid.start import grid_about, grid_of, is_unknown
+from echostep.localization.grid.search import Search
+from echostep.localization.grid.start import grid_about, is_unknown, search_of
 from echostep.localization.height.height_filter import RelativeHeight, RidingHeight
 from echostep.localization.height.levels import HeightChange
 from echostep.localization.limits import BELIEVED, LOST_M, PROBABLE, TRACKING_M
 from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, move_of
 from echostep.localization.particle_arrays import Move, PingBatch
-from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.localization.particles.kernels import systematic
 from echostep.localization.particles.start import ANY_LEVEL, STATED, Air, Start
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
@@ -92,28 +93,34 @@ class MapFilter:
         return self._pings.odometer
 
     @property
-    def cloud(self) -> Cloud:
-        """The cloud that is tracked."""
+    def cloud(self) -> Cloud | Search:
+        """The cloud that is tracked, or the search if there is none."""
         return self.belief.tracked.cloud
 
     def update(self, measured: MeasuredSegment) -> Estimate:
         """Propagate along a segment, reweight by its pings and height change, and resample; returns the estimate at its end."""
         segment, belief = measured.segment, self.belief
+        # 1. What the last gap was: a pause, a way that was not observed, rangers that were silent.
         gap = self._gaps.ended(measured)
-        self._follow_barometer(measured)
-        change = height_change(measured, self._riding.height_m)
-        if self._height is not None:
-            self._height.update(change)
+        # 2. How the height has changed, by the foot and by pressure.
+        change = self._height_change(measured)
+        # 3. A way that was not observed scatters each hypothesis.
         if segment.unobserved:
             self._scatter(segment, change, is_long=gap is Gap.UNOBSERVED)
+        # 4. After a gap the wearer may be elsewhere: a rest, a ride in a lift, a walk.
         if gap is not None:
-            if gap is not Gap.UNOBSERVED:  # a rest, a ride in a lift, or a walk
+            if gap is not Gap.UNOBSERVED:
                 belief.leave(UNOBSERVED_DOUBT)
             self._search_beside(self.cloud.air, segment.heading1_rad)
+        # 5. Along an observed way each hypothesis moves, and is weighed by pings, walls and heights.
+        # 6. The hypotheses are compared, and the rangers' bias is learnt from the likeliest.
         if not segment.unobserved:
-            self._follow(measured, change)
+            self._compare(segment, *self._follow(measured, change))
+        # 7. What aids the filter weighs the tracked one.
         self._aid(segment)
+        # 8. If the trunk is probably in none, it is searched.
         self._search_if_doubted(segment.heading1_rad)
+        # 9. The estimate of the tracked one, and of its rival.
         return self._estimate(segment)
 
     def _aid(self, segment: PathSegment) -> None:
@@ -125,14 +132,18 @@ class MapFilter:
             each.cloud.turn_walk_frame(by_rad)
         self._way.clear()
 
-    def new_cloud(self, start: Start, walk_heading_rad: float) -> Cloud:
+    def new_cloud(self, start: Start, walk_heading_rad: float) -> Cloud | Search:
         """A cloud from a start; a search, if the place is unknown."""
         s, b = self._settings, self.building
         start = b.drawn.widened(start)
-        cloud = Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor, b.walls.index)
         if is_unknown(start) and len(b.floor.x_m):
-            cloud.grid = grid_of(start, walk_heading_rad, *self._table(), b.floor, b.sheet, s)
-        return cloud
+            return self._search_from(start, walk_heading_rad)
+        return cloud_about(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor, b.walls.index)
+
+    def _search_from(self, start: Start, walk_heading_rad: float) -> Search:
+        """A search on the floor, which there is."""
+        b = self.building
+        return search_of(start, walk_heading_rad, *self._table(), b.floor, b.sheet, self._settings, self._rng)
 
     def _table(self) -> tuple[GridCells, RangeMemory]:
         """The cells of a grid, and the density of pings without a plan that is as inexact as the cells."""
@@ -162,9 +173,9 @@ class MapFilter:
 
     def _begin_search(self, start: Start, walk_heading_rad: float) -> None:
         """Search the building along the last metres of the path."""
-        cloud = self.new_cloud(start, walk_heading_rad)
-        self.belief.begin_search(cloud, self._way.search(cloud, self._model))
-        if self.belief.search is not None:
+        search = self._search_from(start, walk_heading_rad)
+        self.belief.begin_search(search, self._way.search(search, self._model))
+        if isinstance(self.cloud, Cloud):
             self.belief.tracked.table = grid_about(
                 self.cloud, *self._table(), self.building.floor, self._settings, self._rng
             )
@@ -174,8 +185,8 @@ class MapFilter:
         if self.belief.is_doubted and len(self.building.floor.x_m):
             self._begin_search(Start(), walk_heading_rad)
 
-    def _follow_barometer(self, measured: MeasuredSegment) -> None:
-        """Let the lag of the height by pressure drift over a pause; forget it where the heights begin again."""
+    def _height_change(self, measured: MeasuredSegment) -> HeightChange:
+        """The change of height over a segment. The lag of the height by pressure drifts over a pause; it is forgotten where the heights restart."""
         anew = len(measured.height_m) > 0 and measured.barometer_starts != self._barometer_starts
         if anew:
             self._barometer_starts = measured.barometer_starts
@@ -189,6 +200,10 @@ class MapFilter:
             if self._height is not None:
                 self._height.forget_lag()
         self._riding.add(measured.height_m, self._gaps.pause_s + measured.segment.t1_s - measured.segment.t0_s)
+        change = height_change(measured, self._riding.height_m)
+        if self._height is not None:
+            self._height.update(change)
+        return change
 
     def _scatter(self, segment: PathSegment, change: HeightChange, *, is_long: bool) -> None:
         """Spread the clouds over an unobserved segment: straight through the building, or over a long way that is not known."""
@@ -199,43 +214,36 @@ class MapFilter:
             self.belief.leave(UNOBSERVED_DOUBT)
         self._way.clear()
 
-    def _follow(self, measured: MeasuredSegment, change: HeightChange) -> None:
-        """Propagate along an observed segment; a cloud resamples itself after each reweighting that needs it."""
-        segment = measured.segment
+    def _follow(self, measured: MeasuredSegment, change: HeightChange) -> tuple[Move, PingBatch]:
+        """Propagate along an observed segment; a cloud resamples itself after each reweighting that needs it. Returns the move and its pings."""
+        segment, belief, walls = measured.segment, self.belief, self.building.walls
         pings, unplanned = self._pings.take(
             self._bias.corrected(measured) if self.building.has_walls else measured.without_pings
         )
         move, path_m = move_of(segment), math.hypot(segment.dx_m, segment.dy_m)
         self._way.add(move, pings, change)
-        clouds, share = self.belief.clouds, evidence_share(segment.turn_rad)
+        clouds, share = belief.clouds, evidence_share(segment.turn_rad)
         for each in clouds:
-            self._follow_with(each, move, pings, unplanned, share)
-        self.belief.weigh_heights([each.change_levels(move, change) for each in clouds])
+            if isinstance(each.cloud, Search):
+                each.weigh(share * each.cloud.advance(move, pings, self._model), 0.0)
+            else:
+                self._follow_with(each, each.cloud, move, pings, unplanned, share)
+        belief.weigh_heights([each.change_levels(move, change) for each in clouds])
         for each in clouds:
-            if each.cloud.is_searching:
-                if each.cloud.show_search():
-                    self._way.pass_again(each.cloud, self._blurred, self.building.walls)
-                    each.cloud.draw_veer()
-                    self.belief.find(each)
-                continue
-            loss = self.building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m) if path_m > 0.0 else None
-            if loss is not None:
+            if isinstance(each.cloud, Search):
+                found = each.cloud.found()
+                if found is not None:
+                    self._way.pass_again(found, self._blurred, walls)
+                    found.draw_veer()
+                    belief.find(each, found)
+            elif (loss := self.building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m)) is not None:
                 each.cloud.reweight(loss)
-        if self.building.has_walls:
-            self._compare(path_m)
-            if len(pings.share) and self.belief.probability(self.belief.tracked) > PROBABLE:  # bounded by its prior
-                self._bias.learn_behind(
-                    self.cloud.arrays, self.cloud.weight, move, pings, self.building.walls, self._model
-                )
+        return move, pings
 
     def _follow_with(
-        self, each: CloudHypothesis, move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float
-    ) -> None:
+        self, each: CloudHypothesis, cloud: Cloud, move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float
+    ) -> None:  # fmt: skip
         """Propagate and reweight one cloud, and its hypothesis by this share of the evidence of the pings."""
-        cloud = each.cloud
-        if cloud.is_searching:
-            each.weigh(share * cloud.search(move, pings, self._model), 0.0)
-            return
         # By the spacing of sparse particles
         model, alone = (self._blurred, unplanned.blurred) if cloud.is_scattered else (self._model, unplanned.either)
         evidence = cloud.propagate_and_reweight(move, pings, model, self.building.walls)
@@ -255,14 +263,18 @@ class MapFilter:
             return log_passed
         return self._crossed.charge(self._believed(0.0), math.hypot(move.dx_m, move.dy_m), log_passed)
 
-    def _compare(self, path_m: float) -> None:
-        """Update the belief after a move: end improbable clouds, and merge clouds in one place."""
-        belief = self.belief
+    def _compare(self, segment: PathSegment, move: Move, pings: PingBatch) -> None:
+        """Update the belief after a move: end improbable clouds, and merge clouds in one place; learn the bias where the likeliest is."""
+        belief, path_m = self.belief, math.hypot(segment.dx_m, segment.dy_m)
+        if not self.building.has_walls:
+            return
         belief.judge_plan(path_m)
         belief.leave(WRONG_PER_M * path_m)
         belief.prune()
         if self._is_found_here():
             belief.merge()
+        if len(pings.share) and belief.probability(belief.tracked) > PROBABLE:  # bounded by its prior
+            self._bias.learn_behind(self.cloud.arrays, self.cloud.weight, move, pings, self.building.walls, self._model)
 
     def _is_found_here(self) -> bool:
         """Whether a search has found the place of the tracked cloud."""

@@ -21,6 +21,16 @@ class ParticleArrays(NamedTuple):
     log_weight: Floats
 
 
+class DrawnPoses(NamedTuple):
+    """Poses (n,) on the sheet: places (m), rotations walk -> map (rad), heights and offsets of the height by pressure (m)."""
+
+    x_m: Floats
+    y_m: Floats
+    turn_rad: Floats
+    z_m: Floats
+    lag_m: Floats
+
+
 class Move(NamedTuple):
     """A piece of the path in the walk frame, its bend [PathSegment], and standard deviations: per axis, of the rotation, of the scale."""
 

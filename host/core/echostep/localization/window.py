@@ -14,6 +14,7 @@ import math
 from collections import deque
 
 from echostep.localization.echoes.likelihood import EchoModel
+from echostep.localization.grid.search import Search
 from echostep.localization.height.levels import HeightChange
 from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import Cloud
@@ -46,12 +47,12 @@ class RecentWay:
         self._pieces.clear()
         self.length_m = 0.0
 
-    def search(self, cloud: Cloud, model: EchoModel) -> float:
+    def search(self, search: Search, model: EchoModel) -> float:
         """Let a search process the way from its beginning; returns the log of its density of the pings over the density without a plan."""
         log_pings = 0.0
         for move, pings, change in self._pieces:
-            log_pings += cloud.search(move, pings, model)
-            cloud.change_levels(move, change)
+            log_pings += search.advance(move, pings, model)
+            search.change_levels(move, change)
         return log_pings
 
     def pass_again(self, cloud: Cloud, model: EchoModel, walls: Walls) -> None:

@@ -19,7 +19,7 @@ from echostep.aiding.team.meetings import best_omega, information, places_at, we
 from echostep.arrays import Floats
 from echostep.localization import STATED, Building, CloudSettings, Start
 from echostep.localization.belief import Belief
-from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.path import Odometer, PathSegment
 from echostep.plan import Plan, Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
@@ -38,7 +38,7 @@ FAR_MESSAGE = MeetingMessage("eve", "tracking", 20.0, 2.0, 0, 0.0025, 0.0, 0.002
 def cloud(mean: tuple[float, float], sd: tuple[float, float], size: int = 20_000, seed: int = 1) -> Cloud:
     """A cloud whose particles are drawn from a normal distribution."""
     rng = np.random.default_rng(seed)
-    made = Cloud(CloudSettings(size=size), Start(Pose(*mean, 0.0)), 0.0, rng)
+    made = cloud_about(CloudSettings(size=size), Start(Pose(*mean, 0.0)), 0.0, rng)
     made.x_m, made.y_m = (m + s * rng.standard_normal(len(made.x_m)) for m, s in zip(mean, sd, strict=True))
     return made
 

@@ -22,7 +22,7 @@ from echostep.localization import (
 )
 from echostep.localization.echoes.likelihood import log_echo
 from echostep.localization.particle_arrays import Move, PingBatch
-from echostep.localization.particles.cloud import BENDS, Cloud
+from echostep.localization.particles.cloud import BENDS, Cloud, cloud_about
 from echostep.localization.particles.kernels import (
     NOISE_BEND,
     begin_segment,
@@ -45,7 +45,7 @@ Source = tuple[float, float, float]  # distance, degrees off the axis, kind
 
 
 def cloud(size: int = 1000, heading: float = 0.0) -> Cloud:
-    return Cloud(CloudSettings(size=size), Start(Pose(1.0, 1.0, heading)), 0.0, np.random.default_rng(1))
+    return cloud_about(CloudSettings(size=size), Start(Pose(1.0, 1.0, heading)), 0.0, np.random.default_rng(1))
 
 
 def heard(axis_rad: float, range_m: float, count: int = 1, power: float = 0.3) -> PingBatch:
@@ -162,7 +162,7 @@ def test_pings_count_where_they_were_triggered() -> None:
     shares = np.linspace(0.05, 0.95, 10)
     ends = {}
     for name, ranges in (("passed", [1.0] * 5 + [0.0] * 5), ("not yet", [1.0] * 10)):
-        found = Cloud(CloudSettings(size=2000), Start(place, 0.3), 0.0, np.random.default_rng(3))
+        found = cloud_about(CloudSettings(size=2000), Start(place, 0.3), 0.0, np.random.default_rng(3))
         pings = PingBatch(
             shares,
             np.full(10, math.pi / 2),

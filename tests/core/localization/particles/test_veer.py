@@ -10,6 +10,7 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.localization import Building, CloudSettings, FilterSettings, MapFilter, Start
+from echostep.localization.grid.search import Search
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
@@ -56,7 +57,7 @@ def test_without_a_prior_of_one_the_heading_lags() -> None:
 def test_a_search_that_has_found_a_place_learns_one() -> None:
     settings = FilterSettings(cloud=CloudSettings(start_veer_sd_deg=2.0))
     found = MapFilter(CORRIDOR, Start(), 0.0, np.random.default_rng(1), settings)
-    assert found.cloud.grid is not None
+    assert isinstance(found.cloud, Search)
     found.cloud.grid.begin_about(np.array([START.x_m]), np.array([START.y_m]), np.array([0.01]), 1.0)
     found.update(segments()[0])
     assert not found.cloud.is_searching

@@ -28,6 +28,7 @@ import numpy as np
 from echostep.aiding.team.meeting import RANGE_BODY_SD_M, WRONG, Meeting, covariance
 from echostep.arrays import Bools, Floats
 from echostep.localization.belief import CloudHypothesis
+from echostep.localization.grid.search import Search
 from echostep.localization.limits import HALF_STOREY_M, PROBABLE
 from echostep.localization.particles.cloud import Cloud
 
@@ -77,7 +78,7 @@ def best_omega(own: Floats, other: Floats) -> float:
     return min(max((2.0 * b - c) / (2.0 * curvature), 0.0), 1.0)
 
 
-def places_at(cloud: Cloud, meeting: Meeting) -> Floats:
+def places_at(cloud: Cloud | Search, meeting: Meeting) -> Floats:
     """Places (n, 2) of the particles at the meeting, map frame."""
     place: Floats = np.column_stack([cloud.map_x_m, cloud.y_m])
     c, s = np.cos(cloud.turn_rad), np.sin(cloud.turn_rad)
@@ -86,9 +87,10 @@ def places_at(cloud: Cloud, meeting: Meeting) -> Floats:
     return place
 
 
-def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
+def weigh(cloud: Cloud | Search, meeting: Meeting, area_m2: float) -> float:
     """Reweight a cloud by a meeting on a floor of this area; returns the probability that the meeting is right, given the cloud."""
-    cloud.show_every_state()
+    if isinstance(cloud, Search):
+        cloud.show_every_state()
     place = places_at(cloud, meeting)
     if cloud.sheet is None:
         on_level, levels = np.full(len(place), meeting.level == 0), 1

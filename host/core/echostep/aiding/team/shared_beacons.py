@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from echostep.aiding.beacon_map import BeaconMap
 from echostep.aiding.team.meeting import Meeting, TimedMeeting
 from echostep.board.gateway import BeaconReading
-from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.particles import Particles
 from echostep.ports.people.team_beacons import SharedBeacon, parse_team_beacons
 
 MOST_TEAMMATES = 64  # whose beacons are kept, the newest, assumed
@@ -27,7 +27,9 @@ SHARED_SD_M = 1.0  # per axis, of a place above which a beacon is not shared: it
 ROUNDING_M2 = 2e-4  # added to the variances of a shared place, which is rounded to 0.01 m
 
 
-def shared_beacons(beacon_map: BeaconMap, cloud: Cloud, t_s: float, numbers: Sequence[int]) -> tuple[SharedBeacon, ...]:
+def shared_beacons(
+    beacon_map: BeaconMap, cloud: Particles, t_s: float, numbers: Sequence[int]
+) -> tuple[SharedBeacon, ...]:
     """The beacons that a cloud has placed, to be sent to teammates; `numbers`: of the beacon in each slot."""
     shared = []
     for place in beacon_map.places(cloud, t_s):

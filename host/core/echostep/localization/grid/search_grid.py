@@ -11,7 +11,6 @@ states of a large building the heaviest MOST_STATES are kept.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -29,7 +28,7 @@ from echostep.localization.grid.kernels import (
     weigh_levels,
 )
 from echostep.localization.height.levels import HeightChange
-from echostep.localization.particle_arrays import Move, PingBatch
+from echostep.localization.particle_arrays import DrawnPoses, Move, PingBatch
 from echostep.localization.particles.kernels import MovePiece, piece_of, systematic
 from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.path import bend_of
@@ -43,16 +42,6 @@ SPREAD_M, SPREAD_RAD = 0.05, math.radians(1.0)  # standard deviations on a metre
 SPREAD_SHARE = 0.05  # of a state's weight that is due to each neighbour when it is spread
 MOST_BESIDE, MOST_TURNED = 0.2, 0.25  # of the weight that a neighbour gets at most: the peak remains
 NO_PING_BEND = bend_of(math.radians(45.0))  # of a move's chord, above which its pings do not count: an uncertain turn
-
-
-class DrawnPoses(NamedTuple):
-    """Poses (n,) on the sheet: places (m), rotations walk -> map (rad), heights and offsets of the height by pressure (m)."""
-
-    x_m: Floats
-    y_m: Floats
-    turn_rad: Floats
-    z_m: Floats
-    lag_m: Floats
 
 
 Places = tuple[Floats, Floats]  # x, y (n,) on the sheet (m)

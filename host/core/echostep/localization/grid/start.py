@@ -16,6 +16,7 @@ from echostep.localization.echoes.range_table import SECTORS
 from echostep.localization.echoes.unplanned import RangeMemory
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.heights import GridHeights
+from echostep.localization.grid.search import Search
 from echostep.localization.grid.search_grid import SearchGrid
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.kernels import systematic
@@ -44,6 +45,17 @@ def grid_about(
     chosen = systematic(cloud.weight, float(rng.random()), len(cloud.x_m))
     grid.begin_about(cloud.x_m[chosen], cloud.y_m[chosen], cloud.turn_rad[chosen], 1.0)
     return grid
+
+
+def search_of(
+    start: Start, walk_heading_rad: float, cells: GridCells, unplanned: RangeMemory, floor: Floor, sheet: LevelSheet | None,
+    settings: FilterSettings, rng: np.random.Generator,
+) -> Search:  # fmt: skip
+    """The search of an unknown start, as `grid_of`."""
+    sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
+    grid = grid_of(start, walk_heading_rad, cells, unplanned, floor, sheet, settings)
+    on_any = start.is_on_any_level
+    return Search(grid, settings.cloud, rng, sheet, settings.climb, start.lag_variance, is_on_any_level=on_any)
 
 
 def grid_of(

@@ -15,24 +15,21 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from echostep.arrays import Floats
 from echostep.localization.echoes.likelihood import EchoModel
-from echostep.localization.grid.search_grid import DrawnPoses, SearchGrid
 from echostep.localization.height.levels import (
-    UNKNOWN_LAG_M2,
     ClimbSettings,
     HeightArrays,
     HeightChange,
     change_levels,
-    drift_m,
     level_change_model,
     set_levels_by_pressure,
 )
-from echostep.localization.particle_arrays import Move, PingBatch
+from echostep.localization.particle_arrays import DrawnPoses, Move, PingBatch
 from echostep.localization.particles.kernels import (
     NOISE_BEND,
     NOISE_TURN,
@@ -42,7 +39,7 @@ from echostep.localization.particles.kernels import (
 from echostep.localization.particles.particles import GATHERED_REST, Particles
 from echostep.localization.particles.reweighting import CloudModel, EchoMemory, MoveProgress, propagate_and_reweight
 from echostep.localization.particles.sampling import kld_size, log_mode_weight, spread_evenly
-from echostep.localization.particles.start import ANY_LEVEL, Air, Start, draw_poses
+from echostep.localization.particles.start import Start, draw_poses
 from echostep.localization.settings import CloudSettings
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
@@ -50,12 +47,6 @@ from echostep.walls.index import NO_WALLS, WallIndex, crossings
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never that large
-# Weight outside of one place below which a search has found it, on one level, and on several, there after this length of search: exact likelihoods
-# discriminate between levels that are alike, and need a path to do so; assumed
-FOUND_REST, LEVELS_REST, LEVELS_M = 0.03, 0.1, 10.0
-SHOWN = 5_000  # particles that show a search
-TRACED_M2_RAD = 5.0  # poses that 20,000 particles fill by the sizes of `CloudSettings`: 6,000 cells
-SCATTERED_SHARE = 0.8  # weight of a search that stays about its places after a move that was not observed, assumed
 START_SIZE = 6_000  # least particles at the start: enough of them in the tails of its distribution (`start`)
 LEAST_LEVEL = 0.01  # probability of a level that counts among those on which the trunk may be, assumed
 # Particles of a second pass (about a second for 40 m), and roughening (m, rad) of the places tried again: a coarse place is off by this much
@@ -72,83 +63,53 @@ class Evidence(NamedTuple):
     log_path: float
 
 
+def cloud_about(
+    settings: CloudSettings, start: Start, walk_heading_rad: float, rng: np.random.Generator, sheet: LevelSheet | None = None,
+    climbing: ClimbSettings | None = None, floor: Floor = NO_FLOOR, walls: WallIndex = NO_WALLS,
+) -> Cloud:  # fmt: skip
+    """The cloud of a start. `walk_heading_rad`: the trunk's heading in the walk frame while it stands there; without `sheet` there is one level.
+
+    `floor`: for a start that is anywhere. `walls`: a start lies on one side of them.
+    """
+    sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
+    x_m, y_m, heading, log_weight = draw_poses(start, settings.largest, floor, sheet, rng, walls)
+    z_m = sheet.height_m[level_of(x_m, sheet)] if sheet else np.zeros(len(x_m))
+    lag_m = np.full(len(x_m), 0.0 if start.air is None else start.air.zero_m)
+    poses = DrawnPoses(x_m, y_m, heading - walk_heading_rad, z_m, lag_m)
+    cloud = Cloud(poses, settings, rng, sheet, climbing or ClimbSettings(), start.lag_variance)
+    cloud.shrink(log_weight)
+    return cloud
+
+
 class Cloud(Particles):
     """Particles as flat arrays of n; `log_weight` is normalised to a maximum of 0.
 
     A cloud is scattered or contracted by its number of particles, gathered or in one place by its spread: see the properties of these names.
-    `grid`: of a search, until it has found the place; the particles only show it, and are drawn from it again after each move. `is_gathered`: since
-    it last was scattered by an unobserved move, less than GATHERED_REST of its weight was once farther than ROOM_M from its mean on the sheet.
+    `is_gathered`: since it last was scattered by an unobserved move, less than GATHERED_REST of its weight was once farther than ROOM_M from its mean
+    on the sheet. `is_on_any_level`: a search has found it on several levels, between which the last metres of the path have not yet discriminated.
     """
 
-    def __init__(
-        self, settings: CloudSettings, start: Start, walk_heading_rad: float, rng: np.random.Generator,
-        sheet: LevelSheet | None = None, climbing: ClimbSettings | None = None, floor: Floor = NO_FLOOR, walls: WallIndex = NO_WALLS,
-    ) -> None:  # fmt: skip
-        """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at `start`; without `sheet` there is one level.
+    is_searching: ClassVar[bool] = False
 
-        `floor`: for a start that is anywhere. `walls`: a start lies on one side of them.
-        """
-        self.sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
-        self._climbing = climbing or ClimbSettings()
-        self._level_changes = level_change_model(self._climbing)
-        self.lag_variance = UNKNOWN_LAG_M2 if start.air is None else start.air.sd_m**2
-        self._settings = settings
-        self._rng = rng
-        self.grid: SearchGrid | None = None
-        self.is_gathered = False
-        self.is_on_any_level = (
-            self.sheet is not None and start.pose is None and start.level == ANY_LEVEL and start.air is None
-        )
-        x_m, y_m, heading, log_weight = draw_poses(start, settings.largest, floor, self.sheet, rng, walls)
-        z_m = self.sheet.height_m[level_of(x_m, self.sheet)] if self.sheet else np.zeros(len(x_m))
-        lag_m = np.full(len(x_m), 0.0 if start.air is None else start.air.zero_m)
-        self._put(DrawnPoses(x_m, y_m, heading - walk_heading_rad, z_m, lag_m))
+    def __init__(
+        self, poses: DrawnPoses, settings: CloudSettings, rng: np.random.Generator, sheet: LevelSheet | None,
+        climbing: ClimbSettings, lag_variance: float,
+    ) -> None:  # fmt: skip
+        """As `Particles`."""
+        super().__init__(poses, settings, rng, sheet, climbing, lag_variance)
+        self._level_changes = level_change_model(climbing)
+        self.is_gathered = self.is_on_any_level = False
+
+    def shrink(self, log_weight: Floats) -> None:
+        """Keep as many of the first particles, which were drawn with these log-weights (n,), as a start needs."""
         count = min(max(self._wanted_size(), START_SIZE), len(self.x_m))
         self.keep(np.arange(count))
         self.log_weight = log_weight[:count]
         self.draw_veer()
 
-    def _put(self, poses: DrawnPoses) -> None:
-        """Replace the particles by others with these poses, of which nothing else is known yet."""
-        self.x_m, self.y_m, self.turn_rad, self.z_m, self.lag_m = poses
-        count = len(self.x_m)
-        self.scale: Floats = 1.0 + self._settings.start_scale_sd * self._rng.standard_normal(count)
-        self.veer_rad_m: Floats = np.zeros(count)
-        self.log_weight: Floats = np.zeros(count)
-        self.hidden: Floats = np.zeros((2, count))
-        self.bend: Floats = np.zeros(count)
-        self.carried = ()
-
-    @property
-    def is_searching(self) -> bool:
-        """Whether the place is searched on a grid."""
-        return self.grid is not None
-
-    def search(self, move: Move, pings: PingBatch, model: EchoModel) -> float:
-        """Move and weigh all states of a search; returns the log of its density of the pings over the density without a plan."""
-        return 0.0 if self.grid is None else self.grid.advance(move, pings, model)
-
-    def show_search(self) -> bool:
-        """Draw particles from the grid; returns whether the search is over: they are in one place, or in few enough for a cloud to trace."""
-        grid = self.grid
-        if grid is None:
-            return False
-        self._put(grid.draw(SHOWN, self._rng))
-        rest, least_m = (FOUND_REST, 0.0) if self.sheet is None else (LEVELS_REST, LEVELS_M)
-        is_found = grid.densest_share(TRACED_M2_RAD) > 1.0 - FOUND_REST or self.place_share > 1.0 - rest
-        if grid.path_m < least_m or not is_found:
-            return False
-        self.grid = None
-        self._put(grid.draw(self._settings.largest, self._rng))
+    def contract(self) -> None:
+        """Resample to the size for the spread."""
         self._resample(self.log_weight, self.log_weight, min(self._wanted_size(), self._settings.largest))
-        return True
-
-    def show_every_state(self) -> None:
-        """Make the particles of a search all states of the grid."""
-        if self.grid is not None:
-            poses, log_weight = self.grid.every()
-            self._put(poses)
-            self.log_weight = log_weight
 
     def draw_veer(self) -> None:
         """Draw each particle's veer; after a search, once its second pass is over: the pass begins where the path leads back to."""
@@ -200,11 +161,7 @@ class Cloud(Particles):
         """
         if self.sheet is None:
             return 0.0
-        if math.isfinite(change.height_sd_m):
-            self.lag_variance += self._climbing.drift_m**2 * change.span_s
-        if self.grid is not None:
-            self.lag_variance, log_mean = self.grid.change_levels(change, self.lag_variance)
-            return log_mean
+        self._drift(change)
         noise = self._rng.standard_normal(len(self.x_m))
         heights = HeightArrays(self.z_m, self.lag_m)
         self.lag_variance, log_mean = change_levels(
@@ -243,29 +200,8 @@ class Cloud(Particles):
         self.z_m = sheet.height_m[level]
         self.forget_lag()
 
-    def forget_lag(self) -> None:
-        """Make the lag unknown: the barometer may have restarted."""
-        self.lag_variance = UNKNOWN_LAG_M2
-
-    def let_lag_drift(self, pause_s: float) -> None:
-        """Let the variance of the lag grow over a pause without measurements."""
-        drifted_m2 = self.lag_variance + drift_m(self._climbing, pause_s) ** 2
-        self.lag_variance = min(drifted_m2, UNKNOWN_LAG_M2)
-
-    @property
-    def air(self) -> Air | None:
-        """Mean and standard deviation of the lag of the height by pressure; None if it is unknown."""
-        if self.sheet is None or self.lag_variance >= UNKNOWN_LAG_M2:
-            return None
-        weight = self.weight
-        mean = float(weight @ self.lag_m)
-        return Air(mean, math.sqrt(self.lag_variance + float(weight @ (self.lag_m - mean) ** 2)))
-
     def scatter(self, move: Move, walls: WallIndex, change: HeightChange | None = None) -> None:
-        """Spread by an unobserved move. `walls`: those that it would have to cross. The level follows the height by pressure, if any.
-
-        A search begins again about the places reached.
-        """
+        """Spread by an unobserved move. `walls`: those that it would have to cross. The level follows the height by pressure, if any."""
         self.keep(systematic(np.exp(self.log_weight), float(self._rng.random()), self._settings.largest))
         self.is_gathered = False
         noise = self._rng.standard_normal((3, len(self.x_m)))
@@ -279,27 +215,12 @@ class Cloud(Particles):
         self.log_weight = np.where(crosses, -self._settings.wall_cost, 0.0)
         if self.sheet and change and math.isfinite(change.height_sd_m):
             set_levels_by_pressure(self.x_m, HeightArrays(self.z_m, self.lag_m), change.height_m, self.sheet)
-        if self.grid is not None:
-            self.grid.begin_about(self.x_m, self.y_m, self.turn_rad, SCATTERED_SHARE)
-
-    def turn_walk_frame(self, by_rad: float) -> None:
-        """Rotate all particles: the heading in the walk frame has changed while the wearer's heading on the map has not."""
-        self.turn_rad = self.turn_rad + by_rad
-        if self.grid is not None:
-            self.grid.turn_walk_frame(by_rad)
 
     def reweight(self, log_factor: Floats) -> None:
-        """Multiply the weights by factors, given as logarithms (n,), and resample when too few particles carry the weight.
-
-        The particles of a search are its states (`show_every_state`).
-        """
+        """Multiply the weights by factors, given as logarithms (n,), and resample when too few particles carry the weight."""
         self.log_weight = self.log_weight + log_factor
         self.log_weight -= self.log_weight.max()
-        if self.grid is None:
-            self.resample_if_needed()
-        else:
-            self.grid.reweight(self.log_weight)
-            self.show_search()
+        self.resample_if_needed()
 
     def resample_if_needed(self) -> None:
         """Systematic resampling [Kitagawa 1996] when too few particles carry the weight.

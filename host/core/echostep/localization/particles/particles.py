@@ -6,12 +6,17 @@ In: arrays of n particles. Out: levels, weights, places. Owns the arrays.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from echostep.arrays import Floats, Ints
+from echostep.localization.height.levels import UNKNOWN_LAG_M2, ClimbSettings, HeightChange, drift_m
 from echostep.localization.limits import ROOM_M
-from echostep.localization.particle_arrays import ParticleArrays
+from echostep.localization.particle_arrays import DrawnPoses, ParticleArrays
 from echostep.localization.particles.places import LikelyPlace, hypotheses
+from echostep.localization.particles.start import Air
+from echostep.localization.settings import CloudSettings
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 # A cloud is gathered when less than this weight is farther than ROOM_M from its mean, assumed
@@ -24,7 +29,6 @@ class Particles:
     `carried`: arrays (n, ...) of what aids the filter, which each particle carries along.
     """
 
-    sheet: LevelSheet | None
     x_m: Floats
     y_m: Floats
     turn_rad: Floats
@@ -36,6 +40,51 @@ class Particles:
     bend: Floats
     carried: tuple[Floats, ...]
     z_m: Floats
+
+    def __init__(
+        self, poses: DrawnPoses, settings: CloudSettings, rng: np.random.Generator, sheet: LevelSheet | None,
+        climbing: ClimbSettings, lag_variance: float,
+    ) -> None:  # fmt: skip
+        """`sheet`: of several levels, or None. `lag_variance`: of the lag, in m2, the same for all particles."""
+        self.sheet, self.lag_variance = sheet, lag_variance
+        self._settings, self._climbing, self._rng = settings, climbing, rng
+        self._put(poses)
+
+    def _put(self, poses: DrawnPoses) -> None:
+        """Replace the particles by others with these poses, of which nothing else is known yet."""
+        self.x_m, self.y_m, self.turn_rad, self.z_m, self.lag_m = poses
+        count = len(self.x_m)
+        self.scale = 1.0 + self._settings.start_scale_sd * self._rng.standard_normal(count)
+        self.veer_rad_m, self.log_weight, self.bend = np.zeros(count), np.zeros(count), np.zeros(count)
+        self.hidden = np.zeros((2, count))
+        self.carried = ()
+
+    @property
+    def air(self) -> Air | None:
+        """Mean and standard deviation of the lag of the height by pressure; None if it is unknown."""
+        if self.sheet is None or self.lag_variance >= UNKNOWN_LAG_M2:
+            return None
+        weight = self.weight
+        mean = float(weight @ self.lag_m)
+        return Air(mean, math.sqrt(self.lag_variance + float(weight @ (self.lag_m - mean) ** 2)))
+
+    def forget_lag(self) -> None:
+        """Make the lag unknown: the barometer may have restarted."""
+        self.lag_variance = UNKNOWN_LAG_M2
+
+    def let_lag_drift(self, pause_s: float) -> None:
+        """Let the variance of the lag grow over a pause without measurements."""
+        drifted_m2 = self.lag_variance + drift_m(self._climbing, pause_s) ** 2
+        self.lag_variance = min(drifted_m2, UNKNOWN_LAG_M2)
+
+    def _drift(self, change: HeightChange) -> None:
+        """Let the variance of the lag grow by the time of a segment with pressure."""
+        if math.isfinite(change.height_sd_m):
+            self.lag_variance += self._climbing.drift_m**2 * change.span_s
+
+    def turn_walk_frame(self, by_rad: float) -> None:
+        """Rotate all particles: the heading in the walk frame has changed while the wearer's heading on the map has not."""
+        self.turn_rad = self.turn_rad + by_rad
 
     @property
     def level(self) -> Ints:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from echostep.arrays import Floats, Ints
+from echostep.localization.height.levels import UNKNOWN_LAG_M2
 from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.plan import Pose
 from echostep.walls.floor import Floor
@@ -63,6 +64,16 @@ class Start:
     near: Pose | None = None
     air: Air | None = None
     after_pause: bool = False
+
+    @property
+    def is_on_any_level(self) -> bool:
+        """Whether nothing is known of the level."""
+        return self.pose is None and self.level == ANY_LEVEL and self.air is None
+
+    @property
+    def lag_variance(self) -> float:
+        """Variance (m2) of the offset of the height by pressure."""
+        return UNKNOWN_LAG_M2 if self.air is None else self.air.sd_m**2
 
     def __repr__(self) -> str:
         """The fields that are not the default."""
