@@ -78,7 +78,7 @@ class AidedFilter(MapFilter):
             self.belief.raise_to(tracked, min(fits[0], 1.0 - wrong))
             self._met.agree()
             return MeetingEffect.USED
-        moved = moved_by(meeting, self.belief.probability(tracked), self._met.contradict())
+        moved = moved_by(meeting, self.belief.right, self._met.contradict())
         if moved is None:
             return MeetingEffect.CONTRADICTS
         self._met.agree()

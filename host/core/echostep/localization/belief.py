@@ -122,6 +122,16 @@ class Belief:
         return 0.0 if each is None else math.exp(each.log_weight) * (1.0 if fits >= SURE else fits)
 
     @property
+    def right(self) -> float:
+        """Probability that the trunk is in the tracked cloud."""
+        return self.probability(self.tracked)
+
+    @property
+    def is_searching(self) -> bool:
+        """Whether the building is searched, or was, and a rival of the tracked cloud was found."""
+        return self.search is not None or self.tracked.cloud.is_searching
+
+    @property
     def is_doubted(self) -> bool:
         """Whether the trunk is probably in no cloud, if the plan fits."""
         return math.exp(self.log_elsewhere) > PROBABLE

@@ -26,14 +26,15 @@ class Building:
     """Data of a plan, shared by all filters on it: walls, sheet of levels, floor; tables are made when a cloud first needs them."""
 
     def __init__(self, walls: Walls, sheet: LevelSheet | None = None, drawn: DrawnPlaces | None = None) -> None:
-        """`drawn`: how well its places are known, if it was drawn by a walk."""
-        self.walls, self.sheet, self.drawn = walls, sheet, drawn or DrawnPlaces()
+        """`sheet`: None after this, if it has one level. `drawn`: how well its places are known, if it was drawn by a walk."""
+        self.walls, self.drawn = walls, drawn or DrawnPlaces()
+        self.sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
         self.floor = walkable_floor(walls.index.walls)
         self.indoors = indoors(self.floor)
-        self.upper_levels = None
-        if sheet is not None and len(sheet.height_m) > 1 and len(self.floor.x_m):
-            self.upper_levels = UpperLevels(self.floor, sheet)
-        self.elsewhere = _elsewhere(self.floor, sheet)
+        self.upper_levels = (
+            UpperLevels(self.floor, self.sheet) if self.sheet is not None and len(self.floor.x_m) else None
+        )
+        self.elsewhere = _elsewhere(self.floor, self.sheet)
         self._backgrounds: dict[EchoModel, Background] = {}
         self._cells: dict[EchoModel, GridCells] = {}
 

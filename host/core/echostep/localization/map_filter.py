@@ -22,7 +22,7 @@ from echostep.localization.echoes.unplanned import RangeMemory, UnplannedDensiti
 from echostep.localization.estimate import Estimate
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.search import Search
-from echostep.localization.grid.start import grid_about, is_unknown, search_of
+from echostep.localization.grid.start import grid_about, grid_of, is_unknown
 from echostep.localization.height.height_filter import RelativeHeight, RidingHeight
 from echostep.localization.height.levels import HeightChange
 from echostep.localization.limits import BELIEVED, LOST_M, PROBABLE, TRACKING_M
@@ -36,7 +36,6 @@ from echostep.localization.window import RecentWay
 from echostep.path import MeasuredSegment, Odometer, PathSegment
 from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
-from echostep.walls.index import NO_WALLS
 
 SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports the cloud, assumed
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate: no plan is more exact
@@ -142,8 +141,9 @@ class MapFilter:
 
     def _search_from(self, start: Start, walk_heading_rad: float) -> Search:
         """A search on the floor, which there is."""
-        b = self.building
-        return search_of(start, walk_heading_rad, *self._table(), b.floor, b.sheet, self._settings, self._rng)
+        s, b = self._settings, self.building
+        grid = grid_of(start, walk_heading_rad, *self._table(), b.floor, b.sheet, s)
+        return Search(grid, start, s.cloud, self._rng, b.sheet, s.climb)
 
     def _table(self) -> tuple[GridCells, RangeMemory]:
         """The cells of a grid, and the density of pings without a plan that is as inexact as the cells."""
@@ -153,11 +153,7 @@ class MapFilter:
     @property
     def plan_supports(self) -> bool:
         """Whether the last metres of echoes confirm the cloud by the plan."""
-        return (
-            self.building.has_walls
-            and self.belief.probability(self.belief.tracked) > BELIEVED
-            and self._pings.silent_m < SUPPORTED_M
-        )
+        return self.building.has_walls and self.belief.right > BELIEVED and self._pings.silent_m < SUPPORTED_M
 
     def _search_beside(self, air: Air | None, walk_heading_rad: float) -> None:
         """Search the whole building in addition to the tracked cloud, which covers the near places.
@@ -206,10 +202,9 @@ class MapFilter:
         return change
 
     def _scatter(self, segment: PathSegment, change: HeightChange, *, is_long: bool) -> None:
-        """Spread the clouds over an unobserved segment: straight through the building, or over a long way that is not known."""
-        walls = NO_WALLS if is_long else self.building.walls.index
+        """Spread the hypotheses over an unobserved segment, straight through the building."""
         for each in self.belief.clouds:
-            each.cloud.scatter(move_of(segment), walls, change)
+            each.cloud.scatter(move_of(segment), change)
         if is_long:
             self.belief.leave(UNOBSERVED_DOUBT)
         self._way.clear()
@@ -273,7 +268,7 @@ class MapFilter:
         belief.prune()
         if self._is_found_here():
             belief.merge()
-        if len(pings.share) and belief.probability(belief.tracked) > PROBABLE:  # bounded by its prior
+        if len(pings.share) and belief.right > PROBABLE:  # bounded by its prior
             self._bias.learn_behind(self.cloud.arrays, self.cloud.weight, move, pings, self.building.walls, self._model)
 
     def _is_found_here(self) -> bool:
@@ -301,7 +296,7 @@ class MapFilter:
         map_sd_m = self._map_sd_m()
         if map_sd_m > 0.0:
             sd_m = math.hypot(sd_m, map_sd_m)
-        right = Right(belief.probability(belief.tracked), belief.probability(belief.search))
+        right = Right(belief.right, belief.probability(belief.search))
         search = belief.search.cloud if belief.search else None
         new = estimate_of(
             self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, self.building.elsewhere, search,

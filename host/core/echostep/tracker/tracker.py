@@ -126,9 +126,8 @@ class Tracker:
             undone=self._undone,
             bad_check_ins=self._bad_check_ins,
             particle_count=0 if self.filter is None else len(self.filter.cloud.x_m),
-            right=math.nan if self.filter is None else self.filter.belief.probability(self.filter.belief.tracked),
-            searches=self.filter is not None
-            and (self.filter.belief.search is not None or self.filter.cloud.is_searching),
+            right=math.nan if self.filter is None else self.filter.belief.right,
+            searches=self.filter is not None and self.filter.belief.is_searching,
             beacon_numbers=tuple(self.gateway.numbers),
             beacon_heard_s=None if self.filter is None else self.filter.beacon_map.heard_s,
             alarm=self.watch.alarm,
@@ -178,15 +177,10 @@ class Tracker:
 
         With a stated start the status is `tracking` before any echo; teammates would take over its error.
         """
-        last = self._estimate
-        if (
-            self.filter is None
-            or last is None
-            or last.status is not TrackStatus.TRACKING
-            or not self.filter.plan_supports
-        ):
+        last, tracked = self._estimate, self.filter
+        if last is None or tracked is None or last.status is not TrackStatus.TRACKING or not tracked.plan_supports:
             return None
-        return shared_beacons(self.filter.beacon_map, self.filter.cloud, last.t_s, self.gateway.numbers)
+        return shared_beacons(tracked.beacon_map, tracked.cloud, last.t_s, self.gateway.numbers)
 
     def last_place(self) -> LastPlace | None:
         """The start of the next run; None unless the status of the newest estimate is `tracking`."""

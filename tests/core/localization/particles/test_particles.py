@@ -33,7 +33,6 @@ from echostep.localization.particles.kernels import (
 )
 from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
-from echostep.walls.index import NO_WALLS
 from echostep.walls.tile_points import CORNER, EDGE
 
 TRAVEL_M, ALIKE, UNPLANNED = 0.05, 0.2, 0.6  # path between two pings; density like the one before, and by no plan
@@ -182,7 +181,7 @@ def test_pings_count_where_they_were_triggered() -> None:
 
 def test_an_unwatched_move_grows_the_cloud_and_it_shrinks_again() -> None:
     found = cloud(300)
-    found.scatter(Move(0.0, 0.0, 6.0, 3.0), NO_WALLS)
+    found.scatter(Move(0.0, 0.0, 6.0, 3.0))
     assert len(found.x_m) == CloudSettings().largest
     assert estimate_of(found, 0.0, 0.0, 0).status == TrackStatus.LOST
     found.x_m[:] = 1.0 + 0.02 * np.random.default_rng(3).standard_normal(len(found.y_m))

@@ -17,8 +17,8 @@ from echostep.localization.height.levels import ClimbSettings, HeightChange
 from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.particles import Particles
+from echostep.localization.particles.start import Start
 from echostep.localization.settings import CloudSettings
-from echostep.walls.index import WallIndex
 from echostep.walls.level_sheet import LevelSheet
 
 # Weight outside of one place below which a search has found it, on one level, and on several, there after this length of search: exact likelihoods
@@ -35,12 +35,13 @@ class Search(Particles):
     is_searching: ClassVar[bool] = True
 
     def __init__(
-        self, grid: SearchGrid, settings: CloudSettings, rng: np.random.Generator, sheet: LevelSheet | None,
-        climbing: ClimbSettings, lag_variance: float, *, is_on_any_level: bool,
+        self, grid: SearchGrid, start: Start, settings: CloudSettings, rng: np.random.Generator, sheet: LevelSheet | None,
+        climbing: ClimbSettings,
     ) -> None:  # fmt: skip
-        """As `Particles`, which are drawn from the grid."""
-        super().__init__(grid.draw(SHOWN, rng), settings, rng, sheet, climbing, lag_variance)
-        self.grid, self.is_on_any_level = grid, is_on_any_level and sheet is not None
+        """`grid`: of the start."""
+        super().__init__(grid.draw(SHOWN, rng), settings, rng, sheet, climbing, start.lag_variance)
+        self.grid = grid
+        self.is_on_any_level = sheet is not None and start.is_on_any_level
 
     def advance(self, move: Move, pings: PingBatch, model: EchoModel) -> float:
         """Move and weigh all states; returns the log of their density of the pings over the density without a plan."""
@@ -82,10 +83,10 @@ class Search(Particles):
         """Multiply the weights of all states, which the particles are [`show_every_state`], by factors given as logarithms (n,)."""
         self.grid.reweight(self.log_weight + log_factor)
 
-    def scatter(self, move: Move, walls: WallIndex, change: HeightChange) -> None:
+    def scatter(self, move: Move, change: HeightChange) -> None:
         """Begin again about the places that are reached by an unobserved move, as of a cloud."""
         cloud = self._cloud()
-        cloud.scatter(move, walls, change)
+        cloud.scatter(move, change)
         self.grid.begin_about(cloud.x_m, cloud.y_m, cloud.turn_rad, SCATTERED_SHARE)
 
     def turn_walk_frame(self, by_rad: float) -> None:

@@ -16,7 +16,6 @@ from echostep.localization.echoes.range_table import SECTORS
 from echostep.localization.echoes.unplanned import RangeMemory
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.heights import GridHeights
-from echostep.localization.grid.search import Search
 from echostep.localization.grid.search_grid import SearchGrid
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.kernels import systematic
@@ -47,23 +46,11 @@ def grid_about(
     return grid
 
 
-def search_of(
-    start: Start, walk_heading_rad: float, cells: GridCells, unplanned: RangeMemory, floor: Floor, sheet: LevelSheet | None,
-    settings: FilterSettings, rng: np.random.Generator,
-) -> Search:  # fmt: skip
-    """The search of an unknown start, as `grid_of`."""
-    sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
-    grid = grid_of(start, walk_heading_rad, cells, unplanned, floor, sheet, settings)
-    on_any = start.is_on_any_level
-    return Search(grid, settings.cloud, rng, sheet, settings.climb, start.lag_variance, is_on_any_level=on_any)
-
-
 def grid_of(
     start: Start, walk_heading_rad: float, cells: GridCells, unplanned: RangeMemory, floor: Floor, sheet: LevelSheet | None,
     settings: FilterSettings,
 ) -> SearchGrid:  # fmt: skip
     """The grid of an unknown start. `walk_heading_rad`: the trunk's heading in the walk frame at the start."""
-    sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
     allowed = allowed_floor(floor, start, sheet)
     heights = None if sheet is None else GridHeights(sheet, settings.climb, start)
     grid = SearchGrid(

@@ -43,7 +43,7 @@ from echostep.localization.particles.start import Start, draw_poses
 from echostep.localization.settings import CloudSettings
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
-from echostep.walls.index import NO_WALLS, WallIndex, crossings
+from echostep.walls.index import NO_WALLS, WallIndex
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never that large
@@ -71,7 +71,6 @@ def cloud_about(
 
     `floor`: for a start that is anywhere. `walls`: a start lies on one side of them.
     """
-    sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
     x_m, y_m, heading, log_weight = draw_poses(start, settings.largest, floor, sheet, rng, walls)
     z_m = sheet.height_m[level_of(x_m, sheet)] if sheet else np.zeros(len(x_m))
     lag_m = np.full(len(x_m), 0.0 if start.air is None else start.air.zero_m)
@@ -91,14 +90,7 @@ class Cloud(Particles):
 
     is_searching: ClassVar[bool] = False
 
-    def __init__(
-        self, poses: DrawnPoses, settings: CloudSettings, rng: np.random.Generator, sheet: LevelSheet | None,
-        climbing: ClimbSettings, lag_variance: float,
-    ) -> None:  # fmt: skip
-        """As `Particles`."""
-        super().__init__(poses, settings, rng, sheet, climbing, lag_variance)
-        self._level_changes = level_change_model(climbing)
-        self.is_gathered = self.is_on_any_level = False
+    is_gathered, is_on_any_level = False, False
 
     def shrink(self, log_weight: Floats) -> None:
         """Keep as many of the first particles, which were drawn with these log-weights (n,), as a start needs."""
@@ -165,7 +157,7 @@ class Cloud(Particles):
         noise = self._rng.standard_normal(len(self.x_m))
         heights = HeightArrays(self.z_m, self.lag_m)
         self.lag_variance, log_mean = change_levels(
-            self.arrays, heights, move, noise, change, self.lag_variance, self._level_changes, self.sheet
+            self.arrays, heights, move, noise, change, self.lag_variance, level_change_model(self._climbing), self.sheet
         )
         self.resample_if_needed()
         return log_mean
@@ -200,19 +192,15 @@ class Cloud(Particles):
         self.z_m = sheet.height_m[level]
         self.forget_lag()
 
-    def scatter(self, move: Move, walls: WallIndex, change: HeightChange | None = None) -> None:
-        """Spread by an unobserved move. `walls`: those that it would have to cross. The level follows the height by pressure, if any."""
+    def scatter(self, move: Move, change: HeightChange | None = None) -> None:
+        """Spread by an unobserved move. The level follows the height by pressure, if any."""
         self.keep(systematic(np.exp(self.log_weight), float(self._rng.random()), self._settings.largest))
         self.is_gathered = False
         noise = self._rng.standard_normal((3, len(self.x_m)))
-        from_x_m: Floats = self.x_m
-        from_y_m: Floats = self.y_m
         self.turn_rad += move.turn_sd_rad * noise[2]
         c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
-        self.x_m = from_x_m + c * move.dx_m - s * move.dy_m + move.sd_m * noise[0]
-        self.y_m = from_y_m + s * move.dx_m + c * move.dy_m + move.sd_m * noise[1]
-        crosses = crossings(from_x_m, from_y_m, self.x_m, self.y_m, walls)
-        self.log_weight = np.where(crosses, -self._settings.wall_cost, 0.0)
+        self.x_m = self.x_m + c * move.dx_m - s * move.dy_m + move.sd_m * noise[0]
+        self.y_m = self.y_m + s * move.dx_m + c * move.dy_m + move.sd_m * noise[1]
         if self.sheet and change and math.isfinite(change.height_sd_m):
             set_levels_by_pressure(self.x_m, HeightArrays(self.z_m, self.lag_m), change.height_m, self.sheet)
 
