@@ -80,10 +80,13 @@ def test_a_known_start_is_tracked_whatever_the_rangers_do_at_first(building: str
 
 
 @pytest.mark.study
-@pytest.mark.parametrize("building", ["corridor-20", "flat", "hall"])
-def test_a_foot_alone_is_led_by_the_plan(building: str) -> None:
-    """It is closer than the foot laid on the plan, and never lost or falsely sure."""
-    row = small_run(building, "/foot-alone")["/foot-alone"]
+@pytest.mark.parametrize(
+    ("building", "fault"),
+    [("corridor-20", "/foot-alone"), ("flat", "/foot-alone"), ("hall", "/foot-alone"), ("flat", "/off-foot")],
+)
+def test_a_foot_alone_is_led_by_the_plan(building: str, fault: str) -> None:
+    """It is closer than the foot laid on the plan, and never lost or falsely sure; the last from a start that is off."""
+    row = small_run(building, fault)[fault]
     assert row.rmse_m < row.laid_m
     assert row.lost == 0.0
     assert row.false_tracking == 0.0
@@ -91,7 +94,7 @@ def test_a_foot_alone_is_led_by_the_plan(building: str) -> None:
 
 @pytest.mark.process
 def test_the_command_names_its_rows(tmp_path: Path) -> None:
-    assert len(NAMES) == len(set(NAMES)) == len(BUILDINGS) * (len(FAULTS) + 1)
+    assert len(NAMES) == len(set(NAMES)) == len(BUILDINGS) * (len(FAULTS) + 3)
     wrong = echostep("evaluate", "simple", "--rows", "corridor-7", "--out", tmp_path)
     assert wrong.returncode != 0
     assert "corridor-20/silent-3" in wrong.stderr
