@@ -113,8 +113,9 @@ def propagated(g: Gaussian, air: int, way: int, dt: float) -> Gaussian:
     if air == HELD:
         g = wider(g, GUST, model.HELD_WANDERS_M**2 * dt)
     if air == FADING:
-        g = wider(g, GUST, (model.FADING_WANDERS_M**2 + (model.FADING_WANDERS * g.mean[GUST]) ** 2) * dt)
-        f[GUST, GUST] = math.exp(-dt / model.FADES_S)
+        f[GUST, GUST] = fades = math.exp(-dt / model.FADES_S)
+        rate = model.FADING_WANDERS_M**2 + (model.FADING_WANDERS * g.mean[GUST]) ** 2
+        q[GUST, GUST] = 0.5 * model.FADES_S * (1.0 - fades**2) * rate
     if way != ON:
         speed, sd, tau = motion(way)
         keeps = math.exp(-dt / tau)
@@ -146,7 +147,7 @@ def observed(g: Gaussian, way: int, seen: Floats, dt: float) -> tuple[float, Gau
             likelihood *= normal(foot - g.mean[RATE], g.cov[RATE, RATE] + noise_var)
             g = updated(g, UNIT[RATE], foot, noise_var)
         else:
-            likelihood *= normal(foot, model.FOOT_LEVEL_M_S**2 + noise_var)
+            likelihood *= normal(foot, model.FOOT_LEVEL_M_S**2 / dt + noise_var)
     if math.isnan(claimed):
         return likelihood, g
     noise_var = seen[model.NOISE] ** 2

@@ -16,7 +16,7 @@ from echostep_studies.barometer import vertical_model as model
 from echostep_studies.barometer.vertical_filter import Hypotheses
 from echostep_studies.barometer.vertical_kernels import filter_samples, smooth_backward, start
 from echostep_studies.barometer.vertical_model import State
-from naive.vertical import Gaussian, smoothed, started
+from naive.vertical import Gaussian, observed, propagated, smoothed, started
 from naive.vertical_steps import VerticalFilter
 
 STEPS_S = (0.02, 0.11, 0.5, 0.7, 1.9, 5.0, 5.1, 60.0, 4000.0)  # up to three steps, the longest without a gap, gaps
@@ -141,3 +141,24 @@ def test_blocks_of_a_record_are_smoothed_as_one(monkeypatch: pytest.MonkeyPatch)
         before = expected[0] @ np.divide(joint, total, out=np.zeros_like(joint), where=total > 0.0)
         expected.insert(0, before / before.sum())
     np.testing.assert_allclose(smooth, expected, rtol=1e-6, atol=1e-10)
+
+
+def test_a_second_is_a_second_however_it_is_cut() -> None:
+    """A gust that fades wanders as far, and a foot on level ground speaks as loudly, in ten steps as in one."""
+    seen = np.full(9, math.nan)
+    seen[model.FOOT], seen[model.FOOT_SD] = 0.2, 0.1
+    one = Gaussian(np.zeros(model.SIZE), np.eye(model.SIZE))
+    whole, log_whole = propagated(one, model.FADING, model.ON, 1.0), _log_foot_ratio(one, seen, 1.0)
+    cut, log_cut = one, 0.0
+    for _ in range(10):
+        cut = propagated(cut, model.FADING, model.ON, 0.1)
+        log_cut += _log_foot_ratio(one, seen, 0.1)
+    assert cut.cov[model.GUST, model.GUST] == pytest.approx(whole.cov[model.GUST, model.GUST])
+    assert log_cut == pytest.approx(log_whole)
+
+
+def _log_foot_ratio(g: Gaussian, seen: Floats, dt: float) -> float:
+    """Log of how much likelier a standing foot is than what was seen."""
+    still = seen.copy()
+    still[model.FOOT] = 0.0
+    return math.log(observed(g, model.ON, still, dt)[0] / observed(g, model.ON, seen, dt)[0])

@@ -155,12 +155,13 @@ def _propagate(x: Floats, c: Floats, way: int, air: int, dt: float) -> None:
     if air == HELD:
         c[GUST, GUST] += HELD_WANDERS_M**2 * dt
     elif air == FADING:
-        c[GUST, GUST] += (FADING_WANDERS_M**2 + (FADING_WANDERS * x[GUST]) ** 2) * dt
         fades = math.exp(-dt / FADES_S)
+        wanders_m2 = (FADING_WANDERS_M**2 + (FADING_WANDERS * x[GUST]) ** 2) * 0.5 * FADES_S * (1.0 - fades**2)
         x[GUST] *= fades
         for a in range(SIZE):
             c[GUST, a] *= fades
             c[a, GUST] *= fades
+        c[GUST, GUST] += wanders_m2
     if way == ON:
         return
     stairs = way < LIFT_UP
@@ -197,7 +198,7 @@ def _evidence_cost(x: Floats, way: int, seen: Floats) -> float:
 def _foot_likelihood(x: Floats, c: Floats, way: int, seen: Floats) -> float:
     """Likelihood of the foot's vertical speed: on stairs it measures RATE (and updates it), elsewhere, also in a lift, it is 0."""
     stairs = STAIRS_UP <= way < LIFT_UP
-    noise = seen[FOOT_SD] ** 2 / seen[DT] + (0.0 if stairs else FOOT_LEVEL_M_S**2)
+    noise = (seen[FOOT_SD] ** 2 + (0.0 if stairs else FOOT_LEVEL_M_S**2)) / seen[DT]
     off = seen[FOOT] - (x[RATE] if stairs else 0.0)
     spread = noise + (c[RATE, RATE] if stairs else 0.0)
     if stairs:
