@@ -67,8 +67,8 @@ def correct(belief: Belief, h: Floats, innovation: float, noise_var: float) -> N
     belief.cov = rest @ belief.cov @ rest.T + noise_var * np.outer(gain, gain)
 
 
-def expected_range(belief: Belief, place: Floats) -> tuple[float, float, float]:
-    """Mean and variance of the range by the moments of its square, and the variance's part from across the line of sight.
+def expected_range(belief: Belief, place: Floats) -> tuple[float, float, float, float]:
+    """Mean and variance of the range by the moments of its square, the variance's part from across the line of sight, and the variance across.
 
     For a place that is normal along and across the line: E r^2 = d^2 + across, var r^2 = 4 d^2 along + 2 across^2, sd r = sd r^2 / (2 r).
     """
@@ -79,17 +79,18 @@ def expected_range(belief: Belief, place: Floats) -> tuple[float, float, float]:
     across = max(float(np.trace(belief.cov[:2, :2])) - along, 0.0)
     mean_square = square + across
     curved = 2.0 * across**2 / (4.0 * mean_square)
-    return math.sqrt(mean_square), 4.0 * square * along / (4.0 * mean_square) + curved, curved
+    return math.sqrt(mean_square), 4.0 * square * along / (4.0 * mean_square) + curved, curved, across
 
 
 def take_range(
     belief: Belief, place: Floats, range_m: float, model: BeaconModel, outliers: float, in_place: float
 ) -> float:
     """Density of the range; it corrects the belief where an inlier of a beacon in its place is likelier than all else."""
-    expected, variance, curved = expected_range(belief, place)
+    expected, variance, curved, across = expected_range(belief, place)
     inlier = (1.0 - outliers) * normal(range_m - expected, variance + model.range_sd_m**2)
     density = inlier + outliers / model.span_m
-    if in_place * inlier / density > 0.5:
+    away = place - belief.mean[:2]
+    if away @ away + SOFT_M2 > across and in_place * inlier / density > 0.5:
         by_place = -(place - belief.mean[:2]) / expected  # of the root of E r^2
         correct(belief, np.array([*by_place, 0.0]), range_m - expected, model.range_sd_m**2 + curved)
     return density

@@ -12,6 +12,9 @@ from hypothesis import strategies as st
 
 from echostep.aiding import BeaconSettings
 from echostep.aiding.beacons.beliefs import (
+    XX,
+    XY,
+    YY,
     BeaconBeliefs,
     BeaconMeasurement,
     empty_beliefs,
@@ -116,6 +119,22 @@ def test_place_and_axis_are_learnt_from_a_walk_around() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("away_m", [0.2, 0.5, 3.0])
+def test_ranges_from_beside_a_beacon_make_no_belief_surer_than_right(away_m: float) -> None:
+    """Six ranges from around the believed place: the normalised square of the error is 2 where a belief is right."""
+    rng, sd_m, squares = np.random.default_rng(1), 1.2, []
+    for _ in range(300):
+        true = sd_m * rng.standard_normal(2)
+        beliefs = empty_beliefs(1, 1)
+        set_beliefs(beliefs, 0, 0.0, 0.0, 0.0, sd_m**2, 0.0)
+        for x, y in zip(*ring(6, away_m), strict=True):
+            range_m = math.hypot(x - true[0], y - true[1]) + MODEL.range_sd_m * rng.standard_normal()
+            weigh(np.array([x]), np.array([y]), np.zeros(1), beliefs, abs(range_m), math.nan)
+        off, cov = true - beliefs.mean[0, 0, :2], beliefs.cov[0, 0]
+        squares.append(off @ np.linalg.inv([[cov[XX], cov[XY]], [cov[XY], cov[YY]]]) @ off)
+    assert np.mean(squares) < 3.0
+
+
 def test_moved_beacon_is_noticed_while_others_vouch_for_the_cloud() -> None:
     rng = np.random.default_rng(2)
     n = 100

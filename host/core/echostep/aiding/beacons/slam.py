@@ -151,7 +151,8 @@ def _range_density(
     """Density of a range (1/m): normal, or with probability `outliers` uniform over `span_m`; corrects the belief by a range that is an inlier.
 
     Expected range and its variance come from the moments of the belief. Near the beacon the variance across the line of sight makes the mean range
-    longer than the distance of the means. `in_place`: the particle's probability that the beacon was not moved.
+    longer than the distance of the means; nearer than its own spread, the direction to it is not known, and the range corrects nothing.
+    `in_place`: the particle's probability that the beacon was not moved.
     """
     dx, dy = x - mean[X], y - mean[Y]
     square = dx * dx + dy * dy + 1e-6
@@ -165,7 +166,7 @@ def _range_density(
     innovation = range_m - expected
     inlier = (1.0 - outliers) * (math.exp(-0.5 * innovation * innovation / variance) / math.sqrt(TWO_PI * variance))
     density = inlier + outliers / model.span_m
-    if in_place * inlier > 0.5 * density:
+    if square > across and in_place * inlier > 0.5 * density:
         noise_var = model.range_sd_m**2 + longer_var * inverse
         slope = math.sqrt(square) / expected  # of the expected range, by the distance of the means
         correct(mean, cov, -slope * ux, -slope * uy, 0.0, innovation, noise_var)
