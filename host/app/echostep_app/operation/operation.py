@@ -52,7 +52,7 @@ Key = tuple[str, str, str]  # team, name, run
 class TableScene:
     """One moment. `places`: rows of float32, one for each wearer on this plan (`Operation.scene`). `rows`: the list, the most urgent first.
 
-    `summary`: number of members in each state; `refused`: rejected messages, in words; `fault`: of connection and output, in words.
+    `summary`: number of members in each state; `refused`: rejected messages, in words; `fault`: of connection and output, in words; `waiting`: requests that wait for the broker.
     """
 
     t_s: float
@@ -63,6 +63,7 @@ class TableScene:
     refused: str
     connected: bool
     fault: str
+    waiting: int
     marks: tuple[ShownMark, ...] = ()
     crews: tuple[Crew, ...] = ()
 
@@ -190,7 +191,9 @@ class Operation:
         members = self.roster.members(now_s)
         return [(followed.number, m) for m in members if (followed := self._followed.get(m.key)) is not None]
 
-    def scene(self, now_s: float, unix_s: float, *, connected: bool = True, fault: str = "") -> TableScene:
+    def scene(
+        self, now_s: float, unix_s: float, *, connected: bool = True, fault: str = "", waiting: int = 0
+    ) -> TableScene:
         """The scene at a time of the commander's clock.
 
         Rows of its `places`: wearer, x, y, level, heading, 95 % radius, protection radius (NaN: not known, none).
@@ -201,8 +204,9 @@ class Operation:
                 self._list(members, now_s)
             places, refused = self._places(members, now_s), rejected(self.roster)
             words = summary_words(members, now_s)
+            link = connected, fault, waiting
             return TableScene(
-                now_s, unix_s, places, self._rows, words, refused, connected, fault, self._marks(), self._shown_crews()
+                now_s, unix_s, places, self._rows, words, refused, *link, self._marks(), self._shown_crews()
             )
 
     def trail(self, begin: int, now_s: float) -> tuple[bytes, int]:

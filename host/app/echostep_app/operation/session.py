@@ -57,6 +57,7 @@ class TableHeader:
     refused: str
     connected: bool
     fault: str
+    waiting: int
     details: ShownDetails | None
     distress: ShownDistress | None
     marks: tuple[ShownMark, ...] | None
@@ -186,6 +187,7 @@ class TableSession(GuardedSocket):
             refused=scene.refused,
             connected=scene.connected,
             fault=scene.fault,
+            waiting=scene.waiting,
             details=None if chosen is None else operation.details(chosen, scene.t_s),
             distress=None if chosen is None else operation.distress(chosen, scene.t_s),
             marks=scene.marks if last is None or scene.marks is not last.marks else None,

@@ -100,6 +100,7 @@ function frame(received) {
   }
   if (received.list) alarm.update(received.list, scene.places, received.time, timeBar.isPast);
   if (received.marks) scene.marks = received.marks;
+  link.outbox.wait(received.waiting);
   crews.show(received.crews, received.unix_s, timeBar.isPast);
   list.details(received.details, received.distress);
   scene.frame = received;
