@@ -110,6 +110,7 @@ class Mailbox:
         """Store a new scene and call `on_publish`; called in the tracker's thread."""
         if self.replay:
             self.history.add(scene)
+        self.over_time.note(scene)
         self.latest = scene
         self._announce()
 

@@ -23,7 +23,9 @@ from team.team_broker import Broker, needs_broker
 from team.team_reports import PLAN
 from waiting import PATIENCE_S
 
-TABLE_READY = "window.echostep?.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
+TABLE_READY = (
+    "window.echostep?.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
+)
 ROW = "document.querySelector('#list li .said').textContent"
 WAITING = "Requests that wait for the broker: 1"
 LOST = "no broker: the last known state"
@@ -70,12 +72,27 @@ def outage(wearer: Any, table: Any, broker: Broker) -> None:
 @needs_broker
 def test_a_dead_broker_is_told_and_what_is_asked_for_arrives_once(browser: Any, tmp_path: Path) -> None:
     with Broker(tmp_path) as broker:
-        walk = ("demo", "--speed", "1", "--port", 0, "--publish", broker.url, "--name", "anna", "--out", tmp_path / "demo")
+        walk = (
+            "demo",
+            "--speed",
+            "1",
+            "--port",
+            0,
+            "--publish",
+            broker.url,
+            "--name",
+            "anna",
+            "--out",
+            tmp_path / "demo",
+        )
         follow = ("command", broker.url, "--plan", PLAN, "--port", 0, "--out", tmp_path / "operation.mcap")
         with program(*walk, "--page", "--no-open") as wearer_url, program(*follow) as table_url:
             for k, (width, height) in enumerate(SIZES):
                 how = {"viewport": {"width": width, "height": height}}
-                wearer, table = loaded_page(browser, wearer_url, how, READY), loaded_page(browser, table_url, how, TABLE_READY)
+                wearer, table = (
+                    loaded_page(browser, wearer_url, how, READY),
+                    loaded_page(browser, table_url, how, TABLE_READY),
+                )
                 table.fill("#me", "Ben")
                 outage(wearer, table, broker)
                 for role, page in (("wearer", wearer), ("table", table)):

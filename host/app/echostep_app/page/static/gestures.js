@@ -15,6 +15,7 @@ export class Gestures {
     map.addEventListener('wheel', (e) => this.wheel(e), { passive: false });
     map.addEventListener('contextmenu', (e) => e.preventDefault());
     map.addEventListener('keydown', (e) => this.key(e));
+    document.addEventListener('keydown', (e) => this.anywhere(e));
   }
 
   pixel(e) {
@@ -86,6 +87,12 @@ export class Gestures {
     if (e.shiftKey) this.view.grip(pixel, pixel, 1, step * 0.002);
     else this.view.grip(pixel, pixel, Math.exp(-step * 0.0015));
     this.actions.moved();
+  }
+
+  // ? and Space act wherever the focus is, but for what takes them itself.
+  anywhere(e) {
+    const takes = { '?': 'input:not([type=range]), textarea', ' ': 'input:not([type=range]), textarea, select, button, summary' }[e.key];
+    if (takes && !e.defaultPrevented && !e.target.matches?.(takes) && !document.querySelector('dialog[open]')) this.key(e);
   }
 
   key(e) {

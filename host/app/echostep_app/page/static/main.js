@@ -52,7 +52,7 @@ const drops = new Drops(hint), charts = new Charts($('charts'), () => painter.co
 const tools = new Tools({ view, scene, planView, layers: scene.layers, charts, hint, enter, seek, changed: redraw, plan: () => plan, globe: () => globe, takesFiles: () => drops.takes });
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
-const drawn = (window.echostep = { frames: 0, view, scene, link, last: null, missing, tr });  // read by tests
+const drawn = (window.echostep = { frames: 0, view, scene, link, charts, last: null, missing, tr });  // read by tests
 
 async function hello(message) {
   if (plan && (plan.digest !== message.plan.digest || title !== message.title)) startAnew();
@@ -280,6 +280,7 @@ function key(name) {
   const actions = {
     l: () => showLegend(false), '?': () => showLegend(true), t: () => tools.open(), c: () => tools.setCharts(!charts.on), d: () => enter('measure', true), n: () => view.northUp(), w: fitWhole, f: toggleFollow,
     h: () => !$('here').hidden && enter('here', true), g: () => enter('go', true),
+    ' ': () => !$('replay').hidden && $('play').click(),
     Escape: () => { scene.measure.clear(); enter(null); },
     Enter: () => (mode === 'measure' ? measured(middle) : mode && posed(middle, mode === 'here' ? turned : null)),
     ',': () => { turned += Math.PI / 12; dirty = true; }, '.': () => { turned -= Math.PI / 12; dirty = true; },
