@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A run over time: ranges, rates and heading at each estimate, and events.
 
-In: scenes, and which of them are of new estimates, in the tracker's thread. Out: `OverTime`, which any thread may read up to a length that it has read before. Owns the
-rows and the events; their number is bounded.
+In: scenes, and which of them are of new estimates, in the tracker's thread. Out: `OverTime`, which any thread may read up to a length that it has
+read before. Owns the rows and the events; their number is bounded.
 """
 
 from __future__ import annotations

@@ -178,8 +178,8 @@ def notes(m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]])
         remarks.append(f"battery {r.battery_percent} %")
     remarks += r.streams.findings if r.streams else ()
     if s := r.streams:
-        counts = (s.bad, "bad frames"), (s.lost, "lost frames"), (s.dropped, "dropped frames")
-        remarks += [f"{count} {what}" for count, what in counts if count]
+        remarks += [f"{s.bad} bad frames"] * bool(s.bad) + [f"{s.lost} lost frames"] * bool(s.lost)
+        remarks += [f"{s.dropped} dropped frames"] * bool(s.dropped)
     remarks += [f"{event} {count} x" for event, count in m.notes.items()]
     return remarks
 

@@ -17,8 +17,8 @@ import pytest
 
 from command_line import PROGRAM
 from page.browser import HELD_MS, READY, loaded_page, overflow, wait_for
-from page.web.test_page_sizes import SIZES, UNREACHED
 from page.web.test_page_silence import OUTBOX, STATUS, WITHIN_S
+from page.web.test_page_sizes import SIZES, UNREACHED
 from team.team_broker import Broker, needs_broker
 from team.team_reports import PLAN
 from waiting import PATIENCE_S

@@ -2,6 +2,7 @@
 // Fingers, mouse and keys on the map: pan, zoom, rotate, tap. In a mode that takes a position: a tap gives the position, a drag also the heading.
 
 const SLOP_PX = 10;  // a movement below this is a tap
+const TAKES = { '?': ['INPUT'], ' ': ['INPUT', 'SELECT', 'BUTTON', 'SUMMARY'] };  // controls that take these keys themselves
 const PAN_PX = 60;  // per arrow key
 
 export class Gestures {
@@ -91,8 +92,8 @@ export class Gestures {
 
   // ? and Space act wherever the focus is, but for what takes them itself.
   anywhere(e) {
-    const takes = { '?': 'input:not([type=range]), textarea', ' ': 'input:not([type=range]), textarea, select, button, summary' }[e.key];
-    if (takes && !e.defaultPrevented && !e.target.matches?.(takes) && !document.querySelector('dialog[open]')) this.key(e);
+    const { tagName, type } = e.target, takes = TAKES[e.key]?.includes(tagName) && type !== 'range';
+    if (e.key in TAKES && !takes && !e.defaultPrevented && !document.querySelector('dialog[open]')) this.key(e);
   }
 
   key(e) {

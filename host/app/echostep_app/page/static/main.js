@@ -10,6 +10,7 @@ import { Painter } from './live/paint.js';
 import { Panel } from './live/panel.js';
 import { PlanView } from './plan.js';
 import { Points } from './live/points.js';
+import { Orders } from './live/orders.js';
 import { Replay } from './live/replay.js';
 import { Speech } from './live/speech.js';
 import { Taps } from './live/taps.js';
@@ -45,6 +46,7 @@ const link = new Link({
   isLive: () => isLive && scene.frame?.ended == null,
 });
 const speech = new Speech($('speech'), $('sentence'), $('invitation'), $('unspoken'));
+const orders = new Orders((kind, fields) => link.send(kind, fields), (text) => speech.unsent(text));
 const showLegend = startLegend($('legend-button'), LIVE, LIVE_KEYS);
 const replay = new Replay((kind, fields) => link.send(kind, fields));
 const points = new Points((kind, fields) => link.send(kind, fields));
@@ -180,6 +182,7 @@ function frame(received) {
   speech.alarm(received.play ? null : received.alarm);
   if (!received.alarm) speech.update(received.guidance);
   if (!received.play && !received.alarm) speech.sent(received.errand);
+  orders.show(received.play ? [] : received.orders);
   dirty = true;
 }
 
