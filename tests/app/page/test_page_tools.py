@@ -14,10 +14,12 @@ import pytest
 
 from echostep.localization import TrackStatus
 from echostep.plan import Georeference, Plan
+from echostep_app.page.elements.alarm import ShownAlarm
 from echostep_app.page.elements.echo_lines import EchoLine
 from echostep_app.page.elements.scene import PageScene
 from echostep_app.page.elements.stream_rates import StreamRates
 from echostep_app.page.mailbox import Mailbox
+from echostep_app.page.over_time import OverTime
 from echostep_app.page.server import PageServer
 from page.browser import LOCAL, READY, loaded_page, overflow, picture, spot, wait_for
 from page.frames import PLAN, scene, told
@@ -117,6 +119,16 @@ def test_charts_show_the_walk_and_what_happened(browser: Any, url: str, tmp_path
     box = page.locator("#charts").bounding_box()
     page.mouse.click(box["x"] + 34 + 0.25 * (box["width"] - 34), box["y"] + 80)
     wait_for(page, "Math.abs(echostep.last.play.t_s - 30) < 0.5")
+    near = "echostep.charts.near"
+    page.mouse.move(box["x"] + 34 + 0.5 * (box["width"] - 40), box["y"] + 80)
+    wait_for(page, f"{near}?.[0] === 60")
+    page.mouse.wheel(0, -1000)
+    wait_for(page, "echostep.charts.span[0] > 45 && echostep.charts.span[1] < 75")
+    picture(page, "charts-zoomed", tmp_path)
+    page.locator("#charts").dblclick()
+    wait_for(page, "echostep.charts.span[1] === 120")
+    page.mouse.move(5, 5)
+    wait_for(page, f"{near} === null")
     page.focus("#map")
     page.keyboard.press("t")
     page.screenshot(path=tmp_path / "tools.png")
@@ -324,3 +336,41 @@ def test_it_can_be_installed_as_an_app(browser: Any, url: str) -> None:
     assert asked
     assert all(address.startswith(url) for address in asked)  # it works without the internet
     page.context.close()
+
+
+def test_the_keys_act_wherever_the_focus_is(browser: Any, url: str) -> None:
+    """`?` shows the keys, Space holds and plays; a control that takes a key itself keeps it."""
+    page = looking(browser, url)
+    page.evaluate("document.activeElement.blur()")
+    page.keyboard.press("Space")
+    wait_for(page, "echostep.last.play.playing")
+    page.focus("#time")
+    page.keyboard.press("Space")
+    wait_for(page, "!echostep.last.play.playing")
+    page.focus("#north")
+    page.keyboard.press("Space")  # presses that button
+    page.keyboard.press("?")
+    wait_for(page, "document.querySelector('#legend').open")
+    assert not page.evaluate("echostep.last.play.playing")
+    page.keyboard.press("Escape")
+    assert not page.wrong
+    page.context.close()
+
+
+def test_what_happened_between_two_estimates_is_listed_too() -> None:
+    """A walk that begins lost; a position set by hand and undone; a mayday that comes and goes while the wearer stands."""
+    lost = moment(70.0)
+    run = OverTime(("Ground floor",), 0.0)
+    mayday = ShownAlarm("mayday", "Mayday", "Mayday", 1)
+    rates = (RATES, replace(RATES, check_ins=1), replace(RATES, check_ins=1, undone=1))
+    for seen in (*(replace(lost, streams=one) for one in rates), lost):
+        run.note(seen)
+    run.note(replace(lost, alarm=mayday))
+    run.note(lost)
+    assert [event.text for event in run.events] == [
+        "lost",
+        "position set by hand",
+        "position set by hand: undone",
+        "mayday",
+    ]
+    assert not len(run)

@@ -25,6 +25,7 @@ project = "echostep"
 version = release = tomllib.loads((ROOT / "host/core/pyproject.toml").read_text())["project"]["version"]
 copyright = "the echostep authors"  # noqa: A001 (Sphinx' name)
 extensions = ["myst_parser"]
+smartquotes = False  # else the dashes of an option become one that no terminal takes
 highlight_language = "none"  # of blocks that name no language
 root_doc = "README"
 include_patterns = [

@@ -21,6 +21,7 @@ from echostep.plan import Plan
 from echostep_app.operation import requests
 from echostep_app.operation.crews import CrewLog
 from echostep_app.operation.distress import ShownDistress, errand_to, shown_distress
+from echostep_app.operation.orders import NEWER_S, ShownOrder, order_by, order_news, shown_order
 from echostep_app.operation.trails import Trails
 from echostep_app.operation.words import (
     ShownDetails,
@@ -42,7 +43,7 @@ from echostep_app.team.messages.report import BadReportError
 from echostep_app.team.roster import Member, MemberState, Roster
 
 LIST_S = 0.5  # between two versions of the list: words are read, not watched
-NEWER_S = 1e-3  # by which an errand is newer than the one that it replaces
+GONE = "There is no such alarm, mark, wearer or floor any more."
 MOST_EVENTS = 64  # of a wearer's history
 SHOWN_STATUS = {"tracking", "uncertain"}  # of which a trail is drawn
 Key = tuple[str, str, str]  # team, name, run
@@ -52,7 +53,8 @@ Key = tuple[str, str, str]  # team, name, run
 class TableScene:
     """One moment. `places`: rows of float32, one for each wearer on this plan (`Operation.scene`). `rows`: the list, the most urgent first.
 
-    `summary`: number of members in each state; `refused`: rejected messages, in words; `fault`: of connection and output, in words.
+    `summary`: number of members in each state; `refused`: rejected messages, in words; `fault`: of connection and output, in words; `waiting`:
+    requests that wait for the broker; `order`: to everybody.
     """
 
     t_s: float
@@ -63,7 +65,9 @@ class TableScene:
     refused: str
     connected: bool
     fault: str
+    waiting: int
     marks: tuple[ShownMark, ...] = ()
+    order: ShownOrder | None = None
     crews: tuple[Crew, ...] = ()
 
 
@@ -109,7 +113,11 @@ class Operation:
         """Take messages, and counts of dropped ones by reason; returns the accepted messages."""
         with self._lock:
             believed = self.roster.take([m for m in messages if not is_shared(m.topic)], dropped)
-            believed += [m for m in messages if is_shared(m.topic) and self._receive_shared(m.topic or "", m.payload)]
+            believed += [
+                m
+                for m in messages
+                if is_shared(m.topic) and self._receive_shared(m.topic or "", m.payload, now_s, unix_s)
+            ]
             self._follow(now_s, unix_s)
         return believed
 
@@ -118,16 +126,20 @@ class Operation:
         with self._lock:
             self.roster.received, self.roster.rejected = received, Counter(rejected)
 
-    def _receive_shared(self, topic: str, payload: bytes) -> bool:
+    def _receive_shared(self, topic: str, payload: bytes, now_s: float, unix_s: float) -> bool:
         self.roster.received += 1
         crews, identity = self._board.crews, topic.rpartition("/")[2]
-        before = crews.get(identity)
+        before, orders = crews.get(identity), self._board.copy() if "/order/" in topic or "/receipt/" in topic else None
         try:
             self._board.receive(topic, payload)
         except BadReportError as error:
             self.roster.count_rejected(str(error))
             return False
         self.crew_log.note(before, crews.get(identity))
+        if orders:
+            for _, m in self._numbered(now_s):
+                events = [ShownEvent(unix_s, text) for text in order_news(orders, self._board, m)]
+                self._followed[m.key].history.extend(events)
         self._changed = True
         return True
 
@@ -135,20 +147,28 @@ class Operation:
         """The message that carries out a page's request, or the reason why there is none."""
         with self._lock:
             match request:
-                case requests.SetMark() if request.level < len(self.plan.levels):
-                    identity, at = secrets.token_hex(4), (request.x_m, request.y_m, request.level)
-                    return Mark(1, identity, request.mark, *at, request.by, unix_s, self.plan.digest).message
-                case requests.Unmark(identity) if identity in self._board.marks:
-                    return structs.replace(self._board.marks[identity], removed=True).message
+                case requests.SetMark() | requests.Unmark():
+                    return self._mark(request, unix_s)
                 case requests.Acknowledge(number, by):
                     m = self._member(number, now_s)
                     if m is not None and (key := alarm_key(m)) is not None:
                         return ack_message(key, by, unix_s)
                 case requests.Send():
                     return self._send(request, unix_s, now_s)
+                case requests.SetOrder(to=to) if (m := self._member(to, now_s)) is not None or to is None:
+                    return order_by(request, m, self._board, unix_s)
                 case requests.SetCrew() | requests.CrewDoes():
                     return self._change_crew(request, unix_s)
-        return "There is no such alarm, mark or floor any more."
+        return GONE
+
+    def _mark(self, request: requests.SetMark | requests.Unmark, unix_s: float) -> tuple[str, bytes] | str:
+        if isinstance(request, requests.Unmark):
+            known = self._board.marks.get(request.id)
+            return structs.replace(known, removed=True).message if known else GONE
+        if request.level >= len(self.plan.levels):
+            return GONE
+        identity, at = secrets.token_hex(4), (request.x_m, request.y_m, request.level)
+        return Mark(1, identity, request.mark, *at, request.by, unix_s, self.plan.digest).message
 
     def _send(self, request: requests.Send, unix_s: float, now_s: float) -> tuple[str, bytes] | str:
         rescuer, m = self._member(request.id, now_s), self._member(request.to, now_s)
@@ -181,7 +201,7 @@ class Operation:
             self._board.answers.clear()
         return answers
 
-    def _member(self, number: int, now_s: float) -> Member | None:
+    def _member(self, number: int | None, now_s: float) -> Member | None:
         """The member with this number."""
         return next((m for n, m in self._numbered(now_s) if n == number), None)
 
@@ -190,7 +210,9 @@ class Operation:
         members = self.roster.members(now_s)
         return [(followed.number, m) for m in members if (followed := self._followed.get(m.key)) is not None]
 
-    def scene(self, now_s: float, unix_s: float, *, connected: bool = True, fault: str = "") -> TableScene:
+    def scene(
+        self, now_s: float, unix_s: float, *, connected: bool = True, fault: str = "", waiting: int = 0
+    ) -> TableScene:
         """The scene at a time of the commander's clock.
 
         Rows of its `places`: wearer, x, y, level, heading, 95 % radius, protection radius (NaN: not known, none).
@@ -201,9 +223,9 @@ class Operation:
                 self._list(members, now_s)
             places, refused = self._places(members, now_s), rejected(self.roster)
             words = summary_words(members, now_s)
-            return TableScene(
-                now_s, unix_s, places, self._rows, words, refused, connected, fault, self._marks(), self._shown_crews()
-            )
+            link, order = (connected, fault, waiting), shown_order(self._board, members, now_s)
+            shared = self._marks(), order, self._shown_crews()
+            return TableScene(now_s, unix_s, places, self._rows, words, refused, *link, *shared)
 
     def trail(self, begin: int, now_s: float) -> tuple[bytes, int]:
         """Rows of the trails from point number `begin` on, and the number of the next point."""

@@ -16,6 +16,7 @@ from echostep.ports.people.payloads import Level, decoded
 from echostep_app.page.requests import MOST_REQUEST, FrameDrawn, Seek, SetPlaying, SetSpeed
 from echostep_app.team.messages.crews import AirMinutes, Does, Members
 from echostep_app.team.messages.marks import MarkKind
+from echostep_app.team.messages.orders import OUT, NoteText
 from echostep_app.team.messages.report import is_printable
 from echostep_app.team.messages.shared import Identity, Person
 
@@ -76,12 +77,21 @@ class CrewDoes(msgspec.Struct, frozen=True, tag_field="kind", tag="crew_does"):
     by: Person
 
 
+class SetOrder(msgspec.Struct, frozen=True, tag_field="kind", tag="order"):
+    """Everybody out, or a note in words to wearer `to`; `ended`: that order holds no longer."""
+
+    by: Person
+    to: Number | None = None
+    text: NoteText = OUT
+    ended: bool = False
+
+
 class Now(msgspec.Struct, frozen=True, tag_field="kind", tag="now"):
     """Show the present."""
 
 
 TimeRequest = Seek | SetPlaying | SetSpeed | Now
-Action = SetMark | Unmark | Acknowledge | Send | SetCrew | CrewDoes
+Action = SetMark | Unmark | Acknowledge | Send | SetCrew | CrewDoes | SetOrder
 TableRequest = FrameDrawn | Choose | TimeRequest | Action
 _REQUESTS = msgspec.json.Decoder(TableRequest)
 
@@ -90,6 +100,8 @@ def parse_request(text: str | None) -> TableRequest | None:
     """The request in a text from a page; None when it is not a valid one."""
     request = None if text is None else decoded(text, _REQUESTS, MOST_REQUEST)
     texts = [getattr(request, "by", "x")]
+    if isinstance(request, SetOrder):
+        texts.append(request.text)
     if isinstance(request, SetCrew):
         texts += [request.name, *request.members]
     return request if all(is_printable(text) and text.strip() for text in texts) else None

@@ -23,6 +23,7 @@ from starlette.websockets import WebSocket
 from echostep_app.operation import requests
 from echostep_app.operation.distress import ShownDistress
 from echostep_app.operation.operation import Operation, TableScene
+from echostep_app.operation.orders import ShownOrder
 from echostep_app.operation.recorded.past import PastView, ShownTime
 from echostep_app.operation.recorded.tape import Tape
 from echostep_app.operation.words import ShownDetails, ShownWearer
@@ -57,9 +58,11 @@ class TableHeader:
     refused: str
     connected: bool
     fault: str
+    waiting: int
     details: ShownDetails | None
     distress: ShownDistress | None
     marks: tuple[ShownMark, ...] | None
+    order: ShownOrder | None
     crews: tuple[Crew, ...] | None
     time: ShownTime | None
     kind: Literal["table"] = "table"
@@ -186,9 +189,11 @@ class TableSession(GuardedSocket):
             refused=scene.refused,
             connected=scene.connected,
             fault=scene.fault,
+            waiting=scene.waiting,
             details=None if chosen is None else operation.details(chosen, scene.t_s),
             distress=None if chosen is None else operation.distress(chosen, scene.t_s),
             marks=scene.marks if last is None or scene.marks is not last.marks else None,
+            order=scene.order,
             crews=scene.crews if last is None or scene.crews is not last.crews else None,
             time=self._view.shown(scene.t_s, sum(row.open_alarm for row in latest.rows)) if self._view else None,
         )

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from echostep.plan import Plan
+from echostep_app.operation.orders import order_notes
 from echostep_app.page.elements.marks import ShownMark
 from echostep_app.team.commander import heading_on, notes
 from echostep_app.team.cot import alarm_words
@@ -112,6 +113,7 @@ def shown_wearer(
         remarks.insert(0, f"acknowledged by {ack.by}")
     if errand := board.errands.get(m.key):
         remarks.insert(0, f"sent to {errand.to} by {errand.by}")
+    remarks[:0] = order_notes(board, m)
     if crew := crew_of(m.report.name, board.crews.values()):
         remarks.insert(0, f"crew {crew.name}{' inside' * crew.is_inside}")
     is_open = key is not None and ack is None

@@ -27,7 +27,7 @@ from echostep_app.page.elements.echo_lines import EchoLine, expected_range, last
 from echostep_app.page.elements.guidance import ShownGuidance, guidance_of_cue
 from echostep_app.page.elements.likely_places import PlaceNumbers
 from echostep_app.page.elements.lookahead import extrapolate, moves_as_one
-from echostep_app.page.elements.marks import ShownMark, beacon_marks, shown_meeting
+from echostep_app.page.elements.marks import ShownMark, ShownOrder, beacon_marks, shown_meeting
 from echostep_app.page.elements.scene import MOST_SHOWN, PageScene, is_placed, sample_of, status_text
 from echostep_app.page.elements.stream_rates import StreamRateMeter
 from echostep_app.page.elements.taps import PointPress, ShownPoints
@@ -143,6 +143,14 @@ class LivePage:
     def set_marks(self, marks: tuple[ShownMark, ...]) -> None:
         """Show the commanders' marks on all pages."""
         self._mailbox.set_marks(marks)
+
+    def set_orders(self, orders: tuple[ShownOrder, ...]) -> None:
+        """Show on all pages what the wearer has not understood yet."""
+        self._mailbox.set_orders(orders)
+
+    def pop_understood(self) -> Iterator[str]:
+        """Identities of the orders that the pages have said are understood since the last call."""
+        return self._mailbox.pop_understood()
 
     def set_errand(self, x_m: float, y_m: float, level: int, text: str) -> None:
         """Guide all pages to a person in distress, and show who sent the wearer; a level that is not in the plan is ignored."""

@@ -17,7 +17,7 @@ from typing import TypeVar
 from echostep.plan import Plan
 from echostep.ports.people.check_in import Call, CheckIn, Undo
 from echostep_app.page.elements.drawn_walls import ShownDrawing
-from echostep_app.page.elements.marks import ShownMark
+from echostep_app.page.elements.marks import ShownMark, ShownOrder
 from echostep_app.page.elements.scene import PageScene
 from echostep_app.page.elements.taps import PointPress, ShownPoints
 from echostep_app.page.over_time import OverTime
@@ -105,11 +105,14 @@ class Mailbox:
         self.exchange = Exchange()
         self._check_ins: queue.Queue[CheckIn | Undo | Call] = queue.Queue(MOST_CHECK_INS)
         self._met: queue.Queue[str] = queue.Queue(MOST_CHECK_INS)
+        self._understood: queue.Queue[str] = queue.Queue(MOST_CHECK_INS)
+        self.orders: tuple[ShownOrder, ...] = ()  # of the commanders; replaced, never changed
 
     def publish(self, scene: PageScene) -> None:
         """Store a new scene and call `on_publish`; called in the tracker's thread."""
         if self.replay:
             self.history.add(scene)
+        self.over_time.note(scene)
         self.latest = scene
         self._announce()
 
@@ -122,6 +125,12 @@ class Mailbox:
         """Replace the commanders' marks and call `on_publish`."""
         self.marks = marks
         self._announce()
+
+    def set_orders(self, orders: tuple[ShownOrder, ...]) -> None:
+        """Replace the commanders' orders; calls `on_publish` when they have changed."""
+        if orders != self.orders:
+            self.orders = orders
+            self._announce()
 
     def add_drawing(self, drawing: ShownDrawing) -> None:
         """Show a new drawing from its time on and call `on_publish`; called in the drawing's thread."""
@@ -178,6 +187,14 @@ class Mailbox:
     def pop_meetings(self) -> Iterator[str]:
         """Remove and yield the names of teammates reported as met; never blocks."""
         return _popped(self._met)
+
+    def add_understood(self, identity: str) -> bool:
+        """Queue that an order is understood; False when it is refused: in a replay, or with a full queue."""
+        return self._put(self._understood, identity)
+
+    def pop_understood(self) -> Iterator[str]:
+        """Remove and yield the identities of understood orders; never blocks."""
+        return _popped(self._understood)
 
     def add_press(self, press: PointPress) -> bool:
         """Hand on a tap at a surveyed point; False when it is refused: in a replay, or by the guide of the walk."""

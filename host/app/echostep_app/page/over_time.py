@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A run over time: ranges, rates and heading at each estimate, and events.
 
-In: the scenes of new estimates, in the tracker's thread. Out: `OverTime`, which any thread may read up to a length that it has read before. Owns the
-rows and the events; their number is bounded.
+In: scenes, and which of them are of new estimates, in the tracker's thread. Out: `OverTime`, which any thread may read up to a length that it has
+read before. Owns the rows and the events; their number is bounded.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from echostep.localization import claims_place
+from echostep.localization import TrackStatus, claims_place
 from echostep_app.page.elements.scene import PageScene
 
 COLUMNS = 6  # time (s), range to the left and to the right (m), samples of the foot and pings a second, compass heading (deg); NaN: none
@@ -36,7 +36,8 @@ class OverTime:
         self._levels, self._north_rad = levels, north_rad
         self._rows = array("f")
         self.events: tuple[Event, ...] = ()  # replaced, never changed
-        self._last: PageScene | None = None
+        self._last: PageScene | None = None  # of which changes were noted
+        self._row_s = -math.inf
 
     def __len__(self) -> int:
         return len(self._rows) // COLUMNS
@@ -51,28 +52,41 @@ class OverTime:
             return
         ranges = [math.nan, math.nan]
         for line in scene.echo_lines:
-            if line.t_s > (self._last.t_s if self._last else -math.inf) and line.measured_m is not None:
+            if line.t_s > self._row_s and line.measured_m is not None:
                 ranges[line.ranger] = line.measured_m
         rates = (scene.streams.mtx_hz, scene.streams.pings_hz) if scene.streams else (None, None)
         known = [math.nan if rate is None else rate for rate in rates]
         bearing_deg = math.degrees(self._north_rad - scene.estimate.heading_rad) % 360.0
         heading = bearing_deg if claims_place(scene.estimate) else math.nan
         self._rows.extend((scene.t_s, *ranges, *known, heading))
-        if self._last is not None and (new := list(self._news(self._last, scene))):
+        self._row_s = scene.t_s
+
+    def note(self, scene: PageScene) -> None:
+        """Note what has changed since the scene before; scenes between two estimates count too."""
+        if scene.estimate is None:
+            return
+        before, self._last = self._last, scene
+        if before is not None:
+            new = list(self._news(before, scene))
+        else:
+            in_doubt = scene.estimate.status is not TrackStatus.TRACKING
+            new = [Event(scene.t_s, scene.estimate.status.value)] if in_doubt else []
+        if new:
             self.events = (*self.events, *new)[:MOST_EVENTS]
-        self._last = scene
 
     def _news(self, before: PageScene, now: PageScene) -> Iterator[Event]:
-        """Changes between the scenes of two estimates."""
+        """Changes between two scenes with an estimate."""
         old, new = before.estimate, now.estimate
-        if old is None or new is None:
-            return
+        assert old
+        assert new
         if old.status != new.status:
             yield Event(now.t_s, new.status.value)
         if old.level != new.level:
             yield Event(now.t_s, self._levels[new.level])
         if before.streams and now.streams and now.streams.check_ins > before.streams.check_ins:
             yield Event(now.t_s, "position set by hand")
+        if before.streams and now.streams and now.streams.undone > before.streams.undone:
+            yield Event(now.t_s, "position set by hand: undone")
         if now.alarm and (before.alarm is None or before.alarm.kind != now.alarm.kind):
             yield Event(
                 now.t_s, {"over": "alarm over", "asked": "asked after a fall"}.get(now.alarm.kind, now.alarm.kind)

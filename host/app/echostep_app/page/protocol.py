@@ -26,7 +26,7 @@ from echostep_app.page.elements.drawn_walls import ShownDrawing
 from echostep_app.page.elements.echo_lines import EchoLine
 from echostep_app.page.elements.guidance import ShownGuidance
 from echostep_app.page.elements.likely_places import numbered
-from echostep_app.page.elements.marks import BeaconMark, ShownMark, ShownMeeting
+from echostep_app.page.elements.marks import BeaconMark, ShownMark, ShownMeeting, ShownOrder
 from echostep_app.page.elements.scene import PageScene, ParticleSample
 from echostep_app.page.elements.stream_rates import StreamRates
 from echostep_app.page.elements.taps import Considered, ShownPoints
@@ -197,8 +197,9 @@ class CloudGrid:
 class FrameHeader:
     """One moment. `seq`: the page returns it when the frame is drawn. `goal`: the destination that was chosen on a page of this run.
 
-    `errand`: who sent the wearer there, in words; empty when the wearer chose it. `team`: names of the teammates for meetings, when they have
-    changed; `met`: result of the newest meeting. `points`: what an acceptance walk asks for, when that has changed. `gait`: that the wearer runs.
+    `errand`: who sent the wearer there, in words; empty when the wearer chose it. `orders`: those that are not understood yet. `team`: names of the
+    teammates for meetings, when they have changed; `met`: result of the newest meeting. `points`: what an acceptance walk asks for, when that has
+    changed. `gait`: that the wearer runs.
     """
 
     seq: int
@@ -215,6 +216,7 @@ class FrameHeader:
     guidance: ShownGuidance | None
     goal: RoutePlace | None
     errand: str
+    orders: tuple[ShownOrder, ...]
     undo: UndoOffer | None
     play: PlayState | None
     truth: TruePosition | None
@@ -303,6 +305,7 @@ class FrameParts:
     guidance: ShownGuidance | None = None
     goal: RoutePlace | None = None
     errand: str = ""
+    orders: tuple[ShownOrder, ...] = ()
     play: PlayState | None = None
     marks: tuple[ShownMark, ...] | None = None
     drawing: ShownDrawing | None = None
@@ -330,6 +333,7 @@ def frame(scene: PageScene, parts: FrameParts) -> bytes:
         guidance=parts.guidance,
         goal=parts.goal,
         errand=parts.errand,
+        orders=parts.orders,
         undo=scene.undo,
         play=parts.play,
         truth=scene.truth,

@@ -45,6 +45,12 @@ class Met(msgspec.Struct, frozen=True, tag_field="kind", tag="met"):
     name: Annotated[str, Meta(min_length=1, max_length=MOST_NAME)]
 
 
+class Understood(msgspec.Struct, frozen=True, tag_field="kind", tag="understood"):
+    """The wearer has understood a commander's order."""
+
+    id: Annotated[str, Meta(min_length=1, max_length=64)]
+
+
 class AtPoint(msgspec.Struct, frozen=True, tag_field="kind", tag="at_point"):
     """In an acceptance walk, while the page shows visit `number`: the wearer is at the point that it names, or at another one by its name."""
 
@@ -106,7 +112,7 @@ class StepBy(msgspec.Struct, frozen=True, tag_field="kind", tag="skip"):
 
 
 _OwnRequest = (
-    Undo | Call | Consider | Met | AtPoint | NoTap | GoTo | EndGuidance | FrameDrawn | SetPlaying | SetSpeed | Seek | StepBy
+    Undo | Call | Consider | Met | Understood | AtPoint | NoTap | GoTo | EndGuidance | FrameDrawn | SetPlaying | SetSpeed | Seek | StepBy
 )  # fmt: skip
 Request = CheckIn | _OwnRequest
 _KEPT = msgspec.json.Decoder(Kept)

@@ -20,7 +20,7 @@ from echostep.ports.people.check_in import Call, CheckIn, Undo
 from echostep_app.page import protocol, requests
 from echostep_app.page.elements.drawn_walls import NO_DRAWING, ShownDrawing
 from echostep_app.page.elements.guidance import Destination, ShownGuidance
-from echostep_app.page.elements.marks import ShownMark
+from echostep_app.page.elements.marks import ShownMark, ShownOrder
 from echostep_app.page.elements.scene import PageScene, ParticleSample, is_placed
 from echostep_app.page.elements.taps import NO_TAP, PointPress, ShownPoints
 from echostep_app.page.guarded_socket import MOST_UNDRAWN, UNKNOWN, GuardedSocket
@@ -54,6 +54,7 @@ class PageSession(GuardedSocket):
         self._last: PageScene | None = None
         self._particles: ParticleSample | None = None
         self._marks: tuple[ShownMark, ...] | None = None  # that the page has
+        self._orders: tuple[ShownOrder, ...] = ()
         self._drawing: ShownDrawing | None = None  # that the page has
         self._team: tuple[str, ...] | None = None  # that the page has
         self._points: ShownPoints | None = None  # that the page has
@@ -97,8 +98,9 @@ class PageSession(GuardedSocket):
                 refusal = "It is too late to undo this." if is_late else self._take(request)
             case Call():
                 refusal = self._take(request)
-            case requests.Met() | requests.AtPoint() | requests.NoTap():
-                refusal = self._meet(request.name) if isinstance(request, requests.Met) else self._press(request)
+            case requests.Met() | requests.Understood() | requests.AtPoint() | requests.NoTap():
+                for_team = requests.Met | requests.Understood
+                refusal = self._tell_team(request) if isinstance(request, for_team) else self._press(request)
             case requests.GoTo() if request.level < levels:
                 self._mailbox.set_goal(request.goal)
             case requests.EndGuidance():
@@ -115,11 +117,13 @@ class PageSession(GuardedSocket):
         """Queue a check-in, its undoing or a call for the tracker; the reason of a refusal, else empty."""
         return "" if self._mailbox.add_check_in(request) else TOO_BUSY
 
-    def _meet(self, name: str) -> str:
-        """Queue a meeting; the reason of a refusal, else empty."""
-        if name not in self._mailbox.team:
-            return f"{name} is not heard."
-        return "" if self._mailbox.add_meeting(name) else TOO_BUSY
+    def _tell_team(self, request: requests.Met | requests.Understood) -> str:
+        """Queue a meeting, or that an order is understood; the reason of a refusal, else empty."""
+        if isinstance(request, requests.Understood):
+            return "" if self._mailbox.add_understood(request.id) else TOO_BUSY
+        if request.name not in self._mailbox.team:
+            return f"{request.name} is not heard."
+        return "" if self._mailbox.add_meeting(request.name) else TOO_BUSY
 
     def _press(self, request: requests.AtPoint | requests.NoTap) -> str:
         """Queue a tap at a surveyed point for the guide of the walk; the reason of a refusal, else empty."""
@@ -152,6 +156,7 @@ class PageSession(GuardedSocket):
                 continue
             self._follow_goal()
             self._frame_due = self._frame_due or self._marks is not self._mailbox.marks
+            self._frame_due = self._frame_due or self._orders is not self._mailbox.orders
             self._frame_due = self._frame_due or self._team is not self._mailbox.team
             self._frame_due = self._frame_due or self._points is not self._mailbox.points
             scene = self._cursor.scene(time.monotonic()) if self._cursor else self._mailbox.latest
@@ -189,6 +194,7 @@ class PageSession(GuardedSocket):
             guidance=self._guidance(scene),
             goal=self._mailbox.goal,
             errand=self._mailbox.errand,
+            orders=self._mailbox.orders,
             play=self._cursor.state() if self._cursor else None,
             marks=self._mailbox.marks if self._marks is not self._mailbox.marks else None,
             drawing=(drawing or NO_DRAWING) if drawing is not self._drawing else None,
@@ -197,6 +203,7 @@ class PageSession(GuardedSocket):
             ended=self._mailbox.summary if self._cursor is None or self._cursor.at_end else None,
         )
         self._marks, self._team, self._drawing, self._points = self._mailbox.marks, self._mailbox.team, drawing, points
+        self._orders = self._mailbox.orders
         self._last, self._trail_count, self._particles = scene, scene.trail_count, scene.particles
         return protocol.frame(scene, parts)
 

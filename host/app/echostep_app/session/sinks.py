@@ -79,11 +79,14 @@ def teammate_sink(
 
 
 def mark_sink(marks: MarkFeed, page: LivePage) -> Sink:
-    """The commanders' marks when they have changed, and the way to the one in distress to whom the wearer is sent, for the page."""
+    """For the page: the commanders' marks and orders, and the way to the one in distress to whom the wearer is sent; from it: what is understood."""
 
     def take(_: Portion, __: list[Estimate]) -> None:
         if (news := marks.news()) is not None:
             page.set_marks(news)
+        for identity in page.pop_understood():
+            marks.understand(identity)
+        page.set_orders(marks.orders())
         if errand := marks.new_errand():
             page.set_errand(errand.x_m, errand.y_m, errand.level, errand.words)
 

@@ -177,8 +177,9 @@ def notes(m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]])
     if r.battery_percent is not None and r.battery_percent < LOW_BATTERY_PERCENT:
         remarks.append(f"battery {r.battery_percent} %")
     remarks += r.streams.findings if r.streams else ()
-    if r.streams and r.streams.dropped + r.streams.lost + r.streams.bad:
-        remarks.append(f"{r.streams.bad} bad, {r.streams.lost} lost, {r.streams.dropped} dropped frames")
+    if s := r.streams:
+        remarks += [f"{s.bad} bad frames"] * bool(s.bad) + [f"{s.lost} lost frames"] * bool(s.lost)
+        remarks += [f"{s.dropped} dropped frames"] * bool(s.dropped)
     remarks += [f"{event} {count} x" for event, count in m.notes.items()]
     return remarks
 

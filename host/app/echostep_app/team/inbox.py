@@ -110,14 +110,16 @@ class ListenerThread:
         return True
 
     @property
-    def sent_all(self) -> bool:
-        """Whether no message waits."""
-        return not self._outgoing
+    def waiting(self) -> int:
+        """How many messages wait for the broker."""
+        return len(self._outgoing)
 
     def close(self) -> None:
-        """Disconnect and end the thread."""
+        """Disconnect and end the thread; says how many messages were not sent."""
         self._closing.set()
         self._thread.join(12.0)
+        if self.waiting:
+            self._print_line(f"not sent: {self.waiting} of the messages that waited for the broker")
 
     def _work(self) -> None:
         while not self._closing.is_set():

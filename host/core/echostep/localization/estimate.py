@@ -46,7 +46,7 @@ class Estimate:
     >>> import echostep
     >>> last = echostep.replay("walk.mcap", "demo.json").estimates[-1]
     >>> last
-    <Estimate at 2.67 s: x 2.00 m, y 7.49 m, level 0, 95 % within 0.39 m, heading 0 deg, tracking>
+    <Estimate at 2.67 s: x 2.00 m, y 7.49 m, level 0, 95 % within 0.39 m, heading 0 deg from x, tracking>
     >>> last.status == "tracking"
     True
     >>> round(last.ellipse95.minor_m, 1)
@@ -74,11 +74,12 @@ class Estimate:
     outside: float = 0.0
 
     def __repr__(self) -> str:
-        """Time, place with its 95 % radius, heading, status."""
-        return (
-            f"<Estimate at {self.t_s:.2f} s: x {self.x_m:.2f} m, y {self.y_m:.2f} m, level {self.level}, "
-            f"95 % within {self.ellipse95.major_m:.2f} m, heading {math.degrees(self.heading_rad):.0f} deg, {self.status.value}>"
+        """Time, place with its 95 % radius, heading (it knows no north), status."""
+        place = (
+            f"x {self.x_m:.2f} m, y {self.y_m:.2f} m, level {self.level}, 95 % within {self.ellipse95.major_m:.2f} m"
         )
+        heading_deg = round(math.degrees(self.heading_rad))
+        return f"<Estimate at {self.t_s:.2f} s: {place}, heading {heading_deg} deg from x, {self.status.value}>"
 
     @property
     def ellipse95(self) -> Ellipse:

@@ -228,7 +228,8 @@ def parse_plan(raw: bytes) -> Plan:
     try:
         tree = json.loads(raw)
     except (ValueError, RecursionError) as error:
-        raise NotJsonError(f"not a plan: {error}") from error
+        where = f", line {error.lineno}, column {error.colno}" if isinstance(error, json.JSONDecodeError) else ""
+        raise NotJsonError(f"not a plan: it is not JSON{where}") from error
     return _plan(tree, hashlib.sha256(raw).hexdigest())
 
 

@@ -16,6 +16,7 @@ import { Crews } from './crews.js';
 import { Floors } from './floors.js';
 import { List } from './list.js';
 import { Painter } from './paint.js';
+import { Orders } from './orders.js';
 import { Sheet } from './sheet.js';
 import { put, say } from './text.js';
 import { TimeBar } from './timebar.js';
@@ -35,6 +36,7 @@ let plan = null, wantedLevel = 0, fitted = false, isAsked = false, drawnStamp = 
 const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onAge: connection, onUnsent: () => {}, isLive: () => scene.frame?.time?.live !== false && !timeBar.isPast, parse: parseFrame });
 const sheet = new Sheet((kind, fields) => link.send(kind, fields), hint);
 const showLegend = startLegend($('legend-button'), COMMAND, COMMAND_KEYS), crews = new Crews((act) => sheet.signed(act), (kind, fields) => link.send(kind, fields));
+const orders = new Orders((act) => sheet.signed(act), (kind, fields) => link.send(kind, fields), () => scene.chosen, hint);
 const timeBar = new TimeBar((kind, fields) => link.send(kind, fields));
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
@@ -100,6 +102,8 @@ function frame(received) {
   }
   if (received.list) alarm.update(received.list, scene.places, received.time, timeBar.isPast);
   if (received.marks) scene.marks = received.marks;
+  orders.show(received.order, received.unix_s);
+  link.outbox.wait(received.waiting);
   crews.show(received.crews, received.unix_s, timeBar.isPast);
   list.details(received.details, received.distress);
   scene.frame = received;
@@ -208,7 +212,7 @@ function hint(text) {
 
 function key(name) {
   const middle = [view.width / 2, view.height / 2];
-  const does = { m: () => { place(view.toMap(...middle), middle); $('mark-cleared').focus(); }, l: () => showLegend(false), '?': () => showLegend(true), p: () => $('crews-button').click(), n: () => view.northUp(), w: () => view.fit(planView.box), Escape: () => { sheet.close(); list.choose(null); } }[name.length === 1 ? name.toLowerCase() : name];
+  const does = { m: () => { place(view.toMap(...middle), middle); $('mark-cleared').focus(); }, l: () => showLegend(false), '?': () => showLegend(true), p: () => $('crews-button').click(), n: () => view.northUp(), ' ': () => $('play').click(), w: () => view.fit(planView.box), Escape: () => { sheet.close(); list.choose(null); } }[name.length === 1 ? name.toLowerCase() : name];
   does?.();
   return Boolean(does);
 }

@@ -8,6 +8,3 @@ export const put = (element, text) => { if (element.textContent !== text) elemen
 
 // In the reader's language.
 export const say = (element, text) => put(element, tr(text));
-
-// Seconds as minutes and seconds.
-export const minutes = (s) => `${Math.floor(Math.max(s, 0) / 60)}:${String(Math.floor(Math.max(s, 0) % 60)).padStart(2, '0')}`;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The time bar over the whole operation: go back, hold, play, return to now. While the past is shown, what calls for help now is said beside it.
 
-import { tr } from '../static/language.js';
-import { minutes, put } from './text.js';
+import { minutes, tr } from '../static/language.js';
+import { put } from './text.js';
 
 const $ = (id) => document.getElementById(id);
 const SKIP_S = 10;

@@ -21,6 +21,15 @@ RECENT_S = 1.5
 
 
 @dataclass(frozen=True, slots=True)
+class ShownOrder:
+    """A commander's order that the wearer has not understood yet, in words; `urgent`: it is repeated. The names are keys of the page's JSON."""
+
+    id: str
+    text: str
+    urgent: bool
+
+
+@dataclass(frozen=True, slots=True)
 class ShownMark:
     """A mark of kind `mark` at a place; `by`: who set it. The names are keys of the frame's JSON."""
 

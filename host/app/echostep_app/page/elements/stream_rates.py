@@ -36,6 +36,7 @@ class StreamRates:
     check_ins: int
     wrong: str
     foot: str = "MTx"
+    undone: int = 0
 
 
 class StreamRateMeter:
@@ -63,6 +64,7 @@ class StreamRateMeter:
             check_ins=tracker.state.check_ins,
             wrong=". ".join(filter(None, (fault, _advice(streams, mtx_hz, pings_hz, _unused(mtx) - self._unused)))),
             foot=streams.foot_name,
+            undone=tracker.state.undone,
         )
 
     def _rates_hz(self, samples: int, pings: int, t_ns: int) -> tuple[float | None, float | None]:

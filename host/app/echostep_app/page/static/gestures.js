@@ -2,6 +2,7 @@
 // Fingers, mouse and keys on the map: pan, zoom, rotate, tap. In a mode that takes a position: a tap gives the position, a drag also the heading.
 
 const SLOP_PX = 10;  // a movement below this is a tap
+const TAKES = { '?': ['INPUT'], ' ': ['INPUT', 'SELECT', 'BUTTON', 'SUMMARY'] };  // controls that take these keys themselves
 const PAN_PX = 60;  // per arrow key
 
 export class Gestures {
@@ -15,6 +16,7 @@ export class Gestures {
     map.addEventListener('wheel', (e) => this.wheel(e), { passive: false });
     map.addEventListener('contextmenu', (e) => e.preventDefault());
     map.addEventListener('keydown', (e) => this.key(e));
+    document.addEventListener('keydown', (e) => this.anywhere(e));
   }
 
   pixel(e) {
@@ -86,6 +88,12 @@ export class Gestures {
     if (e.shiftKey) this.view.grip(pixel, pixel, 1, step * 0.002);
     else this.view.grip(pixel, pixel, Math.exp(-step * 0.0015));
     this.actions.moved();
+  }
+
+  // ? and Space act wherever the focus is, but for what takes them itself.
+  anywhere(e) {
+    const { tagName, type } = e.target, takes = TAKES[e.key]?.includes(tagName) && type !== 'range';
+    if (e.key in TAKES && !takes && !e.defaultPrevented && !document.querySelector('dialog[open]')) this.key(e);
   }
 
   key(e) {

@@ -74,6 +74,9 @@ function whole(text) {
   return text.endsWith('.') && text.length > 1 ? withStop(whole(text.slice(0, -1))) : undefined;
 }
 
+// Seconds as minutes and seconds.
+export const minutes = (s) => `${Math.floor(Math.max(s, 0) / 60)}:${String(Math.floor(Math.max(s, 0) % 60)).padStart(2, '0')}`;
+
 const withStop = (text) => text && `${text}.`;
 const filled = (name, value) => (name.length === 1 ? value.replace('.', decimal) : translated(value, false));
 

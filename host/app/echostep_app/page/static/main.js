@@ -10,6 +10,7 @@ import { Painter } from './live/paint.js';
 import { Panel } from './live/panel.js';
 import { PlanView } from './plan.js';
 import { Points } from './live/points.js';
+import { Orders } from './live/orders.js';
 import { Replay } from './live/replay.js';
 import { Speech } from './live/speech.js';
 import { Taps } from './live/taps.js';
@@ -45,6 +46,7 @@ const link = new Link({
   isLive: () => isLive && scene.frame?.ended == null,
 });
 const speech = new Speech($('speech'), $('sentence'), $('invitation'), $('unspoken'));
+const orders = new Orders((kind, fields) => link.send(kind, fields), (text) => speech.unsent(text));
 const showLegend = startLegend($('legend-button'), LIVE, LIVE_KEYS);
 const replay = new Replay((kind, fields) => link.send(kind, fields));
 const points = new Points((kind, fields) => link.send(kind, fields));
@@ -52,7 +54,7 @@ const drops = new Drops(hint), charts = new Charts($('charts'), () => painter.co
 const tools = new Tools({ view, scene, planView, layers: scene.layers, charts, hint, enter, seek, changed: redraw, plan: () => plan, globe: () => globe, takesFiles: () => drops.takes });
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
-const drawn = (window.echostep = { frames: 0, view, scene, link, last: null, missing, tr });  // read by tests
+const drawn = (window.echostep = { frames: 0, view, scene, link, charts, last: null, missing, tr });  // read by tests
 
 async function hello(message) {
   if (plan && (plan.digest !== message.plan.digest || title !== message.title)) startAnew();
@@ -180,6 +182,7 @@ function frame(received) {
   speech.alarm(received.play ? null : received.alarm);
   if (!received.alarm) speech.update(received.guidance);
   if (!received.play && !received.alarm) speech.sent(received.errand);
+  orders.show(received.play ? [] : received.orders);
   dirty = true;
 }
 
@@ -280,6 +283,7 @@ function key(name) {
   const actions = {
     l: () => showLegend(false), '?': () => showLegend(true), t: () => tools.open(), c: () => tools.setCharts(!charts.on), d: () => enter('measure', true), n: () => view.northUp(), w: fitWhole, f: toggleFollow,
     h: () => !$('here').hidden && enter('here', true), g: () => enter('go', true),
+    ' ': () => !$('replay').hidden && $('play').click(),
     Escape: () => { scene.measure.clear(); enter(null); },
     Enter: () => (mode === 'measure' ? measured(middle) : mode && posed(middle, mode === 'here' ? turned : null)),
     ',': () => { turned += Math.PI / 12; dirty = true; }, '.': () => { turned -= Math.PI / 12; dirty = true; },

@@ -6,7 +6,7 @@ import { tr } from './language.js';
 import { remember } from './storage.js';
 
 const LABELS = {
-  call: 'Help!', check_in: 'I am here', undo: 'Undo', met: 'I met a teammate', at_point: 'At the point', no_tap: 'Undo', go_to: 'Go here', go_nowhere: 'End of the guidance',
+  call: 'Help!', check_in: 'I am here', undo: 'Undo', met: 'I met a teammate', understood: 'Understood', order: 'Order', at_point: 'At the point', no_tap: 'Undo', go_to: 'Go here', go_nowhere: 'End of the guidance',
   acknowledge: 'Acknowledge', send: 'Send', mark: 'Mark', unmark: 'Remove', crew: 'Crew', crew_does: 'Crew',
 };
 const FRESH_S = { check_in: 5, undo: 5, met: 5, at_point: 2, no_tap: 2 };  // what is said of this moment is wrong later; assumed
@@ -17,7 +17,7 @@ const $ = (id) => document.getElementById(id);
 export class Outbox {
   // `transmit(request)`: sends it if there is a connection; `onUnsent(text)`: a call for help has not gone out, each REMIND_S; `serverNow_s()`: or null
   constructor(transmit, onUnsent, serverNow_s) {
-    Object.assign(this, { transmit, onUnsent, serverNow_s, prefix: `request ${location.pathname} `, run: null, kept: [], news: [] });
+    Object.assign(this, { transmit, onUnsent, serverNow_s, prefix: `request ${location.pathname} `, run: null, kept: [], news: [], waiting: 0 });
     this.kept = stored(this.prefix).filter((request) => age_s(request) < STORED_S);
     setInterval(() => this.tick(), 1000 * SLOW_S);
   }
@@ -73,9 +73,17 @@ export class Outbox {
     if (this.kept.length || this.news.length) this.show();
   }
 
+  // Requests that the server has, and the broker has not yet.
+  wait(waiting) {
+    if (waiting === this.waiting) return;
+    this.waiting = waiting;
+    this.show();
+  }
+
   show() {
     const waiting = this.kept.filter((request) => request.kind === 'call' || age_s(request) > SLOW_S).map((request) => `${label(request)}: sending for ${Math.round(age_s(request))} s`);
     this.news = this.news.filter(({ ends }) => ends > Date.now()).slice(-MOST_NEWS);
+    if (this.waiting) waiting.push(`Requests that wait for the broker: ${this.waiting}`);
     const text = [...waiting, ...this.news.map(({ text: news }) => news)].map(tr).join('. ');
     if ($('outbox').textContent !== text) $('outbox').textContent = text;
     $('outbox').hidden = !text;

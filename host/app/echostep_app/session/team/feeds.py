@@ -13,12 +13,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 
 from echostep.plan import Plan
-from echostep_app.page.elements.marks import ShownMark
+from echostep_app.page.elements.marks import ShownMark, ShownOrder
 from echostep_app.ports.teammate import Teammate
 from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.team.endpoint import Outlet
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.marks import MARKS, Errand, MarkBoard, acks_of, errand_of
+from echostep_app.team.messages.orders import EVERYBODY, ORDERS, RECEIPTS, Receipt, order_key, receipt_message
 from echostep_app.team.messages.report import BadReportError
 from echostep_app.team.roster import Member, MemberState, Roster
 
@@ -87,7 +88,10 @@ class MarkFeed:
         self._board = MarkBoard()
         self._shown: tuple[ShownMark, ...] = ()
         self._errand: Errand | None = None  # the last one that was given
-        topics = [MARKS, acks_of(outlet.team, outlet.name), errand_of(self._key)]
+        own = outlet.team, outlet.name
+        topics = [MARKS, acks_of(*own), errand_of(self._key), f"{ORDERS}/{EVERYBODY}", f"{ORDERS}/{order_key(*own)}"]
+        topics.append(f"{RECEIPTS}/+/{order_key(*own)}")
+        self._send = subscription.send
         self._looks = subscription.add(topics, self._receive)
 
     def news(self) -> tuple[ShownMark, ...] | None:
@@ -114,6 +118,26 @@ class MarkFeed:
             return None
         self._errand = errand
         return errand
+
+    def orders(self) -> tuple[ShownOrder, ...]:
+        """The commanders' orders to this wearer that hold and are not understood yet, as of the last call of `news`."""
+        team, name, _ = self._key
+        found = ((kind, self._board.order_to(kind, team, name)) for kind in (EVERYBODY, "note"))
+        return tuple(
+            ShownOrder(f"{kind} {one[0].unix_s}", f"{one[0].by}: {one[0].text}", kind == EVERYBODY)
+            for kind, one in found if one and not one[1]
+        )  # fmt: skip
+
+    def understand(self, identity: str) -> None:
+        """The wearer has understood the order of this identity: the commanders are told; one that holds no longer is ignored."""
+        team, name, _ = self._key
+        kind = identity.partition(" ")[0]
+        found = self._board.order_to(kind, team, name)
+        if found is None or f"{kind} {found[0].unix_s}" != identity:
+            return
+        key, receipt = (kind, team, name), Receipt(1, found[0].unix_s, name[:32], time.time())
+        if self._send(*receipt_message(key, receipt)):
+            self._board.receipts[key] = receipt
 
     def _receive(self, message: ReceivedMessage) -> None:
         try:

@@ -80,7 +80,7 @@ class TeamSubscription:
     @property
     def sent_all(self) -> bool:
         """Whether no message waits."""
-        return self._receiver is not None and self._receiver.sent_all
+        return self._receiver is not None and not self._receiver.waiting
 
     def close(self) -> None:
         """Disconnect."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Shared state of the commanders: marks on the plan, acknowledgements of alarms, errands, crews. The broker retains it, so it is the same for all.
+"""Shared state of the commanders: marks on the plan, acknowledgements of alarms, errands, orders, crews. The broker retains it: all have the same.
 
 In: retained messages from untrusted senders, on `echostep-table/mark/<id>`, `echostep-table/ack/<team>/<wearer>/<run>-<number>` and
 `echostep-table/errand/<team>/<wearer>/<run>`; an empty one removes. Out: `Mark`s, `Ack`s and `Errand`s, and the messages for new ones. Owns those
@@ -14,13 +14,24 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
 
 from echostep.ports.people.payloads import Level
 from echostep_app.team.messages.crews import MOST_CREWS, Crew
+from echostep_app.team.messages.orders import (
+    EVERYBODY,
+    MOST_ORDERS,
+    MOST_RECEIPTS,
+    Order,
+    Receipt,
+    ReceiptKey,
+    order_key,
+    order_message,
+    receipt_message,
+)
 from echostep_app.team.messages.report import BadReportError, Metres, check_name
 from echostep_app.team.messages.shared import (
     Identity,
@@ -121,9 +132,9 @@ def is_shared(topic: str | None) -> bool:
 
 
 class MarkBoard:
-    """`receive` takes messages; `marks`, `acks`, `errands` and `crews` are what they amount to; `removed`: marks that were there.
+    """`receive` takes messages; `marks`, `acks`, `errands`, `orders`, `receipts` and `crews` are what they amount to.
 
-    `answers`: messages for the broker, which keeps older ones.
+    `removed`: marks that were there; `answers`: messages for the broker, which keeps older ones.
     """
 
     def __init__(self) -> None:
@@ -143,25 +154,37 @@ class MarkBoard:
         self.crews: Kept[str, Crew] = Kept(
             Crew, "crew", MOST_CREWS, lambda _, crew: crew.message, lambda c: [c.name, c.by, *c.members]
         )
+        self.orders: Kept[str, Order] = Kept(Order, "order", MOST_ORDERS, order_message, lambda o: [o.by, o.text])
+        self.receipts: Kept[ReceiptKey, Receipt] = Kept(
+            Receipt, "receipt", MOST_RECEIPTS, receipt_message, lambda r: [r.by]
+        )
         self.answers: deque[tuple[str, bytes]] = deque(maxlen=MOST_ANSWERS)
 
     def copy(self) -> MarkBoard:
         """A board of the same state that changes by itself."""
         made = MarkBoard()
         made.marks, made.removed = dict(self.marks), dict(self.removed)
-        made.acks.update(self.acks)
-        made.errands.update(self.errands)
-        made.crews.update(self.crews)
+        for own, other in zip(made._kept, self._kept, strict=True):
+            own.update(other)
         return made
+
+    @property
+    def _kept(self) -> tuple[Kept[Any, Any], ...]:
+        return self.acks, self.errands, self.orders, self.receipts, self.crews
+
+    def order_to(self, kind: str, team: str, name: str) -> tuple[Order, bool] | None:
+        """The order to everybody, or the note to one wearer, while it holds; and whether this wearer has understood it."""
+        order = self.orders.get(EVERYBODY if kind == EVERYBODY else order_key(team, name))
+        receipt = self.receipts.get((kind, team, name))
+        return (order, receipt is not None and receipt.order_s == order.unix_s) if order and not order.ended else None
 
     @property
     def messages(self) -> Iterator[tuple[str, bytes]]:
         """Topic and payload of all that is known."""
         for mark in (*self.marks.values(), *self.removed.values()):
             yield mark.message
-        yield from self.acks.messages
-        yield from self.errands.messages
-        yield from self.crews.messages
+        for kept in self._kept:
+            yield from kept.messages
 
     def receive(self, topic: str, payload: bytes) -> None:
         """Take one message; raises BadReportError with the reason of its rejection."""
@@ -173,6 +196,12 @@ class MarkBoard:
                 self.acks.receive(_checked_key(key), (topic, payload), self.answers)
             case ["errand", *key]:
                 self.errands.receive(_checked_key(key), (topic, payload), self.answers)
+            case ["order", "everybody"]:
+                self.orders.receive(EVERYBODY, (topic, payload), self.answers)
+            case ["order", team, name]:
+                self.orders.receive(order_key(*_names(team, name)), (topic, payload), self.answers)
+            case ["receipt", ("everybody" | "note") as kind, team, name]:
+                self.receipts.receive((kind, *_names(team, name)), (topic, payload), self.answers)
             case ["crew", identity]:
                 self.crews.receive(identity, (topic, payload), self.answers)
             case _:
@@ -205,6 +234,11 @@ def _checked_key(parts: Sequence[str]) -> tuple[str, str, str]:
     """Team, wearer and run of a topic; raises BadReportError for one that names no wearer."""
     if len(parts) != 3 or len(parts[2]) > 32:
         raise BadReportError("unknown topic")
-    for name in parts[:2]:
-        check_name(name)
-    return parts[0], parts[1], parts[2]
+    return *_names(*parts[:2]), parts[2]
+
+
+def _names(team: str, name: str) -> tuple[str, str]:
+    """Team and wearer; raises BadReportError for what is no name."""
+    check_name(team)
+    check_name(name)
+    return team, name

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The time bar of a replay: play and pause, step, seek, speed.
 
-import { tr } from '../language.js';
+import { minutes, tr } from '../language.js';
 
 const $ = (id) => document.getElementById(id);
 
@@ -44,5 +44,3 @@ export class Replay {
     $('play').setAttribute('aria-label', $('play').title);
   }
 }
-
-const minutes = (s) => `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, '0')}`;

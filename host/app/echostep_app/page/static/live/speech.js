@@ -62,7 +62,7 @@ export class Speech {
     this.bell.ring();
   }
 
-  // A call for help that has not gone out, whether speech is switched on or not.
+  // A call for help that has not gone out, or a commander's order, whether speech is switched on or not.
   unsent(text) {
     this.say(text);
     this.bell.ring();

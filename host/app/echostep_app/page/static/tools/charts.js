@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Charts under the map: ranges, rates and heading over time, with what happened as ticks. In a replay of the whole walk, a tap seeks; live, of the last minute.
+// Charts under the map: ranges, rates and heading over time, with what happened as ticks. In a replay of the whole walk, a tap seeks; live, of the last
+// minute. The values under the pointer are written; the wheel zooms about it, a double click shows all again.
 
-import { tr } from '../language.js';
+import { minutes, tr } from '../language.js';
 import { inUnits } from './units.js';
 
 const LIVE_S = 60;  // shown of a live run
@@ -12,18 +13,23 @@ const CHARTS = [
   { title: 'rate, /s', series: [['foot', 'here', 'foot'], ['pings', 'goal', 'pings']] },
   { title: 'heading from north, °', series: [['heading', 'ink', 'heading']], dots: true },
 ];
-const LEFT_PX = 34, TOP_PX = 15;
+const LEFT_PX = 34, RIGHT_PX = 6, TOP_PX = 15, AXIS_PX = 14, TICK_PX = 70, NEAR_PX = 12;
+const STEPS_S = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600], SHORTEST_S = 2;
 
 export class Charts {
   // `onSeek(t_s)`: the chart was tapped, in a replay
   constructor(canvas, colours, onSeek) {
-    Object.assign(this, { canvas, colours, onSeek, pen: canvas.getContext('2d'), on: false, rows: [], events: [], play: null, reading: false, onEvents: () => {}, isWanted: () => false });
+    Object.assign(this, { canvas, colours, onSeek, pen: canvas.getContext('2d'), on: false, rows: [], events: [], play: null, zoomed: null, pointed: null, reading: false, onEvents: () => {}, isWanted: () => false });
     canvas.onclick = ({ offsetX }) => { if (this.play) onSeek(this.time(offsetX)); };
+    canvas.onpointermove = ({ offsetX }) => { this.pointed = offsetX; this.paint(); };
+    canvas.onpointerleave = () => { this.pointed = null; this.paint(); };
+    canvas.ondblclick = () => { this.zoomed = null; this.paint(); };
+    canvas.addEventListener('wheel', (e) => this.zoom(e), { passive: false });
     setInterval(() => this.read(), POLL_MS);
   }
 
   clear() {
-    Object.assign(this, { rows: [], events: [], play: null, run: (this.run ?? 0) + 1 });
+    Object.assign(this, { rows: [], events: [], play: null, zoomed: null, run: (this.run ?? 0) + 1 });
     this.onEvents(this.events);
   }
 
@@ -48,14 +54,29 @@ export class Charts {
     if (this.on && play?.t_s !== this.shown) this.paint();
   }
 
+  // By the wheel, about the time under the pointer; live, the end stays now.
+  zoom(e) {
+    e.preventDefault();
+    const [first, last] = this.whole, [begin, end] = this.span, long = Math.min(Math.max((end - begin) * Math.exp(0.0015 * e.deltaY), SHORTEST_S), last - first);
+    const at = this.time(e.offsetX), from = Math.min(Math.max(at - (at - begin) * long / (end - begin), first), last - long);
+    this.zoomed = long < last - first ? { from: this.play ? from : null, long } : null;
+    this.paint();
+  }
+
   get span() {
+    const { zoomed } = this, [first, last] = this.whole, from = zoomed?.from ?? last - (zoomed?.long ?? LIVE_S);
+    return zoomed || !this.play ? [from, from + (zoomed?.long ?? LIVE_S)] : [first, last];
+  }
+
+  // All that can be shown.
+  get whole() {
     const end = this.rows.at(-1)?.[0] ?? 1;
-    return this.play ? [this.play.begin_s, Math.max(this.play.end_s, this.play.begin_s + 1)] : [end - LIVE_S, end];
+    return this.play ? [this.play.begin_s, Math.max(this.play.end_s, this.play.begin_s + 1)] : [Math.min(this.rows[0]?.[0] ?? 0, end - LIVE_S), end];
   }
 
   time(px) {
     const [begin, end] = this.span;
-    return Math.min(Math.max(begin + (end - begin) * (px - LEFT_PX) / (this.canvas.clientWidth - LEFT_PX), begin), end);
+    return Math.min(Math.max(begin + (end - begin) * (px - LEFT_PX) / (this.canvas.clientWidth - LEFT_PX - RIGHT_PX), begin), end);
   }
 
   paint() {
@@ -64,12 +85,25 @@ export class Charts {
     [canvas.width, canvas.height] = [Math.round(width * sharp), Math.round(height * sharp)];
     pen.setTransform(sharp, 0, 0, sharp, 0, 0);
     this.shown = this.play?.t_s;
-    const [begin, end] = this.span, seen = this.rows.filter(([t]) => t >= begin && t <= end), each = height / CHARTS.length;
-    const x = (t) => LEFT_PX + (width - LEFT_PX) * (t - begin) / (end - begin);
-    CHARTS.forEach((chart, k) => this.chart(chart, seen, x, k * each, each - 3, width));
-    for (const { t_s } of this.events) if (t_s >= begin) this.rule(x(t_s), height, 'bad', [2, 3]);
-    if (this.play) this.rule(x(this.play.t_s), height, 'ink', []);
+    const [begin, end] = this.span, seen = this.rows.filter(([t]) => t >= begin && t <= end), each = (height - AXIS_PX) / CHARTS.length;
+    const x = (t) => LEFT_PX + (width - LEFT_PX - RIGHT_PX) * (t - begin) / (end - begin);
+    const near = this.pointed === null || !seen.length ? null : seen.reduce((a, b) => (Math.abs(x(b[0]) - this.pointed) < Math.abs(x(a[0]) - this.pointed) ? b : a));
+    this.near = near && Math.abs(x(near[0]) - this.pointed) < NEAR_PX ? near : null;
+    CHARTS.forEach((chart, k) => this.chart(chart, seen, x, k * each, each - 3, width - RIGHT_PX));
+    this.axis(begin, end, x, height);
+    if (this.near) this.rule(x(this.near[0]), height - AXIS_PX, 'ink', [1, 3]);
+    for (const { t_s } of this.events) if (t_s >= begin && t_s <= end) this.rule(x(t_s), height, 'bad', [2, 3]);
+    if (this.play && this.play.t_s >= begin && this.play.t_s <= end) this.rule(x(this.play.t_s), height, 'ink', []);
     canvas.setAttribute('aria-label', tr(inUnits(this.words(seen))));
+  }
+
+  // Times from the beginning of the walk, and that under the pointer.
+  axis(begin, end, x, height) {
+    const { pen } = this, [first] = this.whole, most = Math.max((x(end) - x(begin)) / TICK_PX, 1), step = STEPS_S.find((one) => (end - begin) / one <= most) ?? 7200;
+    const text = (t, of) => { pen.fillText(of, Math.min(Math.max(x(t), LEFT_PX), x(end) - pen.measureText(of).width / 2), height - 3); };
+    Object.assign(pen, { font: '11px system-ui, sans-serif', textAlign: 'center', fillStyle: this.colours()[this.near ? 'ink' : 'faint'] });
+    if (this.near) return text(this.near[0], `${minutes(this.near[0] - first)}.${Math.floor(10 * ((this.near[0] - first) % 1))}`);
+    for (let t = first + step * Math.ceil((begin - first) / step); t <= end; t += step) text(t, minutes(t - first));
   }
 
   chart({ title, series, dots }, rows, x, top, height, width) {
@@ -80,7 +114,8 @@ export class Charts {
     pen.fillText(high.toFixed(high < 10 ? 1 : 0), 2, top + TOP_PX + 9);
     pen.fillText(low.toFixed(0), 2, top + height);
     let at = LEFT_PX;
-    for (const [text, colour] of [[tr(title), 'faint'], ...series.map(([, name, text], k) => [`${k ? '▬' : '●'} ${tr(text)}`, name])]) {
+    const value = (name) => (Number.isFinite(of(this.near ?? [], name)) ? ` ${of(this.near, name).toFixed(title.startsWith('range') ? 2 : 0)}` : '');
+    for (const [text, colour] of [[tr(title), 'faint'], ...series.map(([name, paint, text], k) => [`${k ? '▬' : '●'} ${tr(text)}${value(name)}`, paint])]) {
       pen.fillStyle = this.colours()[colour];
       pen.fillText(text, at, top + 11);
       at += pen.measureText(text).width + 12;

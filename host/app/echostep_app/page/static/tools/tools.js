@@ -7,7 +7,7 @@ import { linkOf } from './hash.js';
 import { Heard } from './heard.js';
 import { LAYERS } from './layers.js';
 import { chooseUnit, chosenUnit } from './units.js';
-import { localise, tr } from '../language.js';
+import { localise, minutes, tr } from '../language.js';
 
 const $ = (id) => document.getElementById(id);
 const BUTTONS = { measure: 'Measure', charts: 'Charts', link: 'Copy a link', picture: 'Picture (PNG)', geojson: 'GeoJSON', full: 'Full screen', files: 'Open files…' };
@@ -100,9 +100,9 @@ export class Tools {
 
   // What happened, as a list and as ticks on the time bar; in a replay each leads to its moment.
   events(events) {
-    const { play } = this.page.scene.frame ?? {}, begin = play?.begin_s ?? events[0]?.t_s ?? 0, whole = play ? Math.max(play.end_s - begin, 1e-3) : 1;
+    const { play } = this.page.scene.frame ?? {}, begin = play?.begin_s ?? this.page.charts.rows[0]?.[0] ?? events[0]?.t_s ?? 0, whole = play ? Math.max(play.end_s - begin, 1e-3) : 1;
     $('events').replaceChildren(...events.map(({ t_s, text }) => {
-      const item = document.createElement('li'), at = `${Math.floor((t_s - begin) / 60)}:${String(Math.floor((t_s - begin) % 60)).padStart(2, '0')} ${tr(text)}`;
+      const item = document.createElement('li'), at = `${minutes(t_s - begin)} ${tr(text)}`;
       if (!play) item.textContent = at;
       else {
         const button = document.createElement('button');

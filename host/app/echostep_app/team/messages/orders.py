@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: MIT
+"""Orders of the commanders to wearers: everybody out, and a note in words to one wearer; each wearer's page says that it was understood.
+
+In: retained messages from untrusted senders, on `echostep-table/order/everybody`, `echostep-table/order/<team>/<wearer>` and
+`echostep-table/receipt/<everybody|note>/<team>/<wearer>`. Out: `Order`s and `Receipt`s, and the messages for new ones. Owns nothing. Of several
+orders to the same ones, and of several receipts of one wearer, the latest counts (`shared.Kept`), so there are no more than wearers.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from echostep_app.team.messages.shared import Person, UnixTime
+
+ORDERS, RECEIPTS = "echostep-table/order", "echostep-table/receipt"
+EVERYBODY = "everybody"
+OUT = "Everybody out!"
+MOST_ORDERS, MOST_RECEIPTS = 257, 512  # of as many wearers as a roster has; further ones are refused
+NoteText = Annotated[str, Meta(min_length=1, max_length=200)]
+ReceiptKey = tuple[str, str, str]  # "everybody" or "note", team, wearer
+
+
+class Order(msgspec.Struct, frozen=True):
+    """What the commander `by` wrote at `unix_s`. `ended`: it holds no longer."""
+
+    echostep_order: Literal[1]
+    text: NoteText
+    by: Person
+    unix_s: UnixTime
+    ended: bool = False
+
+
+class Receipt(msgspec.Struct, frozen=True):
+    """The wearer `by` has understood the order of the time `order_s`."""
+
+    echostep_receipt: Literal[1]
+    order_s: UnixTime
+    by: Person
+    unix_s: UnixTime
+
+
+def order_key(team: str, name: str) -> str:
+    """Of the orders to one wearer."""
+    return f"{team}/{name}"
+
+
+def order_message(key: str, order: Order) -> tuple[str, bytes]:
+    """Topic and payload of an order to everybody, or to one wearer."""
+    return f"{ORDERS}/{key}", msgspec.json.encode(order)
+
+
+def receipt_message(key: ReceiptKey, receipt: Receipt) -> tuple[str, bytes]:
+    """Topic and payload of a wearer's answer."""
+    return f"{RECEIPTS}/{'/'.join(key)}", msgspec.json.encode(receipt)

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: MIT
+"""Everybody out, and a note to one wearer: over a broker to the wearers' pages, and back who has understood; in Chromium."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from echostep.plan import load_plan
+from echostep.ports.chunks import portion_of
+from echostep_app.operation.requests import SetOrder, parse_request
+from echostep_app.session.sinks import mark_sink
+from echostep_app.session.team.feeds import MarkFeed
+from echostep_app.session.team.subscription import TeamSubscription
+from echostep_app.team.endpoint import parse_outlet
+from echostep_app.team.messages.marks import MarkBoard
+from echostep_app.team.messages.orders import EVERYBODY, OUT, Order, Receipt, order_message, receipt_message
+from echostep_app.team.messages.report import BadReportError
+from operation.teams import Team, whole_team
+from operation.test_marks_and_alarms import Commander
+from operation.test_sent import SPEAKS
+from page.browser import HELD_MS, READY, Walk, opened_page, overflow, wait_for
+from page.web.test_page_sizes import UNREACHED
+from team.network import box_to
+from team.team_broker import Broker, needs_broker
+from team.team_reports import PLAN, report
+from waiting import until
+
+TEXT = "document.querySelector('#everybody-text').textContent"
+LOW = ((360, 740), (740, 360), (320, 256), (768, 1024), (1366, 768), (1920, 1080))
+
+
+def carry_out(team: Team, request: SetOrder) -> None:
+    message = team.operation.act(request, team.unix_s, team.now_s)
+    assert isinstance(message, tuple)
+    team.put_bytes(*message)
+
+
+def row(team: Team, name: str) -> Any:
+    return next(row for row in team.scene().rows if row.name == name)
+
+
+def test_who_has_understood_is_counted_and_stands_in_the_history() -> None:
+    team = whole_team()
+    carry_out(team, SetOrder("Ann"))
+    order = team.scene().order
+    assert order
+    assert (order.text, order.by, order.understood, order.of) == (OUT, "Ann", 0, 8)
+    kim = ("everybody", "red", "Kim")
+    team.put_bytes(*receipt_message(kim, Receipt(1, order.unix_s, "Kim", team.unix_s)))
+    told = team.scene().order
+    assert told
+    assert (told.understood, "Kim" in told.missing, "Bo" in told.missing) == (1, False, True)
+    team.pass_time(1.0)
+    assert row(team, "Kim").notes[0] == f"understood: {OUT}"
+    assert row(team, "Bo").notes[0] == f"not understood yet: {OUT}"
+    carry_out(team, SetOrder("Ben"))  # once more, with the clock of another commander: all are asked anew
+    again = team.scene().order
+    assert again
+    assert (again.by, again.understood) == ("Ben", 0)
+    bo = row(team, "Bo").id
+    carry_out(team, SetOrder("Ben", to=bo, text="Come to stairs B"))
+    carry_out(team, SetOrder("Ben", ended=True))
+    assert team.scene().order is None
+    team.pass_time(1.0)
+    assert row(team, "Bo").notes[0] == "not understood yet: Come to stairs B"
+    details = team.operation.details(bo, team.now_s)
+    assert details
+    said = [event.text for event in details.history]
+    assert said[:4] == ["everybody out: ended", "Ben: Come to stairs B", f"Ben: {OUT}", f"Ann: {OUT}"]
+    copied = team.operation.copy()
+    assert set(copied.shared) == set(team.operation.shared)
+
+
+def test_hostile_orders_are_refused() -> None:
+    board, (topic, payload) = MarkBoard(), order_message(EVERYBODY, Order(1, OUT, "Ann", 1.8e9))
+    for wrong in (
+        (topic, b"{"),
+        (topic, payload.replace(b"Ann", b"A\\u0007n")),
+        (topic.replace("everybody", "red/+"), payload),
+        ("echostep-table/receipt/other/red/kim", payload),
+        (topic, order_message(EVERYBODY, Order(1, "x" * 201, "Ann", 1.8e9))[1]),
+    ):
+        with pytest.raises(BadReportError):
+            board.receive(*wrong)
+    assert not board.orders
+    assert parse_request('{"kind":"order","by":"Ann","text":"  "}') is None
+    assert parse_request('{"kind":"order","by":"Ann"}') == SetOrder("Ann")
+
+
+@needs_broker
+def test_everybody_is_ordered_out_and_says_so(browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
+    with Broker(tmp_path) as broker, Commander(broker.url) as ben, Walk(1.0, 1.0, stands=True) as walk:
+        outlet = parse_outlet([broker.url], "bo", "red")
+        subscription = TeamSubscription(outlet.endpoints[0], print)
+        sink = mark_sink(MarkFeed(subscription, outlet, "0123abcd", load_plan(PLAN).digest), walk.page)
+        subscription.open()
+        box = box_to(broker.url, name="bo")
+        box.offer(report("bo"))
+        assert until(lambda: len(ben.look().rows) == 1)
+        wearer, table = (opened_page(browser, viewport={"width": 360, "height": 740}) for _ in range(2))
+        wearer.add_init_script(SPEAKS)
+        wearer.goto(walk.page.url)
+        wait_for(wearer, READY)
+        table.goto(ben.page.url)
+        wait_for(table, "document.querySelectorAll('#list li').length === 1")
+        table.fill("#me", "Ben")
+        table.click("#out")
+        wait_for(table, "document.querySelector('#hint').textContent === 'Hold Everybody out for a second.'")
+        table.click("#out", delay=HELD_MS)
+
+        def exchanged(page: Any, holds: str) -> bool:
+            sink.take(portion_of([]), [])
+            ben.look()
+            return bool(page.evaluate(holds))
+
+        assert until(lambda: exchanged(table, f"{TEXT}.endsWith('understood by 0 of 1. not understood yet: bo')"))
+        assert until(lambda: exchanged(wearer, "!document.querySelector('#order').hidden"))
+        assert wearer.inner_text("#order-text") == f"Ben: {OUT}"
+        assert wearer.evaluate("said").count(f"Ben: {OUT}") == 1
+        for page in (wearer, table):
+            for width, height in LOW:
+                page.set_viewport_size({"width": width, "height": height})
+                page.screenshot(path=tmp_path / f"{'wearer' if page is wearer else 'table'}-{width}.png")
+                assert overflow(page) == (0, 0), width
+                assert page.evaluate(UNREACHED) == [], (width, page is table)
+        wearer.reload()  # what is not understood stays
+        wait_for(wearer, f"{READY} && !document.querySelector('#order').hidden")
+        wearer.click("#understood")
+        assert until(lambda: exchanged(table, f"{TEXT}.endsWith('understood by 1 of 1')"))
+        assert until(lambda: exchanged(wearer, "document.querySelector('#order').hidden"))
+        table.click("#list li button")
+        table.fill("#note", "Come to stairs B")
+        table.keyboard.press("Enter")
+        assert until(lambda: exchanged(wearer, "!document.querySelector('#order').hidden"))
+        assert wearer.inner_text("#order-text") == "Ben: Come to stairs B"
+        wearer.screenshot(path=tmp_path / "note.png")
+        wearer.click("#understood")
+        told = "document.querySelector('#history').innerText.includes('understood: Come to stairs B')"
+        assert until(lambda: exchanged(table, told))
+        table.click("#everybody-end")
+        assert until(lambda: exchanged(table, "document.querySelector('#everybody').hidden"))
+        table.context.close()
+        wearer.context.close()
+        box.close()
+        subscription.close()

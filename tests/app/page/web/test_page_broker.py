@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""A broker that dies between a wearer and a commander, both as programs: both pages say so, and what is asked for meanwhile arrives once."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line import PROGRAM
+from page.browser import HELD_MS, READY, loaded_page, overflow, wait_for
+from page.web.test_page_silence import OUTBOX, STATUS, WITHIN_S
+from page.web.test_page_sizes import SIZES, UNREACHED
+from team.team_broker import Broker, needs_broker
+from team.team_reports import PLAN
+from waiting import PATIENCE_S
+
+TABLE_READY = (
+    "window.echostep?.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
+)
+ROW = "document.querySelector('#list li .said').textContent"
+WAITING = "Requests that wait for the broker: 1"
+LOST = "no broker: the last known state"
+
+
+@contextmanager
+def program(*arguments: object) -> Iterator[str]:
+    """A program until the end of the test; its page's address."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "PYTHONUNBUFFERED": "1"}
+    command = [*PROGRAM, *map(str, arguments)]
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment)
+    assert running.stdout
+    try:
+        found = next(filter(None, (re.search(r"http://127\.0\.0\.1:\d+/\S*", line) for line in running.stdout)))
+        yield found[0]
+    finally:
+        running.terminate()
+        running.communicate(timeout=PATIENCE_S)
+
+
+def outage(wearer: Any, table: Any, broker: Broker) -> None:
+    """Both pages say that the broker is gone, take what is asked for, and say what has become of it."""
+    broker.stop()
+    began_s = time.monotonic()
+    wait_for(table, f"{STATUS} === '{LOST}'")
+    assert time.monotonic() - began_s < WITHIN_S
+    wearer.click("#help", delay=HELD_MS)
+    wait_for(wearer, "document.querySelector('#alarm').textContent.includes('It has not gone out: ')")
+    table.focus("#map")
+    table.keyboard.press("m")
+    table.click("#mark-hazard")
+    wait_for(table, f"{OUTBOX}.includes('{WAITING}')")
+    wait_for(table, f"!{ROW}.includes('heard now')")
+    for page in (wearer, table):
+        assert overflow(page) == (0, 0)
+        assert page.evaluate(UNREACHED) == []
+    assert table.evaluate("echostep.scene.marks.length") == 0  # what is shown is what all commanders have
+    broker.start()
+    wait_for(table, f"{STATUS} === 'connected' && {ROW}.startsWith('mayday')")
+    wait_for(table, f"echostep.scene.marks.length === 1 && !{OUTBOX}.includes('broker')")
+
+
+@pytest.mark.long
+@needs_broker
+def test_a_dead_broker_is_told_and_what_is_asked_for_arrives_once(browser: Any, tmp_path: Path) -> None:
+    with Broker(tmp_path) as broker:
+        walk = (
+            "demo",
+            "--speed",
+            "1",
+            "--port",
+            0,
+            "--publish",
+            broker.url,
+            "--name",
+            "anna",
+            "--out",
+            tmp_path / "demo",
+        )
+        follow = ("command", broker.url, "--plan", PLAN, "--port", 0, "--out", tmp_path / "operation.mcap")
+        with program(*walk, "--page", "--no-open") as wearer_url, program(*follow) as table_url:
+            for k, (width, height) in enumerate(SIZES):
+                how = {"viewport": {"width": width, "height": height}}
+                wearer, table = (
+                    loaded_page(browser, wearer_url, how, READY),
+                    loaded_page(browser, table_url, how, TABLE_READY),
+                )
+                table.fill("#me", "Ben")
+                outage(wearer, table, broker)
+                for role, page in (("wearer", wearer), ("table", table)):
+                    page.screenshot(path=tmp_path / f"broker-{role}-{width}.png")
+                table.click("#list li:first-child button")
+                table.click("#acknowledge")
+                wait_for(wearer, "document.querySelector('#alarm').textContent.includes('Ben has acknowledged it')")
+                wearer.click("#fine")
+                wait_for(table, f"!{ROW}.startsWith('mayday')")
+                table.evaluate("echostep.link.send('unmark', { id: echostep.scene.marks[0].id })")
+                wait_for(table, "!echostep.scene.marks.length")
+                assert [*wearer.wrong, *table.wrong] == [], k
+                wearer.context.close()
+                table.context.close()
