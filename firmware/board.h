@@ -8,6 +8,16 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+/* Constant tables of bytes stay in flash: `static const uint8_t table[] FLASH`, read by flash_byte. */
+#ifdef __AVR__
+#include <avr/pgmspace.h>
+#define FLASH PROGMEM
+#define flash_byte(address) pgm_read_byte(address)
+#else
+#define FLASH
+#define flash_byte(address) (*(address))
+#endif
+
 /* Time: 0.5 us ticks since the start, wrapping after 35.8 minutes. */
 #define TICKS_PER_MS UINT32_C(2000)
 #define TICKS_PER_S UINT32_C(2000000)

@@ -35,20 +35,20 @@ bool lsm6dso_answers(enum chip chip)
 
 void lsm6dso_start(enum chip chip)
 {
-	static const uint8_t settings[] = {
+	static const uint8_t settings[] FLASH = {
 		CTRL1_XL_1667_HZ_8_G, CTRL2_G_1667_HZ_1000_DPS, CTRL3_C_WHOLE_SAMPLES, CTRL4_C_SPI_ONLY_FILTER, 0, CTRL6_C_50_HZ,
 		0, CTRL8_XL_83_HZ,
 	};
 	(void)spi_begin(chip, SPI_MODE3, REGISTER_CTRL1_XL); /* the addresses count up from the start: the default of IF_INC */
 	for (uint8_t n = 0; n < sizeof settings; n++)
-		(void)spi_exchange(settings[n]);
+		(void)spi_exchange(flash_byte(&settings[n]));
 	spi_release();
 }
 
 static int16_t read_word(void)
 {
 	uint8_t low = spi_exchange(0), high = spi_exchange(0);
-	return (int16_t)(uint16_t)((uint16_t)(high << 8) | low);
+	return (int16_t)(uint16_t)((uint16_t)high << 8 | low);
 }
 
 uint8_t lsm6dso_read(enum chip chip, struct lsm6dso_sample *out)

@@ -20,7 +20,7 @@ static uint8_t *put32(uint8_t *out, uint32_t v)
 
 static uint16_t get16(const uint8_t *in)
 {
-	return (uint16_t)(in[0] | (uint16_t)(in[1] << 8));
+	return (uint16_t)(in[0] | (uint16_t)in[1] << 8);
 }
 
 uint8_t msg_pack_identity(uint8_t *out, const struct msg_identity *m)

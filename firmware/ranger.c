@@ -44,8 +44,6 @@ static struct ranger {
 	struct ranging ranging;
 } rangers[2];
 
-static const uint8_t sensors[2] = { SENSORS_RANGER_LEFT, SENSORS_RANGER_RIGHT };
-
 static uint16_t lfsr;
 static bool slow; /* the grid is that of a MaxSonar */
 
@@ -74,7 +72,7 @@ static bool blocked_by_other(const struct ranger *r)
 
 static bool may_trigger(const struct ranger *r)
 {
-	return !r->pinging && configuration_reads(sensors[r->index]) && !blocked_by_other(r);
+	return !r->pinging && configuration_reads((uint8_t)(SENSORS_RANGER_LEFT << r->index)) && !blocked_by_other(r);
 }
 
 static enum kind first_kind(const struct ranger *r)

@@ -59,7 +59,7 @@ static enum ranging_state finish(uint8_t side, struct ranging *r)
 {
 	if (r->transfer.bytes[1] != UNUSED)
 		return RANGING_REFUSED;
-	r->time_of_flight_us = (uint16_t)((uint16_t)(r->transfer.bytes[2] << 8) | r->transfer.bytes[3]);
+	r->time_of_flight_us = (uint16_t)((uint16_t)r->transfer.bytes[2] << 8 | r->transfer.bytes[3]);
 	parts_found(side, PART_SRF02, r->transfer.bytes[0]);
 	return RANGING_DONE;
 }

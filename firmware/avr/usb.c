@@ -26,7 +26,7 @@
 
 static volatile bool bus_was_reset, suspended;
 static uint8_t suspends;
-static uint8_t ring[RING_SIZE]; /* send buffer; empty when head == tail */
+static uint8_t ring[RING_SIZE] __attribute__((section(".noinit.ring"))); /* send buffer; empty when head == tail; above restart.c's memory */
 static uint16_t head, tail;     /* indices of the next byte to write and to send */
 
 void usb_start(void)
