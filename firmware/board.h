@@ -91,6 +91,7 @@ struct capture_pulse {
 	uint32_t rise, fall; /* ticks; fall is valid when the pulse is over */
 };
 bool capture_trigger(uint8_t side);   /* sends a trigger pulse (12 us); false: the line is high, or pulses without one */
+bool capture_pull_low(uint8_t side);  /* pulls the line low for 0.2 ms, against 1 kohm in Echo; true: it stays low */
 enum capture_state capture_take_pulse(uint8_t side, struct capture_pulse *out);
 void capture_end_pulse(uint8_t side); /* gives up waiting */
 
@@ -116,6 +117,7 @@ void restart_note_sag(bool sagging); /* whether the supply is far below its usua
 /* Power and start. */
 void board_start(void);                /* pins, clock, buses, USB, watchdog, interrupts */
 void board_sleep(uint32_t wake_ticks); /* until then, or until an interrupt needs the main loop; restarts the watchdog */
+void board_lamp(bool level);            /* the LED beside the USB plug: which level lights it depends on the board */
 uint16_t board_memory_used(void);      /* bytes: static RAM plus the deepest stack since the start */
 void board_bootloader(void);           /* resets the processor into the bootloader; does not return */
 

@@ -164,12 +164,18 @@ static void fail_or_seek_on(struct ranger *r, uint32_t now)
 	r->due = now;
 }
 
-/* The echo line is high: held by a module that has heard no echo, pulled up because nothing is plugged in, or stuck. */
+/* The echo line is high: held by a module that has heard no echo, pulled up because nothing is plugged in, or stuck. A module without a
+ * timeout holds it for ever, unless it is pulled low. */
 static void hold(struct ranger *r, uint32_t now)
 {
 	if (r->kind == PULSE && r->holds < HOLDS_MAX) {
 		r->holds++;
 		r->due = now + HOLD_TICKS;
+		return;
+	}
+	if (parts_in(r->index) == PART_PULSE && capture_pull_low(r->index)) {
+		status_failed((enum device)r->index, FAULT_TOO_LATE);
+		r->holds = 0;
 		return;
 	}
 	miss(r, now, parts_in(r->index) == PART_PULSE ? FAULT_ALWAYS_READY : r->ranging.fault);

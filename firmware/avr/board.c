@@ -54,6 +54,15 @@ void board_start(void)
 	sei();
 }
 
+/* PB0, the RX LED, is an output for SPI's sake. */
+void board_lamp(bool level)
+{
+	if (level)
+		PORTB |= BIT(PB0);
+	else
+		PORTB &= (uint8_t)~BIT(PB0);
+}
+
 void board_sleep(uint32_t wake_ticks)
 {
 	wdt_reset();

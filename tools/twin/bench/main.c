@@ -72,6 +72,11 @@ bool pin_is_output(char port, uint8_t pin)
 	return port_registers(port)[0] >> pin & 1;
 }
 
+bool pin_is_low_output(char port, uint8_t pin)
+{
+	return pin_is_output(port, pin) && !(port_registers(port)[1] >> pin & 1);
+}
+
 bool pin_is_pulled_up(char port, uint8_t pin)
 {
 	return !pin_is_output(port, pin) && (port_registers(port)[1] >> pin & 1);

@@ -23,9 +23,14 @@ _PULSE = {
         "does not answer its trigger",
         "check its 5 V and ground, and that trigger and echo are not exchanged (left A2 and D4, right A3 and D13)",
     ),
+    Fault.TOO_LATE: (
+        "holds its Echo line high while there is no echo, and had to be pulled low",
+        "this module has no timeout of its own and does not fit: use an RCWL-1601",
+    ),
     Fault.ALWAYS_READY: (
         "its echo line stays high",
-        "check its plug, since the board pulls an open line up, and the line for a short to 5 V (left D4, right D13)",
+        "check its plug, since the board pulls an open line up, and the line for a short to 5 V (left D4, right D13); "
+        "a module without a timeout of its own does not fit",
     ),
 }
 _MAXSONAR = {
