@@ -18,6 +18,7 @@ from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC
 pytestmark = needs_twin
 BARE = ("bmp390", "imu_thigh", "imu_calf", "imu_belt", "pulse_left", "pulse_right", "lis3mdl")
 ECHO_US = 5831
+LEAST_OPEN = 0.5
 
 
 def rows(milliseconds: int, echo_us: int = 0) -> np.ndarray[tuple[int], np.dtype[np.void]]:
@@ -72,6 +73,31 @@ def test_a_module_that_holds_its_line_is_named(bench: Bench, module: str, words:
     assert [
         x for x in bench.all_findings if x.startswith(f"left ranger (pulse ranger): {words}") and "does not fit" in x
     ]
+
+
+@pytest.mark.parametrize(("cycle_us", "least_hz"), [(61_000, 30.0), (66_000, 28.0), (70_000, 26.5), (75_000, 25.0)])
+def test_the_schedule_follows_the_measured_cycle(bench: Bench, cycle_us: int, least_hz: float) -> None:
+    """N4: above 66 ms the sides lost their half period, and from 73 ms on every ping failed."""
+    begin(bench, "kit=papers", f"srf_cycle={cycle_us}")
+    bench.run(2_000)
+    found = [x for x in bench.run(20_000) if isinstance(x, m.Ping)]
+    assert {p.outcome for p in found} == {m.Outcome.ECHO}
+    assert len(found) >= 20 * least_hz
+    left, right = (np.array([p.ticks for p in found if p.ranger == side]) * 5e-4 for side in m.Ranger)
+    after_ms = right - left[np.searchsorted(left, right) - 1]
+    period_ms = float(np.median(np.diff(left)))
+    assert np.abs(after_ms[1:-1] - period_ms / 2).max() < 9.0  # twice the jitter
+
+
+@pytest.mark.parametrize("cycle_us", [61_000, 66_000, 70_000])
+def test_echoes_beyond_the_range_say_open(bench: Bench, cycle_us: int) -> None:
+    """A ranger that listens for 60 ms hears the other one's burst and the hall's reverberation as walls at 6.7 to 11 m."""
+    begin(bench, "kit=papers", f"srf_cycle={cycle_us}", "srf_window=60000", "fading=50")
+    table = rows(10_000)["row"].copy()
+    table["cross_us"][:, 0] = 9_000
+    bench.run(500, table[:500])
+    left = pings(bench.run(10_000, table), m.Ranger.LEFT)
+    assert np.mean([p.outcome == m.Outcome.NO_ECHO for p in left]) > LEAST_OPEN
 
 
 @pytest.mark.parametrize("errors", [1, 3])

@@ -79,7 +79,7 @@ static avr_cycle_count_t rise(avr_t *a, avr_cycle_count_t when, void *param)
 	uint32_t us = bursts_first_echo(&pulse, &rangers[!side].bursts, when, input.row.own_us[side]);
 
 	set_line(r, true);
-	bursts_add(&r->bursts, side, when);
+	bursts_add(&pulse, &r->bursts, side, when);
 	if (fault == GHOST && r->unheard)
 		us = GHOST_US;
 	r->unheard = !us;

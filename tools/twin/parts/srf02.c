@@ -10,6 +10,11 @@ enum { COMMAND, RANGE_HIGH = 2, RANGE_LOW, MINIMUM_HIGH, MINIMUM_LOW, REGISTERS 
 FAULT_SWITCH(srf_cycle, "<=90000", NULL, 61000) /* us */
 #define SPREAD_US 1000u /* random part of a ranging's duration */
 
+#define FADING_FIRST_US 36000u /* a hall fades for 60 to 70 ms [robot-electronics.co.uk forum, t=68] */
+#define FADING_SPREAD_US 26000u
+FAULT_SWITCH(srf_window, "<=65000", NULL, 35000) /* us: how long it listens, 6 m as sold; "near the 60ms mark" [there] */
+FAULT_SWITCH(fading, "<=100", NULL, 0) /* % of the bursts whose last reverberation the other ranger hears */
+
 static struct ranger rangers[] = {
 	{ .twi = { .part = PART(srf02, PLACE_RANGER_LEFT, "srf_left"), .address = 0x70 } },
 	{ .twi = { .part = PART(srf02, PLACE_RANGER_RIGHT, "srf_right"), .address = 0x71 } },
@@ -49,6 +54,16 @@ static void changed(void *self, unsigned before)
 		r->listening = r->listening && avr->cycle < r->busy_until;
 }
 
+static uint32_t window_us(void)
+{
+	return srf_window.value;
+}
+
+static uint32_t fading_us(void)
+{
+	return fading.value && random_below(100) < fading.value ? FADING_FIRST_US + random_below(FADING_SPREAD_US) : 0;
+}
+
 const struct model srf02 = {
 	.kind = OF_PAPERS,
 	.faults = "ok absent nack stretch mute deaf",
@@ -61,5 +76,6 @@ const struct model srf02 = {
 	.stop = on_stop,
 	.fault_stretch_us = 500,
 	.least_us = 875,    /* the ring-down: 15 cm, out and back */
-	.window_us = 35000, /* 600 cm */
+	.listens_us = window_us,
+	.fades_us = fading_us,
 };

@@ -165,7 +165,12 @@ def _device_finding(reports: BoardReports, device: Healthy, fault: Fault) -> Fin
     what, remedy = f"failed ({fault.name.lower().replace('_', ' ')})", "check its wires and its supply"
     if text := part_text(part_in(reports, device), identity_in(reports, device), device, fault):
         what, remedy = text
-    elif reports.parts is not None and part_in(reports, device) is Part.NONE and fault == Fault.NO_ANSWER:
+    elif (
+        fault == Fault.NO_ANSWER
+        and device in UNKNOWN_PART_REMEDIES
+        and reports.parts
+        and part_in(reports, device) is Part.NONE
+    ):
         what, remedy = "does not answer", UNKNOWN_PART_REMEDIES[device]
     elif device == Healthy.PRESSURE:
         what, remedy = _PRESSURE_TEXTS.get(fault, (what, remedy))

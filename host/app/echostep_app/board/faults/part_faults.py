@@ -57,15 +57,11 @@ _ICM20649 = {
 _TRIGGERED = (
     "check its 5 V and ground, Trig ({}) and Echo ({}); of a ranger on I2C, its address 0x{} (firmware/README.md)"
 )
-_SELECTED = f"{_SPI} and its chip select ({{}})"
 UNKNOWN_PART_REMEDIES = {  # of a place in which nothing was found since the start: a part of either kit may be meant
     Healthy.RANGER_LEFT: _TRIGGERED.format("A2", "D4", "70"),
     Healthy.RANGER_RIGHT: _TRIGGERED.format("A3", "D13", "71"),
     Healthy.COMPASS: "check its plug and 5 V, SDA (D2) and SCL (D3)",
-    Healthy.THIGH: _SELECTED.format("D8"),
-    Healthy.CALF: _SELECTED.format("D9"),
-    Healthy.BELT: _SELECTED.format("D10"),
-    Healthy.PRESSURE: _SELECTED.format("D6"),
+    Healthy.PRESSURE: f"{_SPI}; its chip select is D6",
 }
 _TEXTS: dict[Part, dict[Fault, tuple[str, str]]] = {
     Part.BMP390: _BMP390,
