@@ -116,6 +116,8 @@ void restart_note_sag(bool sagging); /* whether the supply is far below its usua
 
 /* Power and start. */
 void board_start(void);                /* pins, clock, buses, USB, watchdog, interrupts */
+/* Longest turn of the main loop, between two sleeps, and longest time from a timer's event to its interrupt, in ticks, since the last call. */
+void board_take_timing(uint16_t *turn, uint16_t *latency);
 void board_sleep(uint32_t wake_ticks); /* until then, or until an interrupt needs the main loop; restarts the watchdog */
 void board_lamp(bool level);            /* the LED beside the USB plug: which level lights it depends on the board */
 uint16_t board_memory_used(void);      /* bytes: static RAM plus the deepest stack since the start */

@@ -67,6 +67,13 @@ static void send_board_health(void)
 	link_send(MSG_BOARD_HEALTH, msg_pack_board_health(link_body(), &m));
 }
 
+static void send_loop(void)
+{
+	struct msg_loop m = { .ticks = clock_now(), .ranging_cycle = (uint16_t)(ranger_cycle() / 8u) };
+	board_take_timing(&m.longest_turn, &m.longest_latency);
+	link_send(MSG_LOOP, msg_pack_loop(link_body(), &m));
+}
+
 /* The optional messages that come once a second. */
 static void send_subscribed_reports(void)
 {
@@ -78,6 +85,8 @@ static void send_subscribed_reports(void)
 		foot_send_health();
 	if (link_wants(REPORTS_ELECTRICAL))
 		electrical_send();
+	if (link_wants(REPORTS_LOOP))
+		send_loop();
 }
 
 static void send_identity_and_configuration(void)

@@ -255,6 +255,16 @@ uint8_t msg_pack_electrical(uint8_t *out, const struct msg_electrical *m)
 	return (uint8_t)(end - out);
 }
 
+uint8_t msg_pack_loop(uint8_t *out, const struct msg_loop *m)
+{
+	uint8_t *end = out;
+	end = put32(end, m->ticks);
+	end = put16(end, m->longest_turn);
+	end = put16(end, m->longest_latency);
+	end = put16(end, m->ranging_cycle);
+	return (uint8_t)(end - out);
+}
+
 bool msg_unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t length)
 {
 	if (length != MSG_CLOCK_QUERY_SIZE)

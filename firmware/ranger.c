@@ -284,6 +284,11 @@ static void fit_grid(uint32_t now)
 	ranger_start(now);
 }
 
+uint32_t ranger_cycle(void)
+{
+	return cycle;
+}
+
 static void plan_triggers(void)
 {
 	for (uint8_t side = 0; side < 2; side++)

@@ -19,6 +19,9 @@ void ranger_start(uint32_t now);
 /* Triggers and reads what is due; returns the time of the next call, unless an interrupt comes earlier. */
 uint32_t ranger_run(uint32_t now);
 
+/* Measured cycle of SRF02 in ticks, which the schedule follows; 0: of none. */
+uint32_t ranger_cycle(void);
+
 /* For the drivers. A side is RANGER_LEFT or RANGER_RIGHT, which are also its `enum device`. */
 enum ranging_state {
 	RANGING_BUSY,

@@ -20,13 +20,14 @@ from rich.progress import track
 from echostep.arrays import Floats
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader, encode
-from echostep_app.board.subscription import SUBSCRIBE
+from echostep_app.board.subscription import SUBSCRIBE as USUAL
 from echostep_app.simulation.devices.board import BoardProcess
 from echostep_app.simulation.kits import Kit
 from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 from places import TWIN
 from reliability.campaign import Figure, options, report
 
+SUBSCRIBE = m.Subscribe(USUAL.reports | m.Reports.LOOP)
 SETTLED_S = 2.0  # enumeration and start-up take less
 TICK_US = 0.5
 CYCLES_US = (61_000, 66_000, 70_000)  # of an SRF02: likely; two that its maker names [forum, t=269; data sheet]
@@ -47,6 +48,8 @@ class RunResult:
     memory: int = 0
     dropped: dict[str, int] = field(default_factory=dict)
     lost: int = 0
+    turn_ms: float = 0.0  # longest of the main loop
+    latency_us: float = 0.0  # longest of an interrupt
     worst_flight_us: int = 0  # error of the right ranger, which hears its own echo only
 
     def add(self, message: m.Message, t_ns: int) -> None:
@@ -57,6 +60,9 @@ class RunResult:
         if t_ns < SETTLED_S * 1e9:
             return
         self.counts[type(message).__name__] += 1
+        if isinstance(message, m.Loop):
+            self.turn_ms = max(self.turn_ms, 1e-3 * TICK_US * message.longest_turn)
+            self.latency_us = max(self.latency_us, TICK_US * message.longest_latency)
         if isinstance(message, m.Ping):
             self.stamps[TRIGGERS[message.ranger]].append(message.ticks)
             if message.ranger == m.Ranger.RIGHT:
@@ -80,6 +86,8 @@ class RunResult:
         """Figures of every board."""
         return [
             Figure(f"frames lost in {self.seconds / 60:.0f} min", str(self.lost), "0", self.lost == 0),
+            Figure("longest turn of the loop", f"{self.turn_ms:.1f} ms", "<= 5 ms", self.turn_ms <= 5.0),
+            Figure("longest interrupt latency", f"{self.latency_us:.1f} us", "<= 100 us", self.latency_us <= 100.0),
             Figure("drops by stream", str(self.dropped or 0), "0", not self.dropped),
             Figure("static RAM and deepest stack", f"{self.memory} B", "< 2200 B", self.memory < 2200),
             Figure("speed, with the reader", f"{self.seconds / self.wall_s:.0f} x real time", "", None),
