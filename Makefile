@@ -128,7 +128,7 @@ docs: $(READY) ## make the pages anew that come from the code
 	$(BIN)/python protocol/generate.py
 	$(TOOL) docs.generate
 
-fuzz: $(READY) ## fuzz the firmware's codec for a minute from its kept corpus, on from where the last minute stopped
+fuzz: $(READY) ## fuzz the firmware's codec for a minute from its kept corpus, then the whole portable firmware, on from where the last run stopped
 	@tools/apt.sh clang libclang-rt-dev
 	$(TOOL) reliability.fuzz.codec
 

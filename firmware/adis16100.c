@@ -20,7 +20,7 @@ static uint16_t exchange(enum chip chip, uint16_t command)
 	uint8_t high = spi_begin(chip, SPI_ADIS16100, (uint8_t)(command >> 8));
 	uint8_t low = spi_exchange((uint8_t)(command & 0xFFu));
 	spi_release();
-	return (uint16_t)((uint16_t)(high << 8) | low);
+	return (uint16_t)((uint16_t)high << 8 | low);
 }
 
 /* Counts of a reply; MSG_GYROS_INVALID when it names another channel. */

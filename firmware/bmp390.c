@@ -90,12 +90,12 @@ uint32_t bmp390_start(uint32_t now)
 
 static float u16(const uint8_t *bytes)
 {
-	return (float)(uint16_t)(bytes[0] | (uint16_t)(bytes[1] << 8));
+	return (float)(uint16_t)(bytes[0] | (uint16_t)bytes[1] << 8);
 }
 
 static float s16(const uint8_t *bytes)
 {
-	return (float)(int16_t)(uint16_t)(bytes[0] | (uint16_t)(bytes[1] << 8));
+	return (float)(int16_t)(uint16_t)(bytes[0] | (uint16_t)bytes[1] << 8);
 }
 
 static float s8(uint8_t byte)
@@ -165,7 +165,7 @@ static uint8_t measure(uint32_t now)
 
 static uint32_t raw_of(const uint8_t *bytes)
 {
-	return (uint32_t)bytes[2] << 16 | (uint16_t)(bytes[1] << 8 | bytes[0]);
+	return (uint32_t)bytes[2] << 16 | (uint16_t)((uint16_t)bytes[1] << 8 | bytes[0]);
 }
 
 static uint8_t sample(uint32_t now, struct pressure_step *out)

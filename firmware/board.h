@@ -8,6 +8,16 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+/* Constant tables of bytes stay in flash: `static const uint8_t table[] FLASH`, read by flash_byte. */
+#ifdef __AVR__
+#include <avr/pgmspace.h>
+#define FLASH PROGMEM
+#define flash_byte(address) pgm_read_byte(address)
+#else
+#define FLASH
+#define flash_byte(address) (*(address))
+#endif
+
 /* Time: 0.5 us ticks since the start, wrapping after 35.8 minutes. */
 #define TICKS_PER_MS UINT32_C(2000)
 #define TICKS_PER_S UINT32_C(2000000)
@@ -81,6 +91,7 @@ struct capture_pulse {
 	uint32_t rise, fall; /* ticks; fall is valid when the pulse is over */
 };
 bool capture_trigger(uint8_t side);   /* sends a trigger pulse (12 us); false: the line is high, or pulses without one */
+bool capture_pull_low(uint8_t side);  /* pulls the line low for 0.2 ms, against 1 kohm in Echo; true: it stays low */
 enum capture_state capture_take_pulse(uint8_t side, struct capture_pulse *out);
 void capture_end_pulse(uint8_t side); /* gives up waiting */
 
@@ -105,7 +116,10 @@ void restart_note_sag(bool sagging); /* whether the supply is far below its usua
 
 /* Power and start. */
 void board_start(void);                /* pins, clock, buses, USB, watchdog, interrupts */
+/* Longest turn of the main loop, between two sleeps, and longest time from a timer's event to its interrupt, in ticks, since the last call. */
+void board_take_timing(uint16_t *turn, uint16_t *latency);
 void board_sleep(uint32_t wake_ticks); /* until then, or until an interrupt needs the main loop; restarts the watchdog */
+void board_lamp(bool level);            /* the LED beside the USB plug: which level lights it depends on the board */
 uint16_t board_memory_used(void);      /* bytes: static RAM plus the deepest stack since the start */
 void board_bootloader(void);           /* resets the processor into the bootloader; does not return */
 

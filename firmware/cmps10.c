@@ -24,7 +24,7 @@ static void report(uint32_t ticks, uint16_t bearing)
 
 uint8_t cmps10_finish(const struct twi_transfer *transfer)
 {
-	uint16_t bearing = (uint16_t)((uint16_t)(transfer->bytes[0] << 8) | transfer->bytes[1]);
+	uint16_t bearing = (uint16_t)((uint16_t)transfer->bytes[0] << 8 | transfer->bytes[1]);
 	if (bearing > BEARING_MAX) {
 		cmps10_send_none(transfer->ticks);
 		return FAULT_BAD_VALUE;

@@ -39,6 +39,6 @@ int16_t frame_decode(uint8_t *bytes, uint8_t length)
 	if (decoded < FRAME_OVERHEAD)
 		return -1;
 	uint8_t covered = (uint8_t)(decoded - 2u);
-	uint16_t crc = (uint16_t)(bytes[covered] | (uint16_t)(bytes[covered + 1u] << 8));
+	uint16_t crc = (uint16_t)(bytes[covered] | (uint16_t)bytes[covered + 1u] << 8);
 	return crc == frame_crc(bytes, covered) ? (int16_t)(decoded - FRAME_OVERHEAD) : (int16_t)-1;
 }

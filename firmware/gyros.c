@@ -15,15 +15,21 @@
 #define MISSES_MAX 40u                      /* samples in a row without a value after which the part is sought again: 0.2 s */
 #define TEMPERATURE_STEP_MAX 8              /* counts, 1.2 degC: between two readings one after the other, assumed */
 
-static const struct {
-	enum chip chip;
-	enum device device;
-	uint8_t sensor;
-} devices[GYROS] = {
-	[GYRO_THIGH] = { CHIP_THIGH, DEVICE_THIGH, SENSORS_THIGH },
-	[GYRO_CALF] = { CHIP_CALF, DEVICE_CALF, SENSORS_CALF },
-	[GYRO_BELT] = { CHIP_BELT, DEVICE_BELT, SENSORS_BELT },
-};
+/* Of a gyro; the enums of chips, devices and sensors' bits have the three in the same order. */
+static enum chip chip_of(uint8_t gyro)
+{
+	return (enum chip)(CHIP_THIGH + gyro);
+}
+
+static enum device device_of(uint8_t gyro)
+{
+	return (enum device)(DEVICE_THIGH + gyro);
+}
+
+static bool is_read(uint8_t gyro)
+{
+	return configuration_reads((uint8_t)(SENSORS_THIGH << gyro));
+}
 
 static struct {
 	enum { UNKNOWN, ADIS16100, LSM6DSO } kind; /* the part that has proven itself */
@@ -64,19 +70,19 @@ static bool is_adis16100(enum chip chip, uint8_t *fault)
 /* Seeks a part. Those with an identity come first, since frames for an ADIS16100 write to their registers. */
 static void seek(uint8_t gyro)
 {
-	enum chip chip = devices[gyro].chip;
+	enum chip chip = chip_of(gyro);
 	gyros[gyro].misses = 0;
 	gyros[gyro].kind = UNKNOWN;
 	gyros[gyro].fault = FAULT_NO_ANSWER;
 	if (lsm6dso_answers(chip)) {
 		gyros[gyro].kind = LSM6DSO;
-		parts_found((uint8_t)devices[gyro].device, PART_LSM6DSO, LSM6DSO_IDENTITY);
+		parts_found((uint8_t)device_of(gyro), PART_LSM6DSO, LSM6DSO_IDENTITY);
 		lsm6dso_start(chip);
 		warming = WARM_UP_SAMPLES;
 	} else if (!icm20649_answers(chip) && is_adis16100(chip, &gyros[gyro].fault)) {
 		gyros[gyro].kind = ADIS16100;
-		parts_found((uint8_t)devices[gyro].device, PART_ADIS16100, 0);
-	} else if (parts_in((uint8_t)devices[gyro].device) != PART_ADIS16100) {
+		parts_found((uint8_t)device_of(gyro), PART_ADIS16100, 0);
+	} else if (parts_in((uint8_t)device_of(gyro)) != PART_ADIS16100) {
 		gyros[gyro].fault = FAULT_NO_ANSWER; /* what was read is an idle line's */
 	}
 }
@@ -88,7 +94,7 @@ static void prepare(void)
 		if (gyros[k].misses >= MISSES_MAX)
 			seek(k);
 		if (gyros[k].kind == ADIS16100)
-			adis16100_convert(devices[k].chip);
+			adis16100_convert(chip_of(k));
 	}
 }
 
@@ -96,10 +102,10 @@ static void note(uint8_t gyro, uint8_t fault)
 {
 	if (fault == FAULT_NONE) {
 		gyros[gyro].misses = 0;
-		status_ok(devices[gyro].device);
+		status_ok(device_of(gyro));
 	} else {
 		gyros[gyro].misses++;
-		status_failed(devices[gyro].device, fault);
+		status_failed(device_of(gyro), fault);
 	}
 }
 
@@ -120,7 +126,7 @@ static void set_axes(uint8_t gyro, const int16_t *values)
 static int16_t read_six_axes(uint8_t gyro)
 {
 	struct lsm6dso_sample s;
-	uint8_t fault = lsm6dso_read(devices[gyro].chip, &s);
+	uint8_t fault = lsm6dso_read(chip_of(gyro), &s);
 	if (fault == FAULT_NEVER_READY && ++gyros[gyro].misses < MISSES_MAX)
 		return MSG_GYROS_INVALID;
 	note(gyro, fault);
@@ -135,14 +141,14 @@ static int16_t rate(uint8_t gyro)
 {
 	uint8_t fault;
 	set_axes(gyro, 0);
-	if (!configuration_reads(devices[gyro].sensor))
+	if (!is_read(gyro))
 		return MSG_GYROS_INVALID;
 	if (gyros[gyro].kind == LSM6DSO)
 		return read_six_axes(gyro);
 	int16_t counts = MSG_GYROS_INVALID;
 	fault = gyros[gyro].fault;
 	if (gyros[gyro].kind == ADIS16100)
-		counts = adis16100_rate(devices[gyro].chip, &fault);
+		counts = adis16100_rate(chip_of(gyro), &fault);
 	note(gyro, fault);
 	return counts;
 }
@@ -171,7 +177,7 @@ static void excite(void)
 	spi_excite_gyros(excitation);
 	for (uint8_t k = 0; k < GYROS; k++)
 		if (gyros[k].kind == LSM6DSO)
-			lsm6dso_excite(devices[k].chip, excitation);
+			lsm6dso_excite(chip_of(k), excitation);
 }
 
 static void sample(void)
@@ -203,7 +209,7 @@ static int16_t temperature(uint8_t gyro)
 		return MSG_GYRO_HEALTH_INVALID;
 	if (gyros[gyro].kind == LSM6DSO)
 		return (int16_t)((int32_t)gyros[gyro].warmth * 55 / 2048);
-	int16_t counts = adis16100_temperature(devices[gyro].chip, &fault);
+	int16_t counts = adis16100_temperature(chip_of(gyro), &fault);
 	note(gyro, fault);
 	if (fault != FAULT_NONE)
 		gyros[gyro].misses = MISSES_MAX; /* its rates may be those of a line that is held low: it must prove itself again */
@@ -213,14 +219,14 @@ static int16_t temperature(uint8_t gyro)
 /* A sample has no checksum: wrong bits show where the content is known. */
 static void check_bits(uint8_t gyro)
 {
-	if (gyros[gyro].kind == LSM6DSO && !gyros[gyro].misses && !lsm6dso_answers(devices[gyro].chip))
-		status_failed(devices[gyro].device, FAULT_BAD_VALUE);
+	if (gyros[gyro].kind == LSM6DSO && !gyros[gyro].misses && !lsm6dso_answers(chip_of(gyro)))
+		status_failed(device_of(gyro), FAULT_BAD_VALUE);
 }
 
 static void report_health(void)
 {
 	for (uint8_t k = 0; k < GYROS; k++) {
-		if (!configuration_reads(devices[k].sensor))
+		if (!is_read(k))
 			continue;
 		check_bits(k);
 		const struct selftest_result *test = selftest_result(k);

@@ -60,7 +60,7 @@ void icm20649_reset(enum chip chip)
 
 void icm20649_start(enum chip chip)
 {
-	static const uint8_t settings[][2] = {
+	static const uint8_t settings[][2] FLASH = {
 		{ REGISTER_PWR_MGMT_1, BEST_CLOCK },
 		{ REGISTER_USER_CTRL, SPI_ONLY },
 		{ REGISTER_BANK_SEL, BANK_2 },
@@ -72,13 +72,13 @@ void icm20649_start(enum chip chip)
 		{ REGISTER_INT_ENABLE_1, RAW_DATA_READY },
 	};
 	for (uint8_t n = 0; n < sizeof settings / sizeof *settings; n++)
-		spi_write(chip, SPI_MODE3, settings[n][0], settings[n][1]);
+		spi_write(chip, SPI_MODE3, flash_byte(&settings[n][0]), flash_byte(&settings[n][1]));
 }
 
 static int16_t read_word(void)
 {
 	uint8_t high = spi_exchange(0), low = spi_exchange(0);
-	return (int16_t)(uint16_t)((uint16_t)(high << 8) | low);
+	return (int16_t)(uint16_t)((uint16_t)high << 8 | low);
 }
 
 uint8_t icm20649_read(enum chip chip, struct icm20649_sample *out)

@@ -22,19 +22,17 @@
 
 void lis3mdl_prepare(struct twi_transfer *transfer, enum lis3mdl_step step, bool second)
 {
-	static const struct {
-		uint8_t write_length, read_length, bytes[4];
-	} steps[] = {
-		[LIS3MDL_IDENTITY] = { 1, 1, { REGISTER_WHO_AM_I } },
-		[LIS3MDL_SETTINGS] = { 4, 0, { COUNT_UP | REGISTER_CTRL_REG1, CTRL_REG1_FINEST_80_HZ, CTRL_REG2_4_GAUSS, CTRL_REG3_CONTINUOUS } },
-		[LIS3MDL_MORE_SETTINGS] = { 3, 0, { COUNT_UP | REGISTER_CTRL_REG4, CTRL_REG4_FINEST_Z, CTRL_REG5_WHOLE_SAMPLES } },
-		[LIS3MDL_SAMPLE] = { 1, SAMPLE_LENGTH, { COUNT_UP | REGISTER_STATUS } },
+	static const uint8_t steps[][6] FLASH = { /* bytes to write, bytes to read, the bytes */
+		[LIS3MDL_IDENTITY] = { 1, 1, REGISTER_WHO_AM_I },
+		[LIS3MDL_SETTINGS] = { 4, 0, COUNT_UP | REGISTER_CTRL_REG1, CTRL_REG1_FINEST_80_HZ, CTRL_REG2_4_GAUSS, CTRL_REG3_CONTINUOUS },
+		[LIS3MDL_MORE_SETTINGS] = { 3, 0, COUNT_UP | REGISTER_CTRL_REG4, CTRL_REG4_FINEST_Z, CTRL_REG5_WHOLE_SAMPLES },
+		[LIS3MDL_SAMPLE] = { 1, SAMPLE_LENGTH, COUNT_UP | REGISTER_STATUS },
 	};
 	transfer->address = second ? ADDRESS_HIGH : ADDRESS_LOW;
-	transfer->write_length = steps[step].write_length;
-	transfer->read_length = steps[step].read_length;
-	for (uint8_t n = 0; n < sizeof steps[step].bytes; n++)
-		transfer->bytes[n] = steps[step].bytes[n];
+	transfer->write_length = flash_byte(&steps[step][0]);
+	transfer->read_length = flash_byte(&steps[step][1]);
+	for (uint8_t n = 2; n < sizeof steps[step]; n++)
+		transfer->bytes[n - 2] = flash_byte(&steps[step][n]);
 }
 
 bool lis3mdl_answers(const struct twi_transfer *transfer)
@@ -48,7 +46,7 @@ bool lis3mdl_answers(const struct twi_transfer *transfer)
 
 static int16_t word(const uint8_t *bytes)
 {
-	return (int16_t)(uint16_t)((uint16_t)(bytes[1] << 8) | bytes[0]);
+	return (int16_t)(uint16_t)((uint16_t)bytes[1] << 8 | bytes[0]);
 }
 
 uint8_t lis3mdl_finish(const struct twi_transfer *transfer)

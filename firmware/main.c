@@ -67,6 +67,13 @@ static void send_board_health(void)
 	link_send(MSG_BOARD_HEALTH, msg_pack_board_health(link_body(), &m));
 }
 
+static void send_loop(void)
+{
+	struct msg_loop m = { .ticks = clock_now(), .ranging_cycle = (uint16_t)(ranger_cycle() / 8u) };
+	board_take_timing(&m.longest_turn, &m.longest_latency);
+	link_send(MSG_LOOP, msg_pack_loop(link_body(), &m));
+}
+
 /* The optional messages that come once a second. */
 static void send_subscribed_reports(void)
 {
@@ -78,6 +85,8 @@ static void send_subscribed_reports(void)
 		foot_send_health();
 	if (link_wants(REPORTS_ELECTRICAL))
 		electrical_send();
+	if (link_wants(REPORTS_LOOP))
+		send_loop();
 }
 
 static void send_identity_and_configuration(void)
@@ -234,6 +243,14 @@ static uint32_t run_sensors(void)
 	return earlier(wake, send_each_second(now));
 }
 
+/* The lamp changes every 0.52 s, every 0.07 s while a part that is to be read has not answered. */
+static void beat(void)
+{
+	uint8_t wanted = configuration.sensors & (uint8_t)~SENSORS_SYNC;
+	bool well = (status.healthy & wanted) == wanted;
+	board_lamp((clock_now() >> (well ? 20 : 17)) & 1u);
+}
+
 /* A restart that was not wanted happens during a walk: no self-test then. */
 static bool was_started_on_purpose(void)
 {
@@ -256,6 +273,7 @@ int main(void)
 		receive_commands();
 		take_edge();
 		uint32_t wake = run_sensors();
+		beat();
 		restart_enter(CRASH_PLACE_USB);
 		usb_run(); /* the messages just made */
 		restart_enter(CRASH_PLACE_SLEEP);

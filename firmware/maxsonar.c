@@ -50,7 +50,7 @@ static enum ranging_state fail(struct ranging *r, uint8_t fault)
 
 static enum ranging_state finish(uint8_t side, struct ranging *r)
 {
-	uint16_t range_cm = (uint16_t)((uint16_t)(r->transfer.bytes[0] << 8) | r->transfer.bytes[1]);
+	uint16_t range_cm = (uint16_t)((uint16_t)r->transfer.bytes[0] << 8 | r->transfer.bytes[1]);
 	if (range_cm > RANGE_MAX_CM)
 		return fail(r, FAULT_BAD_VALUE);
 	r->time_of_flight_us = range_cm == RANGE_MAX_CM ? 0 : (uint16_t)(range_cm * US_PER_CM);

@@ -20,7 +20,7 @@ static uint8_t *put32(uint8_t *out, uint32_t v)
 
 static uint16_t get16(const uint8_t *in)
 {
-	return (uint16_t)(in[0] | (uint16_t)(in[1] << 8));
+	return (uint16_t)(in[0] | (uint16_t)in[1] << 8);
 }
 
 uint8_t msg_pack_identity(uint8_t *out, const struct msg_identity *m)
@@ -252,6 +252,16 @@ uint8_t msg_pack_electrical(uint8_t *out, const struct msg_electrical *m)
 	end = put8(end, m->d13_ones);
 	end = put8(end, m->sda_ones);
 	end = put8(end, m->scl_ones);
+	return (uint8_t)(end - out);
+}
+
+uint8_t msg_pack_loop(uint8_t *out, const struct msg_loop *m)
+{
+	uint8_t *end = out;
+	end = put32(end, m->ticks);
+	end = put16(end, m->longest_turn);
+	end = put16(end, m->longest_latency);
+	end = put16(end, m->ranging_cycle);
 	return (uint8_t)(end - out);
 }
 

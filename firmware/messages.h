@@ -22,6 +22,7 @@
 #define MSG_MOTION_INVALID ((int16_t)-32768)
 #define MSG_MAGNETIC_INVALID ((int16_t)-32768)
 #define MSG_FOOT_HEALTH_TEMPERATURE_INVALID ((int16_t)-32768)
+#define MSG_LOOP_RANGING_CYCLE_INVALID ((uint16_t)0)
 
 enum {
 	MSG_IDENTITY = 0x01,
@@ -41,6 +42,7 @@ enum {
 	MSG_FOOT = 0x0F,
 	MSG_FOOT_HEALTH = 0x10,
 	MSG_ELECTRICAL = 0x11,
+	MSG_LOOP = 0x12,
 	MSG_IDENTIFY = 0x81,
 	MSG_CLOCK_QUERY = 0x82,
 	MSG_CONFIGURE = 0x83,
@@ -66,6 +68,7 @@ enum {
 	MSG_FOOT_SIZE = 18,
 	MSG_FOOT_HEALTH_SIZE = 12,
 	MSG_ELECTRICAL_SIZE = 10,
+	MSG_LOOP_SIZE = 10,
 	MSG_IDENTIFY_SIZE = 0,
 	MSG_CLOCK_QUERY_SIZE = 2,
 	MSG_CONFIGURE_SIZE = 5,
@@ -199,6 +202,7 @@ enum {
 	REPORTS_MAGNETIC = 8,
 	REPORTS_FOOT = 16,
 	REPORTS_ELECTRICAL = 32,
+	REPORTS_LOOP = 64,
 };
 
 /* Firmware version and schema. Sent when the port opens, when asked for, and once a second. Layout and CRC seed of this message
@@ -423,6 +427,15 @@ struct msg_electrical {
 	uint8_t scl_ones;
 };
 uint8_t msg_pack_electrical(uint8_t *out, const struct msg_electrical *m);
+
+/* Timing of the firmware itself, once a second, by firmware 1.7 and newer. */
+struct msg_loop {
+	uint32_t ticks; /* 0.5 us */
+	uint16_t longest_turn; /* 0.5 us */
+	uint16_t longest_latency; /* 0.5 us */
+	uint16_t ranging_cycle; /* 4 us, 0: invalid */
+};
+uint8_t msg_pack_loop(uint8_t *out, const struct msg_loop *m);
 
 /* Request for identity and configuration. Its CRC seed is the fixed one, as identity's. */
 /* identify has no fields. */

@@ -8,6 +8,7 @@
 #define ANSWER_MAX_TICKS (20u * TICKS_PER_MS)         /* from the trigger to the rising edge */
 #define ECHO_MAX_TICKS (53u * TICKS_PER_MS / 2u)      /* 4.5 m, out and back: a longer pulse is one without an echo */
 #define TICKS_PER_US 2u
+#define GHOST_MAX_US 700u /* 12 cm: many modules answer the ping after one without an echo with 4 to 9 cm [forum.arduino.cc 429576, 337199] */
 #define POLL_TICKS TICKS_PER_MS
 
 bool pulse_begin(uint8_t side, struct ranging *r)
@@ -16,10 +17,13 @@ bool pulse_begin(uint8_t side, struct ranging *r)
 	return capture_trigger(side);
 }
 
-/* A rising edge is an answer, whatever becomes of the pulse. */
+/* A rising edge is an answer, whatever becomes of the pulse. What really is so near is heard again by the next ping. */
 static enum ranging_state finish(uint8_t side, uint32_t length, struct ranging *r)
 {
-	r->time_of_flight_us = length > ECHO_MAX_TICKS ? 0 : (uint16_t)(length / TICKS_PER_US);
+	static bool silent[2];
+	uint16_t us = length > ECHO_MAX_TICKS ? 0 : (uint16_t)(length / TICKS_PER_US);
+	r->time_of_flight_us = silent[side] && us < GHOST_MAX_US ? 0 : us;
+	silent[side] = us == 0;
 	parts_found(side, PART_PULSE, 0);
 	return RANGING_DONE;
 }

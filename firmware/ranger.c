@@ -22,6 +22,7 @@
 #define CONCURRENT_HALF_TICKS (33u * TICKS_PER_MS)
 #define SEQUENTIAL_HALF_TICKS (70u * TICKS_PER_MS)
 #define SLOW_CONCURRENT_HALF_TICKS (50u * TICKS_PER_MS)
+#define CYCLE_MARGIN_TICKS (2u * TICKS_PER_MS) /* of the period over the measured cycle: half of the jitter */
 #define SLOW_SEQUENTIAL_HALF_TICKS (100u * TICKS_PER_MS)
 
 #define CONCURRENT_JITTER_MASK 0x1FFFu /* ticks: up to 4.1 ms */
@@ -44,16 +45,23 @@ static struct ranger {
 	struct ranging ranging;
 } rangers[2];
 
-static const uint8_t sensors[2] = { SENSORS_RANGER_LEFT, SENSORS_RANGER_RIGHT };
-
 static uint16_t lfsr;
 static bool slow; /* the grid is that of a MaxSonar */
+static uint32_t cycle; /* ticks: of the last rangings of SRF02, nearer to the longer ones */
 
 static uint32_t half_period(void)
 {
 	if (configuration.schedule == SCHEDULE_SEQUENTIAL)
 		return slow ? SLOW_SEQUENTIAL_HALF_TICKS : SEQUENTIAL_HALF_TICKS;
-	return slow ? SLOW_CONCURRENT_HALF_TICKS : CONCURRENT_HALF_TICKS;
+	uint32_t half = slow ? SLOW_CONCURRENT_HALF_TICKS : CONCURRENT_HALF_TICKS, measured = (cycle + CYCLE_MARGIN_TICKS) / 2u;
+	return measured > half ? measured : half;
+}
+
+/* The grid follows the slower ranger: a quarter of the way when its cycle is longer, a sixteenth when it is shorter. */
+static void follow_cycle(const struct ranger *r, uint32_t now)
+{
+	uint32_t measured = now - r->ranging.trigger;
+	cycle = r->kind != SRF02 ? 0 : measured > cycle ? cycle + (measured - cycle) / 4u : cycle - (cycle - measured) / 16u;
 }
 
 /* Pseudo-random delay in ticks, 0 when sequential; the same sequence after every start. With one shift per delay, each delay would be
@@ -74,7 +82,7 @@ static bool blocked_by_other(const struct ranger *r)
 
 static bool may_trigger(const struct ranger *r)
 {
-	return !r->pinging && configuration_reads(sensors[r->index]) && !blocked_by_other(r);
+	return !r->pinging && configuration_reads((uint8_t)(SENSORS_RANGER_LEFT << r->index)) && !blocked_by_other(r);
 }
 
 static enum kind first_kind(const struct ranger *r)
@@ -82,13 +90,23 @@ static enum kind first_kind(const struct ranger *r)
 	return r->kind == UNKNOWN ? MAXSONAR : r->kind;
 }
 
-/* Goes to the next slot. A ranger that is late by less than half a period triggers late; one that is later skips slots. The grid does
- * not move. */
+/* Moves the right ranger's slot to the middle between two of the left one's, which keep no such distance when the period changes. */
+static void keep_apart(struct ranger *r)
+{
+	int32_t half = (int32_t)half_period(), off = (int32_t)(r->slot - rangers[RANGER_LEFT].slot) % (2 * half) - half;
+	if (off < -half)
+		off += 2 * half;
+	if (r->index == RANGER_RIGHT && configuration_reads(SENSORS_RANGER_LEFT))
+		r->slot -= (uint32_t)off;
+}
+
+/* Goes to the next slot. A ranger that is late by less than half a period triggers late; one that is later skips slots. */
 static void schedule_next(struct ranger *r, uint32_t now)
 {
 	do
 		r->slot += 2u * half_period();
 	while (ticks_reached(now, r->slot + half_period()));
+	keep_apart(r);
 	r->due = r->slot + jitter();
 	r->tries = 0;
 	r->pinging = false;
@@ -120,6 +138,7 @@ static void succeed(struct ranger *r, uint32_t now)
 	uint16_t time_of_flight_us = r->ranging.time_of_flight_us;
 	r->kind = r->pinged;
 	r->misses = r->holds = 0;
+	follow_cycle(r, now);
 	if (other->kind > r->kind)
 		other->kind = UNKNOWN; /* its next answer is refused */
 	if (other->kind == r->kind)
@@ -166,12 +185,18 @@ static void fail_or_seek_on(struct ranger *r, uint32_t now)
 	r->due = now;
 }
 
-/* The echo line is high: held by a module that has heard no echo, pulled up because nothing is plugged in, or stuck. */
+/* The echo line is high: held by a module that has heard no echo, pulled up because nothing is plugged in, or stuck. A module without a
+ * timeout holds it for ever, unless it is pulled low. */
 static void hold(struct ranger *r, uint32_t now)
 {
 	if (r->kind == PULSE && r->holds < HOLDS_MAX) {
 		r->holds++;
 		r->due = now + HOLD_TICKS;
+		return;
+	}
+	if (parts_in(r->index) == PART_PULSE && capture_pull_low(r->index)) {
+		status_failed((enum device)r->index, FAULT_TOO_LATE);
+		r->holds = 0;
 		return;
 	}
 	miss(r, now, parts_in(r->index) == PART_PULSE ? FAULT_ALWAYS_READY : r->ranging.fault);
@@ -257,6 +282,11 @@ static void fit_grid(uint32_t now)
 		return;
 	slow = found;
 	ranger_start(now);
+}
+
+uint32_t ranger_cycle(void)
+{
+	return cycle;
 }
 
 static void plan_triggers(void)

@@ -2,7 +2,7 @@
 /* The two ultrasonic rangers: finds which kind is wired, triggers and reads them, one `ping` message per ranging cycle.
  * Owns the ping schedule. Both schedules share one grid: each ranger has one slot per period, the right ranger half a period after
  * the left one.
- *   concurrent: period 66 ms, plus a pseudo-random delay of up to 4.1 ms on every trigger. From ping to ping, an echo of the other
+ *   concurrent: period 66 ms, or of slower SRF02 2 ms more than their measured cycle, plus a pseudo-random delay of up to 4.1 ms on every trigger. From ping to ping, an echo of the other
  *               ranger's ping moves by a known amount; an own echo does not.
  *   sequential: period 140 ms, no delay, and a ranger waits until the other one has been read [Girard 2011, section 2].
  * With a MaxSonar the periods are 100 ms and 200 ms.
@@ -18,6 +18,9 @@ void ranger_start(uint32_t now);
 
 /* Triggers and reads what is due; returns the time of the next call, unless an interrupt comes earlier. */
 uint32_t ranger_run(uint32_t now);
+
+/* Measured cycle of SRF02 in ticks, which the schedule follows; 0: of none. */
+uint32_t ranger_cycle(void);
 
 /* For the drivers. A side is RANGER_LEFT or RANGER_RIGHT, which are also its `enum device`. */
 enum ranging_state {

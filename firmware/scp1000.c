@@ -48,7 +48,7 @@ static uint16_t read16(uint8_t address)
 	(void)spi_begin(CHIP_PRESSURE, SPI_SCP1000, (uint8_t)(address << 2));
 	uint8_t high = spi_exchange(0), low = spi_exchange(0);
 	spi_release();
-	return (uint16_t)((uint16_t)(high << 8) | low);
+	return (uint16_t)((uint16_t)high << 8 | low);
 }
 
 static void write8(uint8_t address, uint8_t value)

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: MIT
 """Flash, static RAM and an upper bound of the stack of the firmware, each against its limit.
 
-Also where the memory lies that survives a reset (.noinit): the bootloader must not write there.
-In: the ELF, and the compiler's stack usage files (-fstack-usage) in the same folder. Out: a table; exit status 1 when a
-limit is exceeded. The bound comes from the call graph of the disassembly: the deepest chain of calls from main plus the
-deepest interrupt (interrupts do not nest). A switch may jump through a table, whose entries must lie in its function; any
-other computed jump is an error. Owns nothing.
+Also where the memory lies that survives a reset: the bootloader must not write there.
+In: the ELF. Out: a table; exit status 1 when a limit is exceeded. The bound comes from the disassembly, so that it holds
+however the compiler inlines: the deepest chain of calls from main plus the deepest interrupt (interrupts do not nest), and
+of each function all that it pushes, and its frame. A computed jump is an error, and so is a stack pointer that is set in
+any other way. Owns nothing.
 """
 
 from __future__ import annotations
@@ -17,22 +17,16 @@ import sys
 from pathlib import Path
 
 FUNCTION = re.compile(r"^([0-9a-f]+) <([A-Za-z_][\w.]*)>:\n", re.MULTILINE)
-INSTRUCTION = re.compile(r"^ +([0-9a-f]+):\t((?:[0-9a-f]{2} )+)(.*)$", re.MULTILINE)
+INSTRUCTION = re.compile(r"^ +[0-9a-f]+:\t(?:[0-9a-f]{2} )+(.*)$", re.MULTILINE)
 CALL = re.compile(r"r?(?:call|jmp) (?:.*; )?0x([0-9a-f]+)")
-TARGET = re.compile(r"(?:; |jmp )0x([0-9a-f]+)")
-TABLE_JUMP = "__tablejump2__"  # of libgcc: jumps to where the word at word address Z of the flash says
-COMPUTED = re.compile(rf" (?:e?icall|e?ijmp)\b|<{TABLE_JUMP}>")
-SWITCH = re.compile(  # Z = the word address of a table + an index below its length
-    r"^(?P<first>\w+) cpi (?:r30|(?P<index>r\d+)), 0x(?P<length>\w+).*\n(?P<wide>\w+ cpc r\d+, r1\n)?"
-    r"(?:\w+ brcc .*|\w+ brcs \.\+[24] .*\n\w+ r?jmp .*)\n"
-    r"(?(index)\w+ mov(?(wide)w) r30, (?P=index)\n)(?(wide)|\w+ ldi r31, 0x00.*\n)"
-    r"\w+ subi r30, 0x(?P<low>\w+).*\n"
-    r"\w+ sbci r31, 0x(?P<high>\w+).*\n"
-    rf"(?P<last>\w+) r?jmp .*<{TABLE_JUMP}>$",
-    re.MULTILINE,
+COMPUTED = re.compile(r"^(?:e?icall|e?ijmp)\b|<__tablejump2__>$", re.MULTILINE)
+FRAME = re.compile(  # in r28, SPL; in r29, SPH; then r29:r28 less its size; or a call of the next instruction, or both
+    r"in r28, 0x3d.*\nin r29, 0x3e.*\n(?:sbiw r28, 0x(\w+)|subi r28, 0x(\w+).*\n(?:sbci r29, 0x(\w+))?)?"
 )
+RESERVE = re.compile(r"^rcall \.\+0\b", re.MULTILINE)  # calls the next instruction, for its two bytes
 INTERRUPT = re.compile(r"__vector_\d+$")
 RETURN_ADDRESS = 2  # bytes on the stack
+START_UP = ("__ctors_end", "__init", "__dtors_end")  # of avr-libc: sets the stack pointer to the end of the memory
 BOOTLOADER_WRITES = (0x0300, 0x0800)  # Caterina's variables end below the first address, its key is at the second
 DATA_SPACE = 0x800000  # of the ELF
 
@@ -46,62 +40,42 @@ def plain(name: str) -> str:
     return name.partition(".")[0]
 
 
-def frames(folder: Path) -> dict[str, int]:
-    """Function name -> stack bytes, return address included; the largest if several functions or parts have this name."""
-    found: dict[str, int] = {}
-    for path in folder.rglob("*.su"):
-        for line in path.read_text().splitlines():
-            location, size, _ = line.split("\t")
-            name = plain(location.rsplit(":", 1)[1])
-            found[name] = max(found.get(name, 0), int(size))
-    return found
-
-
-def stays_inside(code: dict[int, str], flash: dict[int, int]) -> bool:
-    """Whether a function's computed jumps lead back into it: each is a SWITCH whose table holds addresses of its instructions."""
-    text = "\n".join(f"{at:x} {instruction}" for at, instruction in code.items())
-    rest = SWITCH.sub("", text)
-    entered = {int(to, 16) for to in TARGET.findall(rest)}
-    for switch in SWITCH.finditer(text):
-        first, length, low, high, last = (int(x, 16) for x in switch.group("first", "length", "low", "high", "last"))
-        table = 2 * (-(high << 8 | low) & 0xFFFF)
-        entries = range(table, table + 2 * length, 2)
-        targets = {2 * (flash.get(at, 0) | flash.get(at + 1, 0) << 8) for at in entries}
-        if not targets <= code.keys() or any(first < at <= last for at in entered):
-            return False
-    return not COMPUTED.search(rest)
+def stack_bytes(name: str, body: str) -> int:
+    """What a function itself takes of the stack: return address, pushes on all its ways together, frame."""
+    pushed = len(re.findall(r"^push ", body, re.MULTILINE)) + RETURN_ADDRESS * len(RESERVE.findall(body))
+    frames = FRAME.findall(body)
+    sizes = [int(word or low or "0", 16) + (int(high or "0", 16) << 8) for word, low, high in frames]
+    if len(re.findall(r"^out 0x3d, ", body, re.MULTILINE)) > 2 * len(frames) and name not in START_UP:
+        raise SystemExit(f"{name} sets the stack pointer: its stack cannot be bounded")
+    return RETURN_ADDRESS + pushed + sum(sizes)
 
 
 def call_graph(listing: str) -> tuple[dict[int, str], dict[int, set[int]], dict[int, int]]:
-    """From a disassembly, per function address: its name, the addresses that it calls or jumps to, the bytes that it pushes."""
+    """From a disassembly, per function address: its name, the addresses that it calls or jumps to, its stack."""
     names: dict[int, str] = {}
     calls: dict[int, set[int]] = {}
-    pushed: dict[int, int] = {}
-    lines = INSTRUCTION.findall(listing)
-    flash = {int(at, 16) + k: byte for at, raw, _ in lines for k, byte in enumerate(bytes.fromhex(raw))}
+    stacks: dict[int, int] = {}
     parts = FUNCTION.split(listing)[1:]
     for address, name, body in zip(parts[::3], parts[1::3], parts[2::3], strict=True):
-        code = {int(at, 16): " ".join(text.split()) for at, _, text in INSTRUCTION.findall(body)}
-        if name != TABLE_JUMP and not stays_inside(code, flash):
+        code = [" ".join(text.split()) for text in INSTRUCTION.findall(body)]
+        if COMPUTED.search("\n".join(code)):
             raise SystemExit(f"{name} jumps to a computed address: its stack cannot be bounded")
         here = int(address, 16)
         names[here] = plain(name)
-        calls[here] = {int(match[1], 16) for match in map(CALL.match, code.values()) if match}
-        pushed[here] = sum(instruction.startswith("push ") for instruction in code.values())
-    return names, calls, pushed
+        calls[here] = {int(match[1], 16) for match in map(CALL.match, code) if match}
+        stacks[here] = stack_bytes(name, "\n".join(code))
+    return names, calls, stacks
 
 
 def deepest(elf: Path) -> int:
     """Stack bytes of the deepest chain of calls from main plus the deepest interrupt; a recursion is an error."""
-    names, calls, pushed = call_graph(output_of("avr-objdump", "-d", str(elf)))
-    known = frames(elf.parent)
+    names, calls, stacks = call_graph(output_of("avr-objdump", "-d", str(elf)))
 
     def depth(address: int, callers: tuple[int, ...]) -> int:
         if address in callers:
             raise SystemExit(f"{elf}: {names[address]} calls itself: its stack cannot be bounded")
-        own = known.get(names[address], RETURN_ADDRESS + pushed[address])
         inner = (depth(to, (*callers, address)) for to in calls[address] if to in names and to != address)
-        return own + max(inner, default=0)
+        return stacks[address] + max(inner, default=0)
 
     main = next(address for address, name in names.items() if name == "main")
     interrupts = (depth(address, ()) for address, name in names.items() if INTERRUPT.match(name))
@@ -109,10 +83,10 @@ def deepest(elf: Path) -> int:
 
 
 def kept_memory(elf: Path) -> tuple[int, int]:
-    """First address of .noinit, and the address behind it."""
-    fields = next(f for f in map(str.split, output_of("avr-size", "-A", str(elf)).splitlines()) if f[:1] == [".noinit"])
-    begin = int(fields[2]) - DATA_SPACE
-    return begin, begin + int(fields[1])
+    """First address of the variable that survives a reset, and the address behind it."""
+    fields = next(f for f in map(str.split, output_of("avr-nm", "-S", str(elf)).splitlines()) if plain(f[-1]) == "kept")
+    begin = int(fields[0], 16) - DATA_SPACE
+    return begin, begin + int(fields[1], 16)
 
 
 def main() -> int:

@@ -4,7 +4,8 @@
 #include "bus.h"   /* it is kept free for triggers */
 #include "parts.h" /* what was found */
 
-/* [Devantech, SRF02 technical specification] An SRF02 does not answer while it is ranging: at most 65 ms, in practice about 61 ms. */
+/* [Devantech, SRF02 technical specification] An SRF02 does not answer while it is ranging: up to 65 ms, in practice about 61 ms; it
+ * listens longer than to its farthest range. */
 #define ADDRESS_LEFT 0x70u
 #define COMMAND_RANGE_US 0x52u
 #define REGISTER_COMMAND 0u
@@ -12,7 +13,8 @@
 #define UNUSED 0x80u /* content of register 1 [SRF02 technical specification] */
 #define REVISION_BUSY 0xFFu /* some SRF02 answer this while ranging, instead of not answering */
 #define RANGING_MIN_TICKS (60u * TICKS_PER_MS) /* first request for the result */
-#define RANGING_MAX_TICKS (72u * TICKS_PER_MS) /* last request: 65 ms with a margin */
+#define RANGING_MAX_TICKS (90u * TICKS_PER_MS) /* last request: up to 65 ms, and 70 "is a better value" [Devantech's forum, t=269], with a margin */
+#define FARTHEST_US 35500u /* 600 cm [technical specification]: what comes later is another ping's */
 #define POLL_TICKS (TICKS_PER_MS / 2u)         /* between requests */
 
 enum stage { TRIGGERING, RANGING, READING };
@@ -59,7 +61,8 @@ static enum ranging_state finish(uint8_t side, struct ranging *r)
 {
 	if (r->transfer.bytes[1] != UNUSED)
 		return RANGING_REFUSED;
-	r->time_of_flight_us = (uint16_t)((uint16_t)(r->transfer.bytes[2] << 8) | r->transfer.bytes[3]);
+	uint16_t us = (uint16_t)((uint16_t)r->transfer.bytes[2] << 8 | r->transfer.bytes[3]);
+	r->time_of_flight_us = us > FARTHEST_US ? 0 : us;
 	parts_found(side, PART_SRF02, r->transfer.bytes[0]);
 	return RANGING_DONE;
 }

@@ -1,19 +1,28 @@
 /* SPDX-License-Identifier: MIT */
 #include "status.h"
+#include <stddef.h> /* offsetof */
+#include "board.h"  /* tables in flash */
 
 struct msg_status status;
 
-static const struct {
-	uint16_t *errors;
-	uint8_t *fault;
-} counters[] = {
-	[DEVICE_RANGER_LEFT] = { &status.errors_ranger_left, &status.fault_ranger_left },
-	[DEVICE_RANGER_RIGHT] = { &status.errors_ranger_right, &status.fault_ranger_right },
-	[DEVICE_COMPASS] = { &status.errors_compass, &status.fault_compass },
-	[DEVICE_THIGH] = { &status.errors_thigh, &status.fault_thigh },
-	[DEVICE_CALF] = { &status.errors_calf, &status.fault_calf },
-	[DEVICE_BELT] = { &status.errors_belt, &status.fault_belt },
-	[DEVICE_PRESSURE] = { &status.errors_pressure, &status.fault_pressure },
+/* Where its fields are in `status`. */
+static const uint8_t errors_at[] FLASH = {
+	[DEVICE_RANGER_LEFT] = offsetof(struct msg_status, errors_ranger_left),
+	[DEVICE_RANGER_RIGHT] = offsetof(struct msg_status, errors_ranger_right),
+	[DEVICE_COMPASS] = offsetof(struct msg_status, errors_compass),
+	[DEVICE_THIGH] = offsetof(struct msg_status, errors_thigh),
+	[DEVICE_CALF] = offsetof(struct msg_status, errors_calf),
+	[DEVICE_BELT] = offsetof(struct msg_status, errors_belt),
+	[DEVICE_PRESSURE] = offsetof(struct msg_status, errors_pressure),
+};
+static const uint8_t fault_at[] FLASH = {
+	[DEVICE_RANGER_LEFT] = offsetof(struct msg_status, fault_ranger_left),
+	[DEVICE_RANGER_RIGHT] = offsetof(struct msg_status, fault_ranger_right),
+	[DEVICE_COMPASS] = offsetof(struct msg_status, fault_compass),
+	[DEVICE_THIGH] = offsetof(struct msg_status, fault_thigh),
+	[DEVICE_CALF] = offsetof(struct msg_status, fault_calf),
+	[DEVICE_BELT] = offsetof(struct msg_status, fault_belt),
+	[DEVICE_PRESSURE] = offsetof(struct msg_status, fault_pressure),
 };
 
 void status_ok(enum device device)
@@ -24,6 +33,7 @@ void status_ok(enum device device)
 void status_failed(enum device device, uint8_t fault)
 {
 	status.healthy = (uint8_t)(status.healthy & ~(1u << device));
-	++*counters[device].errors;
-	*counters[device].fault = fault;
+	uint8_t *fields = (uint8_t *)&status;
+	++*(uint16_t *)(void *)(fields + flash_byte(&errors_at[device]));
+	fields[flash_byte(&fault_at[device])] = fault;
 }

@@ -54,9 +54,36 @@ void board_start(void)
 	sei();
 }
 
+/* PB0, the RX LED, is an output for SPI's sake. */
+void board_lamp(bool level)
+{
+	if (level)
+		PORTB |= BIT(PB0);
+	else
+		PORTB &= (uint8_t)~BIT(PB0);
+}
+
+static uint32_t woke;         /* when the turn of the main loop began */
+static uint16_t longest_turn; /* ticks */
+
+static void note_turn(void)
+{
+	uint32_t turn = clock_now() - woke;
+	if (turn > longest_turn)
+		longest_turn = turn < UINT16_MAX ? (uint16_t)turn : UINT16_MAX;
+}
+
+void board_take_timing(uint16_t *turn, uint16_t *latency)
+{
+	*turn = longest_turn;
+	*latency = clock_take_latency();
+	longest_turn = 0;
+}
+
 void board_sleep(uint32_t wake_ticks)
 {
 	wdt_reset();
+	note_turn();
 	cli();
 	clock_alarm(wake_ticks);
 	while (!board_awake && !ticks_reached(clock_now() + ALARM_MARGIN_TICKS, wake_ticks)) {
@@ -68,6 +95,7 @@ void board_sleep(uint32_t wake_ticks)
 	}
 	board_awake = false;
 	sei();
+	woke = clock_now();
 }
 
 /* Searches downwards from the deepest byte known so far, until UNTOUCHED_MAX painted bytes follow each other. A search of the whole memory

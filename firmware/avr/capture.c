@@ -13,6 +13,7 @@
 #define LEFT 0u
 #define RIGHT 1u
 #define TRIGGER_US 12 /* at least 10 [HC-SR04 user guide] */
+#define PULL_US 200
 #define TRIGGER_LEFT BIT(PF5)
 #define TRIGGER_RIGHT BIT(PF4)
 #define LINE_LEFT BIT(PD4)
@@ -92,6 +93,20 @@ bool capture_trigger(uint8_t side)
 	_delay_us(TRIGGER_US);
 	PORTF &= (uint8_t)~trigger;
 	return true;
+}
+
+/* Never drives high: the pull-up goes off before, and on after it. */
+bool capture_pull_low(uint8_t side)
+{
+	volatile uint8_t *port = side == LEFT ? &PORTD : &PORTC, *direction = side == LEFT ? &DDRD : &DDRC;
+	uint8_t line = side == LEFT ? LINE_LEFT : LINE_RIGHT;
+	*port &= (uint8_t)~line;
+	*direction |= line;
+	_delay_us(PULL_US);
+	*direction &= (uint8_t)~line;
+	*port |= line;
+	_delay_us(TRIGGER_US);
+	return !line_is_taken(side);
 }
 
 enum capture_state capture_take_pulse(uint8_t side, struct capture_pulse *out)

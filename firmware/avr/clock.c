@@ -9,6 +9,7 @@
 #define CLOCK_START 0ul /* ticks; tests start the clock near its wraps */
 #endif
 
+static volatile uint16_t latency; /* longest */
 static volatile uint16_t overflows = (uint16_t)(CLOCK_START >> 16);
 
 void clock_start(void)
@@ -51,8 +52,23 @@ void clock_alarm(uint32_t ticks)
 	OCR1A = (uint16_t)ticks;
 }
 
+uint16_t clock_take_latency(void)
+{
+	uint16_t taken;
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+	{
+		taken = latency;
+		latency = 0;
+	}
+	return taken;
+}
+
+/* The timer was at zero when it overflowed. */
 ISR(TIMER1_OVF_vect)
 {
+	uint16_t late = TCNT1;
+	if (late > latency)
+		latency = late;
 	overflows++;
 }
 

@@ -13,6 +13,7 @@ extern volatile bool board_awake; /* set by an interrupt that needs the main loo
 
 void clock_start(void);
 void clock_alarm(uint32_t ticks); /* an interrupt at that time, which must be less than 32 ms away; call with interrupts off */
+uint16_t clock_take_latency(void);         /* longest of an interrupt since the last call, ticks */
 uint32_t clock_at(uint16_t timer);         /* the time at which Timer1 had this value, less than 32 ms ago; call with interrupts off */
 void capture_start(void);
 void twi_start(void);

@@ -19,9 +19,7 @@
 #define GYRO_MODE (BIT(CPOL) | BIT(SPR0)) /* mode 2; with SPI2X 16 MHz / 8 = 2 MHz */
 #define EXCHANGE_TRIES 255u                        /* more than 1000 cycles; a byte takes at most 512 */
 
-static const struct {
-	uint8_t control, status; /* SPCR, SPSR */
-} protocols[] = {
+static const uint8_t protocols[][2] FLASH = { /* SPCR, SPSR */
 	[SPI_ADIS16100] = { MASTER | GYRO_MODE, BIT(SPI2X) },
 	[SPI_SCP1000] = { MASTER | BIT(SPR1), 0 }, /* mode 0; 16 MHz / 64 = 250 kHz */
 	[SPI_MODE3] = { MASTER | BIT(CPOL) | BIT(CPHA) | BIT(SPR0), 0 },
@@ -38,8 +36,8 @@ void spi_start(void)
 
 uint8_t spi_begin(enum chip chip, enum spi_protocol protocol, uint8_t first_byte)
 {
-	SPCR = protocols[protocol].control;
-	SPSR = protocols[protocol].status;
+	SPCR = flash_byte(&protocols[protocol][0]);
+	SPSR = flash_byte(&protocols[protocol][1]);
 	if (chip == CHIP_PRESSURE)
 		PORTD &= (uint8_t)~PRESSURE_SELECT;
 	else

@@ -26,7 +26,7 @@
 
 static volatile bool bus_was_reset, suspended;
 static uint8_t suspends;
-static uint8_t ring[RING_SIZE]; /* send buffer; empty when head == tail */
+static uint8_t ring[RING_SIZE] __attribute__((section(".noinit.ring"))); /* send buffer; empty when head == tail; above restart.c's memory */
 static uint16_t head, tail;     /* indices of the next byte to write and to send */
 
 void usb_start(void)
@@ -42,12 +42,14 @@ void usb_start(void)
 	UDCON = 0; /* full speed, attached */
 }
 
-/* A bus without traffic for 3 ms is suspended. The controller's clock stays on, so that it answers at once when the bus resumes. */
+/* A bus without traffic for 3 ms is suspended. The controller's clock stays on, so that it answers at once when the bus resumes. On a bus that
+ * stays idle the flag may come back at once: the interrupt is off until traffic does [Arduino's USBCore.cpp]. */
 ISR(USB_GEN_vect)
 {
 	if (UDINT & BIT(EORSTI))
 		bus_was_reset = true;
 	suspended = !(UDINT & BIT(EORSTI));
+	UDIEN = suspended ? BIT(EORSTE) : BIT(EORSTE) | BIT(SUSPE);
 	UDINT = 0;
 	board_awake = true;
 }
@@ -160,8 +162,11 @@ bool usb_is_open(void)
 static void follow_suspend(void)
 {
 	static bool counted;
-	if (UDINT & BIT(SOFI))
+	if (suspended && (UDINT & BIT(SOFI))) {
 		suspended = false;
+		UDINT = (uint8_t)~BIT(SUSPI); /* of the suspension that is over */
+		UDIEN = BIT(EORSTE) | BIT(SUSPE);
+	}
 	if (suspended && !counted && usb_control_is_configured())
 		suspends++;
 	counted = suspended;

@@ -243,7 +243,7 @@ static bool handle_request(const struct setup *s)
 static uint16_t read16(void)
 {
 	uint8_t low = UEDATX;
-	return (uint16_t)(low | (uint16_t)(UEDATX << 8));
+	return (uint16_t)(low | (uint16_t)UEDATX << 8);
 }
 
 static void receive_setup(void)

@@ -88,7 +88,7 @@ static uint8_t *put32(uint8_t *out, uint32_t v)
 GET16 = """
 static uint16_t get16(const uint8_t *in)
 {
-	return (uint16_t)(in[0] | (uint16_t)(in[1] << 8));
+	return (uint16_t)(in[0] | (uint16_t)in[1] << 8);
 }
 """
 

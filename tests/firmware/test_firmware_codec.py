@@ -129,3 +129,15 @@ def test_coverage_guided_hostile_bytes(tmp_path: Path) -> None:
     done = fuzz_codec.fuzz(program, corpus, 1, "-runs=50000", f"-artifact_prefix={tmp_path}/")
     assert done.returncode == 0, done.stderr[-2000:]
     assert fuzz_codec.executions(done.stderr) >= 50_000
+
+
+@pytest.mark.process
+@pytest.mark.skipif(shutil.which("clang") is None, reason="no clang, so no libFuzzer")
+def test_the_whole_firmware_on_a_hostile_board(tmp_path: Path) -> None:
+    """A small shard of the second half of `make fuzz`."""
+    (corpus := tmp_path / "corpus").mkdir()
+    program = fuzz_codec.build(tmp_path / "whole", fuzz_codec.WHOLE)
+    limits = "-runs=5000", f"-artifact_prefix={tmp_path}/"
+    done = fuzz_codec.fuzz(program, corpus, 1, *limits, longest=fuzz_codec.WHOLE_LONGEST)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert fuzz_codec.executions(done.stderr) >= 5_000

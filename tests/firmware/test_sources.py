@@ -49,11 +49,8 @@ def test_both_timers_are_read_with_interrupts_off() -> None:
     """An interrupt between the two readings would shift all stamps of the right ranger."""
     command = ["avr-objdump", "-d", str(ELF)]
     listing = subprocess.run(command, check=True, capture_output=True, text=True, timeout=PATIENCE_S).stdout
-    follows = listing.partition("<capture_trigger>:\n")[2]
-    function = re.split(r"^\w+ <\w+>:$", follows, flags=re.M)[0]  # labels in it have a dot or a ^
-    steps = re.findall(r"\t(cli|sei|reti?|r?call|out\t0x3f|lds\tr\d+, 0x00(?:84|94))", function)
-    reads = [k for k, step in enumerate(steps) if step.startswith("lds")]
-    assert [steps[k][-2:] for k in reads] == ["84", "94"]
-    assert reads[1] == reads[0] + 1  # no call, and no interrupt let in
-    assert steps[reads[0] - 1] == "cli"
-    assert steps[reads[1] + 1] == "out\t0x3f"
+    steps = re.findall(r"\t(cli|sei|reti?|r?call|out\t0x3f|lds\tr\d+, 0x00(?:84|94))", listing)
+    (timer3,) = [k for k, step in enumerate(steps) if step.endswith("94")]  # wherever the compiler has inlined it
+    assert steps[timer3 - 2] == "cli"
+    assert steps[timer3 - 1].endswith("84")  # no call in between, and no interrupt let in
+    assert steps[timer3 + 1] == "out\t0x3f"

@@ -21,7 +21,8 @@ README = ROOT / "firmware/README.md"
 
 # What is done to the board; what `echostep doctor --electrical` says; whether the README's table names it.
 DAY_ONE = [
-    (("kit=2026", "pulse_right=stuck_low"), "D13: is driven low and never rises"),
+    (("kit=2026", "pulse_left=stuck_low"), "D4: is driven low and never rises"),
+    (("kit=2026", "pulse_right=stuck_low"), "D13: reads zero"),
     (("kit=foot", "icm20649=zeros"), "SPI bus: no part answers on SPI, and MISO is low"),
     (("kit=2026", "imu_thigh=absent"), "thigh gyro: does not answer"),
     (("kit=2026", "imu_calf=no_self_test"), "calf gyro (LSM6DSO): failed its self-test"),

@@ -50,6 +50,7 @@ void fail(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)
 avr_int_vector_t *vector(int number);
 
 bool pin_is_output(char port, uint8_t pin);
+bool pin_is_low_output(char port, uint8_t pin);
 bool pin_is_pulled_up(char port, uint8_t pin);
 void set_pin(char port, uint8_t pin, bool level); /* of an input, as the program reads it */
 
@@ -154,6 +155,7 @@ bool board_runs(void); /* once a millisecond: whether the program runs; without 
 /* floating.c: the capture inputs while nothing drives them. */
 void floating_pin(char port, uint8_t pin, bool open);
 void floating_resume(void);
+void floating_millisecond(void);
 
 /* hang.c: a processor that hangs. */
 void hang_now(void);

@@ -63,6 +63,16 @@ def test_one_cause_for_many_is_said_once() -> None:
     assert text.startswith("SPI bus: no device answers")
 
 
+def test_a_bare_board_is_one_finding_without_parts_of_a_kit() -> None:
+    """It was three faults, with the pull-ups and the level shifter of the papers."""
+    mute = {f"{what}_{d.name.lower()}": 1 for d in m.Healthy if d.name for what in ("errors", "fault")}
+    parts = m.Parts(**dict.fromkeys(m.Parts._fields, 0) | {"ticks": 9})
+    (text,) = texts(words(status(healthy=0, **mute), parts))
+    assert text.startswith("board: has found no part; normal before anything is wired")
+    found = texts(words(status(healthy=0, **mute), parts._replace(part_pressure=m.Part.BMP390)))
+    assert not [text for text in found if "level shifter" in text or "both pull-ups" in text]
+
+
 def test_old_failures_are_forgotten_and_new_ones_are_not() -> None:
     old = {"errors_compass": 9, "fault_compass": m.Fault.NO_ANSWER, "bus_recoveries": 3, "dropped_ping": 65_530}
     heard = words(status(**old), status(**old | {"ticks": 2_000_000}))

@@ -19,7 +19,7 @@ from echostep.board.frames import encode
 from echostep.ports.chunks import BOARD, Chunk
 from echostep_app.board.faults.health import Severity
 from echostep_app.commissioning import serial_ports as ports
-from echostep_app.commissioning.diagnosis import Diagnosis, judge_board, judge_mtx
+from echostep_app.commissioning.diagnosis import Diagnosis, judge_board, judge_mtx, loop_diagnosis
 from echostep_app.commissioning.doctor import examine
 from echostep_app.commissioning.probe import ProbeResult, _Probe, drift_of
 from echostep_app.commissioning.serial_ports import PortSeen, Role
@@ -163,6 +163,19 @@ def test_an_mtx_that_answers_but_measures_nothing_says_so(arrived_s: list[float]
     assert finding.what.startswith(words)
     assert (finding.severity, finding.subject) == (Severity.FAULT, "MTx")
     assert "configured" not in str(finding)
+
+
+@pytest.mark.parametrize(("turn", "latency"), [(10_400, 20), (5_600, 300)])
+def test_a_main_loop_that_is_too_slow_is_named(turn: int, latency: int) -> None:
+    report, probed = Diagnosis(), ProbeResult()
+    probed.reports.add(m.Loop(0, 5_600, 20, 15_700))
+    loop_diagnosis(report, probed, "board")
+    assert report.lines == ["loop      longest turn 2.8 ms, interrupts within 10 us; rangers measure for 62.8 ms"]
+    assert report.findings == []
+    probed.reports.add(m.Loop(0, turn, latency, 0))
+    loop_diagnosis(report, probed, "board")
+    (finding,) = report.findings
+    assert "is too slow" in finding.what
 
 
 def test_nothing_plugged_in(monkeypatch: pytest.MonkeyPatch) -> None:

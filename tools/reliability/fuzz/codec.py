@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Fuzz the firmware's codec with libFuzzer, one shard at a time (`make fuzz`): every run goes on where the last one stopped.
+"""Fuzz the firmware's codec, then all its portable files, with libFuzzer, one shard at a time (`make fuzz`), on from where the last one stopped.
 
 In: tests/firmware/fuzz_codec.c, the firmware's codec, tests/firmware/corpus.txt (an input a line, hex), the log in out/fuzz. Out: the corpus
-with what was found, reduced; the log with one more line; executions so far on stdout. Exit status 1, and the input in out/fuzz, when a check
+with what was found, reduced; for the whole firmware (tests/firmware/fuzz_firmware.c) the corpus in out/fuzz/firmware; the log with one more line;
+executions so far on stdout. Exit status 1, and the input in out/fuzz, when a check
 fails. Owns the build of the fuzzer. The sanitizers for addresses and undefined behaviour are on.
 """
 
@@ -12,7 +13,7 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from places import OUT, ROOT
@@ -23,15 +24,28 @@ SOURCES = [
     ROOT / "tests/firmware/fuzz_codec.c",
     *(FIRMWARE / name for name in ("cobs.c", "frame.c", "messages.c", "link.c", "status.c")),
 ]
+WHOLE = [
+    ROOT / "tests/firmware/fuzz_firmware.c",
+    *sorted(FIRMWARE.glob("*.c")),
+]  # on a board that does what the input says
 CORPUS = ROOT / "tests/firmware/corpus.txt"
 FOLDER = OUT / "fuzz"
 FLAGS = ["-std=c11", "-O2", "-g", f"-I{FIRMWARE}", "-DLIBFUZZER", "-fsanitize=fuzzer,address,undefined"]
 LONGEST = (70, 600)  # bytes of an input, in turn by shard: a frame, as many as fuzz_codec.c takes
+WHOLE_LONGEST = (4000,)  # about a second of the board
 
 
-def build(program: Path) -> Path:
-    """The fuzzer, compiled."""
-    command = ["clang", *FLAGS, "-fno-sanitize-recover=all", "-o", str(program), *map(str, SOURCES)]
+def build(program: Path, sources: Sequence[Path] = SOURCES) -> Path:
+    """The fuzzer, compiled; of the whole firmware, `main` is called by it."""
+    command = [
+        "clang",
+        *FLAGS,
+        "-Dmain=firmware_main",
+        "-fno-sanitize-recover=all",
+        "-o",
+        str(program),
+        *map(str, sources),
+    ]
     subprocess.run(command, check=True)
     return program
 
@@ -50,10 +64,18 @@ def packed(inputs: Iterable[Path]) -> str:
     return "".join(f"{line}\n" for line in sorted(lines, key=lambda line: (len(line), line)))
 
 
-def fuzz(program: Path, corpus: Path, shard: int, *limits: str) -> subprocess.CompletedProcess[str]:
+def fuzz(
+    program: Path, corpus: Path, shard: int, *limits: str, longest: Sequence[int] = LONGEST
+) -> subprocess.CompletedProcess[str]:
     """One run of the fuzzer, with the shard's number as its seed; new inputs go into the folder `corpus`."""
-    longest = f"-max_len={LONGEST[shard % len(LONGEST)]}"
-    command = [str(program), longest, f"-seed={shard}", "-print_final_stats=1", *limits, str(corpus)]
+    command = [
+        str(program),
+        f"-max_len={longest[shard % len(longest)]}",
+        f"-seed={shard}",
+        "-print_final_stats=1",
+        *limits,
+        str(corpus),
+    ]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
@@ -71,17 +93,26 @@ def main() -> int:
         program = build(Path(temporary) / "fuzz")
         corpus, reduced = unpack(Path(temporary) / "corpus"), Path(temporary) / "reduced"
         done = fuzz(program, corpus, shard, f"-max_total_time={seconds}", f"-artifact_prefix={FOLDER}/")
-        if done.returncode:
-            print(done.stderr[-4000:], file=sys.stderr)
+        (FOLDER / "firmware").mkdir(exist_ok=True)
+        limits = f"-max_total_time={seconds}", f"-artifact_prefix={FOLDER}/"
+        whole = fuzz(
+            build(Path(temporary) / "whole", WHOLE), FOLDER / "firmware", shard, *limits, longest=WHOLE_LONGEST
+        )
+        for failed in (run for run in (done, whole) if run.returncode):
+            print(failed.stderr[-4000:], file=sys.stderr)
             return 1
         reduced.mkdir()
         subprocess.run([str(program), "-merge=1", str(reduced), str(corpus)], check=True, capture_output=True)
         CORPUS.write_text(packed(reduced.iterdir()))
-    journal.add({"shard": shard, "executions": executions(done.stderr)})
+    journal.add({"shard": shard, "executions": executions(done.stderr), "whole": executions(whole.stderr)})
     counts = [row["executions"] for row in journal.rows]
     return report(
         f"codec, shard {shard}: none failed",
-        [Figure("executions", f"{counts[-1]:,}"), Figure("of all shards", f"{sum(counts):,}")],
+        [
+            Figure("executions", f"{counts[-1]:,}"),
+            Figure("of all shards", f"{sum(counts):,}"),
+            Figure("of the whole firmware", f"{sum(row.get('whole', 0) for row in journal.rows):,}"),
+        ],
     )
 
 

@@ -107,6 +107,7 @@ static void run_millisecond(avr_cycle_count_t end)
 		return;
 	}
 	miso_millisecond();
+	floating_millisecond();
 	if (input.row.sync_us != NO_SYNC)
 		avr_cycle_timer_register(avr, clock_cycles(input.row.sync_us) + 1, sync_rise, NULL);
 	if (avr->cycle < end)

@@ -72,6 +72,11 @@ bool pin_is_output(char port, uint8_t pin)
 	return port_registers(port)[0] >> pin & 1;
 }
 
+bool pin_is_low_output(char port, uint8_t pin)
+{
+	return pin_is_output(port, pin) && !(port_registers(port)[1] >> pin & 1);
+}
+
 bool pin_is_pulled_up(char port, uint8_t pin)
 {
 	return !pin_is_output(port, pin) && (port_registers(port)[1] >> pin & 1);
@@ -200,6 +205,7 @@ int main(int argc, char **argv)
 	static const struct option options[] = {
 		{ "elf", required_argument, NULL, 'e' },
 		{ "seed", required_argument, NULL, 's' },
+		{ "fault", required_argument, NULL, 'f' },
 		{ "pty", no_argument, NULL, 'p' },
 		{ "help", no_argument, NULL, 'h' },
 		{ NULL, 0, NULL, 0 },
@@ -212,9 +218,10 @@ int main(int argc, char **argv)
 		switch (option) {
 		case 'e': elf = optarg; break;
 		case 's': random_state = seed_of(optarg); break;
+		case 'f': switch_fault(optarg); break; /* of constants: those that act at once need a board */
 		case 'p': with_pty = true; break;
 		case 'h':
-			printf("echostep-twin --elf FILE [--seed N] [--pty]\nThe bench protocol on standard input and output; see README.md.\n");
+			printf("echostep-twin --elf FILE [--seed N] [--fault NAME=VALUE] [--pty]\nThe bench protocol on standard input and output; see README.md.\n");
 			return 0;
 		default: return 2;
 		}

@@ -30,7 +30,7 @@ static void supply_changed(void *self, unsigned before);
 FAULT_SWITCH(supply, "<=6000", supply_changed, 5000)
 FAULT_SWITCH(brown_out_fuse, "0 2600 4300", NULL, 1) /* of the boards as sold */
 FAULT_SWITCH(bootloader, "none caterina", NULL, 1)
-FAULT_SWITCH(echo_resistor, "none 1000", NULL, 1) /* in series in ECHO_R, as wired in firmware/hardware */
+FAULT_SWITCH(echo_resistor, "none 1000", NULL, 1) /* in series in both Echo, as wired in firmware/hardware */
 
 static bool plugged = true, in_brown_out, memory_lost, chips_lost;
 static uint8_t next_cause = POWER_ON;
@@ -116,7 +116,7 @@ static void drive_leds(void)
 
 bool has_series_resistor(char port, uint8_t pin)
 {
-	return echo_resistor.value && port == 'C' && pin == 7;
+	return echo_resistor.value && ((port == 'C' && pin == 7) || (port == 'D' && pin == 4));
 }
 
 /* While the bootloader waits, its LED breathes: PC7 is driven high and low by turns, against what drives the right echo line. */
@@ -148,6 +148,17 @@ static void end_bootloader(void)
 	bench_trace("program starts");
 }
 
+/* The lamp of RX, which a Micro lights by a one and a Leonardo by a zero [Caterina.h; variants/micro/pins_arduino.h]. */
+static void watch_lamp(void)
+{
+	static bool was;
+	bool level = pin_is_output('B', 0) && !pin_is_low_output('B', 0);
+
+	if (level != was)
+		bench_trace("lamp %u", level);
+	was = level;
+}
+
 bool board_runs(void)
 {
 	if (bootloader_ms && plugged && !in_brown_out && --bootloader_ms == 0)
@@ -159,6 +170,7 @@ bool board_runs(void)
 	if (supply.value < RELIABLE_MV)
 		hang_now();
 	hang_millisecond();
+	watch_lamp();
 	return true;
 }
 

@@ -11,9 +11,9 @@
 
 #include "parts/parts.h"
 
-enum { WHO_AM_I = 0x0F, CTRL1_XL, CTRL2_G, CTRL3_C, CTRL5_C = 0x14, CTRL8_XL = 0x17, STATUS = 0x1E, OUT_TEMP = 0x20, OUT_G = 0x22, OUT_A = 0x28, REGISTERS = 0x80 };
+enum { WHO_AM_I = 0x0F, CTRL1_XL, CTRL2_G, CTRL3_C, CTRL5_C = 0x14, CTRL8_XL = 0x17, CTRL9_XL = 0x18, STATUS = 0x1E, OUT_TEMP = 0x20, OUT_G = 0x22, OUT_A = 0x28, REGISTERS = 0x80 };
 enum { RATE_READY = 2, FORCE_READY = 1 };
-enum { ZEROS = OTHER_FAULTS, WRONG_IDENTITY, NEVER_READY, STUCK, SATURATED, WEAK, VIBRATING };
+enum { ZEROS = OTHER_FAULTS, WRONG_IDENTITY, NEVER_READY, STUCK, SATURATED, WEAK, VIBRATING, I3C };
 #define IDENTITY 0x6C
 #define OTHER_IDENTITY 0x69 /* an LSM6DS3 */
 #define BOOT US(10000)
@@ -31,6 +31,7 @@ static struct imu {
 	double excited; /* counts of 0.035 deg/s added by the self-test at the time `excited_at` */
 	avr_cycle_count_t excited_at;
 	int response;
+	bool confused; /* by frames for others while the processor restarted, for I3C was on [STMicroelectronics/stm32-lsm6dso issue 1] */
 	struct axes kept; /* of a part that is stuck */
 } imus[3] = {
 	{ .file.spi = { .part = PART(lsm6dso, PLACE_THIGH, "imu_thigh"), .port = 'B', .pin = 4 } },
@@ -105,6 +106,8 @@ static int get(void *self, uint8_t at)
 {
 	struct imu *u = self;
 
+	if (at == WHO_AM_I && u->confused)
+		return 0;
 	if (at == WHO_AM_I)
 		return u->file.part.fault.value == WRONG_IDENTITY ? OTHER_IDENTITY : IDENTITY;
 	if (at == STATUS) {
@@ -141,7 +144,15 @@ static void power(void *self)
 		u->response = 4600 + (int)random_below(15000); /* 161 to 686 deg/s */
 	u->file.up_at = avr->cycle + BOOT;
 	u->excited = 0.0;
+	u->confused = false;
 	u->read_at = 0;
+}
+
+static void resume(void *self)
+{
+	struct imu *u = self;
+
+	u->confused = u->file.part.fault.value == I3C && !(u->registers[CTRL9_XL] & 2);
 }
 
 static void changed(void *self, unsigned before)
@@ -154,9 +165,10 @@ static void changed(void *self, unsigned before)
 
 const struct model lsm6dso = {
 	.kind = OF_2026,
-	.faults = "ok absent zeros wrong_identity never_ready stuck saturated no_self_test vibrating",
+	.faults = "ok absent zeros wrong_identity never_ready stuck saturated no_self_test vibrating i3c",
 	PARTS(imus),
 	.power = power,
+	.resume = resume,
 	.changed = changed,
 	.select = registers_select,
 	.exchange = registers_exchange,

@@ -55,6 +55,7 @@ struct bursts {
 	struct burst {
 		avr_cycle_count_t at;
 		uint16_t cross_us; /* when it reaches the other ranger, 0: never */
+		uint32_t late_us;  /* the same of its last reverberation */
 	} last[4];
 	unsigned count;
 };
@@ -100,6 +101,8 @@ struct model {
 	uint8_t address_mask; /* on I2C; the bit 0x80, where it is none of an address, makes these count up */
 
 	uint32_t least_us, window_us; /* first and last time at which a ranger hears an echo */
+	uint32_t (*listens_us)(void); /* instead of window_us */
+	uint32_t (*fades_us)(void);   /* when a burst's last reverberation reaches the other ranger; 0: never */
 };
 #define PARTS(array) .parts = (array), .count = sizeof(array) / sizeof *(array), .size = sizeof *(array)
 
@@ -134,7 +137,7 @@ enum { MUTE = OTHER_TWI_FAULTS, DEAF, MISREADS };
 extern const char *const sides[2];
 /* The first echo after `began` within the model's window, in us: of the own burst, or of the other ranger's; 0: none. */
 uint32_t bursts_first_echo(const struct model *model, const struct bursts *others, avr_cycle_count_t began, uint16_t own_us);
-void bursts_add(struct bursts *own, unsigned side, avr_cycle_count_t at); /* and traces it */
+void bursts_add(const struct model *model, struct bursts *own, unsigned side, avr_cycle_count_t at); /* and traces it */
 void ranger_power(void *self);
 bool ranger_start(void *self, bool read);
 bool ranger_write(void *self, uint8_t byte, bool first);

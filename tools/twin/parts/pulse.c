@@ -15,14 +15,18 @@
 #define GLITCH US(3000)
 #define HELD_US 70000u /* measured at HC-SR04 modules [forum.arduino.cc 613370: "approximately 70000"] */
 #define LONG_US 200000u /* some modules hold the line so long */
+#define LOOK US(50)
+#define GHOST_US 467u /* 8 cm in the ping after one without an echo [forum.arduino.cc 429576, 337199] */
 
-enum { STUCK_LOW = OTHER_FAULTS, STUCK_HIGH, UNECHOED, HELD, LONG };
+/* NO_TIMEOUT: without an echo the line stays high until it is pulled low from outside [NewPing; HC-SR04P: fossasia/pslab-python 209]; ENDLESS: even then. */
+enum { STUCK_LOW = OTHER_FAULTS, STUCK_HIGH, UNECHOED, HELD, LONG, NO_TIMEOUT, ENDLESS, GHOST };
 
 static struct pulse_ranger {
 	struct part part;
 	char echo_port;
 	uint8_t echo_pin;
 	bool trigger, line;
+	bool unheard; /* its last ping had no echo */
 	avr_cycle_count_t triggered_at;
 	struct bursts bursts;
 } rangers[] = {
@@ -55,6 +59,18 @@ static uint32_t longest_us(unsigned fault)
 	return fault == LONG ? LONG_US : fault == HELD ? HELD_US : NO_ECHO_US;
 }
 
+/* Looks whether the processor pulls its line low. */
+static avr_cycle_count_t wait_for_ever(avr_t *a, avr_cycle_count_t when, void *param)
+{
+	struct pulse_ranger *r = param;
+
+	if (r->part.fault.value == NO_TIMEOUT && !pin_is_low_output(r->echo_port, r->echo_pin))
+		return when + LOOK;
+	if (r->part.fault.value != ENDLESS)
+		set_line(r, false);
+	return r->part.fault.value == ENDLESS ? when + LOOK : 0;
+}
+
 /* A burst of the other ranger that begins while this one listens is not heard: a shortcut, it would arrive behind most own echoes. */
 static avr_cycle_count_t rise(avr_t *a, avr_cycle_count_t when, void *param)
 {
@@ -63,8 +79,14 @@ static avr_cycle_count_t rise(avr_t *a, avr_cycle_count_t when, void *param)
 	uint32_t us = bursts_first_echo(&pulse, &rangers[!side].bursts, when, input.row.own_us[side]);
 
 	set_line(r, true);
-	bursts_add(&r->bursts, side, when);
-	avr_cycle_timer_register(a, US(us && fault != UNECHOED ? us : longest_us(fault)), fall, r);
+	bursts_add(&pulse, &r->bursts, side, when);
+	if (fault == GHOST && r->unheard)
+		us = GHOST_US;
+	r->unheard = !us;
+	if (!us && fault >= NO_TIMEOUT && fault <= ENDLESS)
+		avr_cycle_timer_register(a, LOOK, wait_for_ever, r);
+	else
+		avr_cycle_timer_register(a, US(us && fault != UNECHOED ? us : longest_us(fault)), fall, r);
 	return 0;
 }
 
@@ -96,6 +118,7 @@ static void power(void *self)
 
 	avr_cycle_timer_cancel(avr, rise, r);
 	avr_cycle_timer_cancel(avr, fall, r);
+	avr_cycle_timer_cancel(avr, wait_for_ever, r);
 	r->bursts = (struct bursts){ 0 };
 	set_line(r, false);
 }
@@ -130,7 +153,7 @@ static void changed(void *self, unsigned before)
 
 const struct model pulse = {
 	.kind = OF_2026,
-	.faults = "ok absent stuck_low stuck_high deaf held long",
+	.faults = "ok absent stuck_low stuck_high deaf held long no_timeout endless ghost",
 	PARTS(rangers),
 	.wire = wire,
 	.power = power,

@@ -5,22 +5,25 @@
 
 const char *const sides[2] = { "left", "right" };
 
-void bursts_add(struct bursts *own, unsigned side, avr_cycle_count_t at)
+void bursts_add(const struct model *model, struct bursts *own, unsigned side, avr_cycle_count_t at)
 {
-	own->last[own->count++ % 4] = (struct burst){ at, input.row.cross_us[!side] };
+	own->last[own->count++ % 4] = (struct burst){ at, input.row.cross_us[!side], model->fades_us ? model->fades_us() : 0 };
 	bench_trace("trigger %s", sides[side]);
 }
 
 uint32_t bursts_first_echo(const struct model *model, const struct bursts *others, avr_cycle_count_t began, uint16_t own_us)
 {
-	int64_t least = model->least_us, none = (int64_t)model->window_us + 1, first = own_us >= least && own_us < none ? own_us : none;
+	int64_t least = model->least_us, none = (int64_t)(model->listens_us ? model->listens_us() : model->window_us) + 1;
+	int64_t first = own_us >= least && own_us < none ? own_us : none;
 
 	for (int k = 0; k < 4; k++) {
 		const struct burst *b = &others->last[k];
-		int64_t us = ((int64_t)b->at - (int64_t)began) / 16 + b->cross_us;
+		int64_t at_us = ((int64_t)b->at - (int64_t)began) / 16;
 
-		if (b->cross_us && us >= least && us < first)
-			first = us;
+		if (b->cross_us && at_us + b->cross_us >= least && at_us + b->cross_us < first)
+			first = at_us + b->cross_us;
+		if (b->late_us && at_us + b->late_us >= least && at_us + b->late_us < first)
+			first = at_us + b->late_us;
 	}
 	return first == none ? 0 : (uint32_t)first;
 }
@@ -47,9 +50,9 @@ void ranger_ping(struct ranger *r, avr_cycle_count_t busy_until)
 {
 	struct ranger *other = other_of(r);
 
-	if (other->listening && avr->cycle >= other->busy_until)
+	if (other->listening && avr->cycle >= other->busy_until && other->twi.part.fault.value != MUTE)
 		finish(other); /* this ping may overwrite one that the other ranger's result needs */
-	bursts_add(&r->bursts, side_of(r), avr->cycle);
+	bursts_add(r->twi.part.model, &r->bursts, side_of(r), avr->cycle);
 	r->began = avr->cycle;
 	r->own_us = input.row.own_us[side_of(r)];
 	r->listening = true;

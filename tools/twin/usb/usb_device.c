@@ -12,6 +12,8 @@
 #define VECTOR_ENDPOINT 11
 
 struct endpoint usb_endpoints[ENDPOINTS];
+static bool suspended; /* the bus is idle */
+FAULT_SWITCH(suspend_repeats, "off on", NULL, 0) /* while the bus is idle the flag comes back at once: unknown of the silicon */
 
 static struct endpoint *selected(void) { return &usb_endpoints[avr->data[UENUM] < ENDPOINTS ? avr->data[UENUM] : 0]; }
 static struct bank *bank_of_cpu(struct endpoint *e) { return &e->bank[is_control(e) ? 0 : e->cpu]; }
@@ -163,7 +165,11 @@ static void write_device_register(avr_io_addr_t address, uint8_t value)
 			memset(usb_endpoints, 0, sizeof usb_endpoints);
 		break;
 	case USBINT:
-	case UDINT: value &= old; break;
+	case UDINT:
+		value &= old;
+		if (address == UDINT && suspend_repeats.value && suspended)
+			value |= USB_SUSPEND;
+		break;
 	case UENUM: value &= 7; break;
 	case UERST:
 		for (int i = 1; i < ENDPOINTS; i++)
@@ -246,6 +252,7 @@ bool usb_device_attached(void)
 
 void usb_bus_event(enum usb_event event, uint16_t frame)
 {
+	suspended = event == USB_SUSPEND || (suspended && event != USB_RESET && event != USB_FRAME && event != USB_RESUME);
 	if (event == USB_RESET) {
 		memset(usb_endpoints, 0, sizeof usb_endpoints);
 		avr->data[UDADDR] = 0;

@@ -10,7 +10,7 @@ from __future__ import annotations
 from echostep.board.messages import BoardHealth, Identity, Message, Reports, Subscribe
 
 SUBSCRIBE = Subscribe(Reports.BOARD_HEALTH | Reports.PARTS | Reports.MOTION | Reports.MAGNETIC | Reports.FOOT)
-SUBSCRIBE_ELECTRICAL = Subscribe(SUBSCRIBE.reports | Reports.ELECTRICAL)  # for `echostep doctor`
+SUBSCRIBE_ELECTRICAL = Subscribe(SUBSCRIBE.reports | Reports.ELECTRICAL | Reports.LOOP)  # for `echostep doctor`
 FIRST_VERSION = (1, 2)  # of the firmware that knows `Subscribe`
 
 

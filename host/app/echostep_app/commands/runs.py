@@ -64,6 +64,7 @@ def demo(
         Kit,
         typer.Option(help="Parts on the board: of the papers, or of 2026 (not built yet; with --board-command only)."),
     ] = Kit.PAPERS,
+    celsius: Annotated[float, typer.Option(help="Temperature of the air, degC.", min=-20.0, max=60.0)] = 20.0,
     browser: Browser = True,
 ) -> None:
     """Track a simulated walk through a simulated building."""
@@ -71,7 +72,7 @@ def demo(
 
     outputs = output.options(out, browser=browser)
     plan = _plan_file(plan, outputs.outlet, out)
-    demo_run.demo(demo_run.DemoOptions(seed, board_command, guide, plan, speed, kit), outputs)
+    demo_run.demo(demo_run.DemoOptions(seed, board_command, guide, plan, speed, kit, celsius), outputs)
 
 
 @app.command()

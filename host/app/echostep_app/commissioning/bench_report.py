@@ -13,9 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from echostep.board.calibration import SPEED_OF_SOUND_M_S
+from echostep.board.air import CELSIUS, USUAL_C, sound_m_s
 from echostep.board.messages import GYROS_INVALID, Outcome, Ranger
 from echostep.errors import EchostepError
+from echostep_app.board.faults.findings import Finding, Severity
 from echostep_app.commissioning.diagnosis import Diagnosis
 from echostep_app.commissioning.doctor import examine
 from echostep_app.commissioning.probe import ProbeResult
@@ -58,6 +59,8 @@ def text(report: Diagnosis) -> Iterable[str]:
     yield from report.lines
     yield from (f"{finding.severity.name:8}  {finding}" for finding in report.findings)
     for subject, probed in report.probed.items():
+        yield from (f"{finding.severity.name:8}  {finding}" for finding in _unrest(subject, probed))
+    for subject, probed in report.probed.items():
         yield f"\n[{subject}]"
         yield from _reports(probed)
         yield from _ranges(probed)
@@ -69,24 +72,46 @@ def text(report: Diagnosis) -> Iterable[str]:
 def _reports(probed: ProbeResult) -> Iterable[str]:
     """The newest of each report of the board, field by field."""
     r = probed.reports
-    newest = (r.identity, r.configuration, r.status, r.board_health, r.parts, r.electrical, r.foot, *r.gyros.values())
+    newest = (
+        r.identity,
+        r.configuration,
+        r.status,
+        r.board_health,
+        r.parts,
+        r.electrical,
+        r.loop,
+        r.foot,
+        *r.gyros.values(),
+    )
     for message in newest:
         if message is not None:
             yield f"{type(message).__name__}: " + ", ".join(f"{k} {v}" for k, v in message._asdict().items())
 
 
 def _ranges(probed: ProbeResult) -> Iterable[str]:
+    celsius = CELSIUS * float(np.median([p.temperature for p in probed.pressures])) if probed.pressures else USUAL_C
     for ranger in Ranger:
         pings = [p for p in probed.pings if p.ranger == ranger]
         flights_us = [p.time_of_flight_us for p in pings if p.outcome == Outcome.ECHO]
         if flights_us:
-            metres = np.array(flights_us) * 0.5e-6 * SPEED_OF_SOUND_M_S
+            metres = np.array(flights_us) * 0.5e-6 * sound_m_s(celsius)
             yield (
                 f"{ranger.name.lower()}: {len(flights_us)} echoes in {len(pings)} pings, median {np.median(metres):.3f} m "
-                f"({np.median(flights_us):.0f} us) at 20 degC, sd {metres.std():.3f} m"
+                f"({np.median(flights_us):.0f} us) at {celsius:.1f} degC, sd {metres.std():.3f} m"
             )
         elif pings:
             yield f"{ranger.name.lower()}: no echo in {len(pings)} pings"
+
+
+REST_SD_COUNTS = 4.0  # 1 deg/s: eight times the noise of an ADIS16100 [data sheet: 0.5 counts in 40 Hz]; assumed
+
+
+def _unrest(subject: str, probed: ProbeResult) -> list[Finding]:
+    """Findings on gyros whose rates vary more than a board at rest explains: wrong bits, or a board that was moved."""
+    noisy = [line.partition(":")[0] for line in _noise(probed) if float(line.rpartition("sd ")[2]) > REST_SD_COUNTS]
+    what = f"{', '.join(noisy)}: the rates vary by more than {REST_SD_COUNTS:g} counts at rest"
+    remedy = "lay the board down and repeat; if it stays, the SPI wires are too long (measurement 7)"
+    return [Finding(Severity.WARNING, subject, what, remedy)] if noisy else []
 
 
 def _noise(probed: ProbeResult) -> Iterable[str]:

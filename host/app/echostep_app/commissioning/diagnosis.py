@@ -14,7 +14,7 @@ from echostep.board.reports import BoardReports
 from echostep.ports.chunks import BOARD, MTX
 from echostep.timing.timeline import MtxTiming
 from echostep_app.board.faults.electrical import electrical_findings, level_line
-from echostep_app.board.faults.findings import part_in, part_text_of
+from echostep_app.board.faults.findings import TICK_S, part_in, part_text_of
 from echostep_app.board.faults.health import (
     NAMES,
     SELECTS,
@@ -38,6 +38,8 @@ FULL_SCALE = 2047  # counts of an ADIS16100
 SIX_AXES_FULL_SCALE = 4697  # counts of `gyros` at the 1000 deg/s of an LSM6DSO, less its last 0.1 %
 HURRIED_G = 18.0  # range of the MTx that is beyond a hurried foot's force [echostep evaluate kits]
 FIRST_LEVELS = (1, 6)  # version of the firmware that reports levels
+TURN_MAX_MS = 5.0  # a sample of the gyros
+LATENCY_MAX_US = 100.0  # of an interrupt: a SyncOut pulse lasts 1 ms; assumed
 LEAST_PINGS = 20  # for a statement on echoes
 
 
@@ -66,6 +68,7 @@ def judge_board(report: Diagnosis, probed: ProbeResult, port: str) -> None:
         return
     report.lines += board_lines("board", probed, port) + _device_lines(probed) + _rate_lines(probed)
     electrical_diagnosis(report, probed, "board")
+    loop_diagnosis(report, probed, "board")
     report.findings += board_findings(reports) + _stream_findings(probed) + _version_findings(reports.identity, port)
     if probed.rates_hz:
         report.findings += rate_findings(reports, probed.rates_hz)
@@ -113,6 +116,21 @@ def electrical_diagnosis(report: Diagnosis, probed: ProbeResult, subject: str) -
         return
     what = f"reports no levels: its firmware is older than {'.'.join(map(str, FIRST_LEVELS))}"
     report.findings.append(Finding(Severity.WARNING, subject, what, "flash it: echostep flash"))
+
+
+def loop_diagnosis(report: Diagnosis, probed: ProbeResult, subject: str) -> None:
+    """Add the timing of a board's main loop, and a finding where it is too slow."""
+    loop = probed.reports.loop
+    if loop is None:
+        return
+    turn_ms, latency_us = 1e3 * TICK_S * loop.longest_turn, 1e6 * TICK_S * loop.longest_latency
+    cycle = f"; rangers measure for {4e-3 * loop.ranging_cycle:.1f} ms" if loop.ranging_cycle else ""
+    report.lines.append(f"loop      longest turn {turn_ms:.1f} ms, interrupts within {latency_us:.0f} us{cycle}")
+    if turn_ms > TURN_MAX_MS or latency_us > LATENCY_MAX_US:
+        what = (
+            f"is too slow: a turn of its main loop takes {turn_ms:.1f} ms, an interrupt waits for {latency_us:.0f} us"
+        )
+        report.findings.append(Finding(Severity.WARNING, subject, what, "send this line in, with the parts plugged in"))
 
 
 def _supply_lines(reports: BoardReports) -> list[str]:

@@ -18,6 +18,7 @@ from echostep_app.commissioning.diagnosis import (
     board_lines,
     clock_diagnosis,
     electrical_diagnosis,
+    loop_diagnosis,
     silence,
     stale_firmware,
 )
@@ -42,6 +43,7 @@ def judge_foot_board(report: Diagnosis, probed: ProbeResult, port: str) -> None:
         return
     report.lines += board_lines(subject, probed, port)
     electrical_diagnosis(report, probed, subject)
+    loop_diagnosis(report, probed, subject)
     if reports.foot is None:
         report.findings.append(_no_part(probed))
         return

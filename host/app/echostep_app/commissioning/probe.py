@@ -26,6 +26,7 @@ from echostep.board.messages import (
     Message,
     Motion,
     Ping,
+    Pressure,
     SelfTest,
     Sync,
 )
@@ -66,6 +67,7 @@ class ProbeResult:
     pings: list[Ping] = field(default_factory=list)
     gyros: list[Gyros] = field(default_factory=list)
     compass: list[Compass] = field(default_factory=list)
+    pressures: list[Pressure] = field(default_factory=list)
     axes: list[Motion | Magnetic] = field(default_factory=list)  # in the order of their arrival
     foot: list[Foot] = field(default_factory=list)  # of a foot board
     replies: list[tuple[float, float, int]] = field(default_factory=list)
@@ -217,6 +219,8 @@ class _Probe:
             result.gyros.append(message)
         elif isinstance(message, Compass):
             result.compass.append(message)
+        elif isinstance(message, Pressure):
+            result.pressures.append(message)
         elif isinstance(message, Foot):
             result.foot.append(message)
         elif isinstance(message, Motion | Magnetic):

@@ -88,7 +88,10 @@ ECHO = tuple(
     topic(f"/echo/{side}", fields("echostep.Echo", ticks=WHOLE, heard=TRUTH, range_m=NUMBER, time_of_flight_us=WHOLE))
     for side in _SIDES
 )
-PRESSURE = topic("/pressure", fields("echostep.Pressure", ticks=WHOLE, pressure_pa=NUMBER, temperature_c=NUMBER))
+PRESSURE = topic(
+    "/pressure",
+    fields("echostep.Pressure", ticks=WHOLE, pressure_pa=NUMBER, temperature_c=NUMBER, speed_of_sound_m_s=NUMBER),
+)
 STATUS = topic(
     "/status",
     fields(
@@ -129,7 +132,7 @@ class Derived:
         if from_board.received:
             frames = self._board.frames(from_board.received)
             t_ns = portion.t_arrival_ns[from_board.rows_of(frames.end)] + self._log_offset_ns
-            notes += self._echoes(frames, t_ns) + _pressures(frames, t_ns) + self._status(frames, t_ns)
+            notes += self._echoes(frames, t_ns) + self._pressures(frames, t_ns) + self._status(frames, t_ns)
         for estimate in estimates:
             notes += self._estimate(estimate)
         self._segments.clear()
@@ -139,13 +142,29 @@ class Derived:
         frame_index, pings = frames.rows(Ping)
         notes = []
         for k, ping, range_m in zip(
-            frame_index.tolist(), pings, ranges(pings, self._tracker.settings.ranger).tolist(), strict=True
+            frame_index.tolist(),
+            pings,
+            ranges(pings, self._tracker.settings.ranger, self._tracker.front_end.air.speed_m_s).tolist(),
+            strict=True,
         ):
             which, body = int(ping["ranger"]), {"ticks": int(ping["ticks"]), "heard": not math.isnan(range_m)}
             if body["heard"]:
                 body |= {"range_m": range_m, "time_of_flight_us": int(ping["time_of_flight_us"])}
                 self._last_echo[which] = int(t_ns[k]), range_m
             notes.append(DerivedMessage(ECHO[which], int(t_ns[k]), body))
+        return notes
+
+    def _pressures(self, frames: Frames, t_ns: Any) -> list[DerivedMessage]:
+        frame_index, rows = frames.rows(Pressure)
+        notes = []
+        for k, row in zip(frame_index.tolist(), rows, strict=True):
+            if row["pressure"] == PRESSURE_PRESSURE_INVALID:
+                continue
+            body: dict[str, Any] = {"ticks": int(row["ticks"]), "pressure_pa": PRESSURE_PA * int(row["pressure"])}
+            body["speed_of_sound_m_s"] = round(self._tracker.front_end.air.speed_m_s, 2)
+            if row["temperature"] != PRESSURE_TEMPERATURE_INVALID:
+                body["temperature_c"] = round(TEMPERATURE_C * int(row["temperature"]), 3)
+            notes.append(DerivedMessage(PRESSURE, int(t_ns[k]), body))
         return notes
 
     def _status(self, frames: Frames, t_ns: Any) -> list[DerivedMessage]:
@@ -238,19 +257,6 @@ def east_north(rotation_rad: float, xx_m2: float, xy_m2: float, yy_m2: float) ->
     east = c * c * xx_m2 - 2.0 * c * s * xy_m2 + s * s * yy_m2
     north = s * s * xx_m2 + 2.0 * c * s * xy_m2 + c * c * yy_m2
     return east, c * s * (xx_m2 - yy_m2) + (c * c - s * s) * xy_m2, north
-
-
-def _pressures(frames: Frames, t_ns: Any) -> list[DerivedMessage]:
-    frame_index, rows = frames.rows(Pressure)
-    notes = []
-    for k, row in zip(frame_index.tolist(), rows, strict=True):
-        if row["pressure"] == PRESSURE_PRESSURE_INVALID:
-            continue
-        body: dict[str, Any] = {"ticks": int(row["ticks"]), "pressure_pa": PRESSURE_PA * int(row["pressure"])}
-        if row["temperature"] != PRESSURE_TEMPERATURE_INVALID:
-            body["temperature_c"] = round(TEMPERATURE_C * int(row["temperature"]), 3)
-        notes.append(DerivedMessage(PRESSURE, int(t_ns[k]), body))
-    return notes
 
 
 def outline95(e: Estimate, points: int) -> Floats:

@@ -27,7 +27,7 @@ from echostep_app.simulation.devices.kit_2026 import Kit2026Sensors
 from echostep_app.simulation.devices.mtx import MtxModel, stream
 from echostep_app.simulation.kits import Kit
 from echostep_app.simulation.people.walker import Person, Waypoint, walk
-from echostep_app.simulation.stimulus import BoardSensors
+from echostep_app.simulation.stimulus import TEMPERATURE_C, BoardSensors
 from echostep_app.simulation.world.magnetic_field import MagneticField
 
 BLOCK_MS = 50
@@ -47,16 +47,17 @@ class Scenario:
         self, plan: Plan, waypoints: Sequence[Waypoint], seed: int, board: Board,
         person: Person | None = None, model: MtxModel | None = None, configure: Configure | None = None,
         kit: Kit = Kit.PAPERS, foot_board: Board | None = None, worn: WornGyro | None = None,
+        celsius: float = TEMPERATURE_C,
     ) -> None:  # fmt: skip
         """`configure` is sent to the board before it starts; `foot_board` is the one on the foot, instead of an MTx.
 
-        `worn`: how the belt's gyro is worn, perfectly by default; of the papers' kit.
+        `worn`: how the belt's gyro is worn, perfectly by default; of the papers' kit. `celsius`: of the air.
         """
         streams = [np.random.default_rng([seed, k]) for k in range(3, 7)]
         magnetism = MagneticField(streams[3])
         self.walk = walk(waypoints, person or Person(), streams[0])
         self.mtx = stream(self.walk, model or MtxModel(), streams[1], magnetism)
-        kind = Kit2026Sensors if kit is Kit.OF_2026 else partial(BoardSensors, worn=worn)
+        kind = partial(Kit2026Sensors if kit is Kit.OF_2026 else partial(BoardSensors, worn=worn), celsius=celsius)
         self.sensors: BoardSensors | Kit2026Sensors = kind(self.walk, plan.levels, self.mtx.t_s, streams[2], magnetism)
         self._board = board
         self.foot = None if foot_board is None else FootBoardPort(self.walk, foot_rng(seed), foot_board)

@@ -38,7 +38,7 @@ class BoardSensors:
     def __init__(
         self, walk: Walk, levels: Sequence[Level], sync_t_s: Floats, rng: np.random.Generator,
         magnetism: MagneticField | None = None, air_pa: Floats | None = None, acoustics: Acoustics = SRF02,
-        barometer: Scp1000Model | None = None, worn: WornGyro | None = None,
+        barometer: Scp1000Model | None = None, worn: WornGyro | None = None, celsius: float = TEMPERATURE_C,
     ) -> None:  # fmt: skip
         """`sync_t_s`: times of the MTx SyncOut edges, ascending; without `magnetism` the earth field alone.
 
@@ -46,13 +46,15 @@ class BoardSensors:
 
         `acoustics`: of the rangers; `barometer`: another one than an SCP1000; `worn`: how the belt's gyro is worn, perfectly by default.
 
+        `celsius`: of the air.
+
         `air_pa`: the true pressure at each millisecond of the walk (`weather.pressures`), instead of its heights.
         """
-        self._walk = walk
+        self._walk, self._celsius = walk, celsius
         self._walls = [level.solid for level in levels]
         self._level = np.abs(walk.height_m[:, None] - [level.height_m for level in levels]).argmin(1)
         self._sync_us = np.rint(sync_t_s * 1e6).astype(np.int64)
-        self._acoustics = acoustics._replace(speed_m_s=speed_of_sound_m_s(TEMPERATURE_C))
+        self._acoustics = acoustics._replace(speed_m_s=speed_of_sound_m_s(celsius))
         self._echo_rng, *rest = rng.spawn(6)
         self._range_bias_m = ranger_bias_m(self._echo_rng, self._acoustics)
         self._thigh, self._calf, self._belt = (Adis16100Model(r) for r in rest[:3])
@@ -85,7 +87,7 @@ class BoardSensors:
             begin = end
         rows["bearing"] = self._compass.bearings(trunk, heading)
         air = None if self._air_pa is None else self._air_pa[at]
-        rows["pressure"], rows["temperature"] = self._barometer.counts(w.height_m[at], TEMPERATURE_C, len(at), air)
+        rows["pressure"], rows["temperature"] = self._barometer.counts(w.height_m[at], self._celsius, len(at), air)
         rows["sync_us"] = self._edges(start, stop)
         return rows
 

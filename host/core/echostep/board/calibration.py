@@ -40,12 +40,12 @@ LEAST_RANGE_M = 0.01  # least range after the bias is subtracted: 0 would mean n
 
 @dataclass(frozen=True, slots=True)
 class RangerSettings:
-    """`speed_of_sound_m_s`; `delay_s` from the time stamp of the trigger to the ultrasonic burst; `ahead_deg`: how far both rangers look ahead of
-    abeam, as worn on the belt; `left_bias_m`, `right_bias_m`: how much too far each measures (`echostep calibrate rangers`). `learn`: after each
-    live walk on a plan, suggest settings for its rangers.
+    """`speed_of_sound_m_s`; 0: by the temperature that the board measures. `delay_s` from the time stamp of the trigger to the ultrasonic burst;
+    `ahead_deg`: how far both rangers look ahead of abeam, as worn on the belt; `left_bias_m`, `right_bias_m`: how much too far each measures
+    (`echostep calibrate rangers`). `learn`: after each live walk on a plan, suggest settings for its rangers.
     """
 
-    speed_of_sound_m_s: float = SPEED_OF_SOUND_M_S
+    speed_of_sound_m_s: float = 0.0
     delay_s: float = 0.0
     ahead_deg: float = 0.0
     left_bias_m: float = 0.0
@@ -133,10 +133,10 @@ class Imus(NamedTuple):
     belt: ImuSettings = ImuSettings()
 
 
-def ranges(pings: NDArray[np.void], settings: RangerSettings) -> Floats:
-    """Ranges (n,) in m of pings (n,): half the path of the sound, less the ranger's bias; NaN without an echo."""
+def ranges(pings: NDArray[np.void], settings: RangerSettings, speed_m_s: Floats | float = SPEED_OF_SOUND_M_S) -> Floats:
+    """Ranges (n,) in m of pings (n,): half the path of the sound at these speeds (n,), less the ranger's bias; NaN without an echo."""
     bias_m = np.where(pings["ranger"] == 0, settings.left_bias_m, settings.right_bias_m)
-    measured_m = 0.5e-6 * pings["time_of_flight_us"] * settings.speed_of_sound_m_s
+    measured_m = 0.5e-6 * pings["time_of_flight_us"] * (settings.speed_of_sound_m_s or speed_m_s)
     range_m = np.maximum(measured_m - bias_m, np.minimum(measured_m, LEAST_RANGE_M))
     unmeasured = pings["time_of_flight_us"] == PING_TIME_OF_FLIGHT_US_INVALID
     range_m[(pings["outcome"] != Outcome.ECHO) | unmeasured] = np.nan

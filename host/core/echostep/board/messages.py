@@ -144,6 +144,7 @@ class Reports(IntFlag):
     MAGNETIC = 8
     FOOT = 16
     ELECTRICAL = 32
+    LOOP = 64
 
 
 _IDENTITY = struct.Struct("<IIBBBB")
@@ -734,6 +735,34 @@ class Electrical(NamedTuple):
         return cls._make(_ELECTRICAL.unpack(body))
 
 
+_LOOP = struct.Struct("<IHHH")
+LOOP_RANGING_CYCLE_INVALID = 0
+
+
+class Loop(NamedTuple):
+    """Timing of the firmware itself, once a second, by firmware 1.7 and newer."""
+
+    ticks: int  # 0.5 us
+    longest_turn: int  # 0.5 us
+    longest_latency: int  # 0.5 us
+    ranging_cycle: int  # 4 us, 0 = invalid
+
+    @property
+    def id(self) -> int:
+        return 0x12
+
+    def pack(self) -> bytes:
+        """Bytes of the body; raises struct.error when a value does not fit its type."""
+        return _LOOP.pack(*self)
+
+    @classmethod
+    def unpack(cls, body: bytes) -> Loop:
+        """Values of a body; raises ValueError when length or an enumeration is wrong."""
+        if len(body) != 10:
+            raise ValueError(f"loop: {len(body)} bytes, expected 10")
+        return cls._make(_LOOP.unpack(body))
+
+
 _IDENTIFY = struct.Struct("<")
 
 
@@ -908,6 +937,7 @@ Message = (
     | Foot
     | FootHealth
     | Electrical
+    | Loop
     | Identify
     | ClockQuery
     | Configure
@@ -934,6 +964,7 @@ BY_ID: dict[int, type[Message]] = {
     0x0F: Foot,
     0x10: FootHealth,
     0x11: Electrical,
+    0x12: Loop,
     0x81: Identify,
     0x82: ClockQuery,
     0x83: Configure,
@@ -1139,6 +1170,14 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("d13_ones", "u1"),
             ("sda_ones", "u1"),
             ("scl_ones", "u1"),
+        ]
+    ),
+    0x12: np.dtype(
+        [
+            ("ticks", "<u4"),
+            ("longest_turn", "<u2"),
+            ("longest_latency", "<u2"),
+            ("ranging_cycle", "<u2"),
         ]
     ),
     0x81: np.dtype([]),

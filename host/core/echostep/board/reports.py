@@ -15,6 +15,7 @@ from echostep.board.messages import (
     FootHealth,
     GyroHealth,
     Identity,
+    Loop,
     Message,
     Parts,
     Sensors,
@@ -37,6 +38,7 @@ class BoardReports:
     foot: FootHealth | None = None  # of a foot board
     previous_foot: FootHealth | None = None
     electrical: Electrical | None = None
+    loop: Loop | None = None
 
     def add(self, message: Message) -> None:
         """Keep a message if it is a report; after a restart of the board there is no previous status."""
@@ -53,6 +55,8 @@ class BoardReports:
             self.previous_foot, self.foot = self.foot, message
         elif isinstance(message, Electrical):
             self.electrical = message
+        elif isinstance(message, Loop):
+            self.loop = message
         elif isinstance(message, GyroHealth):
             self.gyros[message.gyro] = message
         elif isinstance(message, Status):

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Floats, Ints
+from echostep.board.air import Air
 from echostep.board.calibration import GyroSettings, Imus, RangerSettings, heights, ranges, six_axes
 from echostep.board.frames import BoardReader, Frames
 from echostep.board.messages import (
@@ -98,6 +99,7 @@ class FrontEnd:
         self.watch = watch or WearerWatch()
         self.newest_s = math.nan  # newest time of either port
         self._ranger = ranger
+        self.air = Air(ranger.speed_of_sound_m_s)
         self._ranger_parts = np.zeros((1, 2), np.int64)  # left, right, by the newest report
         self._gyro_blocks = GyroBlocks(gyro or GyroSettings(), errors.belt)
         self._barometer = BarometerStart()
@@ -193,11 +195,11 @@ class FrontEnd:
         self.pings += len(ping_row)
         pings = np.zeros(len(ping_row), MEASUREMENT)
         pings["t_s"] = times.board_s[ping_row] + self._ranger.delay_s
-        pings["value_m"] = ranges(reports, self._ranger)
         pings["source"] = reports["ranger"]
         pings["ranger_part"] = self._parts_of(frames, ping_row, reports["ranger"])
         usable = ~np.isnan(pings["t_s"]) & (reports["outcome"] != Outcome.BUS_ERROR)
         height_row, samples = frames.rows(Pressure)
+        pings["value_m"] = ranges(reports, self._ranger, self.air.speeds(ping_row, height_row, samples))
         height = np.zeros(len(height_row), MEASUREMENT)
         height["t_s"] = times.board_s[height_row]
         height["value_m"] = heights(samples)

@@ -40,6 +40,7 @@ from echostep_app.board.faults.part_faults import (
     LIKE_FOOT_PARTS,
     SIX_AXES_RESPONSES,
     SIX_AXES_TESTS,
+    UNKNOWN_PART_REMEDIES,
     foot_text,
     mixed_rangers,
     part_text,
@@ -96,11 +97,26 @@ def device_findings(reports: BoardReports, status: Status) -> list[Finding]:
     mixed, refused = _mixed_rangers(reports, failed)
     failed = [d for d in failed if not refused & d]
     pulses = _union(d for d in Healthy if part_in(reports, d) is Part.PULSE)
+    if (bare := _bare_board(reports, on, failed)) is not None:
+        return [bare]
     common, explained = _common_causes(status, failed, on & ~pulses)
     strange = _strange_foot(reports, status) if Healthy.THIGH in failed else []
     explained |= Healthy.THIGH if strange else Healthy(0)
     single = [_device_finding(reports, d, Fault(status_field(status, "fault", d))) for d in failed if not explained & d]
     return mixed + strange + common + single
+
+
+def _bare_board(reports: BoardReports, on: Healthy, failed: list[Healthy]) -> Finding | None:
+    """A finding on a board that has found no part since its start, and no trace of one."""
+    parts = reports.parts
+    if (
+        parts is None
+        or any(value for name, value in parts._asdict().items() if name != "ticks")
+        or _union(failed) != on
+    ):
+        return None
+    remedy = "normal before anything is wired; else check 5V and GND at the carrier"
+    return Finding(Severity.FAULT, "board", "has found no part", remedy)
 
 
 def _strange_foot(reports: BoardReports, status: Status) -> list[Finding]:
@@ -131,7 +147,11 @@ def _common_causes(status: Status, failed: list[Healthy], on: Healthy) -> tuple[
         findings.append(Finding(Severity.FAULT, "I2C bus", what, remedy))
         explained |= stuck
     for group, bus, lines in (
-        (ON_I2C & on, "I2C bus", "5 V, ground, both pull-ups, and whether SDA (D2) and SCL (D3) are swapped"),
+        (
+            ON_I2C & on,
+            "I2C bus",
+            "5 V, ground, the pull-ups of rangers on I2C, and whether SDA (D2) and SCL (D3) are swapped",
+        ),
         (GYROS & on, "SPI bus", "5 V and ground of the gyros, and SCK, MOSI, MISO on the ICSP plug"),
     ):
         if group.bit_count() > 1 and group & mute == group:
@@ -145,6 +165,13 @@ def _device_finding(reports: BoardReports, device: Healthy, fault: Fault) -> Fin
     what, remedy = f"failed ({fault.name.lower().replace('_', ' ')})", "check its wires and its supply"
     if text := part_text(part_in(reports, device), identity_in(reports, device), device, fault):
         what, remedy = text
+    elif (
+        fault == Fault.NO_ANSWER
+        and device in UNKNOWN_PART_REMEDIES
+        and reports.parts
+        and part_in(reports, device) is Part.NONE
+    ):
+        what, remedy = "does not answer", UNKNOWN_PART_REMEDIES[device]
     elif device == Healthy.PRESSURE:
         what, remedy = _PRESSURE_TEXTS.get(fault, (what, remedy))
     elif fault == Fault.NO_ANSWER and device in ADDRESSES:

@@ -77,6 +77,10 @@ def _echo_lines(reports: BoardReports, e: Electrical) -> list[Finding]:
             what = "is open: no ranger's Echo drives it, or it is shorted to 5 V"
             remedy = "normal before the ranger is wired; else check Echo's wire, and the ranger's 5 V and ground"
             findings.append(Finding(Severity.NOTE, echo, what, remedy))
+        elif not ones and device is Healthy.RANGER_RIGHT and part_in(reports, device) is Part.NONE:
+            what = "reads zero: the LED of an Arduino Micro, or a ranger's Echo whose trigger does not arrive"
+            remedy = f"normal before the ranger is wired; else check Trig's wire ({trigger}), and that Trig and Echo are not exchanged"
+            findings.append(Finding(Severity.NOTE, echo, what, remedy))
         elif not ones:
             what = "is driven low and never rises: a ranger's Echo is connected, but no trigger reaches it"
             remedy = f"check Trig's wire ({trigger}), and that Trig and Echo are not exchanged"

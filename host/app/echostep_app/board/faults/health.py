@@ -45,6 +45,7 @@ from echostep_app.board.faults.findings import (
     span_s,
     status_field,
 )
+from echostep_app.board.faults.part_faults import part_text
 
 LEAST_MV = 4100  # a measurement below it is below the 4.5 V that 16 MHz need, although the reference is off by up to 9 % [data sheet]
 SAG = 0.08  # of the usual voltage: 0.4 V, more than the drop on a good cable
@@ -143,6 +144,8 @@ def _intermittent_findings(reports: BoardReports) -> list[Finding]:
             if fault is Fault.BAD_VALUE and (device & GYROS or part_in(reports, device) is Part.BMP390):
                 what = f"sent wrong bits {count} time{'s' if count > 1 else ''} {span}"
                 remedy = WRONG_BITS_REMEDY
+            if fault is Fault.TOO_LATE and part_in(reports, device) is Part.PULSE:
+                what, remedy = part_text(Part.PULSE, 0, device, fault) or (what, remedy)
             findings.append(Finding(Severity.WARNING, name_of(reports, device), what, remedy))
     return findings
 

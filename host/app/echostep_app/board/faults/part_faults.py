@@ -23,9 +23,14 @@ _PULSE = {
         "does not answer its trigger",
         "check its 5 V and ground, and that trigger and echo are not exchanged (left A2 and D4, right A3 and D13)",
     ),
+    Fault.TOO_LATE: (
+        "holds its Echo line high while there is no echo, and had to be pulled low",
+        "this module has no timeout of its own and does not fit: use an RCWL-1601",
+    ),
     Fault.ALWAYS_READY: (
         "its echo line stays high",
-        "check its plug, since the board pulls an open line up, and the line for a short to 5 V (left D4, right D13)",
+        "check its plug, since the board pulls an open line up, and the line for a short to 5 V (left D4, right D13); "
+        "a module without a timeout of its own does not fit",
     ),
 }
 _MAXSONAR = {
@@ -48,6 +53,15 @@ _ICM20649 = {
         "answers, but its data-ready line does not pulse",
         "check the wire from its INT1 to D4; else it may have lost its supply for a moment: check its plug",
     ),
+}
+_TRIGGERED = (
+    "check its 5 V and ground, Trig ({}) and Echo ({}); of a ranger on I2C, its address 0x{} (firmware/README.md)"
+)
+UNKNOWN_PART_REMEDIES = {  # of a place in which nothing was found since the start: a part of either kit may be meant
+    Healthy.RANGER_LEFT: _TRIGGERED.format("A2", "D4", "70"),
+    Healthy.RANGER_RIGHT: _TRIGGERED.format("A3", "D13", "71"),
+    Healthy.COMPASS: "check its plug and 5 V, SDA (D2) and SCL (D3)",
+    Healthy.PRESSURE: f"{_SPI}; its chip select is D6",
 }
 _TEXTS: dict[Part, dict[Fault, tuple[str, str]]] = {
     Part.BMP390: _BMP390,

@@ -40,6 +40,7 @@ from echostep_app.simulation.kits import Kit
 from echostep_app.simulation.people.tours import room_tour
 from echostep_app.simulation.people.walker import Person, Waypoint
 from echostep_app.simulation.scenario import DEMO_WAYPOINTS, Scenario, start_of
+from echostep_app.simulation.stimulus import TEMPERATURE_C
 
 WATCHED_SPEED = 4.0  # times real time, on a terminal: a walk of 90 s is seen in 22 s
 # Chunks that are tracked together in a run that is watched: 20 ms of the walk: no step is shown later
@@ -56,7 +57,7 @@ class DemoOptions:
     """`board_command` starts the program that plays the board; `guide` adds beacons and guidance to the end of the walk.
 
     `plan_path` None: the demo's plan. `speed`: times real time; None: `WATCHED_SPEED` on a terminal, else as fast as it can.
-    `kit`: the parts on the board; those of 2026 need the real firmware in the simulator.
+    `kit`: the parts on the board; those of 2026 need the real firmware in the simulator. `celsius`: of the air.
     """
 
     seed: int
@@ -65,6 +66,7 @@ class DemoOptions:
     plan_path: Path | None = None
     speed: float | None = None
     kit: Kit = Kit.PAPERS
+    celsius: float = TEMPERATURE_C
 
 
 def demo(options: DemoOptions, output: OutputOptions) -> None:
@@ -120,7 +122,10 @@ def _track(
         session.prepare(SIMULATION)
         with progress_line("Simulating the walk"):
             person = Person() if options.plan_path is None else Person(corner_m=TOUR_CORNER_M)
-            scenario = Scenario(plan, waypoints, options.seed, boards[0], person, kit=options.kit, foot_board=boards[1])
+            scenario = Scenario(
+                plan, waypoints, options.seed, boards[0], person, kit=options.kit, foot_board=boards[1],
+                celsius=options.celsius,
+            )  # fmt: skip
         scenario.write_truth(claim(output.folder / "truth.csv"))
         session.show_truth(TruePath.of(scenario.truth, plan))
         metadata = run_metadata(plan, start, options.seed, "simulated walk, simulated sensors", source=SIMULATED)

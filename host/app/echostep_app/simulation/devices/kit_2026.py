@@ -20,7 +20,7 @@ from echostep.plan import Level
 from echostep_app.simulation.devices.board_sensors import HARD_IRON, Scp1000Model
 from echostep_app.simulation.people.attitude import rotations
 from echostep_app.simulation.people.walker import RATE_HZ, Walk
-from echostep_app.simulation.stimulus import EXTENDED_ROW, BoardSensors
+from echostep_app.simulation.stimulus import EXTENDED_ROW, TEMPERATURE_C, BoardSensors
 from echostep_app.simulation.world.acoustics import PULSE_RANGER
 from echostep_app.simulation.world.magnetic_field import EARTH, EARTH_T, MagneticField
 
@@ -44,12 +44,14 @@ class Kit2026Sensors:
 
     def __init__(
         self, walk: Walk, levels: Sequence[Level], sync_t_s: Floats, rng: np.random.Generator,
-        magnetism: MagneticField | None = None,
+        magnetism: MagneticField | None = None, celsius: float = TEMPERATURE_C,
     ) -> None:  # fmt: skip
         self._walk, self._magnetism = walk, magnetism
         self._rng, *rest = rng.spawn(3)
         barometer = Scp1000Model(rest[1], noise_pa=PRESSURE_NOISE_PA)
-        self._plain = BoardSensors(walk, levels, sync_t_s, rest[0], magnetism, None, PULSE_RANGER, barometer)
+        self._plain = BoardSensors(
+            walk, levels, sync_t_s, rest[0], magnetism, None, PULSE_RANGER, barometer, celsius=celsius
+        )
         self._gyro_bias = GYRO_BIAS_RAD_S * self._rng.standard_normal((3, 3))
         self._force_bias = FORCE_BIAS_M_S2 * self._rng.standard_normal((3, 3))
         self._tilt = rotations(np.array([[*(BELT_TILT_RAD * self._rng.standard_normal(2)), 0.0]]))[0]  # belt -> level

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: MIT
+"""The ten things that a first bench would have found after the first ten: each is a fault of the twin, on one board or the other."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from board_runs import Bench, needs_twin, pings
+from echostep.board import messages as m
+from echostep.board.reports import BoardReports
+from echostep_app.board.faults.electrical import electrical_findings
+from echostep_app.board.subscription import SUBSCRIBE_ELECTRICAL
+from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC
+
+pytestmark = needs_twin
+BARE = ("bmp390", "imu_thigh", "imu_calf", "imu_belt", "pulse_left", "pulse_right", "lis3mdl")
+ECHO_US = 5831
+LEAST_OPEN = 0.5
+
+
+def rows(milliseconds: int, echo_us: int = 0) -> np.ndarray[tuple[int], np.dtype[np.void]]:
+    """Rows of somebody who stands: walls on both sides with this echo, or in the open."""
+    table = np.zeros(milliseconds, EXTENDED_ROW)
+    table["row"]["sync_us"], table["row"]["pressure"], table["row"]["own_us"] = NO_SYNC, 405_296, echo_us
+    table["motion"]["force"][:, :, 2] = 4_098
+    return table
+
+
+def begin(bench: Bench, *faults: str) -> None:
+    """A board with these faults, asked for all reports."""
+    for fault in faults:
+        bench.fault(fault)
+    bench.run(300, rows(300))
+    bench.ask(SUBSCRIBE_ELECTRICAL)
+
+
+def electrical(bench: Bench) -> list[str]:
+    """What the newest levels of the inputs say."""
+    reports = BoardReports()
+    for message in bench.messages:
+        reports.add(message)
+    return [str(finding) for finding in electrical_findings(reports)]
+
+
+@pytest.mark.parametrize("reads", ["ones", "zeros", "noise"])
+def test_a_led_on_d13_is_no_ranger(bench: Bench, reads: str) -> None:
+    """N1: a Micro's LED holds the bare pin between the thresholds; nothing is wrong with it."""
+    begin(bench, "kit=2026", f"d13_led={reads}", *(f"{name}=absent" for name in BARE))
+    bench.run(4_000, rows(4_000))
+    assert not [text for text in electrical(bench) if text.startswith("D13") and "driven low" in text]
+
+
+def test_a_module_without_a_timeout_hears_the_wall_again(bench: Bench) -> None:
+    """N2: such a module holds its line until an echo comes, which none does: its side was dead from the first open door on."""
+    begin(bench, "kit=2026", "pulse_left=no_timeout")
+    bench.run(2_000, rows(2_000, ECHO_US))
+    open_side = pings(bench.run(3_000, rows(3_000)), m.Ranger.LEFT)
+    back = pings(bench.run(3_000, rows(3_000, ECHO_US)), m.Ranger.LEFT)
+    assert Counter(p.outcome for p in open_side)[m.Outcome.NO_ECHO] >= 6
+    assert [p.outcome for p in back[2:]].count(m.Outcome.ECHO) == len(back) - 2 > 30
+
+
+@pytest.mark.parametrize(
+    ("module", "words"), [("no_timeout", "holds its Echo line high"), ("endless", "its echo line stays high")]
+)
+def test_a_module_that_holds_its_line_is_named(bench: Bench, module: str, words: str) -> None:
+    begin(bench, "kit=2026", f"pulse_left={module}")
+    bench.run(2_000, rows(2_000, ECHO_US))
+    bench.run(4_000, rows(4_000))
+    assert [
+        x for x in bench.all_findings if x.startswith(f"left ranger (pulse ranger): {words}") and "does not fit" in x
+    ]
+
+
+@pytest.mark.parametrize(("cycle_us", "least_hz"), [(61_000, 30.0), (66_000, 28.0), (70_000, 26.5), (75_000, 25.0)])
+def test_the_schedule_follows_the_measured_cycle(bench: Bench, cycle_us: int, least_hz: float) -> None:
+    """N4: above 66 ms the sides lost their half period, and from 73 ms on every ping failed."""
+    begin(bench, "kit=papers", f"srf_cycle={cycle_us}")
+    bench.run(2_000)
+    found = [x for x in bench.run(20_000) if isinstance(x, m.Ping)]
+    assert {p.outcome for p in found} == {m.Outcome.ECHO}
+    assert len(found) >= 20 * least_hz
+    left, right = (np.array([p.ticks for p in found if p.ranger == side]) * 5e-4 for side in m.Ranger)
+    after_ms = right - left[np.searchsorted(left, right) - 1]
+    period_ms = float(np.median(np.diff(left)))
+    assert np.abs(after_ms[1:-1] - period_ms / 2).max() < 9.0  # twice the jitter
+
+
+@pytest.mark.parametrize("cycle_us", [61_000, 66_000, 70_000])
+def test_echoes_beyond_the_range_say_open(bench: Bench, cycle_us: int) -> None:
+    """A ranger that listens for 60 ms hears the other one's burst and the hall's reverberation as walls at 6.7 to 11 m."""
+    begin(bench, "kit=papers", f"srf_cycle={cycle_us}", "srf_window=60000", "fading=50")
+    table = rows(10_000)["row"].copy()
+    table["cross_us"][:, 0] = 9_000
+    bench.run(500, table[:500])
+    left = pings(bench.run(10_000, table), m.Ranger.LEFT)
+    assert np.mean([p.outcome == m.Outcome.NO_ECHO for p in left]) > LEAST_OPEN
+
+
+@pytest.mark.parametrize("errors", [1, 3])
+def test_one_wrong_byte_in_a_thousand_is_seen(bench: Bench, errors: int) -> None:
+    """N3: status bits and the reserved byte are known in every sample."""
+    begin(bench, "kit=2026", f"spi_errors={errors}")
+    bench.run(6_000, rows(6_000))
+    assert [text for text in bench.all_findings if "(LSM6DSO): sent wrong bits" in text]
+
+
+def test_a_part_that_is_confused_by_i3c_answers_after_each_reset(bench: Bench) -> None:
+    """N5: after a reset of the processor alone, such a part's identity reads 0 until I3C is off."""
+    begin(bench, "kit=2026", "bootloader=none", *(f"imu_{place}=i3c" for place in ("thigh", "calf", "belt")))
+    for _ in range(3):
+        bench.fault("reset=external")
+        bench.run(2_500, rows(2_500))
+    gyros = m.Healthy.THIGH | m.Healthy.CALF | m.Healthy.BELT
+    assert bench.status.healthy & gyros == gyros
+
+
+def test_a_ghost_after_a_silence_is_a_silence(bench: Bench) -> None:
+    """N6: the ping after one without an echo reads 8 cm; half of the pings that say "open" were lost to it."""
+    begin(bench, "kit=2026", "pulse_left=ghost")
+    found = pings(bench.run(4_000, rows(4_000)), m.Ranger.LEFT)
+    assert Counter(p.outcome for p in found[2:]) == {m.Outcome.NO_ECHO: len(found) - 2}
+
+
+def test_an_idle_bus_does_not_stop_the_board(bench: Bench) -> None:
+    """N8: where the flag of a suspended bus comes back at once, the board still pings."""
+    begin(bench, "kit=2026", "suspend_repeats=on")
+    bench.run(1_000, rows(1_000, ECHO_US))
+    before = len(bench.board.trace)
+    bench.fault("usb=suspend")
+    bench.run(5_000, rows(5_000, ECHO_US))
+    triggers = [text for _, text in bench.board.trace[before:] if text.startswith("trigger")]
+    bench.fault("usb=resume")
+    bench.fault("suspend_repeats=off")
+    assert len(triggers) > 145
+    assert len(pings(bench.run(2_000, rows(2_000, ECHO_US)), m.Ranger.LEFT)) > 25
+    bench.fault("usb=suspend")
+    bench.run(1_000, rows(1_000))
+    bench.fault("usb=resume")
+    bench.ask(SUBSCRIBE_ELECTRICAL)
+    bench.run(2_500, rows(2_500))
+    assert next(x for x in reversed(bench.messages) if isinstance(x, m.BoardHealth)).suspends == 2
+
+
+def lamp_changes(bench: Bench, milliseconds: int) -> int:
+    """How often the lamp changes."""
+    before = len(bench.board.trace)
+    bench.run(milliseconds, rows(milliseconds, ECHO_US))
+    return sum(text.startswith("lamp") for _, text in bench.board.trace[before:])
+
+
+def test_the_lamp_beats_slowly_on_a_board_that_is_well(bench: Bench) -> None:
+    """N9: a beat says that it lives; a fast one, that a part is missing."""
+    begin(bench, "kit=2026")
+    bench.run(2_000, rows(2_000, ECHO_US))
+    assert 9 <= lamp_changes(bench, 5_000) <= 10
+    bench.fault("imu_calf=absent")
+    bench.run(1_000, rows(1_000))
+    assert 70 <= lamp_changes(bench, 5_000) <= 80
