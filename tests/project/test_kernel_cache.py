@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -18,6 +18,7 @@ from echostep import kernel_cache
 from echostep.errors import EchostepError
 from echostep.jit import kernel
 from echostep.kernel_cache import PACKAGE, cache_folder
+from echostep.kernel_files import DAMAGED, CheckedFiles
 from users import ANOTHER_USER, AS_ANOTHER_USER, needs_another_user
 from waiting import PATIENCE_S
 
@@ -65,7 +66,7 @@ def run(package: Path, name: str, unit: float) -> str:
 def test_an_update_in_place_is_compiled_anew_and_the_old_kernels_go(tmp_path: Path) -> None:
     package = tmp_path / "echostep"
     package.mkdir()
-    for name in ("errors", "jit", "kernel_cache"):
+    for name in ("errors", "jit", "kernel_cache", "kernel_files"):
         shutil.copy(f"{PACKAGE}/{name}.py", package)
     (package / "__init__.py").touch()
     (package / "main.py").write_text(MAIN.format(name="Square"))
@@ -180,3 +181,60 @@ def test_where_nothing_can_be_written_the_error_names_what_to_give(monkeypatch: 
     kernel_cache._temporary_folder.cache_clear()
     with pytest.raises(EchostepError, match="give one in NUMBA_CACHE_DIR"):
         kernel_cache._temporary_folder()
+
+
+KEPT = """
+from echostep.jit import kernel
+@kernel
+def twice(x):
+    return 2.0 * x
+print(twice(21.0), twice(2), len(twice.stats.cache_hits), len(twice.stats.cache_misses))
+"""
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "nothing": lambda content: content[:0],
+    "half": lambda content: content[: len(content) // 2],
+    "zeros": lambda content: bytes(len(content)),
+    "its end": lambda content: content[:-1],
+    "zeros inside": lambda content: content[:100] + bytes(64) + content[164:],
+}
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", [*DAMAGES, "a folder", "gone"])
+def test_a_damaged_file_of_kernels_is_put_aside_and_made_anew(tmp_path: Path, kind: str, damage: str) -> None:
+    (tmp_path / "kept.py").write_text(KEPT)
+
+    def start() -> tuple[list[str], str]:
+        done = subprocess.run(
+            [sys.executable, "-m", "kept"], capture_output=True, text=True, timeout=5.0 * PATIENCE_S, check=False, cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": f"{tmp_path}/cache"},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        return done.stdout.split(), done.stderr
+
+    assert start() == (["42.0", "4.0", "0", "2"], "")
+    assert start() == (["42.0", "4.0", "2", "0"], "")
+    files = sorted(tmp_path.glob(f"cache/*/*.{kind}"))
+    assert files
+    for file in files:
+        content = file.read_bytes()
+        file.unlink()
+        if damage == "a folder":
+            file.mkdir()
+        elif damage != "gone":
+            file.write_bytes(DAMAGES[damage](content))
+    printed, said = start()
+    assert printed == ["42.0", "4.0", "0", "2"]
+    assert said.splitlines() == ([] if damage == "gone" else [f"echostep: {DAMAGED}"])
+    assert start() == (["42.0", "4.0", "2", "0"], "")
+    assert len([*tmp_path.glob("cache/*/*.damaged")]) == (0 if damage == "gone" else len(files))
+
+
+def test_an_index_of_another_numba_is_no_damage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = CheckedFiles(str(tmp_path), "k", "stamp")
+    file._version = "0.1"
+    file.save("key", 1)
+    assert CheckedFiles(str(tmp_path), "k", "stamp").load("key") is None
+    assert file.load("key") == 1
+    assert capsys.readouterr().err == ""

@@ -23,6 +23,7 @@ from numba.extending import models, register_model, typeof_impl
 from numba.np import linalg
 
 from echostep.kernel_cache import cache_folder, on_compiling
+from echostep.kernel_files import check_files
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -109,9 +110,11 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
     before = setting["CACHE_DIR"]
     setting["CACHE_DIR"] = str(cache_folder(function.__code__.co_filename) or before)
     try:
-        return cast("Function", njit(**options)(function))
+        compiled = njit(**options)(function)
     finally:
         setting["CACHE_DIR"] = before
+    check_files(compiled)
+    return cast("Function", compiled)
 
 
 class _Compilations(event.Listener):
