@@ -231,7 +231,13 @@ def test_a_program_that_holds_the_port_is_named(tmp_path: Path) -> None:
 def test_the_udev_rules_are_printed_and_recognised(tmp_path: Path) -> None:
     done = doctor("--udev")
     assert done.returncode == 0
-    for part in ('SYMLINK+="echostep echostep-$attr{serial}"', 'SYMLINK+="echostep-mtx"', 'ATTR{latency_timer}="1"'):
+    for part in (
+        'SYMLINK+="echostep-$attr{serial}"',
+        'ENV{ECHOSTEP}="echostep-foot"',
+        'SYMLINK+="$env{ECHOSTEP}"',
+        'SYMLINK+="echostep-mtx"',
+        'ATTR{latency_timer}="1"',
+    ):
         assert part in done.stdout
     assert len(ports.rules_findings((tmp_path,))) == 1
     (tmp_path / ports.RULES).write_text(done.stdout)
