@@ -54,10 +54,11 @@ def test_what_is_wrong_is_said_in_words() -> None:
     for words in (
         "barometer: EEPROM check failed",
         "power-cycle the board, check 3.3 V and the level shifter",
-        "compass: does not answer at I2C address 0x60",
+        "compass: does not answer",
+        "check its plug and 5 V, SDA (D2) and SCL (D3)",
         "calf gyro: failed its self-test",
         "belt gyro: does not answer",
-        "firmware 1.6.0",
+        "firmware 1.7.0",
         "thigh gyro: answers, 20 degC, self-test passed",
         "belt gyro: FAILS",
     ):
