@@ -81,6 +81,7 @@ bool usb_take_opening(void);                          /* true once after each op
 bool usb_write(const uint8_t *bytes, uint8_t length); /* all bytes; false: no room, none was taken */
 int16_t usb_read(void);                               /* one byte, or -1 */
 bool usb_bootloader_wanted(void);                     /* whether the port has been closed at 1200 Bd for 0.12 s */
+void usb_name_foot(void);                             /* the interface's string is "foot" instead of "belt" */
 uint8_t usb_suspends(void);                           /* how often the host has suspended the bus since the start; wraps */
 
 /* The echo lines of pulse rangers, side 0 left, 1 right: both edges are captured by a timer each. The left line is also SyncOut: its

@@ -59,6 +59,7 @@ static bool seek(uint32_t now)
 	}
 	parts_found(PLACE_FOOT, PART_ICM20649, ICM20649_IDENTITY);
 	configuration.sensors = 0;
+	usb_name_foot();
 	icm20649_reset(CHIP);
 	health.foot_state = FOOT_STATE_STARTING;
 	is_set = false;

@@ -5,6 +5,7 @@
 #include <avr/pgmspace.h> /* PROGMEM */
 #include <util/atomic.h>  /* ATOMIC_BLOCK */
 #include "../version.h"   /* release number */
+#include "../board.h"     /* usb_name_foot */
 #include "usb.h"
 
 /* pid.codes reserves 0x1209:0x0001 for tests; hosts know the board by its strings of maker and product. */
@@ -19,7 +20,7 @@ static const uint8_t device_descriptor[] PROGMEM = {
 #define CONFIGURATION_SIZE 67
 static const uint8_t configuration_descriptor[] PROGMEM = {
 	9, 2, CONFIGURATION_SIZE, 0, 2, 1, 0, 0x80, 50,      /* two interfaces, bus powered, 100 mA */
-	9, 4, 0, 0, 1, 2, 2, 0, 0,                           /* communications interface, abstract control model, no AT commands */
+	9, 4, 0, 0, 1, 2, 2, 0, 4,                           /* communications interface, abstract control model, no AT commands; its string */
 	5, 0x24, 0, 0x10, 0x01,                              /* CDC 1.10 */
 	5, 0x24, 1, 0, 1,                                    /* no call management */
 	4, 0x24, 2, 2,                                       /* line coding and line state */
@@ -36,6 +37,16 @@ static const uint8_t maker[] PROGMEM = { 18, 3, 'e', 0, 'c', 0, 'h', 0, 'o', 0, 
 static const uint8_t product[] PROGMEM = {
 	26, 3, 's', 0, 'e', 0, 'n', 0, 's', 0, 'o', 0, 'r', 0, ' ', 0, 'b', 0, 'o', 0, 'a', 0, 'r', 0, 'd', 0,
 };
+
+/* Which board of a kit it is: read after the port was debounced for 100 ms, when the foot's part has been sought, so that udev gives each board its name. */
+static const uint8_t foot[] PROGMEM = { 10, 3, 'f', 0, 'o', 0, 'o', 0, 't', 0 };
+static const uint8_t belt[] PROGMEM = { 10, 3, 'b', 0, 'e', 0, 'l', 0, 't', 0 };
+static bool is_foot;
+
+void usb_name_foot(void)
+{
+	is_foot = true;
+}
 
 /* The chip's lot, wafer and place on it: ten bytes of the signature row, of which the data sheet is silent and which LUFA reads too. */
 #define CHIP_NUMBER 0x0Eu
@@ -81,6 +92,8 @@ static struct descriptor find(uint16_t value)
 		return (struct descriptor){ maker, sizeof maker };
 	case 0x0302:
 		return (struct descriptor){ product, sizeof product };
+	case 0x0304:
+		return (struct descriptor){ is_foot ? foot : belt, sizeof foot };
 	case 0x0303:
 		return (struct descriptor){ 0, SERIAL_SIZE };
 	default:

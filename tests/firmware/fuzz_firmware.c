@@ -80,6 +80,7 @@ bool usb_write(const uint8_t *bytes, uint8_t length)
 }
 int16_t usb_read(void) { uint8_t byte = next(); return byte & 1 ? (int16_t)next() : (int16_t)-1; }
 bool usb_bootloader_wanted(void) { return false; }
+void usb_name_foot(void) {}
 uint8_t usb_suspends(void) { return 0; }
 
 bool capture_take_edge(struct capture_edge *out)

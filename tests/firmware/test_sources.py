@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import configparser
 import re
 import shutil
 import subprocess
@@ -39,6 +40,19 @@ def test_each_model_cites_a_place_or_stands_in_the_list_from_memory() -> None:
     assert sources.keys() == files
     for name, source in sources.items():
         assert source == "-" or PLACE.search(source) or f"`{name}`" in memory or "nets of" in source, name
+
+
+def test_platformio_builds_the_same_sources_with_the_same_options() -> None:
+    ini = configparser.ConfigParser()
+    ini.read(ROOT / "platformio.ini")
+    make = (ROOT / "firmware/Makefile").read_text()
+    (optimize,) = re.findall(r"^OPTIMIZE := (.*)$", make, flags=re.M)
+    (linked,) = re.findall(r"\$\(OPTIMIZE\) (-mrelax \S+) -o", make)
+    board, flags = ini["env:micro"], ini["env:micro"]["build_flags"].split()
+    assert flags == ["-std=c11", "-DCLOCK_START=0ul", *optimize.split(), *linked.split()]
+    assert "-std=c11" in make
+    assert re.findall(r"wildcard ([^)]+)\)", make)[:2] == re.findall(r"<(\S+)>", board["build_src_filter"])
+    assert ini["platformio"]["src_dir"] == "firmware"
 
 
 @needs_twin

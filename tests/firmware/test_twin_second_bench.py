@@ -145,6 +145,14 @@ def test_an_idle_bus_does_not_stop_the_board(bench: Bench) -> None:
     assert next(x for x in reversed(bench.messages) if isinstance(x, m.BoardHealth)).suspends == 2
 
 
+@pytest.mark.parametrize(("kit", "name"), [("2026", "belt"), ("foot", "foot")])
+def test_two_boards_of_a_kit_have_two_names(bench: Bench, kit: str, name: str) -> None:
+    """N10: both claimed /dev/echostep; udev knows them by the interface's string, which the host reads last."""
+    begin(bench, f"kit={kit}", "host_hub=on")  # which debounces the port for 100 ms, as hosts do [USB 2.0, 7.1.7.3]
+    bench.run(1_000, rows(1_000))
+    assert [text for _, text in bench.board.trace if text.startswith("usb interface")] == [f"usb interface {name}"]
+
+
 def lamp_changes(bench: Bench, milliseconds: int) -> int:
     """How often the lamp changes."""
     before = len(bench.board.trace)

@@ -48,6 +48,7 @@ def test_the_matrix_has_a_fault_of_each_switch() -> None:
         "glitch",
         "echo_resistor",
         "jtag_fuse",
+        "d13_led",
     }
     of_the_host = {"host_system", "host_hub"}  # tests/firmware/test_twin_usb.py
     assert known - used <= like_others | without_an_effect_alone | of_another_board | of_the_wiring | of_the_host

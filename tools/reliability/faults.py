@@ -80,12 +80,19 @@ FAULTS = (
     TwinFault(()),
     *_device_faults(),
     *_kit_faults(),
+    *(TwinFault((f"srf_cycle={us}",)) for us in (66_000, 70_000)),
+    TwinFault(("srf_window=60000", "fading=50")),
+    *(
+        TwinFault(("kit=2026", f"pulse_left={module}"), ("pulse_left=ok", "kit=papers"))
+        for module in ("no_timeout", "ghost")
+    ),
     TwinFault(("sda=stuck",)),
     TwinFault(("sda=stuck_forever",), ("sda=ok",)),
     TwinFault(("scl=stuck",), ("scl=ok",)),
     TwinFault(("usb=reset",)),
     TwinFault(("usb=configure",)),
     TwinFault(("usb=suspend",), ("usb=resume",)),
+    TwinFault(("suspend_repeats=on", "usb=suspend"), ("usb=resume", "suspend_repeats=off")),
     TwinFault(("usb=unplug",), ("usb=plug",)),
     TwinFault(("usb_errors=100",)),
     TwinFault(("host=stall",), ("host=read",)),

@@ -93,11 +93,11 @@ static void take_descriptor(void)
 		find_endpoints();
 	if (request[3] == CONFIGURATION && received >= 18)
 		bench_trace("usb first interface: class %02x protocol %02x", d[14], d[16]);
-	if (request[3] != STRING || request[2] != 3)
+	if (request[3] != STRING || (request[2] != 3 && request[2] != 4))
 		return;
 	for (unsigned k = 2; k + 1 < received && k / 2 < sizeof text; k += 2)
 		text[k / 2 - 1] = (char)d[k];
-	bench_trace("usb serial number %s", text);
+	bench_trace("usb %s %s", request[2] == 3 ? "serial number" : "interface", text);
 }
 
 /* Requests that change the address or the data toggles take effect on both ends. */
