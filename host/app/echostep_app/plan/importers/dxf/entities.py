@@ -14,11 +14,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from shapely.geometry.base import BaseGeometry
+
 from echostep.errors import EchostepError
 from echostep_app.extras import require
+from echostep_app.plan.importers.dxf.clips import clipped, shown_of
 from echostep_app.plan.importers.parsing import read_bytes
 from echostep_app.plan.importers.report import ImportReport
 
+BINARY = b"AutoCAD Binary DXF"
 MOST_PARTS = 300_000  # entities in blocks
 DEEPEST_BLOCK = 16
 REMOVED = re.compile(r"Removed invalid DXF entity (\w+)\(")  # ezdxf's message on entities of an unknown kind
@@ -29,12 +33,17 @@ def read_drawing(file: Path, report: ImportReport) -> Any:
     """Read a drawing, repaired where ezdxf can; raises EchostepError when the file is not a drawing."""
     require(f"{file}: DXF", "ezdxf")
     from ezdxf import recover
+    from ezdxf.filemanagement import readfile
     from ezdxf.lldxf.const import DXFError
 
     raw = read_bytes(file)
     logging.getLogger("ezdxf").setLevel(logging.CRITICAL)  # no messages about single values; the audit counts them
     try:
-        drawing, auditor = recover.read(io.BytesIO(raw))
+        if raw.startswith(BINARY):
+            drawing = readfile(str(file))
+            auditor = drawing.audit()
+        else:
+            drawing, auditor = recover.read(io.BytesIO(raw))
     except Exception as error:  # a damaged drawing breaks ezdxf in many ways
         reason = " ".join(str(error).split())[:200] if isinstance(error, DXFError | OSError) else type(error).__name__
         raise EchostepError(f"{file}: not a DXF drawing: {reason}") from error
@@ -67,10 +76,11 @@ class VisibleEntities:
 
     def __call__(self, whole: Callable[[str], bool]) -> Iterator[tuple[Any, str]]:
         """Each entity with its layer; layer "0" inside a block means the block's layer. Blocks are expanded unless `whole(layer)`."""
-        stack = [(entity, "0", 0) for entity in reversed(list(self._space))]
+        stack: list[tuple[Any, str, int, BaseGeometry | None]]
+        stack = [(entity, "0", 0, None) for entity in reversed(list(self._space))]
         count = 0
         while stack:
-            entity, outer, depth = stack.pop()
+            entity, outer, depth, shown = stack.pop()
             count += depth > 0
             if count > MOST_PARTS:
                 raise EchostepError(f"{self._file}: its blocks have more than {MOST_PARTS} parts")
@@ -82,13 +92,15 @@ class VisibleEntities:
                 self._report.leave_out(f"{entity.dxftype()} on {layer[:40]} ({hidden})")
                 continue
             if is_block:
-                stack += [(attribute, layer, depth + 1) for attribute in entity.attribs]
+                stack += [(attribute, layer, depth + 1, shown) for attribute in entity.attribs]
                 if self._is_reference(entity):
                     continue
-            yield entity, layer
+                shown = shown_of(entity, shown)
+            for seen in [entity] if shown is None or is_block else clipped(entity, shown):
+                yield seen, layer
             if is_block and not whole(layer):
                 inner = parts(entity, self._file) if depth < DEEPEST_BLOCK else []
-                stack += [(part, layer, depth + 1) for part in inner]
+                stack += [(part, layer, depth + 1, shown) for part in inner]
                 if not inner and not entity.attribs:
                     self._report.leave_out(f"INSERT without contents on {layer[:40]}")
 
