@@ -22,7 +22,7 @@ from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
-from echostep_app.plan.importers.summary import size_m
+from echostep_app.plan.importers.summary import doors_in_gaps, size_m
 from needs_data import data_or_skip
 
 DEG = 1e-5  # degrees of the small houses on the Earth
@@ -57,7 +57,7 @@ def plan_of(walls: list[list[float]], georeference: dict[str, Any] | None = None
 
 def thick_house(t: float, x: float, y: float) -> list[list[float]]:
     """A house of 8 m by 6 m of walls of this thickness, with an open doorway of 0.9 m in the east."""
-    outside = [[0, 6, 8, 6], [8, 0, 0, 0], [0, 0, 0, 6], [8, 6, 8, 3.4], [8, 2.5, 8, 0]]
+    outside: list[list[float]] = [[0, 6, 8, 6], [8, 0, 0, 0], [0, 0, 0, 6], [8, 6, 8, 3.4], [8, 2.5, 8, 0]]
     inside = [
         [8 - t, 6 - t, t, 6 - t],
         [t, t, 8 - t, t],
@@ -80,7 +80,7 @@ def test_an_open_doorway_in_a_thick_wall_is_a_way_wherever_the_house_lies(t: flo
 
 
 def test_a_narrow_closet_is_no_end_of_a_thick_wall() -> None:
-    closet = [
+    closet: list[list[float]] = [
         [0.0, 0, 0, 2],
         [0.6, 0, 0.6, 2],
         [0, 0, 0.6, 0],
@@ -317,3 +317,39 @@ def test_a_binary_drawing_is_the_same_as_a_text(tmp_path: Path) -> None:
         (tmp_path / "b.dxf").write_bytes(content[:cut])
         with pytest.raises(EchostepError, match=r"b\.dxf: "):
             imported(tmp_path / "b.dxf")
+
+
+@pytest.mark.parametrize("name", ["leaf_closed_wall", "leaf_closed_gap"])
+def test_leaves_drawn_closed_found(found: Path, name: str) -> None:
+    plan, report = imported(found / f"leaf/{name}.dxf")
+    assert doors_in_gaps(plan.levels[0]) == 2
+    assert ("2 doors lie where a wall is drawn through" in " ".join(report.doubts)) == (name == "leaf_closed_wall")
+
+
+@pytest.mark.parametrize("name", ["storeys_frame", "storeys_frame_detail"])
+def test_storeys_side_by_side_found(found: Path, name: str) -> None:
+    assert "looks like 3 storeys beside each other" in " ".join(imported(found / f"storeys/{name}.dxf")[1].doubts)
+
+
+@pytest.mark.parametrize("angle", [0.0, 180.0])
+@pytest.mark.parametrize("at", [(0.0, 0.0), (500.0, 300.0)])
+def test_a_leaf_drawn_closed_in_a_wall_that_is_drawn_through(
+    tmp_path: Path, angle: float, at: tuple[float, float]
+) -> None:
+    drawing = new("R2010", units=6)
+    space = drawing.modelspace()
+    x, y = at
+    for a, b, c, d in ((0, 0, 12, 0), (12, 0, 12, 8), (12, 8, 0, 8), (0, 8, 0, 0), (0, 4, 12, 4)):
+        space.add_line((x + a, y + b), (x + c, y + d), dxfattribs={"layer": "WALLS"})
+    block = drawing.blocks.new("D")
+    block.add_line((0, 0), (0.9, 0))
+    block.add_arc((0, 0), 0.9, 0, 90)
+    space.add_blockref("D", (x + 5, y + 4), dxfattribs={"layer": "DOORS", "rotation": angle})
+    drawing.saveas(tmp_path / "a.dxf")
+    plan, report = imported(tmp_path / "a.dxf")
+    ends = sorted((5.0, 5.9 if angle == 0.0 else 4.1))
+    frame = plan.levels[0].walls.reshape(-1, 2).min(axis=0)
+    (door,) = plan.levels[0].doors
+    assert sorted((door.line[0] - frame[0], door.line[2] - frame[0])) == pytest.approx(ends, abs=0.01)
+    assert door.line[1] - frame[1] == pytest.approx(4.0, abs=0.01)
+    assert "1 door lies where a wall is drawn through" in " ".join(report.doubts)
