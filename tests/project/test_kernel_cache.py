@@ -16,9 +16,8 @@ import pytest
 import echostep
 from echostep import kernel_cache
 from echostep.errors import EchostepError
-from echostep.jit import kernel
+from echostep.jit import DAMAGED, CheckedFiles, kernel
 from echostep.kernel_cache import PACKAGE, cache_folder
-from echostep.kernel_files import DAMAGED, CheckedFiles
 from users import ANOTHER_USER, AS_ANOTHER_USER, needs_another_user
 from waiting import PATIENCE_S
 
@@ -66,7 +65,7 @@ def run(package: Path, name: str, unit: float) -> str:
 def test_an_update_in_place_is_compiled_anew_and_the_old_kernels_go(tmp_path: Path) -> None:
     package = tmp_path / "echostep"
     package.mkdir()
-    for name in ("errors", "jit", "kernel_cache", "kernel_files"):
+    for name in ("errors", "jit", "kernel_cache"):
         shutil.copy(f"{PACKAGE}/{name}.py", package)
     (package / "__init__.py").touch()
     (package / "main.py").write_text(MAIN.format(name="Square"))

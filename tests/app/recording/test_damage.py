@@ -281,3 +281,15 @@ def test_other_programs_read_what_we_write(tmp_path: Path) -> None:
     made(tmp_path, "repair")
     with (tmp_path / "repair.mcap").open("rb") as file:
         assert sum(1 for _ in make_reader(file).iter_messages()) == len(CHUNKS)
+
+
+def test_a_repaired_recording_is_read_by_its_index_of_chunks(tmp_path: Path) -> None:
+    """@mcap/core's indexed reader, Rerun and `mcap cat` find messages by it alone."""
+    made(tmp_path, "repair")
+    for reverse in (False, True):
+        with (tmp_path / "repair.mcap").open("rb") as file:
+            summary = make_reader(file).get_summary()
+            assert summary is not None
+            assert summary.chunk_indexes
+            file.seek(0)
+            assert sum(1 for _ in make_reader(file).iter_messages(reverse=reverse)) == len(CHUNKS)

@@ -21,7 +21,7 @@ START = b"\x94\xc3"
 class Air:
     """Delivers what one node sends to all others, and keeps it."""
 
-    def __init__(self, preset: str = "SHORT_FAST") -> None:
+    def __init__(self, preset: str | int = "SHORT_FAST") -> None:
         self.preset = preset
         self.nodes: list[MeshNodePlayer] = []
         self.sent: list[MeshPacket] = []
@@ -106,7 +106,10 @@ class MeshNodePlayer:
         self.tell(told)
         told = FromRadio()
         told.config.lora.use_preset = True
-        told.config.lora.modem_preset = told.config.lora.ModemPreset.Value(self._air.preset)
+        preset = self._air.preset
+        told.config.lora.modem_preset = (
+            preset if isinstance(preset, int) else told.config.lora.ModemPreset.Value(preset)
+        )
         self.tell(told)
         told = FromRadio()
         told.channel.role = 1  # the primary one

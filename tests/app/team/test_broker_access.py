@@ -6,13 +6,18 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Callable
 from contextlib import closing
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
+from echostep.plan import NO_PLAN
+from echostep_app.team.commander import table
 from echostep_app.team.endpoint import parse_endpoint
 from echostep_app.team.inbox import ListenerThread
 from echostep_app.team.mqtt.publisher import Listener
+from echostep_app.team.roster import Roster
 from free_ports import free_port
 from team.network import at, box_to
 from team.team_broker import Broker, Certificates, needs_broker
@@ -150,3 +155,21 @@ def _people(rule: Callable[..., None]) -> None:
         "addClientRole bo marks 1",
     ):
         rule(*command.split())
+
+
+def test_a_broker_of_qos_0_gets_reports_that_count_as_sent(tmp_path: Path) -> None:
+    """It announces that in its answer, and ends the connection of who sends another one."""
+    words: list[str] = []
+    with Broker(tmp_path, "max_qos 0") as broker:
+        box = box_to(f"mqtt://127.0.0.1:{broker.port}", words)
+        box.offer(at(1.0))
+        assert until(lambda: box.counts.sent == 1), words
+        box.close()
+    assert not words
+
+
+def test_a_broker_that_delivers_nothing_may_forbid_reading() -> None:
+    """Mosquitto grants the subscription."""
+    shown = StringIO()
+    Console(file=shown, width=200).print(table(Roster(), NO_PLAN, 0.0, connected=True))
+    assert "does the broker's access list let this user read echostep/#?" in shown.getvalue()

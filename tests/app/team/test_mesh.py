@@ -357,3 +357,16 @@ def test_without_the_package_there_is_a_sentence(monkeypatch: pytest.MonkeyPatch
 def test_what_is_no_port_is_named(url: str) -> None:
     with pytest.raises(EchostepError, match="expected mesh:///dev/PORT"):
         parse_endpoint(url)
+
+
+@pytest.mark.parametrize("preset", [10, 14, 99])
+def test_a_preset_of_newer_firmware_sends_seldom_and_says_so(preset: int) -> None:
+    said: list[str] = []
+    with Air(preset) as air:
+        node = air.node()
+        transport = MeshTransport(parse_endpoint(f"mesh://{node.port}"), ("red", "anna"), said.append)
+        transport.open()
+        transport.send(report())
+        assert until(lambda: air.sent)
+        transport.close(ended=True)
+    assert "the node's modem preset is not known here" in said[0]

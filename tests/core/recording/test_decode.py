@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+import random
 import struct
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from hypothesis import strategies as st
 import command_line
 from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep.recording import Decoder, as_json, read_capture
+from echostep.recording import Decoder, as_json, port_of_bytes, read_capture
 from echostep.xsens import MTDATA, MTDATA2, MtMessage, MtSample, OutputFormat, encode_frame
 from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import BY_LENGTH, CONFIGURED, GIVEN, OutputFormats
@@ -286,3 +287,27 @@ def test_the_options_are_read_or_named(tmp_path: Path) -> None:
         "--output-mode 99999: a number up to 0xFFFF"
         in command_line.echostep("decode", path, "--output-mode", "99999").stderr
     )
+
+
+@pytest.mark.parametrize("counter", [0, 1])
+def test_utc_time_is_what_the_configuration_says_and_never_taken_for_angles(tmp_path: Path, counter: int) -> None:
+    date = struct.pack(">IH6B", 990_000_000, 2026, 11, 27, 10, 0, 2, 7)
+    rows = [
+        struct.pack(">9f", 0, 0, 9.81, 0, 0, 0, 0.4, 0.1, -0.7) + date + struct.pack(">H", k)[: 2 * counter]
+        for k in range(50)
+    ]
+    sent = b"".join(encode_frame(0x32, row) for row in rows)
+    device = struct.pack(">IHHI8x", 0x00300001, len(rows[0]), 2, 2 + counter)
+    (tmp_path / "a.bin").write_bytes(encode_frame(0x0D, bytes(96) + struct.pack(">H", 1) + device) + sent)
+    samples = [as_json(m) for m in read_capture(tmp_path / "a.bin") if isinstance(m, MtMessage)][1:]
+    assert len(samples) == 50
+    assert samples[-1]["packets"] == [{"name": "utc", "value": [990_000_000, 2026, 11, 27, 10, 0, 2, 7]}]
+    assert samples[-1].get("counter") == (49 if counter else None)
+    (tmp_path / "a.bin").write_bytes(sent)  # without the configuration
+    assert all("quaternion" not in as_json(m) for m in read_capture(tmp_path / "a.bin"))
+
+
+def test_bytes_with_frames_by_chance_are_no_capture(tmp_path: Path) -> None:
+    for seed in range(5):
+        (tmp_path / "a.bin").write_bytes(random.Random(seed).randbytes(300_000))
+        assert port_of_bytes(tmp_path / "a.bin") is None

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Longitude and latitude -> metres on the plan, and back.
+"""Longitude and latitude (WGS 84) -> metres on the plan, and back.
 
-In: degrees (WGS 84 unless the georeference names another system). Out: map metres. Azimuthal equidistant projection about the plan's origin, accurate
-to 1 mm over a kilometre.
+In: degrees. Out: map metres. Azimuthal equidistant projection about the plan's origin, which may be stated in another datum; accurate to 1 mm over
+a kilometre.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan import Georeference, Plan
 from echostep_app.extras import require
+
+WGS84 = "EPSG:4326"
 
 
 class EarthTransform:
@@ -32,10 +34,15 @@ class EarthTransform:
             ) from error
         if not crs.is_geographic:
             raise ValueError(f"georeference.crs: {georeference.crs[:60]!r} is not in longitude and latitude")
-        lon, lat = georeference.longitude_deg, georeference.latitude_deg
+        stated = georeference.longitude_deg, georeference.latitude_deg
+        lon, lat = Transformer.from_crs(crs, WGS84, always_xy=True).transform(*stated)
+        if not (np.isfinite(lon) and np.isfinite(lat)):
+            raise ValueError(
+                f"georeference.origin: {stated[0]:g}, {stated[1]:g} is outside of {georeference.crs[:60]!r}"
+            )
         local = CRS.from_dict({"proj": "aeqd", "lon_0": lon, "lat_0": lat, "datum": "WGS84", "units": "m"})
-        self._to_east_north = Transformer.from_crs(crs, local, always_xy=True)
-        self._to_degrees = Transformer.from_crs(local, crs, always_xy=True)
+        self._to_east_north = Transformer.from_crs(WGS84, local, always_xy=True)
+        self._to_degrees = Transformer.from_crs(local, WGS84, always_xy=True)
         c, s = np.cos(georeference.rotation_rad), np.sin(georeference.rotation_rad)
         self._rotation = np.array([[c, -s], [s, c]])  # map -> east, north
 
@@ -52,6 +59,17 @@ class EarthTransform:
         """(n, 2) map metres -> (n, 2) longitude, latitude in degrees."""
         east, north = self._rotation @ xy_m.T
         return np.column_stack(self._to_degrees.transform(east, north))
+
+
+def is_projected(name: str) -> bool:
+    """Whether a coordinate system is in metres; False for one that pyproj does not know."""
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError
+
+    try:
+        return not CRS.from_user_input(name).is_geographic
+    except CRSError:
+        return False
 
 
 def earth_of(plan: Plan) -> EarthTransform | None:

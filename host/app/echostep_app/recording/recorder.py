@@ -27,6 +27,7 @@ from echostep_app.recording.background_writer import BackgroundWriter
 # All assumed.
 WAIT_NS = 500_000_000  # arrival time between two waits of `wait_for_disk`
 RAW_LIMIT = 1 << 26  # bytes of chunks that may wait for a full disk: an hour and a half
+CHUNK_BYTES = 1 << 16  # of a chunk of an indexed file: what a flipped bit may cost there
 DERIVED_LIMIT = 1 << 20  # unwritten bytes from which derived messages are skipped: they can be computed again
 
 
@@ -48,13 +49,17 @@ class DerivedMessage:
     body: Mapping[str, Any]
 
 
-def begin_file(file: IO[bytes]) -> Writer:
-    """A writer of records without chunks, as all our files have them: a flipped bit costs one message, not all that were compressed with it."""
+def begin_file(file: IO[bytes], *, indexed: bool = False) -> Writer:
+    """A writer of records without chunks: a flipped bit, or the end of a run without notice, costs one message.
+
+    `indexed`: in chunks that are not compressed, for other programs that read by an index of chunks alone.
+    """
     writer = Writer(
         file,
         compression=CompressionType.NONE,
         index_types=IndexType.ALL,
-        use_chunking=False,
+        use_chunking=indexed,
+        chunk_size=CHUNK_BYTES,
         enable_data_crcs=True,
     )
     writer.start(profile="", library=LIBRARY)

@@ -38,6 +38,9 @@ DROPPED = (
     "where", "walked m", "looks", "nearest m", "to start", "floor", "±95% m", "x, y m", "note",
 )  # in this order where the terminal is too narrow  # fmt: skip
 WORDS = ("name", "floor", "where", "nearest m")  # may be cut short at their end; a cut number would be another number
+NOTHING_HEARD = (
+    "nothing heard yet: does a tracker publish there, and does the broker's access list let this user read echostep/#?"
+)
 STYLES = {
     MemberState.MAYDAY: "bold blink white on red", MemberState.ASKED: "bold white on red", MemberState.LOST: "bold white on red",
     MemberState.STALE: "bold red", MemberState.UNCERTAIN: "yellow",
@@ -75,6 +78,8 @@ def table(
     below = [Text(f"and {len(members) - len(shown)} more", style="grey62")] if len(shown) < len(members) else []
     if not connected:
         below.append(Text("no connection to the broker", style="bold red"))
+    elif not roster.received:
+        below.append(Text(NOTHING_HEARD, style="yellow"))
     if roster.rejected:
         below.append(Text(f"rejected: {rejected(roster)}", style="grey62"))
     return Group(grid, *below)

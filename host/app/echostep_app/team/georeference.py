@@ -7,7 +7,6 @@ In: a plan with a georeference, a position, a heading. Out: `ReportedPlace`. Own
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -25,7 +24,7 @@ class GroundPlane:
             raise ValueError("the plan has no georeference")
         self._rotation_rad = plan.georeference.rotation_rad
         self._uncertainty_m = plan.uncertainty_m or 0.0
-        self._earth = EarthTransform(replace(plan.georeference, crs="EPSG:4326"))
+        self._earth = EarthTransform(plan.georeference)
 
     def place(self, x_m: float, y_m: float, sd_m: float, heading_rad: float | None) -> ReportedPlace:
         """A position on the plan, on Earth.

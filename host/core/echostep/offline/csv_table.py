@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """One reader for CSV files of samples: named columns of numbers, in any of three dialects.
 
-In: a text file of any origin, whose first line names the columns, separated by comma, semicolon (then with decimal commas) or tab. Out: `CsvTable`
-with the wanted columns, NaN where there is no number; ValueError for a file that is not such a table, or a line that is too long. Owns nothing.
+In: a text file of any origin, whose first line names the columns, separated by comma, or by semicolon or tab (then also with decimal commas).
+Out: `CsvTable` with the wanted columns, NaN where there is no number; ValueError for a file that is not such a table, or a line that is too long.
+Owns nothing.
 """
 
 from __future__ import annotations
@@ -103,7 +104,7 @@ def read_rows(
     for number, line in enumerate(lines, start=first):
         if not line.strip():
             continue
-        cells = (line.replace(",", ".") if separator == ";" else line).split(separator)
+        cells = (line if separator == "," else line.replace(",", ".")).split(separator)
         fits = not any(map(str.strip, cells[len(names) :]))
         row = [number_of(cells[k]) if fits and 0 <= k < len(cells) else math.nan for k in columns]
         values.extend(row)

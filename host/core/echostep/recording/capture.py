@@ -24,6 +24,9 @@ from echostep.xsens import FrameReader, MtMessage, MtxReader
 from echostep.xsens.frames import LONGEST
 from echostep.xsens.message import MessageReader, as_object
 
+LEAST_SHARE = (
+    0.1  # of the bytes of a port are in frames: by chance a checksum of one byte is right in one of 256 places; assumed
+)
 READ_BYTES = 1 << 16  # of one read of the file: many frames, little memory
 HEAD_BYTES = 1 << 20  # of a port, by which the output format of legacy data is found; assumed
 BOARD_FRAME, MT_FRAME = 10, 5  # approximate bytes of a frame besides the body, to compare what two readers understood
@@ -91,19 +94,24 @@ def _head(chunks: Iterable[tuple[str, bytes]]) -> bytes:
     return bytes(head)
 
 
-def port_of_bytes(path: Path) -> str | None:
-    """The port whose reader understands more bytes of the first blocks in which any byte is understood; None if no byte is."""
+def port_of_bytes(path: Path, least_share: float = LEAST_SHARE) -> str | None:
+    """The port whose reader understands more of the first HEAD_BYTES, and more than a share of them; None if neither does."""
     board, mt = BoardReader(), FrameReader(LONGEST)
+    understood, seen = {BOARD: 0, MTX: 0}, 0
     for received in _blocks(path):
-        understood = {BOARD: BOARD_FRAME * len(board.feed(received)), MTX: _bytes_of_frames(mt, received)}
-        if any(understood.values()):
-            return max(understood, key=lambda port: understood[port])
-    return MTX if _bytes_of_frames(mt, b"", ended=True) else None
+        understood[BOARD] += BOARD_FRAME * len(board.feed(received))
+        understood[MTX] += _bytes_of_frames(mt, received)
+        seen += len(received)
+        if seen >= HEAD_BYTES and (least_share or any(understood.values())):
+            break
+    understood[MTX] += _bytes_of_frames(mt, b"", ended=True)
+    port = max(understood, key=lambda port: understood[port])
+    return port if understood[port] > least_share * seen else None
 
 
 def _port_that_sends(path: Path) -> str:
-    """The same; raises EchostepError instead of returning None."""
-    if (port := port_of_bytes(path)) is None:
+    """The port of which any frame is found: whoever decodes a file knows what it is. Raises EchostepError where there is none."""
+    if (port := port_of_bytes(path, 0.0)) is None:
         raise EchostepError(f"{path}: neither board frames nor Xbus frames nor an MCAP recording")
     return port
 

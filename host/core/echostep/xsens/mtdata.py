@@ -2,7 +2,7 @@
 """MTData (0x32), the measurement message of the MTi and the MTx, in every output mode and setting of an MTx.
 
 In: payloads, and the output format that was set on the device, as the message does not contain it. Out: values in SI units. Owns nothing.
-Order of a payload: temperature, calibrated (accel, gyro, mag), orientation, auxiliary, status, sample counter [Manual 5.3.3, MTData].
+Order of a payload: temperature, calibrated (accel, gyro, mag), orientation, auxiliary, status, UTC time, sample counter [Manual 5.3.3, MTData].
 """
 
 from __future__ import annotations
@@ -21,16 +21,19 @@ from echostep.xsens.sample import MtSample
 # Output mode [Manual 5.3.3, SetOutputMode; status: CMT].
 TEMPERATURE, CALIBRATED, ORIENTATION, AUXILIARY, STATUS, RAW = 0x0001, 0x0002, 0x0004, 0x0008, 0x0800, 0x4000
 # Output settings [Manual 5.3.3, SetOutputSettings; the second analog input: CMT].
-SAMPLE_COUNTER = 0x0001
+SAMPLE_COUNTER, UTC = 0x0001, 0x0002
 QUATERNION, EULER, MATRIX, ORIENTATION_MASK = 0x0000, 0x0004, 0x0008, 0x000C
 NO_ACCEL, NO_GYRO, NO_MAG = 0x0010, 0x0020, 0x0040
 FLOAT, FIXED_12_20, FORMAT_MASK = 0x0000, 0x0100, 0x0300
 NO_ANALOG_1, NO_ANALOG_2 = 0x0400, 0x0800
 
 _MODES = TEMPERATURE | CALIBRATED | ORIENTATION | AUXILIARY | STATUS | RAW
-_SETTINGS = 0x0003 | ORIENTATION_MASK | NO_ACCEL | NO_GYRO | NO_MAG | FORMAT_MASK | NO_ANALOG_1 | NO_ANALOG_2
+_SETTINGS = (
+    SAMPLE_COUNTER | UTC | ORIENTATION_MASK | NO_ACCEL | NO_GYRO | NO_MAG | FORMAT_MASK | NO_ANALOG_1 | NO_ANALOG_2
+)
 _UNIT_12_20 = 2.0**-20
 _ORIENTATION_VALUES = {QUATERNION: 4, EULER: 3, MATRIX: 9}
+UTC_TIME = struct.Struct(">IH6B")  # ns, year, month, day, hour, minute, second, validity
 RAW_BYTES = 20  # accel, gyro, mag and temperature as u16, not calibrated
 
 # Columns of decoded values, the same for both measurement messages; NaN for a quantity that was not sent.
@@ -59,7 +62,7 @@ class OutputFormat:
         """Raise ValueError for reserved bits, and for raw data together with any other."""
         if self.mode & ~_MODES:
             raise ValueError(f"output mode 0x{self.mode:04X} is not a mode of an MTx")
-        if self.settings & ~_SETTINGS or self.settings & 0x0003 > SAMPLE_COUNTER:
+        if self.settings & ~_SETTINGS:
             raise ValueError(f"output settings 0x{self.settings:08X} are not settings of an MTx")
         if self.settings & ORIENTATION_MASK not in _ORIENTATION_VALUES:
             raise ValueError("output settings: quaternion, Euler angles or matrix")
@@ -94,13 +97,17 @@ class OutputFormat:
         """Number of analog inputs that are sent."""
         return (not self.settings & NO_ANALOG_1) + (not self.settings & NO_ANALOG_2) if self.mode & AUXILIARY else 0
 
+    @property
+    def end_bytes(self) -> int:
+        """Bytes of UTC time and counter at the end."""
+        return UTC_TIME.size * (self.settings & UTC > 0) + 2 * (self.settings & SAMPLE_COUNTER > 0)
+
     @cached_property
     def length(self) -> int:
         """Bytes of a payload."""
-        counter = 2 * (self.settings & SAMPLE_COUNTER)
         if self.mode & RAW:
-            return RAW_BYTES + counter
-        return 4 * self.numbers + 2 * self.analog_inputs + (self.mode & STATUS > 0) + counter
+            return RAW_BYTES + self.end_bytes
+        return 4 * self.numbers + 2 * self.analog_inputs + (self.mode & STATUS > 0) + self.end_bytes
 
 
 PROJECT = OutputFormat(CALIBRATED | ORIENTATION, SAMPLE_COUNTER | QUATERNION | FLOAT)  # 54 bytes
@@ -136,10 +143,14 @@ def decode_mtdata(rows: Octets, output: OutputFormat) -> Decoded:
 
 
 def rest_of(payload: bytes, output: OutputFormat) -> dict[str, list[int] | int]:
-    """Fields of a payload besides `Decoded`, as sent: `raw` (accel, gyro, mag, temperature), `analog` (one or two inputs), `status`."""
-    if output.mode & RAW:
-        return {"raw": list(struct.unpack_from(">10H", payload))}
+    """Fields of a payload besides `Decoded`, as sent: `raw` (accel, gyro, mag, temperature), `analog` (one or two inputs), `status`,
+    `utc` (ns, year, month, day, hour, minute, second, validity).
+    """
     fields: dict[str, list[int] | int] = {}
+    if output.settings & UTC:
+        fields["utc"] = list(UTC_TIME.unpack_from(payload, output.length - output.end_bytes))
+    if output.mode & RAW:
+        return {"raw": list(struct.unpack_from(">10H", payload)), **fields}
     begin = 4 * output.numbers
     if output.analog_inputs:
         fields["analog"] = list(struct.unpack_from(f">{output.analog_inputs}H", payload, begin))

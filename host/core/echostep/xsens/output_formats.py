@@ -4,7 +4,7 @@
 In: frames of a capture's beginning, and what the caller knows. Out: the format by bus and length, and how it was found. Owns the formats found.
 
 It is, in this order: given; from a Configuration message or the answers to ReqOutputMode and ReqOutputSettings in the capture; or the simplest
-format of that length with which the values are possible.
+format of that length with which the values are possible. A capture that states a format which is not read has none.
 """
 
 from __future__ import annotations
@@ -57,6 +57,7 @@ MOST = ((ACCEL, 200.0), (GYRO, 40.0), (MAG, 20.0))
 STRONGEST_FIELD = 4.0  # median: some iron, no magnet
 MEAN_ACCEL = (5.0, 20.0)  # m/s2
 AIR_C = (-40.0, 85.0)  # [MTx data sheet, operating temperature]
+TINY = 1e-20  # in any unit: no sensor shows less
 UNIT_ERROR = 0.01  # of |q| = 1
 GIVEN, CONFIGURED, BY_LENGTH = "given", "by a configuration message of the capture", "by the length and the values"
 
@@ -111,6 +112,13 @@ class OutputFormats:
             return _first(self.mode, self.settings, rows, GIVEN)
         told_mode, told_settings = self._told.get(bus, (None, None))
         configured = None if told_mode is None else _first(told_mode, told_settings, rows, CONFIGURED)
+        if (
+            configured is None
+            and told_mode is not None
+            and told_settings is not None
+            and not _is_known(told_mode, told_settings)
+        ):
+            return None
         return configured or _first(None, None, rows, BY_LENGTH)
 
 
@@ -131,7 +139,7 @@ def _first(mode: int | None, settings: int | None, rows: Octets, how: str) -> Fo
     for output in formats:
         if (mode is None or output.mode == mode) and (settings is None or output.settings == settings):
             whole = mode is not None and settings is not None
-            if whole or _is_possible(decode_mtdata(rows, output), output):
+            if whole or (_is_measured(rows, output) and _is_possible(decode_mtdata(rows, output), output)):
                 return Found(output, how)
     return None
 
@@ -143,6 +151,15 @@ def _known_formats(mode: int, settings: int, length: int) -> tuple[OutputFormat,
     except ValueError:
         return ()
     return (output,) if output.length == length else ()
+
+
+def _is_known(mode: int, settings: int) -> bool:
+    """Whether an MTx has this format."""
+    try:
+        OutputFormat(mode, settings)
+    except ValueError:
+        return False
+    return True
 
 
 @cache
@@ -187,6 +204,15 @@ def _complexity(output: OutputFormat) -> tuple[int, ...]:
         output.mode,
         output.settings,
     )
+
+
+def _is_measured(rows: Octets, output: OutputFormat) -> bool:
+    """Whether the floats of most messages are zero or larger than TINY: those of a date are smaller."""
+    if output.settings & FIXED_12_20:
+        return True
+    with np.errstate(invalid="ignore"):
+        size = np.abs(np.ascontiguousarray(rows[:, : 4 * output.numbers]).view(">f4").astype(np.float64))
+    return bool(((size == 0.0) | ~(size < TINY)).all(axis=1).mean() >= POSSIBLE)
 
 
 def _is_possible(decoded: Decoded, output: OutputFormat) -> bool:

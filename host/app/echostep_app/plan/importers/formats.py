@@ -16,7 +16,7 @@ from typing import Any
 from echostep.errors import EchostepError
 from echostep.plan import Plan, load_plan
 from echostep_app.plan.importers.hints import Hints
-from echostep_app.plan.importers.parsing import FORMATS
+from echostep_app.plan.importers.parsing import FORMATS, GML
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.writer import plan_json
 
@@ -47,7 +47,7 @@ NEXT_STEPS = {  # formats that are not read, and what to do
     ".dwf": "DWF: save the drawing that it was made of as DXF",
     **dict.fromkeys((".rvt", ".rfa", ".pln", ".skp", ".3dm"), "a model of its own program: export it there as IFC, or a floor plan as DXF"),
     **dict.fromkeys((".ifcxml", ".ifcjson"), "export it as IFC (STEP, .ifc)"),
-    ".gml": "IndoorGML or CityGML is not read: export the building as IFC, IMDF or DXF",
+    ".gml": GML,
     **dict.fromkeys((".shp", ".gpkg", ".kml", ".kmz"), "export it as DXF (QGIS: Project, Import/Export), or map it as OpenStreetMap indoor tags"),
 }  # fmt: skip
 OTHERS = {

@@ -17,8 +17,8 @@ from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Floats
 from echostep.fields import LIMIT_M
-from echostep_app.plan.georeference import EarthTransform
-from echostep_app.plan.importers.parsing import text, typed
+from echostep_app.plan.georeference import EarthTransform, is_projected
+from echostep_app.plan.importers.parsing import PROJECTED, text, typed
 
 
 def features(tree: Any) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -26,8 +26,17 @@ def features(tree: Any) -> Iterator[tuple[str, dict[str, Any]]]:
     tree = typed(tree, "the file", dict)
     if tree.get("type") != "FeatureCollection":
         raise ValueError(f"type: {str(tree.get('type'))[:40]!r} is not a FeatureCollection")
+    _check_crs(tree.get("crs"))
     for i, feature in enumerate(typed(tree.get("features"), "features", list)):
         yield f"features[{i}]", typed(feature, f"features[{i}]", dict)
+
+
+def _check_crs(crs: Any) -> None:
+    """Raise ValueError for the older field crs [GeoJSON 2008, 3] when it names a projected system."""
+    about = crs.get("properties") if isinstance(crs, dict) else None
+    name = str(about.get("name"))[:60] if isinstance(about, dict) else ""
+    if name and is_projected(name):
+        raise ValueError(f"crs {name}: {PROJECTED}")
 
 
 def properties(feature: dict[str, Any], where: str) -> dict[str, Any]:

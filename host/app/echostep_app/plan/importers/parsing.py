@@ -8,12 +8,15 @@ In: a path. Out: bytes, text, or parsed JSON; every error is an EchostepError th
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
 from echostep.errors import EchostepError
 from echostep.fields import short
 
+PROJECTED = "are these metres of a projected system? save it as EPSG:4326 (longitude, latitude)"
+GML = "IndoorGML or CityGML is not read: export the building as IFC, IMDF or DXF"
 FORMATS = "DXF, IFC, IMDF (zip or folder), OpenStreetMap (.osm, .xml, .geojson, JSON of Overpass), ROS (map.yaml), WRLD (main.json), biba (core.txt)"
 LARGEST_BYTES = 512 * 2**20
 
@@ -54,7 +57,9 @@ def parse_json(raw: str, name: str) -> Any:
 def number(value: Any, where: str, limit: float, unit: str) -> float:
     """A finite number within +-limit."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= limit:
-        raise ValueError(f"{where}: {short(value)} is not a finite number within {limit:.0f} {unit}")
+        is_number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        grid = f": {PROJECTED}" if unit == "degrees" and is_number else ""
+        raise ValueError(f"{where}: {short(value)} is not a finite number within {limit:.0f} {unit}{grid}")
     return float(value)
 
 

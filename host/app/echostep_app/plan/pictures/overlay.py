@@ -65,7 +65,7 @@ def overlays(plan: Plan) -> list[Overlay]:
             f"plan {plan.name}: an overlay needs a georeference: add longitude and latitude of the map's origin to the plan"
         )
     try:
-        earth = EarthTransform(replace(plan.georeference, rotation_rad=0.0, crs="EPSG:4326"))
+        earth = EarthTransform(replace(plan.georeference, rotation_rad=0.0))
     except ValueError as error:
         raise EchostepError(f"plan {plan.name}: {error}") from error
     turned = north_up(plan)

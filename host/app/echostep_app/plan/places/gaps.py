@@ -12,14 +12,18 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from echostep.arrays import Floats
+from echostep.arrays import Bools, Floats, Ints
 from echostep.plan import Door, Level
 
 # Assumed:
 NARROWEST_M, WIDEST_M = 0.5, 1.6  # of an opening that a door could close
-LONGEST_JAMB_M = 0.3  # a shorter wall at the end of another one is a jamb: the longer one still ends free
+LONGEST_JAMB_M = 0.301  # a shorter wall at the end of another one is a jamb: the longer one still ends free
+LONGEST_FACED_M = (
+    1.2  # the same of a jamb that another one of its length faces across an opening: old walls are that thick
+)
 TOUCH_M = 0.02  # walls with a smaller distance touch
 SAME_M = 0.1  # two gaps with nearer middles are one, found from both its ends
+STRAIGHT = 0.99  # cosine of the angle up to which a face runs straight away from its opening
 THICKNESS_M = 0.05  # an opening ends at this distance from its own wall's end at the earliest
 
 
@@ -52,7 +56,8 @@ def with_gaps(level: Level) -> Level:
 def _free_ends(walls: Floats, lines: Floats, level: Level) -> tuple[Floats, Floats]:
     """Ends (k, 2) of walls that touch neither a longer wall than a jamb nor a listed door, and the direction (k, 2) in which their wall points."""
     length = np.hypot(*(walls[:, 2:] - walls[:, :2]).T)
-    long = length > LONGEST_JAMB_M
+    jamb = (length <= LONGEST_JAMB_M) | _faced(walls, length)
+    long = ~jamb
     ends = walls[long].reshape(-1, 2)
     along = (walls[long, 2:] - walls[long, :2]) / length[long, None]
     outward = np.stack((-along, along), axis=1).reshape(-1, 2)
@@ -62,8 +67,49 @@ def _free_ends(walls: Floats, lines: Floats, level: Level) -> tuple[Floats, Floa
     free[end[end // 2 != other]] = False
     if level.doors:
         doors = shapely.linestrings(np.array([door.line for door in level.doors]).reshape(-1, 2, 2))
-        free[shapely.STRtree(doors).query(points, predicate="dwithin", distance=LONGEST_JAMB_M)[0]] = False
+        free[
+            shapely.STRtree(doors).query(
+                points, predicate="dwithin", distance=length[jamb].max(initial=LONGEST_JAMB_M)
+            )[0]
+        ] = False
     return ends[free], outward[free]
+
+
+def _faced(walls: Floats, length: Floats) -> Bools:
+    """Which walls (n,) are jambs of an opening in a thick wall: at both ends a longer wall runs straight back, and an equal jamb lies across."""
+    short = np.flatnonzero((length > LONGEST_JAMB_M) & (length <= LONGEST_FACED_M))
+    faced = np.zeros(len(walls), dtype=bool)
+    along = (walls[short, 2:] - walls[short, :2]) / length[short, None]
+    normal = np.stack((-along[:, 1], along[:, 0]), axis=1)
+    middle = 0.5 * (walls[short, :2] + walls[short, 2:])
+    one, other = shapely.STRtree(shapely.points(middle)).query(
+        shapely.points(middle), predicate="dwithin", distance=WIDEST_M + TOUCH_M
+    )
+    across = middle[other] - middle[one]
+    away = (across * normal[one]).sum(axis=1)
+    equal = np.abs(length[short][one] - length[short][other]) < TOUCH_M
+    parallel = np.abs((along[one] * normal[other]).sum(axis=1)) < TOUCH_M
+    level = np.abs((across * along[one]).sum(axis=1)) < TOUCH_M
+    fits = equal & parallel & level & (np.abs(away) >= NARROWEST_M)
+    back = _runs_back(walls, length, short, normal)
+    for side, sign in enumerate((1.0, -1.0)):
+        opposite = one[fits & (sign * away > 0.0)]
+        faced[short[opposite]] |= back[side, :, opposite].all(axis=1)
+    return faced
+
+
+def _runs_back(walls: Floats, length: Floats, short: Ints, normal: Floats) -> Bools:
+    """Whether at each end of the short walls a longer wall runs against their normal, and along it: (2 directions, 2 ends, k)."""
+    runs = np.zeros((2, 2, len(short)), dtype=bool)
+    ends = shapely.STRtree(shapely.points(walls.reshape(-1, 2)))
+    corner, end = ends.query(shapely.points(walls[short].reshape(-1, 2)), predicate="dwithin", distance=TOUCH_M)
+    wall, k = end // 2, corner // 2
+    step = (walls[wall, 2:] - walls[wall, :2]) * np.where(end % 2, -1.0, 1.0)[:, None]
+    reach = (step * normal[k]).sum(axis=1) / np.maximum(length[wall], length[short[k]])
+    for side, sign in enumerate((-1.0, 1.0)):
+        straight = sign * reach > STRAIGHT
+        runs[side, corner[straight] % 2, k[straight]] = True
+    return runs
 
 
 def _once(gaps: Floats) -> list[list[float]]:

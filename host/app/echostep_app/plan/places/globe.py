@@ -7,7 +7,7 @@ The projection bends by 1 to 2 mm within 100 m of the middle of the plan, by 0.2
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -46,7 +46,7 @@ def globe_of(plan: Plan) -> Globe | None:
     points = np.concatenate(corners) if corners else np.zeros((1, 2))
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     try:
-        return _globe(replace(plan.georeference, crs="EPSG:4326"), float(middle[0]), float(middle[1]))
+        return _globe(plan.georeference, float(middle[0]), float(middle[1]))
     except ValueError:
         return None
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Writes a new recording from the messages of another one.
 
-In: metadata, messages, damage of the other one. Out: an MCAP file as the recorder writes it, the messages numbered again. Owns the new file.
+In: metadata, messages, damage of the other one. Out: an MCAP file with an index of chunks, which other programs need; the messages are numbered
+again. Owns the new file.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class RewrittenRecording:
         self._schema_ids: dict[int, int] = {0: 0}  # by number in the source; 0: no schema
         self._channels: dict[tuple[str, str, int], int] = {}  # by topic, encoding and schema number in the source
         self._file = os.fdopen(create(path), "wb")
-        self._writer = begin_file(self._file)
+        self._writer = begin_file(self._file, indexed=True)
         self._sequence = 0
 
     def write_metadata(self, metadata: Mapping[str, str]) -> None:

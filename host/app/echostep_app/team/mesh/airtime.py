@@ -32,6 +32,8 @@ PRESETS = {
     "VERY_LONG_SLOW": Modem(12, 62.5e3, 8),
 }  # fmt: skip
 
+SLOWEST = PRESETS["LONG_SLOW"]  # of those in use: assumed for a preset that is not known
+
 
 def airtime_s(modem: Modem, payload: int) -> float:
     """Seconds on air of a packet with so many bytes of payload, explicit header and checksum [Semtech, AN1200.13, 4]."""

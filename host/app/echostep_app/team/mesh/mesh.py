@@ -22,7 +22,7 @@ from echostep.errors import EchostepError
 from echostep.plan import Plan
 from echostep_app.ports.port_faults import PORT_FAULTS
 from echostep_app.team.endpoint import Endpoint
-from echostep_app.team.mesh.airtime import INTERVAL_S, PRESETS, Modem, interval_s
+from echostep_app.team.mesh.airtime import INTERVAL_S, PRESETS, SLOWEST, Modem, interval_s
 from echostep_app.team.mesh.mesh_report import MOST_NAMES, Unpacker, pack
 from echostep_app.team.messages.report import Report, ReportedPlace, encode
 from echostep_app.team.outbox import Delivery
@@ -105,11 +105,12 @@ class MeshNode:
         self._broken = self._broken or interface is self._interface
 
 
-def _modem(lora: Any) -> Modem:
-    """The modem of a node's settings."""
+def _modem(lora: Any) -> Modem | None:
+    """The modem of a node's settings; None for a preset without known figures, as newer firmware has."""
     if not lora.use_preset and lora.spread_factor:
         return Modem(lora.spread_factor, 1e3 * (lora.bandwidth or 250), max(lora.coding_rate, 5))
-    return PRESETS.get(lora.ModemPreset.Name(lora.modem_preset), PRESETS["LONG_FAST"])
+    known = lora.ModemPreset.DESCRIPTOR.values_by_number.get(lora.modem_preset)
+    return PRESETS.get(known.name if known else "")
 
 
 class MeshTransport:
@@ -126,6 +127,11 @@ class MeshTransport:
     def open(self) -> None:
         """Connect to the node; raises OSError."""
         self._node = MeshNode(self._endpoint.host)
+        if self._node.modem is None:
+            self._print_line(
+                f"{self._endpoint}: the node's modem preset is not known here: reports go out as seldom as by LONG_SLOW; "
+                "pip install -U meshtastic, or set a preset as SHORT_FAST"
+            )
 
     def send(self, report: Report) -> Delivery:
         """Send the report if a packet is due, or at once when it brings a new alarm; otherwise it is left out."""
@@ -137,7 +143,7 @@ class MeshTransport:
         if now_s < self._due_s and alarm == self._alarm:
             return Delivery.LEFT_OUT
         payload = pack(report, self._number, time.time())
-        wait_s = interval_s(node.modem, len(payload), self._endpoint.wearers or WEARERS)
+        wait_s = interval_s(node.modem or SLOWEST, len(payload), self._endpoint.wearers or WEARERS)
         if self._number == 0 and wait_s > INTERVAL_S:
             wearers = self._endpoint.wearers or WEARERS
             self._print_line(

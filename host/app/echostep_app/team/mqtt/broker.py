@@ -22,6 +22,7 @@ from echostep_app.team.faults import CLIENT_REFUSAL, ENDED, PLAIN_ENDED, opening
 
 ANSWER_S = 5.0  # longest wait for an answer of the broker
 KEEPALIVE_S = 6  # the broker sends the last will after 1.5 times as long [MQTT 3.1.1, 3.1.2.10]
+QOS_NOT_SUPPORTED = 155  # reason code [MQTT 5, 2.4]
 LOOP_S = 0.05  # longest wait for a packet in one call of `run_once`
 MAX_PACKET = 65_536  # bytes; a broker of MQTT 5 sends no longer packet than this, unless it was asked for
 CLIENT_ERRORS = (  # what paho raises on broken connections and malformed packets
@@ -40,6 +41,10 @@ class RefusedError(ConnectionError):
     """The host answers, but it is no broker of this MQTT version, or it refuses the connection."""
 
 
+class QosError(RefusedError):
+    """The broker takes no message of this QoS [MQTT 5, 3.2.2.3.4]."""
+
+
 class UnwantedError(PermissionError):
     """The broker does not accept a message under this topic."""
 
@@ -56,16 +61,20 @@ def make_client(endpoint: Endpoint, tls: Any, identity: str, *, newest: bool = F
     return client
 
 
-def connect(client: paho.Client, endpoint: Endpoint, most_bytes: int = MAX_PACKET) -> None:
-    """Connect and wait for the broker's acceptance; raises OSError, which is a RefusedError when the host answers.
+def connect(client: paho.Client, endpoint: Endpoint, most_bytes: int = MAX_PACKET) -> int:
+    """Connect and wait for the broker's acceptance; returns the greatest QoS that it takes, 0 or 1.
+
+    Raises OSError, which is a RefusedError when the host answers.
 
     `most_bytes`: of a packet that a broker of MQTT 5 sends.
     """
-    refused: list[str] = []
+    refused: list[Any] = []
+    greatest = [1]
 
-    def answered(_client: paho.Client, _user: Any, _flags: Any, code: Any, _properties: Any) -> None:
+    def answered(_client: paho.Client, _user: Any, _flags: Any, code: Any, announced: Any) -> None:
+        greatest[0] = min(getattr(announced, "MaximumQoS", 1), 1)
         if code.is_failure:
-            refused.append(str(code))
+            refused.append(code)
 
     client.on_connect = answered
     properties = None
@@ -83,7 +92,9 @@ def connect(client: paho.Client, endpoint: Endpoint, most_bytes: int = MAX_PACKE
             ended = CLIENT_REFUSAL if endpoint.secure else PLAIN_ENDED
             raise RefusedError(ended if isinstance(error, ENDED) else str(error)) from error
     if refused:
-        raise RefusedError(_refusal(endpoint, refused[0]))
+        kind = QosError if refused[0].value == QOS_NOT_SUPPORTED else RefusedError
+        raise kind(_refusal(endpoint, str(refused[0])))
+    return greatest[0]
 
 
 def _refusal(endpoint: Endpoint, reason: str) -> str:
@@ -119,22 +130,23 @@ def run_once(client: paho.Client, timeout_s: float) -> None:
         raise ConnectionResetError(f"the connection broke: {paho.error_string(code)}")
 
 
-def publish(client: paho.Client, topic: str, payload: bytes) -> bool:
+def publish(client: paho.Client, topic: str, payload: bytes, qos: int = 1) -> bool:
     """Publish a message that the broker keeps, and wait for its answer; returns whether the answer says that the message was accepted.
 
-    A broker of MQTT 3.1.1 cannot say so [MQTT 3.1.1, 3.3.5]. Raises OSError, which is an UnwantedError when the broker refuses the message.
+    By QoS 0 there is no answer, and a broker of MQTT 3.1.1 cannot say so [MQTT 3.1.1, 3.3.5]. Raises OSError, which is an UnwantedError when the
+    broker refuses the message.
     """
     answers: dict[int, Any] = {}
     client.on_publish = lambda _client, _user, number, code, _properties: answers.update({number: code})
     try:
-        info = client.publish(topic, payload, qos=1, retain=True)
+        info = client.publish(topic, payload, qos=qos, retain=True)
         run_until(client, info.is_published, "the broker does not acknowledge")
     except (ValueError, RuntimeError) as error:
         raise ConnectionError(f"cannot publish: {error}") from error
     answer = answers.get(info.mid)
     if answer is not None and answer.is_failure:
         raise UnwantedError(f"{answer}")
-    return client.protocol == paho.MQTTv5
+    return qos > 0 and client.protocol == paho.MQTTv5
 
 
 def close_socket(client: paho.Client) -> None:

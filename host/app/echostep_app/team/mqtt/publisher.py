@@ -21,6 +21,7 @@ from echostep_app.team.mqtt.broker import (
     CLIENT_ERRORS,
     LOOP_S,
     MAX_PACKET,
+    QosError,
     RefusedError,
     UnwantedError,
     close_socket,
@@ -41,7 +42,7 @@ class MqttTransport:
     def __init__(self, endpoint: Endpoint, team: str, name: str, run: str) -> None:
         self._endpoint, self._run, self._team, self._name = endpoint, run, team, name
         self._topic = f"echostep/{team}/{name}"
-        self._use_mqtt5 = True
+        self._use_mqtt5, self._qos = True, 1
         self._tls = tls_context(endpoint) if endpoint.secure else None
         self._client: paho.Client | None = None
 
@@ -49,10 +50,17 @@ class MqttTransport:
         """Connect; raises OSError with the broker's reason. After a refusal the next call uses the other version of MQTT (5 or 3.1.1)."""
         identity = f"echostep-{self._run}-{time.monotonic_ns() & 0xFFFFFF:06x}"
         client = make_client(self._endpoint, self._tls, identity, newest=self._use_mqtt5)
-        client.will_set(f"{self._topic}/presence", self._presence("broken"), qos=1, retain=True)
+        client.will_set(f"{self._topic}/presence", self._presence("broken"), qos=self._qos, retain=True)
         self._client = client
         try:
-            connect(client, self._endpoint)
+            self._qos = min(self._qos, connect(client, self._endpoint))
+        except QosError:
+            if not self._qos:
+                raise
+            self._qos = 0
+            close_socket(client)
+            self.open()
+            return
         except RefusedError:
             self._use_mqtt5 = not self._use_mqtt5
             raise
@@ -87,7 +95,7 @@ class MqttTransport:
         if self._client is None:
             raise ConnectionError("not connected")
         try:
-            return publish(self._client, f"{self._topic}/{leaf}", payload)
+            return publish(self._client, f"{self._topic}/{leaf}", payload, self._qos)
         except UnwantedError as error:
             raise UnwantedError(
                 f"the broker does not let {user_words(self._endpoint)} publish as {self._team}/{self._name} ({error}): "
@@ -109,7 +117,7 @@ class Listener:
         self._endpoint, self._topics, self._put, self._most_bytes = endpoint, topics, put, most_bytes
         self._tls = tls_context(endpoint) if endpoint.secure else None
         self._client: paho.Client | None = None
-        self._use_mqtt5 = True
+        self._use_mqtt5, self._qos = True, 1
 
     def open(self) -> str:
         """Connect and subscribe; returns which topics the broker refuses, in words; raises OSError, also when it refuses all.
@@ -120,7 +128,7 @@ class Listener:
         client.on_message = self._message
         self._client = client
         try:
-            connect(client, self._endpoint, self._most_bytes)
+            self._qos = connect(client, self._endpoint, self._most_bytes)
         except RefusedError:
             self._use_mqtt5 = not self._use_mqtt5
             raise
@@ -146,7 +154,7 @@ class Listener:
         """Publish a message that the broker keeps, and wait for its answer; raises OSError."""
         if self._client is None:
             raise ConnectionError("not connected")
-        publish(self._client, topic, payload)
+        publish(self._client, topic, payload, self._qos)
 
     def close(self) -> None:
         """Disconnect; raises nothing."""

@@ -31,6 +31,7 @@ TIP_M = 0.1  # least visible part of a sliding leaf in its gap; assumed
 FRAME_M = 0.2  # width that a gap may have beyond that: frame; assumed
 BESIDE_M = 6.0  # greatest width of a hole in which a door stands beside a window; assumed
 THICKEST_M = 0.5  # of a wall that is drawn through a door
+BEYOND_M = 0.3  # so far a wall goes on beyond a leaf that is drawn in it; assumed
 SAME_M = 0.25  # two doors with nearer middles are one, as are two lines across one wall; assumed
 NEAR_JAMB_M = 0.02  # closer faces need no end between them
 Line = tuple[float, float, float, float]
@@ -170,6 +171,8 @@ def _of_swing(swing: Swing, walls: WallBands) -> Line | None:
         in_arc = [pair for pair in fitting if pair[0] in towards]
         u, gap = min(in_arc or fitting[:1], key=lambda pair: abs(pair[1].width_m - radius))
         return _line(hinge, u, gap.begin_m, gap.end_m)
+    if (shut := _leaf_in_wall(swing, walls)) is not None:
+        return shut
     if (
         swing.leaf is not None
     ):  # the drawn leaf shows the closed end: in a larger hole, or in a wall drawn through the door
@@ -180,6 +183,18 @@ def _of_swing(swing: Swing, walls: WallBands) -> Line | None:
     through = [end for end in closed if walls.is_at_wall(hinge) and walls.is_at_wall(end)]
     drawn_through = [end for end in through if walls.gap(hinge, _unit(hinge, end), radius / 2, radius) is None]
     return (*hinge, *drawn_through[0]) if drawn_through else None
+
+
+def _leaf_in_wall(swing: Swing, walls: WallBands) -> Line | None:
+    """The line of a leaf that is drawn closed, in a wall that is drawn through it; the open end of its arc stands free in the room."""
+    if swing.leaf is None or not walls.is_at_wall(swing.hinge):
+        return None
+    shut, free = swing.ends[swing.leaf], swing.ends[1 - swing.leaf]
+    (u, v) = _unit(swing.hinge, shut)
+    goes_on = walls.is_at_wall(shut) and walls.is_at_wall((shut[0] + BEYOND_M * u, shut[1] + BEYOND_M * v))
+    is_free = goes_on and not walls.is_at_wall(free)
+    is_walled = walls.gap(swing.hinge, (u, v), swing.radius_m / 2, swing.radius_m) is None
+    return (*swing.hinge, *shut) if is_free and is_walled else None
 
 
 def _exact(swing: Swing, walls: WallBands) -> Line | None:

@@ -18,6 +18,7 @@ from echostep_app.plan.importers.dxf.layers import pieces_of
 
 APART = 0.05  # least distance between storeys beside each other, as a share of the drawing's size; assumed
 LEAST_APART_M = 2.0
+SHARES = (1.0, 0.5, 0.25)  # of that distance, tried in this order; assumed
 LEAST_SHARE = 0.1  # of the longest group of walls: smaller groups are details; assumed
 ALIKE = 0.4  # two storeys of one building differ by less than this share of their size; assumed
 OVER = 0.3  # share of the smaller level's rectangle that lies over the other one's, in one building; assumed
@@ -27,10 +28,22 @@ Box = tuple[float, float, float, float]
 
 
 def storey_boxes(walls: Sequence[LineString]) -> list[Box]:
-    """Rectangles (m) of groups of walls that look like storeys drawn beside each other; one rectangle when there is one group."""
+    """Rectangles (m) of groups of walls that look like storeys drawn beside each other; one rectangle when there is one group.
+
+    A detail close to one storey hides that the storeys are alike: then they are looked for with smaller distances.
+    """
+    for share in SHARES:
+        found = _boxes(walls, share)
+        if len(found) > 1:
+            return found
+    return _boxes(walls, 1.0)
+
+
+def _boxes(walls: Sequence[LineString], share: float) -> list[Box]:
+    """Rectangles of groups of walls of about the same size, at least a share of the usual distance apart."""
     boxes = shapely.bounds(np.array(list(walls), dtype=object))
     low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
-    margin = max(LEAST_APART_M, APART * float((high - low).max())) / 2
+    margin = share * max(LEAST_APART_M, APART * float((high - low).max())) / 2
     blots = shapely.union_all(shapely.box(*(boxes + (-margin, -margin, margin, margin)).T))
     groups = shapely.get_parts(blots)
     lengths = np.zeros(len(groups))

@@ -17,8 +17,16 @@ from echostep.errors import EchostepError
 from echostep_app.plan.importers.dxf.frame import METRES
 from echostep_app.plan.importers.report import ImportReport
 
-INSUNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 21: "ft"}  # 21: US survey feet, longer by 2e-6
-NAMES = {"mm": "millimetres", "cm": "centimetres", "m": "metres", "in": "inches", "ft": "feet"}
+INSUNITS = {
+    1: "in", 2: "ft", 3: "mi", 4: "mm", 5: "cm", 6: "m", 7: "km", 10: "yd", 14: "dm", 15: "dam", 16: "hm",
+    21: "ft", 22: "in", 23: "yd", 24: "mi",
+}  # fmt: skip  # 21 to 24: US survey units, longer by 2e-6
+RARE = {"dm": 0.1, "yd": 0.9144, "dam": 10.0, "hm": 100.0, "km": 1000.0, "mi": 1609.344}  # too rare to be proposed
+STATED = METRES | RARE
+NAMES = {
+    "mm": "millimetres", "cm": "centimetres", "m": "metres", "in": "inches", "ft": "feet",
+    "dm": "decimetres", "yd": "yards", "dam": "decametres", "hm": "hectometres", "km": "kilometres", "mi": "miles",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,18 +67,19 @@ def scale_of(
     if stated is None:
         would = f"; in {NAMES[sensible]} the building is {_size(lengths, sensible)} long" if sensible else ""
         raise EchostepError(f"{file}: the drawing does not say its units ($INSUNITS){would}: {advice}")
-    wrong = _contradictions(lengths, METRES[stated])
+    wrong = _contradictions(lengths, STATED[stated])
     if wrong and not (sensible is None and "size" not in wrong):
-        words = " and ".join(USUAL[key].words.format(_metres(lengths[key] * METRES[stated])) for key in wrong[:2])
-        ask = f"is it in {NAMES[sensible]}? {advice} (or --units {stated} if it is right)" if sensible else advice
+        words = " and ".join(USUAL[key].words.format(_metres(lengths[key] * STATED[stated])) for key in wrong[:2])
+        right = f"--units {stated}" if stated in METRES else f"--scale {STATED[stated]:g}"
+        ask = f"is it in {NAMES[sensible]}? {advice} (or {right} if it is right)" if sensible else advice
         raise EchostepError(f"{file}: the drawing states {NAMES[stated]} ($INSUNITS), but then {words}: {ask}")
     if wrong:
-        words = " and ".join(USUAL[key].words.format(_metres(lengths[key] * METRES[stated])) for key in wrong[:2])
+        words = " and ".join(USUAL[key].words.format(_metres(lengths[key] * STATED[stated])) for key in wrong[:2])
         report.doubt(f"{file.name}: {words} in {NAMES[stated]} as stated, and no other unit is better: --scale?")
-    if sensible and _oddity(lengths, METRES[stated]) - _oddity(lengths, METRES[sensible]) > MUCH_ODDER:
+    if sensible and _oddity(lengths, STATED[stated]) - _oddity(lengths, METRES[sensible]) > MUCH_ODDER:
         sizes = f"{_size(lengths, stated)} long in {NAMES[stated]} as stated, {_size(lengths, sensible)} in {NAMES[sensible]}"
         report.doubt(f"{file.name} would be a more usual building in another unit: {sizes}: --units {sensible}?")
-    return METRES[stated], f"{stated} ($INSUNITS; sizes fit)" if lengths else f"{stated} ($INSUNITS)"
+    return STATED[stated], f"{stated} ($INSUNITS; sizes fit)" if lengths else f"{stated} ($INSUNITS)"
 
 
 def stated_unit(drawing: Any) -> str | None:
@@ -101,7 +110,7 @@ def _oddity(lengths: Mapping[str, float], metre: float) -> float:
 
 
 def _size(lengths: Mapping[str, float], unit: str) -> str:
-    return _metres(lengths["size"] * METRES[unit]) if "size" in lengths else "of a usual size"
+    return _metres(lengths["size"] * STATED[unit]) if "size" in lengths else "of a usual size"
 
 
 def _metres(length_m: float) -> str:

@@ -22,6 +22,8 @@ from echostep.fields import LIMIT_M
 from echostep_app.plan.importers.drawn_level import areas
 from echostep_app.plan.importers.report import ImportReport
 
+FAR_M, EARTH_M = 1e4, 1e8  # larger coordinates are in a national grid; beyond that in none
+
 
 @dataclass(frozen=True, slots=True)
 class SolidBody:
@@ -53,13 +55,14 @@ class SolidBody:
 
 
 class Shapes:
-    """Makes the bodies of elements, in the model's world coordinates in metres."""
+    """Makes the bodies of elements, in the model's world coordinates in metres, from `origin_m` on: the first body's place, if that is in a grid."""
 
     def __init__(self, path: Path) -> None:
         self._geometry: Any = import_module("ifcopenshell.geom")
         self._settings = self._geometry.settings()
         self._settings.set("use-world-coords", True)
         self._path = path
+        self.origin_m: tuple[float, float] | None = None
 
     def body(self, element: Any) -> SolidBody | None:
         """The body of an element; None when it has no usable shape."""
@@ -73,11 +76,19 @@ class Shapes:
         faces = np.array(shape.faces, dtype=np.int64).reshape(-1, 3)
         if not len(corners) or not len(faces):
             return None
+        corners[:, :2] -= self._origin(corners)
         if not (np.abs(corners) <= LIMIT_M).all():
             raise EchostepError(
                 f"{self._path}: {element.is_a()} #{element.id()}: further than {LIMIT_M / 1000:.0f} km from the origin"
             )
         return SolidBody(element, corners, faces)
+
+    def _origin(self, corners: Floats) -> tuple[float, float]:
+        """The origin; the first body decides it."""
+        if self.origin_m is None:
+            x, y = np.floor(corners[0, :2])
+            self.origin_m = (float(x), float(y)) if FAR_M < max(abs(x), abs(y)) <= EARTH_M else (0.0, 0.0)
+        return self.origin_m
 
     def bodies(self, elements: list[Any], report: ImportReport) -> Iterator[SolidBody]:
         """Bodies of elements; without a shape, the bodies of their parts (elemented walls) or of the opening that they fill. Others are reported."""

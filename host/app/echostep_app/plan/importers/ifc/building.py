@@ -9,15 +9,19 @@ openings.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from echostep.errors import EchostepError
 from echostep.plan import ConnectorKind, Door, Georeference, Plan
+from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.importers.connector_shapes import join_connectors
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, room
-from echostep_app.plan.importers.ifc.bodies import Shapes, SolidBody
+from echostep_app.plan.importers.ifc.bodies import FAR_M, Shapes, SolidBody
 from echostep_app.plan.importers.ifc.doors import placed_door
 from echostep_app.plan.importers.ifc.model import open_model, storeys_of
 from echostep_app.plan.importers.report import ImportReport
@@ -58,7 +62,7 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
         None,
         "",
         join_connectors(drawn_levels, report),
-        _georeference(model),
+        _moved(_georeference(model), model, shapes, report),
     )
 
 
@@ -140,6 +144,25 @@ def _georeference(model: Any) -> Georeference | None:
     ]
     x, y = norths[0][:2] if norths else (0.0, 1.0)
     return Georeference(lon, lat, math.pi / 2 - math.atan2(y, x))
+
+
+def _moved(georeference: Georeference | None, model: Any, shapes: Shapes, report: ImportReport) -> Georeference | None:
+    """The georeference of the plan's origin, where that is not the model's own: the site's longitude and latitude are those of its placement."""
+    x, y = shapes.origin_m or (0.0, 0.0)
+    if (x, y) == (0.0, 0.0):
+        return georeference
+    report.doubt(f"the model lies in a national grid: the plan's origin is x {x:.0f} m, y {y:.0f} m there")
+    if georeference is None:
+        return None
+    scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
+    placement = model.by_type("IfcSite")[0].ObjectPlacement
+    matrix = import_module("ifcopenshell.util.placement").get_local_placement(placement)
+    off_m = np.array([[x, y]]) - np.asarray(matrix)[:2, 3] * scale_m
+    if not np.abs(off_m).max() <= FAR_M:
+        report.doubt("its longitude and latitude are of a place far from its walls: left out")
+        return None
+    ((lon, lat),) = EarthTransform(georeference).degrees(off_m).tolist()
+    return replace(georeference, longitude_deg=lon, latitude_deg=lat)
 
 
 def _degrees(parts: Any) -> float:

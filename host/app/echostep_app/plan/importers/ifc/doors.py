@@ -38,7 +38,7 @@ def placed_door(element: Any, shapes: Shapes, scale_m: float) -> PlacedDoor | No
         if hole is not None:
             return PlacedDoor(_across(hole, _host(relation.RelatingOpeningElement, shapes), width_m), hole.z_m)
     body = shapes.body(element)
-    by_placement = _by_placement(element, width_m, scale_m)
+    by_placement = _by_placement(element, width_m, scale_m, shapes.origin_m or (0.0, 0.0))
     if body is None:
         return by_placement
     corners = np.asarray(body.above().exterior.coords)[:3]
@@ -84,12 +84,12 @@ def _along(sides: list[Floats], wall: Polygon | None, width_m: float) -> int:
     return int(np.argmax(lengths))
 
 
-def _by_placement(element: Any, width_m: float, scale_m: float) -> PlacedDoor | None:
+def _by_placement(element: Any, width_m: float, scale_m: float, origin_m: tuple[float, float]) -> PlacedDoor | None:
     """A door from its placement: its x axis runs along its width [IFC 4, IfcDoor]."""
     if element.ObjectPlacement is None or not NARROWEST_M <= width_m <= WIDEST_M:
         return None
     matrix = np.asarray(import_module("ifcopenshell.util.placement").get_local_placement(element.ObjectPlacement))
-    x, y, z = matrix[:3, 3] * scale_m
+    x, y, z = matrix[:3, 3] * scale_m - (*origin_m, 0.0)
     u, v = matrix[:2, 0]
     height_m = float(getattr(element, "OverallHeight", None) or 0.0) * scale_m or 2.0
     line = (x, y, x + width_m * u, y + width_m * v)

@@ -9,6 +9,7 @@ without an opening get doors of this width.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -128,8 +129,8 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
         level.key: DrawnLevel(level.name or f"level {_ordinal(level):g}", round(_ordinal(level) * storey_height_m, 6))
         for level in levels
     }
-    openings = _by_level(_features(archive, "opening", earth), drawn_levels)
-    units = _by_level(_features(archive, "unit", earth), drawn_levels)
+    openings = _by_level(_features(archive, "opening", earth), drawn_levels, report)
+    units = _by_level(_features(archive, "unit", earth), drawn_levels, report)
     order = list(drawn_levels)
     for key, drawn in drawn_levels.items():
         drawn.doors = [door for one in openings[key] for door in _doors(one)]
@@ -143,7 +144,9 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
         report.leave_out("unit without an area", sum(not areas([unit.shape]) for unit in units[key]))
         if doors_m is not None:
             _assume_doors(drawn, units[key], openings[key], doors_m)
-    fixtures = _by_level(_features(archive, "fixture", earth) + _features(archive, "kiosk", earth), drawn_levels)
+    fixtures = _by_level(
+        _features(archive, "fixture", earth) + _features(archive, "kiosk", earth), drawn_levels, report
+    )
     for key, drawn in drawn_levels.items():
         for fixture in fixtures[key]:
             if "kiosk" in fixture.where or fixture.category in SOLID_FIXTURES:
@@ -218,18 +221,24 @@ def _ordinal(level: Feature) -> float:
         raise EchostepError(f"level.geojson: {error}") from error
 
 
-def _by_level(features: list[Feature], drawn_levels: dict[str, DrawnLevel]) -> dict[str, list[Feature]]:
-    """Features by the id of their level; raises EchostepError for an unknown level."""
-    sorted_: dict[str, list[Feature]] = {key: [] for key in drawn_levels}
+def _by_level(features: list[Feature], levels: dict[str, DrawnLevel], report: ImportReport) -> dict[str, list[Feature]]:
+    """Features by the id of their level; those of another export, whose level the archive lacks, are left out and reported."""
+    sorted_: dict[str, list[Feature]] = {key: [] for key in levels}
+    lost: Counter[str] = Counter()
     for feature in features:
         try:
-            sorted_[feature.level].append(feature)
-        except KeyError as error:
-            raise EchostepError(
-                f"{feature.where}: there is no level {feature.level[:50]!r} in level.geojson"
-            ) from error
+            key = feature.level
         except ValueError as error:
             raise EchostepError(str(error)) from error
+        if key in sorted_:
+            sorted_[key].append(feature)
+        else:
+            lost[feature.where.partition(" ")[0]] += 1
+    for kind, count in lost.items():
+        report.leave_out(f"{kind} of a level that level.geojson lacks", count)
+        report.doubt(
+            f"{kind}.geojson: {count} of {len(features)} are of levels that level.geojson lacks and were left out: export all files again"
+        )
     return sorted_
 
 

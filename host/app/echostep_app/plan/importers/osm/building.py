@@ -46,6 +46,10 @@ def import_osm(path: Path, storey_height_m: float, report: ImportReport) -> Plan
     """Import the building in a file; raises EchostepError that names the file and the element."""
     elements = read_osm(path)
     levels = sorted({level for tags in elements.indoor_tags() for level in levels_of(tags)})
+    if not levels and any(levels_of(tags) for tags in elements.way_tags.values() if tags.get("indoor", "no") != "no"):
+        raise EchostepError(
+            f"{path}: its indoor ways have no nodes: download it again by `out geom;`, or with `(._;>;);`"
+        )
     if not levels:
         raise EchostepError(f"{path}: nothing is tagged indoor=* with a level: choose an area that is mapped indoors")
     if len(levels) > MOST_LEVELS:
@@ -79,14 +83,15 @@ def _without_level(elements: Elements, report: ImportReport) -> None:
     """Report indoor elements that no level tag places."""
     lost: dict[str, list[str]] = {}
     for where, _, tags in elements.lines():
-        kind = "room" if tags.get("indoor") == "room" else f"indoor={tags['indoor'][:20]}" if "indoor" in tags else ""
+        indoor = tags.get("indoor", "no")
+        kind = "room" if indoor == "room" else f"indoor={indoor[:20]}" if indoor != "no" else ""
         if (kind or _way(tags)) and not levels_of(tags, where) and tags.get("building", "no") == "no":
             lost.setdefault(kind or str(_way(tags)), []).append(where)
     for kind, names in lost.items():
         report.leave_out(f"{kind} without level", len(names))
         one = len(names) == 1
         report.doubt(
-            f"{len(names)} {kind}{'' if one or kind == 'stairs' else 's'} {'has' if one else 'have'} no level and "
+            f"{len(names)} {kind}{'' if one or kind == 'stairs' or '=' in kind else 's'} {'has' if one else 'have'} no level and "
             f"{'was' if one else 'were'} left out ({', '.join(names[:5])}): tag level=* and download it again"
         )
 
@@ -109,7 +114,7 @@ def _is_door(tags: Tags) -> bool:
 
 def _origin(elements: Elements, path: Path) -> Georeference:
     """The plan's origin: the mean position of the nodes of indoor elements and buildings, rounded to 1e-5 degrees (about 1 m)."""
-    used = [node for _, nodes, tags in elements.lines() if "indoor" in tags or "building" in tags for node in nodes]
+    used = [node for _, nodes, tags in elements.lines() if {"indoor", "building"} & tags.keys() for node in nodes]
     if not used:
         raise EchostepError(f"{path}: no way is tagged indoor=*: choose an area that is mapped indoors")
     lon, lat = np.array([elements.degrees[node] for node in used]).mean(axis=0).round(5)
@@ -176,14 +181,15 @@ def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
         if not _is_door(tags):
             continue
         own = levels_of(tags, f"node {node}") or site.order
-        if not any((level, node) in site.walls_at for level in own):
+        through = elements.same[node]
+        if not any((level, through) in site.walls_at for level in own):
             report.leave_out("door on no wall")
         for level in own:
-            for line in site.walls_at.get((level, node), [])[:1]:
+            for line in site.walls_at.get((level, through), [])[:1]:
                 gap = _gap(line, Point(elements.at_m[node]), _metres(tags, DOOR_M))
-                site.drawn_levels[level].doors.append(
-                    Door(gap, _state(tags), (tags.get("name") or tags.get("ref") or "")[:80])
-                )
+                doors = site.drawn_levels[level].doors
+                if through == node or all(gap != door.line for door in doors):
+                    doors.append(Door(gap, _state(tags), (tags.get("name") or tags.get("ref") or "")[:80]))
 
 
 def _gap(line: LineString, at: Point, wide_m: float) -> tuple[float, float, float, float]:

@@ -22,7 +22,7 @@ from shapely.geometry import LineString
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep_app.plan.importers.osm.geojson_rows import geojson_rows, without_names
-from echostep_app.plan.importers.parsing import FORMATS, number, parse_json, read_text, typed
+from echostep_app.plan.importers.parsing import FORMATS, GML, number, parse_json, read_text, typed
 
 RANGE = re.compile(r"^(-?\d+(?:\.\d+)?)\s*-\s*(-?\d+(?:\.\d+)?)$")
 MOST = 300  # greatest level number, and most levels in a range
@@ -60,6 +60,9 @@ class Elements:
     relations: list[tuple[int, list[tuple[int, str]], Tags]] = field(default_factory=list)
     at_m: dict[int, tuple[float, float]] = field(default_factory=dict)
     other_relations: int = 0
+    same: dict[int, int] = field(
+        default_factory=dict
+    )  # GeoJSON: of nodes at one place, the one that lines pass through
 
     def lines(self) -> Iterator[tuple[str, list[int], Tags]]:
         """Name, nodes and tags of ways, and of the rings of multipolygons; only lines of two nodes or more. Inner rings have no name."""
@@ -78,7 +81,7 @@ class Elements:
 
     def indoor_tags(self) -> Iterator[Tags]:
         """Tags of all lines with an indoor tag."""
-        return (tags for _, _, tags in self.lines() if "indoor" in tags)
+        return (tags for _, _, tags in self.lines() if tags.get("indoor", "no") != "no")
 
     def project(self, metres: Callable[[Floats], Floats]) -> None:
         """Fill `at_m` by the projection `metres`: (n, 2) degrees -> (n, 2) map metres."""
@@ -136,8 +139,17 @@ def _xml_rows(text: str) -> list[dict[str, Any]]:
     except ET.ParseError as error:
         raise ValueError(f"not XML: {error}") from error
     if root.tag != "osm":
-        raise ValueError(f"this XML is <{root.tag[-40:]}>, not <osm>: plans are read as {FORMATS}")
-    return [_xml_row(element) for element in root if element.tag in ("node", "way", "relation")]
+        name = root.tag.rpartition("}")[2][:40]
+        gml = "opengis.net" in root.tag
+        raise ValueError(f"this XML is <{name}>, not <osm>: {GML if gml else f'plans are read as {FORMATS}'}")
+    return [
+        _xml_row(element) for element in root if element.tag in ("node", "way", "relation") and not _is_deleted(element)
+    ]
+
+
+def _is_deleted(element: ET.Element) -> bool:
+    """Whether an element is deleted: in JOSM before the upload, or in an extract with history."""
+    return element.get("action") == "delete" or element.get("visible") == "false"
 
 
 def _xml_row(element: ET.Element) -> dict[str, Any]:
@@ -145,6 +157,10 @@ def _xml_row(element: ET.Element) -> dict[str, Any]:
     row["tags"] = {tag.get("k", ""): tag.get("v", "") for tag in element.iterfind("tag")}
     row["lon"], row["lat"] = _json_number(element.get("lon")), _json_number(element.get("lat"))
     row["nodes"] = [_json_number(nd.get("ref")) for nd in element.iterfind("nd")]
+    row["geometry"] = [
+        {"lon": _json_number(nd.get("lon")), "lat": _json_number(nd.get("lat"))} if nd.get("lon") else None
+        for nd in element.iterfind("nd")
+    ]
     row["members"] = [
         {"type": member.get("type"), "ref": _json_number(member.get("ref")), "role": member.get("role")}
         for member in element.iterfind("member")
@@ -171,10 +187,12 @@ def _add(elements: Elements, row: Any) -> None:
     if kind == "node":
         elements.degrees[key] = _degrees(row, where)
         elements.node_tags[key] = tags
+        elements.same[key] = row.get("same", key)
     elif kind == "way":
         nodes = [_ref(ref, where) for ref in typed(row.get("nodes") or [], f"{where}: nodes", list)]
         for node, place in zip(nodes, typed(row.get("geometry") or [], f"{where}: geometry", list), strict=False):
-            elements.degrees.setdefault(node, _degrees(typed(place, f"{where}: geometry", dict), where))
+            if place is not None:  # of a node outside the box that was asked for
+                elements.degrees.setdefault(node, _degrees(typed(place, f"{where}: geometry", dict), where))
         elements.ways[key], elements.way_tags[key] = nodes, tags
     elif kind == "relation" and tags.get("type") == "multipolygon":
         members = [

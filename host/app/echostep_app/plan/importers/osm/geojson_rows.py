@@ -22,6 +22,7 @@ class _Rows:
     def __init__(self) -> None:
         self.nodes: dict[tuple[float, float], dict[str, Any]] = {}
         self.ways: list[dict[str, Any]] = []
+        self.more: list[dict[str, Any]] = []  # nodes at the place of another one, with tags of their own
         self._ids = count(1)
 
     def node(self, position: Any, where: str) -> dict[str, Any]:
@@ -36,6 +37,14 @@ class _Rows:
         row = {"type": "node", "id": next(self._ids), "lon": lon, "lat": lat, "tags": {}}
         return self.nodes.setdefault((lon, lat), row)
 
+    def point(self, position: Any, tags: dict[str, str], where: str) -> None:
+        """A node with tags; copies of a storey have a node each at one place."""
+        row = self.node(position, where)
+        if not row["tags"]:
+            row["tags"] = tags
+        elif row["tags"] != tags:
+            self.more.append({**row, "id": next(self._ids), "tags": tags, "same": row["id"]})
+
     def way(self, positions: Any, tags: dict[str, str], where: str) -> None:
         """A way through positions."""
         nodes = [self.node(position, where)["id"] for position in typed(positions, f"{where}.coordinates", list)]
@@ -49,14 +58,14 @@ def geojson_rows(tree: Any) -> list[dict[str, Any]]:
         geometry = feature.get("geometry")
         if geometry is not None:
             _add(rows, typed(geometry, f"{where}.geometry", dict), _tags(feature, where), f"{where}.geometry")
-    return [*rows.nodes.values(), *rows.ways]
+    return [*rows.nodes.values(), *rows.more, *rows.ways]
 
 
 def _add(rows: _Rows, geometry: dict[str, Any], tags: dict[str, str], where: str) -> None:
     nested = geometry.get("coordinates")
     match geometry.get("type"):
         case "Point":
-            rows.node(nested, where)["tags"] |= tags
+            rows.point(nested, tags, where)
         case "LineString":
             rows.way(nested, tags, where)
         case "MultiLineString":

@@ -20,12 +20,13 @@ from echostep_app.plan.importers.raster.tracing import grey, trace
 from echostep_app.plan.importers.report import ImportReport
 
 SMALL_M = 0.6  # groups of pixels that are nowhere longer are letters and symbols; assumed
+PAPER = 255  # a transparent pixel is paper
 TRACED = "traced from a picture: long words, furniture, stairs and swings of doors are walls too; echostep plan edit corrects it"
 
 
 def import_picture(path: Path, pixel_m: float, report: ImportReport) -> Plan:
     """Import a picture's dark areas as walls; raises EchostepError that names the file."""
-    values = grey(path)
+    values = grey(path, PAPER)
     dark = values <= threshold(values)
     if dark.all():
         raise EchostepError(f"{path}: one colour all over: is this the plan?")

@@ -2,7 +2,8 @@
 """Maps of ROS navigation (map.yaml and a picture, as map_server and nav2 save them) -> `Plan`.
 
 In: map.yaml. Out: `Plan` of one level. Owns nothing. Occupied pixels become walls by their outlines [nav2_map_server, map_io: p = (255 - value) /
-255, or value / 255 with negate]; the origin is the pose of the lower left corner. Other things that the robot saw are in the picture too, and stay.
+255, or value / 255 with negate; in raw mode a value up to 100 is p in percent, and a greater one unknown]; the origin is the pose of the lower left
+corner. Other things that the robot saw are in the picture too, and stay.
 """
 
 from __future__ import annotations
@@ -10,8 +11,10 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 from shapely.affinity import affine_transform
 
+from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.fields import LIMIT_M
 from echostep.plan import Plan
@@ -22,6 +25,8 @@ from echostep_app.plan.importers.report import ImportReport
 
 OCCUPIED = 0.65  # default of map_server
 LARGEST_PIXEL_M = 10.0
+UNKNOWN = 128  # value of a transparent pixel: neither free nor occupied
+RAW_MOST = 100.0  # in raw mode, a greater value is unknown
 
 
 def import_ros_map(path: Path, report: ImportReport) -> Plan:
@@ -34,9 +39,7 @@ def import_ros_map(path: Path, report: ImportReport) -> Plan:
         raise EchostepError(f"{path}: resolution: expected metres a pixel, more than 0")
     x, y, yaw = _origin(path, fields)
     picture = path.parent / fields["image"]
-    probability = 1.0 - grey(picture) / 255.0
-    if _number(path, fields, "negate", 1.0, 0.0):
-        probability = 1.0 - probability
+    probability = _probability(path, fields, grey(picture, UNKNOWN))
     try:
         outlines, noise = trace(probability > _number(path, fields, "occupied_thresh", 1.0, OCCUPIED))
     except ValueError as error:
@@ -52,6 +55,17 @@ def import_ros_map(path: Path, report: ImportReport) -> Plan:
         "traced from what a robot saw: furniture and people are walls too, and doors that stood open are gaps; echostep plan edit corrects it"
     )
     return Plan(path.stem, (drawn.level(),), None, "")
+
+
+def _probability(path: Path, fields: dict[str, str], values: Floats) -> Floats:
+    """How likely each pixel is occupied, 0 to 1; an unknown one is not."""
+    mode = fields.get("mode", "trinary").casefold()
+    if mode == "raw":
+        return np.where(values <= RAW_MOST, values / RAW_MOST, 0.0)
+    if mode not in ("trinary", "scale"):
+        raise EchostepError(f"{path}: mode: {mode[:40]!r} is none of trinary, scale and raw")
+    dark = 1.0 - values / 255.0
+    return 1.0 - dark if _number(path, fields, "negate", 1.0, 0.0) else dark
 
 
 def _fields(path: Path) -> dict[str, str]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -25,10 +26,10 @@ LEAST_PIXELS = 4.0  # smaller groups are sensor noise; assumed
 MOST_RUNS = 2_000_000
 
 
-def grey(path: Path) -> Floats:
-    """The picture's grey values (rows from the top, columns), 0 black to 255 white; transparent pixels are unknown, as grey."""
+def grey(path: Path, transparent: int) -> Floats:
+    """The picture's grey values as viewers show it (rows from the top, columns), 0 black to 255 white, on a ground of the value `transparent`."""
     require(f"{path}: a picture", "PIL")
-    from PIL import Image
+    from PIL import Image, ImageOps
 
     content = read_bytes(path)
     Image.MAX_IMAGE_PIXELS = MOST_PIXELS
@@ -36,9 +37,23 @@ def grey(path: Path) -> Floats:
         with Image.open(BytesIO(content)) as image:
             if image.width * image.height > MOST_PIXELS:
                 raise EchostepError(f"{path}: more than {MOST_PIXELS // 10**6} million pixels: cut it to the building")
-            return np.asarray(image.convert("L"), dtype=np.float64)
+            return _grey(ImageOps.exif_transpose(image), transparent)
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise EchostepError(f"{path}: not a picture that can be read: {str(error)[:200]}") from error
+
+
+def _grey(image: Any, ground: int) -> Floats:
+    from PIL import Image
+
+    if image.mode[0] in "IF":  # 16 bits a pixel and more, or numbers of any size
+        values = np.asarray(image, dtype=np.float64)
+        greatest = float(np.nan_to_num(values).max())
+        most = next(most for most in (1.0, 255.0, 65535.0, greatest) if greatest <= most)
+        return np.rint(np.clip(values * 255.0 / most, 0.0, 255.0))
+    if image.has_transparency_data:
+        image = image.convert("RGBA")
+        image = Image.alpha_composite(Image.new("RGBA", image.size, (ground, ground, ground, 255)), image)
+    return np.asarray(image.convert("L"), dtype=np.float64)
 
 
 def trace(walls: Bools) -> tuple[list[Polygon], int]:
