@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`echostep map`, `foot`, `legs`, `score` and `decode`: commands that read files and write others.
+"""`echostep map`, `import`, `foot`, `legs`, `score` and `decode`: commands that read files and write others.
 
 In: the command's arguments and options. Out: files, text. Slow imports wait until a command runs.
 """
@@ -34,6 +34,20 @@ def map_command(
     from echostep_app.commands.actions import mapping
 
     mapping.map_recordings(recordings, plan, out, picture)
+
+
+@app.command("import")
+def import_command(
+    imu: Annotated[Path, typer.Argument(help="CSV of a foot IMU, as of foot.")],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT", help="The recording to write.")],
+    columns: Columns = None,
+    units: Units = None,
+) -> None:
+    """Make a recording of a foot IMU's file, for replay, export and map."""
+    from echostep_app.commands.actions import offline
+    from echostep_app.offline.foreign_columns import parse_naming
+
+    offline.import_foot(imu, out, parse_naming(columns, units))
 
 
 @app.command()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`echostep foot`, `legs` and `decode`: recorded files of single sensors, without a plan.
+"""`echostep import`, `foot`, `legs` and `decode`: recorded files of single sensors, without a plan.
 
 In: CSV files of a foot IMU or of leg gyros, captured bytes. Out: track files and a summary; JSON lines. Owns nothing.
 """
@@ -13,11 +13,12 @@ from pathlib import Path
 
 from echostep.errors import EchostepError
 from echostep.legs.stride import StrideSettings
-from echostep.offline.imu_csv import describe_track, own_track, write_foot_track
+from echostep.offline.imu_csv import Imu, describe_track, own_track, write_foot_track
 from echostep.recording import Decoder, as_json, read_capture
 from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import OutputFormats
 from echostep_app.offline.foreign_columns import OWN, Naming, load_foot
+from echostep_app.offline.importing import import_imu
 from echostep_app.offline.leg_csv import load_pair
 from echostep_app.offline.leg_lengths import calibrated_scale, checked_lengths
 from echostep_app.offline.leg_pair import track_pair
@@ -29,17 +30,30 @@ from echostep_app.printing.console import console
 from echostep_app.printing.lines import complain
 from echostep_app.printing.people import is_unread
 from echostep_app.recording.capture_summary import summary
+from echostep_app.session.metadata import version_metadata
 
 SCALE_RANGE = (0.5, 2.0)  # of --scale: beyond it the lengths of the leg are wrong
+
+
+def import_foot(path: Path, out: Path, naming: Naming = OWN) -> None:
+    """Make a recording of a foot IMU's file."""
+    imu = _told(path, naming)
+    console.print(f"{path.name}: {import_imu(imu, path.name, out, version_metadata())}", markup=False)
+    console.print(f"recording: {out}", markup=False)
+
+
+def _told(path: Path, naming: Naming) -> Imu:
+    """The samples of a foot IMU's file; what was mended is printed."""
+    imu = load_foot(path, naming)
+    for note in imu.notes:
+        console.print(f"{path.name}: {note}")
+    return imu
 
 
 def foot(path: Path, out: Path, profile: str, picture: Path | None, naming: Naming = OWN) -> None:
     """Track a recorded foot IMU with this project's method or that of a paper."""
     track_recording = method("foot", profile, own_track)
-    imu = load_foot(path, naming)
-    for note in imu.notes:
-        console.print(f"{path.name}: {note}")
-    track = track_recording(imu, path.name)
+    track = track_recording(_told(path, naming), path.name)
     write_foot_track(out, track)
     console.print(f"{path.name}: {describe_track(track)}")
     if picture is not None:

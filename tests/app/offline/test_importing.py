@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""`echostep import`: the tracker gets the samples of the file, a gap is a gap, and the recording works like every other."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import echostep
+from command_line import echostep as run
+from echostep.errors import EchostepError
+from echostep.localization import digest
+from echostep.offline.imu_csv import Imu
+from echostep.ports.chunks import MTX
+from echostep.recording import open_recording
+from echostep.xsens import MtxReader
+from echostep_app.offline.importing import import_imu, rate_of
+from foot.foot_walks import MANNERS, course, samples
+
+
+@pytest.fixture(scope="module")
+def walk() -> Imu:
+    """A simulated walk of twelve steps."""
+    return Imu(*samples(course(MANNERS["walking"], steps=12), 100, rng=np.random.default_rng(1)))
+
+
+def test_a_recording_holds_the_samples_and_the_gap(walk: Imu, tmp_path: Path) -> None:
+    kept = np.r_[0:300, 340 : len(walk.t_s)]
+    import_imu(Imu(walk.t_s[kept] + 7.0, walk.accel[kept], walk.gyro[kept]), "imu.csv", tmp_path / "walk.mcap", {})
+    reader, recording = MtxReader(), open_recording(tmp_path / "walk.mcap")
+    batch = reader.feed_batch(b"".join(chunk.data for chunk in recording.chunks() if chunk.port == MTX))
+    assert np.allclose(batch.accel, walk.accel[kept], rtol=1e-6, atol=1e-6)
+    assert np.allclose(batch.gyro, walk.gyro[kept], rtol=1e-6, atol=1e-6)
+    assert reader.counts.lost == 40
+    with pytest.raises(EchostepError, match="exists"):
+        import_imu(walk, "imu.csv", tmp_path / "walk.mcap", {})
+
+
+def test_two_commands_track_a_file_on_a_plan(walk: Imu, tmp_path: Path) -> None:
+    file, out, plan = tmp_path / "imu.csv", tmp_path / "walk.mcap", tmp_path / "plan.json"
+    rows = np.column_stack([walk.t_s, walk.accel, walk.gyro])
+    np.savetxt(file, rows, delimiter=",", header="t_s,ax,ay,az,gx,gy,gz", comments="", fmt="%.9g")
+    walls = [[-9, -9, 9, -9], [9, -9, 9, 40], [9, 40, -9, 40], [-9, 40, -9, -9]]
+    plan.write_text(json.dumps({"echostep_plan": 1, "name": "Hall", "levels": [{"name": "0", "walls": walls}]}))
+    imported = run("import", file, "-o", out)
+    assert imported.returncode == 0, imported.stderr
+    tracked = run("replay", out, "--plan", plan, "--start", "1,2,90", "--headless", "--out", tmp_path)
+    assert tracked.returncode == 0, tracked.stderr
+    assert "imported from imu.csv" in tracked.stdout
+    assert (tmp_path / "track.png").exists()
+    first, second = (echostep.replay(out, plan, start=echostep.plan.Pose(1.0, 2.0, np.pi / 2)) for _ in range(2))
+    assert digest(first.estimates) == digest(second.estimates)
+    end = first.estimates[-1]
+    assert end.x_m == pytest.approx(1.0, abs=0.5)
+    assert end.y_m > 10.0
+
+
+def test_times_in_milliseconds_and_gaps_give_the_rate() -> None:
+    t_s = np.round(np.arange(3000) / 204.8, 3)
+    assert rate_of(np.delete(t_s, np.s_[800:1000])) == pytest.approx(204.8, rel=1e-3)
