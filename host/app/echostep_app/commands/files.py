@@ -43,7 +43,7 @@ def import_command(
     columns: Columns = None,
     units: Units = None,
 ) -> None:
-    """Make a recording of a foot IMU's file, for replay, export and map."""
+    """Make a recording of a foot IMU's file, for replay and export."""
     from echostep_app.commands.actions import offline
     from echostep_app.offline.foreign_columns import parse_naming
 
