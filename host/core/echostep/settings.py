@@ -57,6 +57,11 @@ class Settings:
     climb: ClimbSettings = field(default_factory=ClimbSettings)
     wearer: WearerSettings = field(default_factory=WearerSettings)
 
+    @classmethod
+    def of_imu(cls, rate_hz: float) -> Settings:
+        """Of a foot IMU at this rate, with nothing else on the wearer: for `Tracker.feed_samples`."""
+        return parse_settings(imu_settings(rate_hz), "foot IMU")
+
     def __repr__(self) -> str:
         """The values that are not the default."""
         sections = ((f.name, getattr(self, f.name)) for f in dataclasses.fields(self))
@@ -80,6 +85,11 @@ def _changed(section: Any) -> str:
     values = {f.name: getattr(section, f.name) for f in dataclasses.fields(section)}
     given = [f"{name}={value!r}" for name, value in values.items() if value != getattr(default, name)]
     return f"{type(section).__name__}({', '.join(given)})"
+
+
+def imu_settings(rate_hz: float) -> str:
+    """TOML text of the settings of a foot IMU at this rate, with nothing else on the wearer."""
+    return f"[mtx]\nrate_hz = {rate_hz!r}\nlatency_s = 0.0\n\n[gait]\nfoot_left_m = 0.0\n"
 
 
 RENAMED = {("echo", "short"): "hidden"}  # fields of older recordings, by their present names

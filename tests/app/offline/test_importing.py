@@ -27,6 +27,18 @@ def walk() -> Imu:
     return Imu(*samples(course(MANNERS["walking"], steps=12), 100, rng=np.random.default_rng(1)))
 
 
+def write(file: Path, imu: Imu) -> None:
+    rows = np.column_stack([imu.t_s, imu.accel, imu.gyro])
+    np.savetxt(file, rows, delimiter=",", header="t_s,ax,ay,az,gx,gy,gz", comments="", fmt="%.9g")
+
+
+def hall(file: Path) -> Path:
+    """The plan of a hall of 18 by 49 m."""
+    walls = [[-9, -9, 9, -9], [9, -9, 9, 40], [9, 40, -9, 40], [-9, 40, -9, -9]]
+    file.write_text(json.dumps({"echostep_plan": 1, "name": "Hall", "levels": [{"name": "0", "walls": walls}]}))
+    return file
+
+
 def test_a_recording_holds_the_samples_and_the_gap(walk: Imu, tmp_path: Path) -> None:
     kept = np.r_[0:300, 340 : len(walk.t_s)]
     import_imu(Imu(walk.t_s[kept] + 7.0, walk.accel[kept], walk.gyro[kept]), "imu.csv", tmp_path / "walk.mcap", {})
@@ -40,11 +52,8 @@ def test_a_recording_holds_the_samples_and_the_gap(walk: Imu, tmp_path: Path) ->
 
 
 def test_two_commands_track_a_file_on_a_plan(walk: Imu, tmp_path: Path) -> None:
-    file, out, plan = tmp_path / "imu.csv", tmp_path / "walk.mcap", tmp_path / "plan.json"
-    rows = np.column_stack([walk.t_s, walk.accel, walk.gyro])
-    np.savetxt(file, rows, delimiter=",", header="t_s,ax,ay,az,gx,gy,gz", comments="", fmt="%.9g")
-    walls = [[-9, -9, 9, -9], [9, -9, 9, 40], [9, 40, -9, 40], [-9, 40, -9, -9]]
-    plan.write_text(json.dumps({"echostep_plan": 1, "name": "Hall", "levels": [{"name": "0", "walls": walls}]}))
+    file, out, plan = tmp_path / "imu.csv", tmp_path / "walk.mcap", hall(tmp_path / "plan.json")
+    write(file, walk)
     imported = run("import", file, "-o", out)
     assert imported.returncode == 0, imported.stderr
     tracked = run("replay", out, "--plan", plan, "--start", "1,2,90", "--headless", "--out", tmp_path)
@@ -61,3 +70,27 @@ def test_two_commands_track_a_file_on_a_plan(walk: Imu, tmp_path: Path) -> None:
 def test_times_in_milliseconds_and_gaps_give_the_rate() -> None:
     t_s = np.round(np.arange(3000) / 204.8, 3)
     assert rate_of(np.delete(t_s, np.s_[800:1000])) == pytest.approx(204.8, rel=1e-3)
+
+
+def test_one_command_is_short_for_both(walk: Imu, tmp_path: Path) -> None:
+    file, plan = tmp_path / "imu.csv", tmp_path / "plan.json"
+    write(file, walk)
+    hall(plan)
+    tracked = run("foot", file, "--plan", plan, "--start", "1,2,90", "--out", tmp_path / "found" / "track.csv")
+    assert tracked.returncode == 0, tracked.stderr
+    assert {path.suffix for path in (tmp_path / "found").iterdir()} >= {".mcap", ".csv", ".png"}
+
+
+def test_arrays_of_any_length_are_tracked_as_the_recording_is(walk: Imu, tmp_path: Path) -> None:
+    file, plan = tmp_path / "walk.mcap", hall(tmp_path / "plan.json")
+    import_imu(walk, "imu.csv", file, {})
+    start = echostep.plan.Pose(1.0, 2.0, np.pi / 2)
+    tracker = echostep.Tracker(echostep.plan.load_plan(plan), start, echostep.Settings.of_imu(rate_of(walk.t_s)))
+    estimates = [
+        estimate
+        for k in np.array_split(np.arange(len(walk.t_s)), 7)
+        for estimate in tracker.feed_samples(walk.t_s[k], walk.accel[k], walk.gyro[k])
+    ]
+    assert digest(estimates) == digest(echostep.replay(file, plan, start=start).estimates)
+    with pytest.raises(EchostepError, match=r"must be \(n,\)"):
+        tracker.feed_samples(walk.t_s, walk.accel[:, :2], walk.gyro)

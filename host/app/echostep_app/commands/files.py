@@ -11,10 +11,11 @@ from typing import Annotated
 
 import typer
 
-from echostep_app.commands.options import Columns, Shank, Thigh, Units, needs, picture_option
+from echostep_app.commands.options import Columns, OptionalPlan, Shank, Start, Thigh, Units, needs, picture_option
 from echostep_app.extras import require
 
 app = typer.Typer()
+TRACK = Path("track.csv")
 
 
 @app.command("map")
@@ -53,7 +54,9 @@ def import_command(
 @app.command()
 def foot(
     imu: Annotated[Path, typer.Argument(help="CSV: t_s,ax,ay,az,gx,gy,gz[,mx,my,mz] in s, m/s2, rad/s.")],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV).")] = Path("track.csv"),
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV); with --plan, its folder: out/foot.")
+    ] = TRACK,
     profile: Annotated[
         str,
         typer.Option(
@@ -63,12 +66,22 @@ def foot(
     picture: Annotated[Path | None, picture_option("Draw the track there")] = None,
     columns: Columns = None,
     units: Units = None,
+    plan: OptionalPlan = None,
+    start: Start = None,
+    truth: Annotated[
+        Path | None, typer.Option("--truth", metavar="FILE", help="With --plan: true path to compare with (CSV).")
+    ] = None,
 ) -> None:
-    """Zero-velocity navigation of a recorded foot IMU."""
+    """Zero-velocity navigation of a recorded foot IMU; with --plan, on the plan: import and replay."""
     from echostep_app.commands.actions import offline
     from echostep_app.offline.foreign_columns import parse_naming
 
-    offline.foot(imu, out, profile, picture, parse_naming(columns, units))
+    naming = parse_naming(columns, units)
+    if plan is None:
+        offline.foot(imu, out, profile, picture, naming)
+    else:
+        folder = Path("out/foot") if out == TRACK else out.parent
+        offline.foot_on_plan(imu, folder, plan, start, truth, naming)
 
 
 @app.command()

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from echostep.localization.height.levels import ClimbSettings, drift_m
     from echostep.localization.limits import BELIEVED, PROBABLE, TRACKING_M
     from echostep.localization.map_filter import MapFilter, call_kernels
+    from echostep.localization.particles.particles import Particles
     from echostep.localization.particles.places import LikelyPlace
     from echostep.localization.particles.start import ANY_LEVEL, STATED, Air, Start
     from echostep.localization.settings import CloudSettings, FilterSettings
@@ -55,6 +56,7 @@ __getattr__ = face(
         "height.levels": "ClimbSettings drift_m",
         "limits": "BELIEVED PROBABLE TRACKING_M",
         "map_filter": "MapFilter call_kernels",
+        "particles.particles": "Particles",
         "particles.places": "LikelyPlace",
         "particles.start": "ANY_LEVEL STATED Air Start",
         "settings": "CloudSettings FilterSettings",

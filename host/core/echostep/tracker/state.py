@@ -6,6 +6,7 @@ In: nothing. Out: `TrackerState`, `StreamState`, `ParticleSnapshot`. Owns nothin
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from echostep.aiding import MeetingNews
@@ -14,7 +15,7 @@ from echostep.board.frames import FrameCounts
 from echostep.board.gateway import GatewayCounts
 from echostep.board.messages import Identity, Status
 from echostep.board.reports import BoardReports
-from echostep.localization import Estimate
+from echostep.localization import Estimate, Particles
 from echostep.odometry import Alarm, FrontEndCounts
 from echostep.path import PathSegment
 from echostep.ports.people.team_beacons import SharedBeacon
@@ -87,3 +88,10 @@ class ParticleSnapshot:
     y_m: Floats
     level: Ints
     log_weight: Floats
+
+    @classmethod
+    def of(cls, cloud: Particles, most: int) -> ParticleSnapshot:
+        """A copy of at most `most` particles, evenly thinned."""
+        every = slice(None, None, max(1, math.ceil(len(cloud.x_m) / most)))
+        x_m, y_m, log_weight = (each[every].copy() for each in (cloud.map_x_m, cloud.y_m, cloud.log_weight))
+        return cls(x_m, y_m, cloud.level[every].copy(), log_weight)

@@ -27,6 +27,7 @@ from echostep.aiding import (
     start_at,
 )
 from echostep.angles import wrap
+from echostep.arrays import Floats
 from echostep.board.gateway import BeaconReading, Gateway
 from echostep.errors import EchostepError
 from echostep.localization import (
@@ -43,6 +44,7 @@ from echostep.localization import (
     unobserved,
 )
 from echostep.odometry import FrontEnd, WearerWatch
+from echostep.offline.imu_chunks import ImuChunks
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import NO_PLAN, Plan, Pose
 from echostep.ports.chunks import FOOT, GATEWAY, TEAM, Chunk, Portion, portion_of
@@ -89,6 +91,7 @@ class Tracker:
         self._building = Building(self.laid_out.walls, self.laid_out.sheet, DrawnPlaces(plan.levels))
         self.filter: AidedFilter | None = None  # from the first segment on
         self.gateway = Gateway()
+        self._imu = ImuChunks(s.mtx.rate_hz)  # for `feed_samples`
         self.watchers: list[Watch] = []  # called in this order
         self.team_watchers: list[Callable[[bytes], None]] = []  # called with each chunk of the port TEAM
         self._readings: list[BeaconReading] = []  # waiting for their segment
@@ -157,16 +160,7 @@ class Tracker:
 
     def particles(self, most: int) -> ParticleSnapshot | None:
         """A copy of at most `most` particles, evenly thinned; None before the first segment."""
-        if self.filter is None:
-            return None
-        cloud = self.filter.cloud
-        every = slice(None, None, max(1, math.ceil(len(cloud.x_m) / most)))
-        return ParticleSnapshot(
-            x_m=cloud.map_x_m[every].copy(),
-            y_m=cloud.y_m[every].copy(),
-            level=cloud.level[every].copy(),
-            log_weight=cloud.log_weight[every].copy(),
-        )
+        return None if self.filter is None else ParticleSnapshot.of(self.filter.cloud, most)
 
     def beacon_places(self, t_s: float) -> list[BeaconPlace]:
         """Every beacon with a known place, as the particles believe it at `t_s`."""
@@ -193,6 +187,10 @@ class Tracker:
     def feed(self, chunk: Chunk) -> list[Estimate]:
         """Process one chunk; estimates come at the middle of each stance, and twice a second while standing."""
         return self.take(portion_of([chunk]))
+
+    def feed_samples(self, t_s: Floats, accel: Floats, gyro: Floats) -> list[Estimate]:
+        """Process any number of a foot IMU's samples: t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s, body frame [`Settings.of_imu`]."""
+        return self.take(portion_of(list(self._imu.of(t_s, accel, gyro))))
 
     def take(self, portion: Portion) -> list[Estimate]:
         """Process many chunks; the estimates are the same as for the chunks one by one."""

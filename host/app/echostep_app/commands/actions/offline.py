@@ -30,7 +30,11 @@ from echostep_app.printing.console import console
 from echostep_app.printing.lines import complain
 from echostep_app.printing.people import is_unread
 from echostep_app.recording.capture_summary import summary
+from echostep_app.recording.names import new_name
 from echostep_app.session.metadata import version_metadata
+from echostep_app.session.options import OutputOptions, TrackingOptions
+from echostep_app.session.results import output_folder
+from echostep_app.session.runs.replay import replay
 
 SCALE_RANGE = (0.5, 2.0)  # of --scale: beyond it the lengths of the leg are wrong
 
@@ -40,6 +44,16 @@ def import_foot(path: Path, out: Path, naming: Naming = OWN) -> None:
     imu = _told(path, naming)
     console.print(f"{path.name}: {import_imu(imu, path.name, out, version_metadata())}", markup=False)
     console.print(f"recording: {out}", markup=False)
+
+
+def foot_on_plan(
+    path: Path, folder: Path, plan: Path, start: str | None, truth: Path | None, naming: Naming = OWN
+) -> None:
+    """Track a foot IMU's file on a plan: the recording and its results go into the folder."""
+    output_folder(folder)
+    recording = new_name(folder / f"{path.stem}.mcap")
+    import_foot(path, recording, naming)
+    replay([recording], TrackingOptions(plan, start), truth, OutputOptions(folder, terminal=False))
 
 
 def _told(path: Path, naming: Naming) -> Imu:
