@@ -6,6 +6,9 @@ import { put, say } from './text.js';
 
 export const SIGNS = { mayday: '▲', asked: '△', lost: '✕', stale: '◌', uncertain: '◐', waiting: '○', tracking: '●', ended: '■' };
 const URGENT = ['mayday', 'asked', 'lost', 'stale'];
+const CALLS = ['mayday', 'asked'];  // above all others, however the list is sorted and whatever is looked for
+const MANY = 8;  // more than so many can be sorted and looked through
+const ORDERS = { need: () => 0, name: (a, b) => a.name.localeCompare(b.name), floor: (a, b) => (b.level ?? -1) - (a.level ?? -1) };
 const $ = (id) => document.getElementById(id);
 
 export class List {
@@ -13,14 +16,23 @@ export class List {
   constructor(onChoose, onSend) {
     Object.assign(this, { onChoose, onSend, items: new Map(), rows: [], states: new Map(), chosen: null });
     $('close').onclick = () => this.choose(null);
+    $('find').oninput = $('sort').onchange = () => this.show(this.rows, this.isPast);
+  }
+
+  // In the chosen order, those that hold what is looked for; calls for help first.
+  sorted(rows) {
+    const wanted = $('find').value.trim().toLowerCase(), isCall = ({ state }) => CALLS.includes(state);
+    const found = rows.filter((row) => isCall(row) || [row.name, row.team, tr(row.words), ...row.notes.map(tr)].join(' ').toLowerCase().includes(wanted));
+    return found.sort((a, b) => isCall(b) - isCall(a) || ORDERS[$('sort').value](a, b));
   }
 
   // Rows in order of urgency; elements stay, so that focus and scrolling stay. What happened in the past is not announced.
   show(rows, isPast) {
-    this.rows = rows;
-    const known = new Set(rows.map(({ id }) => id)), focused = document.activeElement, teams = new Set(rows.map(({ team }) => team)).size;
+    Object.assign(this, { rows, isPast });
+    const shown = this.sorted(rows), known = new Set(shown.map(({ id }) => id)), focused = document.activeElement, teams = new Set(rows.map(({ team }) => team)).size;
+    $('finding').hidden = rows.length <= MANY && !$('find').value;
     for (const [id, item] of this.items) if (!known.has(id)) { item.li.remove(); this.items.delete(id); }
-    rows.forEach((row, k) => {
+    shown.forEach((row, k) => {
       const item = this.items.get(row.id) ?? this.make(row.id), at = $('list').children[k];
       if (at !== item.li) $('list').insertBefore(item.li, at ?? null);
       item.button.dataset.state = row.state;
@@ -32,7 +44,7 @@ export class List {
     });
     if (focused?.isConnected && document.activeElement !== focused) focused.focus({ preventScroll: true });
     this.announce(rows, isPast);
-    if (this.chosen !== null && !known.has(this.chosen)) this.choose(null);
+    if (this.chosen !== null && !rows.some(({ id }) => id === this.chosen)) this.choose(null);
   }
 
   make(id) {
@@ -55,11 +67,11 @@ export class List {
   choose(id) {
     const before = this.chosen;
     this.chosen = id;
-    $('list').hidden = id !== null;
+    $('list').hidden = $('team').dataset.one = id !== null;
     $('details').hidden = id === null;
     this.shownDetails = null;
     this.head();
-    $('all').open = !['mayday', 'asked'].includes(this.rows.find((row) => row.id === id)?.state);
+    $('all').open = !CALLS.includes(this.rows.find((row) => row.id === id)?.state);
     $('distress').hidden = true;
     $('said').hidden = false;
     $('facts').replaceChildren();

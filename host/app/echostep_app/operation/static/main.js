@@ -9,6 +9,8 @@ import { startTheme } from '../static/theme.js';
 import { View } from '../static/view.js';
 import { localise, missing, tr } from '../static/language.js';
 import { stayAwake } from '../static/live/awake.js';
+import { Globe } from '../static/tools/globe.js';
+import { Measure } from '../static/tools/measure.js';
 import { titled } from '../static/tools/titles.js';
 import { scaleBar } from '../static/tools/units.js';
 import { Alarm } from './alarm.js';
@@ -27,14 +29,14 @@ const TAP_PX = 28;  // a wearer within this distance of a tap is chosen
 const $ = (id) => document.getElementById(id);
 localise(document.body);
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas')), trails = new Trails($('trails'), $('trails-next'));
-const scene = { places: new Map(), rows: [], marks: [], level: 0, chosen: null, isOld: false };
+const scene = { places: new Map(), rows: [], marks: [], level: 0, chosen: null, isOld: false, measure: new Measure() };
 const floors = new Floors((level) => showLevel(level));
 const list = new List(choose, (id) => sheet.signed((by) => link.send('send', { id, to: scene.chosen, by })));
 const alarm = new Alarm(view, { show: goTo, open: (id) => list.choose(id), level: () => wantedLevel, showLevel, floor: (level) => plan.levels[level].name });
-let plan = null, wantedLevel = 0, fitted = false, isAsked = false, drawnStamp = -1, undrawn = [], found = false;
+let plan = null, wantedLevel = 0, fitted = false, isAsked = false, globe = null, drawnStamp = -1, undrawn = [], found = false;
 
 const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onAge: connection, onUnsent: () => {}, isLive: () => scene.frame?.time?.live !== false && !timeBar.isPast, parse: parseFrame });
-const sheet = new Sheet((kind, fields) => link.send(kind, fields), hint);
+const sheet = new Sheet((kind, fields) => link.send(kind, fields), hint, { words: (x, y) => globe?.words(x, y), measure: measured });
 const showLegend = startLegend($('legend-button'), COMMAND, COMMAND_KEYS), crews = new Crews((act) => sheet.signed(act), (kind, fields) => link.send(kind, fields));
 const orders = new Orders((act) => sheet.signed(act), (kind, fields) => link.send(kind, fields), () => scene.chosen, hint);
 const timeBar = new TimeBar((kind, fields) => link.send(kind, fields));
@@ -45,6 +47,8 @@ const drawn = (window.echostep = { frames: 0, view, scene, link, last: null, mis
 async function hello(message) {
   plan = message.plan;
   view.north = plan.north_rad;
+  globe = plan.globe ? new Globe(plan.globe) : null;
+  scene.measure.clear();
   found = fitted = false;
   fault('');
   trails.clear();
@@ -170,6 +174,7 @@ function draw() {
   planView.names(view, here.map(({ place }) => view.toScreen(place.x, place.y)));
   trails.paint(view, scene.level, painter.colour.trail);
   painter.paint(view, here, scene.chosen, trails.points(scene.chosen), scene.marks, scene.level);
+  scene.measure.paint(painter.pen, view, scene.level, painter.colour);
   [drawnStamp, drawn.last] = [view.stamp, scene.frame ?? null];
   if (trails.isBehind) ask();
   drawn.frames++;
@@ -184,7 +189,15 @@ function scale() {
   $('needle').style.transform = `rotate(${-view.tilt}rad)`;
 }
 
+// Two places whose distance is shown; the first one from the sheet of a place, the second by a tap.
+function measured(position, level) {
+  scene.measure.add(position, level);
+  hint(scene.measure.text ? `Distance: ${scene.measure.text}. Escape ends measuring.` : 'Tap the second place.');
+  view.changed();
+}
+
 function tapped(position, pixel) {
+  if (scene.measure.points.length === 1) return measured(position, scene.level);
   const near = scene.rows.map(({ id }) => scene.places.get(id)).filter((place) => place?.level === scene.level).map(({ id, x, y }) => {
     const [sx, sy] = view.toScreen(x, y);
     return { id, far: Math.hypot(sx - pixel[0], sy - pixel[1]) };
@@ -212,7 +225,7 @@ function hint(text) {
 
 function key(name) {
   const middle = [view.width / 2, view.height / 2];
-  const does = { m: () => { place(view.toMap(...middle), middle); $('mark-cleared').focus(); }, l: () => showLegend(false), '?': () => showLegend(true), p: () => $('crews-button').click(), n: () => view.northUp(), ' ': () => $('play').click(), w: () => view.fit(planView.box), Escape: () => { sheet.close(); list.choose(null); } }[name.length === 1 ? name.toLowerCase() : name];
+  const does = { m: () => { place(view.toMap(...middle), middle); $('mark-cleared').focus(); }, l: () => showLegend(false), '?': () => showLegend(true), p: () => $('crews-button').click(), n: () => view.northUp(), ' ': () => $('play').click(), w: () => view.fit(planView.box), Escape: () => { scene.measure.clear(); ask(); sheet.close(); list.choose(null); } }[name.length === 1 ? name.toLowerCase() : name];
   does?.();
   return Boolean(does);
 }

@@ -9,8 +9,10 @@ const KINDS = ['cleared', 'hazard', 'meeting'];
 const $ = (id) => document.getElementById(id);
 
 export class Sheet {
-  constructor(send, onHint) {
-    Object.assign(this, { send, onHint, at: null, mark: null });
+  // `words(x, y)`: a place on the Earth in words, or nothing; `measure(position, level)`: the first place of a distance
+  constructor(send, onHint, { words, measure }) {
+    Object.assign(this, { send, onHint, words, at: null, mark: null });
+    $('measure').onclick = () => { this.close(); measure([this.at.x_m, this.at.y_m], this.at.level); };
     $('me').value = recall('commander') ?? '';
     $('me').onchange = () => remember('commander', $('me').value);
     for (const kind of KINDS) $(`mark-${kind}`).onclick = () => this.signed((by) => this.send('mark', { mark: kind, ...this.at, by })) && this.close();
@@ -32,7 +34,8 @@ export class Sheet {
 
   open(at, mark, pixel, size) {
     Object.assign(this, { at, mark });
-    $('sheet-text').textContent = tr(mark ? `${markWords(mark.mark)}, set by ${mark.by}` : 'Mark this place');
+    const place = `x ${at.x_m.toFixed(1)}, y ${at.y_m.toFixed(1)} m`;
+    $('sheet-text').textContent = [mark ? `${markWords(mark.mark)}, set by ${mark.by}` : 'Mark this place', place, this.words(at.x_m, at.y_m)].filter(Boolean).map(tr).join(' · ');
     for (const kind of KINDS) $(`mark-${kind}`).hidden = Boolean(mark);
     $('mark-remove').hidden = !mark;
     $('sheet').hidden = false;

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: MIT
+"""An officer on the commander's page in Chromium: with a list of twenty; with twelve wearers for ten simulated minutes with two outages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from echostep_app.team.messages.orders import EVERYBODY, Receipt, receipt_message
+from echostep_app.team.messages.report import ReportedAlarm
+from operation.crowd import walking
+from operation.teams import STOREYS, TOWER, ServedTeam, Team
+from operation.test_table_page import READY, WIDE, WORDS
+from page.browser import HELD_MS, loaded_page, overflow, spot, wait_for
+from page.outage import Wire
+from page.web.test_page_silence import OUTBOX, STATUS
+from page.web.test_page_sizes import UNREACHED
+from waiting import until
+
+STEP_S = 5.0
+NAMES = "[...document.querySelectorAll('#list .name')].map((e) => e.textContent)"
+EVERYBODY_TEXT = "document.querySelector('#everybody-text').textContent"
+HINT = "document.querySelector('#hint').textContent"
+
+
+def crowd(wearers: int) -> Team:
+    team = Team(now_s=0.0)
+    for n in range(wearers):
+        team.hear(f"wearer {n:02d}", walking(n, 0.0, n % STOREYS))
+    return team
+
+
+def test_a_list_of_twenty_is_sorted_and_looked_through(browser: Any) -> None:
+    """Calls for help stay on top; a place has coordinates, and a distance to a second one."""
+    team = crowd(20)
+    team.hear("wearer 13", walking(13, 0.0, 1), alarm=ReportedAlarm("mayday", "fall", 1, 14.0))
+    with ServedTeam(team) as served:
+        page = loaded_page(browser, served.page.url, WIDE, READY)
+        page.select_option("#sort", "floor")
+        floors = f"{WORDS}.map((text) => text.match(/(Ground|1st|2nd) floor/)[1])"
+        assert page.evaluate(floors) == ["1st", *["2nd"] * 6, *["1st"] * 6, *["Ground"] * 7]
+        page.select_option("#sort", "name")
+        assert page.evaluate(NAMES) == ["wearer 13", *(f"wearer {n:02d}" for n in range(20) if n != 13)]
+        page.fill("#find", "r 07")
+        assert page.evaluate(NAMES) == ["wearer 13", "wearer 07"]
+        team.pass_time(1.0)
+        served.show()
+        wait_for(page, "echostep.last.unix_s > 1800000000")
+        assert page.evaluate(NAMES) == ["wearer 13", "wearer 07"]
+        page.fill("#find", "")
+        wait_for(page, f"{NAMES}.length === 20")
+        page.evaluate("echostep.view.zoom(0.5)")
+        x_m, y_m = TOWER.levels[0].rooms[0].at_m
+        page.mouse.click(*spot(page, x_m + 2.0, y_m))
+        wait_for(
+            page, f"document.querySelector('#sheet-text').textContent.includes('x {x_m + 2.0:.1f}, y {y_m:.1f} m')"
+        )
+        page.click("#measure")
+        wait_for(page, f"{HINT} === 'Tap the second place.'")
+        page.mouse.click(*spot(page, x_m + 2.0, y_m + 3.0))
+        wait_for(page, f"/^Distance: (2.9|3.0|3.1)/.test({HINT})")
+        assert page.is_hidden("#sheet")
+        assert not page.wrong
+        page.context.close()
+
+
+class Visit:
+    """An officer's page behind a wire; what the page asks for comes back from the broker while there is one."""
+
+    def __init__(self, served: ServedTeam, page: Any, wearers: int) -> None:
+        self.page, self.sent = page, list[str]()
+        self._served, self._team, self._wearers, self._waiting = served, served.team, wearers, list[tuple[str, bytes]]()
+        self._connected, self._begun_s = True, served.team.now_s
+        self._fields: dict[int, dict[str, Any]] = {}
+        served.page.feed.send = self._send
+
+    def _send(self, topic: str, payload: bytes) -> bool:
+        self._waiting.append((topic, payload))
+        return True
+
+    def show(self) -> None:
+        while self._connected and self._waiting:
+            topic, payload = self._waiting.pop(0)
+            self.sent.append(topic)
+            self._team.put_bytes(topic, payload)
+        self._served.show(connected=self._connected, waiting=len(self._waiting))
+        self._served.page.feed.exchange.note_alive()
+
+    def until(self, holds: str) -> None:
+        def shown() -> bool:
+            self.show()
+            return bool(self.page.evaluate(holds))
+
+        assert until(shown), (holds, self.page.evaluate(WORDS))
+
+    def pass_time(self, seconds: float) -> None:
+        """All wearers walk, and report while there is a broker."""
+        for _ in range(round(seconds / STEP_S)):
+            self._team.pass_time(STEP_S)
+            t_s = self._team.now_s - self._begun_s
+            for n in range(self._wearers if self._connected else 0):
+                self._team.hear(f"wearer {n:02d}", walking(n, t_s, n % STOREYS), **self._fields.get(n, {}))
+            self.show()
+
+    def call(self, n: int, number: int) -> None:
+        """Wearer n asks for help from now on; `number`: of the alarm."""
+        self._fields[n] = {"alarm": ReportedAlarm("mayday", "help", number, 1.0)}
+
+    def is_well(self, n: int) -> None:
+        self._fields.pop(n)
+
+    def understood(self, n: int) -> None:
+        """Wearer n taps that the order to everybody is understood."""
+        order, name = self._team.scene().order, f"wearer {n:02d}"
+        assert order
+        self._team.put_bytes(
+            *receipt_message((EVERYBODY, "red", name), Receipt(1, order.unix_s, name, self._team.unix_s))
+        )
+
+    def broker(self, *, there: bool) -> None:
+        self._connected = there
+        self.show()
+
+
+def officer(browser: Any, wearers: int, minutes: float, look: Callable[[Any, str], None]) -> None:
+    """Watches; loses the wire while one calls for help; answers; loses the broker; orders everybody out; all answer."""
+    part_s, caller = 60.0 * minutes / 6.0, wearers - 1
+    name = f"wearer {caller:02d}"
+    with ServedTeam(crowd(wearers)) as served, Wire(served.page.url) as wire:
+        page = loaded_page(browser, wire.url, WIDE, READY)
+        visit = Visit(served, page, wearers)
+        visit.pass_time(part_s)
+        visit.until(f"{STATUS} === 'connected' && echostep.scene.rows.length === {wearers}")
+        page.fill("#me", "Ann")
+        wire.freeze()  # the first outage: one calls for help behind it
+        visit.call(caller, 1)
+        visit.pass_time(part_s)
+        wait_for(page, "document.body.dataset.silent === 'present'")
+        assert page.inner_text("#status-text").startswith("no news for ")
+        look(page, "silent")
+        wire.mend()
+        visit.until(
+            f"!document.body.dataset.silent && document.querySelector('#mayday-text').textContent.includes('{name}')"
+        )
+        page.click("#mayday-open")
+        visit.until(
+            "document.querySelectorAll('#rescuers li').length === 3 || document.querySelectorAll('#list li').length < 4"
+        )
+        look(page, "mayday")
+        page.click("#rescuers li:first-child button")
+        page.click("#acknowledge")
+        visit.until("document.querySelector('#acknowledge').hidden && document.body.dataset.alarm === 'false'")
+        visit.pass_time(part_s)
+        visit.broker(there=False)  # the second one: orders wait, and nobody is heard
+        visit.pass_time(part_s)
+        visit.until(f"{STATUS} === 'no broker: the last known state'")
+        page.click("#close")
+        visit.until("![...document.querySelectorAll('#list .said')].some((e) => e.textContent.includes('heard now'))")
+        page.click("#out", delay=HELD_MS)
+        visit.until(f"{OUTBOX}.includes('Requests that wait for the broker: 1')")
+        look(page, "no-broker")
+        assert page.is_hidden("#everybody")  # it is not said before the broker has it
+        visit.broker(there=True)
+        visit.is_well(caller)
+        visit.until(f"{EVERYBODY_TEXT}.includes('understood by 0 of {wearers}')")
+        visit.pass_time(part_s)
+        for n in range(wearers - 1):
+            visit.understood(n)
+        visit.until(
+            f"{EVERYBODY_TEXT}.endsWith('understood by {wearers - 1} of {wearers}. not understood yet: {name}')"
+        )
+        look(page, "all-but-one")
+        visit.understood(caller)
+        visit.until(f"{EVERYBODY_TEXT}.endsWith('understood by {wearers} of {wearers}')")
+        page.click("#everybody-end")
+        visit.until("document.querySelector('#everybody').hidden")
+        visit.pass_time(part_s)
+        kinds = [topic.split("/")[1] for topic in visit.sent]
+        assert kinds == ["errand", "ack", "order", "order"]  # each once
+        assert not [wrong for wrong in page.wrong if "WebSocket" not in wrong]
+        page.context.close()
+
+
+def test_an_officer_with_four_wearers_and_two_outages(browser: Any) -> None:
+    officer(browser, 4, 1.0, lambda *_: None)
+
+
+@pytest.mark.long
+def test_an_officer_with_twelve_wearers_for_ten_minutes_with_two_outages(browser: Any, tmp_path: Path) -> None:
+    sizes = ((360, 740), (740, 360), (320, 256), (768, 1024), (1366, 768), (1920, 1080))
+
+    def look(page: Any, moment: str) -> None:
+        for width, height in sizes:
+            page.set_viewport_size({"width": width, "height": height})
+            page.screenshot(path=tmp_path / f"{moment}-{width}.png")
+            assert overflow(page) == (0, 0), (moment, width)
+            assert page.evaluate(UNREACHED) == [], (moment, width)
+        page.set_viewport_size(WIDE["viewport"])
+
+    officer(browser, 12, 10.0, look)
