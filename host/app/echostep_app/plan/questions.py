@@ -15,6 +15,7 @@ import shapely
 
 from echostep.plan import Level, Plan, Question
 from echostep_app.plan.check import check_plan
+from echostep_app.plan.places.faces import OUTSIDE
 from echostep_app.plan.places.findings import PlanFinding
 from echostep_app.plan.places.spaces import find_spaces
 
@@ -80,6 +81,7 @@ def _of_gaps(plan: Plan, level_index: int) -> Iterator[Question]:
         return
     listed = {face for _, a, b in spaces.doors[: len(level.doors)] for face in (a, b)}
     outlined = {spaces.face_at(*room.at_m): room for room in spaces.outlined}
+    outlined.pop(OUTSIDE, None)  # a room that is open, as a balcony, is not the whole outside
     names = {face: room.name for face, room in outlined.items()} | {f: r[0].name for f, r in spaces.names.items()}
     for gap, a, b in spaces.doors[len(level.doors) :]:
         name = next((names[face] for face in (a, b) if face in names and face not in listed), None)

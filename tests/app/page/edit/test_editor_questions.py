@@ -7,16 +7,18 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from ezdxf.filemanagement import new
 
-from echostep.plan import Plan, load_plan
+from echostep.plan import Level, Plan, Room, load_plan
 from echostep_app.page.editor import EditServer
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.summary import doors_in_gaps
 from echostep_app.plan.questions import with_questions
 from echostep_app.plan.writer import save_plan
+from page.browser import wait_for
 from page.edit.drawing import PICTURES, click, opened
 from plan.drawings.drawn_houses import DOOR, WALL, Gap, boxes, corners, leaf, loose
 
@@ -49,6 +51,41 @@ def doubtful_house(path: Path) -> Path:
         space.add_text(name, height=0.3, dxfattribs={"layer": "A-AREA-IDEN"}).set_placement(at)
     doc.saveas(path)
     return path
+
+
+def test_a_room_that_is_open_is_not_the_whole_outside() -> None:
+    """A gap in the outer wall is asked about for the room behind it, not for a balcony without walls at the other end of the house."""
+    walls = np.array(
+        [[0, 0, 20, 0], [20, 0, 20, 8], [20, 8, 0, 8], [0, 8, 0, 4.9], [0, 4, 0, 0], [10, 0, 10, 8]], dtype=float
+    )
+    balcony = Room("Balcony", (22.0, 4.0), np.array([(20.0, 2.0), (24.0, 2.0), (24.0, 6.0), (20.0, 6.0)]))
+    for rooms, asked in (((balcony,), 0), ((balcony, Room("Office", (5.0, 4.0))), 1)):
+        plan = with_questions(Plan("house", (Level("Ground floor", 0.0, walls, rooms=rooms),), None, ""))
+        found = [question.text for question in plan.levels[0].questions if "has no door, but a gap" in question.text]
+        assert len(found) == asked
+        assert not any("Balcony" in text for text in found)
+
+
+def test_the_level_below_is_a_ghost_and_the_keys_are_shown(browser: Any, tmp_path: Path) -> None:
+    levels = tuple(
+        Level(name, z, np.array([[0, 0, x, 0]], dtype=float))
+        for name, z, x in (("Ground", 0.0, 5.0), ("Upper", 3.0, 7.0))
+    )
+    save_plan(Plan("two", levels, None, ""), tmp_path / "two.json")
+    with EditServer(tmp_path / "two.json", port=0) as server:
+        page = opened(browser, server)
+        below = "document.querySelector('#below').getAttribute('d')"
+        assert not page.evaluate(below)
+        page.select_option("#level", "1")
+        wait_for(page, f"{below} === 'M0 0L5 0'")
+        page.focus("#save")
+        page.keyboard.press("?")
+        wait_for(page, "document.querySelector('#keys').clientHeight > 30")
+        page.screenshot(path=tmp_path / "keys.png")
+        page.keyboard.press("?")
+        wait_for(page, "document.querySelector('#keys').clientHeight < 2")
+        assert not page.wrong
+        page.context.close()
 
 
 @pytest.fixture

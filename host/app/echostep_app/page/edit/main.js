@@ -129,6 +129,7 @@ function go(e) {
 function key(e) {
   const ctrl = e.ctrlKey || e.metaKey, name = e.key.length === 1 ? e.key.toLowerCase() : e.key;
   if (isOpen()) return;
+  if (e.key === '?' && document.activeElement.tagName !== 'INPUT') { byId('keys').classList.toggle('unseen'); return; }
   const always = ctrl && { s: save, z: () => turn(e.shiftKey ? 'redo' : 'undo'), y: () => turn('redo') }[name];
   if (always) { e.preventDefault(); always(); return; }
   if (ctrl || e.altKey || document.activeElement !== map) return;

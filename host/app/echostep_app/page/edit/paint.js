@@ -72,6 +72,8 @@ export function paint(tools, view, shown) {
   const image = byId('image');
   image.toggleAttribute('hidden', !picture);
   if (picture) image.setAttribute('transform', `matrix(${picture.perPx} 0 0 ${-picture.perPx} ${picture.x} ${picture.y + picture.height * picture.perPx})`);
+  const below = tools.tree.levels.filter(({ height_m }) => height_m < level.height_m).sort((a, b) => b.height_m - a.height_m)[0];
+  byId('below').setAttribute('d', path(below?.walls ?? []));
   byId('walls').setAttribute('d', path(level.walls));
   byId('windows').setAttribute('d', path(level.windows ?? []));
   byId('doors').setAttribute('d', path(doors.map((door) => door.line)));
