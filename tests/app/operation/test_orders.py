@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,9 @@ from echostep_app.session.sinks import mark_sink
 from echostep_app.session.team.feeds import MarkFeed
 from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.team.endpoint import parse_outlet
+from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.marks import MarkBoard
-from echostep_app.team.messages.orders import EVERYBODY, OUT, Order, Receipt, order_message, receipt_message
+from echostep_app.team.messages.orders import EVERYBODY, HOLDS_S, OUT, Order, Receipt, order_message, receipt_message
 from echostep_app.team.messages.report import BadReportError
 from operation.teams import Team, whole_team
 from operation.test_marks_and_alarms import Commander
@@ -147,3 +149,16 @@ def test_everybody_is_ordered_out_and_says_so(browser: Any, tmp_path: Path, monk
         wearer.context.close()
         box.close()
         subscription.close()
+
+
+def test_yesterdays_order_is_no_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A broker keeps what nobody has ended."""
+    outlet = parse_outlet(["mqtt://localhost"], "bo", "red")
+    subscription = TeamSubscription(outlet.endpoints[0], print)
+    feed = MarkFeed(subscription, outlet, "0123abcd", load_plan(PLAN).digest)
+    feed._receive(
+        ReceivedMessage(*order_message(EVERYBODY, Order(1, OUT, "Ann", 1e9)), retained=True, received_s=0.0, unix_s=1e9)
+    )
+    for age_s, shown in ((0.9 * HOLDS_S, 1), (1.1 * HOLDS_S, 0)):
+        monkeypatch.setattr(time, "time", lambda now_s=1e9 + age_s: now_s)
+        assert len(feed.orders()) == shown
