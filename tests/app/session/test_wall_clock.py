@@ -32,6 +32,7 @@ READERS = {
     "session/last_place.py": "when the place was kept",
     "session/metadata.py": "when it was begun, for people and for exports",
     "session/runs/live.py": "how old the kept place is",
+    "session/team/feeds.py": "when an order was understood, and that it is not yesterday's",
     "session/team/drawing_share.py": "the name of a drawing",
     "team/inbox.py": "when a message came, to compare the sender's clock",
     "team/mesh/mesh.py": "when a report was sent",
