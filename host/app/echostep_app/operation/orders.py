@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 from echostep_app.operation import requests
 from echostep_app.team.messages.marks import MarkBoard
-from echostep_app.team.messages.orders import EVERYBODY, Order, order_key, order_message
+from echostep_app.team.messages.orders import EVERYBODY, NOTE, Order, order_key, order_message
 from echostep_app.team.roster import Member, MemberState
 
 NEWER_S = 1e-3  # by which an order or errand is newer than the one that it replaces, however this clock was set back
-NOTE = "note"
 
 
 @dataclass(frozen=True, slots=True)

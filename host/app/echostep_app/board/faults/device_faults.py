@@ -109,11 +109,7 @@ def device_findings(reports: BoardReports, status: Status) -> list[Finding]:
 def _bare_board(reports: BoardReports, on: Healthy, failed: list[Healthy]) -> Finding | None:
     """A finding on a board that has found no part since its start, and no trace of one."""
     parts = reports.parts
-    if (
-        parts is None
-        or any(value for name, value in parts._asdict().items() if name != "ticks")
-        or _union(failed) != on
-    ):
+    if parts is None or any(parts._replace(ticks=0)) or _union(failed) != on:
         return None
     remedy = "normal before anything is wired; else check 5V and GND at the carrier"
     return Finding(Severity.FAULT, "board", "has found no part", remedy)
@@ -163,15 +159,12 @@ def _common_causes(status: Status, failed: list[Healthy], on: Healthy) -> tuple[
 def _device_finding(reports: BoardReports, device: Healthy, fault: Fault) -> Finding:
     """Finding on one device with this fault; a general text for a fault that is not possible for the device."""
     what, remedy = f"failed ({fault.name.lower().replace('_', ' ')})", "check its wires and its supply"
+    is_unknown = reports.parts is not None and part_in(reports, device) is Part.NONE
+    unknown = UNKNOWN_PART_REMEDIES.get(device) if is_unknown else None
     if text := part_text(part_in(reports, device), identity_in(reports, device), device, fault):
         what, remedy = text
-    elif (
-        fault == Fault.NO_ANSWER
-        and device in UNKNOWN_PART_REMEDIES
-        and reports.parts
-        and part_in(reports, device) is Part.NONE
-    ):
-        what, remedy = "does not answer", UNKNOWN_PART_REMEDIES[device]
+    elif fault == Fault.NO_ANSWER and unknown:
+        what, remedy = "does not answer", unknown
     elif device == Healthy.PRESSURE:
         what, remedy = _PRESSURE_TEXTS.get(fault, (what, remedy))
     elif fault == Fault.NO_ANSWER and device in ADDRESSES:

@@ -19,7 +19,16 @@ from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.team.endpoint import Outlet
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.marks import MARKS, Errand, MarkBoard, acks_of, errand_of
-from echostep_app.team.messages.orders import EVERYBODY, HOLDS_S, ORDERS, RECEIPTS, Receipt, order_key, receipt_message
+from echostep_app.team.messages.orders import (
+    EVERYBODY,
+    HOLDS_S,
+    NOTE,
+    ORDERS,
+    RECEIPTS,
+    Receipt,
+    order_key,
+    receipt_message,
+)
 from echostep_app.team.messages.report import BadReportError
 from echostep_app.team.roster import Member, MemberState, Roster
 
@@ -122,7 +131,7 @@ class MarkFeed:
     def orders(self) -> tuple[ShownOrder, ...]:
         """The commanders' orders to this wearer, of the last HOLDS_S, that hold and are not understood, as of the last call of `news`."""
         (team, name, _), since_s = self._key, time.time() - HOLDS_S
-        found = ((kind, self._board.order_to(kind, team, name)) for kind in (EVERYBODY, "note"))
+        found = ((kind, self._board.order_to(kind, team, name)) for kind in (EVERYBODY, NOTE))
         return tuple(
             ShownOrder(f"{kind} {one[0].unix_s}", f"{one[0].by}: {one[0].text}", kind == EVERYBODY)
             for kind, one in found if one and not one[1] and one[0].unix_s > since_s

@@ -16,12 +16,11 @@ from msgspec import Meta
 from echostep_app.team.messages.shared import Person, UnixTime
 
 ORDERS, RECEIPTS = "echostep-table/order", "echostep-table/receipt"
-EVERYBODY = "everybody"
+EVERYBODY, NOTE = "everybody", "note"  # kinds of orders
 OUT = "Everybody out!"
 MOST_ORDERS, MOST_RECEIPTS = 257, 512  # of as many wearers as a roster has; further ones are refused
-HOLDS_S = (
-    12 * 3600.0
-)  # an order to a wearer; a broker keeps it, and the next day it would be another operation's; assumed
+# An order to a wearer holds so long: a broker keeps it, and the next day it would be another operation's; assumed
+HOLDS_S = 12 * 3600.0
 NoteText = Annotated[str, Meta(min_length=1, max_length=200)]
 ReceiptKey = tuple[str, str, str]  # "everybody" or "note", team, wearer
 

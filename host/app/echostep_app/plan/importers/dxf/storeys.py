@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import shapely
@@ -32,23 +33,27 @@ def storey_boxes(walls: Sequence[LineString]) -> list[Box]:
 
     A detail close to one storey hides that the storeys are alike: then they are looked for with smaller distances.
     """
-    for share in SHARES:
-        found = _boxes(walls, share)
-        if len(found) > 1:
-            return found
-    return _boxes(walls, 1.0)
+    lines = np.array(list(walls), dtype=object)
+    nearest = _groups(lines, SHARES[-1])
+    if len(nearest) == 1:  # then it is one group by larger distances, too
+        return _storeys(lines, nearest)
+    tried = (_storeys(lines, nearest if share == SHARES[-1] else _groups(lines, share)) for share in SHARES)
+    return next((found for found in tried if len(found) > 1), _storeys(lines, nearest))
 
 
-def _boxes(walls: Sequence[LineString], share: float) -> list[Box]:
-    """Rectangles of groups of walls of about the same size, at least a share of the usual distance apart."""
-    boxes = shapely.bounds(np.array(list(walls), dtype=object))
-    low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
-    margin = share * max(LEAST_APART_M, APART * float((high - low).max())) / 2
-    blots = shapely.union_all(shapely.box(*(boxes + (-margin, -margin, margin, margin)).T))
-    groups = shapely.get_parts(blots)
+def _groups(lines: np.ndarray[Any, Any], share: float) -> np.ndarray[Any, Any]:
+    """Areas (k,) around groups of lines (n,), at least this share of the usual distance apart."""
+    x0, y0, x1, y1 = shapely.total_bounds(lines)
+    margin = share * max(LEAST_APART_M, APART * max(x1 - x0, y1 - y0)) / 2
+    blots = shapely.union_all(shapely.box(*(shapely.bounds(lines) + (-margin, -margin, margin, margin)).T))
+    return np.asarray(shapely.get_parts(blots))
+
+
+def _storeys(lines: np.ndarray[Any, Any], groups: np.ndarray[Any, Any]) -> list[Box]:
+    """Rectangles of the groups of about the same size as the largest."""
     lengths = np.zeros(len(groups))
-    which, group = shapely.STRtree(groups).query(np.array(list(walls), dtype=object), predicate="intersects")
-    np.add.at(lengths, group, shapely.length(np.array(list(walls), dtype=object))[which])
+    which, group = shapely.STRtree(groups).query(lines, predicate="intersects")
+    np.add.at(lengths, group, shapely.length(lines)[which])
     large = groups[lengths >= LEAST_SHARE * lengths.max()]
     first = large[np.argmax(shapely.area(large))] if len(large) else None
     storeys = [g.bounds for g in large if first is not None and _alike(g.bounds, first.bounds)]
