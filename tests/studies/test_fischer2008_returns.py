@@ -77,7 +77,8 @@ def test_the_particle_filter_reaches_the_exit_where_the_paper_does_not_always() 
 
 @pytest.mark.long
 def test_nearly_all_return_by_a_map_that_was_learnt_on_the_way_in() -> None:
-    assert sum(one_return(Case("", OURS, deployed=True), seed) for seed in range(12)) >= 11
+    """Of 162 returns 156 arrived (seeds 0 to 161); where 96 % do, fewer than 34 of 40 come by chance once in a thousand."""
+    assert sum(one_return(Case("", OURS, deployed=True), seed) for seed in range(40)) >= 34
 
 
 @pytest.mark.long

@@ -48,6 +48,7 @@ CUT = """(() => {
         if (!element.offsetParent || element.closest('.unseen, svg, h1, #map, #floors, #floor, #level, .name')) continue;  // names may be cut
         const style = getComputedStyle(element), { clientWidth: width, clientHeight: height } = element;
         const name = `${element.id || element.tagName}: ${element.innerText}`;
+        if (style.clipPath === 'inset(50%)') continue;  // for screen readers alone
         pen.font = `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`;
         if (element.tagName === 'SELECT' && pen.measureText(element.selectedOptions[0]?.text ?? '').width > width - ARROW) wrong.push(name);
         if (style.overflowX === 'hidden' || element.tagName === 'BUTTON') if (element.scrollWidth > width + 1) wrong.push(name);

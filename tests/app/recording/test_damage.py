@@ -76,6 +76,17 @@ def test_a_flipped_bit_of_what_we_write_costs_less_than_a_second(tmp_path: Path,
         assert sum(chunk in set(found) for chunk in CHUNKS) > len(CHUNKS) - CHUNKS_A_SECOND
 
 
+def test_a_flipped_bit_in_a_chunk_that_is_not_compressed_is_told_without_the_files_own_checksum(tmp_path: Path) -> None:
+    """The end of the file is missing; the chunk has a checksum of its own."""
+    whole, path = made(tmp_path, "repair"), tmp_path / "flip.mcap"
+    at = whole.index(CHUNKS[700].data)
+    path.write_bytes(flipped(whole, at + 3, 2)[: whole.rindex(b"\x0f" + struct.pack("<Q", 4))])
+    recording, found = read(path)
+    assert len(found) == len(CHUNKS)
+    for told in (recording.damage(), info(path), repair(path, tmp_path / "b.mcap")):
+        assert CHECKSUM in "\n".join(told)
+
+
 def test_a_flipped_bit_of_what_export_writes_costs_less_than_a_second(tmp_path: Path) -> None:
     """Of the ports; a derived message costs itself, and is made again."""
     walk, chunks = tmp_path / "walk.mcap", walk_chunks(8.0)

@@ -27,7 +27,7 @@ from echostep_app.recording.background_writer import BackgroundWriter
 # All assumed.
 WAIT_NS = 500_000_000  # arrival time between two waits of `wait_for_disk`
 RAW_LIMIT = 1 << 26  # bytes of chunks that may wait for a full disk: an hour and a half
-CHUNK_BYTES = 1 << 16  # of a chunk of an indexed file: what a flipped bit may cost there
+CHUNK_BYTES = 1 << 16  # of a chunk of an indexed file
 DERIVED_LIMIT = 1 << 20  # unwritten bytes from which derived messages are skipped: they can be computed again
 
 

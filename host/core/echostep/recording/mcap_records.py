@@ -60,8 +60,11 @@ def is_misnamed(channel: Channel) -> bool:
     return (channel.message_encoding == RAW_ENCODING) != channel.topic.endswith("/bytes")
 
 
-def decompress_chunk(body: bytes) -> bytes | None:
-    """The records in a chunk record; None when it is damaged, larger than `RECORD_LIMIT` or compressed in an unknown way."""
+def decompress_chunk(body: bytes) -> tuple[bytes, bool] | None:
+    """The records in a chunk record, and whether their checksum is right; None when it is larger than `RECORD_LIMIT` or cannot be opened.
+
+    Compressed records with a wrong checksum are not given; of others a flipped bit costs one.
+    """
     chunk = parse_record(ChunkRecord, body)
     if chunk is None or chunk.uncompressed_size > RECORD_LIMIT:
         return None
@@ -71,7 +74,8 @@ def decompress_chunk(body: bytes) -> bytes | None:
         return None
     if records is None or len(records) != chunk.uncompressed_size:
         return None
-    return records if not chunk.uncompressed_crc or zlib.crc32(records) == chunk.uncompressed_crc else None
+    is_as_written = chunk.uncompressed_crc in (0, zlib.crc32(records))
+    return (records, is_as_written) if is_as_written or not chunk.compression else None
 
 
 def _decompress(compression: str, compressed: bytes, size: int) -> bytes | None:

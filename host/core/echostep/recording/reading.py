@@ -181,10 +181,12 @@ class Recording:
             before = record
 
     def _records_in_chunk(self, body: bytes, channels: PortChannels) -> Iterator[MessageRun | tuple[int, bytes]]:
-        records = decompress_chunk(body)
-        if records is None:
+        opened = decompress_chunk(body)
+        if opened is None:
             self.own_damage.unreadable_chunks += 1
             return
+        records, is_as_written = opened
+        self.own_damage.altered |= not is_as_written
         inside = FileDamage()
         for _, record in self._scan(np.frombuffer(records, np.uint8), 0, channels, inside):
             yield record

@@ -155,10 +155,12 @@ class Recovery:
         return RecordedMessage(self.channels[channel], sequence, t_ns, publish_ns, bytes(body[MESSAGE_SIZE:]))
 
     def _messages_in_chunk(self, body: bytes) -> Iterator[RecordedMessage]:
-        records = decompress_chunk(body)
-        if records is None:
+        opened = decompress_chunk(body)
+        if opened is None:
             self.own_damage.unreadable_chunks += 1
             return
+        records, is_as_written = opened
+        self.own_damage.altered |= not is_as_written
         whole = True
         for _, _, content in self._scan(np.frombuffer(records, np.uint8), 0):
             whole &= content is not None
