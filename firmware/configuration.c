@@ -24,7 +24,7 @@ void configuration_set(const struct msg_configure *wanted)
 	configuration = *wanted;
 	if (parts_in(PLACE_FOOT) == PART_ICM20649)
 		configuration.sensors = 0;
-	configuration.schedule = clamp(wanted->schedule, SCHEDULE_CONCURRENT, SCHEDULE_SEQUENTIAL);
+	configuration.schedule = clamp(wanted->schedule, SCHEDULE_CONCURRENT, SCHEDULE_SIMULTANEOUS);
 	configuration.gyro_rate_hz = clamp(wanted->gyro_rate_hz, GYROS_RATE_MIN_HZ, GYROS_RATE_MAX_HZ);
 	configuration.compass_rate_hz = clamp(wanted->compass_rate_hz, COMPASS_RATE_MIN_HZ, COMPASS_RATE_MAX_HZ);
 	configuration.pressure_mode = clamp(wanted->pressure_mode, PRESSURE_MODE_HIGH_SPEED, PRESSURE_MODE_HIGH_RESOLUTION);

@@ -6,8 +6,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define SCHEMA_HASH 0x79028015ul
-#define SCHEMA_SEED 0xF917u
+#define SCHEMA_HASH 0x9FA991E6ul
+#define SCHEMA_SEED 0x0E4Fu
 #define IDENTITY_SEED 0xFFFFu
 #define MSG_MAX_SIZE 44u /* longest body */
 
@@ -133,6 +133,7 @@ enum {
 enum {
 	SCHEDULE_CONCURRENT = 0,
 	SCHEDULE_SEQUENTIAL = 1,
+	SCHEDULE_SIMULTANEOUS = 2,
 };
 
 enum {

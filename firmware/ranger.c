@@ -64,11 +64,17 @@ static void follow_cycle(const struct ranger *r, uint32_t now)
 	cycle = r->kind != SRF02 ? 0 : measured > cycle ? cycle + (measured - cycle) / 4u : cycle - (cycle - measured) / 16u;
 }
 
-/* Pseudo-random delay in ticks, 0 when sequential; the same sequence after every start. With one shift per delay, each delay would be
+/* From a slot of the left ranger to the next one of the right ranger. */
+static uint32_t apart(void)
+{
+	return configuration.schedule == SCHEDULE_SIMULTANEOUS ? 0 : half_period();
+}
+
+/* Pseudo-random delay in ticks, 0 unless concurrent; the same sequence after every start. With one shift per delay, each delay would be
  * about half of the previous one. */
 static uint16_t jitter(void)
 {
-	if (configuration.schedule == SCHEDULE_SEQUENTIAL)
+	if (configuration.schedule != SCHEDULE_CONCURRENT)
 		return 0;
 	for (uint8_t n = 0; n < JITTER_STEPS; n++)
 		lfsr = (uint16_t)((lfsr >> 1) ^ ((lfsr & 1u) ? LFSR_TAPS : 0u));
@@ -90,12 +96,14 @@ static enum kind first_kind(const struct ranger *r)
 	return r->kind == UNKNOWN ? MAXSONAR : r->kind;
 }
 
-/* Moves the right ranger's slot to the middle between two of the left one's, which keep no such distance when the period changes. */
+/* Moves the right ranger's slot to its place between two of the left one's, which keep no such distance when the period changes. */
 static void keep_apart(struct ranger *r)
 {
-	int32_t half = (int32_t)half_period(), off = (int32_t)(r->slot - rangers[RANGER_LEFT].slot) % (2 * half) - half;
+	int32_t half = (int32_t)half_period(), off = (int32_t)(r->slot - rangers[RANGER_LEFT].slot - apart()) % (2 * half);
 	if (off < -half)
 		off += 2 * half;
+	if (off > half)
+		off -= 2 * half;
 	if (r->index == RANGER_RIGHT && configuration_reads(SENSORS_RANGER_LEFT))
 		r->slot -= (uint32_t)off;
 }
@@ -271,7 +279,7 @@ void ranger_start(uint32_t now)
 {
 	lfsr = LFSR_START;
 	start_one(RANGER_LEFT, now + START_TICKS);
-	start_one(RANGER_RIGHT, now + START_TICKS + half_period());
+	start_one(RANGER_RIGHT, now + START_TICKS + apart());
 }
 
 /* Lays the grid anew when the first MaxSonar is found, and when none is left. */

@@ -100,6 +100,33 @@ def test_echoes_beyond_the_range_say_open(bench: Bench, cycle_us: int) -> None:
     assert np.mean([p.outcome == m.Outcome.NO_ECHO for p in left]) > LEAST_OPEN
 
 
+@pytest.mark.parametrize(
+    ("schedule", "crosses", "least_open"),
+    [
+        (m.Schedule.CONCURRENT, False, 0.5),
+        (m.Schedule.SEQUENTIAL, True, 1.0),
+        (m.Schedule.SIMULTANEOUS, False, 1.0),
+        (m.Schedule.SIMULTANEOUS, True, 0.0),
+    ],
+)
+def test_ghosts_of_the_schedules(bench: Bench, schedule: m.Schedule, crosses: bool, least_open: float) -> None:
+    """At an open door, in a hall that fades as the maker says: at once, no burst fades into the next one, but a cross echo is one at each ping."""
+    begin(bench, "kit=papers", "srf_window=60000", "fading=50")
+    bench.ask(m.Configure(0xFF, schedule, 200, 10, m.PressureMode.HIGH_SPEED))
+    table = rows(10_000)["row"].copy()
+    table["own_us"][:, 1], table["cross_us"][:, 0] = ECHO_US, 9_000 if crosses else 0
+    bench.run(1_000, table[:1_000])
+    found = [x for x in bench.run(10_000, table) if isinstance(x, m.Ping)]
+    left = [p.outcome == m.Outcome.NO_ECHO for p in found if p.ranger == m.Ranger.LEFT]
+    assert least_open - 0.06 <= np.mean(left) <= least_open + 0.06
+    assert len(found) > (130 if schedule == m.Schedule.SEQUENTIAL else 300)
+    if schedule == m.Schedule.SIMULTANEOUS:
+        fired = [np.array([p.ticks for p in found if p.ranger == side]) for side in m.Ranger]
+        assert (
+            np.abs(np.subtract.outer(*fired)).min(axis=0).max() < 3_000
+        )  # 1.5 ms: one transfer on the bus after the other
+
+
 @pytest.mark.parametrize("errors", [1, 3])
 def test_one_wrong_byte_in_a_thousand_is_seen(bench: Bench, errors: int) -> None:
     """N3: status bits and the reserved byte are known in every sample."""

@@ -14,7 +14,7 @@ from command_line import echostep
 from echostep.board import messages as m
 from echostep_app.commissioning.bench_report import MEASUREMENTS, text
 from echostep_app.commissioning.diagnosis import Diagnosis
-from echostep_app.commissioning.probe import ProbeResult
+from echostep_app.commissioning.probe import ProbeResult, probe
 from players import twin_board
 
 
@@ -41,10 +41,14 @@ def test_a_gyro_that_varies_at_rest_is_named() -> None:
 def test_the_report_of_a_board(tmp_path: Path) -> None:
     out = tmp_path / "report.txt"
     with twin_board("kit=2026") as port:
-        done = echostep("bench-report", "--board", port, "--seconds", 4, "--out", out)
+        done = echostep("bench-report", "--board", port, "--seconds", 4, "--out", out, "--schedule", "simultaneous")
+        after = probe({"board": port}, 3.0).reports.configuration
     assert done.returncode == 0, done.stderr
+    assert after is not None
+    assert after.schedule == m.Schedule.CONCURRENT  # as it was
     found = out.read_text()
     for words in (
+        "schedule 2, ",
         "levels    MISO low, D4 high ",
         "Identity: ticks ",
         "Parts: ticks ",

@@ -105,6 +105,16 @@ def test_no_echo_is_looked_at_in_other_milliseconds_than_those_announced(schedul
     assert asked < 5_600 / 3 or block_ms == 100
 
 
+def test_simultaneous_pings_are_fired_in_pairs() -> None:
+    board, reader = PythonBoard(seed=1), BoardReader()
+    board.send(encode(m.Configure(0xFF, m.Schedule.SIMULTANEOUS, 100, 5, 0), 0))
+    heard(board.advance(rows_of(500)), reader)
+    found = [x for x in heard(board.advance(rows_of(3_000)), reader) if isinstance(x, m.Ping)]
+    fired = [[x.ticks for x in found if x.ranger == ranger] for ranger in m.Ranger]
+    assert 44 <= len(fired[0]) <= 46
+    assert fired[0] == fired[1]
+
+
 def test_sequential_pings_take_turns_every_seventy_milliseconds() -> None:
     board, reader = PythonBoard(seed=1), BoardReader()
     board.send(encode(m.Configure(0xFF, m.Schedule.SEQUENTIAL, 100, 5, 0), 0))

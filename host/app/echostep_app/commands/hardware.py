@@ -7,6 +7,7 @@ In: the command's arguments and options. Out: findings, a flashed board, setting
 from __future__ import annotations
 
 from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +19,14 @@ from echostep_app.commands.options import Shank, Thigh
 from echostep_app.printing.lines import say
 
 app = typer.Typer()
+
+
+class FiredBy(StrEnum):
+    """The schedules of the pings (protocol/messages.toml)."""
+
+    CONCURRENT = "concurrent"
+    SEQUENTIAL = "sequential"
+    SIMULTANEOUS = "simultaneous"
 
 
 @app.command()
@@ -46,11 +55,15 @@ def bench_report(
     foot: Annotated[str | None, typer.Option("--foot", metavar="PORT", help="Port of a foot board.")] = None,
     seconds: Annotated[float, typer.Option(help="Seconds to listen.", min=3.0, max=3600.0)] = 30.0,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The report.")] = Path("bench-report.txt"),
+    schedule: Annotated[
+        FiredBy | None, typer.Option(help="How the rangers fire meanwhile; without it, as they do now.")
+    ] = None,
 ) -> None:
     """Collect what a new board tells of itself into one text file, to be sent in with measurements (firmware/bench.md)."""
+    from echostep.board.messages import Schedule
     from echostep_app.commissioning import bench_report as bench
 
-    say(bench.write(board, foot, seconds, out))
+    say(bench.write(board, foot, seconds, out, Schedule[schedule.name] if schedule else None))
 
 
 @app.command()

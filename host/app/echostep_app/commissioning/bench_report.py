@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from echostep.board.air import CELSIUS, USUAL_C, sound_m_s
-from echostep.board.messages import GYROS_INVALID, Outcome, Ranger
+from echostep.board.messages import GYROS_INVALID, Outcome, Ranger, Schedule
 from echostep.errors import EchostepError
 from echostep_app.board.faults.findings import Finding, Severity
 from echostep_app.commissioning.diagnosis import Diagnosis
@@ -40,9 +40,9 @@ MEASUREMENTS = (  # the headings of firmware/bench.md
 )
 
 
-def write(board: str | None, foot: str | None, seconds: float, out: Path) -> str:
-    """Examine the boards and write the report; returns where it is and what to do with it."""
-    report = examine(board, None, seconds, foot, electrical=True)
+def write(board: str | None, foot: str | None, seconds: float, out: Path, schedule: Schedule | None = None) -> str:
+    """Examine the boards, while the rangers fire by `schedule`, and write the report; returns where it is and what to do with it."""
+    report = examine(board, None, seconds, foot, electrical=True, schedule=schedule)
     if not report.probed:
         raise EchostepError(str(report.findings[0]) if report.findings else "no board has answered")
     try:

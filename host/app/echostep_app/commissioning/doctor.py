@@ -9,6 +9,7 @@ from __future__ import annotations
 from rich.console import Console
 from rich.text import Text
 
+from echostep.board.messages import Schedule
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep_app.board.faults.health import Finding, Severity
@@ -50,9 +51,15 @@ def run(
 
 
 def examine(
-    board: str | None, mtx: str | None, seconds: float = PROBE_S, foot: str | None = None, *, electrical: bool = False
+    board: str | None,
+    mtx: str | None,
+    seconds: float = PROBE_S,
+    foot: str | None = None,
+    *,
+    electrical: bool = False,
+    schedule: Schedule | None = None,
 ) -> Diagnosis:
-    """Check everything; ports that are None are searched for. `electrical`: also the levels of the boards' inputs."""
+    """Check everything; ports that are None are searched for. `electrical`: also the levels of the boards' inputs; `schedule`: of the pings."""
     report = Diagnosis(electrical=electrical)
     seen = list_seen()
     report.lines += [f"port      {port.name}: {port.role.value} ({port.text})" for port in seen]
@@ -66,7 +73,7 @@ def examine(
     report.findings += _several_boards(seen, board, foot)
     at_ankle = usable.pop(FOOT, None)
     if usable:
-        _probe_devices(report, usable, seconds)
+        _probe_devices(report, usable, seconds, schedule)
     if at_ankle is not None:
         _probe_foot_board(report, at_ankle, seconds)
     report.findings += rules_findings()
@@ -107,9 +114,9 @@ def _no_mtx() -> Finding:
     return Finding(Severity.NOTE, "MTx", what, "plug it in, or name its port with --mtx or --foot")
 
 
-def _probe_devices(report: Diagnosis, ports: dict[str, str], seconds: float) -> None:
+def _probe_devices(report: Diagnosis, ports: dict[str, str], seconds: float, schedule: Schedule | None) -> None:
     try:
-        probed = probe(ports, seconds, check_gyros=True)
+        probed = probe(ports, seconds, check_gyros=True, schedule=schedule)
     except EchostepError as error:
         what, _, remedy = str(error).partition("; ")
         report.findings.append(Finding(Severity.FAULT, "ports", what, remedy or "unplug it and plug it in again"))

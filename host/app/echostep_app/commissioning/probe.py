@@ -19,6 +19,7 @@ from echostep.board.messages import (
     ClockQuery,
     ClockReply,
     Compass,
+    Configure,
     Foot,
     Gyros,
     Identify,
@@ -27,6 +28,8 @@ from echostep.board.messages import (
     Motion,
     Ping,
     Pressure,
+    PressureMode,
+    Schedule,
     SelfTest,
     Sync,
 )
@@ -137,9 +140,11 @@ def drift_of(result: ProbeResult) -> Drift | None:
 class _Probe:
     """Reads the ports, queries the board's clock and sets up the MTx."""
 
-    def __init__(self, ports: SerialPorts, names: Mapping[str, str], check_gyros: bool) -> None:
+    def __init__(
+        self, ports: SerialPorts, names: Mapping[str, str], check_gyros: bool, schedule: Schedule | None = None
+    ) -> None:
         self.result = ProbeResult()
-        self._ports, self._names, self._check_gyros = ports, names, check_gyros
+        self._ports, self._names, self._check_gyros, self._schedule = ports, names, check_gyros, schedule
         self._board, self._mtx = BoardReader(), MtxReader()
         self._subscription = BoardSubscription()
         self._start = MtxStart(MtxTiming().rate_hz, lambda sent: ports.send(MTX, sent), self.result.mtx_messages.append)
@@ -155,6 +160,7 @@ class _Probe:
         """Read for `seconds`, and longer for a self-test that was requested, or a board that has just started."""
         if BOARD in self._names:
             self._send(Identify())
+            self._set_schedule(self._schedule)
         for chunk in self._ports.chunks():
             now_s = clock_s() - self._start_s
             if chunk is not None:
@@ -166,10 +172,16 @@ class _Probe:
             late_s = self._first_message_s + self._least_board_s if self._first_message_s <= seconds else 0.0
             if now_s >= max(seconds + self.extra_s, late_s):
                 break
+        self._set_schedule(self._schedule and Schedule.CONCURRENT)
         self.result.seconds = clock_s() - self._start_s
         self.result.rejected, self.result.lost = self._board.counts.rejected, self._board.counts.lost
         self.result.notices += self._ports.notices
         self.result.mtx_product = self._start.product
+
+    def _set_schedule(self, schedule: Schedule | None) -> None:
+        """Configure the board as after a start, but for this schedule; None: leave it as it is."""
+        if schedule is not None:
+            self._send(Configure(0xFF, schedule, 200, 10, PressureMode.HIGH_SPEED))
 
     def _send(self, message: Message) -> None:
         self._ports.send(BOARD, encode(message, self._sequence))
@@ -235,16 +247,18 @@ class _Probe:
             self.result.mtx_fault = str(error)
 
 
-def probe(names: Mapping[str, str], seconds: float, *, check_gyros: bool = False) -> ProbeResult:
+def probe(
+    names: Mapping[str, str], seconds: float, *, check_gyros: bool = False, schedule: Schedule | None = None
+) -> ProbeResult:
     """Read the ports (URLs by `BOARD`, `MTX`) for `seconds`; raises EchostepError when one cannot be opened.
 
-    `check_gyros` requests a self-test of the gyros when the last one has not passed.
+    `check_gyros` requests a self-test of the gyros when the last one has not passed; `schedule`: of the pings, while it reads.
     """
     warm_up()
     BoardReader().feed(encode(Sync(0, 0), 0))  # compiles its kernel before bytes arrive
     ports = SerialPorts(names, BAUD)
     try:
-        running = _Probe(ports, names, check_gyros)
+        running = _Probe(ports, names, check_gyros, schedule)
         running.run(seconds)
     finally:
         ports.close()

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-SCHEMA_HASH = 0x79028015
-SCHEMA_SEED = 0xF917
+SCHEMA_HASH = 0x9FA991E6
+SCHEMA_SEED = 0x0E4F
 FIXED_SEED = 0xFFFF
 
 
@@ -75,6 +75,7 @@ class Sensors(IntFlag):
 class Schedule(IntEnum):
     CONCURRENT = 0
     SEQUENTIAL = 1
+    SIMULTANEOUS = 2
 
 
 class PressureMode(IntEnum):
@@ -431,7 +432,7 @@ class Configuration(NamedTuple):
         if len(body) != 9:
             raise ValueError(f"configuration: {len(body)} bytes, expected 9")
         message = cls._make(_CONFIGURATION.unpack(body))
-        if message.schedule >= 2:
+        if message.schedule >= 3:
             raise ValueError(f"configuration: schedule {message.schedule} is unknown")
         if message.pressure_mode >= 2:
             raise ValueError(f"configuration: pressure_mode {message.pressure_mode} is unknown")
@@ -835,7 +836,7 @@ class Configure(NamedTuple):
         if len(body) != 5:
             raise ValueError(f"configure: {len(body)} bytes, expected 5")
         message = cls._make(_CONFIGURE.unpack(body))
-        if message.schedule >= 2:
+        if message.schedule >= 3:
             raise ValueError(f"configure: schedule {message.schedule} is unknown")
         if message.pressure_mode >= 2:
             raise ValueError(f"configure: pressure_mode {message.pressure_mode} is unknown")
@@ -1214,7 +1215,7 @@ GREATEST = (  # id, offset in the body, greatest value of the enumeration there
     (0x07, 38, 9),  # status.fault_calf
     (0x07, 39, 9),  # status.fault_belt
     (0x07, 40, 9),  # status.fault_pressure
-    (0x09, 5, 1),  # configuration.schedule
+    (0x09, 5, 2),  # configuration.schedule
     (0x09, 8, 1),  # configuration.pressure_mode
     (0x0A, 4, 2),  # gyro_health.gyro
     (0x0A, 7, 5),  # gyro_health.self_test
@@ -1230,6 +1231,6 @@ GREATEST = (  # id, offset in the body, greatest value of the enumeration there
     (0x0C, 20, 1),  # parts.wiring
     (0x10, 4, 2),  # foot_health.foot_state
     (0x10, 5, 9),  # foot_health.fault
-    (0x83, 1, 1),  # configure.schedule
+    (0x83, 1, 2),  # configure.schedule
     (0x83, 4, 1),  # configure.pressure_mode
 )

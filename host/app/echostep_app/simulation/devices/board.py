@@ -99,7 +99,7 @@ class PythonBoard:
     def _configure(self, wanted: m.Configure) -> None:
         """Take the settings, clamped as the firmware does (firmware/configuration.c), and restart the sensors."""
         self._began_us = 1000 * self._ms
-        schedule = m.Schedule(min(wanted.schedule, m.Schedule.SEQUENTIAL))
+        schedule = m.Schedule(min(wanted.schedule, m.Schedule.SIMULTANEOUS))
         mode = m.PressureMode(min(wanted.pressure_mode, m.PressureMode.HIGH_RESOLUTION))
         gyro_hz, compass_hz = min(max(wanted.gyro_rate_hz, 10), 200), min(max(wanted.compass_rate_hz, 1), 20)
         ticks = _ticks(self._began_us)

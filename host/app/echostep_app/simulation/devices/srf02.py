@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from echostep.board.messages import Outcome, Ping, Ranger, Schedule, Sensors
 
 START_US = 100_000
-HALF_US = {Schedule.CONCURRENT: 33_000, Schedule.SEQUENTIAL: 70_000}
+HALF_US = {Schedule.CONCURRENT: 33_000, Schedule.SEQUENTIAL: 70_000, Schedule.SIMULTANEOUS: 33_000}
 JITTER_US = 4_096
 RANGING_US = 61_000  # [SRF02 technical specification: up to 65 ms; measured about 61]
 POLL_US = 1_000  # it is read later than that by up to this
@@ -36,7 +36,7 @@ class _Ranger:
 
 
 class Rangers:
-    """Both rangers on one grid, the right one half a period after the left one."""
+    """Both rangers on one grid, the right one half a period after the left one, or with it."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
@@ -48,7 +48,7 @@ class Rangers:
         self._half_us = HALF_US[schedule]
         self._jitter_us = JITTER_US if schedule == Schedule.CONCURRENT else 0
         for index, ranger in enumerate(self._both):
-            ranger.slot_us = now_us + START_US + index * self._half_us
+            ranger.slot_us = now_us + START_US + (0 if schedule == Schedule.SIMULTANEOUS else index * self._half_us)
             ranger.due_us = ranger.slot_us + self._delay_us()
 
     def advance(self, start_us: int, rows: NDArray[Any], sensors: int) -> list[tuple[int, Ping]]:
