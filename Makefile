@@ -151,7 +151,7 @@ calls: $(READY) ## each call of the operating system fails in turn, in each comm
 kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording; on from where it stopped
 	$(TOOL) reliability.kill_recorder
 
-hardware: $(READY) ## checks the nets of the wiring; the printed boxes: STL in out/hardware, checked to be closed, and their pictures; not built yet
+hardware: $(READY) ## checks the nets of the wiring; the printed boxes: STL, checked to be closed, and their pictures; not built yet
 	@tools/apt.sh openscad || true
 	$(TOOL) hardware.nets
 	$(TOOL) hardware.boxes

@@ -55,10 +55,15 @@ def test_a_picture_shows_three_sides() -> None:
 
 
 @pytest.mark.parametrize("name", boxes.NAMES)
-def test_the_picture_is_of_the_present_source(name: str) -> None:
-    """`make hardware` after a change of a source."""
+def test_the_picture_and_what_is_printed_are_of_the_present_source(name: str) -> None:
+    """`make hardware` after a change of a source. A binary STL file: 80 bytes, a count, and 50 bytes a facet [3D Systems, 1989]."""
     with Image.open(boxes.BOXES / f"{name}.png") as image:
         assert image.info["Source"] == boxes.sources(name)
+    for part in boxes.PARTS:
+        stl = (boxes.BOXES / f"{name}-{part}.stl").read_bytes()
+        assert stl[:80].decode().split()[-1] == boxes.sources(name)
+        facets = np.frombuffer(stl[84:], np.uint8).reshape(int.from_bytes(stl[80:84], "little"), 50)
+        assert faults(facets[:, 12:48].copy().view("<f4").reshape(-1, 3, 3).astype(float)) == []
 
 
 @pytest.mark.process

@@ -92,3 +92,15 @@ def test_identifiers_and_references_are_unique(board: WiredBoard) -> None:
     references = re.findall(r'\(reference "(\w+)"\)', text)
     assert len(references) == len(set(references)) == len(board.devices) + 1
     assert "Not built yet" in text
+
+
+@BOARDS
+def test_a_part_has_a_footprint_with_as_many_pads_as_pins(board: WiredBoard) -> None:
+    root = parsed(board)
+    for instance in all_of(root, "symbol"):
+        pins, footprint = (
+            len(all_of(instance, "pin")),
+            next(p[2] for p in all_of(instance, "property") if p[1] == "Footprint"),
+        )
+        pads = 2 if "R_Axial" in footprint else int((re.search(r"_1x(\d+)_", footprint) or [0, 0])[1])
+        assert pads == (0 if one(instance, "lib_id")[1].startswith("echostep:micro") else pins)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The printed boxes (`make hardware`): each part from its OpenSCAD source to STL, checked to be a closed surface, and drawn for the README.
 
-In: firmware/hardware/boxes/*.scad; the program openscad. Out: out/hardware/NAME-PART.stl, boxes/NAME.png beside the source; what was found on
-standard output, exit status 1 when a surface is not closed. A picture states the sources that it was made from. Owns nothing.
+In: firmware/hardware/boxes/*.scad; the program openscad. Out: NAME-PART.stl and NAME.png beside the source; what was found on
+standard output, exit status 1 when a surface is not closed. Each file states the sources that it was made from. Owns nothing.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from hardware import HARDWARE, solids
-from hardware.solids import Triangles, faults, picture, read_stl, volume
+from hardware.solids import Triangles, faults, picture, read_stl, volume, write_stl
 from places import OUT
 
 BOXES = HARDWARE / "boxes"
 NAMES = ("belt_box", "ranger_holder", "imu_clip", "ankle_box")
 PARTS = ("box", "lid")
 STL = OUT / "hardware"
+HEADER = "echostep, made from "  # of a binary STL file; `solid` would mark one as text
 WIDTH = 420  # of a part's picture, pixels
 
 
@@ -35,7 +36,7 @@ def sources(name: str) -> str:
 
 
 def compiled(name: str, part: str, out: Path) -> Triangles:
-    """A part by OpenSCAD; its STL is kept in `out`."""
+    """A part by OpenSCAD, by way of a text file in `out`."""
     out.mkdir(parents=True, exist_ok=True)
     path = out / f"{name}-{part}.stl"
     command = ["openscad", "-q", "-D", f'part="{part}"', "-o", str(path), str(BOXES / f"{name}.scad")]
@@ -64,6 +65,7 @@ def main() -> int:
     for name in NAMES:
         parts = [compiled(name, part, STL) for part in PARTS]
         for part, triangles in zip(PARTS, parts, strict=True):
+            write_stl(BOXES / f"{name}-{part}.stl", triangles, f"{HEADER}{sources(name)}")
             size = np.ptp(triangles.reshape(-1, 3), axis=0)
             found = faults(triangles)
             sound &= not found

@@ -34,6 +34,17 @@ class Box:
     kinds: dict[str, str]
     nets: dict[str, str]
 
+    @property
+    def footprint(self) -> str:
+        """Of KiCad's own library: a resistor, or the header on a carrier into which a part or its cable is plugged, in the order of the pins here.
+
+        None for the processor board, whose pins are those that are used, under their printed names.
+        """
+        if self.reference.startswith("R"):
+            return "Resistor_THT:R_Axial_DIN0207_L6.3mm_D2.5mm_P10.16mm_Horizontal"
+        pins = f"1x{len(self.kinds):02}"
+        return f"Connector_PinHeader_2.54mm:PinHeader_{pins}_P2.54mm_Vertical" if self.reference.startswith("U") else ""
+
     def height(self) -> float:
         """Of the box, mm."""
         return GRID * (len(self.kinds) + 1)
@@ -60,7 +71,8 @@ def schematic(board: WiredBoard) -> str:
         lines.append(_instance(board, box, x, y))
     lines.append('  (sheet_instances (path "/" (page "1")))')
     instances = "".join(
-        f'\n    (path "/{_identifier(board, box.reference)}" (reference "{box.reference}") (unit 1) (value "{box.value}") (footprint ""))'
+        f'\n    (path "/{_identifier(board, box.reference)}" (reference "{box.reference}") (unit 1) (value "{box.value}")'
+        f' (footprint "{box.footprint}"))'
         for box in boxes
     )
     return "\n".join([*lines, f"  (symbol_instances{instances}\n  )", ")"]) + "\n"
@@ -116,7 +128,8 @@ def _library_symbol(box: Box) -> str:
         for row, (pin, kind) in enumerate(box.kinds.items())
     )
     hidden = "".join(
-        f' (property "{key}" "" (id {n}) (at 0 0 0) {HIDDEN})' for n, key in ((2, "Footprint"), (3, "Datasheet"))
+        f' (property "{key}" "{text}" (id {n}) (at 0 0 0) {HIDDEN})'
+        for n, (key, text) in enumerate((("Footprint", box.footprint), ("Datasheet", "")), 2)
     )
     return (
         f'    (symbol "{name}" (pin_names (offset 1.016)) (in_bom yes) (on_board yes)\n'
@@ -148,7 +161,7 @@ def _ends(board: WiredBoard, box: Box, x: float, y: float) -> list[str]:
 def _instance(board: WiredBoard, box: Box, x: float, y: float) -> str:
     texts = (
         ("Reference", box.reference, x, y - 3 * GRID, False), ("Value", box.value, x, y - 2 * GRID, False),
-        ("Footprint", "", x, y, True), ("Datasheet", "", x, y, True), ("Place", box.note, x, y - GRID, False),
+        ("Footprint", box.footprint, x, y, True), ("Datasheet", "", x, y, True), ("Place", box.note, x, y - GRID, False),
     )  # fmt: skip
     properties = "".join(
         f'\n    (property "{key}" "{text}" (id {n}) (at {at_x:.2f} {at_y:.2f} 0)'

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Triangles of a printed part: read from OpenSCAD's STL, checked to be a closed surface, drawn.
+"""Triangles of a printed part: read from OpenSCAD's STL, checked to be a closed surface, written for a printer, drawn.
 
-In: an ASCII STL file, mm. Out: triangles (n, 3, 3); faults of the surface; its volume; a shaded picture. Owns nothing.
+In: an ASCII STL file, mm. Out: triangles (n, 3, 3); a binary STL file; faults of the surface; its volume; a shaded picture. Owns nothing.
 """
 
 from __future__ import annotations
@@ -26,6 +26,13 @@ def read_stl(path: Path) -> Triangles:
     """The triangles of an ASCII STL file."""
     numbers = re.findall(r"vertex (\S+) (\S+) (\S+)", path.read_text())
     return np.array(numbers, dtype=float).reshape(-1, 3, 3)
+
+
+def write_stl(path: Path, triangles: Triangles, header: str) -> None:
+    """Write a binary STL file; its normals are zero: a reader computes them from the corners."""
+    facets = np.zeros(len(triangles), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
+    facets["corners"] = triangles
+    path.write_bytes(header.encode().ljust(80) + np.uint32(len(facets)).tobytes() + facets.tobytes())
 
 
 def faults(triangles: Triangles) -> list[str]:
