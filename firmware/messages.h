@@ -6,8 +6,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define SCHEMA_HASH 0x9FA991E6ul
-#define SCHEMA_SEED 0x0E4Fu
+#define SCHEMA_HASH 0x79028015ul
+#define SCHEMA_SEED 0xF917u
 #define IDENTITY_SEED 0xFFFFu
 #define MSG_MAX_SIZE 44u /* longest body */
 

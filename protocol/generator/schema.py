@@ -50,6 +50,7 @@ class Field:
     invalid: int | None = None
     enum: tuple[str, ...] = ()
     flags: tuple[str, ...] = ()
+    later: int = 0  # so many last members of `enum` came later: not part of the schema hash
     enum_name: str = ""  # name of the enumeration in code: its name in [enums], or the field's
 
     @property
@@ -142,7 +143,12 @@ def board_messages(messages: list[Message]) -> list[Message]:
 def schema_hash(messages: list[Message]) -> int:
     """First four bytes, big-endian, of the SHA-256 over everything that shapes the messages that are not optional."""
     shape = [
-        [m.id, m.name, m.direction, [[f.name, f.type, f.unit, f.invalid, f.enum, f.flags] for f in m.fields]]
+        [
+            m.id,
+            m.name,
+            m.direction,
+            [[f.name, f.type, f.unit, f.invalid, f.enum[: len(f.enum) - f.later], f.flags] for f in m.fields],
+        ]
         for m in board_messages(messages)
         if not m.optional
     ]

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-SCHEMA_HASH = 0x9FA991E6
-SCHEMA_SEED = 0x0E4F
+SCHEMA_HASH = 0x79028015
+SCHEMA_SEED = 0xF917
 FIXED_SEED = 0xFFFF
 
 
