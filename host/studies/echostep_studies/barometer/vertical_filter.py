@@ -23,10 +23,10 @@ def smooth(seen: Floats, heights_m: Floats, prior: Floats, *, free: bool) -> tup
     Hypotheses are over levels at `heights_m` (k,), or over level ground at any height (`free`); `prior` (k,) of the level at the start.
     """
     size = len(heights_m) * vertical.MODES
-    filtered, before = np.zeros((len(seen), size, vertical.RESULTS)), []
+    filtered, before = np.zeros((len(seen), size, vertical.RESULTS)), list[vertical.State]()
     state = kernels.start(heights_m, prior, seen[0, vertical.CLAIMED], seen[0, vertical.NOISE])
     for block in _blocks(len(seen)):
-        before.append(tuple(part.copy() for part in state))
+        before.append((state[0].copy(), state[1].copy(), state[2].copy()))
         kernels.filter_samples(state, heights_m, free, seen[block], filtered[block], np.zeros((0, size, size)))
     smoothed = filtered[:, :, vertical.RESULT_WEIGHT].copy()
     for block, state_before in zip(reversed(list(_blocks(len(seen)))), reversed(before), strict=True):
