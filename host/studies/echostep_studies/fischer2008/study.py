@@ -165,13 +165,9 @@ def wilson95(successes: int, runs: int) -> tuple[float, float]:
 
 
 def draw(out: Path, _seed: int, rows: list[ReturnSummary]) -> None:
-    """The paper's Figures 9 and 10, the same return by the particle filter, and the sweeps."""
-    from echostep_studies.fischer2008.pictures import draw_returns, draw_sweeps
+    """Success over each parameter that was varied."""
+    from echostep_studies.fischer2008.pictures import draw_sweeps
 
-    trail = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 15.0], [45.0, 15.0], [45.0, -5.0], [70.0, -5.0]])
-    world = ground(NOMINAL, np.random.default_rng(9), trail)
-    returns = {name: guided_return(world, system, 9) for name, system in SYSTEMS.items()}
-    draw_returns(out / "figures9-10.png", world, returns)
     by_name = {r.name: as_dict(r) for r in rows}
     nominal = {key: getattr(NOMINAL, key, 0.2) for key in SWEEPS}
     draw_sweeps(out / "sweeps.png", SWEEPS, nominal, by_name)

@@ -2,8 +2,7 @@
 """The three experiments of [Lee 2010] in simulation: a lap of 40 x 30 m, the way down from the 5th floor to the 1st, the 3D track;
 the method of the paper and the default one.
 
-In: seeds. Out: rows `lap/lee2010`, `lap/default`, `lap/default+plan`, `floors`, `storeys`, `storeys/default`; pictures as its Figures 6, 7, 8.
-Owns the routes.
+In: seeds. Out: rows `lap/lee2010`, `lap/default`, `lap/default+plan`, `floors`, `storeys`, `storeys/default`. Owns nothing.
 Everything is simulated, from the bytes of the simulated board on: frames, clock and counts are read as live. Each run is another person in another
 magnetic field. All methods are given the place and the heading of the start, and the wearer's legs to within a centimetre; with the plan the wearer
 is calibrated by a walk of 10 m before.
@@ -13,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,7 +23,6 @@ from echostep_app.simulation.people.walker import Walk
 from echostep_studies.frame.report import as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.lee2010.methods import METHODS, MethodTrack, floors_of, with_plan
-from echostep_studies.lee2010.pictures import draw
 from echostep_studies.lee2010.walks import STOREY_M, chunks_of, descent_of, lap_of, lap_plan, measure, start_of, storeys
 
 PRINTED: tuple[dict[str, Any], ...] = ({"name": "lap, the paper", "ending_m": 8.0},)
@@ -137,10 +134,4 @@ def _tables(rows: list[PeopleSummary], request: StudyRequest) -> list[Table]:
     return [Table(title, [*as_dicts(rows), *PRINTED], COLUMNS, (LEGEND,))]
 
 
-def _draw(folder: Path, seed: int, _rows: list[PeopleSummary]) -> None:
-    draw(folder, seed)
-
-
-STUDY = Study(
-    "lee2010", (PersonRun,), one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables, _draw
-)
+STUDY = Study("lee2010", (PersonRun,), one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables)

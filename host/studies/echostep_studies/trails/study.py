@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`echostep evaluate trails`: the trails of [Fischer 2008, section 3.2], walked in simulation, by the paper's method and by ours.
 
-In: seeds. Out: rows for each trail, method and rate; pictures as its Figures 3-6. Owns nothing. All results are simulated. The magnitudes of the
+In: seeds. Out: rows for each trail, method and rate. Owns nothing. All results are simulated. The magnitudes of the
 paper's errors were used to set the model of the MTx's filter (`xsens.onboard_filter`) and the machines, so they test the method, not the MTx.
 """
 
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from echostep_app.output.table import Table
 from echostep_studies.frame.report import ErrorSummary, as_dict, as_dicts, rows_by_name, summary
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.fischer_trails import TRAILS, Trail, measure_trail, walk_trail
-from echostep_studies.trails.pictures import draw_trails
 from echostep_studies.trails.walks import METHODS, RATES_HZ, JudgedTrack, judge, track
 
 COLUMNS = {
@@ -154,8 +152,4 @@ def _ranges(rows: list[TrailSummary]) -> list[str]:
     ]
 
 
-def _draw(folder: Path, seed: int, _rows: list[TrailSummary]) -> None:
-    draw_trails(folder, seed)
-
-
-STUDY = Study("trails", (TrailRun, PrintedRun), one_run, summaries, _tables, _draw, parquet=None)
+STUDY = Study("trails", (TrailRun, PrintedRun), one_run, summaries, _tables, parquet=None)
