@@ -209,5 +209,5 @@ def test_a_summary_is_over_all_runs() -> None:
     )  # fmt: skip
     other = replace(row, distance_error_percent=-3.0, heading_max_deg=9.0, errors_m=[1.0, 4.0])
     (found,) = summaries([row, other])
-    assert (found.distance_error_percent, found.heading_max_deg, found.ending_m) == (-1.0, 9.0, 2.5)
-    assert (found.distance_error_min_percent, found.lost, found.runs) == (-3.0, 1, 2)
+    assert (found["distance_error_percent"], found["heading_max_deg"], found["ending_m"]) == (-1.0, 9.0, 2.5)
+    assert (found["distance_error_min_percent"], found["lost"], found["runs"]) == (-3.0, 1, 2)

@@ -22,7 +22,7 @@ from echostep_app.output.table import Table
 from echostep_app.simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
 from echostep_studies.barometer.altitude import Pressures
 from echostep_studies.barometer.floor_filter import Floors, smooth_floors
-from echostep_studies.frame.report import as_dicts, rows_by_name
+from echostep_studies.frame.report import Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.air_pressure import Weather, device_temperatures, pressures
 from echostep_studies.simulation.vertical_day import VerticalMove, climb
@@ -73,20 +73,6 @@ class FloorRun:
     changes: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FloorSummary:
-    """All runs of a scene: means, the worst run, runs with more than 10 s on a wrong floor."""
-
-    name: str
-    runs: int
-    floor_right: float
-    strict_right: float
-    worst_right: float
-    longest_wrong_s: float
-    late_runs: int
-    changes: int
-
-
 def one_run(seed: int) -> list[FloorRun]:
     """Every scene with the person and the weather of this seed."""
     return [_row(name, scene, seed) for name, scene in SCENES.items()]
@@ -134,18 +120,18 @@ def longest_s(t_s: Floats, wrong: Bools) -> float:
     return max((float(t_s[min(b, len(t_s) - 1)] - t_s[a]) for a, b in spans(wrong).tolist()), default=0.0)
 
 
-def _summary(rows: Sequence[FloorRun]) -> FloorSummary:
+def _summary(rows: Sequence[FloorRun]) -> Row:
     right, strict = [row.floor_right for row in rows], [row.strict_right for row in rows]
-    return FloorSummary(
-        name=rows[0].name, runs=len(rows), floor_right=round(sum(right) / len(right), 5),
-        strict_right=round(sum(strict) / len(strict), 5), worst_right=round(min(right), 5),
-        longest_wrong_s=round(max(row.longest_wrong_s for row in rows), 5),
-        late_runs=sum(row.longest_wrong_s > 10.0 for row in rows), changes=sum(row.changes for row in rows),
-    )  # fmt: skip
+    return {
+        "name": rows[0].name, "runs": len(rows), "floor_right": round(sum(right) / len(right), 5),
+        "strict_right": round(sum(strict) / len(strict), 5), "worst_right": round(min(right), 5),
+        "longest_wrong_s": round(max(row.longest_wrong_s for row in rows), 5),
+        "late_runs": sum(row.longest_wrong_s > 10.0 for row in rows), "changes": sum(row.changes for row in rows),
+    }  # fmt: skip
 
 
-def _tables(rows: list[FloorSummary], request: StudyRequest) -> list[Table]:
-    shown = [{k: 100.0 * v if k.endswith("right") else v for k, v in row.items()} for row in as_dicts(rows)]
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    shown = [{k: 100.0 * v if k.endswith("right") else v for k, v in row.items()} for row in rows]
     title = f"Floors by pressure, {request.runs} simulated runs of 20 minutes, weather of 1 hPa/h"
     return [Table(title, shown, COLUMNS)]
 
