@@ -127,27 +127,16 @@ def propagated(g: Gaussian, air: int, way: int, dt: float) -> Gaussian:
 
 
 def evidence(g: Gaussian, way: int, seen: Floats, dt: float) -> float:
-    """Likelihood of gait, place and the range of levels: only stairs and lifts pay."""
-    if way == ON:
-        return 1.0
-    gait = model.STILL if way < LIFT_UP else model.WALKING
+    """Likelihood of a height beyond the range of levels: only stairs and lifts pay."""
     height = g.mean[HEIGHT]
     beyond = max(height - (seen[model.HIGHEST] + 1.0), (seen[model.LOWEST] - 1.0) - height, 0.0)
-    cost = model.PLACE_COST * (seen[model.PLACE] == model.OUTSIDE) + model.GAIT_COST * (seen[model.GAIT] == gait)
-    return math.exp(-dt * (cost + model.RANGE_COST * beyond))
+    return 1.0 if way == ON else math.exp(-dt * model.RANGE_COST * beyond)
 
 
 def observed(g: Gaussian, way: int, seen: Floats, dt: float) -> tuple[float, Gaussian]:
     """Likelihood of the sample, and the Gaussian after it."""
     likelihood = evidence(g, way, seen, dt)
-    foot, claimed = seen[model.FOOT], seen[model.CLAIMED]
-    if not math.isnan(foot):
-        noise_var = seen[model.FOOT_SD] ** 2 / dt
-        if STAIRS_UP <= way < LIFT_UP:
-            likelihood *= normal(foot - g.mean[RATE], g.cov[RATE, RATE] + noise_var)
-            g = updated(g, UNIT[RATE], foot, noise_var)
-        else:
-            likelihood *= normal(foot, model.FOOT_LEVEL_M_S**2 / dt + noise_var)
+    claimed = seen[model.CLAIMED]
     if math.isnan(claimed):
         return likelihood, g
     noise_var = seen[model.NOISE] ** 2

@@ -76,10 +76,7 @@ class VerticalFilter:
                 if self.weights[s] * share < model.TINIEST:
                     continue
                 passed = 0.0 if after_gap else dt
-                late = seen.copy()
-                if after_gap:
-                    late[model.FOOT] = math.nan
-                likelihood, then = observed(propagated(gaussian, air, way, passed), way, late, passed)
+                likelihood, then = observed(propagated(gaussian, air, way, passed), way, seen, passed)
                 target = level * model.MODES + air * model.WAYS + way
                 arrived[target].append((self.weights[s] * share * likelihood, then))
                 joint[target, s] += self.weights[s] * share * likelihood
@@ -97,7 +94,7 @@ class VerticalFilter:
         level, air, way = s // model.MODES, s % model.MODES // model.WAYS, s % model.WAYS
         here = Successor(level, air, way, 1.0, self.gaussians[s])
         leaving = self._calm(here, seen, dt) if air == CALM else self._gust(here, dt)
-        leaving += self._departures(here, seen, dt) if way == ON else self._arrivals(here, dt)
+        leaving += self._departures(here, dt) if way == ON else self._arrivals(here, dt)
         stays = 1.0 - sum(successor.share for successor in leaving)
         if way != ON:
             stays *= math.exp(-dt / model.BETWEEN_S)
@@ -136,9 +133,9 @@ class VerticalFilter:
             found.append(here._replace(air=CALM, share=within(model.GUST_SHIFTS, dt) * alike, gaussian=weather))
         return found
 
-    def _departures(self, here: Successor, seen: Floats, dt: float) -> list[Successor]:
+    def _departures(self, here: Successor, dt: float) -> list[Successor]:
         """From level ground to stairs and lifts, at the speed of a stop."""
-        often = (10.0 if seen[model.PLACE] == model.CONNECTOR else 1.0) * (model.FREE_RATES if self.free else 1.0)
+        often = model.FREE_RATES if self.free else 1.0
         found = []
         for ways, rate, sd in (
             (STAIRS, model.CLIMB_BEGINS, model.CLIMB_STOPS_M_S),

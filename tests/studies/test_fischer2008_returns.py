@@ -107,7 +107,7 @@ def test_every_row_has_its_share_of_returns() -> None:
 
 
 @pytest.mark.long
-def test_command_writes_rows_and_pictures(tmp_path: Path) -> None:
+def test_command_writes_rows_and_a_picture(tmp_path: Path) -> None:
     arguments = [
         "evaluate",
         "fischer2008",
@@ -123,5 +123,4 @@ def test_command_writes_rows_and_pictures(tmp_path: Path) -> None:
     rows = json.loads((tmp_path / "rows.json").read_text())["rows"]
     assert all(set(row) == {"name", "success", "low95", "high95", "runs"} for row in rows)
     assert all(0.0 <= row["low95"] <= row["success"] <= row["high95"] <= 1.0 for row in rows)
-    assert (tmp_path / "out" / "figures9-10.png").stat().st_size > 10_000
     assert (tmp_path / "out" / "sweeps.png").stat().st_size > 10_000

@@ -87,8 +87,8 @@ def test_the_columns_are_those_of_all_wearers() -> None:
         for k, a, b in ((0, 4.0, 1.0), (1, 0.5, 0.5), (2, 0.5, 0.55))
     ]
     found = study._summary(rows)
-    assert (found.ratio, found.worst, found.by_chance) == (0.41, 1.1, 1.0)
-    assert (found.first_alone_m, found.others_together_m) == (4.0, 0.525)
+    assert (found["ratio"], found["worst"], found["by_chance"]) == (0.41, 1.1, 1.0)
+    assert (found["first_alone_m"], found["others_together_m"]) == (4.0, 0.525)
 
 
 def test_a_short_team(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -186,7 +186,7 @@ def test_the_figures_have_the_printed_magnitudes() -> None:
 
 
 @pytest.mark.long
-def test_the_command_writes_rows_for_every_trail_method_and_rate_and_draws(tmp_path: Path) -> None:
+def test_the_command_writes_rows_for_every_trail_method_and_rate(tmp_path: Path) -> None:
     options = ["--runs", "1", "--seed", "4", "--out", str(tmp_path), "--json", str(tmp_path / "r.json")]
     found = CliRunner().invoke(app, ["evaluate", "trails", *options])
     assert found.exit_code == 0, found.output
@@ -199,8 +199,6 @@ def test_the_command_writes_rows_for_every_trail_method_and_rate_and_draws(tmp_p
     for row in rows.values():
         assert row["min_m"] <= row["mean_m"] <= row["max_m"]
         assert row["coverage95"] is None
-    for trail in TRAILS:
-        assert (tmp_path / f"trail-{trail.name}.png").stat().st_size > 10_000
     assert "printed" in found.output
 
 
@@ -211,5 +209,5 @@ def test_a_summary_is_over_all_runs() -> None:
     )  # fmt: skip
     other = replace(row, distance_error_percent=-3.0, heading_max_deg=9.0, errors_m=[1.0, 4.0])
     (found,) = summaries([row, other])
-    assert (found.distance_error_percent, found.heading_max_deg, found.ending_m) == (-1.0, 9.0, 2.5)
-    assert (found.distance_error_min_percent, found.lost, found.runs) == (-3.0, 1, 2)
+    assert (found["distance_error_percent"], found["heading_max_deg"], found["ending_m"]) == (-1.0, 9.0, 2.5)
+    assert (found["distance_error_min_percent"], found["lost"], found["runs"]) == (-3.0, 1, 2)

@@ -14,9 +14,9 @@ from echostep.xsens import MtxReader
 from echostep_app.xsens.products import force_range_g, product_text
 from echostep_app.xsens.requests import successor_requests
 from echostep_app.xsens.setup import State
-from echostep_studies.simulation.devices.mti_setup import MTI_1, MTI_3, MTI_630, Model, MtiDevice
 from players import python_board
 from xsens.mt_lines import SAMPLE, Line, on_a_terminal
+from xsens.simulated_mti import MTI_1, MTI_3, MTI_630, Model, MtiDevice
 
 
 @pytest.mark.parametrize("model", [MTI_3, MTI_630, MTI_1])

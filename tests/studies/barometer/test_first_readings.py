@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from echostep_studies.barometer.altitude import Altitude, BarometerSettings, Pressures
+from echostep_studies.barometer.altitude import Pressures, heights_above_start
 from echostep_studies.barometer.pressure_csv import load_pressures
 
 RNG = np.random.default_rng(1)
@@ -21,15 +21,14 @@ def test_a_wrong_first_sample_makes_no_rise_and_hides_none(first_pa: float | Non
     pressure_pa = CLIMB_PA.copy()
     if first_pa:
         pressure_pa[0] = first_pa
-    heights = Altitude(BarometerSettings(noise_pa=1.5)).feed(Pressures(T_S, pressure_pa))
-    rise_m, _ = heights.change(500, 1400)
-    assert rise_m == pytest.approx(3.5, abs=0.3)
-    assert heights.height_m[-1] == pytest.approx(3.5, abs=0.3)
+    height_m = heights_above_start(Pressures(T_S, pressure_pa), 1.5).height_m
+    assert height_m[1400] - height_m[500] == pytest.approx(3.5, abs=0.3)
+    assert height_m[-1] == pytest.approx(3.5, abs=0.3)
 
 
 def test_a_lift_from_the_first_sample_on_is_a_rise() -> None:
     pressure_pa = 101_325.0 * np.exp(-np.minimum(5.0 * T_S, 60.0) / 8434)
-    assert Altitude().feed(Pressures(T_S, pressure_pa)).height_m[-1] == pytest.approx(60.0, abs=2.0)
+    assert heights_above_start(Pressures(T_S, pressure_pa), 3.0).height_m[-1] == pytest.approx(60.0, abs=2.0)
 
 
 @pytest.mark.parametrize(("wrong", "pa"), [(0, 0.0), (1, 68_500.0), (5, 118_000.0)])

@@ -19,20 +19,19 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep_app.cli import app
 from echostep_app.simulation.devices.board_sensors import Scp1000Model
-from echostep_studies.barometer import vertical_model as vertical
-from echostep_studies.barometer.altitude import Altitude, BarometerSettings, Heights, Pressures, noise_of
-from echostep_studies.barometer.floor_filter import FloorFilter, checked_heights
+from echostep_studies.barometer.altitude import Pressures, heights_above_start, noise_of
+from echostep_studies.barometer.floor_filter import checked_heights, smooth_floors
 from echostep_studies.barometer.floor_record import find_storeys, stays
 from echostep_studies.barometer.floors_command import parse_heights, record_floors
 from echostep_studies.barometer.pressure_csv import load_pressures
-from echostep_studies.floors.study import FloorScene, judge, longest_s
+from echostep_studies.floors.study import judge, longest_s
 from echostep_studies.frame.recordings import DATA
 from echostep_studies.simulation.air_pressure import Weather, device_temperatures, pressures
 from echostep_studies.simulation.vertical_day import climb
 from needs_data import needs_data
 
 STOREYS = np.array([0.0, 3.5, 7.0])
-PA_PER_M = 101_325.0 * 9.80665 / (287.053 * 293.15)
+NOISE_PA = 3.0
 
 
 def pascals(height_m: Floats) -> Floats:
@@ -61,20 +60,16 @@ def known(floor: int, count: int = 3) -> Floats:
 @pytest.mark.long
 def test_standing_keeps_the_height_under_the_weather() -> None:
     t = np.arange(10_800) / 9.0
-    heights = Altitude().feed(record(np.zeros(10_800), extra_pa=100.0 / 3600.0 * t))  # 2.8 m of weather
+    heights = heights_above_start(record(np.zeros(10_800), extra_pa=100.0 / 3600.0 * t), NOISE_PA)  # 2.8 m of weather
     assert abs(heights.height_m[-1]) < 1.0
     assert (heights.moving < 0.5).mean() > 0.99
 
 
 def test_stairs_are_climbed_and_told_while_they_are() -> None:
     way = stairs_up()
-    heights = Altitude().feed(record(way))
-    rise, variance = heights.change(300, len(way) - 1)
-    assert rise == pytest.approx(3.5, abs=3.0 * variance**0.5)
-    assert variance**0.5 < 0.5
-    on_stairs = slice(60 * 9 + 45, 60 * 9 + 100)
-    assert np.median(heights.moving[on_stairs]) > 0.7
-    assert np.median(heights.speed_m_s[on_stairs]) == pytest.approx(0.3, abs=0.1)
+    heights = heights_above_start(record(way), NOISE_PA)
+    assert heights.height_m[-1] - heights.height_m[300] == pytest.approx(3.5, abs=0.5)
+    assert np.median(heights.moving[60 * 9 + 45 : 60 * 9 + 100]) > 0.7
 
 
 @pytest.mark.parametrize("size_pa", [-50.0, -20.0, 20.0, 50.0])
@@ -84,15 +79,15 @@ def test_a_door_moves_nobody(size_pa: float, held_s: float) -> None:
     t = np.arange(n) / 9.0
     pulse = size_pa * ((t > 60.0) & (t < 60.0 + held_s))
     samples = record(np.full(n, 3.5), extra_pa=pulse)
-    found = FloorFilter(STOREYS, prior=known(1)).feed(samples)
+    found = smooth_floors(samples, STOREYS, NOISE_PA, known(1))
     assert (found.floor == 1).all()
-    assert abs(Altitude().feed(samples).height_m[-1]) < 0.5
+    assert abs(heights_above_start(samples, NOISE_PA).height_m[-1]) < 0.5
 
 
 def test_a_building_under_pressure_for_good_moves_nobody() -> None:
     n = 1200
     step = -25.0 * (np.arange(n) > 600)
-    found = FloorFilter(STOREYS, prior=known(1)).feed(record(np.full(n, 3.5), extra_pa=step))
+    found = smooth_floors(record(np.full(n, 3.5), extra_pa=step), STOREYS, NOISE_PA, known(1))
     assert (found.floor == 1).all()
 
 
@@ -100,121 +95,41 @@ def test_spikes_are_no_heights() -> None:
     way = stairs_up()
     samples = record(way)
     samples.pressure_pa[::97] += 400.0
-    found = FloorFilter(STOREYS, prior=known(0)).feed(samples)
+    found = smooth_floors(samples, STOREYS, NOISE_PA, known(0))
     right = found.floor == np.abs(way[:, None] - STOREYS).argmin(axis=1)
     assert right.mean() > 0.98
     assert found.floor[-1] == 1
 
 
-@pytest.mark.slow
-@settings(max_examples=15, deadline=None)
-@given(cuts=st.lists(st.integers(0, 400), max_size=6))
-def test_portions_change_nothing(cuts: list[int]) -> None:
-    way = np.concatenate([np.zeros(150), np.linspace(0.0, 3.5, 100), np.full(150, 3.5)])
-    samples = record(way)
-    whole_floors, whole_heights = FloorFilter(STOREYS).feed(samples), Altitude().feed(samples)
-    floors, altitude = FloorFilter(STOREYS), Altitude()
-    edges = [0, *sorted(cuts), 400]
-    parts = [Pressures(samples.t_s[a:b], samples.pressure_pa[a:b]) for a, b in zip(edges, edges[1:], strict=False)]
-    assert np.array_equal(np.concatenate([floors.feed(part).probability for part in parts]), whole_floors.probability)
-    assert np.array_equal(np.concatenate([altitude.feed(part).height_m for part in parts]), whole_heights.height_m)
-
-
-def test_an_unknown_start_is_uniform_until_the_heights_tell() -> None:
+def test_an_unknown_start_is_uniform_unless_the_heights_tell() -> None:
     uneven = np.array([0.0, 5.0, 8.5])
     way = np.concatenate([np.zeros(400), np.linspace(0.0, 5.0, 150), np.full(400, 5.0)])
-    found = FloorFilter(uneven).feed(record(way))
-    assert found.probability[300] == pytest.approx(np.full(3, 1 / 3), abs=0.05)
+    unmoved = smooth_floors(record(way[:300]), uneven, NOISE_PA)
+    assert unmoved.probability[-1] == pytest.approx(np.full(3, 1 / 3), abs=0.05)
+    found = smooth_floors(record(way), uneven, NOISE_PA)
     assert found.floor[-1] == 1
     assert found.probability[-1, 1] > 0.9
-    back = FloorFilter(uneven).smooth(record(way))
-    assert (back.floor[:390] == 0).all()
+    assert (found.floor[:390] == 0).all()
 
 
 def test_the_range_of_floors_excludes_starts() -> None:
     way = np.concatenate([np.zeros(400), np.linspace(0.0, 7.0, 240), np.full(400, 7.0)])
-    back = FloorFilter(STOREYS).smooth(record(way))
+    back = smooth_floors(record(way), STOREYS, NOISE_PA)
     assert back.probability[100, 0] > 0.9
     assert back.probability[-1, 2] > 0.9
-
-
-def test_gait_tells_a_lift_from_a_gust() -> None:
-    """A storey in three seconds may be a ride to one who stands; one who walks on meanwhile has met a gust."""
-    rise = np.concatenate([np.zeros(300), 1.75 - 1.75 * np.cos(np.linspace(0.0, np.pi, 27))])
-    samples = record(rise)
-    up = []
-    for gait in (vertical.STILL, vertical.WALKING):
-        seen = Pressures(samples.t_s, samples.pressure_pa, gait=np.full(len(rise), gait, np.int8))
-        up.append(float(FloorFilter(STOREYS, prior=known(0)).feed(seen).probability[-1, 1]))
-    assert up[0] > 0.5
-    assert 1.0 - up[1] > 4.0 * (1.0 - up[0])
-
-
-def test_nobody_climbs_where_the_plan_has_no_stairs() -> None:
-    n = 900
-    slow = 30.0 * np.clip((np.arange(n) - 450) / 90.0, 0.0, 1.0)  # a fan: 2.5 m in 10 s
-    samples = record(np.full(n, 3.5), extra_pa=-slow)
-    outside = Pressures(samples.t_s, samples.pressure_pa, place=np.full(n, vertical.OUTSIDE, np.int8))
-    found = FloorFilter(STOREYS, prior=known(1)).feed(outside)
-    assert (found.floor == 1).all()
-    assert (found.up + found.down).max() < 0.2
-
-
-def test_the_foot_on_stairs_narrows_the_height() -> None:
-    way = stairs_up()
-    samples = record(way)
-    rate = np.gradient(way, samples.t_s)
-    aided = Pressures(samples.t_s, samples.pressure_pa, foot_m_s=rate, foot_sd_m_s=np.full(len(way), 0.03))
-    alone, helped = Altitude().feed(samples), Altitude().feed(aided)
-    assert abs(helped.height_m[-1] - 3.5) < 0.3
-    middle = 60 * 9 + 50
-    assert helped.variance_m2[middle] < alone.variance_m2[middle]
-
-
-def test_a_lift_is_ridden_though_the_foot_stands() -> None:
-    ride = np.concatenate([np.zeros(300), 3.5 - 3.5 * np.cos(np.linspace(0.0, np.pi, 60)), np.full(300, 7.0)])
-    samples = record(ride)
-    still = Pressures(
-        samples.t_s, samples.pressure_pa, foot_m_s=np.zeros(len(ride)), foot_sd_m_s=np.full(len(ride), 0.03)
-    )
-    assert Altitude().feed(still).height_m[-1] == pytest.approx(7.0, abs=0.5)
-
-
-def test_samples_that_are_none_are_left_out() -> None:
-    samples = record(stairs_up())
-    bad = samples.pressure_pa.copy()
-    bad[[3, 50, 51]] = [np.nan, 0.0, np.inf]
-    t = samples.t_s.copy()
-    t[70] = t[69]
-    t[90] = np.nan
-    found = Altitude().feed(Pressures(t, bad))
-    assert len(found.t_s) == len(t) - 5
-    assert np.isfinite(found.height_m).all()
-    assert np.isfinite(found.variance_m2).all()
-
-
-def test_an_empty_portion_is_no_sample() -> None:
-    assert len(Altitude().feed(Pressures(np.zeros(0), np.zeros(0))).t_s) == 0
-    assert len(FloorFilter(STOREYS).smooth(Pressures(np.zeros(0), np.zeros(0))).t_s) == 0
 
 
 @settings(max_examples=15, deadline=None)
 @given(st.lists(st.tuples(st.floats(0.01, 60.0), st.floats(20_000.0, 120_000.0)), min_size=1, max_size=30))
 def test_any_pressures_have_finite_heights_and_probabilities(rows: list[tuple[float, float]]) -> None:
     samples = Pressures(np.cumsum([r[0] for r in rows]), np.array([r[1] for r in rows]))
-    heights, floors = Altitude().feed(samples), FloorFilter(STOREYS).smooth(samples)
+    heights, floors = heights_above_start(samples, NOISE_PA), smooth_floors(samples, STOREYS, NOISE_PA)
     assert np.isfinite(heights.height_m).all()
-    assert (heights.variance_m2 >= 0.0).all()
     assert floors.probability.sum(axis=1) == pytest.approx(np.ones(len(floors.t_s)), abs=1e-6)
 
 
 def test_noise_is_measured_on_a_record() -> None:
     assert noise_of(record(stairs_up(), noise_pa=3.0).pressure_pa) == pytest.approx(3.0, rel=0.1)
-
-
-def test_a_change_forgets_what_both_ends_share() -> None:
-    two = Heights(np.array([0.0, 1.0]), np.array([10.0, 10.0]), np.array([4.0, 4.0]), np.zeros(2), np.zeros(2))
-    assert two.change(0, 1) == pytest.approx((0.0, 0.01))
 
 
 @pytest.mark.slow
@@ -229,7 +144,7 @@ def test_a_simulated_quarter_of_an_hour(ways: str) -> None:
         way.t_s[at], air[at] + 3.0 * rng.standard_normal(len(at)), device_temperatures(way.t_s[at], 21.0, rng)
     )
     away = np.abs(way.height_m[at][:, None] - heights)
-    found = FloorFilter(heights, prior=known(int(away[0].argmin()), 5)).smooth(samples)
+    found = smooth_floors(samples, heights, NOISE_PA, known(int(away[0].argmin()), 5))
     score = judge(found, away, "", 1)
     assert score.floor_right > 0.99
     assert score.longest_wrong_s < 10.0
@@ -240,7 +155,6 @@ def test_the_judge_counts() -> None:
     assert longest_s(t, np.array([False, True, True, False, True, False])) == 2.0
     assert longest_s(t, np.zeros(6, bool)) == 0.0
     assert longest_s(t, np.array([False, False, False, False, True, True])) == 1.0
-    assert FloorScene().whole is False
 
 
 def test_the_boards_barometer_is_carried_up() -> None:
@@ -294,12 +208,12 @@ def test_the_command_tells_floors_and_stays(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_storeys_are_found() -> None:
     way = np.concatenate([stairs_up(), 3.5 + stairs_up()[540:], 7.0 - stairs_up()[540:], 3.5 - stairs_up()[540:]])
-    found = find_storeys(record(way), BarometerSettings())
+    found = find_storeys(record(way), NOISE_PA)
     assert found == pytest.approx([0.0, 3.5, 7.0], abs=0.3)
     floors = record_floors(record(way), found)
     assert [stay.floor for stay in stays(floors)] == [0, 1, 2, 1, 0]
     with pytest.raises(EchostepError, match="one storey only"):
-        find_storeys(record(np.zeros(900)), BarometerSettings())
+        find_storeys(record(np.zeros(900)), NOISE_PA)
 
 
 @pytest.mark.parametrize("rate_hz", [0.5, 2.0, 50.0])
@@ -393,7 +307,7 @@ def climbed(path: Path) -> float:
     table = np.array(rows, float)
     t_s = np.arange(len(table)) * (t1 - t0).total_seconds() / len(table)
     pressure, temperature = table[:, 1] / 10.0, table[:, 2] / 1000.0
-    found = Altitude(BarometerSettings(noise_of(pressure))).smooth(Pressures(t_s, pressure, temperature))
+    found = heights_above_start(Pressures(t_s, pressure, temperature), noise_of(pressure))
     return float(found.height_m[-1] - found.height_m[0])
 
 

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from echostep.arrays import Floats
 from echostep_studies.barometer import vertical_filter
 from echostep_studies.barometer import vertical_model as model
-from echostep_studies.barometer.vertical_filter import Hypotheses
+from echostep_studies.barometer.vertical_filter import smooth
 from echostep_studies.barometer.vertical_kernels import filter_samples, smooth_backward, start
 from echostep_studies.barometer.vertical_model import State
-from naive.vertical import Gaussian, observed, propagated, smoothed, started
+from naive.vertical import Gaussian, propagated, smoothed, started
 from naive.vertical_steps import VerticalFilter
 
 STEPS_S = (0.02, 0.11, 0.5, 0.7, 1.9, 5.0, 5.1, 60.0, 4000.0)  # up to three steps, the longest without a gap, gaps
@@ -38,16 +38,13 @@ def any_state(rng: np.random.Generator, heights_m: Floats) -> State:
 
 
 def any_rows(rng: np.random.Generator, heights_m: Floats, n: int) -> Floats:
-    """Samples of a wearer who moves among the levels; pressure, foot, gait and place are missing now and then, and pressure is at times far off."""
-    seen = np.zeros((n, 9))
+    """Samples of a wearer who moves among the levels; pressure is missing now and then, and at times far off."""
+    seen = np.zeros((n, 5))
     seen[:, model.DT] = rng.choice(STEPS_S, n)
     way = rng.choice(heights_m) + np.cumsum(rng.normal(0.0, 0.3, n))
     seen[:, model.CLAIMED] = way + rng.choice([0.0, 4.0, -15.5, 15.5], n, p=[0.6, 0.2, 0.1, 0.1])
     seen[rng.random(n) < 0.15, model.CLAIMED] = math.nan
     seen[:, model.NOISE] = rng.uniform(0.1, 0.5, n)
-    seen[:, model.GAIT], seen[:, model.PLACE] = rng.integers(0, 3, (2, n))
-    seen[:, model.FOOT] = np.where(rng.random(n) < 0.5, rng.normal(0.0, 0.3, n), np.nan)
-    seen[:, model.FOOT_SD] = rng.uniform(0.02, 0.2, n)
     seen[:, model.LOWEST], seen[:, model.HIGHEST] = heights_m[0], heights_m[-1]
     if rng.random() < 0.5:
         seen[:, model.LOWEST], seen[:, model.HIGHEST] = -math.inf, math.inf
@@ -65,7 +62,7 @@ def assert_is_that_of_its_twin(state: State, heights_m: Floats, free: bool, seen
     twin = twin_of(state, heights_m, free)
     expected = np.array([twin.sample(row) for row in seen])
     size = len(twin.weights)
-    found, joint = np.zeros((len(seen), size, 5)), np.zeros((len(seen), size, size))
+    found, joint = np.zeros((len(seen), size, model.RESULTS)), np.zeros((len(seen), size, size))
     filter_samples(state, heights_m, free, seen, found, joint)
     np.testing.assert_allclose(joint, expected, rtol=1e-7, atol=1e-13)
     np.testing.assert_allclose(state[0], twin.weights, rtol=1e-7, atol=1e-13)
@@ -73,7 +70,7 @@ def assert_is_that_of_its_twin(state: State, heights_m: Floats, free: bool, seen
         mean, cov = twin.gaussians[s]
         np.testing.assert_allclose(state[1][s], mean, rtol=1e-7, atol=1e-7)
         np.testing.assert_allclose(state[2][s], cov, rtol=1e-7, atol=1e-7)
-        assert found[-1, s] == pytest.approx([twin.weights[s], *mean[: model.GUST], cov[0, 0]], rel=1e-7, abs=1e-7)
+        assert found[-1, s] == pytest.approx([twin.weights[s], mean[model.HEIGHT], cov[0, 0]], rel=1e-7, abs=1e-7)
 
 
 @pytest.mark.slow
@@ -102,12 +99,14 @@ def test_a_record_from_its_start_is_that_of_the_twin(seed: int, free: bool) -> N
 
 
 def test_a_sample_that_nothing_explains_is_skipped() -> None:
-    """A foot that is a thousand times too fast leaves no hypothesis any weight."""
+    """All are on stairs a million metres above the levels: no hypothesis keeps any weight."""
     rng = np.random.default_rng(1)
     heights = levels(rng, 2)
     seen = any_rows(rng, heights, 1)
-    seen[0, [model.DT, model.FOOT, model.FOOT_SD]] = 0.11, 1e3, 0.02
+    seen[0, model.DT], seen[0, model.LOWEST : model.HIGHEST + 1] = 0.5, heights[[0, -1]]
     state = any_state(rng, heights)
+    state[0][np.arange(len(state[0])) % model.WAYS == model.ON] = 0.0
+    state[1][:, model.HEIGHT] = 1e6
     before = state[0].copy()
     assert_is_that_of_its_twin(state, heights, False, seen)
     assert (state[0] == before).all()
@@ -132,7 +131,7 @@ def test_blocks_of_a_record_are_smoothed_as_one(monkeypatch: pytest.MonkeyPatch)
     heights, prior = levels(rng, 2), np.ones(2)
     seen = any_rows(rng, heights, 17)
     seen[0, model.CLAIMED] = heights[0]
-    _, smooth = Hypotheses(heights, prior, free=False).smooth(seen)
+    _, found = smooth(seen, heights, prior, free=False)
     twin = VerticalFilter(heights, False, *started(heights, prior, seen[0, model.CLAIMED], seen[0, model.NOISE]))
     joints = [twin.sample(row) for row in seen]
     expected = [twin.weights]
@@ -140,25 +139,14 @@ def test_blocks_of_a_record_are_smoothed_as_one(monkeypatch: pytest.MonkeyPatch)
         total = joint.sum(axis=1, keepdims=True)
         before = expected[0] @ np.divide(joint, total, out=np.zeros_like(joint), where=total > 0.0)
         expected.insert(0, before / before.sum())
-    np.testing.assert_allclose(smooth, expected, rtol=1e-6, atol=1e-10)
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-10)
 
 
 def test_a_second_is_a_second_however_it_is_cut() -> None:
-    """A gust that fades wanders as far, and a foot on level ground speaks as loudly, in ten steps as in one."""
-    seen = np.full(9, math.nan)
-    seen[model.FOOT], seen[model.FOOT_SD] = 0.2, 0.1
+    """A gust that fades wanders as far in ten steps as in one."""
     one = Gaussian(np.zeros(model.SIZE), np.eye(model.SIZE))
-    whole, log_whole = propagated(one, model.FADING, model.ON, 1.0), _log_foot_ratio(one, seen, 1.0)
-    cut, log_cut = one, 0.0
+    cut = one
     for _ in range(10):
         cut = propagated(cut, model.FADING, model.ON, 0.1)
-        log_cut += _log_foot_ratio(one, seen, 0.1)
+    whole = propagated(one, model.FADING, model.ON, 1.0)
     assert cut.cov[model.GUST, model.GUST] == pytest.approx(whole.cov[model.GUST, model.GUST])
-    assert log_cut == pytest.approx(log_whole)
-
-
-def _log_foot_ratio(g: Gaussian, seen: Floats, dt: float) -> float:
-    """Log of how much likelier a standing foot is than what was seen."""
-    still = seen.copy()
-    still[model.FOOT] = 0.0
-    return math.log(observed(g, model.ON, still, dt)[0] / observed(g, model.ON, seen, dt)[0])

@@ -42,10 +42,10 @@ def test_the_imu_row_is_calibrated_to_the_papers() -> None:
     walks = [walk_markers(lay_markers(site.route), site.built, seed) for seed in range(100)]
     errors = [study._row("imu", "", 0, w, list(study.dead_reckoned(site, w, 0))).errors_m for w in walks]
     row = summary("imu", "girard2011", errors, [])
-    assert row.mean_m == pytest.approx(0.59, rel=0.15)
-    assert row.sd_m == pytest.approx(0.35, rel=0.15)
-    assert row.max_m == pytest.approx(1.47, rel=0.15)
-    assert row.ending_m == pytest.approx(1.47, rel=0.20)
+    assert row["mean_m"] == pytest.approx(0.59, rel=0.15)
+    assert row["sd_m"] == pytest.approx(0.35, rel=0.15)
+    assert row["max_m"] == pytest.approx(1.47, rel=0.15)
+    assert row["ending_m"] == pytest.approx(1.47, rel=0.20)
 
 
 def test_a_walk_is_a_function_of_its_seed() -> None:

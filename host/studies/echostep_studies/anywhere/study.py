@@ -16,11 +16,12 @@ from echostep.errors import EchostepError
 from echostep_app.output.table import Table
 from echostep_studies.anywhere.amcl import track_by_amcl
 from echostep_studies.anywhere.trials import NEEDS_DATA, PEERED, TRIALS, Trial, Walks
-from echostep_studies.bench.columns import ClaimsRow, ClaimsSummary, JudgedRow, run_row, summaries, tables
+from echostep_studies.bench.columns import ClaimsRow, JudgedRow, run_row, summaries, tables
 from echostep_studies.bench.filtering import FilterRun, track
 from echostep_studies.bench.judgement import SEARCH_M, JudgedRun, TruePlaces, judge, true_levels
 from echostep_studies.bench.stanford import draw_stanford
 from echostep_studies.bench.walks import T, X, Y, Z
+from echostep_studies.frame.report import Row
 from echostep_studies.frame.study import Study, StudyRequest
 
 PEER = "/amcl"  # ending of the rows of augmented MCL
@@ -47,7 +48,7 @@ def _judged(trial: Trial, run: FilterRun) -> JudgedRun:
     return judge(claims, TruePlaces(place, true_levels(place, z, trial.plan)), walked_m)
 
 
-def anywhere_study(data: Path | None, rows: str = "*") -> Study[ClaimsRow, ClaimsSummary]:
+def anywhere_study(data: Path | None, rows: str = "*") -> Study[ClaimsRow, Row]:
     """The study of the rows whose names match a pattern; `data`: folder of the public recordings, without which westport-house is left out.
 
     The peer's rows are run where the pattern names it: they cost three times what all others do.
@@ -68,6 +69,6 @@ def _methods(trial: str) -> list[str]:
     return [trial, trial + PEER] if trial in PEERED else [trial]
 
 
-def _tables(rows: list[ClaimsSummary], request: StudyRequest) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     title = f"Found from nowhere, found again, and the radius: {request.runs} simulated walks a row"
     return tables(title, rows, SEARCH_M)

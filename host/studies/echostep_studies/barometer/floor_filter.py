@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Which floor: a hidden state over the building's storeys, with stairs and lifts between them.
 
-In: `Pressures` and the storeys' heights. Out: probabilities of each floor, the height in the building's frame; live, sample by sample, or from a
-whole record, where what comes later helps: an ambiguous start is resolved when the walk shows which storeys fit. Owns nothing but its `Hypotheses`.
+In: `Pressures` and the storeys' heights. Out: probabilities of each floor, the height in the building's frame, from a whole record: an ambiguous
+start is resolved when the walk shows which storeys fit. Owns nothing.
 
 A floor is the index into `heights_m`. On stairs and in a lift the nearest storey counts: the floor changes at the middle between two levels.
 """
@@ -16,8 +16,8 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.errors import EchostepError
 from echostep_studies.barometer import vertical_model as vertical
-from echostep_studies.barometer.altitude import AirColumn, BarometerSettings, Pressures
-from echostep_studies.barometer.vertical_filter import Hypotheses
+from echostep_studies.barometer.altitude import Pressures, observations
+from echostep_studies.barometer.vertical_filter import smooth
 
 TIED = 0.9  # of the best floor's probability: then the lowest of them is named
 CLOSEST_M, HIGHEST_M, MOST_STOREYS = 1.5, 2000.0, 64
@@ -39,29 +39,16 @@ class Floors:
     down: Floats
 
 
-class FloorFilter:
-    """Floors of one barometer, live; `feed` in any portions gives the same floors."""
+def smooth_floors(samples: Pressures, heights_m: Floats, noise_pa: float, prior: Floats | None = None) -> Floors:
+    """Floors at all samples of a record, each by the whole record.
 
-    def __init__(
-        self, heights_m: Floats, settings: BarometerSettings | None = None, prior: Floats | None = None
-    ) -> None:
-        """`heights_m` (k,) ascending; `prior` (k,) of the floor at the start, uniform by default. Raises EchostepError for impossible heights."""
-        self.heights_m = checked_heights(heights_m)
-        prior = np.ones(len(self.heights_m)) if prior is None else np.asarray(prior, float)
-        self._column = AirColumn(settings or BarometerSettings(), float(self.heights_m[0]), float(self.heights_m[-1]))
-        self._hypotheses = Hypotheses(self.heights_m, prior, free=False)
-
-    def feed(self, samples: Pressures) -> Floors:
-        """Floors at the samples that could be used, each by what was known then."""
-        seen, used = self._column.rows(samples)
-        states = self._hypotheses.filter(seen)
-        return _floors(samples.t_s[used], self.heights_m, states, states[:, :, vertical.RESULT_WEIGHT])
-
-    def smooth(self, samples: Pressures) -> Floors:
-        """Floors at the samples of a whole record, each by all of it; a filter can do so once."""
-        seen, used = self._column.rows(samples)
-        states, weight = self._hypotheses.smooth(seen)
-        return _floors(samples.t_s[used], self.heights_m, states, weight)
+    `heights_m` (k,) ascending; `noise_pa`: standard deviation of a sample; `prior` (k,) of the floor at the start, uniform by default. Raises
+    EchostepError for impossible heights.
+    """
+    heights_m = checked_heights(heights_m)
+    seen = observations(samples, noise_pa, float(heights_m[0]), float(heights_m[-1]))
+    states, weight = smooth(seen, heights_m, np.ones(len(heights_m)) if prior is None else prior, free=False)
+    return _floors(samples.t_s, heights_m, states, weight)
 
 
 def checked_heights(heights_m: Floats) -> Floats:
@@ -98,8 +85,7 @@ def _floors(t_s: Floats, heights_m: Floats, states: Floats, weight: Floats) -> F
                 edges = np.hstack([np.ones((n, 1)), above, np.zeros((n, 1))])
                 probability += w[:, None] * (edges[:, :-1] - edges[:, 1:])
     probability /= np.maximum(probability.sum(axis=1, keepdims=True), 1e-300)
-    best = probability.max(axis=1, keepdims=True, initial=0.0)
-    floor = np.argmax(probability >= TIED * best, axis=1) if n else np.zeros(0, int)
+    floor = np.argmax(probability >= TIED * probability.max(axis=1, keepdims=True), axis=1)
     ways = np.arange(weight.shape[1]) % vertical.WAYS
     up = weight[:, (ways == vertical.STAIRS_UP) | (ways == vertical.LIFT_UP)].sum(axis=1)
     down = weight[:, (ways == vertical.STAIRS_DOWN) | (ways == vertical.LIFT_DOWN)].sum(axis=1)

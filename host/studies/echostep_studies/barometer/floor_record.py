@@ -13,8 +13,8 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints, spans
 from echostep.errors import EchostepError
-from echostep_studies.barometer.altitude import AirColumn, Altitude, BarometerSettings, Heights, Pressures, noise_of
-from echostep_studies.barometer.floor_filter import CLOSEST_M, FloorFilter, Floors
+from echostep_studies.barometer.altitude import Heights, Pressures, heights_above_start, noise_of, observations
+from echostep_studies.barometer.floor_filter import CLOSEST_M, Floors, smooth_floors
 from echostep_studies.barometer.vertical_model import CLAIMED
 
 Change = tuple[int, int, float]  # of floor: index before, index after, rise (m)
@@ -80,20 +80,20 @@ def noise_of_record(samples: Pressures, few: Pressures) -> float:
     return noise_pa
 
 
-def find_storeys(samples: Pressures, settings: BarometerSettings) -> Floats:
+def find_storeys(samples: Pressures, noise_pa: float) -> Floats:
     """Heights (k,) above the lowest floor of all floors with a stay; raises EchostepError when there is one only.
 
     1. Rises between stays give changes of floor: the floor after a change is a known one of the same height, or a new one.
     2. Least squares over all changes gives the heights.
     3. The floor filter with these heights gives the stays; the pressures at the ends of stays give the rises; repeat from 2 until nothing changes.
     """
-    changes = _first_changes(_rises(Altitude(settings).smooth(samples)))
+    changes = _first_changes(_rises(heights_above_start(samples, noise_pa)))
     heights = _apart(_fitted(changes, np.zeros(len({index for change in changes for index in change[:2]}) or 1)))
-    claimed, used = AirColumn(settings).rows(samples)
+    claimed_m = observations(samples, noise_pa)[:, CLAIMED]
     for _ in range(MOST_ROUNDS if len(heights) > 1 else 0):
         before = heights
-        visited = stays(FloorFilter(heights, settings).smooth(samples), PASSED_S, PASSED_P)
-        heights = _apart(_fitted(_changes(visited, samples.t_s[used], claimed[:, CLAIMED]), before))
+        visited = stays(smooth_floors(samples, heights, noise_pa), PASSED_S, PASSED_P)
+        heights = _apart(_fitted(_changes(visited, samples.t_s, claimed_m), before))
         if before[-1] - heights[-1] > SHIFTS_M:  # stays were lost
             heights = before
         if len(heights) == len(before) and np.abs(heights - before).max() < SETTLED_M:

@@ -15,8 +15,8 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep_app.offline.foreign_columns import OWN, Naming
 from echostep_app.printing.picture_files import save_picture
-from echostep_studies.barometer.altitude import BarometerSettings, Pressures
-from echostep_studies.barometer.floor_filter import FloorFilter, Floors, checked_heights
+from echostep_studies.barometer.altitude import Pressures
+from echostep_studies.barometer.floor_filter import Floors, checked_heights, smooth_floors
 from echostep_studies.barometer.floor_record import describe, find_storeys, noise_of_record, thinned
 from echostep_studies.barometer.pressure_csv import load_pressures, write_floors
 
@@ -47,8 +47,8 @@ def floors(path: Path, heights: str, out: Path, start: int | None, picture: Path
 def record_floors(samples: Pressures, heights_m: Floats, start: int | None = None) -> Floors:
     """Floors at all samples (n,), each by the whole record: smoothed at about 10 Hz, with the noise measured on the record."""
     few, group = thinned(samples)
-    prior = np.ones(len(heights_m)) if start is None else np.eye(len(heights_m))[start]
-    whole = FloorFilter(heights_m, BarometerSettings(noise_of_record(samples, few)), prior).smooth(few)
+    prior = None if start is None else np.eye(len(heights_m))[start]
+    whole = smooth_floors(few, heights_m, noise_of_record(samples, few), prior)
     return Floors(
         samples.t_s, whole.heights_m, whole.floor[group], whole.probability[group], whole.height_m[group], whole.up[group], whole.down[group]
     )  # fmt: skip
@@ -59,7 +59,7 @@ def _floors_of(path: Path, samples: Pressures, heights_m: Floats | None, start: 
     try:
         if heights_m is None:
             few, _ = thinned(samples)
-            heights_m = find_storeys(few, BarometerSettings(noise_of_record(samples, few)))
+            heights_m = find_storeys(few, noise_of_record(samples, few))
         return record_floors(samples, heights_m, start)
     except EchostepError as error:
         raise EchostepError(f"{path}: {error}") from error

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Vertical motion from pressure: a filter over hypotheses on the wearer's level, way of moving and the state of the air.
 
-In: rows of observations: claimed heights (m), their noise, gait, place and foot speed. Out: a weight and a Gaussian for each hypothesis.
+In: rows of observations: claimed heights (m) and their noise. Out: a weight and a Gaussian for each hypothesis.
 Owns the kernels only; the state lies in the caller's arrays, so results do not depend on how a record is cut into portions.
 
 A hypothesis is (level k, mode). k is the level the wearer is on, or the one where the climb or ride began. The mode combines the way of moving and
@@ -28,11 +28,9 @@ from echostep_studies.barometer.vertical_model import (
     CLIMB_SD_M_S,
     CLIMB_STOPS_M_S,
     CLIMB_TURNS,
-    CONNECTOR,
     DT,
     FADING,
     FADING_HOLDS,
-    FOOT,
     FREE_RATES,
     GAP_S,
     GUST,
@@ -50,7 +48,6 @@ from echostep_studies.barometer.vertical_model import (
     LONGEST_STEP_S,
     MODES,
     ON,
-    PLACE,
     RATE,
     RESTS,
     RESULT_HEIGHT,
@@ -103,10 +100,9 @@ def start(heights_m: Floats, prior: Floats, claimed_m: float, noise_m: float) ->
 def filter_samples(state: State, heights_m: Floats, free: bool, seen: Floats, states: Floats, joint: Floats) -> None:
     """All samples of a portion; `state` (weights, means, covariances) goes on from them.
 
-    `seen`: (n, 9) time since the sample before (s), claimed height, its noise, gait, place, the foot's vertical speed and its sd over a
-    second (NaN: unknown), lowest and highest level. `free`: level ground is anywhere.
-    Filled: `states` (n, 15 k, 5) with weight, h, v, d and the variance of h; `joint`
-    (n, 15 k, 15 k) with p(now, before) for `smooth_backward`, unless it has length 0.
+    `seen`: (n, 5) time since the sample before (s), claimed height, its noise, lowest and highest level. `free`: level ground is anywhere.
+    Filled: `states` (n, 15 k, 3) with weight, height and its variance; `joint` (n, 15 k, 15 k) with p(now, before) for `smooth_backward`, unless it
+    has length 0.
     """
     size = len(state[0])
     merged = (
@@ -131,8 +127,10 @@ def filter_samples(state: State, heights_m: Floats, free: bool, seen: Floats, st
                 chain = merged[3].copy() if piece == 0 else _chain_joint(merged[3], chain)
         for s in range(size):
             states[i, s, RESULT_WEIGHT] = state[0][s]
-            states[i, s, RESULT_HEIGHT:RESULT_VARIANCE] = state[1][s, :GUST]
-            states[i, s, RESULT_VARIANCE] = state[2][s, HEIGHT, HEIGHT]
+            states[i, s, RESULT_HEIGHT], states[i, s, RESULT_VARIANCE] = (
+                state[1][s, HEIGHT],
+                state[2][s, HEIGHT, HEIGHT],
+            )
         if len(joint):
             joint[i] = chain
 
@@ -205,7 +203,7 @@ def _step(state: State, heights_m: Floats, free: bool, gap: bool, dt: float, see
 def _departures(state: State, s: int, free: bool, dt: float, seen: Floats, merged: Merged) -> float:
     """Transitions from level ground to stairs and lifts; returns the weight that leaves s."""
     weights, here = state[0], s - s % WAYS
-    often = (10.0 if seen[PLACE] == CONNECTOR else 1.0) * (FREE_RATES if free else 1.0)
+    often = FREE_RATES if free else 1.0
     gone = 0.0
     for target in range(STAIRS_UP, WAYS):
         share = weights[s] * probability_within(often * (CLIMB_BEGINS if target < LIFT_UP else RIDE_BEGINS), dt)
@@ -329,7 +327,7 @@ def _reinitialise_after_gap(
     count, own, weight = len(heights_m), s // MODES, state[0][s]
     stays = max(RESTS, math.exp(-dt * 2.0 * (CLIMB_BEGINS + RIDE_BEGINS))) if s % WAYS == ON else 0.0
     last = seen.copy()
-    last[DT], last[FOOT] = 0.0, math.nan
+    last[DT] = 0.0
     for j in range(2 if free else count):
         home = j == (0 if free else own)
         share = stays * home + (1.0 - stays) * (1.0 - UNDER_WAY) * ((not home) if free else 1.0 / count)

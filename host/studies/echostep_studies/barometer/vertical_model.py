@@ -24,14 +24,13 @@ ON, STAIRS_UP, STAIRS_DOWN, LIFT_UP, LIFT_DOWN = range(5)  # ways of moving
 WAYS = 5
 CALM, HELD, FADING = range(3)  # air: no gust, one that stays, one that dies away
 MODES = 3 * WAYS  # each way in calm air, then each in held and in fading gusts
-UNKNOWN, WALKING, STILL = range(3)  # gait
-CONNECTOR, OUTSIDE = 1, 2  # place by the plan: on stairs or in a lift, or certainly outside of any
 HEIGHT, RATE, WEATHER, GUST = range(
     4
 )  # state x: height (m), vertical speed (m/s), weather and gust terms of the claimed height (m)
 SIZE = 4
-RESULT_WEIGHT, RESULT_HEIGHT, RESULT_RATE, RESULT_WEATHER, RESULT_VARIANCE = range(5)  # columns of a result
-DT, CLAIMED, NOISE, GAIT, PLACE, FOOT, FOOT_SD, LOWEST, HIGHEST = range(9)  # columns of a row of observations
+RESULTS = 3
+RESULT_WEIGHT, RESULT_HEIGHT, RESULT_VARIANCE = range(RESULTS)  # columns of a result
+DT, CLAIMED, NOISE, LOWEST, HIGHEST = range(5)  # columns of a row of observations
 
 LONGEST_STEP_S = 0.5  # longest step of the mode transitions
 GAP_S = 5.0  # of missing samples: longer gaps reinitialise the modes
@@ -66,8 +65,7 @@ CLIMB_STOPS_M_S, RIDE_STOPS_M_S = 0.3, 0.15
 LEVEL_SD_M = 0.3  # sd of the stated level heights and of the carried barometer
 SCALE = 0.02  # of the rise: temperature of the air
 OUTLIER, OUTLIER_M = 0.003, 4.0
-PLACE_COST, GAIT_COST, RANGE_COST = 3.0, 1.5, 2.0  # nats per second of contradicting evidence
-FOOT_LEVEL_M_S = 0.1  # sd of the vertical speed that a foot on level ground shows, over a second
+RANGE_COST = 2.0  # nats per second and metre beyond the range of levels
 
 
 @part
@@ -111,18 +109,12 @@ def condition_on_value(x: Floats, c: Floats, a: int, value: float, width: float)
     """Multiply the Gaussian by exp(-(x_a - value)^2 / (2 width^2)); returns the mean of that factor."""
     spread = c[a, a] + width**2
     off = value - x[a]
-    update_component(x, c, a, off, spread)
-    return width / math.sqrt(spread) * math.exp(-0.5 * off**2 / spread)
-
-
-@part
-def update_component(x: Floats, c: Floats, a: int, off: float, spread: float) -> None:
-    """Kalman update by a measurement of component a with innovation `off` and innovation variance `spread`."""
     gain = (c[HEIGHT, a] / spread, c[RATE, a] / spread, c[WEATHER, a] / spread, c[GUST, a] / spread)
     for i in range(SIZE):
         x[i] += gain[i] * off
         for j in range(SIZE):
             c[i, j] -= gain[i] * gain[j] * spread
+    return width / math.sqrt(spread) * math.exp(-0.5 * off**2 / spread)
 
 
 @part
@@ -135,9 +127,9 @@ def merge_successor(
         return
     way, air, dt = target % WAYS, target % MODES // WAYS, seen[DT]
     _propagate(x, c, way, air, dt)
-    weight *= math.exp(-dt * _evidence_cost(x, way, seen))
-    if seen[FOOT] == seen[FOOT]:
-        weight *= _foot_likelihood(x, c, way, seen)
+    if way != ON:
+        beyond = max(0.0, x[HEIGHT] - seen[HIGHEST] - 1.0) + max(0.0, seen[LOWEST] - 1.0 - x[HEIGHT])
+        weight *= math.exp(-dt * RANGE_COST * beyond)
     if seen[CLAIMED] == seen[CLAIMED]:
         weight *= _pressure_likelihood(x, c, seen)
     w[target] += weight
@@ -181,29 +173,6 @@ def _propagate(x: Floats, c: Floats, way: int, air: int, dt: float) -> None:
     c[HEIGHT, RATE] += noise * dt / 2.0
     c[RATE, HEIGHT] += noise * dt / 2.0
     c[RATE, RATE] += noise
-
-
-@part
-def _evidence_cost(x: Floats, way: int, seen: Floats) -> float:
-    """Cost (nats per second) of this mode by gait, plan and the range of levels."""
-    cost = 0.0
-    if way != ON:
-        cost += PLACE_COST * (seen[PLACE] == OUTSIDE)
-        cost += GAIT_COST * (seen[GAIT] == (STILL if way < LIFT_UP else WALKING))
-        cost += RANGE_COST * (max(0.0, x[HEIGHT] - seen[HIGHEST] - 1.0) + max(0.0, seen[LOWEST] - 1.0 - x[HEIGHT]))
-    return cost
-
-
-@part
-def _foot_likelihood(x: Floats, c: Floats, way: int, seen: Floats) -> float:
-    """Likelihood of the foot's vertical speed: on stairs it measures RATE (and updates it), elsewhere, also in a lift, it is 0."""
-    stairs = STAIRS_UP <= way < LIFT_UP
-    noise = (seen[FOOT_SD] ** 2 + (0.0 if stairs else FOOT_LEVEL_M_S**2)) / seen[DT]
-    off = seen[FOOT] - (x[RATE] if stairs else 0.0)
-    spread = noise + (c[RATE, RATE] if stairs else 0.0)
-    if stairs:
-        update_component(x, c, RATE, off, spread)
-    return math.exp(-0.5 * off**2 / spread) / math.sqrt(2.0 * math.pi * spread)
 
 
 @part

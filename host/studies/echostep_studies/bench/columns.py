@@ -15,7 +15,7 @@ import numpy as np
 from echostep_app.output.table import Table
 from echostep_studies.bench.filtering import FilterRun
 from echostep_studies.bench.judgement import JudgedRun
-from echostep_studies.frame.report import LOST_END_M, as_dict, as_dicts, rows_by_name
+from echostep_studies.frame.report import LOST_END_M, Row, as_dict, rows_by_name
 
 ALARM_S = 5.0  # an error of more than ALARM_M must be flagged within this time
 FIT = 0.5  # probability of the plan below which a run says that it does not fit
@@ -79,42 +79,10 @@ class JudgedRow(ClaimsRow):
     false_alarms: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ClaimsSummary:
-    """All runs of a name."""
-
-    name: str
-    runs: int
-    named: float
-    tracking: float
-    most_particles: int
-    times_real_time: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JudgedSummary(ClaimsSummary):
-    """The same where the claims are judged."""
-
-    found: float
-    found_m: float | None
-    listed: float
-    mean_m: float | None
-    ce95_m: float | None
-    median_m: float
-    lost: int
-    false_tracking: float
-    false_lost: float
-    beyond_protection: float
-    in_ellipse: float | None
-    alarm_s: float | None
-    alarm_in_5s: float | None
-    false_alarms_h: float | None
-
-
-def tables(title: str, rows: Sequence[ClaimsSummary], search_m: float, notes: Sequence[str] = ()) -> list[Table]:
+def tables(title: str, rows: Sequence[Row], search_m: float, notes: Sequence[str] = ()) -> list[Table]:
     """Two tables of the summary rows: what is found, and what is claimed."""
     below = [*notes, *(note.format(search=round(search_m)) for note in _NOTES)]
-    shares = [{k: 100.0 * v if k in SHARES and v is not None else v for k, v in row.items()} for row in as_dicts(rows)]
+    shares = [{k: 100.0 * v if k in SHARES and v is not None else v for k, v in row.items()} for row in rows]
     return [Table(title, shares, FOUND_COLUMNS), Table(f"{title}: what is claimed", shares, CLAIM_COLUMNS, below)]
 
 
@@ -138,47 +106,46 @@ def run_row(name: str, seed: int, judged: JudgedRun | None, run: FilterRun) -> C
     )  # fmt: skip
 
 
-def summaries(rows: Sequence[ClaimsRow]) -> list[ClaimsSummary]:
+def summaries(rows: Sequence[ClaimsRow]) -> list[Row]:
     """One summary row for each name."""
     return [_summary(group) for group in rows_by_name(rows)]
 
 
-def _summary(runs: Sequence[ClaimsRow]) -> ClaimsSummary:
+def _summary(runs: Sequence[ClaimsRow]) -> Row:
     claims = sum(r.claims for r in runs)
-    summary = ClaimsSummary(
-        name=runs[0].name, runs=len(runs), named=_rounded(float(np.mean([r.named for r in runs]))),
-        tracking=_rounded(sum(r.tracking * r.claims for r in runs) / claims),
-        most_particles=max(r.most_particles for r in runs),
-        times_real_time=_rounded(sum(r.span_s for r in runs) / max(sum(r.cpu_s for r in runs), 1e-9)),
-    )  # fmt: skip
+    summary = {
+        "name": runs[0].name, "runs": len(runs), "named": _rounded(float(np.mean([r.named for r in runs]))),
+        "tracking": _rounded(sum(r.tracking * r.claims for r in runs) / claims),
+        "most_particles": max(r.most_particles for r in runs),
+        "times_real_time": _rounded(sum(r.span_s for r in runs) / max(sum(r.cpu_s for r in runs), 1e-9)),
+    }  # fmt: skip
     judged = [r for r in runs if isinstance(r, JudgedRow)]
     return _judged_summary(summary, judged) if judged else summary
 
 
-def _judged_summary(summary: ClaimsSummary, runs: Sequence[JudgedRow]) -> JudgedSummary:
+def _judged_summary(summary: Row, runs: Sequence[JudgedRow]) -> Row:
     claims = sum(len(r.error_m) for r in runs)
     distances_m = [r.found_m for r in runs if r.found_m is not None]
     after = [e for r in runs for e in r.found_errors_m]
     delays = [s for r in runs for s in r.alarms_s]
     ellipses = sum(r.ellipses for r in runs)
     hours = sum(r.judged_span_s for r in runs) / 3600.0
-    return JudgedSummary(
-        **as_dict(summary),
-        found=_rounded(len(distances_m) / len(runs)),
-        found_m=_rounded(float(np.mean(distances_m))) if distances_m else None,
-        listed=_rounded(float(np.mean([r.listed for r in runs]))),
-        mean_m=_rounded(float(np.mean(after))) if after else None,
-        ce95_m=_rounded(float(np.quantile(after, 0.95))) if after else None,
-        median_m=_rounded(float(np.median([e for r in runs for e in r.error_m]))),
-        lost=sum(r.error_m[-1] > LOST_END_M for r in runs),
-        false_tracking=_rounded(sum(r.false_tracking for r in runs) / claims),
-        false_lost=_rounded(sum(r.false_lost for r in runs) / claims),
-        beyond_protection=_rounded(sum(r.beyond_protection for r in runs) / claims),
-        in_ellipse=_rounded(sum(r.in_ellipse for r in runs) / ellipses) if ellipses else None,
-        alarm_s=_rounded(float(np.quantile(delays, 0.95))) if delays else None,
-        alarm_in_5s=_rounded(float(np.mean([s <= ALARM_S for s in delays]))) if delays else None,
-        false_alarms_h=_rounded(sum(r.false_alarms for r in runs) / hours) if hours else None,
-    )
+    return {
+        **summary, "found": _rounded(len(distances_m) / len(runs)),
+        "found_m": _rounded(float(np.mean(distances_m))) if distances_m else None,
+        "listed": _rounded(float(np.mean([r.listed for r in runs]))),
+        "mean_m": _rounded(float(np.mean(after))) if after else None,
+        "ce95_m": _rounded(float(np.quantile(after, 0.95))) if after else None,
+        "median_m": _rounded(float(np.median([e for r in runs for e in r.error_m]))),
+        "lost": sum(r.error_m[-1] > LOST_END_M for r in runs),
+        "false_tracking": _rounded(sum(r.false_tracking for r in runs) / claims),
+        "false_lost": _rounded(sum(r.false_lost for r in runs) / claims),
+        "beyond_protection": _rounded(sum(r.beyond_protection for r in runs) / claims),
+        "in_ellipse": _rounded(sum(r.in_ellipse for r in runs) / ellipses) if ellipses else None,
+        "alarm_s": _rounded(float(np.quantile(delays, 0.95))) if delays else None,
+        "alarm_in_5s": _rounded(float(np.mean([s <= ALARM_S for s in delays]))) if delays else None,
+        "false_alarms_h": _rounded(sum(r.false_alarms for r in runs) / hours) if hours else None,
+    }  # fmt: skip
 
 
 def _rounded(value: float) -> float:

@@ -15,14 +15,14 @@ import numpy as np
 
 from echostep.localization import CloudSettings, Start
 from echostep_app.output.table import Table
-from echostep_studies.bench.columns import JudgedRow, JudgedSummary, run_row, summaries, tables
+from echostep_studies.bench.columns import JudgedRow, run_row, summaries, tables
 from echostep_studies.bench.filtering import FilterRun, track
 from echostep_studies.bench.judgement import JudgedRun, TruePlaces, judge
 from echostep_studies.bench.laser.building import LogBuilding, LogWalk, building_of, walk_from
 from echostep_studies.bench.laser.carmen_log import logs_in, read_log
 from echostep_studies.bench.stanford import draw_stanford
 from echostep_studies.clutter.pictures import draw_plans
-from echostep_studies.frame.report import as_dict
+from echostep_studies.frame.report import Row, as_dict
 from echostep_studies.frame.study import Study, StudyRequest
 
 UNKNOWN_M = 60.0  # length of the walks from unknown starts
@@ -34,13 +34,6 @@ NOTES = (
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogRow(JudgedRow):
     """A run on one plan of a log; `source`: where the path is from."""
-
-    source: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LogSummary(JudgedSummary):
-    """All runs on one plan of a log."""
 
     source: str
 
@@ -76,13 +69,13 @@ def _judged(walk: LogWalk, run: FilterRun) -> JudgedRun:
     return judge(run.claims, truth, walk.walked_m, UNKNOWN_M)
 
 
-def _summaries(rows: list[LogRow]) -> list[LogSummary]:
+def _summaries(rows: list[LogRow]) -> list[Row]:
     source = {row.name: row.source for row in rows}
-    return [LogSummary(**as_dict(row), source=source[row.name]) for row in summaries(rows)]
+    return [{**row, "source": source[row["name"]]} for row in summaries(rows)]
 
 
-def _tables(rows: list[LogSummary], _request: StudyRequest) -> list[Table]:
-    sources = {row.name.split("/")[0]: row.source for row in rows}
+def _tables(rows: list[Row], _request: StudyRequest) -> list[Table]:
+    sources = {row["name"].split("/")[0]: row["source"] for row in rows}
     paths = "Path by: " + "; ".join(f"{name}: {source}" for name, source in sources.items()) + "."
     return tables("Real clutter: pings from laser scans of real buildings", rows, UNKNOWN_M, (*NOTES, paths))
 
@@ -93,7 +86,7 @@ def _draw(logs: tuple[Path, ...], seed: int, folder: Path, rows: Sequence[LogRow
         draw_plans(folder, building_of(path, seed))
 
 
-def clutter_study(data: Path, starts: int, seed: int) -> Study[LogRow, LogSummary]:
+def clutter_study(data: Path, starts: int, seed: int) -> Study[LogRow, Row]:
     """The study of all logs of a folder, with so many unknown starts each; raises EchostepError that names log and line."""
     logs = tuple(logs_in(data))
     for path in logs:

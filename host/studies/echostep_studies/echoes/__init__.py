@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
 """Echoes of simulated rangers, and how well the echo likelihood predicts them.
 
-In: simulated pings. Out: rows and pictures. Owns nothing.
+In: simulated pings. Out: rows. Owns nothing.
 """

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
@@ -22,7 +21,7 @@ WIDTH_M = 2.4  # of the corridor of Figure 5
 
 @dataclass(frozen=True, slots=True)
 class SimulatedEcho:
-    """Pings of the left ranger: at `place` (what the picture has on its x axis) the pose (x, y, heading) and the ranges (k,), nan for none."""
+    """Pings of the left ranger: at `place` (angle in degrees, or distance in m) the pose (x, y, heading) and the ranges (k,), nan for none."""
 
     place: float
     pose: tuple[float, float, float]
@@ -34,12 +33,10 @@ class Effect:
     """One effect: the true walls, the received echoes, and the walls of the plan."""
 
     name: str
-    axis: str
     plan: Floats
     heard: list[SimulatedEcho]
 
 
-@cache
 def simulated_effects(seed: int) -> tuple[Effect, ...]:
     """All effects; one random generator runs through them."""
     rng = np.random.default_rng([seed, 40])
@@ -50,7 +47,7 @@ def incidence(rng: np.random.Generator) -> Effect:
     """A wall at 2 m, and the ranger turned away from it [Girard 2011, Figure 1]."""
     wall = np.array([[-10.0, 2.0, 10.0, 2.0]])
     poses = [(float(deg), (0.0, 0.0, math.radians(deg))) for deg in range(0, 52, 2)]
-    return Effect("incidence", "angle between ranger and wall's normal, degrees", wall, _listen(wall, poses, rng))
+    return Effect("incidence", wall, _listen(wall, poses, rng))
 
 
 def near_and_far(rng: np.random.Generator) -> Effect:
@@ -61,14 +58,14 @@ def near_and_far(rng: np.random.Generator) -> Effect:
     for y in np.arange(0.2, 2.9, 0.15).tolist():
         built = np.vstack([wall, post + [0.0, y, 0.0, y]])
         echoes += _listen(built, [(y, (0.0, 0.0, 0.0))], rng)
-    return Effect("near and far", "distance of a thin post before a wall at 3 m, m", wall, echoes)
+    return Effect("near and far", wall, echoes)
 
 
 def oblique(rng: np.random.Generator) -> Effect:
     """Across a corridor ever more obliquely: the echo is lost, then comes back by two walls [Girard 2011, Figure 3b]."""
     walls = np.array([[-10.0, 1.0, 4.0, 1.0], [-10.0, -1.0, 4.0, -1.0], [4.0, -1.0, 4.0, 1.0]])
     poses = [(float(deg), (2.0, 0.0, -math.radians(deg))) for deg in range(0, 92, 3)]
-    return Effect("oblique", "angle of the ranger to the corridor's normal, degrees", walls, _listen(walls, poses, rng))
+    return Effect("oblique", walls, _listen(walls, poses, rng))
 
 
 def limits(rng: np.random.Generator) -> Effect:
@@ -77,7 +74,7 @@ def limits(rng: np.random.Generator) -> Effect:
     poses = [
         (d, (0.0, -d, 0.0)) for d in np.concatenate([np.arange(0.04, 0.4, 0.04), np.arange(0.5, 7.0, 0.25)]).tolist()
     ]
-    return Effect("limits", "distance of the wall, m", wall, _listen(wall, poses, rng))
+    return Effect("limits", wall, _listen(wall, poses, rng))
 
 
 def frames(rng: np.random.Generator) -> Effect:
@@ -90,7 +87,7 @@ def frames(rng: np.random.Generator) -> Effect:
     walls += [(x, y, 10.0, y), (0.0, -y, 10.0, -y), (0.0, y + 4.0, 10.0, y + 4.0)]
     plan = np.array(walls)
     poses = [(at, (at, 0.0, 0.0)) for at in np.arange(0.3, 9.7, 0.1).tolist()]
-    return Effect("door frames", "way along the corridor, m", plan, _listen(plan, poses, rng))
+    return Effect("door frames", plan, _listen(plan, poses, rng))
 
 
 def _listen(

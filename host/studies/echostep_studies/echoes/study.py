@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Echoes of simulated rangers, effect by effect [Girard 2011, 2.6, Figures 1-5], and how well the tracker's likelihood predicts them.
 
-In: a seed, or a folder of sweeps. Out: rows, a picture of each effect, shares and places of sweeps, and on demand the settings that explain simulated
-pings best. The simulation and the likelihood share
-nothing but the plan: one computes levels of sound from mirror images, the other has a handful of numbers.
+In: a seed, or a folder of sweeps. Out: rows of each effect, shares and places of sweeps, and on demand the settings that explain simulated pings
+best. The simulation and the likelihood share nothing but the plan: one computes levels of sound from mirror images, the other has a handful of
+numbers.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from echostep_app.simulation.world.acoustics import SRF02, directivity_db
 from echostep_studies.echoes.effects import Effect, pipe_range_m, simulated_effects
 from echostep_studies.echoes.findings import FINDINGS
 from echostep_studies.echoes.likelihood import SettingRow, fitted, log_p
-from echostep_studies.echoes.pictures import draw_effects
 from echostep_studies.echoes.sweep_rows import ShareRow, SweepRow, share_rows, sweep_rows
 from echostep_studies.echoes.sweeps import SweepSet, read_sweeps, simulated_sweeps
 from echostep_studies.frame.report import as_dicts
@@ -71,7 +70,6 @@ def echoes_study(*, fit: bool, sweeps: Path | None = None) -> Study[EchoesRow, E
         partial(one_run, fit=fit) if measured is None else partial(measured_run, measured),
         lambda rows: rows,
         partial(_tables, is_real=measured is not None),
-        draw_figures if measured is None else None,
         journal=False,
         parquet=None,
     )
@@ -89,11 +87,6 @@ def one_run(seed: int, *, fit: bool) -> list[EchoesRow]:
 def measured_run(sweeps: SweepSet, _seed: int) -> list[EchoesRow]:
     """Rows of measured sweeps."""
     return [*share_rows(sweeps), *sweep_rows(sweeps)]
-
-
-def draw_figures(folder: Path, seed: int, _rows: list[EchoesRow]) -> None:
-    """The picture of all effects."""
-    draw_effects(folder / "figures1-5.png", simulated_effects(seed))
 
 
 def _tables(rows: list[EchoesRow], _request: StudyRequest, *, is_real: bool) -> list[Table]:

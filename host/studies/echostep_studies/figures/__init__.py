@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""README's figures and pictures that no study prints.
+"""README's figure that no study prints.
 
-In: recordings, simulated walks. Out: figures on the terminal, pictures. Owns nothing.
+In: a recording. Out: the figure on the terminal, its picture. Owns nothing.
 """

@@ -21,7 +21,7 @@ from echostep_app.output.table import Table
 from echostep_app.simulation.world.beacon_ground import GroundSettings, ground
 from echostep_studies.fischer2008.simulator import OURS, PAPER, PDR, Knowledge, guided_return
 from echostep_studies.fischer2008.walker import EXACT, Obedience
-from echostep_studies.frame.report import as_dict, rows_by_name
+from echostep_studies.frame.report import Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 
 BATCH = 50  # returns a task
@@ -67,17 +67,6 @@ class BatchRun:
     out: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReturnSummary:
-    """The share of the returns that reached the exit, with its 95 % interval."""
-
-    name: str
-    success: float
-    low95: float
-    high95: float
-    runs: int
-
-
 def cases() -> Iterator[Case]:
     """All rows of the study."""
     for name, system in SYSTEMS.items():
@@ -106,7 +95,7 @@ def _with(parameter: str, value: float) -> GroundSettings:
     return replace(NOMINAL, **changed)
 
 
-def fischer2008_study(runs: int, seed: int) -> Study[BatchRun, ReturnSummary]:
+def fischer2008_study(runs: int, seed: int) -> Study[BatchRun, Row]:
     """The study of `runs` returns from `seed` on. Its runs are batches of returns: the seed of a run is the batch's index."""
     return Study(
         "fischer2008",
@@ -120,10 +109,10 @@ def fischer2008_study(runs: int, seed: int) -> Study[BatchRun, ReturnSummary]:
     )
 
 
-def _tables(rows: list[ReturnSummary], request: StudyRequest) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     """Success rates with 95 % intervals, in percent."""
     printed = [
-        as_dict(r) | {"percent": 100 * r.success, "low_percent": 100 * r.low95, "high_percent": 100 * r.high95}
+        r | {"percent": 100 * r["success"], "low_percent": 100 * r["low95"], "high_percent": 100 * r["high95"]}
         for r in rows
     ]
     return [Table(f"People guided back to the exit in time, {request.runs} simulated returns", printed, COLUMNS)]
@@ -148,11 +137,11 @@ def one_return(case: Case, seed: int) -> bool:
     return guided_return(world, case.system, seed, case.period_s, case.obedience, knowledge).arrived
 
 
-def _summary(batches: list[BatchRun]) -> ReturnSummary:
+def _summary(batches: list[BatchRun]) -> Row:
     """The batches of one row added up: the success rate and its 95 % interval."""
     runs, out = sum(b.runs for b in batches), sum(b.out for b in batches)
     low, high = wilson95(out, runs)
-    return ReturnSummary(name=batches[0].name, success=out / runs, low95=low, high95=high, runs=runs)
+    return {"name": batches[0].name, "success": out / runs, "low95": low, "high95": high, "runs": runs}
 
 
 def wilson95(successes: int, runs: int) -> tuple[float, float]:
@@ -164,14 +153,10 @@ def wilson95(successes: int, runs: int) -> tuple[float, float]:
     return max(middle - half, 0.0), min(middle + half, 1.0)
 
 
-def draw(out: Path, _seed: int, rows: list[ReturnSummary]) -> None:
-    """The paper's Figures 9 and 10, the same return by the particle filter, and the sweeps."""
-    from echostep_studies.fischer2008.pictures import draw_returns, draw_sweeps
+def draw(out: Path, _seed: int, rows: list[Row]) -> None:
+    """Success over each parameter that was varied."""
+    from echostep_studies.fischer2008.pictures import draw_sweeps
 
-    trail = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 15.0], [45.0, 15.0], [45.0, -5.0], [70.0, -5.0]])
-    world = ground(NOMINAL, np.random.default_rng(9), trail)
-    returns = {name: guided_return(world, system, 9) for name, system in SYSTEMS.items()}
-    draw_returns(out / "figures9-10.png", world, returns)
-    by_name = {r.name: as_dict(r) for r in rows}
+    by_name = {r["name"]: r for r in rows}
     nominal = {key: getattr(NOMINAL, key, 0.2) for key in SWEEPS}
     draw_sweeps(out / "sweeps.png", SWEEPS, nominal, by_name)

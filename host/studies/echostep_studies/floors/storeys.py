@@ -31,7 +31,7 @@ from echostep_app.simulation.devices.board import PythonBoard
 from echostep_app.simulation.people.tours import tour as tour_of
 from echostep_app.simulation.people.walker import Person, Waypoint
 from echostep_app.simulation.scenario import Scenario
-from echostep_studies.frame.report import LOST_END_M, as_dicts, rows_by_name
+from echostep_studies.frame.report import LOST_END_M, Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.tower import tour, tower
 
@@ -77,26 +77,6 @@ class StoreysRun:
     strict_right: float
     longest_wrong_s: float
     floors: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StoreysSummary:
-    """All walks of a scene: means, the greatest errors, the walks that end lost."""
-
-    name: str
-    profile: str
-    runs: int
-    mean_m: float
-    sd_m: float
-    ending_m: float
-    ce95_m: float
-    coverage95: float
-    floor_right: float
-    strict_right: float
-    max_m: float
-    min_m: float
-    lost: int
-    longest_wrong_s: float
 
 
 def one_run(real: Path | None, seed: int) -> list[StoreysRun]:
@@ -175,29 +155,27 @@ def _holds(connector: Connector, x: float, y: float) -> bool:
     return bool(Polygon(connector.outline_m).buffer(0.3).contains(Point(x, y)))
 
 
-def _summary(rows: Sequence[StoreysRun]) -> StoreysSummary:
+def _summary(rows: Sequence[StoreysRun]) -> Row:
     def mean(key: str) -> float:
         return round(sum(getattr(row, key) for row in rows) / len(rows), 4)
 
-    return StoreysSummary(
-        name=rows[0].name, profile="default", runs=len(rows), mean_m=mean("mean_m"), sd_m=mean("sd_m"), ending_m=mean("ending_m"),
-        ce95_m=mean("ce95_m"), coverage95=mean("coverage95"), floor_right=mean("floor_right"), strict_right=mean("strict_right"),
-        max_m=round(max(row.max_m for row in rows), 4), min_m=round(min(row.min_m for row in rows), 4),
-        lost=sum(row.lost for row in rows), longest_wrong_s=round(max(row.longest_wrong_s for row in rows), 4),
-    )  # fmt: skip
+    return {
+        "name": rows[0].name, "profile": "default", "runs": len(rows), "mean_m": mean("mean_m"), "sd_m": mean("sd_m"),
+        "ending_m": mean("ending_m"), "ce95_m": mean("ce95_m"), "coverage95": mean("coverage95"),
+        "floor_right": mean("floor_right"), "strict_right": mean("strict_right"),
+        "max_m": round(max(row.max_m for row in rows), 4), "min_m": round(min(row.min_m for row in rows), 4),
+        "lost": sum(row.lost for row in rows), "longest_wrong_s": round(max(row.longest_wrong_s for row in rows), 4),
+    }  # fmt: skip
 
 
-def _tables(rows: list[StoreysSummary], request: StudyRequest) -> list[Table]:
-    shown = [
-        {k: 100.0 * v if k.endswith("right") or k == "coverage95" else v for k, v in row.items()}
-        for row in as_dicts(rows)
-    ]
-    real = any(row.name == WESTPORT for row in rows)
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    shown = [{k: 100.0 * v if k.endswith("right") or k == "coverage95" else v for k, v in row.items()} for row in rows]
+    real = any(row["name"] == WESTPORT for row in rows)
     notes = () if real else ("Without --data westport-house is left out.",)
     return [Table(f"All floors of a building, {request.runs} simulated walks", shown, COLUMNS, notes)]
 
 
-def storeys_study(data: Path | None) -> Study[StoreysRun, StoreysSummary]:
+def storeys_study(data: Path | None) -> Study[StoreysRun, Row]:
     """The study; `data`: folder of the public recordings, which holds the plan of westport-house."""
     westport = None if data is None else data / "maps" / "westport-house"
     if westport is not None and not westport.is_dir():

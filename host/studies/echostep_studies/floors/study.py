@@ -5,8 +5,8 @@ In: seeds. Out: rows `floors/...`. A run is 20 minutes about five storeys under 
 `simulation.world.air_pressure`).
 
 The true floor is the storey nearest to the wearer: on stairs and in a lift it changes at the middle between two. Within a quarter of
-a metre of the middle both count as right (`floor_right`), because landings lie there; `strict_right` gives nothing away. Unless a scene is of a
-`whole` record, each sample is judged by what was known at it.
+a metre of the middle both count as right (`floor_right`), because landings lie there; `strict_right` gives nothing away. Each floor is that of the
+whole record, as `echostep floors` names it.
 """
 
 from __future__ import annotations
@@ -20,10 +20,9 @@ import numpy as np
 from echostep.arrays import Bools, Floats, Ints, spans
 from echostep_app.output.table import Table
 from echostep_app.simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
-from echostep_studies.barometer import vertical_model as vertical
-from echostep_studies.barometer.altitude import BarometerSettings, Pressures
-from echostep_studies.barometer.floor_filter import FloorFilter, Floors
-from echostep_studies.frame.report import as_dicts, rows_by_name
+from echostep_studies.barometer.altitude import Pressures
+from echostep_studies.barometer.floor_filter import Floors, smooth_floors
+from echostep_studies.frame.report import Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.air_pressure import Weather, device_temperatures, pressures
 from echostep_studies.simulation.vertical_day import VerticalMove, climb
@@ -40,17 +39,12 @@ STORM = Weather()
 
 @dataclass(frozen=True, slots=True)
 class FloorScene:
-    """`known_start`: the first floor is given; `gait`: walking and standing are given, as legs or foot report them.
-
-    `whole`: judged with the whole record, as `echostep floors` does.
-    """
+    """`known_start`: the first floor is given."""
 
     ways: Literal["stairs", "lift", "both"] = "both"
     weather: Weather = STORM
     mode: Mode = "high-speed"
     known_start: bool = True
-    gait: bool = True
-    whole: bool = False
 
 
 SCENES = {
@@ -59,9 +53,7 @@ SCENES = {
     "floors/both": FloorScene(),
     "floors/pulses": FloorScene(weather=replace(STORM, doors_s=30.0, fan_s=90.0, fan_pa=15.0)),
     "floors/high-resolution": FloorScene(mode="high-resolution"),
-    "floors/pressure-only": FloorScene(gait=False),
-    "floors/unknown-start": FloorScene(known_start=False, gait=False, whole=True),
-    "floors/record": FloorScene(gait=False, whole=True),
+    "floors/unknown-start": FloorScene(known_start=False),
 }
 COLUMNS = {
     "name": "", "runs": "runs", "floor_right": "right %", "strict_right": "strict %", "worst_right": "worst run %",
@@ -81,20 +73,6 @@ class FloorRun:
     changes: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FloorSummary:
-    """All runs of a scene: means, the worst run, runs with more than 10 s on a wrong floor."""
-
-    name: str
-    runs: int
-    floor_right: float
-    strict_right: float
-    worst_right: float
-    longest_wrong_s: float
-    late_runs: int
-    changes: int
-
-
 def one_run(seed: int) -> list[FloorRun]:
     """Every scene with the person and the weather of this seed."""
     return [_row(name, scene, seed) for name, scene in SCENES.items()]
@@ -110,9 +88,7 @@ def _row(name: str, scene: FloorScene, seed: int) -> FloorRun:
     away = np.abs(way.height_m[at][:, None] - heights)
     true = away.argmin(axis=1)
     prior = np.eye(len(heights))[true[0]] if scene.known_start else None
-    filter_ = FloorFilter(heights, BarometerSettings(PRESSURE_NOISE_PA[scene.mode]), prior)
-    floors = filter_.smooth(samples) if scene.whole else filter_.feed(samples)
-    return judge(floors, away, name, seed)
+    return judge(smooth_floors(samples, heights, PRESSURE_NOISE_PA[scene.mode], prior), away, name, seed)
 
 
 def _measured(
@@ -124,8 +100,7 @@ def _measured(
     rate = 1.0 / float(way.t_s[1] - way.t_s[0])
     at = np.floor(np.arange(0.0, RUN_S, 1.0 / MODE_HZ[scene.mode]) * rate).astype(np.int64)
     noisy = air[at] + PRESSURE_NOISE_PA[scene.mode] * rng.standard_normal(len(at))
-    gait = np.where(way.walking[at], vertical.WALKING, vertical.STILL).astype(np.int8) if scene.gait else None
-    return at, Pressures(way.t_s[at], COUNTS_PA * np.rint(noisy / COUNTS_PA), np.rint(20.0 * device[at]) / 20.0, gait)
+    return at, Pressures(way.t_s[at], COUNTS_PA * np.rint(noisy / COUNTS_PA), np.rint(20.0 * device[at]) / 20.0)
 
 
 def judge(floors: Floors, away_m: Floats, name: str, seed: int) -> FloorRun:
@@ -145,18 +120,18 @@ def longest_s(t_s: Floats, wrong: Bools) -> float:
     return max((float(t_s[min(b, len(t_s) - 1)] - t_s[a]) for a, b in spans(wrong).tolist()), default=0.0)
 
 
-def _summary(rows: Sequence[FloorRun]) -> FloorSummary:
+def _summary(rows: Sequence[FloorRun]) -> Row:
     right, strict = [row.floor_right for row in rows], [row.strict_right for row in rows]
-    return FloorSummary(
-        name=rows[0].name, runs=len(rows), floor_right=round(sum(right) / len(right), 5),
-        strict_right=round(sum(strict) / len(strict), 5), worst_right=round(min(right), 5),
-        longest_wrong_s=round(max(row.longest_wrong_s for row in rows), 5),
-        late_runs=sum(row.longest_wrong_s > 10.0 for row in rows), changes=sum(row.changes for row in rows),
-    )  # fmt: skip
+    return {
+        "name": rows[0].name, "runs": len(rows), "floor_right": round(sum(right) / len(right), 5),
+        "strict_right": round(sum(strict) / len(strict), 5), "worst_right": round(min(right), 5),
+        "longest_wrong_s": round(max(row.longest_wrong_s for row in rows), 5),
+        "late_runs": sum(row.longest_wrong_s > 10.0 for row in rows), "changes": sum(row.changes for row in rows),
+    }  # fmt: skip
 
 
-def _tables(rows: list[FloorSummary], request: StudyRequest) -> list[Table]:
-    shown = [{k: 100.0 * v if k.endswith("right") else v for k, v in row.items()} for row in as_dicts(rows)]
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    shown = [{k: 100.0 * v if k.endswith("right") else v for k, v in row.items()} for row in rows]
     title = f"Floors by pressure, {request.runs} simulated runs of 20 minutes, weather of 1 hPa/h"
     return [Table(title, shown, COLUMNS)]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -18,7 +18,7 @@ from msgspec import UNSET
 from echostep.errors import EchostepError
 from echostep_app.scorecard.error_statistics import error_statistics
 
-Row = dict[str, Any]  # the columns of a row by name
+Row = dict[str, Any]  # the columns of a row by name: every summary row is one
 
 LOST_END_M = 3.0  # error at the end of a run above which the run counts as lost: a definition
 
@@ -34,8 +34,8 @@ NamedRow = TypeVar("NamedRow", bound=Named)
 
 
 def as_dict(row: Any) -> Row:
-    """The columns that a row has."""
-    values = ((field.name, getattr(row, field.name)) for field in fields(row))
+    """The columns that a row has; a summary row is a dictionary already."""
+    values = row.items() if isinstance(row, dict) else ((field.name, getattr(row, field.name)) for field in fields(row))
     return {key: value for key, value in values if value is not UNSET}
 
 
@@ -52,34 +52,13 @@ def rows_by_name(rows: Iterable[NamedRow]) -> list[list[NamedRow]]:
     return list(groups.values())
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ErrorSummary:
-    """A row in the form of [Girard 2011, Table 1].
+def summary(name: str, profile: str, errors_m: Sequence[Sequence[float]], inside95: Sequence[Sequence[bool]]) -> Row:
+    """The summary row of the errors at the steps of each run, (runs, steps), in the form of [Girard 2011, Table 1].
 
     `mean_m`, `sd_m`, `max_m`, `min_m`, `ending_m` are computed for each run, then averaged over the runs; `worst_m` is the greatest error of all,
-    `ce50_m` and `ce95_m` are percentiles of all errors [ISO/IEC 18305:2016, 8.9].
-    `coverage95`: share of all steps with the truth inside the 95 % ellipse. `lost`: number of runs that end more than `LOST_END_M` off.
+    `ce50_m` and `ce95_m` are percentiles of all errors [ISO/IEC 18305:2016, 8.9]. `coverage95`: share of all steps with the truth inside the
+    95 % ellipse, None without `inside95`. `lost`: runs that end more than `LOST_END_M` off.
     """
-
-    name: str
-    profile: str
-    runs: int
-    mean_m: float
-    sd_m: float
-    max_m: float
-    min_m: float
-    ending_m: float
-    ce50_m: float
-    ce95_m: float
-    worst_m: float
-    coverage95: float | None
-    lost: int
-
-
-def summary(
-    name: str, profile: str, errors_m: Sequence[Sequence[float]], inside95: Sequence[Sequence[bool]]
-) -> ErrorSummary:
-    """The summary row of the errors at the steps of each run, (runs, steps); without `inside95` no coverage is stated."""
     each = [error_statistics(errors) for errors in errors_m]
     whole = error_statistics([error for errors in errors_m for error in errors])
     steps = [bool(x) for run in inside95 for x in run]
@@ -87,12 +66,13 @@ def summary(
     def mean(key: str) -> float:
         return round(sum(getattr(run, key) for run in each) / len(each), 4)
 
-    return ErrorSummary(
-        name=name, profile=profile, runs=len(each), mean_m=mean("mean_m"), sd_m=mean("sd_m"), max_m=mean("max_m"),
-        min_m=mean("min_m"), ending_m=mean("ending_m"), ce50_m=round(whole.median_m, 4), ce95_m=round(whole.p95_m, 4),
-        worst_m=round(whole.max_m, 4), coverage95=round(sum(steps) / len(steps), 4) if steps else None,
-        lost=sum(errors[-1] > LOST_END_M for errors in errors_m),
-    )  # fmt: skip
+    return {
+        "name": name, "profile": profile, "runs": len(each), "mean_m": mean("mean_m"), "sd_m": mean("sd_m"),
+        "max_m": mean("max_m"), "min_m": mean("min_m"), "ending_m": mean("ending_m"), "ce50_m": round(whole.median_m, 4),
+        "ce95_m": round(whole.p95_m, 4), "worst_m": round(whole.max_m, 4),
+        "coverage95": round(sum(steps) / len(steps), 4) if steps else None,
+        "lost": sum(errors[-1] > LOST_END_M for errors in errors_m),
+    }  # fmt: skip
 
 
 def write_json(path: Path, study: str, runs: int, seed: int, rows: Sequence[Mapping[str, Any]]) -> None:

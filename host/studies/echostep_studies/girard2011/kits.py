@@ -17,7 +17,7 @@ from echostep.localization.echoes.rangers import ECHO_OF
 from echostep_app.output.table import Table
 from echostep_app.simulation.devices.srf02 import HALF_US
 from echostep_app.simulation.world.acoustics import MAXSONAR, PULSE_RANGER, SRF02, Acoustics
-from echostep_studies.frame.report import ErrorSummary, as_dicts, rows_by_name, summary
+from echostep_studies.frame.report import Row, as_dicts, rows_by_name, summary
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.girard2011 import kit_feet
 from echostep_studies.girard2011.kit_feet import KitRun
@@ -82,11 +82,11 @@ def _row(name: str, seed: int, walk: MarkerWalk, seen: list[MethodOutput]) -> Ki
     return KitRun(name=name, seed=seed, errors_m=errors, inside95=inside)
 
 
-def _summary(runs: list[KitRun]) -> ErrorSummary:
+def _summary(runs: list[KitRun]) -> Row:
     return summary(runs[0].name, "kits", [r.errors_m for r in runs], [r.inside95 for r in runs])
 
 
-def _tables(rows: list[ErrorSummary], request: StudyRequest) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     title = f"Position error in metres by kind of ranger, and of the foot alone, {request.runs} simulated runs; only SRF02 and MTx were ever worn"
     return [Table(title, as_dicts(sorted(rows, key=lambda row: row.name.split(", ")[:-1])), COLUMNS)]
 

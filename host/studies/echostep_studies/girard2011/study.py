@@ -21,7 +21,7 @@ from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
 from echostep_app.output.table import Table
-from echostep_studies.frame.report import ErrorSummary, as_dict, as_dicts, rows_by_name, summary
+from echostep_studies.frame.report import Row, as_dict, rows_by_name, summary
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.papers.girard2011 import Girard, GirardSettings
 from echostep_studies.simulation.marker_walk import STEP_M, ImuModel, MarkerWalk, lay_markers, walk_markers
@@ -93,16 +93,7 @@ class HallRun(MethodRun):
     after_10s_m: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HallSummary(ErrorSummary):
-    """The row of a hall, with the means of what a `HallRun` has more."""
-
-    hall_growth_m: float
-    foot_growth_m: float
-    after_10s_m: float
-
-
-def draw(folder: Path, seed: int, _rows: list[ErrorSummary]) -> None:
+def draw(folder: Path, seed: int, _rows: list[Row]) -> None:
     """The clouds after 9, 21 and 52 steps: without the plan, with it, with ranging, and the default filter [Girard 2011, Figures 10-13]."""
     from echostep_studies.frame.pictures import draw_clouds
 
@@ -233,24 +224,23 @@ def _in_hall(walk: MarkerWalk, run: MethodRun) -> HallRun:
     )
 
 
-def _summary(runs: list[MethodRun]) -> ErrorSummary:
+def _summary(runs: list[MethodRun]) -> Row:
     row = summary(runs[0].name, runs[0].profile, [r.errors_m for r in runs], [r.inside95 for r in runs])
     halls = [r for r in runs if isinstance(r, HallRun)]
     if not halls:
         return row
-    return HallSummary(
-        **as_dict(row),
-        hall_growth_m=round(sum(r.hall_growth_m for r in halls) / len(halls), 4),
-        foot_growth_m=round(sum(r.foot_growth_m for r in halls) / len(halls), 4),
-        after_10s_m=round(sum(r.after_10s_m for r in halls) / len(halls), 4),
-    )
+    return {
+        **row, "hall_growth_m": round(sum(r.hall_growth_m for r in halls) / len(halls), 4),
+        "foot_growth_m": round(sum(r.foot_growth_m for r in halls) / len(halls), 4),
+        "after_10s_m": round(sum(r.after_10s_m for r in halls) / len(halls), 4),
+    }  # fmt: skip
 
 
-def _tables(rows: list[ErrorSummary], request: StudyRequest) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     """The table, with the paper's rows at its end."""
     printed = [row | {"name": f"{row['name']}, the paper"} for row in PAPER]
     title = f"Position error in metres, {request.runs} simulated runs; below, the paper's one real run"
-    return [Table(title, [*as_dicts(rows), *printed], COLUMNS)]
+    return [Table(title, [*rows, *printed], COLUMNS)]
 
 
 STUDY = Study(

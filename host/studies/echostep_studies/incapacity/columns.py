@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep_app.output.table import Table
-from echostep_studies.frame.report import as_dicts, rows_by_name
+from echostep_studies.frame.report import Row, rows_by_name
 from echostep_studies.frame.study import StudyRequest
 from echostep_studies.incapacity import falls
 
@@ -40,34 +40,10 @@ class DayRun:
     maydays: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LyingSummary:
-    """Summary of all incapacitated wearers."""
-
-    name: str
-    runs: int
-    told: float
-    median_s: float
-    longest_s: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DaySummary:
-    """All days, or recordings, of a name."""
-
-    name: str
-    runs: int
-    hours: float
-    asked: int
-    maydays: int
-    per_8h: float
-
-
 RunRow = LyingRun | DayRun | falls.FallRun | falls.NoFallRun
-SummaryRow = LyingSummary | DaySummary | falls.FallSummary | falls.NoFallSummary
 
 
-def summarize(rows: Sequence[RunRow]) -> list[SummaryRow]:
+def summarize(rows: Sequence[RunRow]) -> list[Row]:
     """One row for each name; those of falls last."""
     lying = rows_by_name(row for row in rows if isinstance(row, LyingRun))
     days = rows_by_name(row for row in rows if isinstance(row, DayRun))
@@ -75,21 +51,23 @@ def summarize(rows: Sequence[RunRow]) -> list[SummaryRow]:
     return [*map(_lying_summary, lying), *map(_day_summary, days), *falls.summarize(fell)]
 
 
-def _lying_summary(group: Sequence[LyingRun]) -> LyingSummary:
+def _lying_summary(group: Sequence[LyingRun]) -> Row:
     told_s = [row.told_s for row in group]
     in_time, median_s = sum(row.told for row in group), float(np.median(told_s))
-    return LyingSummary(name=group[0].name, runs=len(group), told=in_time, median_s=median_s, longest_s=max(told_s))
+    return {
+        "name": group[0].name, "runs": len(group), "told": in_time, "median_s": median_s, "longest_s": max(told_s),
+    }  # fmt: skip
 
 
-def _day_summary(group: Sequence[DayRun]) -> DaySummary:
+def _day_summary(group: Sequence[DayRun]) -> Row:
     hours, maydays = sum(row.hours for row in group), sum(row.maydays for row in group)
-    return DaySummary(
-        name=group[0].name, runs=len(group), hours=hours, asked=sum(row.asked for row in group), maydays=maydays,
-        per_8h=8.0 * maydays / hours,
-    )  # fmt: skip
+    return {
+        "name": group[0].name, "runs": len(group), "hours": hours, "asked": sum(row.asked for row in group), "maydays": maydays,
+        "per_8h": 8.0 * maydays / hours,
+    }  # fmt: skip
 
 
-def tables(rows: Sequence[SummaryRow], _: StudyRequest) -> list[Table]:
+def tables(rows: Sequence[Row], _: StudyRequest) -> list[Table]:
     """Tables of incapacitated wearers, of false alarms, and of falls."""
     in_time = f"told within {TOLD_S:.0f} s"
     lying = {"name": "", "runs": "wearers", "told": in_time, "median_s": "median s", "longest_s": "longest s"}
@@ -103,12 +81,8 @@ def tables(rows: Sequence[SummaryRow], _: StudyRequest) -> list[Table]:
     }
     return [
         Table(
-            "Wearers who cannot move (simulated)", as_dicts(row for row in rows if isinstance(row, LyingSummary)), lying
+            "Wearers who cannot move (simulated)", [row for row in rows if "told" in row and "early" not in row], lying
         ),
-        Table(
-            "Wearers who can (days simulated, recordings real)",
-            as_dicts(row for row in rows if isinstance(row, DaySummary)),
-            days,
-        ),
-        *falls.tables([row for row in rows if isinstance(row, (falls.FallSummary, falls.NoFallSummary))]),
+        Table("Wearers who can (days simulated, recordings real)", [row for row in rows if "per_8h" in row], days),
+        *falls.tables(rows),
     ]

@@ -24,9 +24,10 @@ from echostep_app.wearer.wearer_signs import StepTaken
 from echostep_studies.bench.recordings.feet import SETS as FEET
 from echostep_studies.bench.recordings.legs import SETS as LEGS
 from echostep_studies.frame.recordings import DATA, read_sets
+from echostep_studies.frame.report import Row
 from echostep_studies.frame.study import Study
 from echostep_studies.incapacity import fall_recordings, falls
-from echostep_studies.incapacity.columns import TOLD_S, DayRun, LyingRun, RunRow, SummaryRow, summarize, tables
+from echostep_studies.incapacity.columns import TOLD_S, DayRun, LyingRun, RunRow, summarize, tables
 
 RATE_HZ = 100.0
 GYRO_NOISE, ACCEL_NOISE = math.radians(0.1) * 10.0, 0.04  # rad/s, m/s2: an MTx at 100 Hz, by its manual
@@ -202,7 +203,7 @@ def one_run(days: int, data: Path, first: int, seed: int) -> list[RunRow]:
     return rows
 
 
-def incapacity_study(days: int, data: Path | None, first: int) -> Study[RunRow, SummaryRow]:
+def incapacity_study(days: int, data: Path | None, first: int) -> Study[RunRow, Row]:
     """`runs` of a request: wearers who cannot move; `first`: its seed; `data`: folder of the public recordings; None: DATA."""
     kinds = (LyingRun, DayRun, falls.FallRun, falls.NoFallRun)
     return Study(

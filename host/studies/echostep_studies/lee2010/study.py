@@ -2,8 +2,7 @@
 """The three experiments of [Lee 2010] in simulation: a lap of 40 x 30 m, the way down from the 5th floor to the 1st, the 3D track;
 the method of the paper and the default one.
 
-In: seeds. Out: rows `lap/lee2010`, `lap/default`, `lap/default+plan`, `floors`, `storeys`, `storeys/default`; pictures as its Figures 6, 7, 8.
-Owns the routes.
+In: seeds. Out: rows `lap/lee2010`, `lap/default`, `lap/default+plan`, `floors`, `storeys`, `storeys/default`. Owns nothing.
 Everything is simulated, from the bytes of the simulated board on: frames, clock and counts are read as live. Each run is another person in another
 magnetic field. All methods are given the place and the heading of the start, and the wearer's legs to within a centimetre; with the plan the wearer
 is calibrated by a walk of 10 m before.
@@ -13,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,10 +20,9 @@ from msgspec import UNSET, UnsetType
 from echostep.arrays import Floats
 from echostep_app.output.table import Table
 from echostep_app.simulation.people.walker import Walk
-from echostep_studies.frame.report import as_dicts, rows_by_name
+from echostep_studies.frame.report import Row, as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.lee2010.methods import METHODS, MethodTrack, floors_of, with_plan
-from echostep_studies.lee2010.pictures import draw
 from echostep_studies.lee2010.walks import STOREY_M, chunks_of, descent_of, lap_of, lap_plan, measure, start_of, storeys
 
 PRINTED: tuple[dict[str, Any], ...] = ({"name": "lap, the paper", "ending_m": 8.0},)
@@ -46,20 +43,6 @@ class PersonRun:
     mean_m: float
     distance_error_percent: float | UnsetType = UNSET
     floor_right: float | UnsetType = UNSET
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PeopleSummary:
-    """One method with all people: means, and the worst ending."""
-
-    name: str
-    profile: str
-    runs: int
-    ending_m: float
-    mean_m: float
-    distance_error_percent: float | UnsetType
-    floor_right: float | UnsetType
-    ending_max_m: float
 
 
 def one_run(seed: int) -> list[PersonRun]:
@@ -116,14 +99,14 @@ def _height_at(t_s: Floats, walked: Walk) -> Floats:
     return np.interp(t_s, walked.t_s, walked.height_m)
 
 
-def _summary(rows: list[PersonRun]) -> PeopleSummary:
+def _summary(rows: list[PersonRun]) -> Row:
     endings = [row.ending_m for row in rows]
-    return PeopleSummary(
-        name=rows[0].name, profile=rows[0].profile, runs=len(rows), ending_m=round(sum(endings) / len(rows), 4),
-        mean_m=round(sum(row.mean_m for row in rows) / len(rows), 4),
-        distance_error_percent=_mean(row.distance_error_percent for row in rows),
-        floor_right=_mean(row.floor_right for row in rows), ending_max_m=round(max(endings), 4),
-    )  # fmt: skip
+    return {
+        "name": rows[0].name, "profile": rows[0].profile, "runs": len(rows), "ending_m": round(sum(endings) / len(rows), 4),
+        "mean_m": round(sum(row.mean_m for row in rows) / len(rows), 4),
+        "distance_error_percent": _mean(row.distance_error_percent for row in rows),
+        "floor_right": _mean(row.floor_right for row in rows), "ending_max_m": round(max(endings), 4),
+    }  # fmt: skip
 
 
 def _mean(values: Iterable[float | UnsetType]) -> float | UnsetType:
@@ -132,15 +115,9 @@ def _mean(values: Iterable[float | UnsetType]) -> float | UnsetType:
     return round(sum(stated) / len(stated), 4) if stated else UNSET
 
 
-def _tables(rows: list[PeopleSummary], request: StudyRequest) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     title = f"Lee and Lee 2010: {request.runs} simulated runs, metres; last, the paper's one real lap"
     return [Table(title, [*as_dicts(rows), *PRINTED], COLUMNS, (LEGEND,))]
 
 
-def _draw(folder: Path, seed: int, _rows: list[PeopleSummary]) -> None:
-    draw(folder, seed)
-
-
-STUDY = Study(
-    "lee2010", (PersonRun,), one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables, _draw
-)
+STUDY = Study("lee2010", (PersonRun,), one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables)

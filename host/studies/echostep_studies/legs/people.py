@@ -18,7 +18,7 @@ from echostep.legs.stride import StrideSettings
 from echostep.legs.strides import StrideEstimator
 from echostep_app.offline.clipped_rates import repair_clipping
 from echostep_app.output.table import Table
-from echostep_studies.frame.report import as_dicts, rows_by_name
+from echostep_studies.frame.report import Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.joint_gait import (
     FAST,
@@ -72,20 +72,6 @@ class PersonRun:
     error_percent: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PeopleSummary:
-    """The errors of all people at one pace, with one cause."""
-
-    name: str
-    pace: str
-    cause: str
-    runs: int
-    bias_percent: float
-    sd_percent: float
-    mean_abs_percent: float
-    worst_percent: float
-
-
 def one_run(seed: int) -> list[PersonRun]:
     """One person at every pace, with every cause."""
     person = draw_person(np.random.default_rng([seed, 50]))
@@ -127,18 +113,18 @@ def measured_m(gait: SimulatedGait, person: JointGaitPerson, sensors: LegSensors
     return sum(s.length_m for s in (*legs.feed(t_s, thigh, shank), *legs.finish()))
 
 
-def _summary(rows: list[PersonRun]) -> PeopleSummary:
+def _summary(rows: list[PersonRun]) -> Row:
     first, errors = rows[0], np.array([row.error_percent for row in rows])
-    return PeopleSummary(
-        name=first.name, pace=first.pace, cause=first.cause, runs=len(rows),
-        bias_percent=round(float(errors.mean()), 2), sd_percent=round(float(errors.std()), 2),
-        mean_abs_percent=round(float(np.abs(errors).mean()), 2), worst_percent=round(float(np.abs(errors).max()), 2),
-    )  # fmt: skip
+    return {
+        "name": first.name, "pace": first.pace, "cause": first.cause, "runs": len(rows),
+        "bias_percent": round(float(errors.mean()), 2), "sd_percent": round(float(errors.std()), 2),
+        "mean_abs_percent": round(float(np.abs(errors).mean()), 2), "worst_percent": round(float(np.abs(errors).max()), 2),
+    }  # fmt: skip
 
 
-def _tables(rows: list[PeopleSummary], request: StudyRequest) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     title = f"About {WAY_M:g} m by {request.runs} people, legs known, no calibration (simulated)"
-    return [Table(title, as_dicts(rows), COLUMNS, ("Error of the distance from standing to standing.",))]
+    return [Table(title, rows, COLUMNS, ("Error of the distance from standing to standing.",))]
 
 
 STUDY = Study("legs", (PersonRun,), one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables)

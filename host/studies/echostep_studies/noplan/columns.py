@@ -13,9 +13,9 @@ import numpy as np
 from msgspec import UNSET, UnsetType
 
 from echostep_app.output.table import Table
-from echostep_studies.frame.report import LOST_END_M, as_dicts, rows_by_name
+from echostep_studies.frame.report import LOST_END_M, Row, as_dicts, rows_by_name
 from echostep_studies.frame.study import StudyRequest
-from echostep_studies.noplan.joined import PairRun, PairSummary, joined_summary
+from echostep_studies.noplan.joined import PairRun, joined_summary
 
 COLUMNS = {
     "name": "row", "rmse_m": "RMSE m", "worst_rmse_m": "worst", "shape_m": "shape m", "foot_rmse_m": "foot alone",
@@ -77,52 +77,15 @@ class SecondRun:
     refused: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DrawnSummary:
-    """Means over the runs; of the errors also the worst."""
-
-    name: str
-    runs: int
-    rmse_m: float
-    shape_m: float
-    foot_rmse_m: float
-    footslam_rmse_m: float
-    wall_median_m: float
-    wall95_m: float
-    map_s: float
-    worst_rmse_m: float
-    drawn_pc: float
-    absent_pc: float
-    wrong_storey_pc: float
-    closures: int
-    wrong: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SecondSummary:
-    """Means over the runs, the worst one, those that end lost; storeys of all runs that are refused."""
-
-    name: str
-    runs: int
-    mean_m: float
-    worst_m: float
-    lost: int
-    tracking_pc: float
-    false_tracking_pc: float
-    beyond_pc: float
-    refused: int
-
-
 RunRow = DrawnRun | SecondRun | PairRun
-SummaryRow = DrawnSummary | SecondSummary | PairSummary
 
 
-def summaries(rows: list[RunRow]) -> list[SummaryRow]:
+def summaries(rows: list[RunRow]) -> list[Row]:
     """The summary row of each name."""
     return [_summary(group) for group in rows_by_name(rows)]
 
 
-def _summary(group: Sequence[RunRow]) -> SummaryRow:
+def _summary(group: Sequence[RunRow]) -> Row:
     """All rows of a name, which are of one kind."""
     if pairs := [row for row in group if isinstance(row, PairRun)]:
         return joined_summary(pairs)
@@ -131,37 +94,37 @@ def _summary(group: Sequence[RunRow]) -> SummaryRow:
     return _drawn_summary([row for row in group if isinstance(row, DrawnRun)])
 
 
-def _drawn_summary(group: Sequence[DrawnRun]) -> DrawnSummary:
+def _drawn_summary(group: Sequence[DrawnRun]) -> Row:
     def mean(key: str) -> float:
         return float(np.mean([value for row in group if (value := getattr(row, key)) is not UNSET]))
 
-    return DrawnSummary(
-        name=group[0].name, runs=len(group), rmse_m=mean("rmse_m"), shape_m=mean("shape_m"), foot_rmse_m=mean("foot_rmse_m"),
-        footslam_rmse_m=mean("footslam_rmse_m"), wall_median_m=mean("wall_median_m"), wall95_m=mean("wall95_m"),
-        map_s=mean("map_s"), worst_rmse_m=max(row.rmse_m for row in group), drawn_pc=100.0 * mean("drawn"),
-        absent_pc=100.0 * mean("absent"), wrong_storey_pc=100.0 * mean("wrong_storey"),
-        closures=sum(row.closures for row in group), wrong=sum(row.wrong for row in group),
-    )  # fmt: skip
+    return {
+        "name": group[0].name, "runs": len(group), "rmse_m": mean("rmse_m"), "shape_m": mean("shape_m"),
+        "foot_rmse_m": mean("foot_rmse_m"), "footslam_rmse_m": mean("footslam_rmse_m"), "wall_median_m": mean("wall_median_m"),
+        "wall95_m": mean("wall95_m"), "map_s": mean("map_s"), "worst_rmse_m": max(row.rmse_m for row in group),
+        "drawn_pc": 100.0 * mean("drawn"), "absent_pc": 100.0 * mean("absent"), "wrong_storey_pc": 100.0 * mean("wrong_storey"),
+        "closures": sum(row.closures for row in group), "wrong": sum(row.wrong for row in group),
+    }  # fmt: skip
 
 
-def _second_summary(group: Sequence[SecondRun]) -> SecondSummary:
+def _second_summary(group: Sequence[SecondRun]) -> Row:
     means = [row.mean_m for row in group]
     lost = sum(row.end_m > LOST_END_M for row in group)
     shares = {
         f"{key}_pc": 100.0 * float(np.mean([getattr(row, key) for row in group]))
         for key in ("tracking", "false_tracking", "beyond")
     }
-    return SecondSummary(
-        name=group[0].name, runs=len(group), mean_m=float(np.mean(means)), worst_m=max(means), lost=lost,
-        refused=sum(row.refused for row in group), **shares,
-    )  # fmt: skip
+    return {
+        "name": group[0].name, "runs": len(group), "mean_m": float(np.mean(means)), "worst_m": max(means), "lost": lost,
+        "refused": sum(row.refused for row in group), **shares,
+    }  # fmt: skip
 
 
-def tables(rows: list[SummaryRow], request: StudyRequest) -> list[Table]:
+def tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     """A table for each kind of row."""
-    first = as_dicts(row for row in rows if isinstance(row, DrawnSummary))
-    second = as_dicts(row for row in rows if isinstance(row, SecondSummary))
-    pairs = as_dicts(row for row in rows if isinstance(row, PairSummary))
+    first = as_dicts(row for row in rows if "rmse_m" in row)
+    second = as_dicts(row for row in rows if "tracking_pc" in row)
+    pairs = as_dicts(row for row in rows if "joined" in row)
     title = f"Drawn without a plan: {request.runs} simulated walks a row"
     every = [
         Table(title, first, COLUMNS),

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from msgspec import UNSET, UnsetType
+from msgspec import UNSET
 
 from echostep.errors import EchostepError
 from echostep_app.mapping.joining import join_walks
@@ -19,7 +19,7 @@ from echostep_app.plan.routing import RoutePlace
 from echostep_studies.bench.sites import Site
 from echostep_studies.bench.tours import random_tour
 from echostep_studies.bench.walks import SimulatedWalk
-from echostep_studies.frame.report import as_dict
+from echostep_studies.frame.report import Row, as_dict
 from echostep_studies.noplan.judgement import closure_columns, known_start, path_columns, true_path, wall_columns
 from echostep_studies.noplan.walks import walked
 
@@ -48,21 +48,6 @@ class JoinedRun(PairRun):
     closures: int
     wrong: int
     nodes: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PairSummary:
-    """Counts of all pairs, and means over those that were joined rightly, if any."""
-
-    name: str
-    runs: int
-    joined: int
-    misplaced: int
-    closures: int
-    wrong: int
-    joined_rmse_m: float | UnsetType = UNSET
-    worst_rmse_m: float | UnsetType = UNSET
-    drawn_pc: float | UnsetType = UNSET
 
 
 def again(site: Site, length_m: float, seed: int) -> Site:
@@ -110,14 +95,15 @@ def strangers_row(name: str, walks: tuple[SimulatedWalk, SimulatedWalk], seed: i
     return PairRun(name=name, seed=seed, joined=1, misplaced=1)
 
 
-def joined_summary(group: Sequence[PairRun]) -> PairSummary:
+def joined_summary(group: Sequence[PairRun]) -> Row:
     """The summary row of all pairs of a name."""
     joined = [row for row in group if isinstance(row, JoinedRun)]
     right = [row for row in joined if not row.misplaced]
     rmse = [row.joined_rmse_m for row in right]
-    return PairSummary(
-        name=group[0].name, runs=len(group), joined=sum(row.joined for row in group), misplaced=sum(row.misplaced for row in group),
-        closures=sum(row.closures for row in joined), wrong=sum(row.wrong for row in joined),
-        joined_rmse_m=float(np.mean(rmse)) if right else UNSET, worst_rmse_m=max(rmse, default=UNSET),
-        drawn_pc=100.0 * float(np.mean([row.drawn for row in right])) if right else UNSET,
-    )  # fmt: skip
+    return {
+        "name": group[0].name, "runs": len(group), "joined": sum(row.joined for row in group),
+        "misplaced": sum(row.misplaced for row in group), "closures": sum(row.closures for row in joined),
+        "wrong": sum(row.wrong for row in joined), "joined_rmse_m": float(np.mean(rmse)) if right else UNSET,
+        "worst_rmse_m": max(rmse, default=UNSET),
+        "drawn_pc": 100.0 * float(np.mean([row.drawn for row in right])) if right else UNSET,
+    }  # fmt: skip

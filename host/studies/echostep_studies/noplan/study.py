@@ -30,10 +30,10 @@ from echostep_studies.bench.recordings import hallways
 from echostep_studies.bench.recordings.foot_metrics import rmse
 from echostep_studies.bench.sites import Site
 from echostep_studies.bench.walks import SimulatedWalk
-from echostep_studies.frame.report import as_dict
+from echostep_studies.frame.report import Row, as_dict
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.noplan import real_clutter, sites
-from echostep_studies.noplan.columns import DrawnRun, RunRow, SecondRun, SummaryRow, summaries, tables
+from echostep_studies.noplan.columns import DrawnRun, RunRow, SecondRun, summaries, tables
 from echostep_studies.noplan.footslam import footslam
 from echostep_studies.noplan.joined import (
     JoinedRun,
@@ -197,7 +197,7 @@ def second_row(
     )  # fmt: skip
 
 
-def noplan_study(data: Path | None, pattern: str, request: StudyRequest) -> Study[RunRow, SummaryRow]:
+def noplan_study(data: Path | None, pattern: str, request: StudyRequest) -> Study[RunRow, Row]:
     """The study of the rows whose names match a pattern; `data`: folder of the public recordings."""
     if data is not None and not (data / "maps" / "westport-house").is_dir():
         raise EchostepError(f"{data / 'maps' / 'westport-house'}: not there: without --data its rows are left out")

@@ -26,7 +26,7 @@ from echostep_app.scorecard.card import FLOOR_PENALTY_M, score
 from echostep_app.scorecard.error_statistics import error_statistics, quantile
 from echostep_app.scorecard.own_track import track_of
 from echostep_studies.bench.judgement import true_levels
-from echostep_studies.frame.report import as_dict, as_dicts, rows_by_name
+from echostep_studies.frame.report import Row, as_dict, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.operation.true_tracks import truth_of
 from echostep_studies.operation.walks import HALF_M, OperationWalk, operation
@@ -57,33 +57,6 @@ class PartRun:
 class WholeRun(PartRun):
     """All points of an operation, with what the scorecard says of the whole."""
 
-    zone: float | None
-    available: float | None
-    search_s: float | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PartSummary:
-    """A part of all operations, without a point in it."""
-
-    name: str
-    runs: int
-    points: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ScoredSummary(PartSummary):
-    """A part of all operations, with the scores of its points."""
-
-    mean_m: float
-    ce50_m: float
-    ce95_m: float
-    max_m: float
-    ve95_m: float
-    se95_m: float
-    evaal_m: float
-    floor: float
-    floor_tied: float
     zone: float | None
     available: float | None
     search_s: float | None
@@ -144,13 +117,13 @@ def _resumed_parts(walk: OperationWalk, t_s: Floats, says: Any) -> dict[str, Boo
     }  # fmt: skip
 
 
-def _summary(rows: Sequence[PartRun]) -> PartSummary:
+def _summary(rows: Sequence[PartRun]) -> Row:
     """Scores of the points of all runs together."""
     error, above, off, right = (
         np.concatenate([np.asarray(getattr(row, key)) for row in rows])
         for key in ("error_m", "above_m", "floors_off", "tied_right")
     )
-    summary = PartSummary(name=rows[0].name, runs=len(rows), points=len(error))
+    summary: Row = {"name": rows[0].name, "runs": len(rows), "points": len(error)}
     if not len(error):
         return summary
     statistics = error_statistics(error)
@@ -162,8 +135,7 @@ def _summary(rows: Sequence[PartRun]) -> PartSummary:
         "floor_tied": float(right.mean()), "zone": _over(np.mean, (row.zone for row in whole)),
         "available": _over(np.mean, (row.available for row in whole)), "search_s": _over(np.max, (row.search_s for row in whole)),
     }  # fmt: skip
-    rounded: dict[str, Any] = {key: None if value is None else round(value, 4) for key, value in scores.items()}
-    return ScoredSummary(**as_dict(summary), **rounded)
+    return summary | {key: None if value is None else round(value, 4) for key, value in scores.items()}
 
 
 def _over(how: Callable[[list[float]], Any], values: Iterable[float | None]) -> float | None:
@@ -172,21 +144,19 @@ def _over(how: Callable[[list[float]], Any], values: Iterable[float | None]) -> 
     return float(how(stated)) if stated else None
 
 
-def _tables(rows: list[PartSummary], request: StudyRequest) -> list[Table]:
-    shown = [{key: 100.0 * value if key in PERCENT else value for key, value in row.items()} for row in as_dicts(rows)]
-    remarks = [_told(row) for row in rows if isinstance(row, ScoredSummary) and row.name in (ALL, RESUMED)]
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    shown = [{key: 100.0 * value if key in PERCENT else value for key, value in row.items()} for row in rows]
+    remarks = [_told(row) for row in rows if row["name"] in (ALL, RESUMED) and row["points"]]
     return [Table(f"Operations of twenty minutes on three storeys, {request.runs} simulated", shown, COLUMNS, remarks)]
 
 
-def _told(row: ScoredSummary) -> str:
+def _told(row: Row) -> str:
     """What was asked for and is met, of a row of all points."""
-    assert row.zone is not None
-    assert row.available is not None
     return (
-        f"{row.name}: asked were CE95 at most {ASKED_CE95_M} m: {_met(row.ce95_m <= ASKED_CE95_M)}; "
-        f"floor at least {100 * ASKED_FLOOR:g} %: {_met(row.floor >= ASKED_FLOOR)} by the nearest floor, "
-        f"{_met(row.floor_tied >= ASKED_FLOOR)} with both at a tie. Zone detection {100 * row.zone:.1f} %, "
-        f"availability {100 * row.available:.1f} %, search after the change at most {row.search_s or math.inf:.0f} s. Simulated."
+        f"{row['name']}: asked were CE95 at most {ASKED_CE95_M} m: {_met(row['ce95_m'] <= ASKED_CE95_M)}; "
+        f"floor at least {100 * ASKED_FLOOR:g} %: {_met(row['floor'] >= ASKED_FLOOR)} by the nearest floor, "
+        f"{_met(row['floor_tied'] >= ASKED_FLOOR)} with both at a tie. Zone detection {100 * row['zone']:.1f} %, "
+        f"availability {100 * row['available']:.1f} %, search after the change at most {row['search_s'] or math.inf:.0f} s. Simulated."
     )
 
 
@@ -194,7 +164,7 @@ def _met(is_met: bool) -> str:
     return "met" if is_met else "not met"
 
 
-def operation_study(half_m: float = HALF_M) -> Study[PartRun, PartSummary]:
+def operation_study(half_m: float = HALF_M) -> Study[PartRun, Row]:
     """The study; `half_m`: length of the way before the change of the battery, and after it."""
     return Study(
         "operation",

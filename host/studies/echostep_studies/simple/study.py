@@ -22,7 +22,7 @@ from echostep_app.output.table import Table
 from echostep_studies.bench.filtering import track
 from echostep_studies.bench.judgement import LOST, TRACKING, TruePlaces, judge
 from echostep_studies.bench.walks import SimulatedWalk, T, X, Y, simulate, simulate_by_legs
-from echostep_studies.frame.report import as_dicts, rows_by_name
+from echostep_studies.frame.report import Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simple.buildings import BUILDINGS
 from echostep_studies.simple.faults import FAULTS
@@ -59,13 +59,6 @@ class SimpleRow(SimpleFigures):
     """One walk."""
 
     seed: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SimpleSummary(SimpleFigures):
-    """All walks of a name: means, RMS of the RMSE, worst error; shares in percent."""
-
-    runs: int
 
 
 def simple_run(names: Sequence[str], seed: int) -> list[SimpleRow]:
@@ -110,22 +103,22 @@ def _laid(walk: SimulatedWalk, start: Pose) -> Floats:
     return np.asarray(ends @ np.array([[c, s], [-s, c]]) + (start.x_m, start.y_m))
 
 
-def _summaries(rows: Sequence[SimpleRow]) -> list[SimpleSummary]:
+def _summaries(rows: Sequence[SimpleRow]) -> list[Row]:
     return [_summary(group) for group in rows_by_name(rows)]
 
 
-def _summary(rows: Sequence[SimpleRow]) -> SimpleSummary:
+def _summary(rows: Sequence[SimpleRow]) -> Row:
     def mean(name: str, power: float = 1.0) -> float:
         return round(float(np.mean([getattr(row, name) ** power for row in rows]) ** (1.0 / power)), 5)
 
-    return SimpleSummary(
-        name=rows[0].name, runs=len(rows), tracking=100.0 * mean("tracking"), lost=100.0 * mean("lost"),
-        false_tracking=100.0 * mean("false_tracking"), mean_m=mean("mean_m"), rmse_m=mean("rmse_m", 2.0),
-        worst_m=max(row.worst_m for row in rows), laid_m=mean("laid_m", 2.0),
-    )  # fmt: skip
+    return {
+        "name": rows[0].name, "runs": len(rows), "tracking": 100.0 * mean("tracking"), "lost": 100.0 * mean("lost"),
+        "false_tracking": 100.0 * mean("false_tracking"), "mean_m": mean("mean_m"), "rmse_m": mean("rmse_m", 2.0),
+        "worst_m": max(row.worst_m for row in rows), "laid_m": mean("laid_m", 2.0),
+    }  # fmt: skip
 
 
-def simple_study(pattern: str = "*") -> Study[SimpleRow, SimpleSummary]:
+def simple_study(pattern: str = "*") -> Study[SimpleRow, Row]:
     """The study of the rows whose names match a pattern."""
     names = tuple(name for name in NAMES if fnmatch(name, pattern))
     if not names:
@@ -133,6 +126,6 @@ def simple_study(pattern: str = "*") -> Study[SimpleRow, SimpleSummary]:
     return Study("simple", (SimpleRow,), partial(simple_run, names), _summaries, _tables)
 
 
-def _tables(rows: list[SimpleSummary], request: StudyRequest) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     title = f"Known starts in the simplest buildings: {request.runs} simulated walks a row"
-    return [Table(title, as_dicts(rows), COLUMNS, NOTES)]
+    return [Table(title, rows, COLUMNS, NOTES)]

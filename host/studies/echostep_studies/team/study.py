@@ -31,7 +31,7 @@ from echostep_studies.bench import judgement, sites
 from echostep_studies.bench.judgement import FALSE_TRACKING_M, TruePlaces, true_levels
 from echostep_studies.bench.tours import random_tour
 from echostep_studies.bench.walks import T, X, Y, Z
-from echostep_studies.frame.report import as_dicts, rows_by_name
+from echostep_studies.frame.report import Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.tower import tower
 from echostep_studies.team.beacons import with_dropped_beacons
@@ -88,26 +88,6 @@ class WearerRun:
     again_m: float
     false_again: float
     seed: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TeamSummary:
-    """All runs of a name."""
-
-    name: str
-    runs: int
-    meetings: float
-    alone_m: float
-    together_m: float
-    first_alone_m: float | None
-    first_together_m: float | None
-    others_alone_m: float
-    others_together_m: float
-    ratio: float
-    worst: float
-    by_chance: float
-    false_alone: float
-    false_together: float
 
 
 def one_run(names: tuple[str, ...], length_m: float, seed: int) -> list[WearerRun]:
@@ -184,41 +164,43 @@ def errors_m(walks: TeamWalks, who: int, estimates: Sequence[Estimate]) -> Float
     return judgement.errors_m(places, np.array([e.level for e in estimates], np.int64), true)
 
 
-def _summary(rows: Sequence[WearerRun]) -> TeamSummary:
+def _summary(rows: Sequence[WearerRun]) -> Row:
     """One row of all runs of a name."""
     first, others = ([r for r in rows if (r.wearer == FIRST) is is_first] for is_first in (True, False))
     alone_m, together_m = _mean(r.alone_m for r in rows), _mean(r.together_m for r in rows)
-    return TeamSummary(
-        name=rows[0].name, runs=len({r.seed for r in rows}), meetings=round(_mean(r.meetings for r in rows), 4),
-        alone_m=round(alone_m, 4), together_m=round(together_m, 4),
-        first_alone_m=round(_mean(r.alone_m for r in first), 4) if first else None,
-        first_together_m=round(_mean(r.together_m for r in first), 4) if first else None,
-        others_alone_m=round(_mean(r.alone_m for r in others), 4), others_together_m=round(_mean(r.together_m for r in others), 4),
-        ratio=round(together_m / alone_m, 4), worst=round(max(r.together_m / r.alone_m for r in others), 4),
-        by_chance=round(max(r.again_m / r.alone_m for r in others), 4),
-        false_alone=round(_mean(r.false_alone for r in rows), 4), false_together=round(_mean(r.false_together for r in rows), 4),
-    )  # fmt: skip
+    return {
+        "name": rows[0].name, "runs": len({r.seed for r in rows}), "meetings": round(_mean(r.meetings for r in rows), 4),
+        "alone_m": round(alone_m, 4), "together_m": round(together_m, 4),
+        "first_alone_m": round(_mean(r.alone_m for r in first), 4) if first else None,
+        "first_together_m": round(_mean(r.together_m for r in first), 4) if first else None,
+        "others_alone_m": round(_mean(r.alone_m for r in others), 4),
+        "others_together_m": round(_mean(r.together_m for r in others), 4), "ratio": round(together_m / alone_m, 4),
+        "worst": round(max(r.together_m / r.alone_m for r in others), 4),
+        "by_chance": round(max(r.again_m / r.alone_m for r in others), 4),
+        "false_alone": round(_mean(r.false_alone for r in rows), 4),
+        "false_together": round(_mean(r.false_together for r in rows), 4),
+    }  # fmt: skip
 
 
 def _mean(values: Iterable[float]) -> float:
     return float(np.mean(list(values)))
 
 
-def _tables(rows: list[TeamSummary], request: StudyRequest) -> list[Table]:
-    shown = [{k: 100.0 * v if k.startswith("false") else v for k, v in row.items()} for row in as_dicts(rows)]
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    shown = [{k: 100.0 * v if k.startswith("false") else v for k, v in row.items()} for row in rows]
     notes = [
         f"Asked: ratio at most {ASKED_RATIO} where one start is wrong, worst at most {ASKED_WORST}: "
-        + ", ".join(f"{row.name} {_met(row)}" for row in rows if not row.name.endswith("liar")) + ".",
+        + ", ".join(f"{row['name']} {_met(row)}" for row in rows if not row["name"].endswith("liar")) + ".",
         "meetings: of each wearer. first: the wearer whose start is wrong or unknown. worst: of the others, in one run. Simulated.",
     ]  # fmt: skip
     return [Table(f"Five wearers, each alone and with meetings: {request.runs} teams a row", shown, COLUMNS, notes)]
 
 
-def _met(row: TeamSummary) -> str:
-    return "met" if row.ratio <= ASKED_RATIO and row.worst <= ASKED_WORST else "not met"
+def _met(row: Row) -> str:
+    return "met" if row["ratio"] <= ASKED_RATIO and row["worst"] <= ASKED_WORST else "not met"
 
 
-def team_study(rows: str = "*", length_m: float = LENGTH_M) -> Study[WearerRun, TeamSummary]:
+def team_study(rows: str = "*", length_m: float = LENGTH_M) -> Study[WearerRun, Row]:
     """The study of the rows whose names match a pattern."""
     names = tuple(name for name in ROWS if fnmatch(name, rows))
     if not names:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
 """The trails of Fischer et al. 2008, walked by simulated people.
 
-In: seeds. Out: rows and pictures. Owns nothing.
+In: seeds. Out: rows. Owns nothing.
 """

@@ -1,23 +1,21 @@
 # SPDX-License-Identifier: MIT
 """`echostep evaluate trails`: the trails of [Fischer 2008, section 3.2], walked in simulation, by the paper's method and by ours.
 
-In: seeds. Out: rows for each trail, method and rate; pictures as its Figures 3-6. Owns nothing. All results are simulated. The magnitudes of the
+In: seeds. Out: rows for each trail, method and rate. Owns nothing. All results are simulated. The magnitudes of the
 paper's errors were used to set the model of the MTx's filter (`xsens.onboard_filter`) and the machines, so they test the method, not the MTx.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 
 from echostep_app.output.table import Table
-from echostep_studies.frame.report import ErrorSummary, as_dict, as_dicts, rows_by_name, summary
+from echostep_studies.frame.report import Row, as_dict, rows_by_name, summary
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.fischer_trails import TRAILS, Trail, measure_trail, walk_trail
-from echostep_studies.trails.pictures import draw_trails
 from echostep_studies.trails.walks import METHODS, RATES_HZ, JudgedTrack, judge, track
 
 COLUMNS = {
@@ -57,27 +55,6 @@ class PrintedRun(TrailRun):
     printed_distance_error_percent: float | None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrailSummary(ErrorSummary):
-    """One method on all walks of a trail."""
-
-    rate_hz: int
-    distance_m: float
-    distance_error_percent: float
-    distance_error_min_percent: float
-    distance_error_max_percent: float
-    heading_error_deg: float
-    heading_max_deg: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PrintedSummary(TrailSummary):
-    """The same by the paper's method, with the paper's figures of the trail."""
-
-    printed: str
-    printed_distance_error_percent: float | None
-
-
 def one_run(seed: int) -> list[TrailRun]:
     """Rows of one run: every trail, rate and method."""
     rows = []
@@ -106,56 +83,49 @@ def _row(trail: Trail, rate_hz: int, profile: str, walked: JudgedTrack) -> Trail
     return PrintedRun(**as_dict(row), printed=trail.printed, printed_distance_error_percent=trail.printed_percent)
 
 
-def summaries(rows: Sequence[TrailRun]) -> list[TrailSummary]:
+def summaries(rows: Sequence[TrailRun]) -> list[Row]:
     """One row for each trail, method and rate, over all runs."""
     return [_summary(group) for group in rows_by_name(rows)]
 
 
-def _summary(rows: list[TrailRun]) -> TrailSummary:
+def _summary(rows: list[TrailRun]) -> Row:
     first = rows[0]
     off = [row.distance_error_percent for row in rows]
-    common = TrailSummary(
-        **as_dict(summary(first.name, first.profile, [row.errors_m for row in rows], [])),
-        rate_hz=first.rate_hz,
-        distance_m=round(sum(row.distance_m for row in rows) / len(rows), 2),
-        distance_error_percent=round(sum(off) / len(off), 2),
-        distance_error_min_percent=round(min(off), 2),
-        distance_error_max_percent=round(max(off), 2),
-        heading_error_deg=round(sum(row.heading_error_deg for row in rows) / len(rows), 2),
-        heading_max_deg=round(max(row.heading_max_deg for row in rows), 2),
-    )
+    common: Row = {
+        **summary(first.name, first.profile, [row.errors_m for row in rows], []), "rate_hz": first.rate_hz,
+        "distance_m": round(sum(row.distance_m for row in rows) / len(rows), 2),
+        "distance_error_percent": round(sum(off) / len(off), 2), "distance_error_min_percent": round(min(off), 2),
+        "distance_error_max_percent": round(max(off), 2),
+        "heading_error_deg": round(sum(row.heading_error_deg for row in rows) / len(rows), 2),
+        "heading_max_deg": round(max(row.heading_max_deg for row in rows), 2),
+    }  # fmt: skip
     if not isinstance(first, PrintedRun):
         return common
-    percent = first.printed_distance_error_percent
-    return PrintedSummary(**as_dict(common), printed=first.printed, printed_distance_error_percent=percent)
+    return common | {"printed": first.printed, "printed_distance_error_percent": first.printed_distance_error_percent}
 
 
-def _tables(rows: list[TrailSummary], request: StudyRequest) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     """One table for each rate; below the last one the printed and simulated errors of the way."""
     tables = []
     for rate_hz in RATES_HZ:
-        shown = [replace(row, name=row.name.removesuffix(f"/{rate_hz}Hz")) for row in rows if row.rate_hz == rate_hz]
+        shown = [row | {"name": row["name"].removesuffix(f"/{rate_hz}Hz")} for row in rows if row["rate_hz"] == rate_hz]
         notes = (
             ("Printed and simulated error of the way: " + "; ".join(_ranges(rows)), LEGEND)
             if rate_hz == RATES_HZ[-1]
             else ()
         )
         title = f"Trails of Fischer et al. 2008, simulated: {request.runs} runs at {rate_hz} Hz"
-        tables.append(Table(title, as_dicts(shown), COLUMNS, notes))
+        tables.append(Table(title, shown, COLUMNS, notes))
     return tables
 
 
-def _ranges(rows: list[TrailSummary]) -> list[str]:
+def _ranges(rows: list[Row]) -> list[str]:
     """The printed distance errors, each with the range of the simulated walkers."""
     return [
-        f"{row.name} {row.printed}, {row.distance_error_min_percent:+.1f} to {row.distance_error_max_percent:+.1f} %"
+        "{name} {printed}, {distance_error_min_percent:+.1f} to {distance_error_max_percent:+.1f} %".format(**row)
         for row in rows
-        if isinstance(row, PrintedSummary) and row.printed_distance_error_percent is not None
+        if row.get("printed_distance_error_percent") is not None
     ]
 
 
-def _draw(folder: Path, seed: int, _rows: list[TrailSummary]) -> None:
-    draw_trails(folder, seed)
-
-
-STUDY = Study("trails", (TrailRun, PrintedRun), one_run, summaries, _tables, _draw, parquet=None)
+STUDY = Study("trails", (TrailRun, PrintedRun), one_run, summaries, _tables, parquet=None)

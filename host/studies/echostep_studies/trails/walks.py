@@ -18,7 +18,7 @@ from echostep_app.simulation.devices.mtx import MtxSamples
 from echostep_app.simulation.people.walker import RATE_HZ, Walk
 from echostep_studies.papers import fischer2008
 
-RATES_HZ = (100, 50)  # of the MTx: the first is that of all pictures
+RATES_HZ = (100, 50)  # of the MTx
 METHODS = ("fischer2008", "default")
 
 
