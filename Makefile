@@ -92,9 +92,16 @@ measure: $(READY) ## rates, stamp errors, drops, memory and speed of the firmwar
 	$(MAKE) --quiet -C tools/twin
 	$(TOOL) twin.measure
 
+bench: $(VENV)/peers ## speed of the host as ratios against others, in the same run
+	$(BIN)/python -m echostep_studies.speed.bench
+
 page-speed: $(READY) ## latency and frame rate of the live page and of the commander's page in Chromium
 	@tools/apt.sh chromium || true
 	$(BIN)/python -m pytest -q -s -m speed tests/app/page/web/test_page_speed.py tests/app/operation/test_table_speed.py
+
+$(VENV)/peers: host/studies/pyproject.toml $(READY)
+	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host/studies[bench]' || echo "Not all peers could be installed: the table says which are missing."
+	touch $@
 
 wheel: $(READY) ## build the wheel, install it in a fresh environment, run the demo in there; URL=https://... is the public address in it
 	ECHOSTEP_URL=$(URL) $(TOOL) release.wheel
@@ -158,4 +165,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: elsewhere help setup firmware twin demo real quick test long board suite check check-c size measure page-speed wheel fuzz fuzz-host faults soak calls kill hardware docs site licences lock audit flash clean
+.PHONY: elsewhere help setup firmware twin demo real quick test long board suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak calls kill hardware docs site licences lock audit flash clean

@@ -16,7 +16,7 @@ import pytest
 from board_runs import ROOT, needs_twin
 from command_line import echostep
 from echostep_app.recording.recorder import Recorder
-from echostep_studies.bench import stages
+from echostep_studies.speed import stages
 from release import same_bits, tested_versions
 from reliability import campaign, faults
 from reliability.fault_outcomes import FaultOutcome
