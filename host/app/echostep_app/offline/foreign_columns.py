@@ -115,11 +115,12 @@ def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
     theirs, separator = header_of(text)
     columns, units = dict(naming.columns), dict(naming.units)
     notes: tuple[str, ...] = ()
-    if not columns and "t_s" not in theirs:
+    names = [_own(title) for title in theirs]
+    if not columns and "t_s" not in names:
         columns, more, notes = _recognised(theirs, above)
         units = more | units
     counts_hz, period = _counter(columns.get("t_s"), above)
-    names = _renamed(theirs, columns)
+    names = _renamed(theirs, columns) if columns else names
     factors = _factors(names, theirs, units)
     return Header(names, separator, len(above) + 1, factors, counts_hz, period, notes, ADVICE)
 
@@ -169,6 +170,13 @@ def _recognised(theirs: list[str], above: list[str]) -> tuple[dict[str, str], di
             "rate quantities or custom mode 5 (FreeAcc is without gravity, which a track needs)"
         )
     return {}, {}, ()
+
+
+def _own(title: str) -> str:
+    """The name without the unit of a title like `ax (g)`, t_s for `t (ms)`; any other title unchanged."""
+    name = re.sub(r" *\([^)]*\)$", "", title)
+    name = "t_s" if name == "t" else name
+    return name if quantity_of(name) else title
 
 
 def _renamed(theirs: list[str], columns: Mapping[str, str]) -> list[str]:

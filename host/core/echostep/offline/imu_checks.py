@@ -24,10 +24,8 @@ SENSOR_COLUMNS = 7  # time, force and rate; a magnetometer may follow
 
 # Assumed, all of them.
 CALMEST_SHARE = 0.1  # share of the samples in which a foot surely stands
-GRAVITY_RANGE_M_S2 = (
-    7.0,
-    13.0,
-)  # of the specific force at rest: 30 % for errors of the sensor and a foot not quite at rest
+# Of the specific force at rest: 30 % for errors of the sensor and a foot not quite at rest
+GRAVITY_RANGE_M_S2 = (7.0, 13.0)
 G_RANGE = (0.7, 1.3)  # the same in units of gravity
 FASTEST_FOOT_RAD_S = 40.0  # 2300 deg/s; common gyros end at 2000 deg/s
 FASTEST_QUANTILE = 0.999  # of the rates, compared with that limit: single spikes are left out
