@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from echostep.offline.imu_csv import COLUMNS
-from echostep_app.offline.foreign_columns import load_foot
+from echostep_app.offline.foot_files import load_foot
 
 HEADER = ",".join(COLUMNS)
 

@@ -24,7 +24,7 @@ from echostep.localization import digest
 from echostep.ports.chunks import LINES, MTX
 from echostep.recording import open_recording
 from echostep.xsens import MtxReader
-from echostep_app.offline.foreign_columns import load_foot
+from echostep_app.offline.foot_files import load_foot
 from echostep_app.ports.serial_ports import SerialPorts
 from echostep_app.session.runs import line_foot
 from echostep_app.session.runs.line_foot import LineFoot, port_of

@@ -19,8 +19,8 @@ from echostep.ports.chunks import LINES, Chunk
 from echostep.settings import imu_settings, parse_settings
 from echostep_app.interruption import is_asked
 from echostep_app.offline.importing import rate_of
-from echostep_app.offline.live_lines import LineChunks, LineReader
 from echostep_app.ports.serial_ports import SerialPorts
+from echostep_app.session.runs.live_lines import LineChunks, LineReader
 
 SCHEME = "lines:"
 LISTEN_S = 2.0  # of samples, from which their rate is measured

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from board_runs import ROOT
 from echostep.ports.chunks import MTX
 from echostep.xsens import MtxReader
-from echostep_app.offline.live_lines import LONGEST_LINE, LineChunks, LineReader
+from echostep_app.session.runs.live_lines import LONGEST_LINE, LineChunks, LineReader
 
 TEXT = (
     b"boot 1.2\r\nt (ms),ax (g),ay (g),az (g),gx (deg/s),gy (deg/s),gz (deg/s)\r\n0,0,0,1,180,0,0\r\n10,1,0,0,0,0,0\n"
