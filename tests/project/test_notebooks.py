@@ -9,13 +9,17 @@ from __future__ import annotations
 import ast
 import json
 import re
+import shlex
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+from packaging.requirements import Requirement
 
 import echostep
 from board_runs import ROOT
+from echostep_app.extras import EXTRAS
 from needs_data import data_or_skip
 
 FOLDER = ROOT / "host/docs/notebooks"
@@ -27,10 +31,21 @@ def cells(path: Path) -> list[dict[str, Any]]:
     return list(json.loads(path.read_text())["cells"])
 
 
+def prescribed() -> set[str]:
+    """The optional packages that the page's one line installs."""
+    (line,) = re.findall(r"`pip install (.*?)`", (FOLDER / "README.md").read_text())
+    *names, project = map(Requirement, shlex.split(line))
+    return {
+        package for package, extra in EXTRAS.items() if extra in project.extras or package in {r.name for r in names}
+    }
+
+
 def run(name: str, monkeypatch: pytest.MonkeyPatch, folder: Path) -> tuple[dict[str, Any], list[Any]]:
     """What the cells of a notebook have named, and the values that it shows below them."""
     monkeypatch.chdir(folder)
     monkeypatch.setenv("MPLBACKEND", "agg")
+    for package in set(EXTRAS) - prescribed():
+        monkeypatch.setitem(sys.modules, package, None)
     names: dict[str, Any] = {"__name__": "__main__"}
     shown = []
     for number, cell in enumerate(cells(FOLDER / f"{name}.ipynb")):
