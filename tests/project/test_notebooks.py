@@ -10,6 +10,7 @@ import ast
 import json
 import re
 import shlex
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,6 @@ from packaging.requirements import Requirement
 import echostep
 from board_runs import ROOT
 from echostep_app.extras import EXTRAS
-from needs_data import data_or_skip
 
 FOLDER = ROOT / "host/docs/notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
@@ -110,17 +110,13 @@ def test_settings_and_pings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
 @pytest.mark.process
 @pytest.mark.long
 def test_a_foot_with_its_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("ECHOSTEP_DATA", str(data_or_skip("vicon_pyshoe").parent))
-    names, shown = run("foot_error", monkeypatch, tmp_path)
+    """The first cell fetches the recording; what is not installed stays so."""
+    try:
+        names, shown = run("foot_error", monkeypatch, tmp_path)
+    except subprocess.CalledProcessError as error:
+        if "pip" in error.cmd:
+            pytest.skip("pip cannot fetch the source of gaitmap here")
+        raise
     assert "</svg>" in (shown[1]._repr_svg_() or "")
-    assert 0.0 < names["card"]["ce50_m"] < names["card"]["ce95_m"] < 0.3
+    assert 0.0 < names["card"]["ce50_m"] < 0.1 < names["card"]["ce95_m"] < 0.4
     assert "motion capture" in (tmp_path / "foot.svg").read_text()
-
-
-@pytest.mark.process
-def test_without_the_recordings_the_notebook_says_which_and_where(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setenv("ECHOSTEP_DATA", str(tmp_path))
-    with pytest.raises(FileNotFoundError, match="set ECHOSTEP_DATA to the folder that holds vicon_pyshoe"):
-        run("foot_error", monkeypatch, tmp_path)
