@@ -23,4 +23,4 @@ def data_or_skip(folder: str) -> Path:
 
 
 def _absent(folder: str) -> str:
-    return f"skipped: no recordings in {DATA / folder} (../shared/data or $ECHOSTEP_DATA)"
+    return f"skipped: no recordings in {DATA / folder} (../shared/data or $ECHOSTEP_DATA): host/studies/README.md says where they come from"

@@ -15,7 +15,7 @@ from echostep.plan import load_plan, parse_plan
 from echostep.recording import open_parts
 from echostep.settings import parse_settings
 from echostep.walk.recorded import recorded_start
-from echostep_app.offline.foreign_columns import load_foot
+from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.leg_csv import load_legs
 from echostep_app.plan.writer import save_plan
 from echostep_app.recording.recorder import Recorder

@@ -9,14 +9,18 @@ from __future__ import annotations
 import ast
 import json
 import re
+import shlex
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+from packaging.requirements import Requirement
 
 import echostep
 from board_runs import ROOT
-from needs_data import data_or_skip
+from echostep_app.extras import EXTRAS
 
 FOLDER = ROOT / "host/docs/notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
@@ -27,10 +31,21 @@ def cells(path: Path) -> list[dict[str, Any]]:
     return list(json.loads(path.read_text())["cells"])
 
 
+def prescribed() -> set[str]:
+    """The optional packages that the page's one line installs."""
+    (line,) = re.findall(r"`pip install (.*?)`", (FOLDER / "README.md").read_text())
+    *names, project = map(Requirement, shlex.split(line))
+    return {
+        package for package, extra in EXTRAS.items() if extra in project.extras or package in {r.name for r in names}
+    }
+
+
 def run(name: str, monkeypatch: pytest.MonkeyPatch, folder: Path) -> tuple[dict[str, Any], list[Any]]:
     """What the cells of a notebook have named, and the values that it shows below them."""
     monkeypatch.chdir(folder)
     monkeypatch.setenv("MPLBACKEND", "agg")
+    for package in set(EXTRAS) - prescribed():
+        monkeypatch.setitem(sys.modules, package, None)
     names: dict[str, Any] = {"__name__": "__main__"}
     shown = []
     for number, cell in enumerate(cells(FOLDER / f"{name}.ipynb")):
@@ -95,17 +110,13 @@ def test_settings_and_pings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
 @pytest.mark.process
 @pytest.mark.long
 def test_a_foot_with_its_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("ECHOSTEP_DATA", str(data_or_skip("vicon_pyshoe").parent))
-    names, shown = run("foot_error", monkeypatch, tmp_path)
+    """The first cell fetches the recording; what is not installed stays so."""
+    try:
+        names, shown = run("foot_error", monkeypatch, tmp_path)
+    except subprocess.CalledProcessError as error:
+        if "pip" in error.cmd:
+            pytest.skip("pip cannot fetch the source of gaitmap here")
+        raise
     assert "</svg>" in (shown[1]._repr_svg_() or "")
-    assert 0.0 < names["card"]["ce50_m"] < names["card"]["ce95_m"] < 0.3
+    assert 0.0 < names["card"]["ce50_m"] < 0.1 < names["card"]["ce95_m"] < 0.4
     assert "motion capture" in (tmp_path / "foot.svg").read_text()
-
-
-@pytest.mark.process
-def test_without_the_recordings_the_notebook_says_which_and_where(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setenv("ECHOSTEP_DATA", str(tmp_path))
-    with pytest.raises(FileNotFoundError, match="set ECHOSTEP_DATA to the folder that holds vicon_pyshoe"):
-        run("foot_error", monkeypatch, tmp_path)

@@ -62,6 +62,9 @@ def test_two_commands_track_a_file_on_a_plan(walk: Imu, tmp_path: Path) -> None:
     assert (tmp_path / "track.png").exists()
     first, second = (echostep.replay(out, plan, start=echostep.plan.Pose(1.0, 2.0, np.pi / 2)) for _ in range(2))
     assert digest(first.estimates) == digest(second.estimates)
+    refused = run("map", out, "-o", tmp_path / "drawn.json")
+    assert refused.returncode == 2
+    assert "no echo in it: it is a foot's alone, and walls are drawn from echoes" in refused.stderr
     end = first.estimates[-1]
     assert end.x_m == pytest.approx(1.0, abs=0.5)
     assert end.y_m > 10.0

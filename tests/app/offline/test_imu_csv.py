@@ -18,7 +18,7 @@ import pytest
 from command_line import echostep
 from echostep.errors import EchostepError
 from echostep_app import cli
-from echostep_app.offline.foreign_columns import load_foot
+from echostep_app.offline.foot_files import load_foot
 from echostep_app.simulation.devices.mtx import specific_force_and_rate
 from echostep_app.simulation.people.walker import Person, walk
 from echostep_studies.frame.recordings import DATA

@@ -15,7 +15,7 @@ from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
 from echostep.recording import Decoder, read_capture
 from echostep.xsens import MTDATA, encode_frame
-from echostep_app.offline.foreign_columns import load_foot
+from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.leg_csv import load_legs
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.report import ImportReport

@@ -22,7 +22,7 @@ from echostep.recording import open_recording
 from echostep.settings import parse_settings
 from echostep.tracker import Tracker
 from echostep.xsens.message import MessageReader
-from echostep_app.offline.foreign_columns import load_foot
+from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.leg_csv import load_legs
 from echostep_app.page.requests import parse_request
 from echostep_app.plan.importers.formats import import_plan

@@ -39,7 +39,7 @@ def map_command(
 
 @app.command("import")
 def import_command(
-    imu: Annotated[Path, typer.Argument(help="CSV of a foot IMU, as of foot.")],
+    imu: Annotated[Path, typer.Argument(help="Recording of a foot IMU: a file, folder or zip, as of foot.")],
     out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT", help="The recording to write.")],
     columns: Columns = None,
     units: Units = None,
@@ -53,7 +53,9 @@ def import_command(
 
 @app.command()
 def foot(
-    imu: Annotated[Path, typer.Argument(help="CSV: t_s,ax,ay,az,gx,gy,gz[,mx,my,mz] in s, m/s2, rad/s.")],
+    imu: Annotated[
+        Path, typer.Argument(help="CSV: t_s,ax,ay,az,gx,gy,gz[,mx,my,mz] in s, m/s2, rad/s; or another program's.")
+    ],
     out: Annotated[
         Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV); with --plan, its folder: out/foot.")
     ] = TRACK,

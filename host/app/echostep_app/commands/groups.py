@@ -114,7 +114,7 @@ class Ports:
         from echostep_app.session.options import PortOptions
 
         split = parse_split(self.split) if self.split is not None else None
-        if self.board is not None:
+        if self.board is not None or (self.foot or "").startswith("lines:"):
             return PortOptions(self.board, self.mtx, self.beacons, self.seconds, self.keep, self.foot, split)
         from echostep_app.commissioning.serial_ports import find_ports
 

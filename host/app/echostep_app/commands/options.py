@@ -166,7 +166,11 @@ MtxPort = Annotated[
 ]
 FootPort = Annotated[
     str | None,
-    typer.Option("--foot", metavar="PORT", help="Serial port of a foot board, in the place of an MTx."),
+    typer.Option(
+        "--foot",
+        metavar="PORT",
+        help="Serial port of a foot board, in the place of an MTx; lines:PORT, lines:tcp://..., lines:udp://..., lines:-: any IMU that prints lines.",
+    ),
 ]
 Foxglove = Annotated[
     str | None,

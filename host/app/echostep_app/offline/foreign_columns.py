@@ -8,7 +8,8 @@ Sources of the table: NGIMU: short_walk.csv of github.com/xioTechnologies/Gait-T
 github.com/xioTechnologies/x-IMU3-CSV. phyphox: titles of the columns in public scripts that read its exports. Sensor Logger: UNITS.md of
 github.com/tszheichoi/awesome-sensor-logger. MT Manager: text exports in a test of opensim-core's reader, and in [Voisard 2025]. Movella DOT: export
 bei_D4CA6EF17860_20210830_170505.csv of a recording, in github.com/Allwillcome/XsensDot2Mtw4OpenSense: its times step by 8333 at 120 Hz, its sensor
-at rest reads 9.65 and 0.2, which as rad/s would be a bias of 11 deg/s; the titles of the other modes: logger of the SDK for Android.
+at rest reads 9.65 and 0.2, which as rad/s would be a bias of 11 deg/s; the titles of the other modes: logger of the SDK for Android. SensorConnect
+(MSCL): data of github.com/mtahakoroglu/gait-driven-inertial-navigation-dataset. gaitmap: example data of github.com/mad-lab-fau/gaitmap.
 """
 
 from __future__ import annotations
@@ -16,15 +17,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import partial
-from pathlib import Path
 
 import numpy as np
 
 from echostep.errors import EchostepError
 from echostep.offline.csv_table import column_of, header_of
 from echostep.offline.header import Header
-from echostep.offline.imu_csv import Imu, load_imu
 
 # Quantity and factor to the SI unit of each unit; standard gravity [CGPM 1901].
 UNITS = {
@@ -42,7 +40,8 @@ COUNTER, COUNTER_PERIOD = "PacketCounter", 1 << 16  # of the samples, in exports
 DOT_CLOCK, DOT_CLOCK_HZ, DOT_CLOCK_PERIOD = "SampleTimeFine", 1e6, 1 << 32  # microseconds, in exports of Movella DOT
 DOT = "DeviceTag:"  # begins a line above the names of the columns
 DOT_PREAMBLE = r"sep=|\w[\w ]*: *,|.*Technologies B\. ?V\.|\s*\n"  # further ones, until an empty line
-PREAMBLE = re.compile(rf"//|Acquisition frequency:|{DOT_PREAMBLE}")  # lines above the names of the columns
+SENSORS = ",left_sensor,"  # begins a line above the names of the columns of gaitmap
+PREAMBLE = re.compile(rf"{SENSORS}|//|Acquisition frequency:|{DOT_PREAMBLE}")  # lines above the names of the columns
 COUNTS_HZ = re.compile(r"(?:Update Rate|Acquisition frequency): *([0-9.]+) *Hz")
 ADVICE = "; other names: --columns OURS=THEIRS,...; other units: --units deg/s,g"  # for a file without the names
 MOST_PREAMBLE = 50  # lines; assumed
@@ -58,6 +57,8 @@ XIO_MAG = _axes("m", "Magnetometer {} (uT)")
 PHYPHOX = _axes("a", "Acceleration {} (m/s^2)", "xyz") | _axes("g", "Gyroscope {} (rad/s)", "xyz")
 XSENS = _axes("a", "Acc_{}") | _axes("g", "Gyr_{}")
 XSENS_MAG = _axes("m", "Mag_{}")
+GAITMAP = _axes("a", "left_sensor.acc_{}", "xyz") | _axes("g", "left_sensor.gyr_{}", "xyz")
+MSCL = _axes("a", "scaledAccel{}") | _axes("g", "scaledGyro{}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +80,8 @@ LOGGERS = (
     Logger("Sensor Logger", {"t_s": "seconds_elapsed", "pressure_pa": "pressure"}, units={"pressure": "hPa"}),
     Logger("Movella DOT", {"t_s": DOT_CLOCK} | XSENS, XSENS_MAG, {"rate": "deg/s"}, DOT),
     Logger("MT Manager", {"t_s": COUNTER} | XSENS, XSENS_MAG),
+    Logger("SensorConnect", {"t_s": "Time"} | MSCL, _axes("m", "scaledMag{}"), {"force": "g"}),
+    Logger("gaitmap, its left sensor", {"t_s": "index"} | GAITMAP, units={"rate": "deg/s"}),
 )
 
 
@@ -112,21 +115,17 @@ def parse_naming(columns: str | None, units: str | None) -> Naming:
 def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
     """The names of the columns, taken from the lines with all lines above them; raises ValueError for missing names."""
     above, text = _preamble(lines)
-    theirs, separator = header_of(text)
+    theirs, separator = _titles(text, above)
     columns, units = dict(naming.columns), dict(naming.units)
     notes: tuple[str, ...] = ()
-    if not columns and "t_s" not in theirs:
+    names = [_own(title) for title in theirs]
+    if not columns and "t_s" not in names:
         columns, more, notes = _recognised(theirs, above)
         units = more | units
     counts_hz, period = _counter(columns.get("t_s"), above)
-    names = _renamed(theirs, columns)
+    names = _renamed(theirs, columns) if columns else names
     factors = _factors(names, theirs, units)
     return Header(names, separator, len(above) + 1, factors, counts_hz, period, notes, ADVICE)
-
-
-def load_foot(path: Path | str, naming: Naming = OWN) -> Imu:
-    """As `load_imu`, for a file of any program."""
-    return load_imu(path, partial(read_header, naming=naming))
 
 
 def _preamble(lines: Iterator[str]) -> tuple[list[str], str]:
@@ -136,6 +135,18 @@ def _preamble(lines: Iterator[str]) -> tuple[list[str], str]:
         above.append(text)
         text = next(lines, "")
     return above, text
+
+
+def _titles(text: str, above: list[str]) -> tuple[list[str], str]:
+    """Titles of the columns, and the separator: without MSCL's name of the device, with gaitmap's name of the sensor from the line above."""
+    titles, separator = header_of(text)
+    titles = [title.rpartition(":")[2] if title.startswith("inertial-") else title for title in titles]
+    if above and above[-1].startswith(SENSORS):
+        sensors, _ = header_of(above[-1])
+        titles = [
+            f"{sensor}.{title}" if sensor else title or "index" for sensor, title in zip(sensors, titles, strict=False)
+        ]
+    return titles, separator
 
 
 def _counter(name: str | None, above: list[str]) -> tuple[float | None, int]:
@@ -169,6 +180,13 @@ def _recognised(theirs: list[str], above: list[str]) -> tuple[dict[str, str], di
             "rate quantities or custom mode 5 (FreeAcc is without gravity, which a track needs)"
         )
     return {}, {}, ()
+
+
+def _own(title: str) -> str:
+    """The name without the unit of a title like `ax (g)`, t_s for `t (ms)`; any other title unchanged."""
+    name = re.sub(r" *\([^)]*\)$", "", title)
+    name = "t_s" if name == "t" else name
+    return name if quantity_of(name) else title
 
 
 def _renamed(theirs: list[str], columns: Mapping[str, str]) -> list[str]:

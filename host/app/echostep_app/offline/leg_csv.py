@@ -20,15 +20,8 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.offline.bursts import spread
-from echostep.offline.csv_table import (
-    CsvLimits,
-    column_of,
-    lines_of,
-    open_samples,
-    rate_complaint,
-    read_rows,
-)
-from echostep.offline.imu_checks import BACK_SHARE, MISSING_SHARE, RATE_RANGE_HZ, missing_share, sorted_by_time
+from echostep.offline.csv_table import CsvLimits, column_of, lines_of, open_samples, read_rows
+from echostep.offline.imu_checks import MISSING_SHARE, missing_share, sorted_by_time, time_complaint
 from echostep_app.offline.clipped_rates import find_clipping_limits, repair_clipping
 from echostep_app.offline.foreign_columns import ADVICE, OWN, Naming, read_header
 from echostep_app.offline.mounting import walking_axis
@@ -177,22 +170,7 @@ def _unit_hint(header: list[str]) -> str:
 
 def complaint(table: Floats) -> str:
     """Why the samples (n, 5) cannot be used, as a message; empty when they can."""
-    return _time_complaint(table[:, TIME]) or _dead_complaint(table) or _unit_complaint(table)
-
-
-def _time_complaint(t_s: Floats) -> str:
-    """Message for times (n,) that do not advance or have another unit."""
-    steps = np.diff(t_s)
-    forward = steps[steps > 0.0]
-    if not len(forward):
-        return "t_s does not advance"
-    if (back := float((steps < 0.0).mean())) > BACK_SHARE:
-        return (
-            f"t_s goes back in {100 * back:.0f} % of the rows, and sorting does not help: are several recordings mixed?"
-        )
-    return rate_complaint(
-        1.0 / float(np.median(forward)), RATE_RANGE_HZ, "a leg needs 50 at least", "average them down to 500 or fewer"
-    )
+    return time_complaint(table[:, TIME], "a leg") or _dead_complaint(table) or _unit_complaint(table)
 
 
 def _dead_complaint(table: Floats) -> str:

@@ -33,7 +33,7 @@ def is_url(port: str) -> bool:
 def refusal(port: str) -> Refusal | None:
     """Why this user cannot open the port; None when it can be tried. Raises nothing."""
     path = Path(port)
-    if is_url(port) or os.name != "posix":
+    if is_url(port) or port == "-" or os.name != "posix":
         return None
     if not path.exists():
         remedy = "plug it in and look again; see which ports there are: ls /dev/serial/by-id"

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The serial ports of a live run.
 
-In: URLs of ports (pyserial, or udp://). Out: `Chunk`s in order of arrival. Owns the open ports, which are locked for this process, their threads.
+In: URLs of ports (pyserial, udp://, or - for standard input, whose end ends the run). Out: `Chunk`s in order of arrival. Owns the open ports,
+which are locked for this process, their threads.
 
 A lost port is opened again, under its device's new name if the device has a USB serial number. Its first chunk is then empty.
 """
@@ -28,11 +29,11 @@ from echostep_app.ports.access import holders, is_url, refusal
 from echostep_app.ports.arrival_clock import now_ns
 from echostep_app.ports.chunk_queue import ChunkQueue
 from echostep_app.ports.port_faults import PORT_FAULTS
-from echostep_app.ports.tcp import TcpPort
+from echostep_app.ports.tcp import StandardInput, TcpPort
 from echostep_app.ports.udp import UdpPort
 from echostep_app.ports.usb_number import port_of_number, usb_number
 
-AnyPort: TypeAlias = "serial.SerialBase | UdpPort | TcpPort"
+AnyPort: TypeAlias = "serial.SerialBase | UdpPort | TcpPort | StandardInput"
 
 # All assumed.
 IDLE_S = 0.05  # longest wait for a chunk; short, so that the set-up of the MTx repeats its requests in time
@@ -44,6 +45,7 @@ JOIN_S = 2.0  # longest wait for the end of a reading thread
 SEE_PORTS = "see which ports there are: " + (
     "ls /dev/serial/by-id" if sys.platform == "linux" else "python -m serial.tools.list_ports"
 )
+STANDARD_INPUT = "-"
 MOST_NOTICES = 8  # kept; the oldest is dropped
 
 
@@ -59,11 +61,11 @@ class SerialPorts:
         self._stop = threading.Event()
         self._told: Counter[str] = Counter()  # dropped chunks by port that a notice has reported
         self.urls = dict(urls)
+        self.unused: list[Chunk] = []  # that come first: read by those who had to know what a port sends
         self._ports: dict[str, AnyPort] = {}
         self.lost: set[str] = set()  # names under which the ports that are away at present were opened
-        self._opened_as = {
-            name: name for name in urls
-        }  # by the name of the device: the name under which its chunks come
+        # By the name of the device: the name under which its chunks come
+        self._opened_as = {name: name for name in urls}
         check_different(urls)
         try:
             for name, url in urls.items():
@@ -87,6 +89,8 @@ class SerialPorts:
 
     def chunks(self) -> Iterator[Chunk | None]:
         """Chunks in order of arrival until `stop`, then those that have arrived; None after `IDLE_S` without a chunk."""
+        yield from self.unused
+        self.unused = []
         while not self._stop.is_set():
             yield self._queue.get(IDLE_S)
             for port in [port for port, count in self._queue.dropped.items() if count > self._told[port]]:
@@ -128,6 +132,9 @@ class SerialPorts:
             port = self._ports[name]
             try:
                 received = _read_block(port)
+            except EOFError:
+                self._stop.set()
+                return
             except (TypeError, *PORT_FAULTS) as error:  # TypeError: closed under a blocking read
                 url = self._reopen(name, url, baud, error)
                 continue
@@ -139,7 +146,7 @@ class SerialPorts:
 
     def _read_rest(self, name: str) -> None:
         """Put what the operating system has received before `stop` into the queue."""
-        with suppress(TypeError, *PORT_FAULTS):
+        with suppress(TypeError, EOFError, *PORT_FAULTS):
             port = self._ports[name]
             if (waiting := port.in_waiting) and (received := port.read(waiting)):
                 self._queue.put(Chunk(name, now_ns(), received))
@@ -216,6 +223,8 @@ def _open(url: str, baud: int) -> AnyPort:
     try:
         if url.startswith("udp://"):
             return UdpPort(url)
+        if url == STANDARD_INPUT:
+            return StandardInput()
         if url.startswith("socket://"):
             return TcpPort(url, WRITE_TIMEOUT_S)
         write_timeout_s = None if url.startswith("rfc2217://") else WRITE_TIMEOUT_S  # pyserial has a fixed one there

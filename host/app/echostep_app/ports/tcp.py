@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""A serial port over TCP, as ser2net gives it, with the methods of a serial port.
+"""A serial port over TCP, as ser2net gives it, and standard input, with the methods of a serial port.
 
 In: a URL, socket://HOST:PORT. Out: the bytes that wait, in blocks: pyserial's own port of this kind reports one byte at a time. Owns the socket.
 """
 
 from __future__ import annotations
 
+import os
 import select
 import socket
 from urllib.parse import urlsplit
@@ -61,3 +62,32 @@ class TcpPort:
     def close(self) -> None:
         """Close the connection."""
         self._socket.close()
+
+
+class StandardInput:
+    """Standard input, which can only be read."""
+
+    in_waiting = BLOCK
+
+    def __init__(self) -> None:
+        if os.name != "posix":
+            raise EchostepError(
+                "-: standard input is a port on Linux and macOS only: give a serial port, tcp:// or udp://"
+            )
+
+    def read(self, size: int) -> bytes:
+        """The waiting bytes, at most `size`; empty after `READ_TIMEOUT_S` without one. Raises EOFError at the end."""
+        ready, _, _ = select.select([0], [], [], READ_TIMEOUT_S)
+        if not ready:
+            return b""
+        received = os.read(0, size)
+        if not received:
+            raise EOFError
+        return received
+
+    def write(self, sent: bytes) -> int:
+        """Discard the bytes; returns their number."""
+        return len(sent)
+
+    def close(self) -> None:
+        """Leave it open: it is the process's."""

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 from echostep.localization import PROBABLE, Estimate, TrackStatus
 from echostep.path import MeasuredSegment
-from echostep.ports.chunks import BOARD, FOOT, MTX, Portion
+from echostep.ports.chunks import BOARD, FOOT, LINES, MTX, Portion
 from echostep.recording import Recording
 from echostep.tracker import Tracker
 from echostep.tracker.state import StreamState, TrackerState
@@ -27,7 +27,7 @@ UNFITTING = "the echoes did not fit the plan"
 ECHOLESS = "there were no echoes"
 SPREAD = "several places fitted"
 DRIFTED = "without a plan nothing corrects the drift"
-NAMES = {BOARD: "the board", MTX: "the MTx", FOOT: "the foot board"}
+NAMES = {BOARD: "the board", MTX: "the MTx", FOOT: "the foot board", LINES: "the foot's lines"}
 SILENT_S = (
     3.0  # before the end of a run, from which a port has fallen silent: an order more than between two chunks; assumed
 )

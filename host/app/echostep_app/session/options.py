@@ -51,10 +51,10 @@ class TrackingOptions:
 class PortOptions:
     """Ports to read, as serial ports or pyserial URLs, for how long, and how many recordings stay."""
 
-    board: str
+    board: str | None
     mtx: str | None = None
     beacons: str | None = None
     seconds: float | None = None  # None: until Ctrl-C
     keep: int | None = None  # recordings to keep in the folder; None: all
-    foot: str | None = None  # of a foot board, in the place of an MTx
+    foot: str | None = None  # of a foot board, in the place of an MTx; lines:PORT: of any IMU, which needs no board
     split: SplitLimit | None = None  # of the recording into parts

@@ -33,7 +33,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, slots=True)
 class CsvLimits:
-    """`line_chars`: a longer line is an error. `lines`: most lines that are read. `early_rows`: rows after which garbage is given up, or None."""
+    """`line_chars`: a longer line is an error. `lines`: more are an error. `early_rows`: rows after which garbage is given up, or None."""
 
     line_chars: int = LONGEST_LINE
     lines: int | None = None
@@ -59,10 +59,12 @@ def column_of(header: Sequence[str], name: str) -> int:
 
 
 def lines_of(file: TextIO, limits: CsvLimits, first: int = 1) -> Iterator[str]:
-    """Lines of bounded length, the next one being number `first`; raises ValueError for a longer one."""
+    """Lines of bounded length, the next one being number `first`; raises ValueError for a longer one, and for more than `limits.lines`."""
     number = first - 1
-    while (limits.lines is None or number < limits.lines) and (line := file.readline(limits.line_chars)):
+    while line := file.readline(limits.line_chars):
         number += 1
+        if limits.lines is not None and number > limits.lines:
+            raise ValueError(f"more than {limits.lines} lines: cut the recording into parts")
         if len(line) == limits.line_chars:
             raise ValueError(f"line {number} is longer than {limits.line_chars} characters: is this a CSV file?")
         yield line

@@ -24,10 +24,8 @@ SENSOR_COLUMNS = 7  # time, force and rate; a magnetometer may follow
 
 # Assumed, all of them.
 CALMEST_SHARE = 0.1  # share of the samples in which a foot surely stands
-GRAVITY_RANGE_M_S2 = (
-    7.0,
-    13.0,
-)  # of the specific force at rest: 30 % for errors of the sensor and a foot not quite at rest
+# Of the specific force at rest: 30 % for errors of the sensor and a foot not quite at rest
+GRAVITY_RANGE_M_S2 = (7.0, 13.0)
 G_RANGE = (0.7, 1.3)  # the same in units of gravity
 FASTEST_FOOT_RAD_S = 40.0  # 2300 deg/s; common gyros end at 2000 deg/s
 FASTEST_QUANTILE = 0.999  # of the rates, compared with that limit: single spikes are left out
@@ -74,11 +72,11 @@ def sorted_by_time(table: Floats) -> tuple[Floats, tuple[str, ...]]:
 
 def complaint(table: Floats, columns: Sequence[str]) -> str:
     """Why the samples cannot be used, as a message; empty when they can."""
-    return _time_complaint(table[:, TIME]) or _dead_complaint(table, columns) or _unit_complaint(table)
+    return time_complaint(table[:, TIME], "a foot") or _dead_complaint(table, columns) or _unit_complaint(table)
 
 
-def _time_complaint(t_s: Floats) -> str:
-    """Message for times (n,) that go back, repeat, or have another unit."""
+def time_complaint(t_s: Floats, what: str) -> str:
+    """Message for the times (n,) of `what` that go back, repeat, or have another unit."""
     steps = np.diff(t_s)
     back = float((steps < 0).mean()) if len(steps) else 0.0
     if back > BACK_SHARE:
@@ -90,9 +88,8 @@ def _time_complaint(t_s: Floats) -> str:
         return "t_s does not advance"
     if (steps == 0.0).mean() > REPEATED_SHARE:
         return f"t_s repeats itself in {100 * (steps == 0.0).mean():.0f} % of the rows: are several recordings mixed?"
-    return rate_complaint(
-        1.0 / float(np.median(forward)), RATE_RANGE_HZ, "a foot needs 50 at least", "average them down to 500 or fewer"
-    )
+    rate = 1.0 / float(np.median(forward))
+    return rate_complaint(rate, RATE_RANGE_HZ, f"{what} needs 50 at least", "average them down to 500 or fewer")
 
 
 def _dead_complaint(table: Floats, columns: Sequence[str]) -> str:

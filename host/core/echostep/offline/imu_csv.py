@@ -11,9 +11,7 @@ import csv
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 
@@ -30,6 +28,7 @@ from echostep.offline.imu_checks import complaint, contradiction, end_sd_m, note
 
 COLUMNS = ("t_s", "ax", "ay", "az", "gx", "gy", "gz")
 MAG_COLUMNS = ("mx", "my", "mz")
+LIMITS = CsvLimits(lines=5_000_000)  # they bound the memory: 7 hours at 200 Hz
 TRACK_COLUMNS = ("t_s", "x", "y", "z", "heading_rad", "stance")
 
 
@@ -49,14 +48,11 @@ class Imu:
 
 def load_imu(path: Path | str, header: HeaderReader = own_header) -> Imu:
     """Samples of a CSV file; raises EchostepError that names the file, the column and what is wrong with it."""
-    table, mended = open_samples(path, partial(_mended_table, read_header=header))
-    mag = table[:, 7:10] if table.shape[1] > len(COLUMNS) else None
-    return Imu(table[:, 0], table[:, 1:4], table[:, 4:7], mag, (*mended, *notes(table, COLUMNS)))
+    return open_samples(path, lambda file: imu_of(*_table(lines_of(file, LIMITS), header)))
 
 
-def _mended_table(file: TextIO, read_header: HeaderReader) -> tuple[Floats, tuple[str, ...]]:
-    """Usable rows (n, 7) or (n, 10) in order of time, and notes on what was mended; raises ValueError for samples that cannot be used."""
-    table, left_out = _table(lines_of(file, CsvLimits()), read_header)
+def imu_of(table: Floats, left_out: tuple[str, ...]) -> Imu:
+    """The usable rows of (n, 7) or (n, 10) in order of time; raises ValueError for samples that cannot be used. `left_out`: notes so far."""
     table, holes = whole_rows(table)
     if empty := int(np.isnan(table[:, len(COLUMNS) :]).any(axis=1).sum()):
         left_out = (f"{empty} rows without a number of the magnetometer: used without it",)
@@ -64,7 +60,9 @@ def _mended_table(file: TextIO, read_header: HeaderReader) -> tuple[Floats, tupl
     table[:, 0], spreading = spread(table[:, 0])
     if wrong := complaint(table, COLUMNS):
         raise ValueError(wrong)
-    return table, (*holes, *left_out, *mended, *spreading)
+    mag = table[:, 7:10] if table.shape[1] > len(COLUMNS) else None
+    mendings = (*holes, *left_out, *mended, *spreading)
+    return Imu(table[:, 0], table[:, 1:4], table[:, 4:7], mag, (*mendings, *notes(table, COLUMNS)))
 
 
 def _table(lines: Iterator[str], read_header: HeaderReader) -> tuple[Floats, tuple[str, ...]]:
@@ -78,7 +76,7 @@ def _table(lines: Iterator[str], read_header: HeaderReader) -> tuple[Floats, tup
     columns = [column_of(header, name) for name in wanted]
     half = [name for name in MAG_COLUMNS if name in header and name not in wanted]
     left_out = (f"{', '.join(half)} without the other axes of the magnetometer: left out",) if half else ()
-    rows = read_rows(lines, (header, head.separator), columns, len(COLUMNS), CsvLimits(), head.line + 1)
+    rows = read_rows(lines, (header, head.separator), columns, len(COLUMNS), LIMITS, head.line + 1)
     return head.in_si(rows.values, wanted), (*head.notes, *left_out)
 
 

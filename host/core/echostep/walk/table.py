@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -45,18 +46,16 @@ PLACE = ("longitude_deg", "latitude_deg")  # columns beside those of track.csv, 
 
 
 def columns_of(estimates: list[Estimate], plan: Plan) -> Columns:
-    """The estimates' fields by name, and longitude and latitude where the plan has a georeference and the estimate claims a place.
-
-    Without echostep-app there are no longitudes.
-    """
+    """The estimates' fields by name; on a plan with a georeference longitude and latitude, empty without pyproj and where no place is claimed."""
     columns: Columns = {f.name: [getattr(e, f.name) for e in estimates] for f in fields(Estimate)}
     columns["status"] = [e.status.value for e in estimates]
     columns["hypotheses"] = [" ".join(map(str, e.hypotheses)) for e in estimates]
-    earth_of = added("earth")
-    if earth_of and (earth := earth_of(plan)):
-        degrees = earth.degrees(np.array([(e.x_m, e.y_m) for e in estimates]))
-        for name, column in zip(PLACE, degrees.T.tolist(), strict=True):
-            columns[name] = [v if claims_place(e) else None for v, e in zip(column, estimates, strict=True)]
+    if plan.georeference and (earth_of := added("earth")):
+        columns |= dict.fromkeys(PLACE, [None] * len(estimates))
+        with suppress(EchostepError):  # pyproj is not installed
+            degrees = earth_of(plan).degrees(np.array([(e.x_m, e.y_m) for e in estimates]))
+            for name, column in zip(PLACE, degrees.T.tolist(), strict=True):
+                columns[name] = [v if claims_place(e) else None for v, e in zip(column, estimates, strict=True)]
     return columns
 
 

@@ -110,7 +110,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     if not (DATA / "gx5_gcp").is_dir():
-        console.print(f"skipped: no recordings in {DATA} (set ECHOSTEP_DATA)")
+        console.print(
+            f"skipped: no recordings in {DATA} (or $ECHOSTEP_DATA): host/studies/README.md says where they come from"
+        )
         return 0
     walk = read_hallway(names_in(DATA)[NAME.removeprefix("GX5 ")])
     write_files(options.out, walk, options.seed)

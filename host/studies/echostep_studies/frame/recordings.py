@@ -40,7 +40,9 @@ def read_sets(folder: Path, sets: Sets[Recording]) -> tuple[list[Recording], lis
 def recordings_in(folder: Path, sets: Sets[Recording]) -> list[Recording]:
     """The recordings of the folder; prints what is skipped; raises EchostepError without any."""
     if not folder.is_dir():
-        raise EchostepError(f"{folder}: no such folder: say with --data where the recordings are")
+        raise EchostepError(
+            f"{folder}: no such folder: say with --data where the recordings are; host/studies/README.md says where they come from"
+        )
     recordings, skipped = read_sets(folder, sets)
     for line in skipped:
         console.print(line)

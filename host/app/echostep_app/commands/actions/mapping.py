@@ -132,7 +132,13 @@ def segments_of(recording: Recording) -> list[MeasuredSegment]:
     if way_m < LEAST_WAY_M:
         raise EchostepError(f"{recording.path}: only {way_m:.1f} m of steps in it: walk past the walls, then draw them")
     if not any(np.isfinite(s.range_m).any() for s in segments):
-        raise EchostepError(f"{recording.path}: no echo in it: echostep doctor examines the rangers")
+        imported = recording.metadata.get("note", "").startswith("imported")
+        why = (
+            "it is a foot's alone, and walls are drawn from echoes"
+            if imported
+            else "echostep doctor examines the rangers"
+        )
+        raise EchostepError(f"{recording.path}: no echo in it: {why}")
     return segments
 
 

@@ -17,7 +17,8 @@ from echostep.offline.imu_csv import Imu, describe_track, own_track, write_foot_
 from echostep.recording import Decoder, as_json, read_capture
 from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import OutputFormats
-from echostep_app.offline.foreign_columns import OWN, Naming, load_foot
+from echostep_app.offline.foot_files import load_foot
+from echostep_app.offline.foreign_columns import OWN, Naming
 from echostep_app.offline.importing import import_imu
 from echostep_app.offline.leg_csv import load_pair
 from echostep_app.offline.leg_lengths import calibrated_scale, checked_lengths

@@ -20,7 +20,7 @@ from echostep.board.messages import Identify
 from echostep.errors import EchostepError
 from echostep.localization import Start
 from echostep.plan import Plan
-from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, POINT, Chunk
+from echostep.ports.chunks import BOARD, FOOT, GATEWAY, LINES, MTX, POINT, Chunk
 from echostep.settings import Settings, parse_settings, read_settings
 from echostep.timing.timeline import MtxTiming
 from echostep.tracker import Tracker
@@ -48,6 +48,7 @@ from echostep_app.session.metadata import (
 )
 from echostep_app.session.options import OutputOptions, PortOptions, TrackingOptions
 from echostep_app.session.results import output_folder
+from echostep_app.session.runs.line_foot import LineFoot, port_of
 from echostep_app.session.runs.port_roles import with_right_names, with_role_check
 from echostep_app.session.runs.recording import start_recording
 from echostep_app.session.session import Session
@@ -57,7 +58,7 @@ if TYPE_CHECKING:
     from echostep_app.page.live import LivePage
     from echostep_app.team.endpoint import Outlet
 
-BAUD = dict.fromkeys((BOARD, MTX, FOOT, GATEWAY), 115200)
+BAUD = dict.fromkeys((BOARD, MTX, FOOT, GATEWAY, LINES), 115200)
 
 
 class Guide(Protocol):
@@ -78,10 +79,27 @@ class Guide(Protocol):
 def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions, guide: Guide | None = None) -> Path:
     """Track a wearer and record everything, with the taps of a guide if there is one; returns the recording."""
     plan = plan_of(tracking)
+    if port_of(ports.foot) is None:
+        return _live(plan, tracking, ports, output, guide)
+    with closing(_open_ports(ports, output.outlet)) as opened:
+        return _live(plan, tracking, ports, output, guide, opened)
+
+
+def _live(
+    plan: Plan,
+    tracking: TrackingOptions,
+    ports: PortOptions,
+    output: OutputOptions,
+    guide: Guide | None,
+    early: SerialPorts | None = None,
+) -> Path:
+    """The run; `early`: open ports whose lines tell the rate of the foot's samples."""
     path = tracking.settings_path
     settings_toml = read_settings(path) if path else ""
+    lines = LineFoot(early, str(ports.foot)) if early else None
+    settings_toml = lines.settings(settings_toml, str(path)) if lines else settings_toml
     settings, seed = parse_settings(settings_toml, str(path)), tracking.seed or 0
-    number, is_last = usb_number(ports.board), tracking.start == LAST
+    number, is_last = usb_number(ports.board or ""), tracking.start == LAST
     start = _last_start(output.folder, plan, number, settings) if is_last else start_given(tracking, plan)
     tracker = Tracker(plan, start, settings, seed)
     check_start(plan, tracker.start, given=tracking.start is not None and not is_last, recorded=is_last)
@@ -89,7 +107,7 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions, g
     session.prepare(SEARCH)  # a search may begin with the first steps
     folder = output_folder(output.folder)
     tracker.watchers.append(PlaceKeeper(folder, tracker, number).note)
-    with closing(_open_ports(ports, output.outlet)) as opened:
+    with closing(early or _open_ports(ports, output.outlet)) as opened:
         _identify(opened)
         metadata = run_metadata(plan, tracker.start, seed, "live", settings_toml) | clock_metadata()
         session.arrivals.urls = opened.urls
@@ -101,10 +119,12 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions, g
                 guide.attach(session.page)
             with start_recording(folder / "walk.mcap", metadata, ports.keep, ports.split) as recorder:
                 ended = guide.is_over if guide is not None else is_asked
-                chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session, ended)
+                chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session, ended, lines)
                 session.track(portions_of(chunks, 1), None, recorder)
             print_notices(recorder.notices)
             session.finish("live")
+            if lines:
+                console.print(lines.report(), markup=False, highlight=False)
         recorder.check_whole()
     return recorder.path
 
@@ -122,14 +142,16 @@ def record(ports: PortOptions, out: Path) -> Path:
     warm_up()
     byte_count: Counter[str] = Counter()
     with closing(_open_ports(ports)) as opened:
+        lines = LineFoot(opened, str(ports.foot)) if LINES in opened.names else None
         _identify(opened)
         metadata = version_metadata() | clock_metadata() | {"note": "recorded without tracking"}
+        metadata |= {"settings_toml": lines.settings("", "")} if lines else {}
         with (
             start_recording(out, metadata, ports.keep, ports.split) as recorder,
             suppress(KeyboardInterrupt),
             holding_signals(),
         ):
-            chunks = _recorded_chunks(opened, recorder, MtxTiming().rate_hz, ports.seconds)
+            chunks = _recorded_chunks(opened, recorder, MtxTiming().rate_hz, ports.seconds, lines=lines)
             for chunk in with_bar(chunks, "recording; Ctrl-C ends it", _passed(ports.seconds)):
                 if chunk is not None:
                     byte_count[chunk.port] += len(chunk.data)
@@ -158,7 +180,9 @@ def _open_ports(options: PortOptions, outlet: Outlet | None = None) -> SerialPor
     """The ports of a run; raises EchostepError when two uses of the run have the same one, the radio of `outlet` included."""
     if options.mtx is not None and options.foot is not None:
         raise EchostepError("--mtx and --foot: only one of them is on the foot: give that one")
-    urls = {BOARD: options.board, MTX: options.mtx, FOOT: options.foot, GATEWAY: options.beacons}
+    lines = port_of(options.foot)
+    foot = options.foot if lines is None else None
+    urls = {BOARD: options.board, MTX: options.mtx, FOOT: foot, GATEWAY: options.beacons, LINES: lines}
     given = {name: url for name, url in urls.items() if url is not None}
     radios = [endpoint.host for endpoint in outlet.endpoints if endpoint.scheme == "mesh"] if outlet else []
     check_different(given | {f"--publish mesh://{port} ({k})": port for k, port in enumerate(radios, 1)})
@@ -172,9 +196,11 @@ def _recorded_chunks(
     seconds: float | None,
     session: Session | None = None,
     ended: Callable[[], bool] = is_asked,
+    lines: LineFoot | None = None,
 ) -> Iterator[Chunk | None]:
     """Chunks of the ports, check-ins and meetings of the page, messages of teammates, each recorded before it is used; the MTx is set up."""
     chunks = with_right_names(_chunks_for(ports, seconds, ended), ports)
+    chunks = lines.with_samples(chunks) if lines else chunks
     if session is not None:
         chunks = with_messages(chunks, session.message_sources, lambda _: now_ns())
     chunks = _with_subscription(with_role_check(recorded(chunks, recorder), ports.urls), ports)

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: MIT
+"""`--foot lines:PORT`: a foot IMU that prints lines, over each kind of port, without a board."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import echostep
+from board_runs import tool
+from command_line import PROGRAM
+from command_line import echostep as run
+from echostep.errors import EchostepError
+from echostep.localization import digest
+from echostep.ports.chunks import LINES, MTX
+from echostep.recording import open_recording
+from echostep.xsens import MtxReader
+from echostep_app.offline.foot_files import load_foot
+from echostep_app.ports.serial_ports import SerialPorts
+from echostep_app.session.runs import line_foot
+from echostep_app.session.runs.line_foot import LineFoot, port_of
+from foot.foot_walks import MANNERS, course, samples
+from free_ports import free_port
+from players import pseudo_terminal
+from twin.line_foot import lines
+
+HEADER = "t_s,ax,ay,az,gx,gy,gz"
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of a simulated walk of four steps."""
+    file = tmp_path_factory.mktemp("lines") / "imu.csv"
+    t_s, accel, gyro = samples(course(MANNERS["walking"], steps=4), 100, rng=np.random.default_rng(1))
+    np.savetxt(file, np.column_stack([t_s, accel, gyro]), delimiter=",", header=HEADER, comments="", fmt="%.9g")
+    return file
+
+
+@contextmanager
+def terminal() -> Iterator[tuple[str, Callable[[bytes], object]]]:
+    with pseudo_terminal() as (ours, port):
+        os.set_blocking(ours, True)
+        yield port, lambda line: os.write(ours, line)
+
+
+@contextmanager
+def tcp() -> Iterator[tuple[str, Callable[[bytes], object]]]:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        taken: list[socket.socket] = []
+
+        def send(line: bytes) -> None:
+            if not taken:
+                taken.append(server.accept()[0])
+            taken[0].sendall(line)
+
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}", send
+        for each in taken:
+            each.close()
+
+
+@contextmanager
+def udp() -> Iterator[tuple[str, Callable[[bytes], object]]]:
+    port = free_port(socket.SOCK_DGRAM)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        yield f"udp://127.0.0.1:{port}", lambda line: sender.sendto(line.rstrip(), ("127.0.0.1", port))
+
+
+@pytest.mark.parametrize("kind", [terminal, tcp, udp])
+def test_each_kind_of_port_gives_the_samples(kind: Callable[[], object], walk: Path) -> None:
+    """The columns are named behind the port, as for a device that prints samples alone."""
+    sent = [line.encode() + b"\n" for _, line in lines(walk) if line != HEADER]
+    with kind() as (port, send):  # type: ignore[attr-defined]
+        foot = f"lines:{port}#{HEADER}"
+        with closing(SerialPorts({LINES: str(port_of(foot))}, {LINES: 115200})) as ports:
+            over = threading.Event()
+
+            def play() -> None:
+                for line in sent:
+                    if over.wait(0.0005):  # datagrams that wait are few
+                        return
+                    send(line)
+
+            player = threading.Thread(target=play)
+            player.start()
+            found = LineFoot(ports, foot)
+            reader, heard = MtxReader(), []
+            for chunk in found.with_samples(ports.chunks()):
+                if chunk is not None and chunk.port == MTX:
+                    heard.extend(reader.feed(chunk.data))
+                if len(heard) == len(sent):
+                    ports.stop()
+            over.set()
+            player.join()
+    imu = load_foot(walk)
+    assert found.rate_hz == pytest.approx(100.0, rel=1e-3)
+    assert np.allclose([sample.accel for sample in heard], imu.accel, rtol=1e-5, atol=1e-5)
+    assert ports.urls[LINES].startswith(("/", "socket:", "udp:"))
+
+
+@pytest.mark.process
+@pytest.mark.slow
+def test_a_live_run_without_a_board_is_replayed_bit_for_bit(walk: Path, tmp_path: Path) -> None:
+    plan = tmp_path / "plan.json"
+    walls = [[-9, -9, 9, -9], [9, -9, 9, 40], [9, 40, -9, 40], [-9, 40, -9, -9]]
+    plan.write_text(json.dumps({"echostep_plan": 1, "name": "Hall", "levels": [{"name": "0", "walls": walls}]}))
+    live = ("live", "--foot", "lines:-", "--plan", plan, "--start", "1,2,90", "--headless", "--out", tmp_path)
+    with subprocess.Popen([*tool("twin.line_foot"), str(walk)], stdout=subprocess.PIPE) as device:
+        done = subprocess.run(
+            [*PROGRAM, *map(str, live)], check=False, stdin=device.stdout, capture_output=True, text=True
+        )
+    assert done.returncode == 0, done.stderr
+    assert "foot in lines: 100 Hz; 0 lines were no sample" in done.stdout
+    again = run("replay", tmp_path / "walk.mcap", "--plan", plan, "--headless", "--out", tmp_path / "again")
+    assert again.returncode == 0, again.stderr
+    assert (tmp_path / "again/track.csv").read_bytes() == (tmp_path / "track.csv").read_bytes()
+    assert digest(echostep.replay(tmp_path / "walk.mcap", plan).estimates)[:16] in done.stdout
+    text = b"".join(chunk.data for chunk in open_recording(tmp_path / "walk.mcap").chunks() if chunk.port == LINES)
+    assert text.decode().split("\n")[:-1] == [line for _, line in lines(walk)]
+
+
+@pytest.mark.parametrize(
+    ("sent", "said"),
+    [
+        (b"", "no line named the columns: print t_s,ax,ay,az,gx,gy,gz each second"),
+        (b"hello\n" + HEADER.encode() + b"\n1,2\n", "0 samples came within 1 s; 2 lines were no sample"),
+        (
+            HEADER.encode()
+            + b"\n"
+            + b"".join(b"%d,0,0.%d,1,0.1%d,.2%d,.3%d\n" % (k * 10, k % 7, k, k, k) for k in range(300)),
+            "is it in milliseconds.*units go into the header, as t",
+        ),
+    ],
+)
+def test_what_is_no_foot_is_said(sent: bytes, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(line_foot, "PATIENCE_S", 1.0)
+    with terminal() as (port, send), closing(SerialPorts({LINES: port}, {LINES: 115200})) as ports:
+        send(sent)
+        with pytest.raises(EchostepError, match=said):
+            LineFoot(ports, f"lines:{port}")

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: MIT
+"""Recordings of a foot as other programs keep them: one walk in each format gives the same samples; what a format lacks is one sentence."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+from scipy.spatial.transform import Rotation
+
+from echostep.errors import EchostepError
+from echostep.offline import imu_csv
+from echostep.offline.csv_table import CsvLimits
+from echostep_app.offline.foot_files import load_foot
+from foot.foot_walks import MANNERS, course, samples
+
+G = 9.80665
+
+
+@pytest.fixture(scope="module")
+def walk() -> np.ndarray:
+    """A simulated walk of four steps: time, force, rate (n, 7)."""
+    t_s, accel, gyro = samples(course(MANNERS["walking"], steps=4), 100, rng=np.random.default_rng(1))
+    return np.column_stack([t_s, accel, gyro])
+
+
+def table(path: Path, header: str, *columns: np.ndarray) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.12g")
+    return path
+
+
+def sensor_logger(folder: Path, walk: np.ndarray) -> Path:
+    """An archive of Android's: the axes from z to x, times since 1970 beside."""
+    t_s, force, rate = walk[:, 0], walk[:, 3:0:-1], walk[:, 6:3:-1]
+    names = "time,seconds_elapsed,z,y,x"
+    table(folder / "Accelerometer.csv", names, 1.7e18 + 1e9 * t_s, t_s, force * 0.0)
+    table(folder / "TotalAcceleration.csv", names, 1.7e18 + 1e9 * t_s, t_s, force)
+    table(folder / "AccelerometerUncalibrated.csv", names, 1.7e18 + 1e9 * t_s, t_s, force / G)
+    table(folder / "Gyroscope.csv", names, 1.7e18 + 1e9 * t_s, t_s, rate)
+    with zipfile.ZipFile(folder / "walk.zip", "w") as packed:
+        for file in folder.glob("*.csv"):
+            packed.write(file, f"2026-11-28/{file.name}")
+    return folder / "walk.zip"
+
+
+def sensor_logger_of_ios(folder: Path, walk: np.ndarray) -> Path:
+    """Gravity in a table of its own."""
+    gravity = np.tile([0.0, 0.0, G], (len(walk), 1))
+    for name, values in (("Accelerometer", walk[:, 1:4] - gravity), ("Gravity", gravity), ("Gyroscope", walk[:, 4:7])):
+        table(folder / f"{name}.csv", "time,seconds_elapsed,x,y,z", 1e9 * walk[:, 0], walk[:, 0], values)
+    return folder
+
+
+def phyphox(folder: Path, walk: np.ndarray) -> Path:
+    """The accelerometer's rows are others than the gyroscope's."""
+    table(folder / "Accelerometer.csv", '"Time (s)","X (m/s^2)","Y (m/s^2)","Z (m/s^2)"', walk[:, :4])
+    table(folder / "Gyroscope.csv", '"Time (s)","X (rad/s)","Y (rad/s)","Z (rad/s)"', walk[5:-5, 0], walk[5:-5, 4:7])
+    return folder
+
+
+def titles(accel: str, gyro: str, letters: str = "XYZ") -> str:
+    return ",".join(title.format(letter) for title in (gyro, accel) for letter in letters)
+
+
+def x_imu3(folder: Path, walk: np.ndarray) -> Path:
+    names = "Timestamp (us)," + titles("Accelerometer {} (g)", "Gyroscope {} (deg/s)")
+    table(folder / "Inertial.csv", names, 1e6 * walk[:, 0], np.degrees(walk[:, 4:7]), walk[:, 1:4] / G)
+    table(folder / "HighGAccelerometer.csv", "Timestamp (us),X", 1e6 * walk[:, 0], walk[:, 1])
+    return folder
+
+
+def ngimu(folder: Path, walk: np.ndarray) -> Path:
+    names = "Time (s)," + titles("Accelerometer {} (g)", "Gyroscope {} (deg/s)")
+    table(folder / "sensors.csv", names, walk[:, 0], np.degrees(walk[:, 4:7]), walk[:, 1:4] / G)
+    return folder
+
+
+def pyshoe(folder: Path, walk: np.ndarray) -> Path:
+    savemat(folder / "walk.mat", {"ts": walk[:, :1].T, "imu": walk[:, 1:7], "gt": walk[:, :3]})
+    return folder / "walk.mat"
+
+
+def sensor_connect(folder: Path, walk: np.ndarray) -> Path:
+    names = "Time," + titles("inertial-6253.76535:scaledAccel{}", "inertial-6253.76535:scaledGyro{}")
+    return table(folder / "walk.csv", names, walk[:, 0], walk[:, 4:7], walk[:, 1:4] / G)
+
+
+def gaitmap(folder: Path, walk: np.ndarray) -> Path:
+    names = titles("acc_{}", "gyr_{}", "xyz")
+    above = ",".join(["", *["left_sensor"] * 6, *["right_sensor"] * 6]) + "\n"
+    left = (np.degrees(walk[:, 4:7]), walk[:, 1:4])
+    return table(folder / "walk.csv", f"{above},{names},{names}", walk[:, 0], *left, walk[:, 1:7] * 0.5)
+
+
+FORMATS = (sensor_logger, sensor_logger_of_ios, phyphox, x_imu3, ngimu, pyshoe, sensor_connect, gaitmap)
+
+
+@pytest.mark.parametrize("made", FORMATS)
+def test_one_walk_in_each_format(made: Callable[[Path, np.ndarray], Path], walk: np.ndarray, tmp_path: Path) -> None:
+    imu = load_foot(made(tmp_path, walk))
+    kept = np.searchsorted(walk[:, 0], imu.t_s - 1e-6)
+    assert len(kept) >= len(walk) - 10
+    assert np.allclose(imu.t_s, walk[kept, 0], atol=1e-6)
+    assert np.allclose(imu.accel, walk[kept, 1:4], atol=1e-5)
+    assert np.allclose(imu.gyro, walk[kept, 4:7], atol=1e-5)
+    assert imu.notes[0].startswith("read ")
+
+
+def test_an_mvnx_file_gives_force_and_rates_of_the_foot(tmp_path: Path) -> None:
+    """A foot that turns about a tilted axis at an uneven pace, at rest otherwise: the force is gravity in its own frame."""
+    t_s = np.arange(300) / 100.0
+    axis = np.array([0.6, 0.0, 0.8])
+    turned = Rotation.from_rotvec((t_s + 0.2 * np.sin(3.0 * t_s))[:, None] * axis)
+    frames = "".join(
+        f'<frame time="{1e3 * t:.0f}" type="normal"><sensorFreeAcceleration>9 9 9 0 0 0</sensorFreeAcceleration>'
+        f"<sensorOrientation>1 0 0 0 {' '.join(f'{value:.12f}' for value in turn.as_quat(scalar_first=True))}</sensorOrientation></frame>"
+        for t, turn in zip(t_s, turned, strict=True)
+    )
+    file = tmp_path / "walk.mvnx"
+    sensors = '<sensors><sensor label="Pelvis"/><sensor label="RightFoot"/></sensors>'
+    file.write_text(
+        f'<mvnx xmlns="http://www.xsens.com/mvn/mvnx"><subject frameRate="100">{sensors}<frames><frame type="identity"/>{frames}'
+        "</frames></subject></mvnx>"
+    )
+    imu = load_foot(file)
+    assert "the sensor of RightFoot: its rates are computed" in imu.notes[0]
+    assert np.allclose(imu.accel, turned.inv().apply([0.0, 0.0, G])[1:], atol=1e-6)
+    assert np.allclose(imu.gyro, (1.0 + 0.6 * np.cos(3.0 * (imu.t_s - 0.005)))[:, None] * axis, atol=1e-3)
+    file.write_text(file.read_text().replace("RightFoot", "RightHand"))
+    with pytest.raises(EchostepError, match=r"walk\.mvnx: no sensor of a foot; there are Pelvis, RightHand"):
+        load_foot(file)
+
+
+def refused(folder: Path, name: str, content: bytes) -> str:
+    path = folder / name
+    path.write_bytes(content)
+    with pytest.raises(EchostepError) as error:
+        load_foot(path)
+    return str(error.value)
+
+
+def test_what_a_file_lacks_is_one_sentence(tmp_path: Path) -> None:
+    assert "no XML" in refused(tmp_path, "a.mvnx", b"<mvnx><frame")
+    assert "no MAT file that can be read" in refused(tmp_path, "a.mat", b"MATLAB 5.0 MAT-file" + bytes(200))
+    savemat(tmp_path / "b.mat", {"angles": np.eye(3)})
+    with pytest.raises(EchostepError, match=r"b\.mat: no timestamps_all or .* there are angles"):
+        load_foot(tmp_path / "b.mat")
+    with zipfile.ZipFile(tmp_path / "c.zip", "w") as packed:
+        packed.writestr("Gyroscope.csv", "seconds_elapsed,x,y,z\n0,0,0,0\n1,0,0,0\n")
+    with pytest.raises(
+        EchostepError, match=r"c\.zip: no table of an accelerometer \(there are: gyroscope\); record both"
+    ):
+        load_foot(tmp_path / "c.zip")
+    broken = bytearray((tmp_path / "c.zip").read_bytes())
+    broken[40:60] = bytes(20)
+    assert "c.zip: " in refused(tmp_path, "c.zip", bytes(broken))
+
+
+def test_a_file_of_too_many_rows_is_refused(tmp_path: Path, walk: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(imu_csv, "LIMITS", CsvLimits(lines=100))
+    path = table(tmp_path / "long.csv", "t_s,ax,ay,az,gx,gy,gz", walk)
+    with pytest.raises(EchostepError, match=r"long\.csv: more than 100 lines: cut the recording into parts"):
+        load_foot(path)
