@@ -254,7 +254,7 @@ MGRS = (  # the first: 38SMB4488 of the manual of GeoConvert; easting and northi
 def test_lengths_in_feet_and_a_page_that_remembers(browser: Any, url: str) -> None:
     page = looking(browser, url)
     wait_for(page, "document.querySelector('#place').textContent.includes(' m')")
-    page.click("#tools-button")
+    page.click("#legend-button")
     page.select_option("#unit", "ft")
     page.keyboard.press("Escape")
     for selector in ("#place", "#echoes", "#status-text", "#bar-text"):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`echostep command OPERATION.mcap`: a recorded operation, shown again by the code that showed it live.
 
-In: a recording, a plan. Out: the page, the final table, a picture, the roster as JSON. Owns the loop. The page can be used while the file is read.
+In: a recording, a plan. Out: the page, the final table, the roster as JSON. Owns the loop. The page can be used while the file is read.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ const link = new Link({
 });
 const speech = new Speech($('speech'), $('sentence'), $('invitation'), $('unspoken'));
 const orders = new Orders((kind, fields) => link.send(kind, fields), (text) => speech.unsent(text));
-const showLegend = startLegend($('legend-button'), LIVE, LIVE_KEYS);
+const showLegend = startLegend($('legend-button'), LIVE, LIVE_KEYS, redraw);
 const replay = new Replay((kind, fields) => link.send(kind, fields));
 const points = new Points((kind, fields) => link.send(kind, fields));
 const drops = new Drops(hint), charts = new Charts($('charts'), () => painter.colour, seek);

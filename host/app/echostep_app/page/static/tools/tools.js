@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The dialog "More": colours, layers, charts, measuring, link, picture, GeoJSON, units, full screen; what happened on the walk, and what the page has said.
+// The dialog "More": colours, layers, charts, measuring, link, picture, GeoJSON, full screen; what happened on the walk, and what the page has said.
 
 import { recall, remember } from '../storage.js';
 import { geojson, picture, save } from './export.js';
 import { linkOf } from './hash.js';
 import { Heard } from './heard.js';
 import { LAYERS } from './layers.js';
-import { chooseUnit, chosenUnit } from './units.js';
 import { localise, minutes, tr } from '../language.js';
 
 const $ = (id) => document.getElementById(id);
@@ -14,7 +13,6 @@ const BUTTONS = { measure: 'Measure', charts: 'Charts', link: 'Copy a link', pic
 const HTML = `<form method="dialog"><h2>More</h2><button aria-label="Close">✕</button></form>
 <div tabindex="0" role="group" aria-label="Tools">
   <p class="row">${Object.entries(BUTTONS).map(([name, text]) => `<button id="tool-${name}" type="button">${text}</button>`).join('')}
-    <label for="unit" class="unseen">Lengths in</label><select id="unit"><option value="m">metres</option><option value="ft">feet</option></select>
     <label for="theme" class="unseen">Colours</label><select id="theme"><option value="auto">auto</option><option value="bright">bright</option><option value="dark">dark</option><option value="contrast">high contrast</option></select></p>
   <h3 id="layers-title">Layers</h3>
   <ul aria-labelledby="layers-title">${Object.entries(LAYERS).map(([name, text]) => `<li><label><input type="checkbox" id="layer-${name}"> ${text}</label></li>`).join('')}</ul>
@@ -45,8 +43,6 @@ export class Tools {
     for (const [name, act] of Object.entries(does)) $(`tool-${name}`).onclick = () => { dialog.close(); act(); };
     $('tools-button').onclick = () => this.open();
     $('tool-full').hidden = !document.documentElement.requestFullscreen;
-    $('unit').value = chosenUnit();
-    $('unit').onchange = () => { chooseUnit($('unit').value); page.changed(); };
   }
 
   wireLayers() {
