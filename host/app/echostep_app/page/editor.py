@@ -32,6 +32,7 @@ from echostep_app.page.server import STATIC, STOP_S, Address, open_listener, pag
 from echostep_app.page.web.access import AccessControl
 from echostep_app.page.web.connections import Connections
 from echostep_app.page.web.gated_server import GatedServer
+from echostep_app.plan.check import check_plan
 from echostep_app.plan.two_points import parse_two_points
 from echostep_app.plan.writer import georeference_fields, plan_json
 from echostep_app.printing.lines import say
@@ -44,11 +45,11 @@ SHARED = (
     "theme.js",
     "view.js",
     "language.js",
-    "*-pages.json",
-    "*-edit.json",
+    "*-*.json",
 )  # files of the live page
 MOST_BODY = 8_000_000  # bytes of a plan: a browser draws this much smoothly
 MOST_PICTURE = 32_000_000  # bytes
+MOST_FOUND = 200  # findings of a check
 POST_S = 20.0  # time for a posted plan to arrive
 NO_FILE = "none"  # state of a plan file that does not exist
 
@@ -158,6 +159,7 @@ class EditServer:
             Route("/plan", self._get_plan, methods=["GET"]),
             Route("/plan", self._post_plan, methods=["POST"]),
             Route("/georeference", _post_two_points, methods=["POST"]),
+            Route("/check", _post_check, methods=["POST"]),
         ]
         return Starlette(routes=[Mount(f"/{token}", routes=routes)])
 
@@ -214,6 +216,19 @@ async def _post_two_points(request: Request) -> Response:
     return JSONResponse(
         {"georeference": georeference_fields(fit.georeference), "plan_m": fit.plan_m, "earth_m": fit.earth_m}
     )
+
+
+async def _post_check(request: Request) -> Response:
+    """What is wrong with a posted plan; nothing is written."""
+    raw = await _body(request)
+    if isinstance(raw, Response):
+        return raw
+    try:
+        findings = await asyncio.to_thread(lambda: check_plan(parse_plan(raw)))
+    except ValueError as error:
+        return _error(422, str(error))
+    found = [{"level": f.level, "at": f.position_m, "text": f.text} for f in findings[:MOST_FOUND]]
+    return JSONResponse({"found": found})
 
 
 async def _body(request: Request) -> bytes | Response:
