@@ -145,7 +145,9 @@ def _follow(run: _Run, page: TablePage | None, console: Console, seconds: float,
                     receiver = run.receiver
                     fault = ". ".join(filter(None, (receiver.fault, news.words())))
                     connected, waiting = receiver.connected, receiver.waiting
-                    page.publish(operation.scene(now_s, time.time(), connected=connected, fault=fault, waiting=waiting))
+                    page.feed.publish(
+                        operation.scene(now_s, time.time(), connected=connected, fault=fault, waiting=waiting)
+                    )
                 if draws and now_s - table_s >= TABLE_S:
                     table_s = now_s
                     shown.update(drawn(console.height), refresh=True)

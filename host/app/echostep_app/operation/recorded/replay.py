@@ -60,7 +60,7 @@ def _read(tape: Tape, operation: Operation, page: TablePage | None) -> Player | 
     for player in load(tape, operation):
         if page and time.monotonic() - shown_s >= FRAME_S:
             shown_s = time.monotonic()
-            page.publish(player.scene())
+            page.feed.publish(player.scene())
     return player
 
 
@@ -68,7 +68,7 @@ def _serve(player: Player, page: TablePage, seconds: float) -> None:
     """Wake the pages 30 times a second: each plays on by itself."""
     end_s, scene = time.monotonic() + seconds, player.scene()
     while time.monotonic() < end_s:
-        page.publish(scene)
+        page.feed.publish(scene)
         time.sleep(FRAME_S)
 
 

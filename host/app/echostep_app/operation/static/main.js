@@ -12,7 +12,7 @@ import { stayAwake } from '../static/live/awake.js';
 import { Globe } from '../static/tools/globe.js';
 import { Measure } from '../static/tools/measure.js';
 import { titled } from '../static/tools/titles.js';
-import { scaleBar } from '../static/tools/units.js';
+import { showScale } from '../static/tools/units.js';
 import { Alarm } from './alarm.js';
 import { Crews } from './crews.js';
 import { Floors } from './floors.js';
@@ -198,7 +198,7 @@ function draw() {
   alarm.keep(scene.places);
   if (drawnStamp !== view.stamp) {
     planView.draw(view);
-    scale();
+    showScale(view);
   }
   const here = scene.rows.filter(({ id }) => scene.places.has(id) && (storeys.on || scene.places.get(id).level === scene.level)).map((row) => {
     const place = scene.places.get(row.id);
@@ -218,13 +218,6 @@ function paint(here) {
   trails.paint(view, scene.level, painter.colour.trail);
   painter.paint(view, here, scene.chosen, trails.points(scene.chosen), scene.marks, scene.level);
   scene.measure.paint(painter.pen, view, scene.level, painter.colour);
-}
-
-function scale() {
-  const { px, text } = scaleBar(view);
-  $('bar').style.width = `${px}px`;
-  $('bar-text').textContent = text;
-  $('needle').style.transform = `rotate(${-view.tilt}rad)`;
 }
 
 // Two places whose distance is shown; the first one from the sheet of a place, the second by a tap.
