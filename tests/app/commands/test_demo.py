@@ -104,7 +104,7 @@ def test_at_the_end_the_page_says_so_and_plays_the_run_again() -> None:
             for chunk in walk_chunks():
                 tracker.take(portion_of([chunk]))
                 page.publish(portion_of([chunk]))
-            page.end("mean error 0.05 m")
+            page.mailbox.end("mean error 0.05 m")
             assert hello(socket)["replay"] is True
             last = frame(socket)
             play = last["play"]

@@ -159,7 +159,7 @@ class ServedTeam:
         self.page = TablePage(team.operation, "Simulated operation", Address(port=0), tape)
 
     def show(self, **how: Any) -> None:
-        self.page.publish(self.team.scene(**how))
+        self.page.feed.publish(self.team.scene(**how))
 
     def __enter__(self) -> Self:
         self.page.__enter__()

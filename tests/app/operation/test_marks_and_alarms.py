@@ -59,7 +59,7 @@ class Commander:
         believed = self.operation.receive(*self._inbox.take_all(), now_s, time.time())
         restore(self._restorer, self.operation, self.receiver, believed, now_s)
         made = self.operation.scene(now_s, time.time(), connected=self.receiver.connected)
-        self.page.publish(made)
+        self.page.feed.publish(made)
         return made
 
 
@@ -157,7 +157,7 @@ def test_marks_are_on_the_table_and_without_a_broker_it_is_said(browser: Any, tm
         marks = tuple(
             ShownMark(f"{k:08x}", kind, x_m - 6.0 + 3.0 * k, y_m + 3.0, 0, "Ann") for k, kind in enumerate(KINDS)
         )
-        served.page.publish(replace(team.scene(), marks=marks))
+        served.page.feed.publish(replace(team.scene(), marks=marks))
         page = table(browser, served.page.url, "phone")
         wait_for(page, "echostep.scene.marks.length === 3")
         page.fill("#me", "Ben")

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,13 +19,21 @@ from operation.test_table_page import READY, WIDE, WORDS
 from page.browser import HELD_MS, loaded_page, overflow, spot, wait_for
 from page.outage import Wire
 from page.web.test_page_silence import OUTBOX, STATUS
-from page.web.test_page_sizes import UNREACHED
+from page.web.test_page_sizes import SIZES, UNREACHED
 from waiting import until
 
 STEP_S = 5.0
 NAMES = "[...document.querySelectorAll('#list .name')].map((e) => e.textContent)"
 EVERYBODY_TEXT = "document.querySelector('#everybody-text').textContent"
 HINT = "document.querySelector('#hint').textContent"
+SHOWN = "echostep.storeys.shown"
+OVER_EACH_OTHER = f"""{SHOWN}.every(({{ place, at: [, y] }}) => {SHOWN}.every((other) => other.place.level <= place.level || other.at[1] < y))"""
+IS_FITTED = """(() => {
+    const map = document.querySelector('#map'), same = (one, other) => Math.abs(one - other) < 1, { view, storeys } = echostep;
+    return same(view.width, map.clientWidth) && same(view.height, map.clientHeight)
+        && storeys.floors.every(({ view: { height, middle: [, y] } }) => same(height, map.clientHeight) && y > 0 && y < height);
+})()"""
+ON_PAGE = """([x, y]) => { const box = document.querySelector('#map').getBoundingClientRect(); return [box.x + x, box.y + y]; }"""
 
 
 def crowd(wearers: int) -> Team:
@@ -69,6 +78,51 @@ def test_a_list_of_twenty_is_sorted_and_looked_through(browser: Any) -> None:
         page.mouse.click(*spot(page, x_m + 2.0, y_m + 3.0))
         wait_for(page, f"/^Distance: (2.9|3.0|3.1)/.test({HINT})")
         assert page.is_hidden("#sheet")
+        assert not page.wrong
+        page.context.close()
+
+
+def test_all_storeys_feet_and_the_log(browser: Any, tmp_path: Path) -> None:
+    """Each storey has its wearers in the order of the heights, at every size; a tap leads to one; a note is for all commanders, as it was written."""
+    team = crowd(6)
+    team.unix_s = time.time()
+    place_words = "document.querySelector('#list .said').textContent"
+    with ServedTeam(team) as served:
+        page = loaded_page(browser, served.page.url, WIDE, READY)
+        served.page.feed.send = lambda *message: team.put_bytes(*message) or True  # type: ignore[func-returns-value]
+        page.focus("#map")
+        page.keyboard.press("v")
+        wait_for(page, f"document.querySelector('#map.stacked') && {SHOWN}.length === 6")
+        for width, height in SIZES:
+            page.set_viewport_size({"width": width, "height": height})
+            wait_for(page, f"{IS_FITTED} && {OVER_EACH_OTHER}")
+            page.screenshot(path=tmp_path / f"storeys-{width}.png")
+            assert page.evaluate(UNREACHED) == []
+        page.set_viewport_size(WIDE["viewport"])
+        wait_for(page, f"{IS_FITTED} && {OVER_EACH_OTHER}")
+        x, y = page.evaluate(f"{SHOWN}.find((row) => row.place.level === 2).at")
+        page.mouse.click(*page.evaluate(ON_PAGE, [x, y + 40]))
+        wait_for(page, "!document.querySelector('#map.stacked') && echostep.scene.level === 2")
+        page.click("#all-floors")
+        wait_for(page, f"document.querySelector('#map.stacked') && {OVER_EACH_OTHER}")
+        page.mouse.click(*page.evaluate(ON_PAGE, page.evaluate(f"{SHOWN}.find((row) => row.place.level === 1).at")))
+        wait_for(page, "echostep.scene.chosen !== null && echostep.scene.level === 1")
+        page.click("#legend-button")
+        page.select_option("#unit", "ft")
+        page.keyboard.press("Escape")
+        wait_for(page, "[...document.querySelectorAll('#facts dd')].some((e) => / ft$/.test(e.textContent))")
+        page.click("#close")
+        wait_for(page, f"/within .* ft/.test({place_words})")
+        assert not page.evaluate(f"/\\d m\\b/.test({place_words})")
+        page.fill("#me", "Ann")
+        page.click("#log summary")
+        page.fill("#log-note", "cleared, 12 m of smoke")
+        page.keyboard.press("Enter")
+        wait_for(page, "document.querySelector('#log-note').value === ''")
+        assert until(lambda: bool(team.scene().log))
+        served.show()
+        wait_for(page, "/Ann: cleared, 12 m of smoke$/.test(document.querySelector('#log-list').innerText)")
+        assert page.evaluate(UNREACHED) == []
         assert not page.wrong
         page.context.close()
 

@@ -11,14 +11,24 @@ import pytest
 
 from echostep.plan import load_plan
 from echostep.ports.chunks import portion_of
-from echostep_app.operation.requests import SetOrder, parse_request
+from echostep_app.operation.requests import SetOrder, WriteNote, parse_request
 from echostep_app.session.sinks import mark_sink
 from echostep_app.session.team.feeds import MarkFeed
 from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.team.endpoint import parse_outlet
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.marks import MarkBoard
-from echostep_app.team.messages.orders import EVERYBODY, HOLDS_S, OUT, Order, Receipt, order_message, receipt_message
+from echostep_app.team.messages.orders import (
+    EVERYBODY,
+    HOLDS_S,
+    MOST_NOTES,
+    OUT,
+    Order,
+    Receipt,
+    note_message,
+    order_message,
+    receipt_message,
+)
 from echostep_app.team.messages.report import BadReportError
 from operation.teams import Team, whole_team
 from operation.test_marks_and_alarms import Commander
@@ -34,7 +44,7 @@ TEXT = "document.querySelector('#everybody-text').textContent"
 LOW = ((360, 740), (740, 360), (320, 256), (768, 1024), (1366, 768), (1920, 1080))
 
 
-def carry_out(team: Team, request: SetOrder) -> None:
+def carry_out(team: Team, request: SetOrder | WriteNote) -> None:
     message = team.operation.act(request, team.unix_s, team.now_s)
     assert isinstance(message, tuple)
     team.put_bytes(*message)
@@ -76,6 +86,26 @@ def test_who_has_understood_is_counted_and_stands_in_the_history() -> None:
     assert set(copied.shared) == set(team.operation.shared)
 
 
+def test_a_note_stays_in_the_log_and_in_the_table_at_the_end(tmp_path: Path) -> None:
+    team, path = Team(), tmp_path / "crews.csv"
+    carry_out(team, WriteNote("stairs B are closed", "Ann"))
+    ((identity, note),) = team.operation._board.log.items()
+    topic, payload = note_message(identity, note)
+    for other in (b"", payload, note_message(identity, Order(1, "nothing", "Ben", note.unix_s + 1.0))[1]):
+        team.put_bytes(topic, other)  # nobody takes it back or writes over it
+    team.pass_time(1.0)
+    assert [event.text for event in team.scene().log] == ["Ann: stairs B are closed"]
+    assert team.scene().log is team.scene().log  # a page gets it when it changes
+    assert (topic, payload) in team.operation.copy().shared
+    team.operation.crew_log.write(path)
+    assert path.read_text().splitlines()[1:] == ["2027-01-15T08:00:00+00:00,,,note: stairs B are closed,,,,Ann"]
+    team.pass_time(HOLDS_S)
+    assert team.scene().log == ()  # that was another operation
+    for k in range(MOST_NOTES - 1):
+        team.put_bytes(*note_message(f"{k:08x}", Order(1, "x", "Ann", team.unix_s)))
+    assert team.operation.act(WriteNote("one more", "Ann"), 0.0, 0.0) == "Not written: the log is full."
+
+
 def test_hostile_orders_are_refused() -> None:
     board, (topic, payload) = MarkBoard(), order_message(EVERYBODY, Order(1, OUT, "Ann", 1.8e9))
     for wrong in (
@@ -83,11 +113,15 @@ def test_hostile_orders_are_refused() -> None:
         (topic, payload.replace(b"Ann", b"A\\u0007n")),
         (topic.replace("everybody", "red/+"), payload),
         ("echostep-table/receipt/other/red/kim", payload),
+        ("echostep-table/log/0123abcd", b""),
+        ("echostep-table/log/x", payload),
+        note_message("0123abcd", Order(1, "a\x07", "Ann", 1.8e9)),
         (topic, order_message(EVERYBODY, Order(1, "x" * 201, "Ann", 1.8e9))[1]),
     ):
         with pytest.raises(BadReportError):
             board.receive(*wrong)
     assert not board.orders
+    assert not board.log
     assert parse_request('{"kind":"order","by":"Ann","text":"  "}') is None
     assert parse_request('{"kind":"order","by":"Ann"}') == SetOrder("Ann")
 

@@ -123,14 +123,14 @@ def test_a_recorded_operation_is_played_in_a_browser(browser: Any, tmp_path: Pat
     tape, operation = Tape(made.close(), grows=False), Operation(TOWER)
     (*_, player) = load(tape, operation)
     with TablePage(operation, "Recorded", Address(port=0), tape) as served:
-        served.publish(player.scene())
+        served.feed.publish(player.scene())
         page = table(browser, served.url, "phone")
         wait_for(page, f"{SHOWN}.includes(' / ')")
         assert page.is_hidden("#now")
         page.select_option("#times", "32")
 
         def is_over() -> bool:
-            served.publish(player.scene())
+            served.feed.publish(player.scene())
             return bool(page.evaluate("echostep.scene.rows.some(({ state }) => state === 'mayday')"))
 
         assert until(is_over)

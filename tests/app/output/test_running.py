@@ -102,13 +102,13 @@ def test_the_page_says_it_until_the_foot_walks_or_is_silent() -> None:
         for t_s, segment in enumerate((WALK, RUN, WALK, RUN), 1):
             noted(tracker, segment, replace(told(t_s=t_s), status=TrackStatus.UNCERTAIN))
             page.publish(portion_of([Chunk(MTX, t_s * 10**9, b"")]))
-            scene = page._mailbox.latest
+            scene = page.mailbox.latest
             assert scene
             assert scene.status_text.startswith("uncertain")
             notes.append(scene.gait)
         page.publish(portion_of([Chunk("person", 60 * 10**9, b"")]))
-        assert page._mailbox.latest
-        notes.append(page._mailbox.latest.gait)
+        assert page.mailbox.latest
+        notes.append(page.mailbox.latest.gait)
     assert [note[:8] for note in notes] == ["", "running:", "", "running:", ""]
 
 

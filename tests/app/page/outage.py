@@ -21,7 +21,7 @@ from itertools import count
 from typing import Self
 
 from echostep_app.page.elements.guidance import ShownGuidance
-from echostep_app.page.mailbox import Mailbox
+from echostep_app.page.mailbox import Mailbox, popped
 from echostep_app.page.web import users
 from echostep_app.plan.routing import RoutePlace
 from operation.teams import ServedTeam, Team, whole_team
@@ -41,7 +41,7 @@ def serve_wearer() -> None:
         for k in count():
             mailbox.publish(replace(scene(1.0 + PAUSE_S * k), status_text="tracking, 0.2 m", guidance=WAY))
             mailbox.exchange.note_alive()
-            for request in mailbox.pop_check_ins():
+            for request in popped(mailbox.check_ins):
                 print(request, flush=True)
             if mailbox.goal is not goal:
                 goal = mailbox.goal

@@ -52,7 +52,7 @@ MODULES: dict[str, tuple[str, ...] | None] = {
 # What the plan editor shows, refusals included.
 EDITOR: dict[str, tuple[str, ...] | None] = {
     "page/editor.py": ("_body", "_post_plan"),
-    "plan/check.py": ("_gaps", "_doors", "_open_rooms", "_with_leak", "NOT_ENCLOSED"),
+    "plan/check.py": None,
     "plan/importers/dxf/doors.py": ("questions",),
     "plan/importers/dxf/drawing.py": ("_left_out_walls",),
     "plan/places/reachability.py": None,

@@ -112,7 +112,7 @@ def test_a_replay_shows_what_was_drawn_by_then_and_draws_the_same_again() -> Non
         tracker = Tracker(NO_PLAN, start, seed=1)
         with LivePage(tracker, "A replay", LOCAL, replay=True) as replay_page:
             take(tracker, replay_page, chunks[: len(chunks) // 2])
-            mailbox = replay_page._mailbox
+            mailbox = replay_page.mailbox
             assert until(lambda mailbox=mailbox: len(mailbox._drawings) >= 2)  # type: ignore[misc]
             drawn.append(mailbox._drawings[:2])
             first = mailbox._drawings[0]

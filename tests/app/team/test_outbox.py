@@ -22,9 +22,8 @@ from echostep_app.team.endpoint import parse_endpoint
 from echostep_app.team.georeference import GroundPlane
 from echostep_app.team.messages.report import BadReportError, Report, check_name, decode, encode
 from echostep_app.team.outbox import Delivery, Outbox, aged, stamped
-from echostep_app.team.picture import draw_team
 from echostep_app.team.publish import ReportHistory
-from team.letters import NOW, UNIX, heard, said
+from team.letters import UNIX
 from team.team_reports import PLACE, PLAN, POSITION, report
 from waiting import PATIENCE_S, ends, until
 
@@ -273,13 +272,3 @@ def test_an_address_with_everything() -> None:
     assert (e.host, e.port, e.user, e.password, e.secure) == ("::1", 8884, "me", "p@ss", True)
     assert str(e) == "mqtts://[::1]:8884"
     assert e.files == {"ca": "a.pem", "cert": "b.pem", "key": "c.pem"}
-
-
-def test_the_picture_of_a_team(tmp_path_factory: pytest.TempPathFactory) -> None:
-    folder = tmp_path_factory.mktemp("team")
-    roster = heard(said(), said("$x_1$", status="lost"), said("w", status="waiting", position=None))
-    for name in ("team.png", "team.svg", "team.pdf"):
-        draw_team(folder / name, load_plan(PLAN), roster.members(NOW), NOW)
-        assert (folder / name).stat().st_size > 10_000
-    for label in ("tracking, 95 % ellipse", "x / m"):
-        assert f"<!-- {label} -->" in (folder / "team.svg").read_text()

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from echostep_app.commands.options import LOCAL, Host, Lang, Port, Seconds, TeamPlan, page_address, picture_option
+from echostep_app.commands.options import LOCAL, Host, Lang, Port, Seconds, TeamPlan, page_address
 from echostep_app.printing.lines import complain
 
 app = typer.Typer()
@@ -32,7 +32,6 @@ def command(
     ] = Path("out/command/operation.mcap"),
     team: Annotated[str | None, typer.Option("--team", help="Only this team.")] = None,
     seconds: Seconds = None,
-    picture: Annotated[Path | None, picture_option("Draw the team on its plan at the end")] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the roster as JSON at the end, instead of the table.")
     ] = False,
@@ -50,7 +49,7 @@ def command(
     from echostep_app.operation import command as commander
     from echostep_app.operation.views import Views
 
-    views = Views(page_address(page, host, port, lang), picture, as_json=as_json)
+    views = Views(page_address(page, host, port, lang), as_json=as_json)
     commander.command(_plan_file(plan, broker, team, out.parent), broker, team, seconds, views, out)
 
 

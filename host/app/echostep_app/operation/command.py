@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`echostep command`: follow a team on one plan, on a page and on the terminal.
 
-In: a plan, a broker's URL. Out: the page, a table on the terminal, a recording, a picture, the roster as JSON. Owns the loop: it empties the
+In: a plan, a broker's URL. Out: the page, a table on the terminal, a recording, the roster as JSON. Owns the loop: it empties the
 inbox, records what it held, and shows the scene 30 times a second, and draws the table four times.
 """
 
@@ -41,7 +41,7 @@ TABLE_S = 0.25  # between two drawings of the table; assumed
 
 
 def command(plan_path: Path, url: str, team: str | None, seconds: float | None, views: Views, out: Path) -> None:
-    """Show a team until Ctrl-C, or for `seconds`, and record it; then draw the picture and print JSON if asked for. `url`: or a recording."""
+    """Show a team until Ctrl-C, or for `seconds`, and record it; then print JSON if asked for. `url`: or a recording."""
     console = console_for_people(stderr=views.as_json)
     if not views.as_json:
         outlast_output()
@@ -145,7 +145,9 @@ def _follow(run: _Run, page: TablePage | None, console: Console, seconds: float,
                     receiver = run.receiver
                     fault = ". ".join(filter(None, (receiver.fault, news.words())))
                     connected, waiting = receiver.connected, receiver.waiting
-                    page.publish(operation.scene(now_s, time.time(), connected=connected, fault=fault, waiting=waiting))
+                    page.feed.publish(
+                        operation.scene(now_s, time.time(), connected=connected, fault=fault, waiting=waiting)
+                    )
                 if draws and now_s - table_s >= TABLE_S:
                     table_s = now_s
                     shown.update(drawn(console.height), refresh=True)

@@ -1,62 +1,52 @@
 # SPDX-License-Identifier: MIT
-"""The protocol of the crews: who went in when, each check, when out; as a table for the report after the operation.
+"""The protocol of the crews: who went in when, each check, when out; and the commanders' notes; as a table for the report after the operation.
 
-In: crews before and after a message. Out: a CSV file. Owns the lines; their number is bounded.
+In: crews before and after a message, notes. Out: a CSV file. Owns the lines; their number is bounded.
 """
 
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from echostep_app.printing.lines import as_error
 from echostep_app.team.messages.crews import Crew
+from echostep_app.team.messages.orders import Order
 
 MOST_LINES = 10_000  # further ones are left out
 HEAD = ("time_utc", "crew", "members", "event", "planned_air_min", "inside_min", "since_check_min", "by")
 FORMULAS = ("=", "+", "-", "@")  # a table program runs what begins so
 
 
-@dataclass(frozen=True, slots=True)
-class CrewEvent:
-    """A line. `inside_min`, `since_check_min`: times since entry and since the check before; None outside."""
-
-    crew: Crew
-    event: str
-    inside_min: float | None
-    since_check_min: float | None
-
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """In the order of `HEAD`."""
-        c = self.crew
-        time = datetime.fromtimestamp(c.unix_s, UTC).isoformat(timespec="seconds")
-        minutes = ["" if value is None else f"{value:.1f}" for value in (self.inside_min, self.since_check_min)]
-        return time, _plain(c.name), _plain(", ".join(c.members)), self.event, f"{c.air_min:g}", *minutes, _plain(c.by)
-
-
 class CrewLog:
-    """`note` takes each accepted message; `write` makes the table."""
+    """`note` takes each accepted change, `add_note` each new note; `write` makes the table."""
 
     def __init__(self) -> None:
-        self.events: list[CrewEvent] = []
+        self.events: list[tuple[str, ...]] = []  # in the order of `HEAD`
 
     def note(self, before: Crew | None, after: Crew | None) -> None:
-        """Note how a crew has changed; the same crew again is no event."""
-        if after is None or after == before or len(self.events) >= MOST_LINES:
+        """Note how a crew has changed; the same crew again is no event. The times are those since entry and since the check before."""
+        if after is None or after == before:
             return
-        began_s = before.entered_s if before and before.is_inside else None
-        inside, since = (None, None)
+        began_s, minutes = before.entered_s if before and before.is_inside else None, ["", ""]
         if before and began_s is not None:
-            inside = (after.unix_s - began_s) / 60.0
-            since = (after.unix_s - (before.checked_s or began_s)) / 60.0
-        self.events.append(CrewEvent(after, _event(before, after), inside, since))
+            minutes = [f"{(after.unix_s - since_s) / 60.0:.1f}" for since_s in (began_s, before.checked_s or began_s)]
+        what = after.name, ", ".join(after.members), _event(before, after)
+        self._add(after.unix_s, *what, f"{after.air_min:g}", *minutes, after.by)
+
+    def add_note(self, note: Order) -> None:
+        """Add what a commander wrote."""
+        self._add(note.unix_s, "", "", f"note: {note.text}", "", "", "", note.by)
+
+    def _add(self, unix_s: float, *cells: str) -> None:
+        if len(self.events) < MOST_LINES:
+            time = datetime.fromtimestamp(unix_s, UTC).isoformat(timespec="seconds")
+            self.events.append((time, *map(_plain, cells)))
 
     def write(self, path: Path) -> None:
         """Write the table, in order of time; raises EchostepError when the file cannot be written."""
-        rows = [event.cells for event in sorted(self.events, key=lambda event: event.crew.unix_s)]
+        rows = sorted(self.events, key=lambda event: event[0])
         with as_error(f"{path}: cannot write the crews"), path.open("w", encoding="utf-8", newline="") as file:
             csv.writer(file).writerows([HEAD, *rows])
 

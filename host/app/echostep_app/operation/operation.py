@@ -24,13 +24,14 @@ from echostep_app.operation.distress import ShownDistress, errand_to, shown_dist
 from echostep_app.operation.orders import NEWER_S, ShownOrder, order_by, order_news, shown_order
 from echostep_app.operation.trails import Trails
 from echostep_app.operation.words import (
+    Shared,
     ShownDetails,
     ShownEvent,
     ShownWearer,
     alarm_key,
     level_on,
     shown_details,
-    shown_mark,
+    shown_shared,
     shown_wearer,
     summary_words,
 )
@@ -39,6 +40,7 @@ from echostep_app.team.commander import rejected
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.crews import Crew
 from echostep_app.team.messages.marks import Mark, MarkBoard, ack_message, errand_message, is_shared
+from echostep_app.team.messages.orders import LOG, MOST_NOTES, Order, note_message
 from echostep_app.team.messages.report import BadReportError
 from echostep_app.team.roster import Member, MemberState, Roster
 
@@ -54,7 +56,7 @@ class TableScene:
     """One moment. `places`: rows of float32, one for each wearer on this plan (`Operation.scene`). `rows`: the list, the most urgent first.
 
     `summary`: number of members in each state; `refused`: rejected messages, in words; `fault`: of connection and output, in words; `waiting`:
-    requests that wait for the broker; `order`: to everybody.
+    requests that wait for the broker; `order`: to everybody; `log`: notes, the newest first.
     """
 
     t_s: float
@@ -66,9 +68,10 @@ class TableScene:
     connected: bool
     fault: str
     waiting: int
-    marks: tuple[ShownMark, ...] = ()
     order: ShownOrder | None = None
+    marks: tuple[ShownMark, ...] = ()
     crews: tuple[Crew, ...] = ()
+    log: tuple[ShownEvent, ...] = ()
 
 
 @dataclass(slots=True)
@@ -88,8 +91,7 @@ class Operation:
         self.roster = Roster()
         self.crew_log = CrewLog()
         self._board = MarkBoard()
-        self._shown_marks: tuple[ShownMark, ...] = ()
-        self._crews: tuple[Crew, ...] = ()
+        self._shared: Shared = ((), (), ())
         self._trails = Trails()
         self._followed: dict[Key, _Followed] = {}
         self._next_number = 1
@@ -129,6 +131,7 @@ class Operation:
     def _receive_shared(self, topic: str, payload: bytes, now_s: float, unix_s: float) -> bool:
         self.roster.received += 1
         crews, identity = self._board.crews, topic.rpartition("/")[2]
+        is_note = topic.startswith(LOG) and identity not in self._board.log
         before, orders = crews.get(identity), self._board.copy() if "/order/" in topic or "/receipt/" in topic else None
         try:
             self._board.receive(topic, payload)
@@ -136,6 +139,8 @@ class Operation:
             self.roster.count_rejected(str(error))
             return False
         self.crew_log.note(before, crews.get(identity))
+        if is_note:
+            self.crew_log.add_note(self._board.log[identity])
         if orders:
             for _, m in self._numbered(now_s):
                 events = [ShownEvent(unix_s, text) for text in order_news(orders, self._board, m)]
@@ -157,8 +162,8 @@ class Operation:
                     return self._send(request, unix_s, now_s)
                 case requests.SetOrder(to=to) if (m := self._member(to, now_s)) is not None or to is None:
                     return order_by(request, m, self._board, unix_s)
-                case requests.SetCrew() | requests.CrewDoes():
-                    return self._change_crew(request, unix_s)
+                case requests.SetCrew() | requests.CrewDoes() | requests.WriteNote():
+                    return self._write(request, unix_s)
         return GONE
 
     def _mark(self, request: requests.SetMark | requests.Unmark, unix_s: float) -> tuple[str, bytes] | str:
@@ -179,7 +184,13 @@ class Operation:
             return errand_message(rescuer.key, errand)
         return "Not sent: the place of the one in distress is not known on this plan."
 
-    def _change_crew(self, request: requests.SetCrew | requests.CrewDoes, unix_s: float) -> tuple[str, bytes] | str:
+    def _write(
+        self, request: requests.SetCrew | requests.CrewDoes | requests.WriteNote, unix_s: float
+    ) -> tuple[str, bytes] | str:
+        if isinstance(request, requests.WriteNote):
+            if len(self._board.log) >= MOST_NOTES:
+                return "Not written: the log is full."
+            return note_message(secrets.token_hex(4), Order(1, request.text, request.by, unix_s))
         if isinstance(request, requests.SetCrew):
             name, members, air_min, by = request.name, request.members, request.air_min, request.by
             return Crew(1, secrets.token_hex(4), name, members, air_min, by, unix_s).message
@@ -220,12 +231,11 @@ class Operation:
         with self._lock:
             members = self.roster.members(now_s)
             if self._changed or now_s - self._listed_s >= LIST_S:
-                self._list(members, now_s)
+                self._list(members, now_s, unix_s)
             places, refused = self._places(members, now_s), rejected(self.roster)
             words = summary_words(members, now_s)
             link, order = (connected, fault, waiting), shown_order(self._board, members, now_s)
-            shared = self._marks(), order, self._shown_crews()
-            return TableScene(now_s, unix_s, places, self._rows, words, refused, *link, *shared)
+            return TableScene(now_s, unix_s, places, self._rows, words, refused, *link, order, *self._shared)
 
     def trail(self, begin: int, now_s: float) -> tuple[bytes, int]:
         """Rows of the trails from point number `begin` on, and the number of the next point."""
@@ -272,28 +282,17 @@ class Operation:
         followed.history.append(ShownEvent(unix_s, f"{state.value}{': ' if where else ''}{where}"))
         followed.state, self._changed = state, True
 
-    def _list(self, members: list[Member], now_s: float) -> None:
-        """Make the list anew."""
+    def _list(self, members: list[Member], now_s: float, unix_s: float) -> None:
+        """Make the list anew; marks on this plan, crews and notes stay the same objects while they are the same."""
         duplicates = self.roster.duplicates(now_s)
         self._rows = tuple(
             shown_wearer(self._followed[m.key].number, m, self.plan, now_s, duplicates, self._board)
             for m in members
             if m.key in self._followed
         )
+        shared = shown_shared(self._board, self.plan, unix_s)
+        self._shared = self._shared if shared == self._shared else shared
         self._listed_s, self._changed = now_s, False
-
-    def _marks(self) -> tuple[ShownMark, ...]:
-        """The marks on this plan; the same object while they are the same."""
-        shown = tuple(shown_mark(m) for m in self._board.marks.values() if m.plan_sha256 == self.plan.digest)
-        if shown != self._shown_marks:
-            self._shown_marks = shown
-        return self._shown_marks
-
-    def _shown_crews(self) -> tuple[Crew, ...]:
-        """All crews; the same object while they are the same."""
-        if (crews := tuple(self._board.crews.values())) != self._crews:
-            self._crews = crews
-        return self._crews
 
     def _places(self, members: list[Member], now_s: float) -> bytes:
         rows = array("f")

@@ -13,7 +13,7 @@ from typing import Self
 
 from starlette.websockets import WebSocket
 
-from echostep_app.operation.operation import Operation, TableScene
+from echostep_app.operation.operation import Operation
 from echostep_app.operation.recorded.tape import Tape
 from echostep_app.operation.session import TableFeed, TableSession
 from echostep_app.page.server import STATIC, Address, PageSite, SocketServer
@@ -42,10 +42,6 @@ class TablePage:
     def url(self) -> str:
         """Address of the page."""
         return self.server.url
-
-    def publish(self, scene: TableScene) -> None:
-        """Show a scene on all pages; never waits."""
-        self.feed.publish(scene)
 
     def __enter__(self) -> Self:
         self.feed.on_publish = self.server.request_wake

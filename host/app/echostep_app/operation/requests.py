@@ -86,12 +86,19 @@ class SetOrder(msgspec.Struct, frozen=True, tag_field="kind", tag="order"):
     ended: bool = False
 
 
+class WriteNote(msgspec.Struct, frozen=True, tag_field="kind", tag="log"):
+    """Write a note into the log."""
+
+    text: NoteText
+    by: Person
+
+
 class Now(msgspec.Struct, frozen=True, tag_field="kind", tag="now"):
     """Show the present."""
 
 
 TimeRequest = Seek | SetPlaying | SetSpeed | Now
-Action = SetMark | Unmark | Acknowledge | Send | SetCrew | CrewDoes | SetOrder
+Action = SetMark | Unmark | Acknowledge | Send | SetCrew | CrewDoes | SetOrder | WriteNote
 TableRequest = FrameDrawn | Choose | TimeRequest | Action
 _REQUESTS = msgspec.json.Decoder(TableRequest)
 
@@ -100,7 +107,7 @@ def parse_request(text: str | None) -> TableRequest | None:
     """The request in a text from a page; None when it is not a valid one."""
     request = None if text is None else decoded(text, _REQUESTS, MOST_REQUEST)
     texts = [getattr(request, "by", "x")]
-    if isinstance(request, SetOrder):
+    if isinstance(request, SetOrder | WriteNote):
         texts.append(request.text)
     if isinstance(request, SetCrew):
         texts += [request.name, *request.members]

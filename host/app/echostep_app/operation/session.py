@@ -26,7 +26,7 @@ from echostep_app.operation.operation import Operation, TableScene
 from echostep_app.operation.orders import ShownOrder
 from echostep_app.operation.recorded.past import PastView, ShownTime
 from echostep_app.operation.recorded.tape import Tape
-from echostep_app.operation.words import ShownDetails, ShownWearer
+from echostep_app.operation.words import ShownDetails, ShownEvent, ShownWearer
 from echostep_app.page.elements.marks import ShownMark
 from echostep_app.page.guarded_socket import MOST_UNDRAWN, UNKNOWN, GuardedSocket
 from echostep_app.page.protocol import FRAME_S, encode, hello, packed
@@ -43,7 +43,7 @@ PAST = "The page shows the past: return to now first."
 
 @dataclass(frozen=True, slots=True)
 class TableHeader:
-    """One moment. `seq`: the page returns it when the frame is drawn. `list`, `marks`, `crews`: None when the page has them already.
+    """One moment. `seq`: the page returns it when the frame is drawn. `list`, `marks`, `crews`, `log`: None when the page has them already.
 
     `trail_from` 0: trails begin anew. `details`, `distress`: of the chosen wearer. `time`: of the time bar. The field names are keys of the JSON.
     """
@@ -64,6 +64,7 @@ class TableHeader:
     marks: tuple[ShownMark, ...] | None
     order: ShownOrder | None
     crews: tuple[Crew, ...] | None
+    log: tuple[ShownEvent, ...] | None
     time: ShownTime | None
     kind: Literal["table"] = "table"
 
@@ -195,6 +196,7 @@ class TableSession(GuardedSocket):
             marks=scene.marks if last is None or scene.marks is not last.marks else None,
             order=scene.order,
             crews=scene.crews if last is None or scene.crews is not last.crews else None,
+            log=scene.log if last is None or scene.log is not last.log else None,
             time=self._view.shown(scene.t_s, sum(row.open_alarm for row in latest.rows)) if self._view else None,
         )
         self._last, self._due = scene, False

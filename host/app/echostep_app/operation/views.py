@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Where a team is shown.
 
-In: options of the command. Out: `Views`; the page, a picture, the roster as JSON. Owns nothing.
+In: options of the command. Out: `Views`; the page, the roster as JSON. Owns nothing.
 """
 
 from __future__ import annotations
@@ -10,16 +10,13 @@ import json
 import sys
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from echostep_app.operation.operation import Operation
 from echostep_app.operation.recorded.tape import Tape
-from echostep_app.printing.lines import complain, say
 from echostep_app.team.commander import as_tree
-from echostep_app.team.picture import draw_team
 
 if TYPE_CHECKING:
     from echostep_app.operation.page import TablePage
@@ -28,10 +25,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Views:
-    """Where a team is shown. `page` None: no page. `picture`: drawn at the end. `as_json`: the roster at the end, instead of the table."""
+    """Where a team is shown. `page` None: no page. `as_json`: the roster at the end, instead of the table."""
 
     page: Address | None = None
-    picture: Path | None = None
     as_json: bool = False
 
 
@@ -50,12 +46,7 @@ def open_page(
 
 
 def finish(operation: Operation, now_s: float, views: Views) -> None:
-    """Draw the picture and print the roster, where asked for; `now_s` on the operation's clock."""
-    roster, plan = operation.roster, operation.plan
-    if views.picture:
-        draw_team(views.picture, plan, roster.members(now_s), now_s)
-        tell = complain if views.as_json else say
-        tell(f"picture: {views.picture}")
+    """Print the roster where asked for; `now_s` on the operation's clock."""
     if views.as_json:
-        json.dump(as_tree(roster, plan, now_s), sys.stdout, indent=2)
+        json.dump(as_tree(operation.roster, operation.plan, now_s), sys.stdout, indent=2)
         sys.stdout.write("\n")

@@ -15,8 +15,9 @@ from echostep_app.operation.orders import order_notes
 from echostep_app.page.elements.marks import ShownMark
 from echostep_app.team.commander import heading_on, notes
 from echostep_app.team.cot import alarm_words
-from echostep_app.team.messages.crews import crew_of
-from echostep_app.team.messages.marks import AlarmKey, Mark, MarkBoard
+from echostep_app.team.messages.crews import Crew, crew_of
+from echostep_app.team.messages.marks import AlarmKey, MarkBoard
+from echostep_app.team.messages.orders import HOLDS_S
 from echostep_app.team.messages.report import Position
 from echostep_app.team.roster import Member, MemberState
 from echostep_app.wearer.falls import LYING_RAD, UPRIGHT_RAD
@@ -71,6 +72,9 @@ class ShownDetails:
     history: tuple[ShownEvent, ...]
 
 
+Shared = tuple[tuple[ShownMark, ...], tuple[Crew, ...], tuple[ShownEvent, ...]]
+
+
 def summary_words(members: Sequence[Member], now_s: float) -> str:
     """How many wearers there are, and how many in each state: "8 wearers: 1 lost, 7 tracked"."""
     states = [m.state(now_s) for m in members]
@@ -94,9 +98,15 @@ def alarm_key(m: Member) -> AlarmKey | None:
     return m.report.team, m.report.name, f"{m.report.run}-{alarm.number}"
 
 
-def shown_mark(m: Mark) -> ShownMark:
-    """A mark for a page."""
-    return ShownMark(m.id, m.mark, m.x_m, m.y_m, m.level, m.by)
+def shown_shared(board: MarkBoard, plan: Plan, unix_s: float) -> Shared:
+    """What the commanders share: marks on this plan, crews, and the notes of this operation, the newest first."""
+    marks = (
+        ShownMark(m.id, m.mark, m.x_m, m.y_m, m.level, m.by)
+        for m in board.marks.values()
+        if m.plan_sha256 == plan.digest
+    )
+    notes = sorted((n for n in board.log.values() if unix_s - n.unix_s < HOLDS_S), key=lambda n: -n.unix_s)
+    return tuple(marks), tuple(board.crews.values()), tuple(ShownEvent(n.unix_s, f"{n.by}: {n.text}") for n in notes)
 
 
 def shown_wearer(

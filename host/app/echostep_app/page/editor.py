@@ -14,6 +14,8 @@ import secrets
 import shutil
 import sys
 import threading
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -32,6 +34,7 @@ from echostep_app.page.server import STATIC, STOP_S, Address, open_listener, pag
 from echostep_app.page.web.access import AccessControl
 from echostep_app.page.web.connections import Connections
 from echostep_app.page.web.gated_server import GatedServer
+from echostep_app.plan.check import check_plan
 from echostep_app.plan.two_points import parse_two_points
 from echostep_app.plan.writer import georeference_fields, plan_json
 from echostep_app.printing.lines import say
@@ -44,12 +47,13 @@ SHARED = (
     "theme.js",
     "view.js",
     "language.js",
-    "*-pages.json",
-    "*-edit.json",
+    "*-*.json",
 )  # files of the live page
 MOST_BODY = 8_000_000  # bytes of a plan: a browser draws this much smoothly
 MOST_PICTURE = 32_000_000  # bytes
+MOST_FOUND = 200  # findings of a check
 POST_S = 20.0  # time for a posted plan to arrive
+Tree = dict[str, object]  # as JSON
 NO_FILE = "none"  # state of a plan file that does not exist
 
 
@@ -157,7 +161,8 @@ class EditServer:
             Route("/picture", self._get_picture),
             Route("/plan", self._get_plan, methods=["GET"]),
             Route("/plan", self._post_plan, methods=["POST"]),
-            Route("/georeference", _post_two_points, methods=["POST"]),
+            Route("/georeference", partial(_post, _georeference), methods=["POST"]),
+            Route("/check", partial(_post, _findings), methods=["POST"]),
         ]
         return Starlette(routes=[Mount(f"/{token}", routes=routes)])
 
@@ -202,18 +207,27 @@ class EditServer:
         return JSONResponse({"saved": self.file.path.name}, headers={"etag": f'"{state}"'})
 
 
-async def _post_two_points(request: Request) -> Response:
-    """The georeference of two posted points, and their distances; nothing is written."""
+async def _post(act: Callable[[bytes], Tree], request: Request) -> Response:
+    """What `act` makes of a posted body; nothing is written."""
     raw = await _body(request)
     if isinstance(raw, Response):
         return raw
     try:
-        fit = await asyncio.to_thread(parse_two_points, raw)
+        return JSONResponse(await asyncio.to_thread(act, raw))
     except (ValueError, EchostepError) as error:
         return _error(422, str(error))
-    return JSONResponse(
-        {"georeference": georeference_fields(fit.georeference), "plan_m": fit.plan_m, "earth_m": fit.earth_m}
-    )
+
+
+def _georeference(raw: bytes) -> Tree:
+    """The georeference of two points, and their distances."""
+    fit = parse_two_points(raw)
+    return {"georeference": georeference_fields(fit.georeference), "plan_m": fit.plan_m, "earth_m": fit.earth_m}
+
+
+def _findings(raw: bytes) -> Tree:
+    """What is wrong with a plan."""
+    found = check_plan(parse_plan(raw))[:MOST_FOUND]
+    return {"found": [{"level": f.level, "at": f.position_m, "text": f.text} for f in found]}
 
 
 async def _body(request: Request) -> bytes | Response:

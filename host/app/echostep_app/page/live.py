@@ -27,13 +27,12 @@ from echostep_app.page.elements.echo_lines import EchoLine, expected_range, last
 from echostep_app.page.elements.guidance import ShownGuidance, guidance_of_cue
 from echostep_app.page.elements.likely_places import PlaceNumbers
 from echostep_app.page.elements.lookahead import extrapolate, moves_as_one
-from echostep_app.page.elements.marks import ShownMark, ShownOrder, beacon_marks, shown_meeting
+from echostep_app.page.elements.marks import beacon_marks, shown_meeting
 from echostep_app.page.elements.scene import MOST_SHOWN, PageScene, is_placed, sample_of, status_text
 from echostep_app.page.elements.stream_rates import StreamRateMeter
-from echostep_app.page.elements.taps import PointPress, ShownPoints
 from echostep_app.page.elements.true_position import TruePath
 from echostep_app.page.elements.undo_offer import UndoClock, echoes_fit
-from echostep_app.page.mailbox import Mailbox
+from echostep_app.page.mailbox import Mailbox, popped
 from echostep_app.page.server import Address, PageServer
 from echostep_app.page.shared import SharedDrawing
 from echostep_app.plan.routing import RoutePlace
@@ -54,7 +53,10 @@ MOST_KEPT = 2000  # particles in each scene of a replay
 
 
 class LivePage:
-    """Call `note_arrival` and `publish` for each portion; `pop_check_ins` gives the pages' check-ins as bytes of chunks."""
+    """Call `note_arrival` and `publish` for each portion; `pop_check_ins` gives the pages' check-ins as bytes of chunks.
+
+    `mailbox`: what all pages of this run are told, and what they have said.
+    """
 
     def __init__(
         self,
@@ -76,7 +78,7 @@ class LivePage:
         self._guided = guided
         self._replay = replay
         self._shared = shared
-        self._mailbox = Mailbox(tracker.plan, title, replay=replay, keeps=keeps)
+        self.mailbox = Mailbox(tracker.plan, title, replay=replay, keeps=keeps)
         self.truth: TruePath | None = None  # shown beside the estimates
         self.receipt_of: Callable[[int], str] | None = None  # delivery of a mayday; None: the run's reports go nowhere
         self.fault_sources: list[Callable[[], str]] = []  # present faults of the run's output, in words
@@ -84,7 +86,7 @@ class LivePage:
             None  # name of the acknowledging commander, by the alarm's number
         )
         self._owns_server = isinstance(address, Address)
-        self.server = PageServer(self._mailbox, address) if isinstance(address, Address) else address
+        self.server = PageServer(self.mailbox, address) if isinstance(address, Address) else address
         self._model = echo_model(tracker.settings.echo)
         self._rate_meter = StreamRateMeter()
         self._rates_ns = 0  # times of the last measurement of rates, of the last bytes, of bytes of MTx or board, of the last estimate
@@ -104,7 +106,7 @@ class LivePage:
         self._undo_clock, self._numbers = UndoClock(), PlaceNumbers()
         self._drawing: DrawingProcess | None = None  # of a walk without a plan
         if not replay:
-            self._mailbox.publish(self._scene)
+            self.mailbox.publish(self._scene)
         expected_range(0.0, 0.0, 0.0, tracker.laid_out.walls.index, self._model)  # compiled now, not at the first step
 
     @property
@@ -127,10 +129,10 @@ class LivePage:
         if self._owns_server:
             self.server.__enter__()
         else:
-            self.server.show(self._mailbox)
+            self.server.show(self.mailbox)
         if not self._tracker.plan.is_drawn:
             fail = self.server.shared.faults.note_text
-            self._drawing = DrawingProcess(self._mailbox.add_drawing, fail, live=not self._replay, shared=self._shared)
+            self._drawing = DrawingProcess(self.mailbox.add_drawing, fail, live=not self._replay, shared=self._shared)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
@@ -140,31 +142,15 @@ class LivePage:
         if self._owns_server:
             self.server.__exit__(kind, error, at)
 
-    def set_marks(self, marks: tuple[ShownMark, ...]) -> None:
-        """Show the commanders' marks on all pages."""
-        self._mailbox.set_marks(marks)
-
-    def set_orders(self, orders: tuple[ShownOrder, ...]) -> None:
-        """Show on all pages what the wearer has not understood yet."""
-        self._mailbox.set_orders(orders)
-
-    def pop_understood(self) -> Iterator[str]:
-        """Identities of the orders that the pages have said are understood since the last call."""
-        return self._mailbox.pop_understood()
-
     def set_errand(self, x_m: float, y_m: float, level: int, text: str) -> None:
         """Guide all pages to a person in distress, and show who sent the wearer; a level that is not in the plan is ignored."""
         if level < len(self._tracker.plan.levels):
-            self._mailbox.set_goal(RoutePlace(x_m, y_m, level), text)
-
-    def set_team(self, names: tuple[str, ...]) -> None:
-        """Offer meetings with these teammates on all pages."""
-        self._mailbox.set_team(names)
+            self.mailbox.set_goal(RoutePlace(x_m, y_m, level), text)
 
     def announce(self, text: str) -> None:
         """Show what the run is doing, until its first bytes."""
         if not self._replay:
-            self._mailbox.publish(replace(self._scene, status_text=text))
+            self.mailbox.publish(replace(self._scene, status_text=text))
 
     def wait_for_page(self) -> None:
         """Wait until a browser shows the page, for at most `OPENING_S`."""
@@ -172,38 +158,22 @@ class LivePage:
         while not self.pages and time.monotonic() < end_s:
             time.sleep(OPENING_POLL_S)
 
-    def end(self, summary: str) -> None:
-        """End the run: pages show its end and its summary; a run with stored scenes can be replayed."""
-        self._mailbox.end(summary)
-
     def fail(self, words: str) -> None:
         """An error ends the run: pages show it; waits until they have it, for at most `TOLD_S`."""
-        self._mailbox.fail(words)
+        self.mailbox.fail(words)
         end_s = time.monotonic() + TOLD_S
         while self.pages and time.monotonic() < end_s:
             time.sleep(OPENING_POLL_S)
 
     def pop_check_ins(self) -> Iterator[bytes]:
         """Check-ins and undoings that pages have made since the last call, encoded as the tracker takes them."""
-        for check_in in self._mailbox.pop_check_ins():
+        for check_in in popped(self.mailbox.check_ins):
             yield check_in.encode()
-
-    def pop_meetings(self) -> Iterator[str]:
-        """Names of the teammates that the pages have reported as met since the last call."""
-        return self._mailbox.pop_meetings()
-
-    def set_points(self, points: ShownPoints) -> None:
-        """Show on all pages which surveyed point comes next; from then on they take taps at points."""
-        self._mailbox.set_points(points)
-
-    def take_presses(self, take: Callable[[PointPress], bool]) -> None:
-        """Call `take` with each tap at a surveyed point, in the server's thread; it returns whether the tap was accepted."""
-        self._mailbox.on_press = take
 
     def note_alive(self) -> None:
         """The run goes on; a live page says when it no longer does."""
         if not self._replay:
-            self._mailbox.exchange.note_alive()
+            self.mailbox.exchange.note_alive()
 
     def note_arrival(self) -> None:
         """Bytes have arrived: their time is the start of the latency of the scenes that follow."""
@@ -226,9 +196,9 @@ class LivePage:
         if self._new or not self._replay:
             for old in self._new or [self._scene_without_news()]:
                 scene = replace(old, **state_fields)
-                self._mailbox.publish(scene)
+                self.mailbox.publish(scene)
                 if self._new:
-                    self._mailbox.keep(scene)
+                    self.mailbox.keep(scene)
             self._new = []
 
     def _state_fields(self) -> dict[str, Any]:
@@ -279,7 +249,7 @@ class LivePage:
             guidance=guidance and guidance.turned(moved.heading_rad - estimate.heading_rad),
             truth=self.truth.at(moved.t_s) if self.truth else None,
         )
-        self._mailbox.publish(self._lookahead)
+        self.mailbox.publish(self._lookahead)
 
     def _scene_without_news(self) -> PageScene:
         """The last scene again; without bytes or steps for too long: the same with a grown ellipse, and status lost."""
@@ -306,14 +276,14 @@ class LivePage:
         self._lookahead = None
         self._extend_trail(estimate)
         if self._drawing and measured is not None:
-            self._drawing.add(measured, estimate, len(self._mailbox.trail))
+            self._drawing.add(measured, estimate, len(self.mailbox.trail))
         published = None if measured is None else self._tracker.particles(MOST_KEPT if self._replay else MOST_SHOWN)
         self._scene = replace(
             self._scene,
             arrived_ns=self._bytes_arrived_ns,
             t_s=estimate.t_s,
             estimate=estimate,
-            trail_count=len(self._mailbox.trail),
+            trail_count=len(self.mailbox.trail),
             status_text=status_text(estimate, accepts_taps=not self._replay, no_plan=not self._tracker.plan.is_drawn),
             particles=self._scene.particles if published is None else sample_of(published),
             echo_lines=self._echo_lines(measured, estimate),
@@ -327,7 +297,7 @@ class LivePage:
 
     def _extend_trail(self, estimate: Estimate) -> None:
         """Append the estimate to the trail when it has moved; a check-in, its undoing, or a time without a place breaks the line."""
-        end, trail = self._trail_end, self._mailbox.trail
+        end, trail = self._trail_end, self.mailbox.trail
         if not is_placed(estimate, self._tracker.plan):
             self._trail_breaks = end is not None
             return

@@ -103,9 +103,9 @@ class Mailbox:
         )
         self.on_publish: Callable[[], None] | None = None
         self.exchange = Exchange()
-        self._check_ins: queue.Queue[CheckIn | Undo | Call] = queue.Queue(MOST_CHECK_INS)
-        self._met: queue.Queue[str] = queue.Queue(MOST_CHECK_INS)
-        self._understood: queue.Queue[str] = queue.Queue(MOST_CHECK_INS)
+        self.check_ins: queue.Queue[CheckIn | Undo | Call] = queue.Queue(MOST_CHECK_INS)
+        self.met: queue.Queue[str] = queue.Queue(MOST_CHECK_INS)  # names of teammates
+        self.understood: queue.Queue[str] = queue.Queue(MOST_CHECK_INS)  # identities of orders
         self.orders: tuple[ShownOrder, ...] = ()  # of the commanders; replaced, never changed
 
     def publish(self, scene: PageScene) -> None:
@@ -172,35 +172,12 @@ class Mailbox:
         self.failure = words
         self._announce()
 
-    def add_check_in(self, check_in: CheckIn | Undo | Call) -> bool:
-        """Queue a check-in, its undoing or a call for the tracker; False when it is refused: in a replay, or with a full queue."""
-        return self._put(self._check_ins, check_in)
-
-    def pop_check_ins(self) -> Iterator[CheckIn | Undo | Call]:
-        """Remove and yield the queued check-ins; never waits."""
-        return _popped(self._check_ins)
-
-    def add_meeting(self, name: str) -> bool:
-        """Queue a meeting with a teammate; False when it is refused: in a replay, or with a full queue."""
-        return self._put(self._met, name)
-
-    def pop_meetings(self) -> Iterator[str]:
-        """Remove and yield the names of teammates reported as met; never blocks."""
-        return _popped(self._met)
-
-    def add_understood(self, identity: str) -> bool:
-        """Queue that an order is understood; False when it is refused: in a replay, or with a full queue."""
-        return self._put(self._understood, identity)
-
-    def pop_understood(self) -> Iterator[str]:
-        """Remove and yield the identities of understood orders; never blocks."""
-        return _popped(self._understood)
-
     def add_press(self, press: PointPress) -> bool:
         """Hand on a tap at a surveyed point; False when it is refused: in a replay, or by the guide of the walk."""
         return not self.replay and self.on_press is not None and self.on_press(press)
 
-    def _put(self, waiting: queue.Queue[T], item: T) -> bool:
+    def add(self, waiting: queue.Queue[T], item: T) -> bool:
+        """Queue what a page has said; False when it is refused: in a replay, or with a full queue."""
         if self.replay:
             return False
         try:
@@ -214,7 +191,8 @@ class Mailbox:
             self.on_publish()
 
 
-def _popped(waiting: queue.Queue[T]) -> Iterator[T]:
+def popped(waiting: queue.Queue[T]) -> Iterator[T]:
+    """Remove and yield what is queued; never waits."""
     while True:
         try:
             yield waiting.get_nowait()

@@ -115,15 +115,15 @@ class PageSession(GuardedSocket):
 
     def _take(self, request: CheckIn | Undo | Call) -> str:
         """Queue a check-in, its undoing or a call for the tracker; the reason of a refusal, else empty."""
-        return "" if self._mailbox.add_check_in(request) else TOO_BUSY
+        return "" if self._mailbox.add(self._mailbox.check_ins, request) else TOO_BUSY
 
     def _tell_team(self, request: requests.Met | requests.Understood) -> str:
         """Queue a meeting, or that an order is understood; the reason of a refusal, else empty."""
         if isinstance(request, requests.Understood):
-            return "" if self._mailbox.add_understood(request.id) else TOO_BUSY
+            return "" if self._mailbox.add(self._mailbox.understood, request.id) else TOO_BUSY
         if request.name not in self._mailbox.team:
             return f"{request.name} is not heard."
-        return "" if self._mailbox.add_meeting(request.name) else TOO_BUSY
+        return "" if self._mailbox.add(self._mailbox.met, request.name) else TOO_BUSY
 
     def _press(self, request: requests.AtPoint | requests.NoTap) -> str:
         """Queue a tap at a surveyed point for the guide of the walk; the reason of a refusal, else empty."""

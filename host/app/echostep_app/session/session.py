@@ -31,6 +31,7 @@ from echostep_app.interruption import holding_signals, is_asked
 from echostep_app.kernel_parts import LATER, TRACKING, Part, compile_parts, compiling_later
 from echostep_app.output.terminal import TerminalView
 from echostep_app.page.elements.true_position import TruePath
+from echostep_app.page.mailbox import popped
 from echostep_app.plan.places.refusals import refusals
 from echostep_app.printing.console import console, print_notices
 from echostep_app.printing.people import FaultNews, outlast_output
@@ -229,7 +230,7 @@ class Session:
         self.message_sources.append((TEAM_BEACONS, teammates.beacons))
         if page is None:
             return
-        self.message_sources.append((MEETING, lambda: teammates.meetings(page.pop_meetings())))
+        self.message_sources.append((MEETING, lambda: teammates.meetings(popped(page.mailbox.met))))
         marks = MarkFeed(subscription, outlet, run, plan.digest)
         page.acknowledged_by = marks.acknowledged_by
         self._sinks.append(mark_sink(marks, page))

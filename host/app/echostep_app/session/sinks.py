@@ -18,6 +18,7 @@ from echostep_app.guidance.cue_list import CueList
 from echostep_app.guidance.cues import arrow_sign, describe_cue
 from echostep_app.output.derived import Derived
 from echostep_app.output.terminal import TerminalView
+from echostep_app.page.mailbox import popped
 from echostep_app.printing.console import console, print_notices
 from echostep_app.recording.recorder import DerivedMessage
 
@@ -54,7 +55,7 @@ def page_sink(page: LivePage) -> Sink:
         page.note_alive()
         print_notices(page.notices)
 
-    return Sink(take, page.note_arrival, page.end)
+    return Sink(take, page.note_arrival, page.mailbox.end)
 
 
 def teammate_sink(
@@ -69,7 +70,7 @@ def teammate_sink(
         if drawing:
             teammates.share_drawing(drawing)
         if page and names is not None:
-            page.set_team(names)
+            page.mailbox.set_team(names)
 
     def end(_: str) -> None:
         if drawing and drawing.too_long:
@@ -83,10 +84,10 @@ def mark_sink(marks: MarkFeed, page: LivePage) -> Sink:
 
     def take(_: Portion, __: list[Estimate]) -> None:
         if (news := marks.news()) is not None:
-            page.set_marks(news)
-        for identity in page.pop_understood():
+            page.mailbox.set_marks(news)
+        for identity in popped(page.mailbox.understood):
             marks.understand(identity)
-        page.set_orders(marks.orders())
+        page.mailbox.set_orders(marks.orders())
         if errand := marks.new_errand():
             page.set_errand(errand.x_m, errand.y_m, errand.level, errand.words)
 

@@ -10,9 +10,11 @@ import pytest
 
 from echostep.plan import Plan, Pose, load_plan, parse_plan
 from echostep_app.page.editor import EditServer
+from echostep_app.plan.check import check_plan
 from echostep_app.plan.writer import save_plan
 from page.browser import wait_for
-from page.edit.drawing import PHONES, answered, click, drag, on_phone, opened, says, tap
+from page.edit.drawing import PHONES, answered, click, drag, on_phone, opened, says, status, tap
+from waiting import until
 
 HOUSE = b"""{"echostep_plan": 1, "name": "house", "levels": [
     {"name": "Ground", "height_m": 0, "walls": [[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0, 8, 0, 0]], "rooms": []},
@@ -214,4 +216,37 @@ def test_fingers_draw_stairs_on_a_phone_held_either_way(
     assert found.violations_count == after.violations_count == 0, found.generate_report() + after.generate_report()
     assert (wide, cut, page.wrong) == (0, [], [])
     assert written(page, house).connectors[0].outline_m.tolist() == [[2, 3], [5, 3], [5, 6], [2, 6]]
+    page.context.close()
+
+
+def test_windows_and_what_is_wrong(browser: Any, house: EditServer) -> None:
+    """Glass is cut into a wall, moved along it, and is no way; what plan check finds is gone to, one after the other."""
+    page = opened(browser, house)
+    page.click('[data-tool="window"]')
+    click(page, 6.0, 0.0)
+    says(page, "Window 0.90 m")
+    page.click('[data-tool="select"]')
+    drag(page, (6.0, 0.0), (8.0, 0.0))
+    says(page, "Moved the window by 2.00 m, 0.0°")
+    level = written(page, house).levels[0]
+    assert (level.windows.round(2).tolist(), len(level.doors)) == ([[7.55, 0.0, 8.45, 0.0]], 0)
+    page.click("#check")
+    found = f"{len(check_plan(load_plan(house.file.path)))} findings: "
+    assert until(lambda: found in status(page)), status(page)
+    first = status(page)
+    page.click("#check")
+    assert until(lambda: status(page).startswith(f"2 of {found}")), (first, status(page))
+    page.click('[data-tool="erase"]')
+    page.select_option("#level", "0")
+    page.click("#whole")
+    click(page, 8.0, 0.0)
+    says(page, "Deleted the window")
+    assert not len(written(page, house).levels[0].windows)
+    page.click('[data-tool="start"]')
+    click(page, 2.0, 2.0)
+    page.click('[data-tool="wall"]')
+    assert status(page).startswith("No start drawn. Click from corner to corner")
+    page.set_viewport_size({"width": 320, "height": 256})
+    wait_for(page, "document.querySelector('#status').clientWidth > 100")
+    assert not page.wrong
     page.context.close()

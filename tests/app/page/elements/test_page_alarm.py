@@ -13,7 +13,7 @@ import pytest
 from echostep.odometry import Alarm, AlarmKind, AlarmReason, WearerWatch
 from echostep.ports.people.check_in import Call
 from echostep_app.page.elements.alarm import ShownAlarm, shown_alarm
-from echostep_app.page.mailbox import Mailbox
+from echostep_app.page.mailbox import Mailbox, popped
 from echostep_app.page.requests import parse_request
 from echostep_app.page.server import PageServer
 from page.browser import HELD_MS, LOCAL, PLAN, Walk, looking, picture, wait_for
@@ -84,7 +84,7 @@ def test_the_page_asks_and_nothing_keeps_anybody_from_answering(browser: Any, lo
         calls: list[Any] = []
 
         def is_answered() -> bool:
-            calls.extend(mailbox.pop_check_ins())
+            calls.extend(popped(mailbox.check_ins))
             return bool(calls)
 
         assert until(is_answered)

@@ -167,7 +167,7 @@ def test_the_track_has_a_gap_where_no_place_was_claimed() -> None:
     with LivePage(Tracker(PLAN), "test", LOCAL) as page:
         for k, status in enumerate((lost, known, known, lost, lost, known)):
             page._watch(None, told(2.0 + k, 7.5, float(k), status))
-        rows = np.frombuffer(page._mailbox.trail.part(0, 9), "<f4").reshape(-1, 3)
+        rows = np.frombuffer(page.mailbox.trail.part(0, 9), "<f4").reshape(-1, 3)
     assert np.array_equal(rows[:, 0], [3.0, 4.0, math.nan, 7.0], equal_nan=True)
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from echostep.aiding import MeetingEffect
 from echostep_app.page.elements.marks import WORDS, ShownMeeting
-from echostep_app.page.mailbox import Mailbox
+from echostep_app.page.mailbox import Mailbox, popped
 from echostep_app.page.requests import Met, parse_request
 from echostep_app.page.server import PageServer
 from page.browser import LOCAL, PLAN, looking, wait_for
@@ -51,7 +51,7 @@ def test_a_teammate_is_chosen_and_the_page_says_what_it_did(browser: Any) -> Non
         page.select_option("#met", "<b>zoe")
 
         def is_told() -> bool:
-            met.extend(mailbox.pop_meetings())
+            met.extend(popped(mailbox.met))
             return bool(met)
 
         assert until(is_told)
@@ -65,5 +65,5 @@ def test_a_teammate_is_chosen_and_the_page_says_what_it_did(browser: Any) -> Non
         wait_for(page, "document.querySelector('#met').hidden")
         assert not page.wrong
         page.context.close()
-    assert not list(mailbox.pop_meetings())
+    assert not list(popped(mailbox.met))
     assert found.violations_count == 0, found.generate_report()

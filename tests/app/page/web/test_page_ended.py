@@ -42,7 +42,7 @@ def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any, tmp
         wait_for(page, "echostep.last && echostep.last.truth")
         assert "4 x real time" in page.inner_text("#title")
         assert page.is_hidden("#replay")
-        live.end("mean error 0.06 m, at most 0.16 m")
+        live.mailbox.end("mean error 0.06 m, at most 0.16 m")
         wait_for(page, f"document.getElementById('status-text').textContent === '{ENDED}'")
         wait_for(page, f"!document.getElementById('replay').hidden && {SETTLED} && {FITS}")  # beside the time bar
         page.screenshot(path=tmp_path / f"ended-{size}.png")

@@ -22,7 +22,7 @@ from echostep.ports.people.check_in import CheckIn
 from echostep_app.page import protocol
 from echostep_app.page.elements.scene import ParticleSample
 from echostep_app.page.guarded_socket import MOST_UNDRAWN
-from echostep_app.page.mailbox import MOST_CHECK_INS, Mailbox
+from echostep_app.page.mailbox import MOST_CHECK_INS, Mailbox, popped
 from echostep_app.page.server import MOST_PAGES, Address, PageServer
 from page.frames import PLAN, fetched, header, lines_of, next_frame, opened, scene, served
 from waiting import PATIENCE_S, ends
@@ -247,19 +247,19 @@ def test_too_many_check_ins_are_refused() -> None:
             page.send(said)
         busy = "Not accepted: this is a replay, or the tracker is too busy."
         assert json.loads(page.recv(timeout=PATIENCE_S)) == {"kind": "refused", "reason": busy}
-        assert list(mailbox.pop_check_ins()) == [CheckIn(2.0, 7.5, None, 0.5)] * MOST_CHECK_INS
+        assert list(popped(mailbox.check_ins)) == [CheckIn(2.0, 7.5, None, 0.5)] * MOST_CHECK_INS
         page.send(said.replace("7.5", "8.5"))
         assert json.loads(page.recv(timeout=PATIENCE_S))["reason"] == "Not accepted: it is inside a wall."
         page.send('{"kind":"undo","undo":1}')
         assert json.loads(page.recv(timeout=PATIENCE_S))["reason"] == "It is too late to undo this."
         page.send(said.replace("check_in", "consider"))
         assert json.loads(page.recv(timeout=PATIENCE_S))["text"].startswith("In North corridor.")
-        assert not list(mailbox.pop_check_ins())
+        assert not list(popped(mailbox.check_ins))
     with served(Mailbox(PLAN, "a replay", replay=True)) as (server, mailbox), opened(server) as page:
         assert json.loads(page.recv(timeout=PATIENCE_S))["replay"]
         page.send(said)
         assert json.loads(page.recv(timeout=PATIENCE_S))["kind"] == "refused"
-        assert not list(mailbox.pop_check_ins())
+        assert not list(popped(mailbox.check_ins))
 
 
 def test_an_address_that_is_taken_is_named_or_another_is_found() -> None:

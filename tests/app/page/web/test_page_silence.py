@@ -13,7 +13,7 @@ import pytest
 from websockets.sync.client import ClientConnection
 
 from echostep.ports.people.check_in import Call
-from echostep_app.page.mailbox import Mailbox
+from echostep_app.page.mailbox import Mailbox, popped
 from page.browser import HELD_MS, loaded_page, overflow, wait_for
 from page.frames import BEAT, PLAN, opened_url, scene, served
 from page.outage import Feeder, Wire, outage
@@ -175,7 +175,7 @@ def test_a_beat_comes_at_once_and_a_request_is_carried_out_once() -> None:
             again.recv(timeout=PATIENCE_S)
             again.send(json.dumps(call))
             assert json.loads(again.recv(timeout=PATIENCE_S))["reason"] == ""
-        assert list(mailbox.pop_check_ins()) == [Call(help=True)]
+        assert list(popped(mailbox.check_ins)) == [Call(help=True)]
         page.send(json.dumps(call | {"help": "please", "request": "12-34-56-79"}))
         assert "another version" in json.loads(page.recv(timeout=PATIENCE_S))["reason"]
         late = {
@@ -190,7 +190,7 @@ def test_a_beat_comes_at_once_and_a_request_is_carried_out_once() -> None:
         assert json.loads(page.recv(timeout=PATIENCE_S))["reason"].startswith("It came too late")
         page.send(json.dumps(late | {"request": "12-34-56-82", "until_s": time.monotonic() + PATIENCE_S}))
         assert not json.loads(page.recv(timeout=PATIENCE_S))["reason"]
-        assert len(list(mailbox.pop_check_ins())) == 1
+        assert len(list(popped(mailbox.check_ins))) == 1
         page.send(json.dumps(late | {"request": "12-34-56-82"}))  # again, later: it was carried out
         assert not json.loads(page.recv(timeout=PATIENCE_S))["reason"]
         page.send(json.dumps({"kind": "check_in", "x_m": 2, "y_m": 8.5, "sd_m": 0.5, "request": "12-34-56-80"}))
@@ -209,5 +209,5 @@ def test_help_is_held_and_a_brush_is_none(browser: Any, *, held: bool) -> None:
         else:
             page.click("#help")
             wait_for(page, "document.querySelector('#hint').textContent === 'Hold Help! for a second.'")
-        assert list(mailbox.pop_check_ins()) == [Call(help=True)] * held
+        assert list(popped(mailbox.check_ins)) == [Call(help=True)] * held
         page.context.close()

@@ -10,7 +10,7 @@ from typing import cast
 import pytest
 
 from echostep_app.page.elements.taps import PointPress, ShownPoints
-from echostep_app.page.live import LivePage
+from echostep_app.page.mailbox import Mailbox
 from echostep_app.ports.arrival_clock import now_ns
 from echostep_app.ports.tap import Tap, parse_tap
 from echostep_app.session.acceptance import guide as guides
@@ -72,12 +72,10 @@ class Page:
     """A page that keeps what it is told to show, and whose buttons are pressed."""
 
     points: ShownPoints
+    on_press: Callable[[PointPress], bool]
 
     def set_points(self, points: ShownPoints) -> None:
         self.points = points
-
-    def take_presses(self, take: Callable[[PointPress], bool]) -> None:
-        self.take = take
 
 
 def test_the_buttons_of_a_page_are_the_keys() -> None:
@@ -85,7 +83,7 @@ def test_the_buttons_of_a_page_are_the_keys() -> None:
     presses = [(0, ""), (0, ""), (1, "4"), (4, "u"), (4, "u"), (1, "9"), (1, ""), (9, "")]
     page, pressed_ns = Page(), now_ns()
     guide = Guide(corridor("20x2"), 1, io.StringIO(), lambda _: None, {})
-    guide.attach(cast(LivePage, page))
+    guide.attach(cast(Mailbox, page))
     assert guide.pop() == []
     assert page.points == ShownPoints(
         0,
@@ -94,7 +92,7 @@ def test_the_buttons_of_a_page_are_the_keys() -> None:
         ("1", "2", "3", "4", "5"),
         undo=False,
     )
-    taken = [page.take(PointPress(pressed_ns + k, number, typed)) for k, (number, typed) in enumerate(presses)]
+    taken = [page.on_press(PointPress(pressed_ns + k, number, typed)) for k, (number, typed) in enumerate(presses)]
     assert taken == [True, False, True, True, False, True, True, False]
     payloads = guide.pop()
     assert payloads == [
@@ -115,9 +113,11 @@ def test_the_buttons_of_a_page_are_the_keys() -> None:
 def test_after_the_last_point_no_button_is_left() -> None:
     page = Page()
     guide = Guide(corridor("20x2"), 1, io.StringIO(), lambda _: None, {})
-    guide.attach(cast(LivePage, page))
+    guide.attach(cast(Mailbox, page))
     assert guide.pop() == []
-    assert all(page.take(PointPress(now_ns(), number, "")) for number in range(9))  # at once, before the run goes on
+    assert all(
+        page.on_press(PointPress(now_ns(), number, "")) for number in range(9)
+    )  # at once, before the run goes on
     assert (page.points.name, page.points.later) == ("", ())
     assert page.points.text.startswith("The last point. Stand still for 5 s")
     assert len(guide.pop()) == 9
@@ -127,12 +127,12 @@ def test_a_flood_of_presses_is_refused_while_the_run_is_behind(monkeypatch: pyte
     monkeypatch.setattr(guides, "MOST_TAPS", 4)
     page = Page()
     guide = Guide(corridor("20x2"), 1, io.StringIO(), lambda _: None, {})
-    guide.attach(cast(LivePage, page))
+    guide.attach(cast(Mailbox, page))
     guide.pop()
-    taken = [page.take(PointPress(now_ns(), k % 2, "u" if k % 2 else "")) for k in range(8)]
+    taken = [page.on_press(PointPress(now_ns(), k % 2, "u" if k % 2 else "")) for k in range(8)]
     assert taken == 4 * [True] + 4 * [False]
     assert len(guide.pop()) == 4
-    assert page.take(PointPress(now_ns(), 0, ""))
+    assert page.on_press(PointPress(now_ns(), 0, ""))
 
 
 def test_the_run_ends_after_the_last_point(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`echostep command OPERATION.mcap`: a recorded operation, shown again by the code that showed it live.
 
-In: a recording, a plan. Out: the page, the final table, a picture, the roster as JSON. Owns the loop. The page can be used while the file is read.
+In: a recording, a plan. Out: the page, the final table, the roster as JSON. Owns the loop. The page can be used while the file is read.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def _read(tape: Tape, operation: Operation, page: TablePage | None) -> Player | 
     for player in load(tape, operation):
         if page and time.monotonic() - shown_s >= FRAME_S:
             shown_s = time.monotonic()
-            page.publish(player.scene())
+            page.feed.publish(player.scene())
     return player
 
 
@@ -68,7 +68,7 @@ def _serve(player: Player, page: TablePage, seconds: float) -> None:
     """Wake the pages 30 times a second: each plays on by itself."""
     end_s, scene = time.monotonic() + seconds, player.scene()
     while time.monotonic() < end_s:
-        page.publish(scene)
+        page.feed.publish(scene)
         time.sleep(FRAME_S)
 
 

@@ -2,7 +2,7 @@
 // The list of wearers and the details of one, in words; and the text for screen readers when a wearer needs help.
 
 import { tr } from '../static/language.js';
-import { put, say } from './text.js';
+import { clock, put, said, say } from './text.js';
 
 export const SIGNS = { mayday: '▲', asked: '△', lost: '✕', stale: '◌', uncertain: '◐', waiting: '○', tracking: '●', ended: '■' };
 const URGENT = ['mayday', 'asked', 'lost', 'stale'];
@@ -45,6 +45,11 @@ export class List {
     if (focused?.isConnected && document.activeElement !== focused) focused.focus({ preventScroll: true });
     this.announce(rows, isPast);
     if (this.chosen !== null && !rows.some(({ id }) => id === this.chosen)) this.choose(null);
+  }
+
+  again() {
+    this.shownDetails = this.shownDistress = null;
+    this.show(this.rows, this.isPast);
   }
 
   make(id) {
@@ -98,7 +103,7 @@ export class List {
     $('facts').replaceChildren(...facts(details.facts));
     $('history').replaceChildren(...details.history.map(({ unix_s, text: what }) => {
       const item = document.createElement('li');
-      item.textContent = `${new Date(1000 * unix_s).toLocaleTimeString('en-GB')} ${tr(what)}`;
+      item.textContent = `${clock(unix_s)} ${said(what)}`;
       return item;
     }));
   }
@@ -136,7 +141,7 @@ export class List {
 function facts(rows) {
   return rows.flatMap(({ name, value }) => [['dt', name], ['dd', value]].map(([tag, of]) => {
     const element = document.createElement(tag);
-    element.textContent = tr(of);
+    element.textContent = said(of);
     return element;
   }));
 }

@@ -12,7 +12,7 @@ import { stayAwake } from '../static/live/awake.js';
 import { Globe } from '../static/tools/globe.js';
 import { Measure } from '../static/tools/measure.js';
 import { titled } from '../static/tools/titles.js';
-import { scaleBar } from '../static/tools/units.js';
+import { showScale } from '../static/tools/units.js';
 import { Alarm } from './alarm.js';
 import { Crews } from './crews.js';
 import { Floors } from './floors.js';
@@ -20,6 +20,7 @@ import { List } from './list.js';
 import { Painter } from './paint.js';
 import { Orders } from './orders.js';
 import { Sheet } from './sheet.js';
+import { Storeys } from './storeys.js';
 import { put, say } from './text.js';
 import { TimeBar } from './timebar.js';
 import { Trails } from './trails.js';
@@ -30,19 +31,19 @@ const $ = (id) => document.getElementById(id);
 localise(document.body);
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas')), trails = new Trails($('trails'), $('trails-next'));
 const scene = { places: new Map(), rows: [], marks: [], level: 0, chosen: null, isOld: false, measure: new Measure() };
-const floors = new Floors((level) => showLevel(level));
+const storeys = new Storeys(), floors = new Floors((level) => (level === null ? stack() : visit(level)));
 const list = new List(choose, (id) => sheet.signed((by) => link.send('send', { id, to: scene.chosen, by })));
-const alarm = new Alarm(view, { show: goTo, open: (id) => list.choose(id), level: () => wantedLevel, showLevel, floor: (level) => plan.levels[level].name });
+const alarm = new Alarm(view, { show: goTo, open: (id) => list.choose(id), level: () => wantedLevel, showLevel: visit, floor: (level) => plan.levels[level].name });
 let plan = null, wantedLevel = 0, fitted = false, isAsked = false, globe = null, drawnStamp = -1, undrawn = [], found = false;
 
 const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onAge: connection, onUnsent: () => {}, isLive: () => scene.frame?.time?.live !== false && !timeBar.isPast, parse: parseFrame });
 const sheet = new Sheet((kind, fields) => link.send(kind, fields), hint, { words: (x, y) => globe?.words(x, y), measure: measured });
-const showLegend = startLegend($('legend-button'), COMMAND, COMMAND_KEYS), crews = new Crews((act) => sheet.signed(act), (kind, fields) => link.send(kind, fields));
+const showLegend = startLegend($('legend-button'), COMMAND, COMMAND_KEYS, inOtherUnit), crews = new Crews((act) => sheet.signed(act), (kind, fields) => link.send(kind, fields));
 const orders = new Orders((act) => sheet.signed(act), (kind, fields) => link.send(kind, fields), () => scene.chosen, hint);
 const timeBar = new TimeBar((kind, fields) => link.send(kind, fields));
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
-const drawn = (window.echostep = { frames: 0, view, scene, link, last: null, missing, tr });  // read by tests
+const drawn = (window.echostep = { frames: 0, view, scene, storeys, link, last: null, missing, tr });  // read by tests
 
 async function hello(message) {
   plan = message.plan;
@@ -56,22 +57,46 @@ async function hello(message) {
   $('title').textContent = `${message.title}: ${plan.name}`;
   alarm.entitle(message.title);
   floors.plan(plan.levels);
+  const wasStacked = storeys.on;
+  storeys.clear();
   if (scene.chosen !== null) link.send('choose', { id: scene.chosen });
   await showLevel(Math.min(scene.level, plan.levels.length - 1));
+  if (wasStacked) stack();
+}
+
+// Nothing while the server is away: when it is back, its hello shows the level again.
+async function lines(level) {
+  const answer = await fetch(new URL(`lines/${level}`, document.baseURI)).catch(() => null);
+  if (answer && !answer.ok) fault(await answer.text());
+  return answer?.ok ? answer.arrayBuffer() : null;
 }
 
 async function showLevel(level) {
   wantedLevel = level;
-  const answer = await fetch(new URL(`lines/${level}`, document.baseURI)).catch(() => null);
-  if (!answer) return;  // the server is away; when it is back, its hello shows the level again
-  if (!answer.ok) return fault(await answer.text());
-  const lines = await answer.arrayBuffer();
-  if (level !== wantedLevel) return;
+  const rows = await lines(level);
+  if (!rows || level !== wantedLevel) return;
   scene.level = level;
-  planView.show(lines, plan.levels[level]);
+  planView.show(rows, plan.levels[level]);
   if (!fitted) view.fit(planView.box);
   fitted = true;
-  floors.show(level, scene.rows);
+  stacked();
+}
+
+function visit(level) {
+  storeys.on = false;
+  stacked();
+  if (level !== wantedLevel) showLevel(level);
+}
+
+// All storeys over each other.
+async function stack() {
+  await storeys.open(plan.levels, lines);
+  stacked();
+}
+
+function stacked() {
+  $('map').classList.toggle('stacked', storeys.on);
+  floors.show(storeys.on ? null : scene.level, scene.rows);
   view.changed();
 }
 
@@ -101,12 +126,13 @@ function frame(received) {
   if (received.list) {
     scene.rows = received.list;
     list.show(received.list, timeBar.isPast);
-    floors.show(scene.level, scene.rows);
+    floors.show(storeys.on ? null : scene.level, scene.rows);
     findFirst();
   }
   if (received.list) alarm.update(received.list, scene.places, received.time, timeBar.isPast);
   if (received.marks) scene.marks = received.marks;
   orders.show(received.order, received.unix_s);
+  orders.log(received.log);
   link.outbox.wait(received.waiting);
   crews.show(received.crews, received.unix_s, timeBar.isPast);
   list.details(received.details, received.distress);
@@ -145,13 +171,20 @@ function choose(id) {
 
 // The floor and the place of a wearer come into view.
 function goTo({ x, y, level }) {
-  if (level !== wantedLevel) showLevel(level);
+  visit(level);
   view.keep(x, y);
 }
 
 function fault(text) {
   say($('fault'), text);
   $('fault').hidden = !text;
+}
+
+// The list and the details are sent anew, also while nothing happens in them.
+function inOtherUnit() {
+  list.again();
+  link.send('choose', { id: scene.chosen });
+  view.changed();
 }
 
 // Draw with the next animation frame.
@@ -165,16 +198,14 @@ function draw() {
   alarm.keep(scene.places);
   if (drawnStamp !== view.stamp) {
     planView.draw(view);
-    scale();
+    showScale(view);
   }
-  const here = scene.rows.filter(({ id }) => scene.places.get(id)?.level === scene.level).map((row) => {
+  const here = scene.rows.filter(({ id }) => scene.places.has(id) && (storeys.on || scene.places.get(id).level === scene.level)).map((row) => {
     const place = scene.places.get(row.id);
     return scene.isOld ? { ...then(row), place: { ...place, heading: NaN, radius: NaN, protection: NaN } } : { ...row, place };
   });
-  planView.names(view, here.map(({ place }) => view.toScreen(place.x, place.y)));
-  trails.paint(view, scene.level, painter.colour.trail);
-  painter.paint(view, here, scene.chosen, trails.points(scene.chosen), scene.marks, scene.level);
-  scene.measure.paint(painter.pen, view, scene.level, painter.colour);
+  if (storeys.on) storeys.paint(painter, view, here, scene.chosen);
+  else paint(here);
   [drawnStamp, drawn.last] = [view.stamp, scene.frame ?? null];
   if (trails.isBehind) ask();
   drawn.frames++;
@@ -182,11 +213,11 @@ function draw() {
   undrawn = [];
 }
 
-function scale() {
-  const { px, text } = scaleBar(view);
-  $('bar').style.width = `${px}px`;
-  $('bar-text').textContent = text;
-  $('needle').style.transform = `rotate(${-view.tilt}rad)`;
+function paint(here) {
+  planView.names(view, here.map(({ place }) => view.toScreen(place.x, place.y)));
+  trails.paint(view, scene.level, painter.colour.trail);
+  painter.paint(view, here, scene.chosen, trails.points(scene.chosen), scene.marks, scene.level);
+  scene.measure.paint(painter.pen, view, scene.level, painter.colour);
 }
 
 // Two places whose distance is shown; the first one from the sheet of a place, the second by a tap.
@@ -197,6 +228,10 @@ function measured(position, level) {
 }
 
 function tapped(position, pixel) {
+  if (storeys.on) {
+    const { id, level } = storeys.at(pixel, TAP_PX);
+    return id === undefined ? visit(level) : list.choose(id);
+  }
   if (scene.measure.points.length === 1) return measured(position, scene.level);
   const near = scene.rows.map(({ id }) => scene.places.get(id)).filter((place) => place?.level === scene.level).map(({ id, x, y }) => {
     const [sx, sy] = view.toScreen(x, y);
@@ -225,7 +260,7 @@ function hint(text) {
 
 function key(name) {
   const middle = [view.width / 2, view.height / 2];
-  const does = { m: () => { place(view.toMap(...middle), middle); $('mark-cleared').focus(); }, l: () => showLegend(false), '?': () => showLegend(true), p: () => $('crews-button').click(), n: () => view.northUp(), ' ': () => $('play').click(), w: () => view.fit(planView.box), Escape: () => { scene.measure.clear(); ask(); sheet.close(); list.choose(null); } }[name.length === 1 ? name.toLowerCase() : name];
+  const does = { m: () => { if (storeys.on) return; place(view.toMap(...middle), middle); $('mark-cleared').focus(); }, l: () => showLegend(false), '?': () => showLegend(true), p: () => $('crews-button').click(), v: () => $('all-floors').click(), n: () => view.northUp(), ' ': () => $('play').click(), w: () => view.fit(planView.box), Escape: () => { scene.measure.clear(); ask(); sheet.close(); list.choose(null); } }[name.length === 1 ? name.toLowerCase() : name];
   does?.();
   return Boolean(does);
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Orders to the wearers: everybody out, by a button that is held, and who has understood; a note in words to the chosen wearer.
+// Orders to the wearers: everybody out, by a button that is held, and who has understood; a note in words to the chosen wearer, or to the log.
 
 import { onHeld } from '../static/held.js';
 import { minutes } from '../static/language.js';
-import { say } from './text.js';
+import { clock, say } from './text.js';
 
 const MOST_NAMES = 6;
 const $ = (id) => document.getElementById(id);
@@ -13,11 +13,20 @@ export class Orders {
   constructor(signed, send, chosen, onHint) {
     onHeld($('out'), () => signed((by) => send('order', { by })), () => onHint('Hold Everybody out for a second.'));
     $('everybody-end').onclick = () => signed((by) => send('order', { by, ended: true }));
-    $('note-form').onsubmit = (e) => {
-      e.preventDefault();
-      const text = $('note').value.trim();
-      if (text && signed((by) => send('order', { by, to: chosen(), text }))) $('note').value = '';
+    const written = (name, act) => {
+      $(`${name}-form`).onsubmit = (e) => {
+        e.preventDefault();
+        const [field] = e.target.elements, text = field.value.trim();
+        if (text && signed((by) => act({ by, text }))) field.value = '';
+      };
     };
+    written('note', (fields) => send('order', { ...fields, to: chosen() }));
+    written('log', (fields) => send('log', fields));
+  }
+
+  // Notes as they were written: they are in no catalogue.
+  log(notes) {
+    if (notes) $('log-list').replaceChildren(...notes.map(({ unix_s, text }) => Object.assign(document.createElement('li'), { textContent: `${clock(unix_s)} ${text}` })));
   }
 
   show(order, unix_s) {

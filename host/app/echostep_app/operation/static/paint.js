@@ -29,16 +29,24 @@ export class Painter {
 
   // `wearers`: rows of the list with their `place`, the most urgent first; `trail`: points of the chosen one.
   paint(view, wearers, chosen, trail, marks, level) {
+    this.begin(view);
+    this.trail(view, trail, level);
+    paintMarks(this.pen, view, marks, level, this.colour);
+    this.wearers(view, wearers.map((wearer) => ({ ...wearer, at: view.toScreen(wearer.place.x, wearer.place.y) })), chosen);
+  }
+
+  begin(view) {
     const sharp = window.devicePixelRatio || 1, { canvas, pen } = this, width = Math.round(view.width * sharp), height = Math.round(view.height * sharp);
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     pen.setTransform(sharp, 0, 0, sharp, 0, 0);
     pen.clearRect(0, 0, view.width, view.height);
     pen.lineJoin = pen.lineCap = 'round';
     pen.imageSmoothingEnabled = false;
-    this.trail(view, trail, level);
-    paintMarks(pen, view, marks, level, this.colour);
-    const shown = wearers.map((wearer) => ({ ...wearer, at: view.toScreen(wearer.place.x, wearer.place.y) }))
-      .filter(({ at: [sx, sy] }) => sx > -200 && sy > -200 && sx < view.width + 200 && sy < view.height + 200);
+  }
+
+  // `at`: their pixels.
+  wearers(view, wearers, chosen) {
+    const shown = wearers.filter(({ at: [sx, sy] }) => sx > -200 && sy > -200 && sx < view.width + 200 && sy < view.height + 200);
     for (const wearer of [...shown].reverse()) this.wearer(view, wearer, wearer.id === chosen);
     this.names(shown, chosen);
   }

@@ -3,7 +3,7 @@
 
 import { recall, remember } from '../static/storage.js';
 import { markWords } from '../static/marks.js';
-import { tr } from '../static/language.js';
+import { said } from './text.js';
 
 const KINDS = ['cleared', 'hazard', 'meeting'];
 const $ = (id) => document.getElementById(id);
@@ -35,7 +35,7 @@ export class Sheet {
   open(at, mark, pixel, size) {
     Object.assign(this, { at, mark });
     const place = `x ${at.x_m.toFixed(1)}, y ${at.y_m.toFixed(1)} m`;
-    $('sheet-text').textContent = [mark ? `${markWords(mark.mark)}, set by ${mark.by}` : 'Mark this place', place, this.words(at.x_m, at.y_m)].filter(Boolean).map(tr).join(' · ');
+    $('sheet-text').textContent = [mark ? `${markWords(mark.mark)}, set by ${mark.by}` : 'Mark this place', place, this.words(at.x_m, at.y_m)].filter(Boolean).map(said).join(' · ');
     for (const kind of KINDS) $(`mark-${kind}`).hidden = Boolean(mark);
     $('mark-remove').hidden = !mark;
     $('sheet').hidden = false;

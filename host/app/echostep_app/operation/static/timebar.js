@@ -2,7 +2,7 @@
 // The time bar over the whole operation: go back, hold, play, return to now. While the past is shown, what calls for help now is said beside it.
 
 import { minutes, tr } from '../static/language.js';
-import { put } from './text.js';
+import { clock, put } from './text.js';
 
 const $ = (id) => document.getElementById(id);
 const SKIP_S = 10;
@@ -53,7 +53,7 @@ export class TimeBar {
     const { t_s, end_s, playing, times, now, live, open_alarms } = time, bar = $('time');
     bar.max = end_s;
     if (!this.holding && !this.isOnItsWay(t_s)) bar.value = t_s;
-    const day = new Date(1000 * unix_s).toLocaleTimeString('en-GB'), behind = live ? `${minutes(end_s - t_s)} ago` : `${minutes(t_s)} / ${minutes(end_s)}`;
+    const day = clock(unix_s), behind = live ? `${minutes(end_s - t_s)} ago` : `${minutes(t_s)} / ${minutes(end_s)}`;
     const text = isOld ? day : tr(now ? `${day}, now` : `${day}, ${behind}`);
     put($('clock'), text);
     bar.setAttribute('aria-valuetext', text);

@@ -32,12 +32,13 @@ function nearest(p, rows, reach) {
   return found;
 }
 
-// The element within reach of p: {kind: 'end' | 'door' | 'room' | 'wall', k: index, ...} or null. Small elements have precedence.
+// The element within reach of p: {kind: 'end' | 'door' | 'window' | 'room' | 'wall', k: index, ...} or null. Small elements have precedence.
 export function hit(level, p, reach) {
   const doors = level.doors ?? [], lines = doors.map((door) => door.line);
   const room = (level.rooms ?? []).findIndex((r) => distance(r.at, p) <= reach);
-  const door = nearest(p, lines, reach), wall = nearest(p, level.walls, reach);
+  const door = nearest(p, lines, reach), wall = nearest(p, level.walls, reach), glass = nearest(p, level.windows ?? [], reach);
   if (door && (!wall || door.away <= wall.away) && door.t > 0.15 && door.t < 0.85) return { kind: 'door', k: door.k };
+  if (glass && (!wall || glass.away <= wall.away) && glass.t > 0.15 && glass.t < 0.85) return { kind: 'window', k: glass.k };
   const joint = level.walls.flatMap(ends).filter((e) => distance(e, p) <= reach).sort((a, b) => distance(a, p) - distance(b, p))[0];
   if (joint) return { kind: 'end', at: joint, k: wall.k };
   if (room >= 0) return { kind: 'room', k: room };
@@ -159,6 +160,10 @@ export function moveDoor(level, k, p, exact = false) {
   return { ...filled.level, doors: [...filled.level.doors, { ...kept, line: [line[0] + dx, line[1] + dy, line[2] + dx, line[3] + dy].map(round) }] };
 }
 
+// A window is cut, moved and filled as a door is: the level with window k as its last door, and with its last door as a window.
+export const asDoor = (level, k) => ({ ...level, windows: level.windows.toSpliced(k, 1), doors: [...(level.doors ?? []), { line: level.windows[k] }] });
+export const asWindow = (level) => level && { ...level, windows: [...(level.windows ?? []), level.doors.at(-1).line], doors: level.doors.slice(0, -1) };
+
 // Move all ends of walls, windows and doors at some joints ([from, to] pairs); segments that have no length then are dropped.
 export function moveJoints(level, moves) {
   const to = (e) => moves.find(([from]) => same(from, e))?.[1] ?? e;
@@ -171,11 +176,11 @@ export function moveJoints(level, moves) {
   };
 }
 
-// The joints of wall k and of all doors and walls that continue it in line: they move together.
+// The joints of wall k and of all doors, windows and walls that continue it in line: they move together.
 export function runOf(level, k) {
-  const doors = (level.doors ?? []).map((d) => d.line), rows = [level.walls[k]], tried = new Set([level.walls[k]]);
+  const doors = [...(level.doors ?? []).map((d) => d.line), ...(level.windows ?? [])], rows = [level.walls[k]], tried = new Set([level.walls[k]]);
   for (let i = 0; i < rows.length; i++) {
-    const others = doors.includes(rows[i]) ? level.walls : doors; // walls are connected by doors only
+    const others = doors.includes(rows[i]) ? level.walls : doors; // walls are connected by doors and windows only
     for (const row of others) if (!tried.has(row) && continues(rows[i], row)) { tried.add(row); rows.push(row); }
   }
   const joints = [];

@@ -18,10 +18,10 @@ import { View } from './view.js';
 import { HINTS, WORDS } from './words.js';
 
 const byId = (id) => document.getElementById(id);
-const KEYS = { v: 'select', w: 'wall', d: 'door', x: 'erase', n: 'room', s: 'scale', o: 'origin', b: 'obstacle', t: 'stairs', l: 'lift', p: 'ramp', g: 'start', e: 'earth' };
+const KEYS = { v: 'select', w: 'wall', d: 'door', i: 'window', x: 'erase', n: 'room', s: 'scale', o: 'origin', b: 'obstacle', t: 'stairs', l: 'lift', p: 'ramp', g: 'start', e: 'earth' };
 const FIRST_WIDTH_M = 20; // of a picture without a scale
 const view = new View(), map = byId('map');
-let sheet, tools, asking, stamp, waiting = false;
+let sheet, tools, asking, stamp, waiting = false, checked = {};
 
 // The plan's own names stay as they are: its title and its list of levels.
 const say = (text) => { byId('status').textContent = tr(text); };
@@ -44,8 +44,8 @@ function draw() {
   paintGrid(view);
   paintNorth(sheet.tree);
   paint(tools, view, asking.current);
-  byId('door').hidden = tools.name !== 'door';
-  byId('typed').hidden = tools.name === 'door';
+  byId('door').hidden = !['door', 'window'].includes(tools.name);
+  byId('typed').hidden = !byId('door').hidden;
   for (const field of byId('typed').elements) field.disabled = !takesTyped(tools);
   for (const button of document.querySelectorAll('[data-tool]')) button.setAttribute('aria-pressed', String(button.dataset.tool === tools.name));
   byId('step-back').disabled = !sheet.past.length;
@@ -65,9 +65,9 @@ function show() {
 
 function goLevel(level) {
   if (level < 0 || level >= sheet.tree.levels.length) return;
-  tools.choose(tools.name);
+  const given = tools.choose(tools.name);
   sheet.k = level;
-  say(WORDS.level(sheet.level.name, sheet.level.height_m));
+  say(given + WORDS.level(sheet.level.name, sheet.level.height_m));
   changed();
 }
 
@@ -96,6 +96,25 @@ async function save(over = false) {
     wrong('');
     say(WORDS.saved(reply.saved));
   } catch { wrong(WORDS.noAnswer); }
+  changed();
+}
+
+// What `echostep plan check` finds in the plan as it is drawn, one with each call.
+async function check() {
+  const { tree } = sheet;
+  if (checked.tree !== tree) {
+    const answer = await fetch('check', { method: 'POST', body: JSON.stringify(tree), signal: AbortSignal.timeout(30000) }).catch(() => null), reply = await answer?.json().catch(() => null);
+    if (!answer?.ok) { wrong(reply?.error ?? WORDS.silent); return; }
+    checked = { tree, k: -1, found: reply.found };
+  }
+  wrong('');
+  const { found } = checked, finding = found[checked.k = (checked.k + 1) % found.length];
+  if (!finding) { say(WORDS.nothingWrong); return; }
+  tools.choose(tools.name);
+  sheet.k = finding.level;
+  [tools.cross, view.scale] = [finding.at, Math.max(view.scale, 30)];
+  view.centre(...finding.at);
+  say(WORDS.finding(checked.k + 1, found.length, finding.text));
   changed();
 }
 
@@ -136,7 +155,7 @@ function key(e) {
   const done = {
     ArrowLeft: () => step(e, [-1, 0]), ArrowRight: () => step(e, [1, 0]), ArrowUp: () => step(e, [0, 1]), ArrowDown: () => step(e, [0, -1]),
     Enter: enter, ' ': enter, Escape: () => tools.end(), Delete: () => tools.chosen && tools.remove(tools.chosen), Backspace: () => tools.chosen && tools.remove(tools.chosen),
-    '+': () => view.zoom(1.25), '=': () => view.zoom(1.25), '-': () => view.zoom(0.8), 0: show, a: () => asking.accept(), m: () => asking.place(), r: () => asking.reject(), q: () => asking.next(), PageUp: () => goLevel(sheet.k + 1), PageDown: () => goLevel(sheet.k - 1),
+    '+': () => view.zoom(1.25), '=': () => view.zoom(1.25), '-': () => view.zoom(0.8), 0: show, a: () => asking.accept(), m: () => asking.place(), r: () => asking.reject(), q: () => asking.next(), c: check, PageUp: () => goLevel(sheet.k + 1), PageDown: () => goLevel(sheet.k - 1),
   }[name] ?? (KEYS[name] && (() => pick(KEYS[name])));
   if (!done) {
     if (/^[1-9.,]$/.test(name) && takesTyped(tools)) byId('length').focus(); // what is typed goes there
@@ -148,8 +167,7 @@ function key(e) {
 }
 
 function pick(name) {
-  tools.choose(name);
-  say(HINTS[name]);
+  say(tools.choose(name) + HINTS[name]);
   changed();
 }
 
@@ -186,7 +204,7 @@ async function start() {
   document.addEventListener('keydown', key);
   for (const button of document.querySelectorAll('[data-tool]')) button.onclick = () => pick(button.dataset.tool);
   const clicks = {
-    end: () => tools.end(), add: addLevel, 'step-back': () => turn('undo'), 'step-forth': () => turn('redo'), whole: show, save: () => save(),
+    end: () => tools.end(), add: addLevel, 'step-back': () => turn('undo'), 'step-forth': () => turn('redo'), whole: show, save: () => save(), check,
     closer: () => { view.zoom(1.25); changed(); }, farther: () => { view.zoom(0.8); changed(); },
   };
   for (const [id, done] of Object.entries(clicks)) byId(id).onclick = done;

@@ -56,7 +56,7 @@ function chosenRows({ tree, level, sheet: { k }, chosen }) {
   if (!chosen) return [];
   const { kind, of } = chosen;
   if (kind === 'obstacle' || kind === 'connector' || of) return sides(outlineOf(tree, k, of ?? chosen));
-  return [{ wall: level.walls[chosen.k], end: level.walls[chosen.k], door: level.doors?.[chosen.k]?.line }[kind]].filter(Boolean);
+  return [{ wall: level.walls[chosen.k], end: level.walls[chosen.k], door: level.doors?.[chosen.k]?.line, window: level.windows?.[chosen.k] }[kind]].filter(Boolean);
 }
 
 // The length of what is drawn or moved, or the size of a rectangle: [text, position].

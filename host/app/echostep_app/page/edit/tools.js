@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The tools: what a press, a move and a click on the sheet do. In: positions in metres. Out: changes of the sheet. Owns the held element, the draft and the selection.
 
-import { cutDoor, distance, ends, fillDoor, foot, hit, moveDoor, moveJoints, moveWall, onGrid, round, same, scaled, snap } from './geometry.js';
+import { asDoor, asWindow, cutDoor, distance, ends, fillDoor, foot, hit, moveDoor, moveJoints, moveWall, onGrid, round, same, scaled, snap } from './geometry.js';
 import { earthClick } from './earth.js';
 import { OUTLINES, endOutline, outlineClick, rectangle, startClick } from './outline.js';
 import { questionAt } from './questions.js';
@@ -23,10 +23,13 @@ export class Tools {
   get picture() { return this.live?.picture ?? this.sheet.picture; }
   get drags() { return this.name === 'select' || this.name === 'origin'; }
 
+  // Returns what is given up thereby, in words.
   choose(name) {
+    const given = this.chain && this.name !== 'wall' ? `${WORDS.givenUp(this.name)}. ` : '';
     this.stop();
     this.name = name;
     this.chosen = null;
+    return given;
   }
 
   // End what is drawn: an outline is closed where it has enough corners.
@@ -94,9 +97,10 @@ export class Tools {
     if (isShape(found)) { const tree = movedShape(sheet.tree, sheet.k, found, by); return tree && { tree, by }; }
     if (kind === 'room') { const at = add(base.rooms[k].at); return { level: { ...base, rooms: base.rooms.with(k, { ...base.rooms[k], at }) }, by }; }
     if (kind === 'wall') return { level: moveWall(base, k, by), by };
-    if (kind === 'door') {
-      const centre = ({ line: [x0, y0, x1, y1] }) => [(x0 + x1) / 2, (y0 + y1) / 2], from = centre(base.doors[k]), level = moveDoor(base, k, add(from), exact);
-      return level && { level, by: apart(from, centre(level.doors.at(-1))) };
+    if (kind === 'door' || kind === 'window') {
+      const here = kind === 'door' ? base : asDoor(base, k), at = kind === 'door' ? k : here.doors.length - 1;
+      const centre = ({ line: [x0, y0, x1, y1] }) => [(x0 + x1) / 2, (y0 + y1) / 2], from = centre(here.doors[at]), level = moveDoor(here, at, add(from), exact);
+      return level && { level: kind === 'door' ? level : asWindow(level), by: apart(from, centre(level.doors.at(-1))) };
     }
     const other = ends(base.walls[k]).find((e) => !same(e, found.at)), walls = base.walls.filter((w) => !ends(w).some((e) => same(e, found.at)));
     const to = exact ? add(found.at) : snap(add(found.at), { walls, from: other, reach: this.reach }).at;
@@ -133,7 +137,8 @@ export class Tools {
   }
 
   rechoose() {
-    if (this.chosen?.kind === 'door') this.chosen = { kind: 'door', k: this.sheet.level.doors.length - 1 };
+    const { kind } = this.chosen ?? {};
+    if (kind === 'door' || kind === 'window') this.chosen = { kind, k: this.sheet.level[`${kind}s`].length - 1 };
     else if (this.chosen?.kind === 'end') this.chosen = { kind: 'wall', k: this.chosen.k };
   }
 
@@ -162,12 +167,14 @@ export class Tools {
   start(p) { startClick(this, p); }
   earth(p) { earthClick(this, p); }
 
-  door(p) {
+  window(p) { this.door(p, WORDS.window, asWindow); }
+
+  door(p, words = WORDS.door, made = (level) => level) {
     const { sheet } = this, width = this.desk.doorWidth();
     const near = sheet.level.walls.map((w, k) => ({ k, ...foot(p, w) })).sort((a, b) => a.away - b.away)[0];
     if (!near || near.away > 1.5 * this.reach) { this.desk.say(WORDS.noWall); return; }
     const cut = cutDoor(sheet.level, near.k, p, width);
-    if (cut) sheet.setLevel(cut, WORDS.door(width));
+    if (cut) sheet.setLevel(made(cut), words(width));
     else this.desk.say(WORDS.short(width));
   }
 
@@ -181,6 +188,7 @@ export class Tools {
     const words = WORDS.deleted(found.kind === 'end' ? 'wall' : kindOf(sheet.tree, found.of ?? found));
     if (isShape(found)) sheet.change(removedShape(sheet.tree, sheet.k, found), words);
     else if (found.kind === 'door') sheet.setLevel(fillDoor(level, found.k).level, words);
+    else if (found.kind === 'window') sheet.setLevel(fillDoor(asDoor(level, found.k), (level.doors ?? []).length).level, words);
     else if (found.kind === 'room') sheet.setLevel({ ...level, rooms: level.rooms.toSpliced(found.k, 1) }, words);
     else sheet.setLevel({ ...level, walls: level.walls.toSpliced(found.k, 1) }, words);
     this.chosen = null;

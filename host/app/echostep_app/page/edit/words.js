@@ -8,14 +8,14 @@ const along = ([dx, dy]) => `${m(Math.hypot(dx, dy))}, ${deg(Math.atan2(dy, dx) 
 
 const percent = (share) => (Math.abs(share) < 5e-4 ? 'the same' : `${Math.abs(100 * share).toFixed(1)} % ${share > 0 ? 'longer' : 'shorter'}`);
 
-export const KINDS = { wall: 'wall', end: 'corner', door: 'door', room: 'name', corner: 'corner', start: 'start', obstacle: 'obstacle', stairs: 'stairs', lift: 'lift', ramp: 'ramp' };
+export const KINDS = { wall: 'wall', end: 'corner', door: 'door', window: 'window', room: 'name', corner: 'corner', start: 'start', obstacle: 'obstacle', stairs: 'stairs', lift: 'lift', ramp: 'ramp' };
 const SNAPPED = { end: 'to a corner', wall: 'to a wall', 'right angle': 'at a right angle', grid: 'to the 5 cm grid', typed: 'as typed' };
 const capital = (text) => text[0].toUpperCase() + text.slice(1);
 
 const corners = (kind) => `Click the corners of the ${kind}, the first one last, or drag a rectangle`;
 
 export const HINTS = {
-  select: 'Drag walls, corners, doors, names, outlines and the start', wall: 'Click from corner to corner, or drag; End ends a wall. Two fingers or the right button move the sheet', door: 'Click on a wall',
+  select: 'Drag walls, corners, doors, windows, names, outlines and the start', wall: 'Click from corner to corner, or drag; End ends a wall. Two fingers or the right button move the sheet', door: 'Click on a wall', window: 'Click on a wall: glass is no way',
   erase: 'Click on an element to delete it', room: 'Click into a room', obstacle: corners('obstacle'), stairs: corners('stairs'), lift: corners('lift'), ramp: corners('ramp'),
   start: 'Click where walks begin, then where the wearer looks; or drag', scale: 'Click two points whose distance you know', origin: 'Drag the picture',
   earth: 'Click a point that you find on a map too, such as a corner of the building; then a second one far from it',
@@ -24,7 +24,7 @@ export const HINTS = {
 export const WORDS = {
   // what an edit did
   wall: (from, to, kind) => `Wall ${along([to[0] - from[0], to[1] - from[1]])}, ${SNAPPED[kind]}`,
-  door: (width) => `Door ${m(width)}`,
+  door: (width) => `Door ${m(width)}`, window: (width) => `Window ${m(width)}`,
   room: (name) => `Room ${name}`,
   outline: (kind, [width, height]) => `${capital(KINDS[kind])} ${m(width)} by ${m(height)}`,
   connector: (kind, levels) => `${capital(KINDS[kind])}: ${levels.join(', ')}`,
@@ -40,6 +40,7 @@ export const WORDS = {
   undone: (words) => `Undone: ${words}`,
   redone: (words) => `Again: ${words}`,
   saved: (name) => `Saved ${name}`,
+  finding: (k, count, text) => `${k} of ${count} findings: ${text}`, nothingWrong: 'Nothing wrong',
   // what is under way
   wallFrom: (place, kind) => `Wall from ${at(place)}, ${SNAPPED[kind]}`,
   corner: (count, place) => `Corner ${count} at ${at(place)}`,
@@ -59,7 +60,7 @@ export const WORDS = {
   size: (width, height) => `${width.toFixed(2)} × ${m(height)}`,
   // why nothing changed
   nothing: 'Nothing here', unchanged: 'Nothing changed: click. Two fingers or the right button move the sheet',
-  noWall: 'No wall here: a door is cut into a wall', short: (width) => `This wall is shorter than ${m(width)}`,
+  noWall: 'No wall here: doors and windows are cut into a wall', short: (width) => `This wall is shorter than ${m(width)}`,
   noRoomForDoor: 'No wall here that is long enough: click on a wall',
   noOutline: 'An outline has three corners or more: nothing drawn', givenUp: (kind) => `No ${KINDS[kind]} drawn`,
   oneLevel: (kind) => `No ${KINDS[kind]} drawn: there is one level. Add the other one first (+ Level)`,

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The legend: what each sign on the map means, the keys, the choice of the language; a dialog that a button or the keys L and ? open, on the wearer's and the commander's page.
+// The legend: what each sign on the map means, the keys, the choice of language and unit; a dialog that a button or the keys L and ? open, on the wearer's and the commander's page.
 
 import { localise, startLanguage, tr } from './language.js';
+import { chooseUnit, chosenUnit } from './tools/units.js';
 
 const line = (d, colour = 'wall', width = 1.5, more = '') => `<path d="${d}" fill="none" stroke="var(--${colour})" stroke-width="${width}" ${more}/>`;
 const shape = (d, colour, fill = colour) => `<path d="${d}" fill="${fill === 'none' ? 'none' : `var(--${fill})`}" stroke="var(--${colour})" stroke-width="2"/>`;
@@ -47,7 +48,7 @@ export const LIVE = [
 ];
 const MOVES = { 'arrow keys': 'move the map', '+ −': 'zoom', '[ ]': 'rotate', N: 'north up', W: 'the whole floor', Space: 'hold or play the past', 'L ?': 'this', Escape: 'cancel, close' };
 export const LIVE_KEYS = { ...MOVES, F: 'follow', H: 'I am here: a cross', G: 'go to: a cross', D: 'measure a distance', Enter: 'take the cross', ', .': 'turn the heading', C: 'charts', T: 'more' };
-export const COMMAND_KEYS = { ...MOVES, M: 'mark the middle', P: 'crews' };
+export const COMMAND_KEYS = { ...MOVES, M: 'mark the middle', P: 'crews', V: 'all storeys' };
 export const COMMAND = [
   ['The building', BUILDING],
   ['Wearers', [
@@ -59,18 +60,21 @@ export const COMMAND = [
   ['Marks', MARKS],
 ];
 
-// A dialog with these groups of [picture, words] and the keys; returns what opens it, at the keys or at its beginning.
-export function startLegend(button, groups, keys) {
+// A dialog with these groups of [picture, words] and the keys; `onUnit()`: another one is chosen. Returns what opens it, at the keys or at its beginning.
+export function startLegend(button, groups, keys, onUnit) {
   const dialog = document.createElement('dialog');
   dialog.id = 'legend';
   dialog.setAttribute('aria-label', tr('Legend'));
   const rows = (entries) => entries.map(([picture, words]) => `<li><svg viewBox="-16 -12 32 24" aria-hidden="true">${picture}</svg><span>${words}</span></li>`).join('');
   const names = Object.entries(keys).map(([key, words]) => `<li><kbd>${key}</kbd><span>${words}</span></li>`).join('');
-  dialog.innerHTML = `<form method="dialog"><h2>Legend</h2><label for="language" class="unseen">Language</label><select id="language"></select><button aria-label="Close">✕</button></form><div tabindex="0" role="group" aria-label="Signs">${groups.map(([title, entries]) => `<h3>${title}</h3><ul>${rows(entries)}</ul>`).join('')}<h3 id="keys-title">Keys on the map</h3><ul>${names}</ul></div>`;
+  dialog.innerHTML = `<form method="dialog"><h2>Legend</h2><label for="language" class="unseen">Language</label><select id="language"></select><label for="unit" class="unseen">Lengths in</label><select id="unit"><option value="m">metres</option><option value="ft">feet</option></select><button aria-label="Close">✕</button></form><div tabindex="0" role="group" aria-label="Signs">${groups.map(([title, entries]) => `<h3>${title}</h3><ul>${rows(entries)}</ul>`).join('')}<h3 id="keys-title">Keys on the map</h3><ul>${names}</ul></div>`;
   dialog.onclick = ({ target }) => { if (target === dialog) dialog.close(); };  // beside it
   localise(dialog);
   document.body.append(dialog);
   startLanguage(document.getElementById('language'));
+  const unit = document.getElementById('unit');
+  unit.value = chosenUnit();
+  unit.onchange = () => { chooseUnit(unit.value); onUnit(); };
   const open = (atKeys) => {
     dialog.showModal();
     document.getElementById(atKeys ? 'keys-title' : 'legend').scrollIntoView();

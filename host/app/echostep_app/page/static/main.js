@@ -22,7 +22,7 @@ import { Layers } from './tools/layers.js';
 import { Measure } from './tools/measure.js';
 import { titled } from './tools/titles.js';
 import { Tools } from './tools/tools.js';
-import { inUnits } from './tools/units.js';
+import { inUnits, showScale } from './tools/units.js';
 import { startTheme } from './theme.js';
 import { View } from './view.js';
 import { localise, missing, tr } from './language.js';
@@ -47,7 +47,7 @@ const link = new Link({
 });
 const speech = new Speech($('speech'), $('sentence'), $('invitation'), $('unspoken'));
 const orders = new Orders((kind, fields) => link.send(kind, fields), (text) => speech.unsent(text));
-const showLegend = startLegend($('legend-button'), LIVE, LIVE_KEYS);
+const showLegend = startLegend($('legend-button'), LIVE, LIVE_KEYS, redraw);
 const replay = new Replay((kind, fields) => link.send(kind, fields));
 const points = new Points((kind, fields) => link.send(kind, fields));
 const drops = new Drops(hint), charts = new Charts($('charts'), () => painter.colour, seek);
@@ -209,7 +209,7 @@ function draw() {
   if (!dirty && !moved) return;
   if (moved) {
     planView.draw(view);
-    panel.scale(view);
+    showScale(view);
     drawnStamp = view.stamp;
   }
   if (mode && mode !== 'measure' && !$('cross').hidden) aim(view.toMap(view.width / 2, view.height / 2), mode === 'here' ? turned : null);

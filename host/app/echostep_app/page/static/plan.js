@@ -74,7 +74,7 @@ function setShown(part, shown, group) {
 }
 
 // Rows x0, y0, x1, y1 by kind; the layout is in page/protocol.py.
-function linesOf(bytes) {
+export function linesOf(bytes) {
   const length = new DataView(bytes).getUint32(0, true), counts = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length)));
   let offset = 4 + length;
   return Object.fromEntries(Object.entries(counts).map(([kind, count]) => {
@@ -99,7 +99,7 @@ function tilesOf(lines, kind) {
   return [...tiles.values()].map(({ box, parts }) => ({ kind, box, parts: [...parts.values()] }));
 }
 
-function boxOf(lines, names) {
+export function boxOf(lines, names) {
   const box = [Infinity, Infinity, -Infinity, -Infinity];
   const add = (x, y) => { box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y); box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y); };
   for (const rows of Object.values(lines)) for (let k = 0; k < rows.length; k += 2) add(rows[k], rows[k + 1]);

@@ -22,7 +22,7 @@ from echostep_app.ports.tap import Tap
 from echostep_app.session.acceptance.protocol import Protocol, Visit
 
 if TYPE_CHECKING:
-    from echostep_app.page.live import LivePage
+    from echostep_app.page.mailbox import Mailbox
 
 HELP = (
     "Enter: at the point that is asked for; its name and Enter: at another one; u and Enter: that was no tap; Ctrl-C ends. "
@@ -51,7 +51,7 @@ class Guide:
         self._tapped: list[int] = []  # numbers of the visits
         self._ended_s: float | None = None
         self._begun = False
-        self._page: LivePage | None = None
+        self._page: Mailbox | None = None
 
     def _read(self) -> None:
         """Take the lines up to the end of the input, which is also that of a terminal that was closed."""
@@ -60,10 +60,10 @@ class Guide:
                 self._take(now_ns(), line.strip())
         self._say("No more lines can be typed: what was tapped counts; Ctrl-C ends.")
 
-    def attach(self, page: LivePage) -> None:
+    def attach(self, page: Mailbox) -> None:
         """Show the points on a page, whose buttons do as the keys."""
         self._page = page
-        page.take_presses(self.press)
+        page.on_press = self.press
 
     @property
     def _next(self) -> int:

@@ -121,7 +121,7 @@ def _play(drop: Drop, files: DroppedFiles, server: PageServer) -> Drop:
     with LivePage(drop.tracker, drop.title, server, replay=True) as page:
         try:
             estimates = _track(drop, files, page)
-            page.end(summary_words(estimates, None))
+            page.mailbox.end(summary_words(estimates, None))
         except EchostepError as error:
             page.fail(words_of(error))
         return _next(files, server)

@@ -55,7 +55,7 @@ from echostep_app.session.session import Session
 from echostep_app.xsens.startup import MtxStart
 
 if TYPE_CHECKING:
-    from echostep_app.page.live import LivePage
+    from echostep_app.page.mailbox import Mailbox
     from echostep_app.team.endpoint import Outlet
 
 BAUD = dict.fromkeys((BOARD, MTX, FOOT, GATEWAY, LINES), 115200)
@@ -66,7 +66,7 @@ class Guide(Protocol):
 
     metadata: dict[str, str]
 
-    def attach(self, page: LivePage) -> None:
+    def attach(self, page: Mailbox) -> None:
         """Show the points on a page, too."""
 
     def pop(self) -> list[bytes]:
@@ -116,7 +116,7 @@ def _live(
             session.message_sources.append((POINT, guide.pop))
         with session:
             if guide is not None and session.page is not None:
-                guide.attach(session.page)
+                guide.attach(session.page.mailbox)
             with start_recording(folder / "walk.mcap", metadata, ports.keep, ports.split) as recorder:
                 ended = guide.is_over if guide is not None else is_asked
                 chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session, ended, lines)

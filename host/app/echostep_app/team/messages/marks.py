@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Shared state of the commanders: marks on the plan, acknowledgements of alarms, errands, orders, crews. The broker retains it: all have the same.
+"""Shared state of the commanders: marks on the plan, acknowledgements of alarms, errands, orders, crews, notes. The broker retains it for all.
 
 In: retained messages from untrusted senders, on `echostep-table/mark/<id>`, `echostep-table/ack/<team>/<wearer>/<run>-<number>` and
 `echostep-table/errand/<team>/<wearer>/<run>`; an empty one removes. Out: `Mark`s, `Ack`s and `Errand`s, and the messages for new ones. Owns those
@@ -23,11 +23,13 @@ from echostep.ports.people.payloads import Level
 from echostep_app.team.messages.crews import MOST_CREWS, Crew
 from echostep_app.team.messages.orders import (
     EVERYBODY,
+    MOST_NOTES,
     MOST_ORDERS,
     MOST_RECEIPTS,
     Order,
     Receipt,
     ReceiptKey,
+    note_message,
     order_key,
     order_message,
     receipt_message,
@@ -132,7 +134,7 @@ def is_shared(topic: str | None) -> bool:
 
 
 class MarkBoard:
-    """`receive` takes messages; `marks`, `acks`, `errands`, `orders`, `receipts` and `crews` are what they amount to.
+    """`receive` takes messages; `marks`, `acks`, `errands`, `orders`, `receipts`, `crews` and `log` are what they amount to.
 
     `removed`: marks that were there; `answers`: messages for the broker, which keeps older ones.
     """
@@ -158,6 +160,9 @@ class MarkBoard:
         self.receipts: Kept[ReceiptKey, Receipt] = Kept(
             Receipt, "receipt", MOST_RECEIPTS, receipt_message, lambda r: [r.by]
         )
+        self.log: Kept[str, Order] = Kept(
+            Order, "note", MOST_NOTES, note_message, lambda o: [o.by, o.text], earliest=True
+        )
         self.answers: deque[tuple[str, bytes]] = deque(maxlen=MOST_ANSWERS)
 
     def copy(self) -> MarkBoard:
@@ -170,7 +175,7 @@ class MarkBoard:
 
     @property
     def _kept(self) -> tuple[Kept[Any, Any], ...]:
-        return self.acks, self.errands, self.orders, self.receipts, self.crews
+        return self.acks, self.errands, self.orders, self.receipts, self.crews, self.log
 
     def order_to(self, kind: str, team: str, name: str) -> tuple[Order, bool] | None:
         """The order to everybody, or the note to one wearer, while it holds; and whether this wearer has understood it."""
@@ -204,6 +209,8 @@ class MarkBoard:
                 self.receipts.receive((kind, *_names(team, name)), (topic, payload), self.answers)
             case ["crew", identity]:
                 self.crews.receive(identity, (topic, payload), self.answers)
+            case ["log", identity] if payload and len(identity) == 8:  # what was written stays
+                self.log.receive(identity, (topic, payload), self.answers)
             case _:
                 raise BadReportError("unknown topic")
 

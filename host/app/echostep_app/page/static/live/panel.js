@@ -3,7 +3,7 @@
 
 import { drawnText } from './drawing.js';
 import { marksText } from '../marks.js';
-import { inUnits, scaleBar } from '../tools/units.js';
+import { inUnits } from '../tools/units.js';
 import { tr } from '../language.js';
 
 const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕', ended: '■' };
@@ -149,13 +149,6 @@ export class Panel {
       button.setAttribute('aria-label', `${button.firstChild.textContent}, ${tr(`${Math.round(100 * share)} % likely`)}`);
       button.lastChild.style.width = `${100 * share}%`;
     });
-  }
-
-  scale(view) {
-    const { px, text } = scaleBar(view);
-    $('bar').style.width = `${px}px`;
-    $('bar-text').textContent = text;
-    $('needle').style.transform = `rotate(${-view.tilt}rad)`;
   }
 
   // Text for screen readers: at once when the status has changed, else not more often than every SPOKEN_MS.

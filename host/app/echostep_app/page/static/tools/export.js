@@ -1,32 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The view as a picture (PNG) and as GeoJSON, to be saved.
-
-const WALL_PX = 1.6;
-
-// What the map shows: walls, canvas, names, on the ground's colour.
-export async function picture(view, wallsGroup, canvas, roomsGroup) {
-  const sharp = window.devicePixelRatio || 1, sheet = new OffscreenCanvas(canvas.width, canvas.height), pen = sheet.getContext('2d');
-  const style = getComputedStyle(document.documentElement), colour = (name) => style.getPropertyValue(`--${name}`).trim();
-  pen.fillStyle = colour('ground');
-  pen.fillRect(0, 0, sheet.width, sheet.height);
-  pen.setTransform(...view.matrix().map((value) => value * sharp));
-  Object.assign(pen, { strokeStyle: colour('wall'), lineWidth: WALL_PX / view.scale });
-  for (const path of wallsGroup.children) {
-    pen.setLineDash(path.classList.contains('unknown') ? [3 / view.scale, 3 / view.scale] : []);
-    pen.stroke(new Path2D(path.getAttribute('d')));
-  }
-  pen.setTransform(1, 0, 0, 1, 0, 0);
-  pen.drawImage(canvas, 0, 0);
-  pen.setTransform(sharp, 0, 0, sharp, 0, 0);
-  Object.assign(pen, { font: '13px system-ui, sans-serif', textAlign: 'center', textBaseline: 'middle', lineWidth: 4, strokeStyle: colour('ground'), fillStyle: colour('room') });
-  for (const text of roomsGroup.children) {
-    if (text.getAttribute('visibility') !== 'visible' || roomsGroup.hasAttribute('hidden')) continue;
-    const at = [Number(text.getAttribute('x')), Number(text.getAttribute('y'))];
-    pen.strokeText(text.textContent, ...at);
-    pen.fillText(text.textContent, ...at);
-  }
-  return sheet.convertToBlob({ type: 'image/png' });
-}
+// The shown floor as GeoJSON, to be saved.
 
 // Walls, rooms, track and position of the shown floor [RFC 7946]; in longitude and latitude on a plan with a georeference, else in metres of the plan.
 export function geojson({ lines, level, rooms, trail, estimate, globe }) {

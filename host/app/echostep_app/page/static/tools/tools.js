@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: MIT
-// The dialog "More": colours, layers, charts, measuring, link, picture, GeoJSON, units, full screen; what happened on the walk, and what the page has said.
+// The dialog "More": colours, layers, charts, measuring, link, GeoJSON, full screen; what happened on the walk, and what the page has said.
 
 import { recall, remember } from '../storage.js';
-import { geojson, picture, save } from './export.js';
+import { geojson, save } from './export.js';
 import { linkOf } from './hash.js';
 import { Heard } from './heard.js';
 import { LAYERS } from './layers.js';
-import { chooseUnit, chosenUnit } from './units.js';
 import { localise, minutes, tr } from '../language.js';
 
 const $ = (id) => document.getElementById(id);
-const BUTTONS = { measure: 'Measure', charts: 'Charts', link: 'Copy a link', picture: 'Picture (PNG)', geojson: 'GeoJSON', full: 'Full screen', files: 'Open files…' };
+const BUTTONS = { measure: 'Measure', charts: 'Charts', link: 'Copy a link', geojson: 'GeoJSON', full: 'Full screen', files: 'Open files…' };
 const HTML = `<form method="dialog"><h2>More</h2><button aria-label="Close">✕</button></form>
 <div tabindex="0" role="group" aria-label="Tools">
   <p class="row">${Object.entries(BUTTONS).map(([name, text]) => `<button id="tool-${name}" type="button">${text}</button>`).join('')}
-    <label for="unit" class="unseen">Lengths in</label><select id="unit"><option value="m">metres</option><option value="ft">feet</option></select>
     <label for="theme" class="unseen">Colours</label><select id="theme"><option value="auto">auto</option><option value="bright">bright</option><option value="dark">dark</option><option value="contrast">high contrast</option></select></p>
   <h3 id="layers-title">Layers</h3>
   <ul aria-labelledby="layers-title">${Object.entries(LAYERS).map(([name, text]) => `<li><label><input type="checkbox" id="layer-${name}"> ${text}</label></li>`).join('')}</ul>
@@ -41,12 +39,10 @@ export class Tools {
   }
 
   wire() {
-    const { page, dialog } = this, does = { measure: () => page.enter('measure'), charts: () => this.setCharts(!page.charts.on), link: () => this.link(), picture: () => this.picture(), geojson: () => this.geojson(), full: () => this.full(), files: () => $('drop-file').click() };
+    const { page, dialog } = this, does = { measure: () => page.enter('measure'), charts: () => this.setCharts(!page.charts.on), link: () => this.link(), geojson: () => this.geojson(), full: () => this.full(), files: () => $('drop-file').click() };
     for (const [name, act] of Object.entries(does)) $(`tool-${name}`).onclick = () => { dialog.close(); act(); };
     $('tools-button').onclick = () => this.open();
     $('tool-full').hidden = !document.documentElement.requestFullscreen;
-    $('unit').value = chosenUnit();
-    $('unit').onchange = () => { chooseUnit($('unit').value); page.changed(); };
   }
 
   wireLayers() {
@@ -79,11 +75,6 @@ export class Tools {
     const byHand = () => hint('The link is in the address bar.', 8000);
     if (!navigator.clipboard) return byHand();  // browsers give it to this computer and to https only
     navigator.clipboard.writeText(link).then(() => hint('The link to this view is copied.', 6000), byHand);
-  }
-
-  async picture() {
-    const { view } = this.page;
-    save(await picture(view, $('walls'), $('canvas'), $('rooms')), 'echostep.png');
   }
 
   geojson() {

@@ -6,6 +6,8 @@ import { recall, remember } from '../storage.js';
 const FOOT_M = 0.3048, INCH_CM = 2.54;  // [international yard and pound agreement, 1959]
 const LENGTH = /(-?\d+(?:\.\d+)?) (m|cm|metres?)(?![\w²])/g, PLACE = /x (-?\d+\.\d), y (-?\d+\.\d) m(?!\w)/g;
 
+const $ = (id) => document.getElementById(id);
+
 let isFeet = recall('unit') === 'ft';
 export const chosenUnit = () => (isFeet ? 'ft' : 'm');
 
@@ -24,10 +26,12 @@ export function inUnits(text) {
   });
 }
 
-// The longest round length of at most 90 px: its pixels and its words.
-export function scaleBar(view) {
+// The needle, and a bar of the longest round length of at most 90 px.
+export function showScale(view) {
   const unit_m = isFeet ? FOOT_M : 1, longest = 90 / view.scale / unit_m, ten = 10 ** Math.floor(Math.log10(longest));
   const length = [5, 2, 1].find((k) => k * ten <= longest) * ten, inches = Math.round(12 * length * 10) / 10;
   const text = isFeet ? (length < 1 ? `${inches} in` : `${length} ft`) : length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;
-  return { px: length * unit_m * view.scale, text };
+  $('bar').style.width = `${length * unit_m * view.scale}px`;
+  $('bar-text').textContent = text;
+  $('needle').style.transform = `rotate(${-view.tilt}rad)`;
 }
