@@ -73,8 +73,9 @@ class SourceList(NamedTuple):
 class Walls:
     """A plan's walls, and the tables of the tiles that a cloud has reached so far."""
 
-    def __init__(self, walls: Floats) -> None:
-        self._index = build_index(walls)
+    def __init__(self, walls: Floats, slant_rad: float = 0.0) -> None:
+        """`slant_rad`: greatest angle of a ray to a wall's normal for which the tables must hold; 0 serves `echo_sources`."""
+        self._index = build_index(walls, slant_rad)
 
     @property
     def index(self) -> WallIndex:
@@ -119,13 +120,13 @@ def _tabulate(tiles: Int32s, index: WallIndex) -> WallIndex:
     count = index.tabulated
     faces, points, numbers = index.faces, index.points, tiles.astype(np.int64)
     for k in range(len(tiles)):
-        more_faces, more_points = tile_sources(numbers[k], index)
+        more_faces, more_points = tile_sources(numbers[k], index, index.slant)
         faces = _appended(faces, count + k, more_faces)
         points = _appended(points, count + k, more_points)
     for k in range(len(tiles)):
         index.tile_number[tiles[k]] = count + k + 1
     return WallIndex(
-        index.x0_m, index.y0_m, index.columns, index.rows, index.walls, index.start, index.ids, index.tile_number,
+        index.x0_m, index.y0_m, index.columns, index.rows, index.walls, index.start, index.ids, index.slant, index.tile_number,
         count + len(tiles), faces, points,
     )  # fmt: skip
 
@@ -241,7 +242,7 @@ def _sources_of_missing_tile(
     receiver: Receiver, tile: int, u: int, index: WallIndex, limits: Limits, sources: SourceList
 ) -> int:
     """The sources in a tile that is not tabulated: its tables are made for this call alone."""
-    faces, points = tile_sources(tile, index)
+    faces, points = tile_sources(tile, index, 0.0)
     return _sources_of_unit(receiver, index.walls, faces, points, u, limits, sources)
 
 

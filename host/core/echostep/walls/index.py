@@ -51,7 +51,8 @@ class WallIndex(NamedTuple):
 
     Tile t is touched by walls[ids[start[t] : start[t + 1]]]. `tile_number[t]` is k + 1 for the k-th tabulated tile, else 0; this index has the first
     `tabulated` of them. Rows of `faces` (walls): start x, y of the wall, its unit tangent x, y, its length. Rows of `points` (ends of walls): x, y,
-    kind, the sector in which they are of that kind, as unit vectors x, y of its sides, counter-clockwise, squared distance from the tile.
+    kind, the sector in which they are of that kind, as unit vectors x, y of its sides, counter-clockwise, squared distance from the tile. Both hold
+    for sound that leaves a wall at up to `slant` (tangent) from its normal.
     """
 
     x0_m: float
@@ -61,6 +62,7 @@ class WallIndex(NamedTuple):
     walls: Floats
     start: Int32s
     ids: Int32s
+    slant: float
     tile_number: Int32s
     tabulated: int
     faces: SourceTable
@@ -84,7 +86,7 @@ def no_sources(columns: int) -> SourceTable:
     return SourceTable(none, none, none[:0], np.zeros((0, columns)), none, none[:0])
 
 
-def build_index(walls: Floats) -> WallIndex:
+def build_index(walls: Floats, slant_rad: float = 0.0) -> WallIndex:
     """Index of walls (n, 4), no tile tabulated yet; raises EchostepError for a plan too wide for its tiles.
 
     Walls without length or with a coordinate that is not finite are left out.
@@ -95,9 +97,9 @@ def build_index(walls: Floats) -> WallIndex:
     valid = np.isfinite(length) & (length >= SHORTEST_M)
     walls = walls if valid.all() else walls[valid]
     tables = (no_sources(FACE), no_sources(POINT))
-    none = np.zeros(1, np.int32)
+    none, slant = np.zeros(1, np.int32), math.tan(slant_rad)
     if not len(walls):
-        return WallIndex(0.0, 0.0, 0, 0, walls, none, none[:0], none[:0], 0, *tables)
+        return WallIndex(0.0, 0.0, 0, 0, walls, none, none[:0], slant, none[:0], 0, *tables)
     ends = walls.reshape(-1, 2)
     low, high = ends.min(0) - EAR_REACH_M, ends.max(0) + EAR_REACH_M
     size = np.ceil((high - low) / TILE_M) + 1
@@ -106,7 +108,7 @@ def build_index(walls: Floats) -> WallIndex:
     columns, rows = int(size[0]), int(size[1])
     start, ids = _walls_by_tile(walls, float(low[0]), float(low[1]), columns, rows)
     tile_number = np.zeros(columns * rows, np.int32)
-    return WallIndex(float(low[0]), float(low[1]), columns, rows, walls, start, ids, tile_number, 0, *tables)
+    return WallIndex(float(low[0]), float(low[1]), columns, rows, walls, start, ids, slant, tile_number, 0, *tables)
 
 
 NO_WALLS = build_index(np.zeros((0, 4)))

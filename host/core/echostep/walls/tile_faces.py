@@ -39,30 +39,32 @@ class Strip(NamedTuple):
 
 
 @part
-def tile_faces(corners: Floats, near: Int32s, walls: Floats) -> SourceTable:
+def tile_faces(corners: Floats, near: Int32s, walls: Floats, slant: float) -> SourceTable:
     """The walls of `near` that can answer a tile, unless other walls cover them, with their screens."""
     faces, starts = np.empty((len(near), FACE)), np.zeros(len(near) + 1, np.int32)
     centre, spread, distance = np.empty(len(near)), np.empty(len(near)), np.empty(len(near))
     screens, used, count = np.empty(256, np.int32), 0, 0
-    spans = np.empty((len(near), 2))
+    spans = np.empty((len(near), 4))
     for w in near:
         x, y, tx, ty, length = frame(walls, w)
         s0, s1, low, high = _extent(corners, x, y, tx, ty)
-        s0, s1 = max(s0, 0.0), min(s1, length)
+        far = max(high, -low)
+        slack = min(far, EAR_REACH_M) * slant
+        s0, s1 = max(s0 - slack, -slack), min(s1 + slack, length + slack)
         nearest = max(low, -high, 0.0)
         if s0 > s1 or nearest > EAR_REACH_M:
             continue
         if len(screens) < used + len(near):
             screens = np.concatenate((screens, screens, near))
         strip = Strip(x, y, tx, ty, s0, s1, low, high)
-        more, covering = _face_screens(w, near, walls, strip, screens[used:], spans)
-        if covered(spans[:covering], s0, s1):
+        more, covering = _face_screens(w, near, walls, strip, slant, screens[used:], spans)
+        if covered(spans[:covering], s0, s1, 2.0 * slack):
             continue
         used += more
         faces[count, 0], faces[count, 1], faces[count, 2], faces[count, 3], faces[count, 4] = x, y, tx, ty, length
         distance[count] = nearest
         centre[count] = math.atan2(-tx, ty) if low > 0.0 else math.atan2(tx, -ty)
-        spread[count] = 0.0 if nearest > 0.0 else math.pi
+        spread[count] = math.atan(slant) if nearest > 0.0 else math.pi
         count += 1
         starts[count] = used
     bearings, order = by_bearing(centre[:count], spread[:count], distance)
@@ -71,7 +73,9 @@ def tile_faces(corners: Floats, near: Int32s, walls: Floats) -> SourceTable:
 
 
 @lean_part
-def _face_screens(w: int, near: Int32s, walls: Floats, strip: Strip, screens: Int32s, spans: Floats) -> tuple[int, int]:
+def _face_screens(
+    w: int, near: Int32s, walls: Floats, strip: Strip, slant: float, screens: Int32s, spans: Floats
+) -> tuple[int, int]:
     """Walls that may stand between wall w and a place in the tile, into `screens`, and spans covered by those between all of both, into `spans`.
 
     Returns the number of each.
@@ -85,13 +89,13 @@ def _face_screens(w: int, near: Int32s, walls: Floats, strip: Strip, screens: In
         a, b, ha, hb = _clip(walls, u, x, y, tx, ty, s0, s1)
         if a > b or max(ha, hb) < min(low, 0.0) or min(ha, hb) > max(high, 0.0):
             continue
-        if max(abs(ha), abs(hb)) < SLACK_M or b - a < SLACK_M * SLACK_M:
+        if max(abs(ha), abs(hb)) < SLACK_M or (slant == 0.0 and b - a < SLACK_M * SLACK_M):
             continue  # on the same line; edge on
         screens[count] = u
         count += 1
         side = 1.0 if low > 0.0 else -1.0
         if nearest > JOIN_M and min(side * ha, side * hb) > JOIN_M and max(side * ha, side * hb) < nearest:
-            spans[covering, 0], spans[covering, 1] = a, b
+            spans[covering, 0], spans[covering, 1], spans[covering, 2], spans[covering, 3] = a, b, ha, hb
             covering += 1
     return count, covering
 

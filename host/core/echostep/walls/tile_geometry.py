@@ -26,17 +26,18 @@ def frame(walls: Floats, w: int) -> tuple[float, float, float, float, float]:
 
 
 @lean_part
-def covered(spans: Floats, low: float, high: float) -> bool:
-    """Whether spans (from, to) leave no gap between low and high."""
-    reach = low
+def covered(spans: Floats, low: float, high: float, overlap: float) -> bool:
+    """Whether spans (from, to, h there, h there) leave no gap between low and high; two that do not join must overlap by `overlap`."""
+    reach, height = low, np.nan
     while reach < high:
-        best = reach
+        best, best_height = reach, height
         for k in range(len(spans)):
-            if spans[k, 0] <= reach:
-                best = max(best, spans[k, 1])
+            joined = spans[k, 0] <= reach and abs(spans[k, 2] - height) < SLACK_M
+            if (joined or spans[k, 0] <= max(reach - overlap, low)) and spans[k, 1] > best:
+                best, best_height = spans[k, 1], spans[k, 3]
         if best == reach:
             return False
-        reach = best
+        reach, height = best, best_height
     return True
 
 

@@ -183,7 +183,7 @@ def _point_screens(
     wedge, narrow = _wedge_of_tile(x, y, mx, my, corners)
     x0, x1 = min(x, corners[0, 0]), max(x, corners[2, 0])
     y0, y1 = min(y, corners[0, 1]), max(y, corners[2, 1])
-    spans, covering, count = np.empty((len(near), 2)), 0, 0
+    spans, covering, count = np.empty((len(near), 4)), 0, 0
     for u in near:
         ax, ay, bx, by = walls[u, 0], walls[u, 1], walls[u, 2], walls[u, 3]
         if max(ax, bx) < x0 or min(ax, bx) > x1 or max(ay, by) < y0 or min(ay, by) > y1:
@@ -195,11 +195,11 @@ def _point_screens(
             if a > b:
                 continue
             if before:
-                spans[covering, 0], spans[covering, 1] = a, b
+                spans[covering, 0], spans[covering, 1], spans[covering, 2], spans[covering, 3] = a, b, 0.0, 0.0
                 covering += 1
         screens[count] = u
         count += 1
-    if narrow and covered(spans[:covering], wedge.low, wedge.high):
+    if narrow and covered(spans[:covering], wedge.low, wedge.high, 0.0):
         return -1, 0.0, 0.0
     return count, math.atan2(-my, -mx), math.atan(max(wedge.high, -wedge.low)) if narrow else math.pi
 

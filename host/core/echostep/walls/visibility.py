@@ -22,15 +22,15 @@ from echostep.walls.tile_points import tile_points
 
 
 @part
-def tile_sources(tile: int, index: WallIndex) -> tuple[SourceTable, SourceTable]:
-    """Faces and points that can be detected from a tile."""
+def tile_sources(tile: int, index: WallIndex, slant: float) -> tuple[SourceTable, SourceTable]:
+    """Faces and points that can be detected from a tile, for sound up to `slant` (tangent) off the normal of a wall."""
     corners = np.empty((4, 2))
     x, y = index.x0_m + tile % index.columns * TILE_M, index.y0_m + tile // index.columns * TILE_M
     for k in range(4):
         corners[k, 0] = x + (TILE_M + SLACK_M if k in (1, 2) else -SLACK_M)
         corners[k, 1] = y + (TILE_M + SLACK_M if k in (2, 3) else -SLACK_M)
     near = _walls_near(tile, index)
-    return tile_faces(corners, near, index.walls), tile_points(corners, near, index)
+    return tile_faces(corners, near, index.walls, slant), tile_points(corners, near, index)
 
 
 @part
