@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.walls.index import build_index
+from echostep.walls.echo_sources import Walls
 from echostep_studies.papers.girard2011 import Girard, GirardSettings, average, disc, merge, moved, similarity
 from echostep_studies.papers.girard2011_rays import lambda_ray_ranges
 from naive import walls as naive
@@ -42,7 +42,7 @@ def test_step_3_draws_uniformly_in_the_disc() -> None:
 def test_step_4_applies_every_vector_to_every_particle_and_walls_remove() -> None:
     x, y = np.array([1.0, 4.9]), np.array([1.5, 1.5])
     vectors = np.array([[0.0, 0.2], [0.3, 0.0]])
-    to_x, to_y, parent = moved(x, y, vectors, build_index(ROOM))
+    to_x, to_y, parent = moved(x, y, vectors, Walls(ROOM).near(x, y))
     assert parent.tolist() == [0, 0, 1]  # the last would have gone through the wall at x = 5
     assert to_x.tolist() == [1.0, 1.3, 4.9]
     assert to_y.tolist() == [1.7, 1.5, 1.7]
@@ -83,8 +83,10 @@ def test_equation_2() -> None:
 @given(st.floats(0.1, 4.9), st.floats(0.1, 2.9), st.floats(-math.pi, math.pi))
 @settings(max_examples=50)
 def test_equation_3_by_plain_rays(x: float, y: float, heading: float) -> None:
-    """The rays that walk through the tiles are the seven that stop at the first of all walls."""
-    found = lambda_ray_ranges(np.array([x]), np.array([y]), np.array([heading]), build_index(ROOM))[0]
+    """The reading from visible reflectors is that of seven rays which stop at the first wall."""
+    walls = Walls(ROOM, 0.5 * PRINTED.aperture_rad / PRINTED.rays)
+    at = np.array([x]), np.array([y])
+    found = lambda_ray_ranges(*at, np.array([heading]), walls.near(*at))[0]
     for ranger, axis in enumerate((0.5 * math.pi, -0.5 * math.pi)):
         twin = naive.cone_reading(x, y, heading + axis, ROOM, 7, PRINTED.aperture_rad, 6.0)
         nearly = naive.cone_reading(x, y, heading + axis, ROOM, 7, PRINTED.aperture_rad * (1 - 1e-9), 6.0)

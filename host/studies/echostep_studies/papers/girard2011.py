@@ -22,7 +22,8 @@ import numpy as np
 
 from echostep.arrays import Floats, Int32s, Ints
 from echostep.jit import kernel, part
-from echostep.walls.index import WallIndex, build_index, crosses_wall
+from echostep.walls.echo_sources import Walls
+from echostep.walls.index import WallIndex, crosses_wall
 from echostep_studies.papers.girard2011_rays import lambda_ray_ranges
 
 
@@ -51,7 +52,7 @@ class Girard:
         self.y_m: Floats = np.array([start_xy[1]])
         self.weight: Floats = np.ones(1)
         self.lost = 0
-        self._walls = None if walls is None else build_index(walls)
+        self._walls = None if walls is None else Walls(walls, 0.5 * settings.aperture_rad / settings.rays)
         self._rng = rng
 
     def step(
@@ -71,7 +72,7 @@ class Girard:
     def _propagate(self, vectors: Floats) -> tuple[Floats, Floats, Floats]:
         """Step 4: every vector applied to every particle; those that cross a wall are removed."""
         if self._walls is not None:
-            x, y, parent = moved(self.x_m, self.y_m, vectors, self._walls)
+            x, y, parent = moved(self.x_m, self.y_m, vectors, self._walls.near(self.x_m, self.y_m))
             if len(x):
                 return x, y, self.weight[parent]
             self.lost += 1
@@ -89,7 +90,7 @@ class Girard:
         if self._walls is None:
             return np.ones(len(x))
         heading = np.full(len(x), heading_rad)
-        modelled = lambda_ray_ranges(x, y, heading, self._walls, s.rays, s.aperture_rad, s.maximum_m)
+        modelled = lambda_ray_ranges(x, y, heading, self._walls.near(x, y), s.rays, s.aperture_rad, s.maximum_m)
         return similarity(modelled, measured, s.maximum_m)
 
 
