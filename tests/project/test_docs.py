@@ -12,6 +12,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import typer
 
 from board_runs import ROOT
 from command_line import echostep
@@ -294,6 +295,43 @@ def test_what_needs_hardware_can_be_typed_as_it_stands(page: Path) -> None:
                 assert f"`{option}`" in section, line
         else:
             assert program in PROGRAMS, line
+
+
+def spans(page: Path, program: str) -> list[str]:
+    """Lines of a program in sentences and tables, without the brackets of what may be left out."""
+    text = re.sub(r"```.*?```", "", page.read_text(), flags=re.S)
+    found = [" ".join(span.split()) for span in re.findall(r"`([^`]+)`", text)]
+    return [span for span in found if span.startswith(f"{program} ")]
+
+
+@pytest.mark.parametrize("page", [*sorted({*PAGES} - {*NOTEBOOK}), ROOT / "host/studies/README.md"], ids=name_of)
+def test_a_command_in_a_sentence_can_be_typed_as_it_stands(page: Path) -> None:
+    """As the command line takes it; the name of a command may stand alone."""
+    for span in spans(page, "echostep"):
+        line = re.sub(r"[][]| \.\.\.|\|svg", "", span.partition(" | ")[0])
+        _, *words = shlex.split(re.sub(r" [NM]\b", " 1", line.replace("COMMAND", "demo")))
+        command = typer.main.get_command(app)
+        while hasattr(command, "resolve_command") and words and not words[0].startswith("-"):
+            _, command, words = command.resolve_command(command.make_context("echostep", ["x"]), words)
+        if words and words != ["--help"]:
+            try:
+                command.make_context("echostep", words)
+            except typer._click.exceptions.ClickException as error:
+                pytest.fail(f"{span}: {error.format_message()}")
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "host/docs/notebooks/README.md"], ids=name_of)
+def test_an_install_line_names_what_there_is(page: Path) -> None:
+    """In sentences, tables and blocks: extras that exist, folders that exist."""
+    project = tomllib.loads((ROOT / "host/core/pyproject.toml").read_text())["project"]
+    in_blocks = re.findall(r"^(?:\S*/)?(pipx? install .*)$", "\n".join(blocks(page, "console")), flags=re.M)
+    for span in (*spans(page, "pip"), *spans(page, "pipx"), *in_blocks):
+        for word in shlex.split(span.partition("&&")[0], comments=True)[2:]:
+            path, _, extras = word.partition("[")
+            if path.startswith("."):
+                assert (ROOT / path / "pyproject.toml").exists(), span
+            elif path == "echostep" and extras:
+                assert set(extras.rstrip("]").split(",")) <= set(project["optional-dependencies"]), span
 
 
 def test_the_readme_says_what_it_is_before_its_commands() -> None:

@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from ezdxf.filemanagement import new
 
 import echostep
+from board_runs import ROOT
 from command_line import echostep as run
 from echostep.errors import EchostepError
 from echostep.localization import digest
@@ -75,13 +78,20 @@ def test_times_in_milliseconds_and_gaps_give_the_rate() -> None:
     assert rate_of(np.delete(t_s, np.s_[800:1000])) == pytest.approx(204.8, rel=1e-3)
 
 
-def test_one_command_is_short_for_both(walk: Imu, tmp_path: Path) -> None:
-    file, plan = tmp_path / "imu.csv", tmp_path / "plan.json"
-    write(file, walk)
-    hall(plan)
-    tracked = run("foot", file, "--plan", plan, "--start", "1,2,90", "--out", tmp_path / "found" / "track.csv")
+@pytest.mark.process
+def test_the_readmes_command_draws_a_walk_on_a_dxf(walk: Imu, tmp_path: Path) -> None:
+    """A hall of 24 by 12 m, its walls in pieces of 4 m."""
+    drawing = new(units=6)
+    for k in range(0, 24, 4):
+        for wall in ((k, 0, k + 4, 0), (k, 12, k + 4, 12), *([(x, k, x, k + 4) for x in (0, 24)] if k < 12 else [])):
+            drawing.modelspace().add_line(wall[:2], wall[2:], {"layer": "A-WALL"})
+    drawing.saveas(tmp_path / "building.dxf")
+    write(tmp_path / "imu.csv", walk)
+    (line,) = re.findall(r"^echostep (foot .*)$", (ROOT / "README.md").read_text(), flags=re.M)
+    tracked = run(*line.split(), cwd=tmp_path)
     assert tracked.returncode == 0, tracked.stderr
-    assert {path.suffix for path in (tmp_path / "found").iterdir()} >= {".mcap", ".csv", ".png"}
+    assert {path.suffix for path in (tmp_path / "out/foot").iterdir()} >= {".mcap", ".csv", ".png"}
+    assert "files: track.csv and track.png in out/foot" in tracked.stdout
 
 
 def test_arrays_of_any_length_are_tracked_as_the_recording_is(walk: Imu, tmp_path: Path) -> None:
