@@ -54,6 +54,7 @@ def test_each_page_of_the_manual_is_in_the_contents(site: Path) -> None:
     contents = (site / "index.html").read_text()
     listed = re.findall(r"^\| \[[^]]+\]\(([^)]+)\.md\)", (ROOT / "host/docs/README.md").read_text(), flags=re.M)
     assert len(listed) > 15
+    assert re.findall(r'class="caption-text">([^<]+)<', contents) == ["Use", "Results", "How it is built"]
     for name in listed:
         page = (site / "host/docs" / f"{name}.html").resolve().relative_to(site.resolve())
         assert re.search(rf'toctree-l1(?: has-children)?"><a class="reference internal" href="{page}"', contents), name
@@ -107,6 +108,10 @@ def test_the_search_finds_without_a_server_or_a_network(site: Path, browser: Any
     page.on("request", lambda request: requests.append(request.url))
     page.goto((site / "search.html").as_uri() + "?q=resampling")
     page.wait_for_selector("#search-results li a[href*='design/cloud']")
+    for word in ("stairs", "language", "notebook"):  # the manual before decisions and what was tried
+        page.goto((site / "search.html").as_uri() + f"?q={word}")
+        found = page.locator("#search-results li a").first.get_attribute("href")
+        assert not re.search("/(decisions|notebook)/", str(found)), (word, found)
     page.goto((site / "index.html").as_uri())
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.evaluate("[...document.images].every(image => image.complete && image.naturalWidth > 0)")

@@ -120,6 +120,22 @@ def test_the_terminal_says_it_below_the_status() -> None:
     assert text.getvalue().index("tracking, 0.24 m") < text.getvalue().index("running: position good to about 0.2 m")
 
 
+@pytest.mark.parametrize(("width", "height"), [(80, 24), (160, 60)])
+def test_the_terminal_is_filled_and_says_that_the_foot_is_silent(
+    monkeypatch: pytest.MonkeyPatch, width: int, height: int
+) -> None:
+    monkeypatch.setattr("echostep_app.output.terminal.SILENT_S", -1.0)
+    text = io.StringIO()
+    console = Console(file=text, force_terminal=True, width=width, height=height, color_system=None)
+    with TerminalView(Tracker(PLAN), "test", console=console) as view:
+        view.show([told()], final=True)
+    shown = text.getvalue()
+    assert "MTx is silent" in shown
+    assert "%" not in shown.split("walk ")[-1]  # nothing says how long this run goes on
+    assert max(map(len, shown.splitlines())) > 0.6 * width
+    assert "╰" in shown.split("walk ")[-1]  # the frame is whole
+
+
 def test_the_record_says_it_of_each_step() -> None:
     tracker = Tracker(PLAN)
     derived, told_ = Derived(tracker), []

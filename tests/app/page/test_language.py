@@ -39,6 +39,8 @@ TABLE_READY = (
 )
 EDITOR_READY = "Boolean(window.echostep)"
 LOCALES = {"en": "en-GB", "de": "de-DE"}
+OTHERS = [name for name in LOCALES if name != "en"]
+STRANGE = "St. Mary, north: up 3"  # as people name rooms, stairs and each other
 HOLE = re.compile(r"\{(\w+)\}")
 MISSING = "[...echostep.missing]"
 LANG = "document.documentElement.lang"
@@ -75,8 +77,8 @@ CUES = (
 )
 
 
-def catalogue(name: str) -> dict[str, str]:
-    """All entries of a language."""
+def catalogue(name: str) -> dict[str, Any]:
+    """All entries of a language: texts, or texts by the category of a number (Unicode CLDR)."""
     parts = [json.loads(path.read_text("utf-8")) for path in sorted(STATIC.glob(f"{name}-*.json"))]
     return {key: text for part in parts for section in part.values() for key, text in section.items()}
 
@@ -109,15 +111,34 @@ def url() -> Iterator[str]:
         yield server.url
 
 
-def test_entries_have_the_holes_of_their_texts() -> None:
-    german = catalogue("de")
-    assert {key: text for key, text in german.items() if set(HOLE.findall(key)) != set(HOLE.findall(text))} == {}
-    assert all(text.strip() for text in german.values())
-    assert not [key for key in german if key.endswith(".")]
+@pytest.mark.parametrize("lang", OTHERS)
+def test_entries_have_the_holes_of_their_texts(lang: str) -> None:
+    entries = catalogue(lang)
+    texts = [(key, text) for key, one in entries.items() for text in (one.values() if isinstance(one, dict) else [one])]
+    assert [key for key, text in texts if set(HOLE.findall(key)) != set(HOLE.findall(text))] == []
+    assert all(text.strip() for _, text in texts)
+    assert all("other" in one for one in entries.values() if isinstance(one, dict))
+    assert not [key for key in entries if key.endswith(".")]
 
 
-def test_every_text_of_the_source_has_an_entry(browser: Any, url: str) -> None:
-    page = page_of(browser, url, "de", READY)
+@pytest.mark.parametrize("lang", OTHERS)
+def test_names_stay_as_they_are_and_the_sentence_about_them_does_not(browser: Any, tmp_path: Path, lang: str) -> None:
+    """Names with full stops, commas and words that have entries, in every sentence that is long enough to be known by its other words."""
+    sentences = [key for key in catalogue(lang) if len(re.findall("[a-zA-Z]", HOLE.sub("", key))) >= 8]
+    named = [key for key in sentences if any(len(hole) > 1 for hole in HOLE.findall(key))]
+    assert len(named) > 30
+    filled = [HOLE.sub(lambda hole: "7" if len(hole[1]) == 1 else STRANGE, key) for key in named]
+    with EditServer(tmp_path / "new.json", port=0) as server:  # its page has all entries
+        page = page_of(browser, server.url, lang, EDITOR_READY)
+        translated = page.evaluate("(texts) => texts.map((text) => echostep.tr(text))", filled)
+        assert page.evaluate(MISSING) == []
+        assert [text for text in translated if STRANGE not in text] == []
+        page.context.close()
+
+
+@pytest.mark.parametrize("lang", OTHERS)
+def test_every_text_of_the_source_has_an_entry(browser: Any, url: str, lang: str) -> None:
+    page = page_of(browser, url, lang, READY)
     texts = page_texts() | host_texts()
     assert len(texts) > 200
     page.evaluate("(texts) => texts.forEach((text) => echostep.tr(text))", sorted(texts))
@@ -125,9 +146,10 @@ def test_every_text_of_the_source_has_an_entry(browser: Any, url: str) -> None:
     page.context.close()
 
 
-def test_every_text_of_the_editor_has_an_entry(browser: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize("lang", OTHERS)
+def test_every_text_of_the_editor_has_an_entry(browser: Any, tmp_path: Path, lang: str) -> None:
     with EditServer(tmp_path / "new.json", port=0) as server:
-        page = page_of(browser, server.url, "de", EDITOR_READY)
+        page = page_of(browser, server.url, lang, EDITOR_READY)
         texts = editor_texts()
         assert len(texts) > 90
         page.evaluate("(texts) => texts.forEach((text) => echostep.tr(text))", sorted(texts))
@@ -135,6 +157,9 @@ def test_every_text_of_the_editor_has_an_entry(browser: Any, tmp_path: Path) -> 
             "import(`${location.href}static/words.js`).then(({ KINDS }) => Object.values(KINDS).forEach(echostep.tr))"
         )
         assert page.evaluate(MISSING) == []
+        count = "Questions of the import: {}, marked on the plan. Answer them one by one, or Move, Door and Delete as you like"
+        told = [page.evaluate("(text) => echostep.tr(text)", count.format(n)) for n in (1, 2)]
+        assert lang != "de" or [text.split(" des ")[0] for text in told] == ["1 Frage", "2 Fragen"]
         page.context.close()
 
 

@@ -49,26 +49,33 @@ html_theme = "furo"
 html_title = f"echostep {version}"
 html_favicon = str(ROOT / "host/app/echostep_app/page/static/icon.svg")
 html_static_path = ["static"]
+html_search_scorer = str(Path(__file__).with_name("scorer.js"))
 html_css_files = ["site.css"]
 html_copy_source = html_show_sphinx = False
 
 
-def contents(manual: str) -> list[str]:
-    """Documents that the manual's table lists, in its order, as paths from the root without suffix."""
-    rows = re.findall(r"^\| \[[^]]+\]\(([^)]+)\.md\)", manual, flags=re.M)
-    return [(ROOT / MANUAL / row).resolve().relative_to(ROOT).as_posix() for row in rows]
+def contents(manual: str) -> dict[str, list[str]]:
+    """Documents that the manual's tables list, by their headings, in their order, as paths from the root without suffix."""
+    parts = [part.partition("\n") for part in manual.split("\n## ")[1:]]
+    rows = {heading: re.findall(r"^\| \[[^]]+\]\(([^)]+)\.md\)", table, flags=re.M) for heading, _, table in parts}
+    return {
+        heading: [(ROOT / MANUAL / row).resolve().relative_to(ROOT).as_posix() for row in listed]
+        for heading, listed in rows.items()
+    }
 
 
 def add_contents(_app: Any, document: str, source: list[str]) -> None:
     """Append the contents to the first page's text, and to that of each series; they are seen in the sidebar only."""
     folder, _, name = document.rpartition("/")
     if document == root_doc:
-        pages = [f"{MANUAL}/README", *contents((ROOT / MANUAL / "README.md").read_text())]
+        pages = {"": [f"{MANUAL}/README"]} | contents((ROOT / MANUAL / "README.md").read_text())
     elif folder in SERIES and name == "README":
-        pages = sorted(page.stem for page in (ROOT / folder).glob("*.md") if page.stem != name)
+        pages = {"": sorted(page.stem for page in (ROOT / folder).glob("*.md") if page.stem != name)}
     else:
         return
-    source[0] += "\n```{toctree}\n:hidden:\n\n" + "\n".join(pages) + "\n```\n"
+    for heading, listed in pages.items():
+        caption = f":caption: {heading}\n" if heading else ""
+        source[0] += f"\n```{{toctree}}\n:hidden:\n{caption}\n" + "\n".join(listed) + "\n```\n"
 
 
 def copy_first_page(app: Any, failure: Exception | None) -> None:

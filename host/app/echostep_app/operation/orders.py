@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from echostep_app.operation import requests
 from echostep_app.team.messages.marks import MarkBoard
-from echostep_app.team.messages.orders import EVERYBODY, NOTE, Order, order_key, order_message
+from echostep_app.team.messages.orders import EVERYBODY, NOTE, Order, order_message
 from echostep_app.team.roster import Member, MemberState
 
 NEWER_S = 1e-3  # by which an order or errand is newer than the one that it replaces, however this clock was set back
@@ -31,7 +31,7 @@ class ShownOrder:
 
 def order_by(request: requests.SetOrder, m: Member | None, board: MarkBoard, unix_s: float) -> tuple[str, bytes]:
     """The message of a commander's request: to a member, or to everybody."""
-    key = order_key(m.report.team, m.report.name) if m else EVERYBODY
+    key = f"{m.report.team}/{m.report.name}" if m else EVERYBODY
     known = board.orders.get(key)
     newer_s = known.unix_s + NEWER_S if known else 0.0
     return order_message(key, Order(1, request.text, request.by, max(unix_s, newer_s), request.ended))

@@ -176,6 +176,8 @@ def shown_details(
         rows += [("trunk", tilt_words(r.trunk_tilt_deg))]
     if r.battery_percent is not None:
         rows += [("battery", f"{r.battery_percent} %")]
+    if s := r.streams:
+        rows += [("frames", f"{s.bad} bad frames, {s.lost} lost frames, {s.dropped} dropped frames")]
     rows += [("reports missed", str(m.missed)), ("source", r.source), ("run", r.run), ("version", r.version)]
     rows += [("note", note) for note in notes(m, plan, now_s, duplicates)]
     return ShownDetails(number, tuple(ShownFact(name, value) for name, value in rows), history)

@@ -32,6 +32,8 @@ from echostep_app.printing.running import running_note
 
 REFRESH_S = 0.1
 MAX_FINDINGS = 3  # shown at a time
+BELOW = 9  # lines of words and frame around the canvas
+SILENT_S = 2.0  # without a sample
 DOTS = (
     (0x01, 0x08),
     (0x02, 0x10),
@@ -44,7 +46,7 @@ BRAILLE = 0x2800
 class Canvas:
     """The walls of a level and the track in braille dots, two by four per character."""
 
-    def __init__(self, level: Level, columns: int = 76, rows: int = 22) -> None:
+    def __init__(self, level: Level, columns: int, rows: int) -> None:
         ends = level.walls.reshape(-1, 2) if len(level.walls) else np.array([[0.0, 0.0], [10.0, 10.0]])
         self._low = ends.min(0)
         extent = np.maximum(ends.max(0) - self._low, 1.0)
@@ -109,15 +111,15 @@ class TerminalView:
         pose = tracker.start.pose if tracker.start else None
         level = pose.level if pose else 0
         self._level = level if level in range(len(tracker.plan.levels)) else 0
-        self._canvas = Canvas(tracker.plan.levels[self._level])
-        self._progress = Progress(
-            TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn()
-        )
+        share = [TextColumn("{task.percentage:>3.0f} %")] if progress else []
+        self._progress = Progress(TextColumn("{task.description}"), BarColumn(), *share, TimeElapsedColumn())
         self._fraction = progress
         self._bar = self._progress.add_task("walk", total=1.0 if progress else None)
         self._last: Estimate | None = None
         self._drawn_s = 0.0
         self._live = Live(console=console, auto_refresh=False, transient=False)
+        self._canvas = self._empty()
+        self._samples, self._heard_s = 0, time.monotonic()
 
     def __enter__(self) -> Self:
         self._live.__enter__()
@@ -126,6 +128,11 @@ class TerminalView:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.show([], final=True)
         self._live.__exit__(kind, error, at)
+
+    def _empty(self) -> Canvas:
+        """A canvas of the level that fills the terminal."""
+        columns, rows = self._live.console.size
+        return Canvas(self._tracker.plan.levels[self._level], max(columns - 4, 20), max(rows - BELOW, 6))
 
     def _level_text(self) -> str:
         """Name, probability and height of the level; empty when the plan has one level."""
@@ -138,13 +145,16 @@ class TerminalView:
         """Add new estimates; redraw when REFRESH_S has passed since the last time, or when `final`; not on a terminal that was closed."""
         for e in estimates:
             if e.level != self._level:
-                self._level, self._canvas = e.level, Canvas(self._tracker.plan.levels[e.level])
+                self._level = e.level
+                self._canvas = self._empty()
             self._canvas.extend_track(e)
             self._last = e
         now = time.monotonic()
         if not final and now - self._drawn_s < REFRESH_S:
             return
         self._drawn_s = now
+        if (samples := self._tracker.streams.mtx.good) != self._samples:
+            self._samples, self._heard_s = samples, now
         if not self._live.console.is_terminal:
             return
         if self._fraction:
@@ -152,7 +162,7 @@ class TerminalView:
         parts = [
             self._canvas.render(self._last if self._last and claims_place(self._last) else None),
             Text(describe(self._last, self._tracker.plan) + self._level_text()),
-            Text(health(self._tracker), style="grey62"),
+            Text(health(self._tracker, silent=now - self._heard_s > SILENT_S), style="grey62"),
             *(Text(str(finding), style="bold red") for finding in findings(self._tracker)),
         ]
         if gait := running_note(self._tracker.state.last_segment, self._last):
@@ -175,13 +185,13 @@ def describe(e: Estimate | None, plan: Plan) -> str:
     )
 
 
-def health(tracker: Tracker) -> str:
+def health(tracker: Tracker, *, silent: bool) -> str:
     """Counts of rejected, lost and dropped frames, the time source of the foot's samples, and the beacons, as a line of text."""
     streams = tracker.streams
     board, status = streams.board, streams.status
     dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
-    sync = "SyncOut" if streams.synchronised else "arrival times"
-    foot = f"{streams.foot_name} on {sync}"
+    sync = "is silent" if silent else "on SyncOut" if streams.synchronised else "on arrival times"
+    foot = f"{streams.foot_name} {sync}"
     gateway = f"   {gateway_words(tracker.gateway)}" if tracker.gateway.counts.words or tracker.gateway.numbers else ""
     return f"board: {board.good} frames, {board.rejected} bad, {board.lost} lost, {dropped} dropped   {foot}{gateway}"
 

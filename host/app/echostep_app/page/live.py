@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from operator import attrgetter
@@ -114,16 +113,6 @@ class LivePage:
         """Address of the page."""
         return self.server.url
 
-    @property
-    def pages(self) -> int:
-        """Number of connected pages."""
-        return self.server.pages
-
-    @property
-    def notices(self) -> deque[str]:
-        """Faults of the server that are not printed yet."""
-        return self.server.shared.faults.notices
-
     def __enter__(self) -> Self:
         self._tracker.watchers.append(self._watch)
         if self._owns_server:
@@ -155,14 +144,14 @@ class LivePage:
     def wait_for_page(self) -> None:
         """Wait until a browser shows the page, for at most `OPENING_S`."""
         end_s = time.monotonic() + OPENING_S
-        while not self.pages and time.monotonic() < end_s:
+        while not self.server.pages and time.monotonic() < end_s:
             time.sleep(OPENING_POLL_S)
 
     def fail(self, words: str) -> None:
         """An error ends the run: pages show it; waits until they have it, for at most `TOLD_S`."""
         self.mailbox.fail(words)
         end_s = time.monotonic() + TOLD_S
-        while self.pages and time.monotonic() < end_s:
+        while self.server.pages and time.monotonic() < end_s:
             time.sleep(OPENING_POLL_S)
 
     def pop_check_ins(self) -> Iterator[bytes]:

@@ -297,7 +297,7 @@ class Session:
         page, stays = self.page, self.output.page_stays
         if page is None or self._interrupted:
             return
-        if not (stays or page.pages):
+        if not (stays or page.server.pages):
             if again:
                 console.print(
                     f"No browser shows the page. To see the walk again: {again}", highlight=False, markup=False
@@ -306,8 +306,8 @@ class Session:
         end = "until" if stays else "while it is open, or until"
         console.print(f"The page stays at {page.url} {end} Ctrl-C.", highlight=False)
         try:
-            while stays or page.pages:
+            while stays or page.server.pages:
                 time.sleep(PAGE_POLL_S)
-                print_notices(page.notices)
+                print_notices(page.server.shared.faults.notices)
         except KeyboardInterrupt:
             pass

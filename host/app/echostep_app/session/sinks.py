@@ -53,7 +53,7 @@ def page_sink(page: LivePage) -> Sink:
     def take(portion: Portion, _: list[Estimate]) -> None:
         page.publish(portion)
         page.note_alive()
-        print_notices(page.notices)
+        print_notices(page.server.shared.faults.notices)
 
     return Sink(take, page.note_arrival, page.mailbox.end)
 

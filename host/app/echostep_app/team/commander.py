@@ -161,7 +161,7 @@ def _state(m: Member, now_s: float) -> str:
 
 
 def notes(m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]]) -> list[str]:
-    """Remarks on a member: alarm, name used twice, broken connection, rest, other plan, clock, battery, faults, losses."""
+    """Remarks on a member: alarm, name used twice, broken connection, rest, other plan, clock, battery, faults."""
     remarks, r = [], m.report
     if m.key[:2] in duplicates:
         remarks.append(f"name used twice (run {r.run})")
@@ -182,9 +182,6 @@ def notes(m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]])
     if r.battery_percent is not None and r.battery_percent < LOW_BATTERY_PERCENT:
         remarks.append(f"battery {r.battery_percent} %")
     remarks += r.streams.findings if r.streams else ()
-    if s := r.streams:
-        remarks += [f"{s.bad} bad frames"] * bool(s.bad) + [f"{s.lost} lost frames"] * bool(s.lost)
-        remarks += [f"{s.dropped} dropped frames"] * bool(s.dropped)
     remarks += [f"{event} {count} x" for event, count in m.notes.items()]
     return remarks
 

@@ -53,18 +53,10 @@ export class List {
   }
 
   make(id) {
-    const li = document.createElement('li'), button = document.createElement('button'), parts = ['sign', 'name', 'said', 'note'].map((name) => {
-      const part = document.createElement('span');
-      part.className = name;
-      return part;
-    });
-    const [sign, name, said, note] = parts;
-    sign.setAttribute('aria-hidden', 'true');
-    button.type = 'button';
-    button.append(...parts);
+    const li = document.createElement('li');
+    li.innerHTML = '<button type="button"><span class="sign" aria-hidden="true"></span><span class="name"></span><span class="said"></span><span class="note"></span></button>';
+    const button = li.firstChild, [sign, name, said, note] = button.children, item = { li, button, sign, name, said, note };
     button.onclick = () => this.choose(id);
-    li.append(button);
-    const item = { li, button, sign, name, said, note };
     this.items.set(id, item);
     return item;
   }
@@ -147,8 +139,7 @@ function facts(rows) {
 }
 
 function rescuer() {
-  const item = document.createElement('li'), button = document.createElement('button');
-  button.type = 'button';
-  item.append(button, document.createElement('span'));
+  const item = document.createElement('li');
+  item.innerHTML = '<button type="button"></button><span></span>';
   return item;
 }

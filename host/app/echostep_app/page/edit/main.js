@@ -11,6 +11,7 @@ import { localise, missing, tr } from './language.js';
 import { Pointer } from './pointer.js';
 import { outlined } from './shapes.js';
 import { Sheet } from './sheet.js';
+import { recall, remember } from './storage.js';
 import { startTheme } from './theme.js';
 import { Tools } from './tools.js';
 import { takesTyped, typed } from './typed.js';
@@ -55,7 +56,7 @@ function draw() {
   const names = sheet.tree.levels.map((level) => level.name), options = byId('level');
   if (names.join('\n') !== [...options.options].map((o) => o.text).join('\n')) options.replaceChildren(...names.map((name, k) => new Option(name, k)));
   options.value = sheet.k;
-  if (sheet.picture) try { localStorage.setItem(`picture of ${sheet.tree.name}`, JSON.stringify(sheet.picture)); } catch { /* private browsing */ }
+  if (sheet.picture) remember(`picture of ${sheet.tree.name}`, JSON.stringify(sheet.picture));
 }
 
 function show() {
@@ -182,7 +183,7 @@ async function loadPicture(name) {
   byId('image').setAttribute('width', width);
   byId('image').setAttribute('height', height);
   let kept = null;
-  try { kept = JSON.parse(localStorage.getItem(`picture of ${name}`)); } catch { /* private browsing */ }
+  try { kept = JSON.parse(recall(`picture of ${name}`)); } catch { /* not of this page */ }
   const fits = kept?.width === width && kept.height === height && kept.perPx > 0;
   sheet.picture = fits ? kept : { x: 0, y: 0, perPx: FIRST_WIDTH_M / width, width, height, set: false };
 }

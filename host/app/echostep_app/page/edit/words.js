@@ -53,7 +53,7 @@ export const WORDS = {
   level: (name, height) => `Level ${name}, ${height} m`,
   doorHere: 'Click on the wall where the door belongs', roomHere: 'Click where the room is',
   question: (k, count, text) => `${k} of ${count}: ${text}`,
-  questions: (count) => `${count} questions of the import are marked: answer them one by one, or Move, Door and Delete as you like`,
+  questions: (count) => `Questions of the import: ${count}, marked on the plan. Answer them one by one, or Move, Door and Delete as you like`,
   scaleFirst: 'Set the scale first: Scale, then two points whose distance you know',
   unsaved: '(not saved)',
   length: (from, to) => along([to[0] - from[0], to[1] - from[1]]),

@@ -26,7 +26,6 @@ from echostep_app.team.messages.orders import (
     ORDERS,
     RECEIPTS,
     Receipt,
-    order_key,
     receipt_message,
 )
 from echostep_app.team.messages.report import BadReportError
@@ -98,8 +97,8 @@ class MarkFeed:
         self._shown: tuple[ShownMark, ...] = ()
         self._errand: Errand | None = None  # the last one that was given
         own = outlet.team, outlet.name
-        topics = [MARKS, acks_of(*own), errand_of(self._key), f"{ORDERS}/{EVERYBODY}", f"{ORDERS}/{order_key(*own)}"]
-        topics.append(f"{RECEIPTS}/+/{order_key(*own)}")
+        topics = [MARKS, acks_of(*own), errand_of(self._key), f"{ORDERS}/{EVERYBODY}", f"{ORDERS}/{'/'.join(own)}"]
+        topics.append(f"{RECEIPTS}/+/{'/'.join(own)}")
         self._send = subscription.send
         self._looks = subscription.add(topics, self._receive)
 

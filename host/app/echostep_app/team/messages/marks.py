@@ -30,7 +30,6 @@ from echostep_app.team.messages.orders import (
     Receipt,
     ReceiptKey,
     note_message,
-    order_key,
     order_message,
     receipt_message,
 )
@@ -179,7 +178,7 @@ class MarkBoard:
 
     def order_to(self, kind: str, team: str, name: str) -> tuple[Order, bool] | None:
         """The order to everybody, or the note to one wearer, while it holds; and whether this wearer has understood it."""
-        order = self.orders.get(EVERYBODY if kind == EVERYBODY else order_key(team, name))
+        order = self.orders.get(EVERYBODY if kind == EVERYBODY else f"{team}/{name}")
         receipt = self.receipts.get((kind, team, name))
         return (order, receipt is not None and receipt.order_s == order.unix_s) if order and not order.ended else None
 
@@ -204,7 +203,7 @@ class MarkBoard:
             case ["order", "everybody"]:
                 self.orders.receive(EVERYBODY, (topic, payload), self.answers)
             case ["order", team, name]:
-                self.orders.receive(order_key(*_names(team, name)), (topic, payload), self.answers)
+                self.orders.receive("/".join(_names(team, name)), (topic, payload), self.answers)
             case ["receipt", ("everybody" | "note") as kind, team, name]:
                 self.receipts.receive((kind, *_names(team, name)), (topic, payload), self.answers)
             case ["crew", identity]:

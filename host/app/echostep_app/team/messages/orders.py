@@ -46,13 +46,8 @@ class Receipt(msgspec.Struct, frozen=True):
     unix_s: UnixTime
 
 
-def order_key(team: str, name: str) -> str:
-    """Of the orders to one wearer."""
-    return f"{team}/{name}"
-
-
 def order_message(key: str, order: Order) -> tuple[str, bytes]:
-    """Topic and payload of an order to everybody, or to one wearer."""
+    """Topic and payload of an order to `key`: everybody, or <team>/<wearer>."""
     return f"{ORDERS}/{key}", msgspec.json.encode(order)
 
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The dialog "More": colours, layers, charts, measuring, link, GeoJSON, full screen; what happened on the walk, and what the page has said.
+// The dialog "More": colours, layers, charts, measuring, link, GeoJSON; what happened on the walk, and what the page has said.
 
 import { recall, remember } from '../storage.js';
 import { geojson, save } from './export.js';
@@ -9,7 +9,7 @@ import { LAYERS } from './layers.js';
 import { localise, minutes, tr } from '../language.js';
 
 const $ = (id) => document.getElementById(id);
-const BUTTONS = { measure: 'Measure', charts: 'Charts', link: 'Copy a link', geojson: 'GeoJSON', full: 'Full screen', files: 'Open files…' };
+const BUTTONS = { measure: 'Measure', charts: 'Charts', link: 'Copy a link', geojson: 'GeoJSON', files: 'Open files…' };
 const HTML = `<form method="dialog"><h2>More</h2><button aria-label="Close">✕</button></form>
 <div tabindex="0" role="group" aria-label="Tools">
   <p class="row">${Object.entries(BUTTONS).map(([name, text]) => `<button id="tool-${name}" type="button">${text}</button>`).join('')}
@@ -39,10 +39,9 @@ export class Tools {
   }
 
   wire() {
-    const { page, dialog } = this, does = { measure: () => page.enter('measure'), charts: () => this.setCharts(!page.charts.on), link: () => this.link(), geojson: () => this.geojson(), full: () => this.full(), files: () => $('drop-file').click() };
+    const { page, dialog } = this, does = { measure: () => page.enter('measure'), charts: () => this.setCharts(!page.charts.on), link: () => this.link(), geojson: () => this.geojson(), files: () => $('drop-file').click() };
     for (const [name, act] of Object.entries(does)) $(`tool-${name}`).onclick = () => { dialog.close(); act(); };
     $('tools-button').onclick = () => this.open();
-    $('tool-full').hidden = !document.documentElement.requestFullscreen;
   }
 
   wireLayers() {
@@ -82,11 +81,6 @@ export class Tools {
     const made = geojson({ lines: planView.lines, level: scene.level, rooms, trail: scene.trail, estimate: scene.frame?.told, globe: globe() });
     save(new Blob([JSON.stringify(made)], { type: 'application/geo+json' }), 'echostep.geojson');
     if (made.coordinates) hint('This plan has no georeference: the file is in metres of the plan.', 8000);
-  }
-
-  full() {
-    const done = document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen();
-    done.catch(() => this.page.hint('The browser does not allow full screen here.', 6000));
   }
 
   // What happened, as a list and as ticks on the time bar; in a replay each leads to its moment.
