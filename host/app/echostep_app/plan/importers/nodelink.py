@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 from shapely.geometry import LineString, Polygon
 
 from echostep.errors import EchostepError
@@ -21,6 +22,7 @@ from echostep.fields import LIMIT_M
 from echostep.plan import Plan
 from echostep_app.plan.importers.connector_shapes import join_connectors
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas
+from echostep_app.plan.importers.far import IN_GRID, grid_origin
 from echostep_app.plan.importers.parsing import read_text
 from echostep_app.plan.importers.report import ImportReport
 
@@ -41,7 +43,7 @@ def import_nodelink(core: Path, report: ImportReport) -> Plan:
     settings = {row[0]: row[1:] for _, row in _rows(core, 1)}
     levels = int(_setting(core, settings, "floor", MOST_FLOORS))
     height_m = _setting(core, settings, "height", 100.0)
-    nodes = _nodes(_beside(core, settings, "node"), levels, _setting(core, settings, "scale", 1000.0))
+    nodes = _nodes(_beside(core, settings, "node"), levels, _setting(core, settings, "scale", 1000.0), report)
     drawn_levels = [DrawnLevel(f"floor {i}", i * height_m) for i in range(levels)]
     for where, row in _rows(_beside(core, settings, "link"), 4, skip=1):
         a, b = (_node(nodes, text, where) for text in row[2:4])
@@ -57,18 +59,24 @@ def import_nodelink(core: Path, report: ImportReport) -> Plan:
     )
 
 
-def _nodes(path: Path, levels: int, scale_m: float) -> dict[str, Node]:
+def _nodes(path: Path, levels: int, scale_m: float, report: ImportReport) -> dict[str, Node]:
     """All nodes in metres; y points up and is 0 at the lowest node."""
-    nodes = {}
+    rows = []
     for where, row in _rows(path, 4, skip=1):
         layer, x, y = (_number(text, where) for text in row[1:4])
         if layer not in range(levels):
             raise EchostepError(f"{where}: floor {row[1]} of {levels}")
-        if max(abs(x), abs(y)) * scale_m > LIMIT_M / 2:
-            raise EchostepError(f"{where}: further than {LIMIT_M / 2000:.0f} km from the origin")
-        nodes[row[0]] = Node(int(layer), round(x * scale_m, 3), -y * scale_m)
-    lowest = min((node.y_m for node in nodes.values()), default=0.0)
-    return {key: node._replace(y_m=round(node.y_m - lowest, 3)) for key, node in nodes.items()}
+        rows.append((where, row[0], int(layer), x * scale_m, -y * scale_m))
+    lowest = min((y for *_, y in rows), default=0.0)
+    far_x, _ = grid_origin(np.array([(x, 0.0) for *_, x, _ in rows]).reshape(-1, 2))
+    if far_x:
+        report.doubt(IN_GRID.format("the building", far_x, lowest))
+    nodes = {}
+    for where, key, layer, x, y in rows:
+        nodes[key] = Node(layer, round(x - far_x, 3), round(y - lowest, 3))
+        if max(abs(nodes[key].x_m), nodes[key].y_m) > LIMIT_M:
+            raise EchostepError(f"{where}: further than {LIMIT_M / 1000:.0f} km from the origin: is scale right?")
+    return nodes
 
 
 def _stairs(

@@ -19,7 +19,7 @@ from shapely.geometry.base import BaseGeometry
 
 from echostep.plan import Door, Question
 from echostep_app.plan.importers.drawn_level import opening
-from echostep_app.plan.importers.dxf.gaps import BY_M, NEAR_M, Gap, WallBands
+from echostep_app.plan.importers.dxf.gaps import BY_M, NEAR_M, THICKEST_M, Gap, WallBands
 from echostep_app.plan.importers.dxf.symbols import NARROWEST_M, Point, Swing, Symbol
 
 LONG = 2.5  # least ratio of a leaf's length to its thickness; assumed
@@ -30,7 +30,6 @@ MOST_OFF_M = 0.3  # from both jambs together; assumed
 TIP_M = 0.1  # least visible part of a sliding leaf in its gap; assumed
 FRAME_M = 0.2  # width that a gap may have beyond that: frame; assumed
 BESIDE_M = 6.0  # greatest width of a hole in which a door stands beside a window; assumed
-THICKEST_M = 0.5  # of a wall that is drawn through a door
 BEYOND_M = 0.3  # so far a wall goes on beyond a leaf that is drawn in it; assumed
 SAME_M = 0.25  # two doors with nearer middles are one, as are two lines across one wall; assumed
 NEAR_JAMB_M = 0.02  # closer faces need no end between them
@@ -93,7 +92,7 @@ class PlacedDoors:
         return any(_same(line, other.line) for other in self.doors)
 
     def _place(self, line: Line, walls: WallBands) -> None:
-        """Add a door in a gap, in the middle of the wall where its symbol is drawn beside it, and the ends of the wall."""
+        """Add a door in a gap, in the middle of the wall, wherever its symbol is drawn, and the ends of the wall."""
         (u, v), ends = _along(line), (line[:2], line[2:])
         spans = [walls.wall_at(end, (side * u, side * v)) for end, side in zip(ends, (-1, 1), strict=True)]
         left = [
@@ -101,11 +100,7 @@ class PlacedDoors:
             for span, side in zip(spans, (-1, 1), strict=True)
         ]
         found = [span for span in left if span is not None]
-        off = (
-            0.0
-            if any(low <= 0.0 <= high for low, high in found)
-            else sum(low + high for low, high in found) / (2 * len(found) or 1)
-        )
+        off = sum(low + high for low, high in found) / (2 * len(found) or 1)
         moved = _line((line[0] - off * v, line[1] + off * u), (u, v), 0.0, math.dist(*ends))
         if self._has(moved):
             return

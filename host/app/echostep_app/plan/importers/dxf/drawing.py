@@ -26,8 +26,7 @@ from echostep_app.plan.importers.dxf.doors import PlacedDoors
 from echostep_app.plan.importers.dxf.entities import parts
 from echostep_app.plan.importers.dxf.frame import DrawingFrame
 from echostep_app.plan.importers.dxf.gaps import WallBands
-from echostep_app.plan.importers.dxf.layers import pieces_of
-from echostep_app.plan.importers.dxf.rooms import rooms_of
+from echostep_app.plan.importers.dxf.rooms import named_spaces, rooms_of, text_of
 from echostep_app.plan.importers.dxf.sheet import Sheet, read_sheet
 from echostep_app.plan.importers.dxf.storeys import alignment, bounds_of, lies_over, storey_boxes, window_words
 from echostep_app.plan.importers.dxf.symbols import (
@@ -40,8 +39,10 @@ from echostep_app.plan.importers.dxf.symbols import (
     symbol_of,
     symbols_of,
 )
+from echostep_app.plan.importers.far import IN_GRID
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.straight import pieces_of
 
 HALF_TREAD_M = 0.3  # half the greatest distance between neighbouring lines of one staircase: a tread
 CURVES = ("ARC", "ELLIPSE", "SPLINE", "LWPOLYLINE", "POLYLINE")  # entities that a swing may be drawn with
@@ -88,6 +89,8 @@ def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Pla
     sheets = [read_sheet(file, hints, report) for file in files]
     report.units = "; ".join(dict.fromkeys(sheet.words for sheet in sheets))
     frame = DrawingFrame.about(sheets[0].walls, sheets[0].scale_m)
+    if (frame.x0_m, frame.y0_m) != (0.0, 0.0):
+        report.doubt(IN_GRID.format("the drawing", frame.x0_m, frame.y0_m))
     storeys = [_Storey(sheet, replace(frame, scale_m=sheet.scale_m)) for sheet in sheets]
     if hints.windows:
         storeys = [_in_window(storeys[0], window) for window in hints.windows]
@@ -97,9 +100,22 @@ def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Pla
         _drawn_level(storey, DrawnLevel(name, round(i * hints.storey_height_m, 6)), report)
         for i, (storey, name) in enumerate(zip(storeys, names, strict=False))
     ]
-    return Plan(
+    plan = Plan(
         files[0].stem, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels, report)
     )
+    return plan if any(level.rooms for level in plan.levels) else _with_names(plan, storeys, report)
+
+
+def _with_names(plan: Plan, storeys: list[_Storey], report: ImportReport) -> Plan:
+    """The plan with the names that are written into its rooms, whatever their layer."""
+    levels = []
+    for i, (level, storey) in enumerate(zip(plan.levels, storeys, strict=True)):
+        texts = [found for entity, _ in storey.sheet.others if (found := text_of(entity, storey.frame)) is not None]
+        rooms = named_spaces(plan, i, [text for text in texts if storey.holds(Point(text[0].at_m))])
+        levels.append(replace(level, rooms=tuple(rooms)))
+    if count := sum(len(level.rooms) for level in levels):
+        report.doubt(f"no layer is named for rooms: the names of {count} are the texts inside them")
+    return replace(plan, levels=tuple(levels))
 
 
 def _names(files: Sequence[Path], levels: int) -> list[str]:

@@ -6,6 +6,7 @@ In: entities on the layers of rooms. Out: `Room`s. Owns the least area of an out
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,12 +14,16 @@ from typing import Any
 from shapely.geometry import Point, Polygon
 
 from echostep.fields import LIMIT_M
-from echostep.plan import Room
+from echostep.plan import Plan, Room
 from echostep_app.plan.importers.drawn_level import areas, room
 from echostep_app.plan.importers.dxf.frame import DrawingFrame
 from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.places.faces import OUTSIDE
+from echostep_app.plan.places.spaces import find_spaces
 
 LEAST_M2 = 1.0  # smaller closed lines are frames of texts, symbols, furniture; assumed
+SAME_HEIGHT = 0.8  # ratio of letters to the largest ones in a room, down to which they belong to its name; assumed
+MEASURE = re.compile(r"[^\w]*\d[\d.,'x× ]*([.,]\d+|\s*(mm|cm|m|m2|m²|qm|sqm|sq ?ft))\.?$", re.IGNORECASE)
 TEXTS = ("TEXT", "MTEXT", "ATTRIB")
 
 
@@ -50,6 +55,37 @@ def _matched(names: list[Room], outlines: list[Polygon]) -> list[Room]:
         rooms.append(room(" ".join(name.name for name in inside)[:80], outline))
     numbered = [one if one.name else Room(f"room {k}", one.at_m, one.outline_m) for k, one in enumerate(rooms, 1)]
     return [*left, *numbered]
+
+
+def named_spaces(plan: Plan, level_index: int, texts: Sequence[tuple[Room, float]]) -> list[Room]:
+    """The enclosed spaces of a level by the texts inside them, where no layer is named for rooms: of each space the largest letters, from the top.
+
+    `texts`: as rooms, and the height of their letters (m). Measures are no names.
+    """
+    spaces = find_spaces(plan, level_index) if texts else None
+    if spaces is None:
+        return []
+    by_face: dict[int, list[tuple[Room, float]]] = {}
+    for text, height_m in texts:
+        if not MEASURE.match(text.name):
+            by_face.setdefault(spaces.face_at(*text.at_m), []).append((text, height_m))
+    rooms = []
+    for face, inside in sorted(by_face.items()):
+        if face != OUTSIDE and face not in spaces.hollow:
+            largest = SAME_HEIGHT * max(height_m for _, height_m in inside)
+            lines = sorted(
+                (text for text, height_m in inside if height_m >= largest),
+                key=lambda text: (-text.at_m[1], text.at_m[0]),
+            )
+            rooms.append(Room(" ".join(text.name for text in lines)[:80], lines[0].at_m))
+    return rooms
+
+
+def text_of(entity: Any, frame: DrawingFrame) -> tuple[Room, float] | None:
+    """A text as a room, and the height of its letters (m); None when it is no text."""
+    named = _named(entity, frame)
+    height = entity.dxf.get("char_height" if entity.dxftype() == "MTEXT" else "height", 0.0) if named else 0.0
+    return (named, float(height) * frame.scale_m) if named else None
 
 
 def _named(entity: Any, frame: DrawingFrame) -> Room | None:

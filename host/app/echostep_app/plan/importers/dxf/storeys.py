@@ -15,7 +15,7 @@ import shapely
 from shapely.geometry import LineString
 
 from echostep.arrays import Floats
-from echostep_app.plan.importers.dxf.layers import pieces_of
+from echostep_app.plan.importers.straight import pieces_of
 
 APART = 0.05  # least distance between storeys beside each other, as a share of the drawing's size; assumed
 LEAST_APART_M = 2.0
@@ -73,7 +73,7 @@ def lies_over(one: Box, other: Box) -> bool:
 
 def bounds_of(walls: Sequence[LineString]) -> Box:
     """The rectangle around lines."""
-    x0, y0, x1, y1 = shapely.union_all(shapely.box(*shapely.bounds(np.array(list(walls), dtype=object)).T)).bounds
+    x0, y0, x1, y1 = shapely.total_bounds(np.array(list(walls), dtype=object))
     return float(x0), float(y0), float(x1), float(y1)
 
 

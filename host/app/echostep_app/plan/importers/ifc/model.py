@@ -21,7 +21,6 @@ from echostep_app.plan.importers.report import ImportReport
 REFERENCE_M = (
     1.0  # a storey without walls, doors and rooms nearer than this to another one is its reference level; assumed
 )
-HALF_STOREY_M = 1.5  # closer storeys are reported; assumed
 CONTENTS = ("IfcWall", "IfcDoor", "IfcWindow", "IfcSpace", "IfcCurtainWall")
 
 
@@ -98,10 +97,6 @@ def _without_references(storeys: list[Storey], report: ImportReport) -> list[Sto
         names = ", ".join(f"{storey.name} ({storey.height_m:g} m)" for storey in dropped[:5])
         report.leave_out("storey without walls, doors and rooms beside another one", len(dropped))
         report.doubt(f"reference levels, not storeys: {names}{', ...' if len(dropped) > 5 else ''}")
-    for low, high in zip(kept, kept[1:], strict=False):
-        if high.height_m - low.height_m < HALF_STOREY_M:
-            apart = f"{high.height_m - low.height_m:.2f} m apart"
-            report.doubt(f"levels {low.name} and {high.name} are {apart}: half storeys, or reference levels?")
     return kept
 
 

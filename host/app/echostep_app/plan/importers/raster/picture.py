@@ -20,14 +20,19 @@ from echostep_app.plan.importers.raster.tracing import grey, trace
 from echostep_app.plan.importers.report import ImportReport
 
 SMALL_M = 0.6  # groups of pixels that are nowhere longer are letters and symbols; assumed
-PAPER = 255  # a transparent pixel is paper
+PAPER, INK = 255, 0  # a transparent pixel is paper
 TRACED = "traced from a picture: long words, furniture, stairs and swings of doors are walls too; echostep plan edit corrects it"
 
 
 def import_picture(path: Path, pixel_m: float, report: ImportReport) -> Plan:
     """Import a picture's dark areas as walls; raises EchostepError that names the file."""
     values = grey(path, PAPER)
+    if np.ptp(values) == 0.0:  # white ink on transparent paper
+        values = grey(path, INK)
     dark = values <= threshold(values)
+    if 0.5 < dark.mean() < 1.0:
+        dark = ~dark
+        report.doubt("most of it is dark, so what is bright was taken for walls")
     if dark.all():
         raise EchostepError(f"{path}: one colour all over: is this the plan?")
     try:

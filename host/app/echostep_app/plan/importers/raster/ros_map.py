@@ -9,6 +9,7 @@ corner. Other things that the robot saw are in the picture too, and stay.
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +17,9 @@ from shapely.affinity import affine_transform
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.fields import LIMIT_M
 from echostep.plan import Plan
 from echostep_app.plan.importers.drawn_level import DrawnLevel
+from echostep_app.plan.importers.far import EARTH_M, IN_GRID, grid_origin
 from echostep_app.plan.importers.parsing import read_text
 from echostep_app.plan.importers.raster.tracing import grey, trace
 from echostep_app.plan.importers.report import ImportReport
@@ -26,6 +27,11 @@ from echostep_app.plan.importers.report import ImportReport
 OCCUPIED = 0.65  # default of map_server
 LARGEST_PIXEL_M = 10.0
 UNKNOWN = 128  # value of a transparent pixel: neither free nor occupied
+FIELD = re.compile(
+    r"""^\s*["']?(\w+)["']?[ \t]*:[ \t]*(\[[^\]]*\]|(?:[ \t]*(?:#[^\n]*)?\n[ \t]*-[ \t][^\n]*)+|[^\n]*)""", re.MULTILINE
+)
+FLOW_COMMA = re.compile(r",(?![^\[]*\])")  # outside of lists
+YES, NO = ("true", "yes", "on", "y"), ("false", "no", "off", "n")
 RAW_MOST = 100.0  # in raw mode, a greater value is unknown
 
 
@@ -46,8 +52,13 @@ def import_ros_map(path: Path, report: ImportReport) -> Plan:
         raise EchostepError(f"{picture}: {error}") from error
     if not outlines:
         raise EchostepError(f"{picture}: no pixel is occupied (occupied_thresh, negate): is this the map?")
+    far_x, far_y = grid_origin(np.array([[x, y]]))
+    if (far_x, far_y) != (0.0, 0.0):
+        report.doubt(IN_GRID.format("the map", far_x, far_y))
     c, s = pixel_m * math.cos(yaw), pixel_m * math.sin(yaw)
-    drawn = DrawnLevel(path.stem, 0.0, walls=[affine_transform(area, (c, -s, s, c, x, y)) for area in outlines])
+    drawn = DrawnLevel(
+        path.stem, 0.0, walls=[affine_transform(area, (c, -s, s, c, x - far_x, y - far_y)) for area in outlines]
+    )
     report.units = f"{pixel_m:g} m a pixel (resolution)"
     if noise:
         report.leave_out("specks of less than 4 pixels", noise)
@@ -69,23 +80,21 @@ def _probability(path: Path, fields: dict[str, str], values: Floats) -> Floats:
 
 
 def _fields(path: Path) -> dict[str, str]:
-    """The fields of a flat YAML file; a list below a field in block style is joined as in flow style."""
+    """The fields of a flat YAML file, in block or flow style; a list is joined by commas."""
+    whole = read_text(path).strip()
+    if whole.startswith("{"):
+        whole = FLOW_COMMA.sub("\n", whole.strip("{} \n"))
     fields: dict[str, str] = {}
-    last = ""
-    for line in read_text(path).splitlines():
-        text = line.split(" #")[0].rstrip()
-        if text.lstrip().startswith("- ") and last:
-            fields[last] = f"{fields[last].removesuffix(']').removeprefix('[')},{text.lstrip()[2:]}".strip(",")
-        elif ":" in text and not text.startswith((" ", "#", "\t")):
-            last, _, value = text.partition(":")
-            fields[last] = value.strip().strip("\"'")
+    for name, value in FIELD.findall(whole):
+        items = [item.split(" #")[0].strip().removeprefix("- ") for item in value.strip().splitlines()]
+        fields[name] = ",".join(item.strip(" ,") for item in items if item).strip("\"'")
     return fields
 
 
 def _origin(path: Path, fields: dict[str, str]) -> tuple[float, float, float]:
     """Position (m) and direction (rad) of the picture's lower left corner."""
     parts = fields.get("origin", "0,0,0").strip("[] ").split(",")
-    numbers = [_number(path, {"origin": part}, "origin", LIMIT_M) for part in parts]
+    numbers = [_number(path, {"origin": part}, "origin", EARTH_M) for part in parts]
     if len(numbers) not in (2, 3):
         raise EchostepError(f"{path}: origin: expected [x, y, yaw]")
     return numbers[0], numbers[1], numbers[2] if len(numbers) == 3 else 0.0
@@ -93,13 +102,14 @@ def _origin(path: Path, fields: dict[str, str]) -> tuple[float, float, float]:
 
 def _number(path: Path, fields: dict[str, str], name: str, most: float, otherwise: float | None = None) -> float:
     """A number between -`most` and `most`; `otherwise` when the file has none."""
-    text = fields.get(name)
-    if text is None and otherwise is not None:
+    text = fields.get(name, "").casefold()
+    if text in ("", "~", "null") and otherwise is not None:
         return otherwise
+    text = "1" if text in YES else "0" if text in NO else text
     try:
-        value = float(text or "")
+        value = float(text)
     except ValueError as error:
-        raise EchostepError(f"{path}: {name}: {str(text)[:40]!r} is not a number") from error
+        raise EchostepError(f"{path}: {name}: {text[:40]!r} is not a number") from error
     if not abs(value) <= most:
         raise EchostepError(f"{path}: {name}: {value:g} is not between {-most:g} and {most:g}")
     return value
