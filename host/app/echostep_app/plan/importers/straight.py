@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from echostep.arrays import Bools, Floats
 
 OFF_M = 0.003  # usual greatest distance of a piece from the wall's line
+ROUNDED_M = 1.1e-3  # of an end by the rounding of coordinates, whatever the length of its piece
 GAP_M = 0.003  # greatest gap between two pieces along it
 
 
@@ -67,7 +68,7 @@ def _on_line(wall: Floats, others: Floats, off_m: float) -> Bools:
     off = np.abs(ends[..., 0] * along[1] - ends[..., 1] * along[0]).max(1)
     way = ends @ along
     touching = (way.min(1) <= length + GAP_M) & (way.max(1) >= -GAP_M)
-    straight = off <= np.minimum(off_m, 0.05 * np.maximum(np.ptp(way, axis=1), 1e-9)) + 1e-9
+    straight = off <= np.minimum(off_m, np.maximum(0.05 * np.ptp(way, axis=1), ROUNDED_M))
     inside = (way.min(1) >= -GAP_M) & (way.max(1) <= length + GAP_M) & (off <= off_m)
     return np.asarray(touching & (straight | inside))
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -33,6 +34,11 @@ BESIDE_M = 6.0  # greatest width of a hole in which a door stands beside a windo
 BEYOND_M = 0.3  # so far a wall goes on beyond a leaf that is drawn in it; assumed
 SAME_M = 0.25  # two doors with nearer middles are one, as are two lines across one wall; assumed
 NEAR_JAMB_M = 0.02  # closer faces need no end between them
+THINNEST_PANEL_M, EVEN, FOLDED = (
+    0.1,
+    1.3,
+    1.3,
+)  # of folding doors: least width, ratio of widths, ratio of panels to their part of the gap; assumed
 Line = tuple[float, float, float, float]
 
 
@@ -53,7 +59,9 @@ class PlacedDoors:
 
     def add(self, symbol: Symbol, walls: WallBands) -> None:
         """Place the doors of a symbol."""
-        lines = list(_lines(symbol, walls)) or list(_lines(symbol, walls.wider()))
+        lines = (
+            list(_lines(symbol, walls)) or list(_lines(symbol, walls.wider())) or list(_of_panels(symbol.lines, walls))
+        )
         if not lines and not (symbol.swings or _is_long(symbol.lines)):
             self.marks += 1
         elif not lines:
@@ -225,6 +233,21 @@ def _of_line(lines: Sequence[LineString], walls: WallBands) -> Line | None:
         return found[0]
     corner = next((line for hinge, end in ((a, b), (b, a)) if (line := _across_leaf(hinge, end, walls))), None)
     return corner or ((*a, *b) if gap is None and walls.is_at_wall(a) and walls.is_at_wall(b) else None)
+
+
+def _of_panels(lines: Sequence[LineString], walls: WallBands) -> Iterator[Line]:
+    """The gap of a folding door: panels of one width in a zigzag from a jamb, half of the gap or all of it."""
+    panels = [math.dist(a, b) for line in lines for a, b in pairwise(line.coords)]
+    zigzags = [line for line in lines if not line.is_ring]
+    if len(panels) < 2 or len(zigzags) < len(lines) or not THINNEST_PANEL_M < max(panels) < EVEN * min(panels):
+        return
+    reach_m = sum(panels)
+    for end in (end for line in zigzags for end in (line.coords[0], line.coords[-1])):
+        for u in walls.directions(end):
+            gap = walls.gap(end, u, min(panels), 2 * FOLDED * reach_m)
+            if gap is not None and abs(gap.begin_m) < BY_M and reach_m / FOLDED <= gap.width_m <= 2 * FOLDED * reach_m:
+                yield _line(end, u, gap.begin_m, gap.end_m)
+                return
 
 
 def _is_square(line: Line, walls: WallBands) -> bool:

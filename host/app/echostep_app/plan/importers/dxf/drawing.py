@@ -283,9 +283,10 @@ def _tell_doors(placed: PlacedDoors, report: ImportReport) -> None:
         places = ", ".join(f"x {x:g} y {y:g}" for (x, y), _ in placed.strays[:SHOWN_STRAYS])
         one = len(placed.strays) == 1
         report.leave_out("door in no wall", len(placed.strays))
-        report.doubt(
+        report.doubts.insert(
+            0,
             f"{len(placed.strays)} door{' stands' if one else 's stand'} in no wall and {'was' if one else 'were'} left out ({places}"
-            f"{'' if len(placed.strays) <= SHOWN_STRAYS else ', ...'}): are all layers of walls used?"
+            f"{'' if len(placed.strays) <= SHOWN_STRAYS else ', ...'}): are all layers of walls used?",
         )
 
 
