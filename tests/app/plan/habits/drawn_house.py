@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -121,26 +120,8 @@ def shut(space: Any, gap: Leaf, layer: Layer) -> None:
         space.add_line(one.hinge, one.at(one.width, 0), layer)
 
 
-def swing_alone(space: Any, gap: Leaf, layer: Layer) -> None:
-    for one in leaves(gap):
-        arc(space, one, layer)
-
-
 def two_leaves(space: Any, gap: Leaf, layer: Layer, first: float = 0.6) -> None:
     """One wide leaf and one narrow one."""
     back = (-gap.along[0], -gap.along[1])
     for hinge, along, width in ((gap.hinge, gap.along, first), (gap.at(gap.width, 0), back, gap.width - first)):
         usual(space, Leaf(hinge, along, gap.side, width, gap.thick), layer)
-
-
-def ellipse(space: Any, gap: Leaf, layer: Layer) -> None:
-    """The swing as a part of an ellipse, and a bulge as the other half of it."""
-    (x, y), (p, q) = gap.hinge, gap.at(gap.width, 0)
-    begin, end = (0, math.pi / 2) if gap.along[0] * gap.side[1] > gap.along[1] * gap.side[0] else (-math.pi / 2, 0)
-    space.add_ellipse((x, y), (p - x, q - y), 1.0, begin, end, dxfattribs=layer)
-    space.add_line(gap.hinge, gap.turned(90), layer)
-
-
-def spline(space: Any, gap: Leaf, layer: Layer) -> None:
-    space.add_spline([(*gap.turned(angle), 0) for angle in range(0, 91, 10)], dxfattribs=layer)
-    space.add_line(gap.hinge, gap.turned(90), layer)

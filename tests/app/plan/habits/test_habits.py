@@ -264,13 +264,13 @@ def drawn(**about: Any) -> Any:
 
 
 THICK, SOLID = Right(thick=0.2), Right(thick=0.2, earth=True)
-INSUNITS = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 14: 0.1}
+INSUNITS = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 10: 0.9144, 14: 0.1, 15: 10.0, 22: 0.0254}
 LINES = (offices.outlines, offices.two_faces, offices.four_lines, offices.hatches)
-SYMBOLS = (dxf.shut, dxf.swing_alone, dxf.two_leaves, dxf.ellipse, dxf.spline)
+SYMBOLS = (dxf.shut, dxf.two_leaves)
 IN_BLOCKS: list[dict[str, Any]] = [{}, {"scale": 0.001}, {"mirror": True}]
 DRAWN = [
     *moved("dxf", dxf.files, THICK, (*MOVES, *FAR)),
-    *(cell for code, metre in INSUNITS.items() for cell in moved("dxf", drawn(units=code, unit=metre), THICK, FAR[:1])),
+    *(cell for code, metre in INSUNITS.items() for cell in cells("dxf", "units", drawn(units=code, unit=metre), right=THICK)),
     *cells("dxf", "units", drawn(units=0), asks="does not say its units"),
     *(Cell("dxf", "thick walls", drawn(thick=t, walls=lines), right=Right(t)) for t in (0.3, 0.365, 0.6) for lines in LINES),
     *(Cell("dxf", "thick walls", drawn(thick=thick), move, right=Right(thick)) for thick in (0.3, 0.6) for move in (MOVES[2], FAR[1])),

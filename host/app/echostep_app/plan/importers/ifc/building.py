@@ -19,7 +19,7 @@ import numpy as np
 from echostep.errors import EchostepError
 from echostep.plan import ConnectorKind, Door, Georeference, Plan
 from echostep_app.plan.georeference import EarthTransform
-from echostep_app.plan.importers.connector_shapes import join_connectors
+from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, room
 from echostep_app.plan.importers.far import FAR_M, IN_GRID
 from echostep_app.plan.importers.ifc.bodies import Shapes, SolidBody
@@ -58,14 +58,7 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
         )
     projects = model.by_type("IfcProject")
     name = str((projects[0].LongName or projects[0].Name) if projects else "") or path.stem
-    return Plan(
-        name[:80],
-        tuple(s.level() for s in drawn_levels),
-        None,
-        "",
-        join_connectors(drawn_levels, report),
-        _moved(_georeference(model), model, shapes, report),
-    )
+    return plan_of(name, drawn_levels, report, _moved(_georeference(model), model, shapes, report))
 
 
 def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: ImportReport) -> None:

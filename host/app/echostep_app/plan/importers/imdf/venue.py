@@ -23,7 +23,7 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan import ConnectorKind, Door, DoorState, Georeference, Plan
 from echostep_app.plan.georeference import EarthTransform
-from echostep_app.plan.importers.connector_shapes import join_connectors
+from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, pieces, room
 from echostep_app.plan.importers.geojson import features, geometries, label, properties, shape
 from echostep_app.plan.importers.imdf.archive import Archive
@@ -163,14 +163,7 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
     numbered = {unit.key: (order.index(key), unit) for key in order for unit in units[key]}
     _relationships(archive, earth, numbered, list(drawn_levels.values()), report)
     name = next((venue.name for venue in _features(archive, "venue", earth)), "") or path.stem
-    return Plan(
-        name,
-        tuple(s.level() for s in drawn_levels.values()),
-        None,
-        "",
-        join_connectors(list(drawn_levels.values()), report),
-        georeference,
-    )
+    return plan_of(name, list(drawn_levels.values()), report, georeference)
 
 
 def _file(archive: Archive, kind: str) -> str:

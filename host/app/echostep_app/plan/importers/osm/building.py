@@ -22,7 +22,7 @@ from echostep.errors import EchostepError
 from echostep.fields import LIMIT_M
 from echostep.plan import ConnectorKind, Door, DoorState, Georeference, Plan
 from echostep_app.plan.georeference import EarthTransform
-from echostep_app.plan.importers.connector_shapes import join_connectors
+from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, room
 from echostep_app.plan.importers.osm.elements import Elements, Tags, levels_of, read_osm
 from echostep_app.plan.importers.report import ImportReport
@@ -70,14 +70,7 @@ def import_osm(path: Path, storey_height_m: float, report: ImportReport) -> Plan
     _other(elements, report)
     drawn_levels = [site.drawn_levels[level] for level in levels]
     names = sorted({tags["name"] for *_, tags in elements.lines() if "building" in tags and "name" in tags})
-    return Plan(
-        ", ".join(names)[:80] or path.stem,
-        tuple(drawn.level() for drawn in drawn_levels),
-        None,
-        "",
-        join_connectors(drawn_levels, report),
-        georeference,
-    )
+    return plan_of(", ".join(names) or path.stem, drawn_levels, report, georeference)
 
 
 def _why_empty(elements: Elements) -> str:

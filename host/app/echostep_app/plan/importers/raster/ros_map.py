@@ -18,9 +18,10 @@ from shapely.affinity import affine_transform
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan import Plan
+from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import DrawnLevel
 from echostep_app.plan.importers.far import EARTH_M, IN_GRID, grid_origin
-from echostep_app.plan.importers.parsing import read_text
+from echostep_app.plan.importers.parsing import finite, read_text
 from echostep_app.plan.importers.raster.tracing import grey, trace
 from echostep_app.plan.importers.report import ImportReport
 
@@ -46,10 +47,7 @@ def import_ros_map(path: Path, report: ImportReport) -> Plan:
     x, y, yaw = _origin(path, fields)
     picture = path.parent / fields["image"]
     probability = _probability(path, fields, grey(picture, UNKNOWN))
-    try:
-        outlines, noise = trace(probability > _number(path, fields, "occupied_thresh", 1.0, OCCUPIED))
-    except ValueError as error:
-        raise EchostepError(f"{picture}: {error}") from error
+    outlines, noise = trace(probability > _number(path, fields, "occupied_thresh", 1.0, OCCUPIED), picture)
     if not outlines:
         raise EchostepError(f"{picture}: no pixel is occupied (occupied_thresh, negate): is this the map?")
     far_x, far_y = grid_origin(np.array([[x, y]]))
@@ -65,7 +63,7 @@ def import_ros_map(path: Path, report: ImportReport) -> Plan:
     report.doubt(
         "traced from what a robot saw: furniture and people are walls too, and doors that stood open are gaps; echostep plan edit corrects it"
     )
-    return Plan(path.stem, (drawn.level(),), None, "")
+    return plan_of(path.stem, [drawn], report)
 
 
 def _probability(path: Path, fields: dict[str, str], values: Floats) -> Floats:
@@ -106,10 +104,7 @@ def _number(path: Path, fields: dict[str, str], name: str, most: float, otherwis
     if text in ("", "~", "null") and otherwise is not None:
         return otherwise
     text = "1" if text in YES else "0" if text in NO else text
-    try:
-        value = float(text)
-    except ValueError as error:
-        raise EchostepError(f"{path}: {name}: {text[:40]!r} is not a number") from error
+    value = finite(text, f"{path}: {name}")
     if not abs(value) <= most:
         raise EchostepError(f"{path}: {name}: {value:g} is not between {-most:g} and {most:g}")
     return value
