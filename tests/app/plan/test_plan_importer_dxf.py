@@ -37,15 +37,6 @@ def walls_of(plan: Plan) -> set[tuple[tuple[float, ...], ...]]:
     return {tuple(sorted((tuple(w[:2]), tuple(w[2:])))) for w in plan.levels[0].walls.tolist()}
 
 
-@pytest.mark.parametrize(
-    ("code", "metre"), [(4, 1000.0), (5, 100.0), (6, 1.0), (1, 39.37007874015748), (2, 3.280839895013123)]
-)
-def test_units_are_read(tmp_path: Path, code: int, metre: float) -> None:
-    doc, space = drawing(code)
-    space.add_line((0, 0), (5 * metre, 0), {"layer": "A-WALL"})
-    assert walls_of(imported(doc, tmp_path)) == {((0, 0), (5, 0))}
-
-
 def test_no_units_are_asked_for(tmp_path: Path) -> None:
     doc, space = drawing(0)
     space.add_line((0, 0), (5000, 0), {"layer": "A-WALL"})
@@ -152,15 +143,6 @@ def test_storeys_with_stairs_and_names(tmp_path: Path) -> None:
     assert [room.name for room in plan.levels[1].rooms] == ["Hall first", "Store 2"]
     assert [(c.kind, c.levels) for c in plan.connectors] == [("stairs", (0, 1))]
     assert np.ptp(plan.connectors[0].outline_m, axis=0) == pytest.approx([2.7, 1.0], abs=0.15)
-
-
-def test_a_national_grid_comes_near(tmp_path: Path) -> None:
-    doc, space = drawing()
-    space.add_line((3456789.25, 5678901), (3456799.25, 5678901), {"layer": "A-WALL"})
-    space.add_text("Hall", dxfattribs={"layer": "A-ROOM", "insert": (3456790.25, 5678902)})
-    plan = imported(doc, tmp_path)
-    assert walls_of(plan) == {((0.25, 0), (10.25, 0))}
-    assert plan.levels[0].rooms[0].at_m == (1.25, 1)
 
 
 def test_hostile_drawings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

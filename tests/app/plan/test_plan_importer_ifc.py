@@ -69,11 +69,14 @@ class Model:
         return element
 
     def cut(self, wall: Any, at: tuple[float, float, float], size: tuple[float, float, float]) -> Any:
+        opening = self.box("IfcOpeningElement", at, size)
+        self.add(wall, opening)
+        return opening
+
+    def add(self, wall: Any, opening: Any) -> None:
         from ifcopenshell.api import feature
 
-        opening = self.box("IfcOpeningElement", at, size)
         feature.add_feature(self.file, feature=opening, element=wall)
-        return opening
 
     def fill(self, opening: Any, element: Any) -> None:
         from ifcopenshell.api import feature

@@ -18,7 +18,6 @@ from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.imdf import archive
-from echostep_app.plan.importers.report import ImportReport
 
 LON, LAT = -2.978, 56.46
 EAST, NORTH = 1 / 61_650.0, 1 / 111_360.0  # degrees a metre there
@@ -143,9 +142,7 @@ def changed(name: str, place: int, **about: Any) -> dict[str, Any]:
         (files() | {"unit.geojson": "[1"}, "unit.geojson: not JSON"),
         (files() | {"unit.geojson": "[" * 100_000}, "unit.geojson: not JSON"),
         (files() | {"level.geojson": {"type": "FeatureCollection", "features": []}}, "no levels"),
-        (changed("unit.geojson", 1, properties={"category": "room"}), r"unit features\[1\].properties.level_id"),
         (changed("unit.geojson", 1, properties={"category": 4, "level_id": "L0"}), r"unit.geojson.*category"),
-        (changed("unit.geojson", 1, id=None), r"unit.geojson: features\[1\].id"),
         (
             changed("unit.geojson", 1, geometry={"type": "Polygon", "coordinates": [[[0, 0]]]}),
             r"unit.geojson: features\[1\].geometry",
@@ -269,13 +266,3 @@ def test_indoorgml_is_answered_with_what_to_export(tmp_path: Path, name: str) ->
 def test_doors_are_for_imdf(tmp_path: Path) -> None:
     with pytest.raises(EchostepError, match="--doors is for IMDF alone"):
         import_plan(tmp_path / "plan.osm", Hints(doors_m=0.9))
-
-
-def test_features_of_a_level_that_is_not_there_are_left_out_and_counted(tmp_path: Path) -> None:
-    """Files of another export."""
-    report = ImportReport()
-    tree = changed("unit.geojson", 1, properties={"category": "room", "level_id": "L9"})
-    plan = import_plan(zipped(tmp_path / "a.zip", tree), report=report)
-    assert len(plan.levels) == len(import_plan(zipped(tmp_path / "b.zip", files())).levels)
-    assert report.left_out["unit of a level that level.geojson lacks"] == 1
-    assert any("unit.geojson: 1 of" in doubt for doubt in report.doubts)

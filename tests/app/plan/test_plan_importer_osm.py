@@ -81,13 +81,6 @@ def test_what_becomes_of_a_house(tmp_path: Path) -> None:
     assert plan.georeference.latitude_deg == pytest.approx(LAT, abs=1e-4)
 
 
-def test_geometry_in_the_ways(tmp_path: Path) -> None:
-    """Overpass `out geom` has no nodes of its own."""
-    at = {e["id"]: {"lon": e["lon"], "lat": e["lat"]} for e in HOUSE if e["type"] == "node"}
-    ways = [e | {"geometry": [at[n] for n in e["nodes"]]} for e in HOUSE if e["type"] == "way"]
-    assert len(imported(tmp_path, ways).levels[0].walls) == 5
-
-
 def test_multipolygons_glass_and_locked_doors(tmp_path: Path) -> None:
     members = [{"type": "way", "ref": 30, "role": "outer"}]
     tags = {"type": "multipolygon", "indoor": "room", "level": "2"}
@@ -226,14 +219,3 @@ def test_rooms_without_a_level_are_told(tmp_path: Path) -> None:
     assert report.left_out["room without level"] == 1
     assert report.left_out["indoor=area without level"] == 1
     assert report.doubts[0].startswith("1 room has no level and was left out (way 60)")
-
-
-def test_a_room_drawn_as_a_relation_has_its_name(tmp_path: Path) -> None:
-    """Its outline is two open ways in opposite directions; the hole's walls have no name."""
-    outline = [way(70, [1, 2, 3]), way(71, [1, 4, 3]), way(72, [2, 3, 4, 2])]
-    members = [{"type": "way", "ref": ref, "role": role} for ref, role in ((70, "outer"), (71, "outer"), (72, "inner"))]
-    tags = {"type": "multipolygon", "indoor": "room", "level": "0", "name": "Ring"}
-    relation = {"type": "relation", "id": 7, "members": members, "tags": tags}
-    (tmp_path / "a.json").write_text(json.dumps({"elements": [*HOUSE, *outline, relation]}))
-    plan = import_plan(tmp_path / "a.json")
-    assert sum(room.name == "Ring" for level in plan.levels for room in level.rooms) == 1

@@ -7,6 +7,8 @@ a kilometre.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from echostep.arrays import Floats
@@ -61,15 +63,19 @@ class EarthTransform:
         return np.column_stack(self._to_degrees.transform(east, north))
 
 
-def is_projected(name: str) -> bool:
-    """Whether a coordinate system is in metres; False for one that pyproj does not know."""
-    from pyproj import CRS
+def to_wgs84(name: str) -> Callable[[float, float], tuple[float, float]] | None:
+    """From longitude and latitude in a coordinate system to WGS 84; None for one that pyproj does not know. Raises ValueError for one in metres."""
+    require("a coordinate system", "pyproj")
+    from pyproj import CRS, Transformer
     from pyproj.exceptions import CRSError
 
     try:
-        return not CRS.from_user_input(name).is_geographic
+        crs = CRS.from_user_input(name)
     except CRSError:
-        return False
+        return None
+    if not crs.is_geographic:
+        raise ValueError(f"{name[:60]!r} is not in longitude and latitude")
+    return Transformer.from_crs(crs, WGS84, always_xy=True).transform
 
 
 def earth_of(plan: Plan) -> EarthTransform | None:

@@ -7,6 +7,7 @@ findings a person can answer, and how many are asked.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -21,6 +22,9 @@ from echostep_app.plan.places.spaces import find_spaces
 
 DOORS_M = (0.6, 3.0)  # widths between which nobody asks; assumed: DIN 18040 has 0.8 m and more, closets less
 MOST_WALLS = 50_000  # of a plan that is checked at an import: a few seconds
+SAME_WALL_M = 0.65  # gaps with nearer middles are both faces of one wall; assumed
+MOST_ALIKE = 5  # on a level; more get one answer
+DETAIL = re.compile(r"'[^']*'|\d+([.]\d+)?")
 MOST_QUESTIONS = 60  # of a level: more take longer than two minutes
 
 
@@ -37,9 +41,27 @@ def with_questions(plan: Plan) -> Plan:
 
 
 def _once(questions: list[Question]) -> tuple[Question, ...]:
-    """The first question about each element."""
+    """The first question about each element; more than `MOST_ALIKE` that differ in names and numbers alone are one about all of their lines."""
     by_element = {(question.about, question.lines_m or question.at_m): question for question in reversed(questions)}
-    return tuple(reversed(by_element.values()))[:MOST_QUESTIONS]
+    by_text: dict[tuple[str, bool], list[Question]] = {}
+    for question in reversed(by_element.values()):
+        by_text.setdefault((DETAIL.sub("", question.text), question.is_proposed), []).append(question)
+    groups = [
+        _together(group) if len(group) > MOST_ALIKE and all(q.lines_m for q in group) else group
+        for group in by_text.values()
+    ]
+    return tuple(question for group in groups for question in group)[:MOST_QUESTIONS]
+
+
+def _together(group: list[Question]) -> list[Question]:
+    """One question for all alike: the answer is for each of them."""
+    return [
+        replace(
+            group[0],
+            text=f"{len(group)} alike: {group[0].text}",
+            lines_m=tuple(line for one in group for line in one.lines_m),
+        )
+    ]
 
 
 def _of_finding(finding: PlanFinding, level: Level) -> Iterator[Question]:
@@ -83,9 +105,12 @@ def _of_gaps(plan: Plan, level_index: int) -> Iterator[Question]:
     outlined = {spaces.face_at(*room.at_m): room for room in spaces.outlined}
     outlined.pop(OUTSIDE, None)  # a room that is open, as a balcony, is not the whole outside
     names = {face: room.name for face, room in outlined.items()} | {f: r[0].name for f, r in spaces.names.items()}
+    asked: list[shapely.Point] = []
     for gap, a, b in spaces.doors[len(level.doors) :]:
         name = next((names[face] for face in (a, b) if face in names and face not in listed), None)
-        if name is not None:
+        across = shapely.LineString((gap.line[:2], gap.line[2:])).centroid
+        if name is not None and all(across.distance(other) > SAME_WALL_M for other in asked):
+            asked.append(across)
             x0, y0, x1, y1 = (round(value, 3) for value in gap.line)
             text = f"room {name!r} has no door, but a gap of {gap.width_m:.2f} m: is it a door?"
             yield Question(text, "door", ((x0 + x1) / 2, (y0 + y1) / 2), ((x0, y0, x1, y1),), is_proposed=True)

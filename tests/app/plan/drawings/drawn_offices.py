@@ -315,7 +315,7 @@ WALL_STYLES: Sequence[Walls] = (
     faces_of_bodies, filled, mirrored_axes, scaled_blocks,
 )  # fmt: skip
 DOOR_STYLES: Sequence[Doors] = (
-    usual, on_layer_0, thick_leaf, opened_a_little, coarse, both_ways, single_blocks, sliding, pocket, two_panels, thresholds,
+    usual, on_layer_0, thick_leaf, opened_a_little, coarse, both_ways, single_blocks, sliding, pocket, two_panels, thresholds, folding,
 )  # fmt: skip
 
 

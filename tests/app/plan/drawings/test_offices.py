@@ -66,12 +66,14 @@ def test_a_mirrored_block_and_what_stands_beside_the_walls(tmp_path: Path) -> No
         assert is_right(plan), facts(plan)
 
 
-@pytest.mark.parametrize("door", [drawn.nothing, drawn.folding])
-def test_a_room_behind_a_gap_is_asked_about(tmp_path: Path, door: Doors) -> None:
-    plan = with_questions(import_plan(write_office(tmp_path / "a.dxf", door=door)))
-    texts = [question.text for question in plan.levels[0].questions if question.is_proposed]
+def test_rooms_behind_gaps_are_asked_about_at_once(tmp_path: Path) -> None:
+    """One question for seven doors, of each the gap in one face of its wall."""
+    plan = with_questions(import_plan(write_office(tmp_path / "a.dxf", door=drawn.nothing)))
     assert plan.levels[0].doors == ()
-    assert len([text for text in texts if "has no door, but a gap" in text]) == len(texts) > 0
+    (question,) = plan.levels[0].questions
+    assert question.text.startswith("7 alike: room ")
+    assert question.is_proposed
+    assert len(question.lines_m) == 7
 
 
 def test_double_doors_without_a_swing_are_told(tmp_path: Path) -> None:

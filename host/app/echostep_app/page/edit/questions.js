@@ -7,7 +7,7 @@ import { cutDoor, distance, ends, fillDoor, foot, length, onGrid, same } from '.
 const WALL_REACH_M = 1; // a door is put into a wall that is nearer than this
 
 const alike = (a, b) => ends(a).every((end, k) => same(end, ends(b)[k]));
-const doorOf = (level, { lines }) => (level.doors ?? []).findIndex((door) => lines.length && alike(door.line, lines[0]));
+const doorOf = (level, { lines }) => (level.doors ?? []).findIndex((door) => lines.some((line) => alike(door.line, line)));
 const roomOf = (level, { at }) => (level.rooms ?? []).findIndex((room) => same(room.at, at));
 const without = (level, question) => ({ ...level, questions: level.questions.filter((other) => other !== question) });
 
@@ -33,13 +33,16 @@ export function reject(level, question) {
   const left = without(level, question);
   if (question.proposed) return left;
   if (question.about === 'room') return { ...left, rooms: left.rooms.toSpliced(roomOf(left, question), 1) };
-  if (question.about === 'door') return fillDoor(left, doorOf(left, question)).level;
+  if (question.about === 'door') return question.lines.reduce((kept, line) => {
+    const k = doorOf(kept, { lines: [line] });
+    return k < 0 ? kept : fillDoor(kept, k).level;
+  }, left);
   return { ...left, walls: left.walls.filter((wall) => !question.lines.some((line) => alike(wall, line))) };
 }
 
-// Put a door or a room where it belongs: a door into the wall nearest to p. Null where there is none, or for walls.
+// Put a door or a room where it belongs: a door into the wall nearest to p. Null where there is none, for walls, and for many doors.
 export function put(level, question, p) {
-  if (question.about === 'wall') return null;
+  if (question.about === 'wall' || question.lines.length > 1) return null;
   const left = without(level, question);
   if (question.about === 'room') {
     const k = roomOf(left, question);

@@ -10,11 +10,19 @@ from collections.abc import Sequence
 
 from shapely.geometry import Polygon
 
-from echostep.plan import Connector
+from echostep.plan import Connector, Georeference, Plan
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, ring
 from echostep_app.plan.importers.report import ImportReport
 
 SHARED = 0.4  # shapes that share more than this part of the smaller area are one staircase; assumed
+
+
+def plan_of(
+    name: str, drawn_levels: Sequence[DrawnLevel], report: ImportReport, georeference: Georeference | None = None
+) -> Plan:
+    """The plan of levels, from the lowest, and the connectors between them."""
+    levels = tuple(drawn.level() for drawn in drawn_levels)
+    return Plan(name[:80], levels, None, "", join_connectors(drawn_levels, report), georeference)
 
 
 def join_connectors(drawn_levels: Sequence[DrawnLevel], report: ImportReport) -> tuple[Connector, ...]:

@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,7 @@ OTHERS = {
     ".zip",
     *NEXT_STEPS,
 }  # files that are not read as plan.json
+HALF_STOREY_M = 1.5  # closer levels are told; assumed
 SNIFFED_BYTES = 4096  # read to recognise a format
 
 
@@ -89,7 +91,13 @@ def import_plan(
         raise EchostepError(
             f"{path}: {' and '.join(given)} {'is' if len(given) == 1 else 'are'} for drawings (DXF) alone"
         )
-    plan = _imported(path, hints, above, ImportReport() if report is None else report)
+    report = ImportReport() if report is None else report
+    plan = _imported(path, hints, above, report)
+    for low, high in pairwise(plan.levels):
+        if (apart_m := high.height_m - low.height_m) < HALF_STOREY_M:
+            report.doubt(
+                f"levels {low.name} and {high.name} are {apart_m:.2f} m apart: half storeys, or reference levels?"
+            )
     return replace(plan, digest=hashlib.sha256(plan_json(plan).encode()).hexdigest())
 
 

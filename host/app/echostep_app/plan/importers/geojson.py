@@ -2,23 +2,27 @@
 """GeoJSON features -> shapes in map metres.
 
 In: a parsed FeatureCollection [RFC 7946]. Out: features with their path in the file, properties, shapes. Owns nothing. Errors are ValueErrors that
-name the feature.
+name the feature. Coordinates in another datum, stated by the older field crs [GeoJSON 2008, 3], become WGS 84; projected ones are refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, MultiLineString, MultiPolygon, Point, Polygon
+from shapely.geometry import GeometryCollection, LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Floats
 from echostep.fields import LIMIT_M
-from echostep_app.plan.georeference import EarthTransform, is_projected
-from echostep_app.plan.importers.parsing import PROJECTED, text, typed
+from echostep_app.plan.georeference import EarthTransform, to_wgs84
+from echostep_app.plan.importers.parsing import PROJECTED, number, text, typed
+
+SINGLE = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
+DEEPEST = {"Point": 0, "LineString": 1, "Polygon": 2}  # lists around a position
+Place = tuple[float, float]
 
 
 def features(tree: Any) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -26,17 +30,51 @@ def features(tree: Any) -> Iterator[tuple[str, dict[str, Any]]]:
     tree = typed(tree, "the file", dict)
     if tree.get("type") != "FeatureCollection":
         raise ValueError(f"type: {str(tree.get('type'))[:40]!r} is not a FeatureCollection")
-    _check_crs(tree.get("crs"))
+    datum = _datum(tree.get("crs"))
     for i, feature in enumerate(typed(tree.get("features"), "features", list)):
-        yield f"features[{i}]", typed(feature, f"features[{i}]", dict)
+        feature = typed(feature, f"features[{i}]", dict)
+        yield f"features[{i}]", feature if datum is None else feature | {"datum": datum}
 
 
-def _check_crs(crs: Any) -> None:
-    """Raise ValueError for the older field crs [GeoJSON 2008, 3] when it names a projected system."""
+def _datum(crs: Any) -> Callable[[float, float], Place] | None:
+    """From a stated datum to WGS 84; None without one. Raises ValueError for a projected system."""
     about = crs.get("properties") if isinstance(crs, dict) else None
     name = str(about.get("name"))[:60] if isinstance(about, dict) else ""
-    if name and is_projected(name):
-        raise ValueError(f"crs {name}: {PROJECTED}")
+    try:
+        return to_wgs84(name) if name else None
+    except ValueError as error:
+        raise ValueError(f"crs {name}: {PROJECTED}") from error
+
+
+def geometries(feature: dict[str, Any], where: str) -> Iterator[tuple[str, Any, str]]:
+    """Points, lines and polygons of a feature, also those in collections: kind, nested positions as (longitude, latitude), path in the file."""
+    stack = [] if feature.get("geometry") is None else [(feature["geometry"], f"{where}.geometry")]
+    while stack:
+        value, at = stack.pop()
+        geometry = typed(value, at, dict)
+        kind, nested = geometry.get("type"), geometry.get("coordinates")
+        if kind == "GeometryCollection":
+            parts = typed(geometry.get("geometries"), f"{at}.geometries", list)
+            stack += [(part, f"{at}.geometries[{i}]") for i, part in enumerate(parts)][::-1]
+        elif kind in SINGLE:
+            nested = typed(nested, f"{at}.coordinates", list)
+            stack += [({"type": SINGLE[kind], "coordinates": part}, at) for part in nested][::-1]
+        elif kind in DEEPEST:
+            at = f"{at}.coordinates"
+            yield kind, _places(nested, at, DEEPEST[kind], feature.get("datum")), at
+        else:
+            raise ValueError(f"{at}: {str(kind)[:40]!r} is no type of geometry: expected points, lines or polygons")
+
+
+def _places(nested: Any, where: str, depth: int, datum: Callable[[float, float], Place] | None) -> Any:
+    """Nested positions as pairs in WGS 84."""
+    rows = typed(nested, where, list)
+    if depth:
+        return [_places(row, where, depth - 1, datum) for row in rows]
+    if len(rows) < 2:
+        raise ValueError(f"{where}: expected [longitude, latitude]")
+    lon, lat = number(rows[0], where, 180.0, "degrees"), number(rows[1], where, 90.0, "degrees")
+    return (lon, lat) if datum is None else datum(lon, lat)
 
 
 def properties(feature: dict[str, Any], where: str) -> dict[str, Any]:
@@ -55,34 +93,26 @@ def label(value: Any, where: str) -> str:
 
 
 def shape(feature: dict[str, Any], where: str, earth: EarthTransform) -> BaseGeometry:
-    """The feature's geometry in map metres; an empty polygon when it has none."""
-    if feature.get("geometry") is None:
-        return Polygon()
-    where = f"{where}.geometry"
-    geometry = typed(feature["geometry"], where, dict)
-    kind, nested = geometry.get("type"), geometry.get("coordinates")
-    where = f"{where}.coordinates"
-    match kind:
-        case "Point":
-            return Point(*_metres([nested], where, earth))
-        case "LineString":
-            return _line(nested, where, earth)
-        case "MultiLineString":
-            return MultiLineString([_line(line, where, earth) for line in typed(nested, where, list)])
-        case "Polygon":
-            return _polygon(nested, where, earth)
-        case "MultiPolygon":
-            return MultiPolygon([_polygon(rings, where, earth) for rings in typed(nested, where, list)])
-    raise ValueError(
-        f"{where}: {str(kind)[:40]!r} is not a type of geometry that plans use: expected a point, lines or polygons"
-    )
+    """The feature's geometry in map metres; an empty one when it has none."""
+    parts = [_shape(kind, nested, at, earth) for kind, nested, at in geometries(feature, where)]
+    return parts[0] if len(parts) == 1 else GeometryCollection(parts)
+
+
+def _shape(kind: str, nested: Any, where: str, earth: EarthTransform) -> BaseGeometry:
+    if kind == "Point":
+        return Point(*_metres([nested], where, earth))
+    if kind == "LineString":
+        if len(nested) < 2:
+            raise ValueError(f"{where}: a line needs two positions")
+        return LineString(_metres(nested, where, earth))
+    return _polygon(nested, where, earth)
 
 
 def _polygon(rings: Any, where: str, earth: EarthTransform) -> Polygon:
     """A polygon from its rings; if it crosses itself, its largest valid part."""
-    rings = [_metres(corners, where, earth) for corners in typed(rings, where, list)]
     if not rings or any(len(corners) < 4 for corners in rings):
         raise ValueError(f"{where}: a polygon needs rings of four positions or more")
+    rings = [_metres(corners, where, earth) for corners in rings]
     polygon = Polygon(rings[0], rings[1:])
     if polygon.is_valid:
         return polygon
@@ -90,25 +120,9 @@ def _polygon(rings: Any, where: str, earth: EarthTransform) -> Polygon:
     return max(parts, key=lambda part: part.area, default=Polygon())
 
 
-def _line(positions: Any, where: str, earth: EarthTransform) -> LineString:
-    metres = _metres(positions, where, earth)
-    if len(metres) < 2:
-        raise ValueError(f"{where}: a line needs two positions")
-    return LineString(metres)
-
-
-def _metres(positions: Any, where: str, earth: EarthTransform) -> Floats:
-    """[[longitude, latitude, ...], ...] -> (n, 2) map metres."""
-    rows = typed(positions, where, list)
-    if not all(isinstance(row, list) and len(row) >= 2 for row in rows):
-        raise ValueError(f"{where}: expected positions [longitude, latitude]")
-    pairs = [row[:2] for row in rows]
-    if not all(type(value) in (int, float) for pair in pairs for value in pair):
-        raise ValueError(f"{where}: a coordinate is not a number")
-    try:
-        metres = earth.metres(np.array(pairs, dtype=np.float64).reshape(-1, 2))
-    except (OverflowError, ValueError) as error:
-        raise ValueError(f"{where}: {error}") from error
+def _metres(places: list[Place], where: str, earth: EarthTransform) -> Floats:
+    """(n, 2) map metres of positions."""
+    metres = earth.metres(np.array(places, dtype=np.float64).reshape(-1, 2))
     if not (np.abs(metres) <= LIMIT_M).all():
         raise ValueError(f"{where}: further than {LIMIT_M / 1000:.0f} km from the plan's origin")
     return metres

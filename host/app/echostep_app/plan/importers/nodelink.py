@@ -9,19 +9,20 @@ left out. The start is left out too, because the format does not state the direc
 from __future__ import annotations
 
 import csv
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 from shapely.geometry import LineString, Polygon
 
 from echostep.errors import EchostepError
 from echostep.fields import LIMIT_M
 from echostep.plan import Plan
-from echostep_app.plan.importers.connector_shapes import join_connectors
+from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas
-from echostep_app.plan.importers.parsing import read_text
+from echostep_app.plan.importers.far import IN_GRID, grid_origin
+from echostep_app.plan.importers.parsing import beside, finite, read_text
 from echostep_app.plan.importers.report import ImportReport
 
 MOST_FLOORS = 200
@@ -41,7 +42,7 @@ def import_nodelink(core: Path, report: ImportReport) -> Plan:
     settings = {row[0]: row[1:] for _, row in _rows(core, 1)}
     levels = int(_setting(core, settings, "floor", MOST_FLOORS))
     height_m = _setting(core, settings, "height", 100.0)
-    nodes = _nodes(_beside(core, settings, "node"), levels, _setting(core, settings, "scale", 1000.0))
+    nodes = _nodes(_beside(core, settings, "node"), levels, _setting(core, settings, "scale", 1000.0), report)
     drawn_levels = [DrawnLevel(f"floor {i}", i * height_m) for i in range(levels)]
     for where, row in _rows(_beside(core, settings, "link"), 4, skip=1):
         a, b = (_node(nodes, text, where) for text in row[2:4])
@@ -52,23 +53,27 @@ def import_nodelink(core: Path, report: ImportReport) -> Plan:
         else:
             report.leave_out("link without length")
     _stairs(core, settings, nodes, drawn_levels, report)
-    return Plan(
-        core.parent.name, tuple(s.level() for s in drawn_levels), None, "", join_connectors(drawn_levels, report)
-    )
+    return plan_of(core.parent.name, drawn_levels, report)
 
 
-def _nodes(path: Path, levels: int, scale_m: float) -> dict[str, Node]:
+def _nodes(path: Path, levels: int, scale_m: float, report: ImportReport) -> dict[str, Node]:
     """All nodes in metres; y points up and is 0 at the lowest node."""
-    nodes = {}
+    rows = []
     for where, row in _rows(path, 4, skip=1):
-        layer, x, y = (_number(text, where) for text in row[1:4])
+        layer, x, y = (finite(text, where) for text in row[1:4])
         if layer not in range(levels):
             raise EchostepError(f"{where}: floor {row[1]} of {levels}")
-        if max(abs(x), abs(y)) * scale_m > LIMIT_M / 2:
-            raise EchostepError(f"{where}: further than {LIMIT_M / 2000:.0f} km from the origin")
-        nodes[row[0]] = Node(int(layer), round(x * scale_m, 3), -y * scale_m)
-    lowest = min((node.y_m for node in nodes.values()), default=0.0)
-    return {key: node._replace(y_m=round(node.y_m - lowest, 3)) for key, node in nodes.items()}
+        rows.append((where, row[0], int(layer), x * scale_m, -y * scale_m))
+    lowest = min((y for *_, y in rows), default=0.0)
+    far_x, _ = grid_origin(np.array([(x, 0.0) for *_, x, _ in rows]).reshape(-1, 2))
+    if far_x:
+        report.doubt(IN_GRID.format("the building", far_x, lowest))
+    nodes = {}
+    for where, key, layer, x, y in rows:
+        nodes[key] = Node(layer, round(x - far_x, 3), round(y - lowest, 3))
+        if max(abs(nodes[key].x_m), nodes[key].y_m) > LIMIT_M:
+            raise EchostepError(f"{where}: further than {LIMIT_M / 1000:.0f} km from the origin: is scale right?")
+    return nodes
 
 
 def _stairs(
@@ -117,28 +122,15 @@ def _rows(path: Path, least: int, skip: int = 0) -> Iterator[tuple[str, list[str
 def _setting(core: Path, settings: dict[str, list[str]], key: str, most: float) -> float:
     """A number from core.txt, greater than 0 and at most `most`."""
     text = (settings.get(key) or [""])[0]
-    value = _number(text, f"{core}: {key}")
+    value = finite(text, f"{core}: {key}")
     if not 0.0 < value <= most:
         raise EchostepError(f"{core}: {key}: {text[:40]!r} is not between 0 and {most:g}")
     return value
 
 
 def _beside(core: Path, settings: dict[str, list[str]], key: str) -> Path:
-    """The file that core.txt names for `key`; it must be in the same folder."""
-    name = (settings.get(key) or [f"{key}.txt"])[0]
-    if Path(name).name != name or "\x00" in name:
-        raise EchostepError(f"{core}: {key}: {name[:60]!r} is not a file beside core.txt")
-    return core.parent / name
-
-
-def _number(text: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError as error:
-        raise EchostepError(f"{where}: {text[:40]!r} is not a number") from error
-    if not math.isfinite(value):
-        raise EchostepError(f"{where}: {text[:40]!r} is not finite")
-    return value
+    """The file that core.txt names for `key`."""
+    return beside(core, (settings.get(key) or [f"{key}.txt"])[0], key)
 
 
 def _node(nodes: dict[str, Node], text: str, where: str) -> Node:

@@ -63,6 +63,24 @@ def number(value: Any, where: str, limit: float, unit: str) -> float:
     return float(value)
 
 
+def finite(text: str, where: str) -> float:
+    """The finite number that a text stands for; raises EchostepError."""
+    try:
+        value = float(text)
+    except ValueError as error:
+        raise EchostepError(f"{where}: {text[:40]!r} is not a number") from error
+    if not math.isfinite(value):
+        raise EchostepError(f"{where}: {text[:40]!r} is not finite")
+    return value
+
+
+def beside(file: Path, name: str, where: str) -> Path:
+    """The file of a name in the folder of another file, and nowhere else; raises EchostepError."""
+    if Path(name).name != name or name in ("", "..") or "\x00" in name:
+        raise EchostepError(f"{file}: {where}: {name[:60]!r} is not a file beside {file.name}")
+    return file.parent / name
+
+
 def text(value: Any, where: str) -> str:
     """A string that can be written as UTF-8."""
     if not isinstance(value, str) or any("\ud800" <= letter <= "\udfff" for letter in value):

@@ -1,39 +1,52 @@
 # SPDX-License-Identifier: MIT
-"""Merges the pieces of a straight wall into one segment.
+"""Lines to straight pieces; merges the pieces of a straight wall into one segment.
 
-In: segments (n, 4) in metres, in any order, overlapping or repeated. Out: fewer segments that cover the same points. Owns nothing.
+In: lines; segments (n, 4) in metres, in any order, overlapping or repeated. Out: fewer segments that cover the same points. Owns nothing.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Bools, Floats
 
-OFF_M = 0.003  # greatest distance of a piece from the wall's line
+OFF_M = 0.003  # usual greatest distance of a piece from the wall's line
+ROUNDED_M = 1.1e-3  # of an end by the rounding of coordinates, whatever the length of its piece
 GAP_M = 0.003  # greatest gap between two pieces along it
 
 
-def merge_collinear(segments: Floats) -> Floats:
-    """Join pieces that continue or cover each other. Ends of joined walls are ends of pieces; walls are ordered by their longest piece."""
+def pieces_of(lines: Sequence[BaseGeometry]) -> Floats:
+    """The straight pieces (n, 4) of lines."""
+    rows = [np.zeros((0, 4))]
+    for line in lines:
+        points = shapely.get_coordinates(line)
+        rows.append(np.concatenate((points[:-1], points[1:]), axis=1))
+    return np.concatenate(rows)
+
+
+def merge_collinear(segments: Floats, off_m: float = OFF_M) -> Floats:
+    """Join pieces that continue or cover each other, up to `off_m` beside the line. Walls end where pieces do; the longest piece's comes first."""
     if not len(segments):
         return segments
     segments = segments[np.argsort(-np.hypot(*(segments[:, 2:] - segments[:, :2]).T), kind="stable")]
     tree = shapely.STRtree(shapely.linestrings(segments.reshape(-1, 2, 2)))
     free = np.ones(len(segments), dtype=bool)
-    walls = [_grown(i, segments, tree, free) for i in range(len(segments)) if free[i]]
+    walls = [_grown(i, segments, tree, free, off_m) for i in range(len(segments)) if free[i]]
     return np.array(walls)
 
 
-def _grown(i: int, segments: Floats, tree: shapely.STRtree, free: Bools) -> Floats:
+def _grown(i: int, segments: Floats, tree: shapely.STRtree, free: Bools, off_m: float) -> Floats:
     """The wall that grows from piece i by every free piece (mask `free`) that lies on its line and touches it."""
     wall, fresh = segments[i], True
     free[i] = False
     while fresh:
-        near = tree.query(shapely.box(*_bounds(wall)))
+        near = tree.query(shapely.box(*_bounds(wall, max(GAP_M, off_m))))
         near = near[free[near]]
-        near = near[_on_line(wall, segments[near])]
+        near = near[_on_line(wall, segments[near], off_m)]
         fresh = len(near) > 0
         if fresh:
             free[near] = False
@@ -41,12 +54,12 @@ def _grown(i: int, segments: Floats, tree: shapely.STRtree, free: Bools) -> Floa
     return wall
 
 
-def _bounds(wall: Floats) -> tuple[float, float, float, float]:
+def _bounds(wall: Floats, by_m: float) -> tuple[float, float, float, float]:
     x, y = wall[::2], wall[1::2]
-    return x.min() - GAP_M, y.min() - GAP_M, x.max() + GAP_M, y.max() + GAP_M
+    return x.min() - by_m, y.min() - by_m, x.max() + by_m, y.max() + by_m
 
 
-def _on_line(wall: Floats, others: Floats) -> Bools:
+def _on_line(wall: Floats, others: Floats, off_m: float) -> Bools:
     """Mask (n,) of the pieces that lie on the wall's line and touch the wall."""
     start, along = wall[:2], wall[2:] - wall[:2]
     length = np.hypot(*along)
@@ -55,8 +68,8 @@ def _on_line(wall: Floats, others: Floats) -> Bools:
     off = np.abs(ends[..., 0] * along[1] - ends[..., 1] * along[0]).max(1)
     way = ends @ along
     touching = (way.min(1) <= length + GAP_M) & (way.max(1) >= -GAP_M)
-    straight = off <= np.minimum(OFF_M, 0.05 * np.maximum(np.ptp(way, axis=1), 1e-9)) + 1e-9
-    inside = (way.min(1) >= -GAP_M) & (way.max(1) <= length + GAP_M) & (off <= OFF_M)
+    straight = off <= np.minimum(off_m, np.maximum(0.05 * np.ptp(way, axis=1), ROUNDED_M))
+    inside = (way.min(1) >= -GAP_M) & (way.max(1) <= length + GAP_M) & (off <= off_m)
     return np.asarray(touching & (straight | inside))
 
 

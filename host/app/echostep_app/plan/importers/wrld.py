@@ -18,10 +18,10 @@ from echostep.errors import EchostepError
 from echostep.fields import Longitude, Text, checked
 from echostep.plan import Door, Georeference, Plan
 from echostep_app.plan.georeference import EarthTransform
-from echostep_app.plan.importers.connector_shapes import join_connectors, same_place
+from echostep_app.plan.importers.connector_shapes import plan_of, same_place
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, opening, room
 from echostep_app.plan.importers.geojson import features, label, properties, shape
-from echostep_app.plan.importers.parsing import parse_json, read_text, text
+from echostep_app.plan.importers.parsing import beside, parse_json, read_text, text
 from echostep_app.plan.importers.report import ImportReport
 
 CONNECTOR_KINDS = {"stairs": "stairs", "elevator": "lift", "escalator": "stairs", "ramp": "ramp"}
@@ -59,7 +59,7 @@ def import_wrld(path: Path, storey_height_m: float, report: ImportReport) -> Pla
     """Import the building of a main.json; raises EchostepError that names the file and the feature."""
     try:
         building = checked(parse_json(read_text(path), str(path)), BuildingFields)
-        files = [_beside(row.filename, f"levels[{i}]", path.parent) for i, row in enumerate(building.levels)]
+        files = [beside(path, row.filename, f"levels[{i}].filename") for i, row in enumerate(building.levels)]
     except ValueError as error:
         raise EchostepError(f"{path}: {error}") from error
     longitude, latitude = building.location.coordinates[:2]
@@ -72,21 +72,7 @@ def import_wrld(path: Path, storey_height_m: float, report: ImportReport) -> Pla
         for row, file in sorted(zip(building.levels, files, strict=True), key=lambda pair: pair[0].z_order)
     ]
     _open_levels(drawn_levels)
-    return Plan(
-        building.name or path.parent.name,
-        tuple(drawn.level() for drawn in drawn_levels),
-        None,
-        "",
-        join_connectors(drawn_levels, report),
-        georeference,
-    )
-
-
-def _beside(file: str, where: str, folder: Path) -> Path:
-    """A level's file, which must be in the folder of main.json."""
-    if Path(file).name != file or file in ("", "..") or "\x00" in file:
-        raise ValueError(f"{where}.filename: {file[:60]!r} is not a file beside main.json")
-    return folder / file
+    return plan_of(building.name or path.parent.name, drawn_levels, report, georeference)
 
 
 def _level(file: Path, drawn: DrawnLevel, earth: EarthTransform, report: ImportReport) -> DrawnLevel:

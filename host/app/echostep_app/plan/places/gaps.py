@@ -11,9 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from echostep.arrays import Bools, Floats, Ints
 from echostep.plan import Door, Level
+
+Areas = NDArray[np.object_]
 
 # Assumed:
 NARROWEST_M, WIDEST_M = 0.5, 1.6  # of an opening that a door could close
@@ -22,6 +25,8 @@ LONGEST_FACED_M = (
     1.2  # the same of a jamb that another one of its length faces across an opening: old walls are that thick
 )
 TOUCH_M = 0.02  # walls with a smaller distance touch
+BESIDE_M = 5e-3  # a wall's end this far beside an opening's line ends it: coordinates are rounded
+AWRY_M = 0.05  # from there to where the line crosses that wall: beyond, it runs along the wall
 SAME_M = 0.1  # two gaps with nearer middles are one, found from both its ends
 STRAIGHT = 0.99  # cosine of the angle up to which a face runs straight away from its opening
 THICKNESS_M = 0.05  # an opening ends at this distance from its own wall's end at the earliest
@@ -39,13 +44,20 @@ def door_gaps(level: Level) -> tuple[Door, ...]:
         return ()
     near, far = begin + THICKNESS_M * outward, begin + WIDEST_M * outward
     rays = shapely.linestrings(np.stack((near, far), axis=1))
-    ray, wall = tree.query(rays, predicate="intersects")
-    reach_m = THICKNESS_M + shapely.distance(shapely.points(near[ray]), shapely.intersection(rays[ray], lines[wall]))
+    ray, wall = tree.query(rays, predicate="dwithin", distance=BESIDE_M)
+    reach_m = THICKNESS_M + _reach_m(shapely.points(near[ray]), rays[ray], lines[wall])
     nearest_m = np.full(len(begin), np.inf)
     np.minimum.at(nearest_m, ray, reach_m)
     fits = (nearest_m >= NARROWEST_M) & np.isfinite(nearest_m)
     gaps = np.concatenate((begin[fits], (begin + np.where(fits, nearest_m, 0.0)[:, None] * outward)[fits]), axis=1)
     return tuple(Door((float(a), float(b), float(c), float(d))) for a, b, c, d in _once(gaps))
+
+
+def _reach_m(begin: Areas, rays: Areas, walls: Areas) -> Floats:
+    """How far each ray (n,) is free: to where it crosses its wall, or runs into the wall's end within `BESIDE_M`, whatever the last bit says."""
+    crossing = shapely.distance(begin, shapely.intersection(rays, walls))
+    beside = shapely.distance(begin, shapely.intersection(shapely.buffer(rays, BESIDE_M, cap_style="flat"), walls))
+    return np.where(crossing < beside + AWRY_M, crossing, beside)
 
 
 def with_gaps(level: Level) -> Level:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -19,7 +20,7 @@ from shapely.geometry.base import BaseGeometry
 
 from echostep.plan import Door, Question
 from echostep_app.plan.importers.drawn_level import opening
-from echostep_app.plan.importers.dxf.gaps import BY_M, NEAR_M, Gap, WallBands
+from echostep_app.plan.importers.dxf.gaps import BY_M, NEAR_M, THICKEST_M, Gap, WallBands
 from echostep_app.plan.importers.dxf.symbols import NARROWEST_M, Point, Swing, Symbol
 
 LONG = 2.5  # least ratio of a leaf's length to its thickness; assumed
@@ -30,10 +31,14 @@ MOST_OFF_M = 0.3  # from both jambs together; assumed
 TIP_M = 0.1  # least visible part of a sliding leaf in its gap; assumed
 FRAME_M = 0.2  # width that a gap may have beyond that: frame; assumed
 BESIDE_M = 6.0  # greatest width of a hole in which a door stands beside a window; assumed
-THICKEST_M = 0.5  # of a wall that is drawn through a door
 BEYOND_M = 0.3  # so far a wall goes on beyond a leaf that is drawn in it; assumed
 SAME_M = 0.25  # two doors with nearer middles are one, as are two lines across one wall; assumed
 NEAR_JAMB_M = 0.02  # closer faces need no end between them
+THINNEST_PANEL_M, EVEN, FOLDED = (
+    0.1,
+    1.3,
+    1.3,
+)  # of folding doors: least width, ratio of widths, ratio of panels to their part of the gap; assumed
 Line = tuple[float, float, float, float]
 
 
@@ -54,7 +59,9 @@ class PlacedDoors:
 
     def add(self, symbol: Symbol, walls: WallBands) -> None:
         """Place the doors of a symbol."""
-        lines = list(_lines(symbol, walls)) or list(_lines(symbol, walls.wider()))
+        lines = (
+            list(_lines(symbol, walls)) or list(_lines(symbol, walls.wider())) or list(_of_panels(symbol.lines, walls))
+        )
         if not lines and not (symbol.swings or _is_long(symbol.lines)):
             self.marks += 1
         elif not lines:
@@ -93,7 +100,7 @@ class PlacedDoors:
         return any(_same(line, other.line) for other in self.doors)
 
     def _place(self, line: Line, walls: WallBands) -> None:
-        """Add a door in a gap, in the middle of the wall where its symbol is drawn beside it, and the ends of the wall."""
+        """Add a door in a gap, in the middle of the wall, wherever its symbol is drawn, and the ends of the wall."""
         (u, v), ends = _along(line), (line[:2], line[2:])
         spans = [walls.wall_at(end, (side * u, side * v)) for end, side in zip(ends, (-1, 1), strict=True)]
         left = [
@@ -101,11 +108,7 @@ class PlacedDoors:
             for span, side in zip(spans, (-1, 1), strict=True)
         ]
         found = [span for span in left if span is not None]
-        off = (
-            0.0
-            if any(low <= 0.0 <= high for low, high in found)
-            else sum(low + high for low, high in found) / (2 * len(found) or 1)
-        )
+        off = sum(low + high for low, high in found) / (2 * len(found) or 1)
         moved = _line((line[0] - off * v, line[1] + off * u), (u, v), 0.0, math.dist(*ends))
         if self._has(moved):
             return
@@ -230,6 +233,21 @@ def _of_line(lines: Sequence[LineString], walls: WallBands) -> Line | None:
         return found[0]
     corner = next((line for hinge, end in ((a, b), (b, a)) if (line := _across_leaf(hinge, end, walls))), None)
     return corner or ((*a, *b) if gap is None and walls.is_at_wall(a) and walls.is_at_wall(b) else None)
+
+
+def _of_panels(lines: Sequence[LineString], walls: WallBands) -> Iterator[Line]:
+    """The gap of a folding door: panels of one width in a zigzag from a jamb, half of the gap or all of it."""
+    panels = [math.dist(a, b) for line in lines for a, b in pairwise(line.coords)]
+    zigzags = [line for line in lines if not line.is_ring]
+    if len(panels) < 2 or len(zigzags) < len(lines) or not THINNEST_PANEL_M < max(panels) < EVEN * min(panels):
+        return
+    reach_m = sum(panels)
+    for end in (end for line in zigzags for end in (line.coords[0], line.coords[-1])):
+        for u in walls.directions(end):
+            gap = walls.gap(end, u, min(panels), 2 * FOLDED * reach_m)
+            if gap is not None and abs(gap.begin_m) < BY_M and reach_m / FOLDED <= gap.width_m <= 2 * FOLDED * reach_m:
+                yield _line(end, u, gap.begin_m, gap.end_m)
+                return
 
 
 def _is_square(line: Line, walls: WallBands) -> bool:

@@ -20,14 +20,13 @@ from shapely.geometry.base import BaseGeometry
 
 from echostep.errors import EchostepError
 from echostep.plan import ConnectorKind, Plan, Question
-from echostep_app.plan.importers.connector_shapes import join_connectors
+from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas
 from echostep_app.plan.importers.dxf.doors import PlacedDoors
 from echostep_app.plan.importers.dxf.entities import parts
 from echostep_app.plan.importers.dxf.frame import DrawingFrame
 from echostep_app.plan.importers.dxf.gaps import WallBands
-from echostep_app.plan.importers.dxf.layers import pieces_of
-from echostep_app.plan.importers.dxf.rooms import rooms_of
+from echostep_app.plan.importers.dxf.rooms import Written, named_spaces, rooms_of, written
 from echostep_app.plan.importers.dxf.sheet import Sheet, read_sheet
 from echostep_app.plan.importers.dxf.storeys import alignment, bounds_of, lies_over, storey_boxes, window_words
 from echostep_app.plan.importers.dxf.symbols import (
@@ -40,8 +39,10 @@ from echostep_app.plan.importers.dxf.symbols import (
     symbol_of,
     symbols_of,
 )
+from echostep_app.plan.importers.far import IN_GRID
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.straight import pieces_of
 
 HALF_TREAD_M = 0.3  # half the greatest distance between neighbouring lines of one staircase: a tread
 CURVES = ("ARC", "ELLIPSE", "SPLINE", "LWPOLYLINE", "POLYLINE")  # entities that a swing may be drawn with
@@ -76,6 +77,11 @@ class _Storey:
         """The lines of a block's part inside the window: the part exists only briefly, so its lines are not kept."""
         return [line for line in self.frame.lines(part, self.sheet.file) if self.holds(line)]
 
+    def texts(self) -> list[Written]:
+        """The texts on layers that mean nothing else."""
+        found = (written(entity, layer, self.frame) for entity, layer in self.sheet.others)
+        return [text for text in found if text is not None and self.holds(Point(text.room.at_m))]
+
     def holds(self, shape: BaseGeometry) -> bool:
         """Whether a shape belongs to this level."""
         return self.window is None or bool(self.window.intersects(shape.centroid))
@@ -88,6 +94,8 @@ def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Pla
     sheets = [read_sheet(file, hints, report) for file in files]
     report.units = "; ".join(dict.fromkeys(sheet.words for sheet in sheets))
     frame = DrawingFrame.about(sheets[0].walls, sheets[0].scale_m)
+    if (frame.x0_m, frame.y0_m) != (0.0, 0.0):
+        report.doubt(IN_GRID.format("the drawing", frame.x0_m, frame.y0_m))
     storeys = [_Storey(sheet, replace(frame, scale_m=sheet.scale_m)) for sheet in sheets]
     if hints.windows:
         storeys = [_in_window(storeys[0], window) for window in hints.windows]
@@ -97,9 +105,19 @@ def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Pla
         _drawn_level(storey, DrawnLevel(name, round(i * hints.storey_height_m, 6)), report)
         for i, (storey, name) in enumerate(zip(storeys, names, strict=False))
     ]
-    return Plan(
-        files[0].stem, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels, report)
-    )
+    plan = plan_of(files[0].stem, drawn_levels, report)
+    return plan if any(level.rooms for level in plan.levels) else _with_names(plan, storeys, report)
+
+
+def _with_names(plan: Plan, storeys: list[_Storey], report: ImportReport) -> Plan:
+    """The plan with the names that are written into its rooms, whatever their layer."""
+    levels = []
+    for i, (level, storey) in enumerate(zip(plan.levels, storeys, strict=True)):
+        rooms = named_spaces(plan, i, storey.texts(), report)
+        levels.append(replace(level, rooms=tuple(rooms)))
+    if count := sum(len(level.rooms) for level in levels):
+        report.doubt(f"no layer is named for rooms: the names of {count} are the texts inside them")
+    return replace(plan, levels=tuple(levels))
 
 
 def _names(files: Sequence[Path], levels: int) -> list[str]:
@@ -173,7 +191,7 @@ def _drawn_level(storey: _Storey, drawn: DrawnLevel, report: ImportReport) -> Dr
     drawn.questions = [*doors.questions(), *_left_out_walls(storey)]
     drawn.walls, drawn.windows = [*storey.lines("walls", "columns"), *doors.jambs], list(storey.lines("windows"))
     drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(_noded(storey.lines("obstacles")))))
-    rooms = rooms_of(sheet.kinds["rooms"], storey.frame, sheet.file, report)
+    rooms = rooms_of(sheet.kinds["rooms"], storey.frame, sheet.file, report, storey.texts())
     drawn.rooms = [room for room in rooms if storey.holds(Point(room.at_m))]
     for kind, layer in (("stairs", "stairs"), ("lift", "lifts")):
         blots = shapely.union_all([line.buffer(HALF_TREAD_M) for line in storey.lines(layer)])
@@ -267,9 +285,10 @@ def _tell_doors(placed: PlacedDoors, report: ImportReport) -> None:
         places = ", ".join(f"x {x:g} y {y:g}" for (x, y), _ in placed.strays[:SHOWN_STRAYS])
         one = len(placed.strays) == 1
         report.leave_out("door in no wall", len(placed.strays))
-        report.doubt(
+        report.doubts.insert(
+            0,
             f"{len(placed.strays)} door{' stands' if one else 's stand'} in no wall and {'was' if one else 'were'} left out ({places}"
-            f"{'' if len(placed.strays) <= SHOWN_STRAYS else ', ...'}): are all layers of walls used?"
+            f"{'' if len(placed.strays) <= SHOWN_STRAYS else ', ...'}): are all layers of walls used?",
         )
 
 

@@ -19,12 +19,12 @@ from shapely.geometry import LineString, Polygon
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.fields import LIMIT_M
+from echostep_app.plan.importers.far import EARTH_M, grid_origin
 
 METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 FLAT_M = 0.005  # greatest distance of an arc from the straight pieces that replace it
-FAR_M = 1e4  # larger coordinates are in a national grid: the origin is then moved to the first wall
-STRAY_M = 1e8  # a line beyond this is not a building in any grid: twice around the Earth
-STRAY = LineString([(0.0, 0.0), (STRAY_M, 0.0)])  # replaces a line beyond that
+SAMPLES = 50  # walls that decide the origin
+STRAY = LineString([(0.0, 0.0), (EARTH_M, 0.0)])  # replaces a line beyond that
 THINNEST_M = 0.03  # a wider polyline is drawn as thick as its wall, a narrower one with a pen; assumed
 THICKEST_M = 1.2  # a hatch that is nowhere wider fills a wall or a column, a wider one a floor; assumed
 ASKEW = 0.5  # sine of the angle between a multiline and its stored offsets below which these are wrong; at right corners it is 0.71
@@ -44,12 +44,10 @@ class DrawingFrame:
 
     @classmethod
     def about(cls, walls: Sequence[Any], scale_m: float) -> DrawingFrame:
-        """The drawing's own origin, or the first wall's position in whole metres when the drawing is in a national grid."""
-        line = next((line for entity in walls for line in cls(scale_m).raw(entity)), None)
-        if line is None or np.abs(shapely.get_coordinates(line)).max() < FAR_M:
-            return cls(scale_m)
-        x, y = np.floor(shapely.get_coordinates(line)[0])
-        return cls(scale_m, float(x), float(y))
+        """The drawing's own origin, or that in a national grid by some of the walls."""
+        some = walls[:: max(1, len(walls) // SAMPLES)]
+        points = [points[0] * scale_m for entity in some for points in corners(entity)[:1]]
+        return cls(scale_m, *grid_origin(np.array(points).reshape(-1, 2)))
 
     def metres(self, point: Any) -> tuple[float, float]:
         """A point of the drawing in map metres."""
@@ -60,7 +58,7 @@ class DrawingFrame:
         from ezdxf.lldxf.const import DXFError
 
         try:
-            if not abs(float(getattr(entity.dxf, "radius", 0.0))) * self.scale_m <= STRAY_M:
+            if not abs(float(getattr(entity.dxf, "radius", 0.0))) * self.scale_m <= EARTH_M:
                 return [STRAY]
             lines = [line for path in paths(entity) if (line := self._flat(path)) is not None]
         except (TypeError, ValueError, ArithmeticError, IndexError, AttributeError, KeyError, DXFError):
@@ -81,7 +79,7 @@ class DrawingFrame:
     def _flat(self, path: Any) -> LineString | None:
         """A path as straight pieces within `FLAT_M`; None when it has no length."""
         ends = np.array([self.metres(p) for p in path.control_vertices()])
-        if len(ends) and not np.abs(ends).max() <= STRAY_M:  # its pieces could not be counted
+        if len(ends) and not np.abs(ends).max() <= EARTH_M:  # its pieces could not be counted
             return STRAY
         points = [self.metres(p) for p in path.flattening(FLAT_M / self.scale_m)]
         return LineString(points) if len(set(points)) > 1 and np.isfinite(points).all() else None

@@ -18,12 +18,12 @@ from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Floats
-from echostep_app.plan.importers.dxf.layers import pieces_of
+from echostep_app.plan.importers.straight import pieces_of
 
 BAND_M = 0.1  # half the width of the band along a door's line in which walls count; assumed
 NEAR_M = 0.35  # greatest distance of a hinge from the wall that it hangs on: frame and lining; assumed
 JAMB_M = 0.3  # shorter pieces of a wall give no direction: its ends, jambs, linings; assumed
-THICKEST_M = 0.6  # of a wall with a door; assumed
+THICKEST_M = 0.95  # of a wall with a door, as of a castle; assumed
 STOP_M, FLAT_M = 0.03, 2e-3  # a wall this near to a door's end stops there; closer faces are one
 WIDE_BAND_M = 0.2  # half the thickness of an outer wall, and a margin; assumed
 BY_M = 0.15  # a point nearer to a wall than this is at it

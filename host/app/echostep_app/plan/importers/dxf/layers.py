@@ -14,6 +14,7 @@ import shapely
 from shapely.geometry import LineString
 
 from echostep.arrays import Floats, Ints
+from echostep_app.plan.importers.straight import pieces_of
 
 # Names in English (AIA) and German, Romance, Germanic and Slavic languages, Turkish, Chinese, Japanese, Korean
 LAYERS: dict[str, tuple[str, ...]] = {
@@ -80,15 +81,6 @@ def matches(layer: str, patterns: Sequence[str]) -> bool:
     """Whether the name of a layer matches a pattern, ignoring case."""
     name = layer.casefold()
     return any(fnmatchcase(name, pattern) for pattern in patterns)
-
-
-def pieces_of(lines: Sequence[LineString]) -> Floats:
-    """The straight pieces (n, 4) of lines."""
-    rows = [np.zeros((0, 4))]
-    for line in lines:
-        points = shapely.get_coordinates(line)
-        rows.append(np.concatenate((points[:-1], points[1:]), axis=1))
-    return np.concatenate(rows)
 
 
 def faces_m(lines: Sequence[LineString]) -> float:

@@ -14,11 +14,12 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString
 
-from echostep.arrays import Floats
-from echostep_app.plan.importers.dxf.layers import pieces_of
+from echostep.arrays import Bools, Floats
+from echostep_app.plan.importers.straight import pieces_of
 
 APART = 0.05  # least distance between storeys beside each other, as a share of the drawing's size; assumed
 LEAST_APART_M = 2.0
+BORDER_M = 0.6  # a border is further from what it frames: more than a thick wall; assumed
 SHARES = (1.0, 0.5, 0.25)  # of that distance, tried in this order; assumed
 LEAST_SHARE = 0.1  # of the longest group of walls: smaller groups are details; assumed
 ALIKE = 0.4  # two storeys of one building differ by less than this share of their size; assumed
@@ -34,11 +35,22 @@ def storey_boxes(walls: Sequence[LineString]) -> list[Box]:
     A detail close to one storey hides that the storeys are alike: then they are looked for with smaller distances.
     """
     lines = np.array(list(walls), dtype=object)
+    lines = lines[~_is_border(lines)]
     nearest = _groups(lines, SHARES[-1])
     if len(nearest) == 1:  # then it is one group by larger distances, too
         return _storeys(lines, nearest)
     tried = (_storeys(lines, nearest if share == SHARES[-1] else _groups(lines, share)) for share in SHARES)
     return next((found for found in tried if len(found) > 1), _storeys(lines, nearest))
+
+
+def _is_border(lines: np.ndarray[Any, Any]) -> Bools:
+    """Which lines (n,) frame all others, and touch none: the border of a sheet."""
+    x0, y0, x1, y1 = shapely.total_bounds(lines)
+    around = np.abs(shapely.bounds(lines) - (x0, y0, x1, y1)).max(axis=1) < APART * max(x1 - x0, y1 - y0)
+    if not around.any() or around.all():
+        return np.zeros(len(lines), dtype=bool)
+    apart = shapely.distance(shapely.union_all(lines[around]), shapely.multilinestrings(lines[~around]))
+    return np.asarray(around & (apart > BORDER_M))
 
 
 def _groups(lines: np.ndarray[Any, Any], share: float) -> np.ndarray[Any, Any]:
@@ -73,7 +85,7 @@ def lies_over(one: Box, other: Box) -> bool:
 
 def bounds_of(walls: Sequence[LineString]) -> Box:
     """The rectangle around lines."""
-    x0, y0, x1, y1 = shapely.union_all(shapely.box(*shapely.bounds(np.array(list(walls), dtype=object)).T)).bounds
+    x0, y0, x1, y1 = shapely.total_bounds(np.array(list(walls), dtype=object))
     return float(x0), float(y0), float(x1), float(y1)
 
 

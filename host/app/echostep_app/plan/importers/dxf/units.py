@@ -44,7 +44,7 @@ class Usual:
 USUAL = {
     "size": Usual(2.5, 1500.0, 30.0, 1.2, "the building is {} long"),
     "door": Usual(0.45, 2.2, 0.9, 0.25, "its doors are {} wide"),
-    "wall": Usual(0.4, 40.0, 5.0, 0.7, "half of its walls are pieces of {} or more"),
+    "wall": Usual(0.4, 120.0, 5.0, 0.7, "half of its walls are pieces of {} or more"),
     "thickness": Usual(0.03, 1.3, 0.2, 0.5, "its walls are {} thick"),
     "text": Usual(0.015, 3.0, 0.25, 0.6, "its letters are {} high"),
 }

@@ -7,6 +7,7 @@ In: a model. Out: `SolidBody`s. Owns nothing. Elements without a usable shape ar
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -20,9 +21,10 @@ from echostep.arrays import Floats, Ints
 from echostep.errors import EchostepError
 from echostep.fields import LIMIT_M
 from echostep_app.plan.importers.drawn_level import areas
+from echostep_app.plan.importers.far import grid_origin
 from echostep_app.plan.importers.report import ImportReport
 
-FAR_M, EARTH_M = 1e4, 1e8  # larger coordinates are in a national grid; beyond that in none
+SAMPLES = 20  # walls that decide the origin
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,40 +57,46 @@ class SolidBody:
 
 
 class Shapes:
-    """Makes the bodies of elements, in the model's world coordinates in metres, from `origin_m` on: the first body's place, if that is in a grid."""
+    """Makes the bodies of elements, in the model's world coordinates in metres, from `origin_m` on."""
 
     def __init__(self, path: Path) -> None:
         self._geometry: Any = import_module("ifcopenshell.geom")
         self._settings = self._geometry.settings()
         self._settings.set("use-world-coords", True)
         self._path = path
-        self.origin_m: tuple[float, float] | None = None
+        self.origin_m = (0.0, 0.0)
 
     def body(self, element: Any) -> SolidBody | None:
         """The body of an element; None when it has no usable shape."""
         if getattr(element, "Representation", None) is None:
             return None
         try:
-            shape = self._geometry.create_shape(self._settings, element).geometry
+            corners, faces = self._triangles(element)
         except RuntimeError:
             return None
-        corners = np.array(shape.verts, dtype=np.float64).reshape(-1, 3)
-        faces = np.array(shape.faces, dtype=np.int64).reshape(-1, 3)
         if not len(corners) or not len(faces):
             return None
-        corners[:, :2] -= self._origin(corners)
+        corners[:, :2] -= self.origin_m
         if not (np.abs(corners) <= LIMIT_M).all():
             raise EchostepError(
                 f"{self._path}: {element.is_a()} #{element.id()}: further than {LIMIT_M / 1000:.0f} km from the origin"
             )
         return SolidBody(element, corners, faces)
 
-    def _origin(self, corners: Floats) -> tuple[float, float]:
-        """The origin; the first body decides it."""
-        if self.origin_m is None:
-            x, y = np.floor(corners[0, :2])
-            self.origin_m = (float(x), float(y)) if FAR_M < max(abs(x), abs(y)) <= EARTH_M else (0.0, 0.0)
-        return self.origin_m
+    def _triangles(self, element: Any) -> tuple[Floats, Ints]:
+        """Corners (n, 3) in the model's own coordinates, and triangles (m, 3); raises RuntimeError for a shape that cannot be made."""
+        shape = self._geometry.create_shape(self._settings, element).geometry
+        return np.array(shape.verts, dtype=np.float64).reshape(-1, 3), np.array(shape.faces, dtype=np.int64).reshape(
+            -1, 3
+        )
+
+    def find_origin(self, elements: list[Any]) -> None:
+        """The origin by some of the elements, where these lie in a national grid."""
+        points = []
+        for element in elements[:: max(1, len(elements) // SAMPLES)]:
+            with suppress(RuntimeError):
+                points += [corner[:2] for corner in self._triangles(element)[0][:1]]
+        self.origin_m = grid_origin(np.array(points).reshape(-1, 2))
 
     def bodies(self, elements: list[Any], report: ImportReport) -> Iterator[SolidBody]:
         """Bodies of elements; without a shape, the bodies of their parts (elemented walls) or of the opening that they fill. Others are reported."""

@@ -19,9 +19,10 @@ import numpy as np
 from echostep.errors import EchostepError
 from echostep.plan import ConnectorKind, Door, Georeference, Plan
 from echostep_app.plan.georeference import EarthTransform
-from echostep_app.plan.importers.connector_shapes import join_connectors
+from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, room
-from echostep_app.plan.importers.ifc.bodies import FAR_M, Shapes, SolidBody
+from echostep_app.plan.importers.far import FAR_M, IN_GRID
+from echostep_app.plan.importers.ifc.bodies import Shapes, SolidBody
 from echostep_app.plan.importers.ifc.doors import placed_door
 from echostep_app.plan.importers.ifc.model import open_model, storeys_of
 from echostep_app.plan.importers.report import ImportReport
@@ -41,6 +42,7 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
     storeys = storeys_of(model, path, report)
     drawn_levels = [DrawnLevel(storey.name, storey.height_m) for storey in storeys]
     shapes = Shapes(path)
+    shapes.find_origin(model.by_type("IfcWall") or model.by_type("IfcElement"))
     elements = [element for kind in SEEN for element in model.by_type(kind)]
     count = 0
     for body in shapes.bodies(elements, report):
@@ -56,14 +58,7 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
         )
     projects = model.by_type("IfcProject")
     name = str((projects[0].LongName or projects[0].Name) if projects else "") or path.stem
-    return Plan(
-        name[:80],
-        tuple(s.level() for s in drawn_levels),
-        None,
-        "",
-        join_connectors(drawn_levels, report),
-        _moved(_georeference(model), model, shapes, report),
-    )
+    return plan_of(name, drawn_levels, report, _moved(_georeference(model), model, shapes, report))
 
 
 def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: ImportReport) -> None:
@@ -148,10 +143,10 @@ def _georeference(model: Any) -> Georeference | None:
 
 def _moved(georeference: Georeference | None, model: Any, shapes: Shapes, report: ImportReport) -> Georeference | None:
     """The georeference of the plan's origin, where that is not the model's own: the site's longitude and latitude are those of its placement."""
-    x, y = shapes.origin_m or (0.0, 0.0)
+    x, y = shapes.origin_m
     if (x, y) == (0.0, 0.0):
         return georeference
-    report.doubt(f"the model lies in a national grid: the plan's origin is x {x:.0f} m, y {y:.0f} m there")
+    report.doubt(IN_GRID.format("the model", x, y))
     if georeference is None:
         return None
     scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))

@@ -38,7 +38,7 @@ def placed_door(element: Any, shapes: Shapes, scale_m: float) -> PlacedDoor | No
         if hole is not None:
             return PlacedDoor(_across(hole, _host(relation.RelatingOpeningElement, shapes), width_m), hole.z_m)
     body = shapes.body(element)
-    by_placement = _by_placement(element, width_m, scale_m, shapes.origin_m or (0.0, 0.0))
+    by_placement = _by_placement(element, width_m, scale_m, shapes.origin_m)
     if body is None:
         return by_placement
     corners = np.asarray(body.above().exterior.coords)[:3]

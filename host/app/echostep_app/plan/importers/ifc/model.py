@@ -6,8 +6,6 @@ In: an .ifc file, or one packed as .ifczip. Out: the model, names and heights of
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,13 +13,13 @@ from typing import Any, NamedTuple
 from echostep.errors import EchostepError
 from echostep.fields import LIMIT_M
 from echostep_app.extras import require
-from echostep_app.plan.importers.parsing import LARGEST_BYTES, read_bytes
+from echostep_app.plan.importers.imdf.archive import Archive
+from echostep_app.plan.importers.parsing import read_bytes
 from echostep_app.plan.importers.report import ImportReport
 
 REFERENCE_M = (
     1.0  # a storey without walls, doors and rooms nearer than this to another one is its reference level; assumed
 )
-HALF_STOREY_M = 1.5  # closer storeys are reported; assumed
 CONTENTS = ("IfcWall", "IfcDoor", "IfcWindow", "IfcSpace", "IfcCurtainWall")
 
 
@@ -49,18 +47,11 @@ def open_model(path: Path) -> Any:
 
 def _unpacked(path: Path) -> bytes:
     """The first .ifc file in an .ifczip, which is a zip file."""
-    try:
-        with zipfile.ZipFile(path) as packed:
-            names = [name for name in packed.namelist() if name.casefold().endswith(".ifc")]
-            if not names:
-                raise EchostepError(f"{path}: no .ifc file in it")
-            with packed.open(names[0]) as file:
-                raw = file.read(LARGEST_BYTES + 1)
-    except (OSError, zipfile.BadZipFile, zlib.error, ValueError, RuntimeError, NotImplementedError, EOFError) as error:
-        raise EchostepError(f"{path}: not a zip file with a model: {error}") from error
-    if len(raw) > LARGEST_BYTES:
-        raise EchostepError(f"{path}: unpacks to more than {LARGEST_BYTES // 2**20} MiB: export one building only")
-    return raw
+    with Archive(path) as packed:
+        names = packed.ending_with(".ifc")
+        if not names:
+            raise EchostepError(f"{path}: no .ifc file in it")
+        return packed.content(names[0])
 
 
 def storeys_of(model: Any, path: Path, report: ImportReport) -> list[Storey]:
@@ -98,10 +89,6 @@ def _without_references(storeys: list[Storey], report: ImportReport) -> list[Sto
         names = ", ".join(f"{storey.name} ({storey.height_m:g} m)" for storey in dropped[:5])
         report.leave_out("storey without walls, doors and rooms beside another one", len(dropped))
         report.doubt(f"reference levels, not storeys: {names}{', ...' if len(dropped) > 5 else ''}")
-    for low, high in zip(kept, kept[1:], strict=False):
-        if high.height_m - low.height_m < HALF_STOREY_M:
-            apart = f"{high.height_m - low.height_m:.2f} m apart"
-            report.doubt(f"levels {low.name} and {high.name} are {apart}: half storeys, or reference levels?")
     return kept
 
 

@@ -58,10 +58,17 @@ class Archive:
         """Whether the archive contains the file."""
         return name in self._names if self._zip is not None else (self.path / name).is_file()
 
+    def ending_with(self, suffix: str) -> list[str]:
+        """The names of the zip file's files with this ending, whatever its case."""
+        return sorted(name for name in self._names if name.casefold().endswith(suffix))
+
     def text(self, name: str) -> str:
         """The text of a file."""
-        if self._zip is None:
-            return read_text(self.path / name)
+        return read_text(self.path / name) if self._zip is None else decode(self.content(name), self.label(name))
+
+    def content(self, name: str) -> bytes:
+        """The bytes of a file in the zip file."""
+        assert self._zip is not None
         if name not in self._names:
             raise EchostepError(f"{self.label(name)}: the archive has no such file: export it again")
         try:
@@ -75,4 +82,4 @@ class Archive:
             raise EchostepError(
                 f"{self.label(name)}: unpacks to more than {most // 2**20} MiB: too large, or not an exported building"
             )
-        return decode(raw, self.label(name))
+        return raw

@@ -10,7 +10,7 @@ without an opening get doors of this width.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,16 +19,18 @@ import shapely
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan import ConnectorKind, Door, DoorState, Georeference, Plan
 from echostep_app.plan.georeference import EarthTransform
-from echostep_app.plan.importers.connector_shapes import join_connectors
+from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, pieces, room
-from echostep_app.plan.importers.geojson import features, label, properties, shape
+from echostep_app.plan.importers.geojson import features, geometries, label, properties, shape
 from echostep_app.plan.importers.imdf.archive import Archive
 from echostep_app.plan.importers.imdf.assumed_doors import ASSUMED, doors_at, doors_of_rooms
-from echostep_app.plan.importers.parsing import number, parse_json, text, typed
+from echostep_app.plan.importers.parsing import number, parse_json, text
 from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.straight import merge_collinear, pieces_of
 
 OPEN = {
     "walkway",
@@ -61,7 +63,9 @@ SOLID_FIXTURES = {
     "vegetation",
 }
 UNUSED = ("address", "amenity", "anchor", "building", "detail", "footprint", "geofence", "occupant", "section")
+ALONG = 0.9  # cosine of the angle up to which an opening runs along its wall; assumed
 ON_M = 0.2  # greatest distance of an opening from the boundary that it opens; assumed
+Line = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,13 +79,13 @@ class Feature:
 
     @property
     def category(self) -> str:
-        """Its category; "" without one."""
-        return text(self.about.get("category") or "", f"{self.where}.properties.category")
+        """Its category in small letters; "" without one."""
+        return text(self.about.get("category") or "", f"{self.where}.properties.category").casefold()
 
     @property
     def level(self) -> str:
-        """The id of its level."""
-        return text(self.about.get("level_id"), f"{self.where}.properties.level_id")
+        """The id of its level; "" without one."""
+        return label(self.about.get("level_id"), f"{self.where}.properties.level_id")
 
     @property
     def name(self) -> str:
@@ -131,9 +135,10 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
     }
     openings = _by_level(_features(archive, "opening", earth), drawn_levels, report)
     units = _by_level(_features(archive, "unit", earth), drawn_levels, report)
+    if not any(units.values()):
+        raise EchostepError(f"{path}: {_file(archive, 'unit')}: no units on these levels: export all files again")
     order = list(drawn_levels)
     for key, drawn in drawn_levels.items():
-        drawn.doors = [door for one in openings[key] for door in _doors(one)]
         if doors_m is None:
             report.leave_out(
                 "opening without a width (--doors 0.9 gives one)", sum(not _doors(one) for one in openings[key])
@@ -141,6 +146,7 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
         _outline(drawn, next(level for level in levels if level.key == key))
         for unit in units[key]:
             _unit(drawn, unit, [one.shape for one in openings[key]])
+        _place_doors(drawn, openings[key], report)
         report.leave_out("unit without an area", sum(not areas([unit.shape]) for unit in units[key]))
         if doors_m is not None:
             _assume_doors(drawn, units[key], openings[key], doors_m)
@@ -157,14 +163,7 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
     numbered = {unit.key: (order.index(key), unit) for key in order for unit in units[key]}
     _relationships(archive, earth, numbered, list(drawn_levels.values()), report)
     name = next((venue.name for venue in _features(archive, "venue", earth)), "") or path.stem
-    return Plan(
-        name,
-        tuple(s.level() for s in drawn_levels.values()),
-        None,
-        "",
-        join_connectors(list(drawn_levels.values()), report),
-        georeference,
-    )
+    return plan_of(name, list(drawn_levels.values()), report, georeference)
 
 
 def _file(archive: Archive, kind: str) -> str:
@@ -176,19 +175,18 @@ def _origin(archive: Archive) -> Georeference:
     """The plan's origin: the first corner of the first level, rounded to 1e-5 degrees (about 1 m)."""
     name = _file(archive, "level")
     tree = parse_json(archive.text(name), archive.label(name))
-    node: Any = tree
     try:
         for where, feature in features(tree):
-            node = typed(feature.get("geometry"), f"{where}.geometry", dict).get("coordinates")
-            while isinstance(node, list) and node and isinstance(node[0], list):
-                node = node[0]
-            if not isinstance(node, list) or len(node) < 2:
-                raise ValueError(f"{where}.geometry: no coordinates")
-            lon, lat = number(node[0], where, 180.0, "degrees"), number(node[1], where, 90.0, "degrees")
-            return Georeference(round(lon, 5), round(lat, 5))
+            for _, place, _ in geometries(feature, where):
+                while isinstance(place, list) and place:
+                    place = place[0]
+                if isinstance(place, tuple):
+                    return Georeference(round(place[0], 5), round(place[1], 5))
     except ValueError as error:
         raise EchostepError(f"{archive.label(name)}: {error}") from error
-    raise EchostepError(f"{archive.label(name)}: it has no levels: export the archive again with its levels")
+    raise EchostepError(
+        f"{archive.label(name)}: it has no levels with a place: export the archive again with its levels"
+    )
 
 
 def _features(archive: Archive, kind: str, earth: EarthTransform) -> list[Feature]:
@@ -200,15 +198,10 @@ def _features(archive: Archive, kind: str, earth: EarthTransform) -> list[Featur
     try:
         for where, feature in features(parse_json(archive.text(name), archive.label(name))):
             place = f"{kind} {where}"
-            read.append(
-                Feature(
-                    place,
-                    text(feature.get("id"), f"{where}.id"),
-                    properties(feature, where),
-                    shape(feature, where, earth),
-                )
-            )
-            _ = read[-1].category, read[-1].name
+            about = properties(feature, where)
+            key = label(feature.get("id", about.get("id")), f"{where}.id") or place
+            read.append(Feature(place, key, about, shape(feature, where, earth)))
+            _ = read[-1].category, read[-1].name, read[-1].level
     except ValueError as error:
         raise EchostepError(f"{archive.label(name)}: {error}") from error
     return read
@@ -226,12 +219,8 @@ def _by_level(features: list[Feature], levels: dict[str, DrawnLevel], report: Im
     sorted_: dict[str, list[Feature]] = {key: [] for key in levels}
     lost: Counter[str] = Counter()
     for feature in features:
-        try:
-            key = feature.level
-        except ValueError as error:
-            raise EchostepError(str(error)) from error
-        if key in sorted_:
-            sorted_[key].append(feature)
+        if feature.level in sorted_:
+            sorted_[feature.level].append(feature)
         else:
             lost[feature.where.partition(" ")[0]] += 1
     for kind, count in lost.items():
@@ -253,6 +242,32 @@ def _doors(one: Feature) -> list[Door]:
             if (round(x0, 3), round(y0, 3)) != (round(x1, 3), round(y1, 3)):
                 doors.append(Door((round(x0, 3), round(y0, 3), round(x1, 3), round(y1, 3)), state, one.name))
     return doors
+
+
+def _place_doors(drawn: DrawnLevel, openings: list[Feature], report: ImportReport) -> None:
+    """Add the doors of openings, each on the wall beside it; those in no wall stay where they are, and are told."""
+    walls = merge_collinear(pieces_of(pieces([*drawn.walls, *(area.exterior for area in drawn.filled)])))
+    lines, astray = shapely.linestrings(walls.reshape(-1, 2, 2)), 0
+    for door in (door for one in openings for door in _doors(one)):
+        off = shapely.distance(lines, Point((door.line[0] + door.line[2]) / 2, (door.line[1] + door.line[3]) / 2))
+        k = int(off.argmin()) if len(walls) else 0
+        is_near = len(walls) > 0 and off[k] < ON_M
+        astray += not is_near
+        drawn.doors.append(replace(door, line=_onto(door.line, walls[k])) if is_near else door)
+    if astray:
+        report.doubt(
+            f"{drawn.name}: {astray} of {len(drawn.doors)} openings lie in no wall: compare them with the building"
+        )
+
+
+def _onto(line: Line, wall: Floats) -> Line:
+    """A door's line moved onto a wall's line, where it runs along it."""
+    ends, start, along = np.array(line).reshape(2, 2), wall[:2], wall[2:] - wall[:2]
+    along = along / np.hypot(*along)
+    moved = (start + ((ends - start) @ along)[:, None] * along).round(3)
+    if np.hypot(*(moved[1] - moved[0])) < ALONG * np.hypot(*(ends[1] - ends[0])):
+        return line
+    return float(moved[0, 0]), float(moved[0, 1]), float(moved[1, 0]), float(moved[1, 1])
 
 
 def _outline(drawn: DrawnLevel, level: Feature) -> None:

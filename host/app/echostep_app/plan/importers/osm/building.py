@@ -13,29 +13,34 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import shapely
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.fields import LIMIT_M
 from echostep.plan import ConnectorKind, Door, DoorState, Georeference, Plan
 from echostep_app.plan.georeference import EarthTransform
-from echostep_app.plan.importers.connector_shapes import join_connectors
+from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, room
 from echostep_app.plan.importers.osm.elements import Elements, Tags, levels_of, read_osm
 from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.straight import merge_collinear, pieces_of
 
 DOOR_M, STAIRS_M, LIFT_M = 0.9, 1.5, 1.8  # widths where the map states none: usual sizes
+OFF_M = 0.02  # of a straight wall's nodes from its line: twice OpenStreetMap's resolution
+ON_M = 0.1  # greatest distance of a door's node from its wall; assumed
 MOST_LEVELS = 200
 
 
 @dataclass(slots=True)
 class OsmSite:
-    """Levels by their OSM level numbers, these numbers in order, and the walls that each node lies on."""
+    """Levels by their OSM level numbers, these numbers in order, and the levels of the walls through each node."""
 
     drawn_levels: dict[float, DrawnLevel]
     order: list[float]
-    walls_at: dict[tuple[float, int], list[LineString]] = field(default_factory=dict)
+    levels_at: dict[int, set[float]] = field(default_factory=dict)
 
     def on(self, levels: list[float]) -> Iterator[DrawnLevel]:
         """The levels with these OSM numbers."""
@@ -46,12 +51,8 @@ def import_osm(path: Path, storey_height_m: float, report: ImportReport) -> Plan
     """Import the building in a file; raises EchostepError that names the file and the element."""
     elements = read_osm(path)
     levels = sorted({level for tags in elements.indoor_tags() for level in levels_of(tags)})
-    if not levels and any(levels_of(tags) for tags in elements.way_tags.values() if tags.get("indoor", "no") != "no"):
-        raise EchostepError(
-            f"{path}: its indoor ways have no nodes: download it again by `out geom;`, or with `(._;>;);`"
-        )
     if not levels:
-        raise EchostepError(f"{path}: nothing is tagged indoor=* with a level: choose an area that is mapped indoors")
+        raise EchostepError(f"{path}: {_why_empty(elements)}")
     if len(levels) > MOST_LEVELS:
         raise EchostepError(f"{path}: {len(levels)} levels; a plan has {MOST_LEVELS} at most: cut out one building")
     georeference = _origin(elements, path)
@@ -68,15 +69,18 @@ def import_osm(path: Path, storey_height_m: float, report: ImportReport) -> Plan
     _lifts(site, elements)
     _other(elements, report)
     drawn_levels = [site.drawn_levels[level] for level in levels]
-    name = next((tags["name"] for *_, tags in elements.lines() if "building" in tags and "name" in tags), path.stem)
-    return Plan(
-        name,
-        tuple(drawn.level() for drawn in drawn_levels),
-        None,
-        "",
-        join_connectors(drawn_levels, report),
-        georeference,
-    )
+    names = sorted({tags["name"] for *_, tags in elements.lines() if "building" in tags and "name" in tags})
+    return plan_of(", ".join(names) or path.stem, drawn_levels, report, georeference)
+
+
+def _why_empty(elements: Elements) -> str:
+    """Why no indoor element has a level, and the next step."""
+    indoor = [tags for tags in elements.way_tags.values() if tags.get("indoor", "no") != "no"]
+    if any(levels_of(tags) for tags in indoor):
+        return "its indoor ways have no nodes: download it again by `out geom;`, or with `(._;>;);`"
+    if unread := sorted({tags["level"][:40] for tags in indoor if tags.get("level")}):
+        return f"level={unread[0]} is no number or range: write level=0;1 or level=0-2"
+    return "nothing is tagged indoor=* with a level: choose an area that is mapped indoors"
 
 
 def _without_level(elements: Elements, report: ImportReport) -> None:
@@ -171,36 +175,49 @@ def _wall(site: OsmSite, elements: Elements, nodes: list[int], levels: list[floa
     for level in levels:
         if level in site.drawn_levels:
             (site.drawn_levels[level].windows if glass else site.drawn_levels[level].walls).append(line)
-            for node in set(nodes):
-                site.walls_at.setdefault((level, node), []).append(line)
+            for node in nodes:
+                site.levels_at.setdefault(node, set()).add(level)
 
 
 def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
-    """Add a door for each node with a door tag, on each level where the node lies on a wall."""
+    """Add a door for each node with a door tag, on each of its levels where it lies on a wall; without a level, on those of the walls through it."""
+    walls = {
+        level: merge_collinear(pieces_of([*drawn.walls, *drawn.windows]), OFF_M)
+        for level, drawn in site.drawn_levels.items()
+    }
     for node, tags in elements.nodes():
         if not _is_door(tags):
             continue
-        own = levels_of(tags, f"node {node}") or site.order
-        through = elements.same[node]
-        if not any((level, through) in site.walls_at for level in own):
-            report.leave_out("door on no wall")
-        for level in own:
-            for line in site.walls_at.get((level, through), [])[:1]:
-                gap = _gap(line, Point(elements.at_m[node]), _metres(tags, DOOR_M))
-                doors = site.drawn_levels[level].doors
-                if through == node or all(gap != door.line for door in doors):
-                    doors.append(Door(gap, _state(tags), (tags.get("name") or tags.get("ref") or "")[:80]))
+        own = levels_of(tags, f"node {node}") or sorted(site.levels_at.get(elements.through(node), site.order))
+        gaps = {
+            level: _gap(walls[level], elements.at_m[node], _metres(tags, DOOR_M)) for level in own if level in walls
+        }
+        report.leave_out("door on no wall", not any(gaps.values()))
+        for level, gap in gaps.items():
+            doors = site.drawn_levels[level].doors
+            if gap is not None and all(gap != door.line for door in doors):
+                doors.append(Door(gap, _state(tags), (tags.get("name") or tags.get("ref") or "")[:80]))
 
 
-def _gap(line: LineString, at: Point, wide_m: float) -> tuple[float, float, float, float]:
-    """A door's line along the longer side of the wall at its node; moved along the side when it would extend beyond the corner."""
-    corners = list(line.coords)
-    sides = [LineString(pair) for pair in zip(corners, corners[1:], strict=False) if pair[0] != pair[1]]
-    near = [side for side in sides if side.distance(at) < 0.01]
-    side = max(near or sides, key=lambda side: side.length)
-    middle = min(max(side.project(at), wide_m / 2), max(side.length - wide_m / 2, side.length / 2))
-    first, last = (side.interpolate(middle + sign * min(wide_m, side.length) / 2) for sign in (-1, 1))
+def _gap(walls: Floats, at_m: tuple[float, float], wide_m: float) -> tuple[float, float, float, float] | None:
+    """A door's line along the longest of the walls (n, 4) at its node, of equal ones the first from west to north; within the wall's ends."""
+    lines = shapely.linestrings(walls.reshape(-1, 2, 2))
+    near = walls[shapely.distance(lines, Point(at_m)) < ON_M]
+    if not len(near):
+        return None
+    x0, y0, x1, y1 = min(
+        (_directed(wall) for wall in near.tolist()), key=lambda w: (-round(math.dist(w[:2], w[2:]), 2), w)
+    )
+    side = LineString([(x0, y0), (x1, y1)])
+    wide_m = min(wide_m, side.length)
+    middle = min(max(side.project(Point(at_m)), wide_m / 2), side.length - wide_m / 2)
+    first, last = (side.interpolate(middle + sign * wide_m / 2) for sign in (-1, 1))
     return round(first.x, 3), round(first.y, 3), round(last.x, 3), round(last.y, 3)
+
+
+def _directed(wall: list[float]) -> tuple[float, ...]:
+    """A wall from its end in the west, or in the south, whichever way it was drawn."""
+    return min(tuple(wall), tuple(wall[2:] + wall[:2]), key=lambda w: (round(w[0], 2), round(w[1], 2)))
 
 
 def _state(tags: Tags) -> DoorState:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Nodes, ways and multipolygons of an OpenStreetMap file, and the numbers of its level tags.
 
-In: XML, the JSON of Overpass (`out body; >; out skel;` or `out geom;`), or GeoJSON of overpass-turbo; tags (`level=0;1`, `level=-1-2`,
+In: XML, the JSON of Overpass (`out body; >; out skel;` or `out geom;`), or GeoJSON; tags (`level=0;1`, `level=-1-2`,
 `repeat_on=3-5`). Out: `Elements`; level numbers, ascending. Owns nothing. XML with an entity or a DTD is refused.
 """
 
@@ -26,6 +26,8 @@ from echostep_app.plan.importers.parsing import FORMATS, GML, number, parse_json
 
 RANGE = re.compile(r"^(-?\d+(?:\.\d+)?)\s*-\s*(-?\d+(?:\.\d+)?)$")
 MOST = 300  # greatest level number, and most levels in a range
+DECIMALS = 7  # of a degree: the resolution of OpenStreetMap
+FIRST_ID = 1 << 62  # of nodes that have a position alone: no element of OpenStreetMap has such an id
 Tags = dict[str, str]
 
 
@@ -58,11 +60,10 @@ class Elements:
     ways: dict[int, list[int]] = field(default_factory=dict)
     way_tags: dict[int, Tags] = field(default_factory=dict)
     relations: list[tuple[int, list[tuple[int, str]], Tags]] = field(default_factory=list)
+    member_ways: dict[int, list[int]] = field(default_factory=dict)
     at_m: dict[int, tuple[float, float]] = field(default_factory=dict)
     other_relations: int = 0
-    same: dict[int, int] = field(
-        default_factory=dict
-    )  # GeoJSON: of nodes at one place, the one that lines pass through
+    at_place: dict[tuple[float, float], int] = field(default_factory=dict)  # nodes that have a position alone
 
     def lines(self) -> Iterator[tuple[str, list[int], Tags]]:
         """Name, nodes and tags of ways, and of the rings of multipolygons; only lines of two nodes or more. Inner rings have no name."""
@@ -71,7 +72,11 @@ class Elements:
                 yield f"way {key}", nodes, self.way_tags[key]
         for key, members, tags in self.relations:
             for inner in (False, True):
-                ways = [self.ways.get(ref, []) for ref, role in members if (role == "inner") == inner]
+                ways = [
+                    self.ways.get(ref, self.member_ways.get(ref, []))
+                    for ref, role in members
+                    if (role == "inner") == inner
+                ]
                 for nodes in rings([way for way in ways if len(way) > 1]):
                     yield f"relation {key}", nodes, without_names(tags) if inner else tags
 
@@ -82,6 +87,10 @@ class Elements:
     def indoor_tags(self) -> Iterator[Tags]:
         """Tags of all lines with an indoor tag."""
         return (tags for _, _, tags in self.lines() if tags.get("indoor", "no") != "no")
+
+    def through(self, node: int) -> int:
+        """The node by which ways pass through a node's place: itself, or one that has a position alone."""
+        return self.at_place.get(_rounded(self.degrees[node]), node)
 
     def project(self, metres: Callable[[Floats], Floats]) -> None:
         """Fill `at_m` by the projection `metres`: (n, 2) degrees -> (n, 2) map metres."""
@@ -142,30 +151,25 @@ def _xml_rows(text: str) -> list[dict[str, Any]]:
         name = root.tag.rpartition("}")[2][:40]
         gml = "opengis.net" in root.tag
         raise ValueError(f"this XML is <{name}>, not <osm>: {GML if gml else f'plans are read as {FORMATS}'}")
-    return [
-        _xml_row(element) for element in root if element.tag in ("node", "way", "relation") and not _is_deleted(element)
-    ]
-
-
-def _is_deleted(element: ET.Element) -> bool:
-    """Whether an element is deleted: in JOSM before the upload, or in an extract with history."""
-    return element.get("action") == "delete" or element.get("visible") == "false"
+    return [_xml_row(element) for element in root if element.tag in ("node", "way", "relation")]
 
 
 def _xml_row(element: ET.Element) -> dict[str, Any]:
-    row: dict[str, Any] = {"type": element.tag, "id": _json_number(element.get("id"))}
+    row: dict[str, Any] = {key: _json_number(value) for key, value in element.items()} | {"type": element.tag}
     row["tags"] = {tag.get("k", ""): tag.get("v", "") for tag in element.iterfind("tag")}
-    row["lon"], row["lat"] = _json_number(element.get("lon")), _json_number(element.get("lat"))
-    row["nodes"] = [_json_number(nd.get("ref")) for nd in element.iterfind("nd")]
-    row["geometry"] = [
-        {"lon": _json_number(nd.get("lon")), "lat": _json_number(nd.get("lat"))} if nd.get("lon") else None
-        for nd in element.iterfind("nd")
-    ]
+    row["nodes"] = [_json_number(nd.get("ref")) for nd in element.iterfind("nd[@ref]")]
+    row["geometry"] = _xml_places(element)
     row["members"] = [
-        {"type": member.get("type"), "ref": _json_number(member.get("ref")), "role": member.get("role")}
+        {key: _json_number(value) for key, value in member.items()} | {"geometry": _xml_places(member)}
         for member in element.iterfind("member")
     ]
     return row
+
+
+def _xml_places(element: ET.Element) -> list[dict[str, Any] | None]:
+    """The positions that `out geom;` writes into an element."""
+    places = [{key: _json_number(nd.get(key)) for key in ("lon", "lat")} for nd in element.iterfind("nd")]
+    return [place if place["lon"] is not None else None for place in places]
 
 
 def _json_number(text: str | None) -> Any:
@@ -179,6 +183,10 @@ def _json_number(text: str | None) -> Any:
 def _add(elements: Elements, row: Any) -> None:
     """Check an element (as in Overpass JSON) and add it; relations other than multipolygons are counted."""
     row = typed(row, "elements", dict)
+    if (
+        row.get("action") == "delete" or row.get("visible") is False
+    ):  # in JOSM before the upload, or in an extract with history
+        return
     kind, key = row.get("type"), row.get("id")
     if isinstance(key, bool) or not isinstance(key, int):
         raise ValueError(f"{str(kind)[:20]} {str(key)[:20]!r}: its id is not a whole number")
@@ -187,22 +195,41 @@ def _add(elements: Elements, row: Any) -> None:
     if kind == "node":
         elements.degrees[key] = _degrees(row, where)
         elements.node_tags[key] = tags
-        elements.same[key] = row.get("same", key)
     elif kind == "way":
-        nodes = [_ref(ref, where) for ref in typed(row.get("nodes") or [], f"{where}: nodes", list)]
-        for node, place in zip(nodes, typed(row.get("geometry") or [], f"{where}: geometry", list), strict=False):
-            if place is not None:  # of a node outside the box that was asked for
-                elements.degrees.setdefault(node, _degrees(typed(place, f"{where}: geometry", dict), where))
-        elements.ways[key], elements.way_tags[key] = nodes, tags
+        elements.ways[key], elements.way_tags[key] = _nodes(elements, row, where), tags
     elif kind == "relation" and tags.get("type") == "multipolygon":
         members = [
             typed(member, f"{where}: members", dict)
             for member in typed(row.get("members") or [], f"{where}: members", list)
         ]
-        ways = [(_ref(m.get("ref"), where), str(m.get("role"))) for m in members if m.get("type") == "way"]
-        elements.relations.append((key, ways, tags))
+        ways = [(m, _ref(m.get("ref"), where)) for m in members if m.get("type") == "way"]
+        elements.relations.append((key, [(ref, str(m.get("role"))) for m, ref in ways], tags))
+        for m, ref in ways:
+            if m.get("geometry"):  # `out geom;` leaves out ways that have no tags of their own
+                elements.member_ways[ref] = _nodes(elements, m, where)
     elif kind == "relation":
         elements.other_relations += 1
+
+
+def _nodes(elements: Elements, row: dict[str, Any], where: str) -> list[int]:
+    """The nodes of a way; positions without an id become nodes, equal ones the same one."""
+    refs = [_ref(ref, where) for ref in typed(row.get("nodes") or [], f"{where}: nodes", list)]
+    places = [
+        None if place is None else _degrees(typed(place, f"{where}: geometry", dict), where)
+        for place in typed(row.get("geometry") or [], f"{where}: geometry", list)
+    ]  # None: a node outside the box that was asked for
+    if not refs:
+        rounded = [_rounded(place) for place in places if place is not None]
+        refs = [elements.at_place.setdefault(place, FIRST_ID + len(elements.at_place)) for place in rounded]
+        places = list(rounded)
+    for node, place in zip(refs, places, strict=False):
+        if place is not None:
+            elements.degrees.setdefault(node, place)
+    return refs
+
+
+def _rounded(place: tuple[float, float]) -> tuple[float, float]:
+    return round(place[0], DECIMALS), round(place[1], DECIMALS)
 
 
 def _degrees(row: dict[str, Any], where: str) -> tuple[float, float]:

@@ -15,25 +15,28 @@ from shapely.affinity import scale
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan import Plan
+from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import DrawnLevel
 from echostep_app.plan.importers.raster.tracing import grey, trace
 from echostep_app.plan.importers.report import ImportReport
 
 SMALL_M = 0.6  # groups of pixels that are nowhere longer are letters and symbols; assumed
-PAPER = 255  # a transparent pixel is paper
+PAPER, INK = 255, 0  # a transparent pixel is paper
 TRACED = "traced from a picture: long words, furniture, stairs and swings of doors are walls too; echostep plan edit corrects it"
 
 
 def import_picture(path: Path, pixel_m: float, report: ImportReport) -> Plan:
     """Import a picture's dark areas as walls; raises EchostepError that names the file."""
     values = grey(path, PAPER)
+    if np.ptp(values) == 0.0:  # white ink on transparent paper
+        values = grey(path, INK)
     dark = values <= threshold(values)
+    if 0.5 < dark.mean() < 1.0:
+        dark = ~dark
+        report.doubt("most of it is dark, so what is bright was taken for walls")
     if dark.all():
         raise EchostepError(f"{path}: one colour all over: is this the plan?")
-    try:
-        outlines, noise = trace(dark)
-    except ValueError as error:
-        raise EchostepError(f"{path}: {error}") from error
+    outlines, noise = trace(dark, path)
     areas = [scale(area, pixel_m, pixel_m, origin=(0, 0)) for area in outlines]
     large = [area for area in areas if max(area.bounds[2] - area.bounds[0], area.bounds[3] - area.bounds[1]) > SMALL_M]
     if not large:
@@ -42,7 +45,7 @@ def import_picture(path: Path, pixel_m: float, report: ImportReport) -> Plan:
         report.leave_out(f"spots and letters up to {SMALL_M:g} m", small)
     report.units = f"{pixel_m:.4g} m a pixel (--scale)"
     report.doubt(TRACED)
-    return Plan(path.stem, (DrawnLevel(path.stem, 0.0, walls=[*large]).level(),), None, "")
+    return plan_of(path.stem, [DrawnLevel(path.stem, 0.0, walls=[*large])], report)
 
 
 def threshold(values: Floats) -> float:

@@ -9,6 +9,7 @@ corner. Other things that the robot saw are in the picture too, and stay.
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -16,16 +17,22 @@ from shapely.affinity import affine_transform
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.fields import LIMIT_M
 from echostep.plan import Plan
+from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import DrawnLevel
-from echostep_app.plan.importers.parsing import read_text
+from echostep_app.plan.importers.far import EARTH_M, IN_GRID, grid_origin
+from echostep_app.plan.importers.parsing import finite, read_text
 from echostep_app.plan.importers.raster.tracing import grey, trace
 from echostep_app.plan.importers.report import ImportReport
 
 OCCUPIED = 0.65  # default of map_server
 LARGEST_PIXEL_M = 10.0
 UNKNOWN = 128  # value of a transparent pixel: neither free nor occupied
+FIELD = re.compile(
+    r"""^\s*["']?(\w+)["']?[ \t]*:[ \t]*(\[[^\]]*\]|(?:[ \t]*(?:#[^\n]*)?\n[ \t]*-[ \t][^\n]*)+|[^\n]*)""", re.MULTILINE
+)
+FLOW_COMMA = re.compile(r",(?![^\[]*\])")  # outside of lists
+YES, NO = ("true", "yes", "on", "y"), ("false", "no", "off", "n")
 RAW_MOST = 100.0  # in raw mode, a greater value is unknown
 
 
@@ -40,21 +47,23 @@ def import_ros_map(path: Path, report: ImportReport) -> Plan:
     x, y, yaw = _origin(path, fields)
     picture = path.parent / fields["image"]
     probability = _probability(path, fields, grey(picture, UNKNOWN))
-    try:
-        outlines, noise = trace(probability > _number(path, fields, "occupied_thresh", 1.0, OCCUPIED))
-    except ValueError as error:
-        raise EchostepError(f"{picture}: {error}") from error
+    outlines, noise = trace(probability > _number(path, fields, "occupied_thresh", 1.0, OCCUPIED), picture)
     if not outlines:
         raise EchostepError(f"{picture}: no pixel is occupied (occupied_thresh, negate): is this the map?")
+    far_x, far_y = grid_origin(np.array([[x, y]]))
+    if (far_x, far_y) != (0.0, 0.0):
+        report.doubt(IN_GRID.format("the map", far_x, far_y))
     c, s = pixel_m * math.cos(yaw), pixel_m * math.sin(yaw)
-    drawn = DrawnLevel(path.stem, 0.0, walls=[affine_transform(area, (c, -s, s, c, x, y)) for area in outlines])
+    drawn = DrawnLevel(
+        path.stem, 0.0, walls=[affine_transform(area, (c, -s, s, c, x - far_x, y - far_y)) for area in outlines]
+    )
     report.units = f"{pixel_m:g} m a pixel (resolution)"
     if noise:
         report.leave_out("specks of less than 4 pixels", noise)
     report.doubt(
         "traced from what a robot saw: furniture and people are walls too, and doors that stood open are gaps; echostep plan edit corrects it"
     )
-    return Plan(path.stem, (drawn.level(),), None, "")
+    return plan_of(path.stem, [drawn], report)
 
 
 def _probability(path: Path, fields: dict[str, str], values: Floats) -> Floats:
@@ -69,23 +78,21 @@ def _probability(path: Path, fields: dict[str, str], values: Floats) -> Floats:
 
 
 def _fields(path: Path) -> dict[str, str]:
-    """The fields of a flat YAML file; a list below a field in block style is joined as in flow style."""
+    """The fields of a flat YAML file, in block or flow style; a list is joined by commas."""
+    whole = read_text(path).strip()
+    if whole.startswith("{"):
+        whole = FLOW_COMMA.sub("\n", whole.strip("{} \n"))
     fields: dict[str, str] = {}
-    last = ""
-    for line in read_text(path).splitlines():
-        text = line.split(" #")[0].rstrip()
-        if text.lstrip().startswith("- ") and last:
-            fields[last] = f"{fields[last].removesuffix(']').removeprefix('[')},{text.lstrip()[2:]}".strip(",")
-        elif ":" in text and not text.startswith((" ", "#", "\t")):
-            last, _, value = text.partition(":")
-            fields[last] = value.strip().strip("\"'")
+    for name, value in FIELD.findall(whole):
+        items = [item.split(" #")[0].strip().removeprefix("- ") for item in value.strip().splitlines()]
+        fields[name] = ",".join(item.strip(" ,") for item in items if item).strip("\"'")
     return fields
 
 
 def _origin(path: Path, fields: dict[str, str]) -> tuple[float, float, float]:
     """Position (m) and direction (rad) of the picture's lower left corner."""
     parts = fields.get("origin", "0,0,0").strip("[] ").split(",")
-    numbers = [_number(path, {"origin": part}, "origin", LIMIT_M) for part in parts]
+    numbers = [_number(path, {"origin": part}, "origin", EARTH_M) for part in parts]
     if len(numbers) not in (2, 3):
         raise EchostepError(f"{path}: origin: expected [x, y, yaw]")
     return numbers[0], numbers[1], numbers[2] if len(numbers) == 3 else 0.0
@@ -93,13 +100,11 @@ def _origin(path: Path, fields: dict[str, str]) -> tuple[float, float, float]:
 
 def _number(path: Path, fields: dict[str, str], name: str, most: float, otherwise: float | None = None) -> float:
     """A number between -`most` and `most`; `otherwise` when the file has none."""
-    text = fields.get(name)
-    if text is None and otherwise is not None:
+    text = fields.get(name, "").casefold()
+    if text in ("", "~", "null") and otherwise is not None:
         return otherwise
-    try:
-        value = float(text or "")
-    except ValueError as error:
-        raise EchostepError(f"{path}: {name}: {str(text)[:40]!r} is not a number") from error
+    text = "1" if text in YES else "0" if text in NO else text
+    value = finite(text, f"{path}: {name}")
     if not abs(value) <= most:
         raise EchostepError(f"{path}: {name}: {value:g} is not between {-most:g} and {most:g}")
     return value

@@ -56,14 +56,11 @@ def _grey(image: Any, ground: int) -> Floats:
     return np.asarray(image.convert("L"), dtype=np.float64)
 
 
-def trace(walls: Bools) -> tuple[list[Polygon], int]:
-    """Outlines of the groups of pixels (rows from the top, columns), and how many groups are left out as noise.
-
-    Raises ValueError for too many pixels.
-    """
+def trace(walls: Bools, path: Path) -> tuple[list[Polygon], int]:
+    """Outlines of the groups of pixels (rows from the top, columns) of a picture, and how many groups are left out as noise."""
     rows, first, last = _runs(walls)
     if len(rows) > MOST_RUNS:
-        raise ValueError("too many pixels of walls: cut the picture to the building")
+        raise EchostepError(f"{path}: too many pixels of walls: cut the picture to the building")
     height = len(walls)
     boxes = shapely.box(first, height - rows - 1, last, height - rows)
     groups = [part for part in shapely.get_parts(shapely.union_all(boxes)) if isinstance(part, Polygon)]
