@@ -32,12 +32,8 @@ from echostep_app.printing.running import running_note
 
 REFRESH_S = 0.1
 MAX_FINDINGS = 3  # shown at a time
-DOTS = (
-    (0x01, 0x08),
-    (0x02, 0x10),
-    (0x04, 0x20),
-    (0x40, 0x80),
-)  # bits of a braille character by row and column [Unicode, block 2800]
+# Bits of a braille character by row and column [Unicode, block 2800]
+DOTS = (0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80)
 BRAILLE = 0x2800
 
 

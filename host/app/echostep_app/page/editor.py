@@ -37,16 +37,8 @@ from echostep_app.plan.writer import georeference_fields, plan_json
 from echostep_app.printing.lines import say
 
 PAGE = Path(__file__).parent / "edit"
-SHARED = (
-    "style.css",
-    "icon.svg",
-    "storage.js",
-    "theme.js",
-    "view.js",
-    "language.js",
-    "*-pages.json",
-    "*-edit.json",
-)  # files of the live page
+# Files of the live page
+SHARED = "style.css", "icon.svg", "storage.js", "theme.js", "view.js", "language.js", "*-pages.json", "*-edit.json"
 MOST_BODY = 8_000_000  # bytes of a plan: a browser draws this much smoothly
 MOST_PICTURE = 32_000_000  # bytes
 POST_S = 20.0  # time for a posted plan to arrive

@@ -26,7 +26,7 @@ from echostep_app.scorecard.truth import Errors, Truth, errors
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """Results of a run: `estimates`, the true path, the computing time where it is worth printing, how much was lost, silent ports."""
+    """Results of a run: `estimates`, the true path, the computing time where it is worth printing, how much was lost, silent or doubtful ports."""
 
     title: str
     estimates: Sequence[Estimate]
