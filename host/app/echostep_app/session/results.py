@@ -78,7 +78,7 @@ def _write_tables(folder: Path, guided: CueList | None, result: Result) -> Echos
         if guided:
             guided.write(folder / "cues.csv")
     except OSError as error:
-        return EchostepError(f"{folder}: cannot write the track: {error.strerror}")
+        return EchostepError(f"{error.filename or folder}: cannot write the track: {error.strerror}")
     return None
 
 
