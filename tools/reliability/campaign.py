@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -16,6 +17,8 @@ from typing import Any, NamedTuple
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
+
+from echostep_app.printing.lines import put_aside
 
 Row = dict[str, Any]
 
@@ -34,8 +37,16 @@ class CampaignJournal:
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._path = path
-        self.rows: list[Row] = [*map(json.loads, path.read_text().splitlines())] if path.exists() else []
+        self._path, whole = path, True
+        self.rows: list[Row] = []
+        for line in path.read_text(errors="replace").splitlines() if path.is_file() else ():
+            try:
+                self.rows.append(dict(json.loads(line)))
+            except (ValueError, TypeError):
+                whole = False
+        if os.path.lexists(path) and not (path.is_file() and whole):
+            put_aside(path, f"{len(self.rows)} of its runs are used, the others made anew")
+            path.write_text("".join(json.dumps(row) + "\n" for row in self.rows))
 
     def add(self, row: Row) -> None:
         """Keep one more row at once, for a campaign may be stopped at any time."""

@@ -25,10 +25,8 @@ from echostep_app.commissioning.diagnosis import (
 from echostep_app.commissioning.probe import ProbeResult
 
 RATE_HZ, RATE_ERROR = 225.0, 0.03  # 1125 Hz / 5 [firmware/icm20649.c]; its own clock is within 1 % [DS-000192, table 4]
-GRAVITY_M_S2, GRAVITY_ERROR_M_S2 = (
-    9.81,
-    1.2,
-)  # zero-g level within 65 mg on each axis, and a scale within 1.5 %; assumed
+# Zero-g level within 65 mg on each axis, and a scale within 1.5 %; assumed
+GRAVITY_M_S2, GRAVITY_ERROR_M_S2 = 9.81, 1.2
 BIAS_MAX_DEG_S = 10.0  # twice the greatest zero rate [DS-000192, table 1]
 LEAST_SAMPLES = 100
 

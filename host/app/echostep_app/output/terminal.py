@@ -34,12 +34,8 @@ REFRESH_S = 0.1
 MAX_FINDINGS = 3  # shown at a time
 BELOW = 9  # lines of words and frame around the canvas
 SILENT_S = 2.0  # without a sample
-DOTS = (
-    (0x01, 0x08),
-    (0x02, 0x10),
-    (0x04, 0x20),
-    (0x40, 0x80),
-)  # bits of a braille character by row and column [Unicode, block 2800]
+# Bits of a braille character by row and column [Unicode, block 2800]
+DOTS = (0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80)
 BRAILLE = 0x2800
 
 

@@ -40,7 +40,8 @@ from echostep_app.plan.writer import georeference_fields, plan_json
 from echostep_app.printing.lines import say
 
 PAGE = Path(__file__).parent / "edit"
-SHARED = ("style.css", "icon.svg", "storage.js", "theme.js", "view.js", "language.js", "*-*.json")  # of the live page
+# Files of the live page
+SHARED = "style.css", "icon.svg", "storage.js", "theme.js", "view.js", "language.js", "*-*.json"
 MOST_BODY = 8_000_000  # bytes of a plan: a browser draws this much smoothly
 MOST_PICTURE = 32_000_000  # bytes
 MOST_FOUND = 200  # findings of a check

@@ -6,11 +6,14 @@ In: texts, among them names in plans, recordings and messages. Out: lines on sta
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from itertools import count
+from pathlib import Path
 
 from echostep.errors import EchostepError
 
@@ -45,3 +48,12 @@ def as_error(words: str, remedy: str = "") -> Iterator[None]:
         yield
     except OSError as error:
         raise EchostepError(f"{words}: {error.strerror or error}{remedy}") from error
+
+
+def put_aside(path: Path, remedy: str) -> None:
+    """Rename a file of this program that an earlier run left damaged, and say so; raises EchostepError where that fails. Nothing is deleted."""
+    names = (path.with_name(f"{path.name}.damaged{number or ''}") for number in count())
+    aside = next(name for name in names if not os.path.lexists(name))
+    with as_error(f"{path}: is damaged, and cannot be renamed"):
+        path.rename(aside)
+    complain(f"echostep: {path}: is damaged, as after a power failure: kept as {aside.name}; {remedy}")

@@ -21,16 +21,8 @@ from echostep.errors import EchostepError
 from echostep.offline.csv_table import GREATEST, SEPARATORS, CsvLimits, lines_of, separator_of
 
 MOST_ROWS = 1_000_000  # of a track: eight hours at 30 positions a second
-TUM = (
-    "timestamp",
-    "tx",
-    "ty",
-    "tz",
-    "qx",
-    "qy",
-    "qz",
-    "qw",
-)  # format of the RGB-D SLAM benchmark of TUM, written by evo and others
+# Format of the RGB-D SLAM benchmark of TUM, written by evo and others
+TUM = "timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"
 SHOWN = 40  # characters of a wrong cell that an error repeats
 
 

@@ -50,10 +50,8 @@ NAMES = {
 REQUIRED = ("time", "x", "y")
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 EPOCH_S = 3e8  # seconds since 1970 in July 1979: a greater number is the time of day of a recording, in whatever unit
-SLOWEST_M_S, WALKED_M_S = (
-    0.005,
-    (0.05, 15.0),
-)  # mean speed below which seconds are doubted, and speeds of tracks; assumed
+# Mean speed below which seconds are doubted, and speeds of tracks; assumed
+SLOWEST_M_S, WALKED_M_S = 0.005, (0.05, 15.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,11 @@ KEPT_S = 5.0  # between two writes: a few strides
 MOST_BYTES = 4096  # of the file
 GIVE = "give a start with --start X,Y,DEG, a room, or ?"
 
+
+class DamagedPlaceError(EchostepError):
+    """The file is there and holds no place."""
+
+
 MOVED_M = 1.0  # standard deviation per axis of the way while a battery is changed on the spot: a stride
 
 
@@ -69,7 +74,7 @@ class PlaceKeeper:
 
 
 def read_kept(folder: Path) -> Kept:
-    """What the last run in a folder kept; raises EchostepError where there is nothing, or it is damaged."""
+    """What the last run in a folder kept; raises EchostepError where there is nothing, DamagedPlaceError where it is damaged."""
     path = folder / FILE
     try:
         with path.open("rb") as file:
@@ -81,7 +86,7 @@ def read_kept(folder: Path) -> Kept:
     except FileNotFoundError as error:
         raise EchostepError(f"--start {LAST}: {path}: no run has kept a place there: {GIVE}") from error
     except (OSError, ValueError, OverflowError, RecursionError, msgspec.MsgspecError) as error:
-        raise EchostepError(f"--start {LAST}: {path} cannot be used: {GIVE}") from error
+        raise DamagedPlaceError(f"--start {LAST}: {path} cannot be used: {GIVE}") from error
 
 
 def start_last(last: Kept, plan: Plan, board: str, climbing: ClimbSettings, now: datetime) -> tuple[Start, str]:

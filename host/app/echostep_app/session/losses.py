@@ -28,9 +28,8 @@ ECHOLESS = "there were no echoes"
 SPREAD = "several places fitted"
 DRIFTED = "without a plan nothing corrects the drift"
 NAMES = {BOARD: "the board", MTX: "the MTx", FOOT: "the foot board", LINES: "the foot's lines"}
-SILENT_S = (
-    3.0  # before the end of a run, from which a port has fallen silent: an order more than between two chunks; assumed
-)
+# Before the end of a run, from which a port has fallen silent: an order more than between two chunks; assumed
+SILENT_S = 3.0
 
 
 class Losses:

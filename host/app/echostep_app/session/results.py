@@ -26,7 +26,7 @@ from echostep_app.scorecard.truth import Errors, Truth, errors
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """Results of a run: `estimates`, the true path, the computing time where it is worth printing, how much was lost, silent ports."""
+    """Results of a run: `estimates`, the true path, the computing time where it is worth printing, how much was lost, silent or doubtful ports."""
 
     title: str
     estimates: Sequence[Estimate]
@@ -78,7 +78,7 @@ def _write_tables(folder: Path, guided: CueList | None, result: Result) -> Echos
         if guided:
             guided.write(folder / "cues.csv")
     except OSError as error:
-        return EchostepError(f"{folder}: cannot write the track: {error.strerror}")
+        return EchostepError(f"{error.filename or folder}: cannot write the track: {error.strerror}")
     return None
 
 

@@ -285,7 +285,8 @@ class Session:
         summary = summary_words(self.estimates, truth)
         for sink in self._sinks:
             sink.end(summary)
-        losses, silent = self.losses.describe(self.arrivals.worn_s), self.arrivals.silent()
+        losses = self.losses.describe(self.arrivals.worn_s)
+        silent = [*self.arrivals.silent(), *self.tracker.streams.front_end.foot_doubts]
         result = Result(title, self.estimates, truth, elapsed_s, losses, silent)
         write_results(self.output.folder, self.tracker, self.guided, result)
 

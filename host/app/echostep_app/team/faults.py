@@ -18,10 +18,8 @@ WORDS = {
     errno.ENETDOWN: NO_WAY,
     errno.ETIMEDOUT: "the host does not answer: is the address right, and does a firewall let it through?",
 }
-HOST_MISMATCH, IP_MISMATCH = (
-    62,
-    64,
-)  # verify codes [OpenSSL, X509_V_ERR_HOSTNAME_MISMATCH, X509_V_ERR_IP_ADDRESS_MISMATCH]
+# Verify codes [OpenSSL, X509_V_ERR_HOSTNAME_MISMATCH, X509_V_ERR_IP_ADDRESS_MISMATCH]
+HOST_MISMATCH, IP_MISMATCH = 62, 64
 EXPIRED, NOT_YET = 10, 9
 UNKNOWN_AUTHORITY = (2, 18, 19, 20, 21)
 NO_TLS = ("WRONG_VERSION_NUMBER", "HTTP_REQUEST", "RECORD_LAYER_FAILURE")

@@ -8,6 +8,7 @@ are named by their content, so none is replaced and one drawing has one file.
 from __future__ import annotations
 
 import hashlib
+import os
 import queue
 import time
 from collections.abc import Callable
@@ -18,7 +19,7 @@ from echostep.errors import EchostepError
 from echostep.file_mode import claim
 from echostep.plan import Plan
 from echostep_app.plan.places.refusals import refusals
-from echostep_app.printing.lines import as_error
+from echostep_app.printing.lines import as_error, put_aside
 from echostep_app.team.endpoint import Endpoint
 from echostep_app.team.inbox import ListenerThread
 from echostep_app.team.messages.report import checked_name
@@ -94,15 +95,15 @@ def _put(newest: queue.Queue[bytes], payload: bytes) -> None:
 
 
 def _kept(payload: bytes, name: str, folder: Path) -> Path:
-    """The file of a drawing, written unless it is there; raises EchostepError when it cannot be written, or holds something else."""
+    """The file of a drawing, written unless it is there; another content is put aside. Raises EchostepError when it cannot be written."""
     letters = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)
     path = folder / f"drawing-{letters}-{hashlib.sha256(payload).hexdigest()[:DIGITS]}.json"
     with as_error(f"{path}: cannot write the drawing"):
         folder.mkdir(parents=True, exist_ok=True)
-        if path.exists():
-            if path.read_bytes() != payload:
-                raise EchostepError(f"{path}: holds something else, and is not overwritten: remove it")
+        if path.is_file() and path.read_bytes() == payload:
             return path
+        if os.path.lexists(path):
+            put_aside(path, "the drawing is written anew")
         part = path.with_suffix(".part")
         claim(part).write_bytes(payload)
         part.replace(path)

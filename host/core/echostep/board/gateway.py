@@ -21,10 +21,8 @@ LEAST_INTERVAL_S = 0.045  # least time between two readings of a beacon: a beaco
 CLOCK_S = 1.0  # largest jump of the gateway's clock relative to the tracker's between two messages; assumed
 CLOCK_GAIN = 0.05  # of a message in the running mean of the gateway's clock offset; assumed
 NEW_CLOCK_MESSAGES = 10  # consecutive messages that agree on a new clock offset before it is accepted; assumed
-FEW_READINGS, FEW_S = (
-    5,
-    60.0,
-)  # a beacon with at most this many readings gives up its slot after this time without a reading: invented numbers
+# A beacon with at most this many readings gives up its slot after this time without a reading: invented numbers
+FEW_READINGS, FEW_S = 5, 60.0
 FORGOTTEN_S = 1800.0  # any beacon gives it up after this time: it is out of power or out of the building
 LARGEST_BEARING_DEG = 180.0
 

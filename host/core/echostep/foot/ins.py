@@ -46,6 +46,7 @@ class Noise(NamedTuple):
     flat_m: float = 0.01  # sd of a level floor's height from step to step
     accel_bias: float = 0.3  # m/s2, sd of an axis when the foot is levelled
     gyro_bias: float = 0.005  # rad/s, the same
+    offset: float = 0.0  # m/s2 by which the force at rest may differ from gravity without a doubt about its scale
 
 
 class Nav(NamedTuple):

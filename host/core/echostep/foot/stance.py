@@ -34,9 +34,8 @@ ROLL_M_S2 = 2.0  # acceleration of a sensor on a foot that rolls
 MOST_EXCESS = 1e3
 # Difference between a resting foot's force and gravity, with the bias of a sensor; a shuffling foot shows 1 to 4
 GRAVITY_ALONE_M_S2 = 1.0
-STEADY_M_S2 = (
-    2.0  # greatest change of that force while a foot rests, twice the above; a foot that glides brakes at 4 to 6 m/s2
-)
+# Greatest change of that force while a foot rests, twice the above; a foot that glides brakes at 4 to 6 m/s2
+STEADY_M_S2 = 2.0
 # Limits for a foot that stands on an accelerating floor: a lift accelerates at up to 1.2 m/s2, and a standing person shifts.
 RIDING_RAD_S, RIDING_M_S2 = 0.15, 2.0
 LASTING_S = 0.15  # no swing is calm for this long: the stance is accepted, the velocity is corrected

@@ -16,22 +16,9 @@ from echostep.additions import svg_of
 from echostep.arrays import Bools, Floats, Ints
 from echostep.foot import ins, stance, zupt_ins, zupt_state
 from echostep.foot.magnetometer import MEASURED, TRUSTED, new_compass
-from echostep.foot.zupt_state import (
-    COVARIANCE,
-    END_S,
-    HEADING,
-    HEADING_SD,
-    KIND,
-    MOVE,
-    ROW_EVENT_COUNT,
-    ROW_HEADING,
-    ROW_IN_STANCE,
-    ROW_POSITION,
-    ROW_SIZE,
-    START_S,
-    TOE,
-)
 
+MOST_EXCESS = 0.02  # of the force at rest that is not worth a sentence
+LEG_SHARE = 0.1  # sd of a length by a sensor of unrest 1 on a leg; public recordings of shanks err by 0.1 to 0.13, of thighs by 1 and more
 NO_MAG: Floats = np.empty((0, 3))  # in place of magnetometer samples
 
 
@@ -57,7 +44,8 @@ class Step:
 
     `heading_rad` is its yaw after the step. The covariance holds for a known yaw before the step; `heading_sd_rad` is the growth of the yaw's
     error: its square is the growth of the variance. The sum of all moves is the position. `toe_rad` is the angle from the yaw to the direction of the
-    toe, as known so far; None until the foot has tipped enough to estimate it.
+    toe, as known so far; None until the foot has tipped enough to estimate it. `excess`: the specific force at rest over gravity, less 1. `unrest`:
+    above 1 the sensor is on no foot.
     """
 
     t_start_s: float
@@ -67,6 +55,23 @@ class Step:
     heading_rad: float
     heading_sd_rad: float
     toe_rad: float | None = None
+    excess: float = 0.0
+    unrest: float = 0.0
+
+    @property
+    def scale_sd(self) -> float:
+        """Standard deviation of the scale that all lengths so far share: an excess may be an offset or a scale, and a leg's lever is not known."""
+        return math.hypot(self.excess, LEG_SHARE * self.unrest**2 if self.unrest > 1.0 else 0.0)
+
+    def doubts(self) -> list[str]:
+        """What is wrong with the sensor or its place, a sentence each."""
+        percent = f"lengths are known to {100 * self.scale_sd:.0f} % (1 sd) only"
+        force = f"the accelerometer shows {ins.GRAVITY_M_S2 * (1.0 + self.excess):.2f} m/s2 at rest, gravity is {ins.GRAVITY_M_S2}"
+        worn = (
+            f"the sensor does not rest while the foot stands, as on a shank or a thigh: {percent}; strap it to the shoe"
+        )
+        wrong = f"{force}: an offset or a wrong scale, {percent}; calibrate it"
+        return [worn] if self.unrest > 1.0 else [wrong] * (abs(self.excess) > MOST_EXCESS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,14 +177,14 @@ class Foot:
 
         Raises ValueError for other shapes.
         """
-        return self._run(t_s, accel, gyro, mag, np.empty((0, ROW_SIZE)))
+        return self._run(t_s, accel, gyro, mag, np.empty((0, zupt_state.ROW_SIZE)))
 
     def track(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None = None) -> FootEvents:
         """As `feed`, with the sample after which each event was known."""
-        rows = np.zeros((len(t_s), ROW_SIZE))
+        rows = np.zeros((len(t_s), zupt_state.ROW_SIZE))
         events = self._run(t_s, accel, gyro, mag, rows)
-        known = np.searchsorted(rows[:, ROW_EVENT_COUNT], np.arange(1, len(events) + 1))
-        return FootEvents(events, known, rows[:, ROW_HEADING], rows[:, ROW_IN_STANCE] > 0.0)
+        known = np.searchsorted(rows[:, zupt_state.ROW_EVENT_COUNT], np.arange(1, len(events) + 1))
+        return FootEvents(events, known, rows[:, zupt_state.ROW_HEADING], rows[:, zupt_state.ROW_IN_STANCE] > 0.0)
 
     def _run(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None, rows: Floats) -> list[Step | Stance]:
         """Events of the samples; fills `rows` (n, ROW_SIZE), or nothing if it is empty."""
@@ -205,13 +210,13 @@ def walk_track(
 ) -> Track:
     """Track of a whole walk, samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s; bit for bit as by `Foot` live."""
     foot = Foot(settings, noise)
-    rows = np.zeros((len(t_s), ROW_SIZE))
+    rows = np.zeros((len(t_s), zupt_state.ROW_SIZE))
     events = foot._run(t_s, accel, gyro, mag, rows)
     return Track(
         np.asarray(t_s, np.float64),
-        rows[:, ROW_POSITION : ROW_POSITION + 3],
-        rows[:, ROW_HEADING],
-        rows[:, ROW_IN_STANCE] > 0.0,
+        rows[:, zupt_state.ROW_POSITION : zupt_state.ROW_POSITION + 3],
+        rows[:, zupt_state.ROW_HEADING],
+        rows[:, zupt_state.ROW_IN_STANCE] > 0.0,
         events,
         foot.counts,
         compass=foot.compass,
@@ -220,10 +225,11 @@ def walk_track(
 
 def _event(row: Floats) -> Step | Stance:
     """The event of a row (EVENT_SIZE,)."""
-    start_s, end_s, heading, toe = row[[START_S, END_S, HEADING, TOE]].tolist()
-    if row[KIND] == zupt_state.STANCE:
+    start_s, end_s = row[[zupt_state.START_S, zupt_state.END_S]].tolist()
+    heading, heading_sd, toe, excess, unrest = row[zupt_state.HEADING : zupt_state.UNREST + 1].tolist()
+    if row[zupt_state.KIND] == zupt_state.STANCE:
         return Stance(start_s, end_s, heading)
-    dx, dy, dz = row[MOVE : MOVE + 3].tolist()
-    covariance = row[COVARIANCE : COVARIANCE + 9].reshape(3, 3).copy()
+    dx, dy, dz = row[zupt_state.MOVE : zupt_state.MOVE + 3].tolist()
+    covariance = row[zupt_state.COVARIANCE : zupt_state.COVARIANCE + 9].reshape(3, 3).copy()
     toe_rad = None if math.isnan(toe) else toe
-    return Step(start_s, end_s, (dx, dy, dz), covariance, heading, float(row[HEADING_SD]), toe_rad)
+    return Step(start_s, end_s, (dx, dy, dz), covariance, heading, heading_sd, toe_rad, excess, unrest)

@@ -31,6 +31,7 @@ RUN_MEMORY = 2  # stances of which the briefest decides whether the foot runs: a
 STRAIGHT_STEP_M = 0.6  # least length of a step that shows the direction of travel
 STRAIGHT_STEP_RAD = math.radians(15.0)  # largest turn of such a step
 FORWARD_RAD = math.radians(45.0)  # largest angle of a forward step to the toe
+KNOWN_SCALE_SD = 0.01  # in which any foot's lengths differ: `CloudSettings.start_scale_sd`
 TOE_MEMORY = 20  # steps that the mean of the toe angle remembers
 
 
@@ -57,6 +58,8 @@ class TrunkPath:
         self._rests_s: deque[float] = deque(maxlen=RUN_MEMORY)
         self._toe = ToeAngle()
         self.steps = 0
+        self.doubts: list[str] = []  # of the newest step
+        self._scale_sd = KNOWN_SCALE_SD
 
     def add_standing(self, t_s: Floats, foot_heading_rad: Floats) -> list[tuple[int, PathSegment]]:
         """Segments of standing while the foot is still at all times `t_s` (n,), each with the index of the sample that completes it."""
@@ -88,6 +91,7 @@ class TrunkPath:
     def add_step(self, step: Step) -> list[PathSegment]:
         """The segment to the middle of the stance after this step."""
         self.steps += 1
+        self.doubts = step.doubts()
         self._toe.learn(step)
         dx, dy = float(step.move_m[0]), float(step.move_m[1])
         self._foot_xy = (self._foot_xy[0] + dx, self._foot_xy[1] + dy)
@@ -97,7 +101,9 @@ class TrunkPath:
             step.t_end_s + self._half_s(), heading, math.sqrt(max(variance, 0.0)), step.heading_sd_rad
         )
         rise_sd = math.sqrt(max(float(step.covariance[2][2]), 0.0))
-        return [replace(segment, rise_m=float(step.move_m[2]), rise_sd_m=rise_sd)]
+        before, self._scale_sd = self._scale_sd, max(self._scale_sd, step.scale_sd)
+        growth = math.sqrt(self._scale_sd**2 - before**2)
+        return [replace(segment, rise_m=float(step.move_m[2]), rise_sd_m=rise_sd, scale_sd=growth)]
 
     def _moving_segment(self, t_s: float, heading: float, sd_m: float, turn_sd_rad: float) -> PathSegment:
         """The segment from the last anchor to a new one over the foot; without a last anchor, an empty segment of one second."""

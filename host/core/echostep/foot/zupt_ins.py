@@ -12,32 +12,13 @@ from __future__ import annotations
 import math
 
 from echostep.arrays import Floats
-from echostep.foot import ins, mounting, soft_limit, stance
+from echostep.foot import ins, mounting, soft_limit, stance, unrest
 from echostep.foot import magnetometer as magnetic
+from echostep.foot import zupt_state as out
 from echostep.foot.ins import POS, TILT, VEL, YAW, Nav
 from echostep.foot.magnetometer import Magnetometer
 from echostep.foot.stance import SampleWindow, ZaruSums
-from echostep.foot.zupt_state import (
-    COVARIANCE,
-    END_S,
-    HEADING,
-    HEADING_SD,
-    KIND,
-    MOVE,
-    ROW_EVENT_COUNT,
-    ROW_HEADING,
-    ROW_IN_STANCE,
-    ROW_POSITION,
-    STANCE,
-    START_S,
-    STEP,
-    TOE,
-    ImuSample,
-    Output,
-    Samples,
-    ZuptInsState,
-    ZuptState,
-)
+from echostep.foot.zupt_state import ImuSample, Output, Samples, ZuptInsState, ZuptState
 from echostep.jit import lean_kernel, lean_part
 
 CONFIRM_S = 0.03  # a stance is reported after this much rest
@@ -90,10 +71,10 @@ def process(foot: ZuptInsState, samples: Samples, output: Output) -> int:
                 s.force[i], s.rate[i] = accel[k, i], gyro[k, i]
         if len(rows):
             for i in range(3):
-                rows[k, ROW_POSITION + i] = nav.position[i]
-            rows[k, ROW_HEADING] = ins.heading(nav)
-            rows[k, ROW_IN_STANCE] = s.in_stance
-            rows[k, ROW_EVENT_COUNT] = event_count
+                rows[k, out.ROW_POSITION + i] = nav.position[i]
+            rows[k, out.ROW_HEADING] = ins.heading(nav)
+            rows[k, out.ROW_IN_STANCE] = s.in_stance
+            rows[k, out.ROW_EVENT_COUNT] = event_count
     return event_count
 
 
@@ -140,7 +121,7 @@ def _restart(
         s.yaw_rad = ins.heading(nav)
     stance.clear_rest(sums)
     s.levelled = 0
-    s.still_s = s.lasting_s = s.doubt_s = s.waited_s = s.rest_s = 0.0
+    s.still_s = s.lasting_s = s.doubt_s = s.waited_s = s.rest_s = s.flight_s = 0.0
     return event_count
 
 
@@ -201,6 +182,7 @@ def _navigate(
     s.saturated += soft_limit.restore(nav, window, s.period_s, s.rate_peak)
     if not s.in_stance:
         s.swing_rad_s = max(s.swing_rad_s, math.sqrt(ins.dot(gyro, gyro)))
+        s.flight_s += dt
     if not _update_if_resting(s, nav, window, sample):
         stance.clear_rest(sums)
         s.rest_s = 0.0
@@ -255,6 +237,7 @@ def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Imu
         stance.inflate_covariance(nav, (level + vertical) / stance.GATE)
     else:
         s.doubt_s = 0.0
+        unrest.accumulate(s, nav, sample.gyro, level, dt)
     stance.zero_velocity_update(nav, expected, variance + stance.deceleration_variance(force2), dt)
     return True
 
@@ -307,6 +290,7 @@ def _begin_stance(s: ZuptState, nav: Nav, begin_s: float, events: Floats, event_
     s.rest_yaw_rad = ins.heading(nav)
     s.stance_tilt[0], s.stance_tilt[1], s.stance_tilt[2] = mounting.tilt(nav)
     if s.walking:
+        unrest.judge_flight(s)
         _write_step(s, nav, events[event_count])
         event_count += 1
     s.walking = 1
@@ -318,14 +302,17 @@ def _begin_stance(s: ZuptState, nav: Nav, begin_s: float, events: Floats, event_
 @lean_part
 def _write_step(s: ZuptState, nav: Nav, row: Floats) -> None:
     """Fill an event row with the step since `origin`; fade the sums of the mounting."""
-    row[KIND], row[START_S], row[END_S] = STEP, s.stance_end_s, s.stance_begin_s
+    row[out.KIND], row[out.START_S], row[out.END_S] = out.STEP, s.stance_end_s, s.stance_begin_s
     for i in range(3):
-        row[MOVE + i] = nav.position[i] - s.origin[i]
+        row[out.MOVE + i] = nav.position[i] - s.origin[i]
         for j in range(3):
-            row[COVARIANCE + 3 * i + j] = nav.P[POS + i, POS + j]
-    row[HEADING] = s.rest_yaw_rad
-    row[HEADING_SD] = math.sqrt(max(nav.P[YAW, YAW] - s.yaw_variance, 0.0))
-    row[TOE] = mounting.toe(s.tilt_square, s.tilt_cube)
+            row[out.COVARIANCE + 3 * i + j] = nav.P[POS + i, POS + j]
+    row[out.HEADING] = s.rest_yaw_rad
+    row[out.HEADING_SD] = math.sqrt(max(nav.P[YAW, YAW] - s.yaw_variance, 0.0))
+    row[out.TOE] = mounting.toe(s.tilt_square, s.tilt_cube)
+    offset = ins.dot(ins.rotation(nav.attitude)[2], nav.accel_bias)
+    row[out.EXCESS] = offset / ins.GRAVITY_M_S2 if abs(offset) > nav.noise.offset else 0.0
+    row[out.UNREST] = s.unrest if s.judged >= unrest.FEWEST else 0.0
     for i in range(3):
         s.tilt_square[i] *= mounting.MEMORY
         s.tilt_cube[i] *= mounting.MEMORY
@@ -342,11 +329,12 @@ def _settle(s: ZuptState, nav: Nav) -> None:
 def _end_stance(s: ZuptState, nav: Nav, compass: Magnetometer, events: Floats, event_count: int) -> int:
     """Write the stance, which ended with its last rest, and apply the magnetometer's yaw correction."""
     row = events[event_count]
-    row[KIND], row[START_S], row[END_S] = STANCE, s.stance_begin_s, max(s.rest_end_s, s.stance_begin_s)
-    row[HEADING] = s.rest_yaw_rad
-    s.stance_end_s = row[END_S]
+    row[out.KIND], row[out.START_S], row[out.END_S] = out.STANCE, s.stance_begin_s, max(s.rest_end_s, s.stance_begin_s)
+    row[out.HEADING] = s.rest_yaw_rad
+    s.stance_end_s = row[out.END_S]
     s.in_stance = 0
-    s.swing_rad_s = 0.0
+    s.swing_rad_s = s.flight_s = 0.0
+    unrest.judge(s, row[out.END_S] - row[out.START_S])
     if not s.settled:
         _settle(s, nav)
     yaw = ins.heading(nav)

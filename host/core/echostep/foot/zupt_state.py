@@ -15,8 +15,8 @@ from echostep.foot.stance import SampleWindow, ZaruSums
 
 STEP, STANCE = 0.0, 1.0  # kinds of event
 # Columns of an event: MOVE has 3, COVARIANCE 9.
-KIND, START_S, END_S, MOVE, COVARIANCE, HEADING, HEADING_SD, TOE = 0, 1, 2, 3, 6, 15, 16, 17
-EVENT_SIZE = 18
+KIND, START_S, END_S, MOVE, COVARIANCE, HEADING, HEADING_SD, TOE, EXCESS, UNREST = 0, 1, 2, 3, 6, 15, 16, 17, 18, 19
+EVENT_SIZE = 20
 EVENTS_PER_SAMPLE = 2
 ROW_POSITION, ROW_HEADING, ROW_IN_STANCE, ROW_EVENT_COUNT = 0, 3, 4, 5  # columns of a row: ROW_POSITION has 3
 ROW_SIZE = 6
@@ -63,6 +63,12 @@ class ZuptState(Protocol):
     saturated: int
     gaps: int
     forced: int
+    flight_s: float  # observed time since the last stance
+    roll: Floats  # rad, the turn about level axes in this stance, see `unrest`
+    strain: float  # sum over the samples of rest in this stance
+    strained: int  # their number
+    unrest: float
+    judged: int  # stances in it
     height_m: float  # of the sensor above the sole's contact with the floor
 
 

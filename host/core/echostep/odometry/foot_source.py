@@ -19,7 +19,7 @@ from echostep.xsens import MtBatch, MtxCounts, MtxReader
 
 # Differences from an MTx, which was calibrated by its maker: cross-axis sensitivity 2 %, sensitivity within 1.5 %, zero rate within 5 deg/s (three
 # sd), zero force within 65 mg (two sd) [ICM-20649 data sheet DS-000192, tables 1 and 2, as remembered: compare them with a copy].
-ICM20649_NOISE = Noise(accel_share=0.01, gyro_share=0.015, accel_bias=0.3, gyro_bias=0.03)
+ICM20649_NOISE = Noise(accel_share=0.01, gyro_share=0.015, accel_bias=0.3, gyro_bias=0.03, offset=0.65)
 
 
 class FootSamples(NamedTuple):

@@ -61,7 +61,7 @@ _REPORTS = (Identity, Configuration, Status, GyroHealth, BoardHealth, Parts)
 
 @dataclass(slots=True)
 class FrontEndCounts:
-    """Counts of input that became neither a segment nor a ping, by cause."""
+    """Counts of input that became neither a segment nor a ping, by cause, and doubts about the foot's."""
 
     unknown_ports: int = 0
     late_pings: int = 0
@@ -71,6 +71,7 @@ class FrontEndCounts:
     clock_steps: int = 0  # of the host's clock
     barometer_jumps: int = 0  # right after its start: the heights before them are not used
     stray_edges: int = 0  # on the board's SyncOut input, not from the MTx
+    foot_doubts: tuple[str, ...] = ()  # what is wrong with the foot's sensor or its place, a sentence each
 
 
 class FrontEnd:
@@ -125,6 +126,7 @@ class FrontEnd:
             timeline.clock_steps,
             self._barometer.jumps,
             timeline.stray_edges,
+            tuple(self.path.doubts),
         )
 
     def process(self, portion: Portion) -> list[MeasuredSegment | Dropout]:

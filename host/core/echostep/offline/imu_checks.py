@@ -46,6 +46,7 @@ FASTEST_WALK_M_S = 8.0  # median speed of the foot over a step
 FORCED_SAMPLES = 5  # samples of rest accepted against the innovation gate
 LOST_SHARE = 0.2  # standard deviation of the end over the length of the path
 HIGHEST_STEP_M = 1.0  # median rise of a step
+LEAST_FAULT = 0.1  # excess of the force at rest that may be why a track is no foot's
 
 
 def whole_rows(table: Floats) -> tuple[Floats, tuple[str, ...]]:
@@ -164,24 +165,28 @@ def _clipped(column: Floats, steep: float) -> tuple[float, float] | None:
 
 
 def contradiction(track: Track) -> str:
-    """How a track contradicts the motion of a foot, as a message; empty when it does not."""
-    steps, counts = track.steps, track.counts
-    if not track.stance.any():
-        return "the foot never stands in these samples: is it a foot, and are the units m/s2 and rad/s?"
+    """How a track contradicts the motion of a foot, as a message with the likely cause; empty when it does not."""
+    steps, counts, wrong = track.steps, track.counts, ""
     speeds = [np.hypot(*s.move_m[:2]) / max(s.t_end_s - s.t_start_s, SHORTEST_STEP_S) for s in steps]
-    if speeds and float(np.median(speeds)) > FASTEST_WALK_M_S:
-        return f"half of the steps are faster than {np.median(speeds):.0f} m/s: are the units m/s2 and rad/s?"
-    if steps and float(np.median([abs(s.move_m[2]) for s in steps])) > HIGHEST_STEP_M:
-        return "half of the steps rise or fall by more than a metre: are the units m/s2 and rad/s, and the axes right-handed?"
-    if counts.forced > FORCED_SAMPLES and end_sd_m(track) > LOST_SHARE * sum(np.hypot(*s.move_m[:2]) for s in steps):
-        return "the foot is at rest where its computed motion excludes it: are the units m/s2 and rad/s, and the axes right-handed?"
-    return ""
+    if not track.stance.any():
+        wrong = "the foot never stands in these samples"
+    elif speeds and float(np.median(speeds)) > FASTEST_WALK_M_S:
+        wrong = f"half of the steps are faster than {np.median(speeds):.0f} m/s"
+    elif steps and float(np.median([abs(s.move_m[2]) for s in steps])) > HIGHEST_STEP_M:
+        wrong = "half of the steps rise or fall by more than a metre"
+    elif counts.forced > FORCED_SAMPLES and end_sd_m(track) > LOST_SHARE * sum(np.hypot(*s.move_m[:2]) for s in steps):
+        wrong = "the foot is at rest where its computed motion excludes it"
+    if not wrong:
+        return ""
+    if steps and LEAST_FAULT < abs(steps[0].excess) < 1.0:
+        return f"{wrong}: {steps[0].doubts()[-1]}"
+    return f"{wrong}: is the sensor on the foot, are the units m/s2 and rad/s, and the axes right-handed?"
 
 
 def end_sd_m(track: Track) -> float:
     """Standard deviation (m) of the horizontal position error at the end, from the steps' covariances and the growth of the yaw's error.
 
-    A yaw error at a step turns the path after it about that step.
+    A yaw error at a step turns the path after it about that step; an error of the scale stretches it whole.
     """
     steps = track.steps
     if not steps:
@@ -189,4 +194,5 @@ def end_sd_m(track: Track) -> float:
     positions = np.cumsum([step.move_m[:2] for step in steps], axis=0)
     own = sum(float(step.covariance[0, 0] + step.covariance[1, 1]) for step in steps)
     turns = np.array([step.heading_sd_rad for step in steps])
-    return math.sqrt(own + float(turns**2 @ ((positions[-1] - positions) ** 2).sum(axis=1)))
+    shared = (steps[-1].scale_sd * float(np.hypot(*positions[-1]))) ** 2
+    return math.sqrt(own + shared + float(turns**2 @ ((positions[-1] - positions) ** 2).sum(axis=1)))

@@ -132,4 +132,5 @@ def describe_track(track: Track) -> str:
     return (
         f"{len(steps)} steps, {distance:.2f} m; the end is {np.hypot(end[0], end[1]):.2f} m from the beginning and {end[2]:+.2f} m in height, "
         f"known to {end_sd_m(track):.2f} m (1 sd); {track.counts.samples} samples, {lost} skipped, {track.counts.gaps} gaps{runs}{compass}{toe}"
+        f"{''.join(f'; {doubt}' for doubt in steps[-1].doubts()) if steps else ''}"
     )

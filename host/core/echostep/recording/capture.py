@@ -24,9 +24,8 @@ from echostep.xsens import FrameReader, MtMessage, MtxReader
 from echostep.xsens.frames import LONGEST
 from echostep.xsens.message import MessageReader, as_object
 
-LEAST_SHARE = (
-    0.1  # of the bytes of a port are in frames: by chance a checksum of one byte is right in one of 256 places; assumed
-)
+# Of the bytes of a port are in frames: by chance a checksum of one byte is right in one of 256 places; assumed
+LEAST_SHARE = 0.1
 READ_BYTES = 1 << 16  # of one read of the file: many frames, little memory
 HEAD_BYTES = 1 << 20  # of a port, by which the output format of legacy data is found; assumed
 BOARD_FRAME, MT_FRAME = 10, 5  # approximate bytes of a frame besides the body, to compare what two readers understood

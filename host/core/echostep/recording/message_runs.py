@@ -16,20 +16,10 @@ from mcap.records import Channel
 from echostep.arrays import Bools, Ints, Octets
 from echostep.jit import kernel
 from echostep.ports.chunks import LATEST_NS, Portion
+from echostep.recording import mcap_records
 from echostep.recording.damage.ending import Ending
 from echostep.recording.damage.scan import record_end
-from echostep.recording.mcap_records import (
-    CHANNEL_IDS,
-    HEAD_SIZE,
-    LOG_TIME_OFFSET,
-    MESSAGE,
-    MESSAGE_SIZE,
-    SEQUENCE_OFFSET,
-    is_misnamed,
-    parse_record,
-    port_of,
-    read_uint,
-)
+from echostep.recording.mcap_records import is_misnamed, parse_record, port_of, read_uint
 
 PORTION_BYTES = 1 << 18  # of the file in one portion, approximately: about five seconds of a walk; assumed
 
@@ -50,8 +40,8 @@ class PortChannels:
     """
 
     names: tuple[str, ...] = ()
-    port_of_channel: Ints = field(default_factory=lambda: np.full(CHANNEL_IDS, -1, np.int64))
-    known: Bools = field(default_factory=lambda: np.zeros(CHANNEL_IDS, np.bool_))
+    port_of_channel: Ints = field(default_factory=lambda: np.full(mcap_records.CHANNEL_IDS, -1, np.int64))
+    known: Bools = field(default_factory=lambda: np.zeros(mcap_records.CHANNEL_IDS, np.bool_))
     misnamed: set[str] = field(default_factory=set)
     _settled: set[int] = field(default_factory=set)  # numbers of the channels in a trusted summary
 
@@ -78,7 +68,7 @@ class PortChannels:
 def read_messages(file: Octets, offset: int, channels: PortChannels) -> tuple[MessageRun | None, int]:
     """The ports' messages among the consecutive valid messages from `offset` on, about `PORTION_BYTES` of them; and the offset after them."""
     stop = min(offset + PORTION_BYTES, len(file))
-    most = (stop - offset) // (HEAD_SIZE + MESSAGE_SIZE) + 1
+    most = (stop - offset) // (mcap_records.HEAD_SIZE + mcap_records.MESSAGE_SIZE) + 1
     port, t_arrival_ns, sequence, start, end = (np.empty(most, np.int64) for _ in range(5))
     count, next_offset = _read_run(
         file, offset, stop, channels.port_of_channel, channels.known, (port, t_arrival_ns, sequence, start, end)
@@ -104,16 +94,16 @@ def _read_run(
     """Fill the columns port, arrival, number, start and end from the messages before `stop`; returns the number of rows, and where the run ends."""
     port, t_arrival_ns, sequence, start, end = columns
     count = 0
-    while offset < stop and file[offset] == MESSAGE:
+    while offset < stop and file[offset] == mcap_records.MESSAGE:
         after = record_end(file, offset, known)
         if after < 0:
             break
-        body, offset = offset + HEAD_SIZE, after
+        body, offset = offset + mcap_records.HEAD_SIZE, after
         if port_of_channel[read_uint(file, body, 2)] >= 0:
             port[count] = port_of_channel[read_uint(file, body, 2)]
-            log_time_ns = read_uint(file, body + LOG_TIME_OFFSET, 8)
+            log_time_ns = read_uint(file, body + mcap_records.LOG_TIME_OFFSET, 8)
             t_arrival_ns[count] = log_time_ns if 0 <= log_time_ns <= LATEST_NS else LATEST_NS
-            sequence[count] = read_uint(file, body + SEQUENCE_OFFSET, 4)
-            start[count], end[count] = body + MESSAGE_SIZE, after
+            sequence[count] = read_uint(file, body + mcap_records.SEQUENCE_OFFSET, 4)
+            start[count], end[count] = body + mcap_records.MESSAGE_SIZE, after
             count += 1
     return count, offset

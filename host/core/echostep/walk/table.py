@@ -23,24 +23,9 @@ from echostep.plan import Plan
 
 Columns = dict[str, list[Any]]
 COLUMNS = (
-    "t_s",
-    "x_m",
-    "y_m",
-    "heading_rad",
-    "xx_m2",
-    "xy_m2",
-    "yy_m2",
-    "heading_sd_rad",
-    "step",
-    "status",
-    "level",
-    "z_m",
-    "z_sd_m",
-    "protection_m",
-    "right",
-    "outside",
-    "plan_fits",
-)
+    "t_s", "x_m", "y_m", "heading_rad", "xx_m2", "xy_m2", "yy_m2", "heading_sd_rad", "step", "status", "level", "z_m", "z_sd_m",
+    "protection_m", "right", "outside", "plan_fits",
+)  # fmt: skip
 HYPOTHESES = "hypotheses"  # the last column: probability:x,y,level of each place that fits
 PLACE = ("longitude_deg", "latitude_deg")  # columns beside those of track.csv, where the plan has a georeference
 

@@ -18,34 +18,9 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Bools, Octets
+from echostep.xsens import mtdata as mt
 from echostep.xsens.frames import BUS_ID, CONFIGURATION, MTDATA, OUTPUT_MODE, OUTPUT_SETTINGS, Frame
-from echostep.xsens.mtdata import (
-    ACCEL,
-    ATTITUDE,
-    AUXILIARY,
-    CALIBRATED,
-    CELSIUS,
-    EULER,
-    FIXED_12_20,
-    FLOAT,
-    GYRO,
-    MAG,
-    MATRIX,
-    NO_ACCEL,
-    NO_ANALOG_1,
-    NO_ANALOG_2,
-    NO_GYRO,
-    NO_MAG,
-    ORIENTATION,
-    QUATERNION,
-    RAW,
-    SAMPLE_COUNTER,
-    STATUS,
-    TEMPERATURE,
-    Decoded,
-    OutputFormat,
-    decode_mtdata,
-)  # fmt: skip
+from echostep.xsens.mtdata import Decoded, OutputFormat, decode_mtdata
 
 # Of a Configuration message, in bytes: the number of devices, the first device's block, the length of a block [CMT].
 _DEVICES, _BLOCKS, _BLOCK = 96, 98, 20
@@ -53,7 +28,7 @@ _BLOCK_FORMAT = struct.Struct(">IHHI")  # of a block: device, length of its data
 MOST_ROWS = 500  # messages by which a format is judged; assumed
 POSSIBLE = 0.9  # least share of messages with possible values: some are damaged
 # Possible values: magnitudes of a sensor on a body, m/s2, rad/s, earth's fields; mean acceleration including gravity; air, degC.
-MOST = ((ACCEL, 200.0), (GYRO, 40.0), (MAG, 20.0))
+MOST = ((mt.ACCEL, 200.0), (mt.GYRO, 40.0), (mt.MAG, 20.0))
 STRONGEST_FIELD = 4.0  # median: some iron, no magnet
 MEAN_ACCEL = (5.0, 20.0)  # m/s2
 AIR_C = (-40.0, 85.0)  # [MTx data sheet, operating temperature]
@@ -165,39 +140,49 @@ def _is_known(mode: int, settings: int) -> bool:
 @cache
 def _formats(length: int) -> tuple[OutputFormat, ...]:
     """All formats whose payloads have this length, the simplest first: with fewer bits set; floats before fixed point, raw data last."""
-    absent = (0, NO_MAG, NO_ACCEL, NO_GYRO, NO_ACCEL | NO_MAG, NO_GYRO | NO_MAG, NO_ACCEL | NO_GYRO)
+    absent = (
+        0,
+        mt.NO_MAG,
+        mt.NO_ACCEL,
+        mt.NO_GYRO,
+        mt.NO_ACCEL | mt.NO_MAG,
+        mt.NO_GYRO | mt.NO_MAG,
+        mt.NO_ACCEL | mt.NO_GYRO,
+    )
     modes = [
         sum(bits)
-        for bits in product((0, CALIBRATED), (0, ORIENTATION), (0, TEMPERATURE), (0, STATUS), (0, AUXILIARY))
+        for bits in product(
+            (0, mt.CALIBRATED), (0, mt.ORIENTATION), (0, mt.TEMPERATURE), (0, mt.STATUS), (0, mt.AUXILIARY)
+        )
         if bits[0] or bits[1]  # with neither, the values show nothing
     ]
     choices = product(
         modes,
-        (FLOAT, FIXED_12_20),
-        (SAMPLE_COUNTER, 0),
-        (QUATERNION, EULER, MATRIX),
+        (mt.FLOAT, mt.FIXED_12_20),
+        (mt.SAMPLE_COUNTER, 0),
+        (mt.QUATERNION, mt.EULER, mt.MATRIX),
         absent,
-        (0, NO_ANALOG_1, NO_ANALOG_2),
+        (0, mt.NO_ANALOG_1, mt.NO_ANALOG_2),
     )
     formats = set()
     for mode, form, counter, orientation, missing, analog in choices:
-        used = ((orientation, ORIENTATION), (missing, CALIBRATED), (analog, AUXILIARY))
+        used = ((orientation, mt.ORIENTATION), (missing, mt.CALIBRATED), (analog, mt.AUXILIARY))
         formats.add(OutputFormat(mode, form | counter | sum(bits for bits, sent in used if mode & sent)))
-    formats |= {OutputFormat(RAW, counter) for counter in (SAMPLE_COUNTER, 0)}
+    formats |= {OutputFormat(mt.RAW, counter) for counter in (mt.SAMPLE_COUNTER, 0)}
     fits = [output for output in formats if output.length == length]
     return tuple(sorted(fits, key=_complexity))
 
 
 def _complexity(output: OutputFormat) -> tuple[int, ...]:
     """Order of the formats of one length: raw last, fixed point later, few bits besides calibrated data and the counter first."""
-    rare = (output.mode & ~(CALIBRATED | ORIENTATION)).bit_count() + (
-        output.settings & ~(SAMPLE_COUNTER | FIXED_12_20)
+    rare = (output.mode & ~(mt.CALIBRATED | mt.ORIENTATION)).bit_count() + (
+        output.settings & ~(mt.SAMPLE_COUNTER | mt.FIXED_12_20)
     ).bit_count()
-    no_calibrated = not output.mode & CALIBRATED
-    missing = output.settings & NO_ACCEL, output.settings & NO_GYRO  # rarer than a missing magnetometer
+    no_calibrated = not output.mode & mt.CALIBRATED
+    missing = output.settings & mt.NO_ACCEL, output.settings & mt.NO_GYRO  # rarer than a missing magnetometer
     return (
-        output.mode & RAW,
-        output.settings & FIXED_12_20,
+        output.mode & mt.RAW,
+        output.settings & mt.FIXED_12_20,
         rare + no_calibrated,
         no_calibrated,
         *missing,
@@ -208,7 +193,7 @@ def _complexity(output: OutputFormat) -> tuple[int, ...]:
 
 def _is_measured(rows: Octets, output: OutputFormat) -> bool:
     """Whether the floats of most messages are zero or larger than TINY: those of a date are smaller."""
-    if output.settings & FIXED_12_20:
+    if output.settings & mt.FIXED_12_20:
         return True
     with np.errstate(invalid="ignore"):
         size = np.abs(np.ascontiguousarray(rows[:, : 4 * output.numbers]).view(">f4").astype(np.float64))
@@ -224,11 +209,11 @@ def _is_possible(decoded: Decoded, output: OutputFormat) -> bool:
             if sent[0, group]:
                 good &= np.isfinite(values[:, columns]).all(axis=1) & (np.abs(values[:, columns]) <= most).all(axis=1)
         if sent[0, len(MOST)]:
-            good &= np.abs(np.linalg.norm(values[:, ATTITUDE], axis=1) - 1.0) <= UNIT_ERROR
-        if output.mode & TEMPERATURE:
-            good &= (values[:, CELSIUS] >= AIR_C[0]) & (values[:, CELSIUS] <= AIR_C[1])
+            good &= np.abs(np.linalg.norm(values[:, mt.ATTITUDE], axis=1) - 1.0) <= UNIT_ERROR
+        if output.mode & mt.TEMPERATURE:
+            good &= (values[:, mt.CELSIUS] >= AIR_C[0]) & (values[:, mt.CELSIUS] <= AIR_C[1])
     if good.mean() < POSSIBLE:
         return False
-    force = np.linalg.norm(values[good][:, ACCEL], axis=1).mean() if sent[0, 0] else np.mean(MEAN_ACCEL)
-    strength = np.median(np.linalg.norm(values[good][:, MAG], axis=1)) if sent[0, 2] else 0.0
+    force = np.linalg.norm(values[good][:, mt.ACCEL], axis=1).mean() if sent[0, 0] else np.mean(MEAN_ACCEL)
+    strength = np.median(np.linalg.norm(values[good][:, mt.MAG], axis=1)) if sent[0, 2] else 0.0
     return bool(MEAN_ACCEL[0] <= force <= MEAN_ACCEL[1] and strength <= STRONGEST_FIELD)

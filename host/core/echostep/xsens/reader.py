@@ -14,35 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
+from echostep.xsens import gates
+from echostep.xsens import mtdata as mt
 from echostep.xsens.frames import ERROR, MTDATA, MTDATA2, WAKE_UP, FrameReader, MtFrames, copy_payloads, encode_frame
-from echostep.xsens.gates import (
-    BAD_COUNTER,
-    BAD_QUATERNION,
-    GOOD,
-    INCOMPLETE,
-    LOST,
-    NO_MESSAGES,
-    NOT_FINITE,
-    OTHER_DEVICE,
-    OUT_OF_RANGE,
-    REPEATED,
-    Messages,
-    apply_gates,
-    joined,
-)  # fmt: skip
-from echostep.xsens.mtdata import (
-    ACCEL,
-    ATTITUDE,
-    CELSIUS,
-    COLUMNS,
-    GYRO,
-    MAG,
-    PROJECT,
-    Decoded,
-    OutputFormat,
-    decode_mtdata,
-    pack_mtdata,
-)  # fmt: skip
+from echostep.xsens.gates import Messages, apply_gates, joined
+from echostep.xsens.mtdata import Decoded, OutputFormat, decode_mtdata, pack_mtdata
 from echostep.xsens.mtdata2 import decode_mtdata2, find_packets
 from echostep.xsens.sample import MtSample
 
@@ -119,14 +95,14 @@ class MtxReader:
     `output`: format of MTData as set on the device; MTData2 contains its format.
     """
 
-    def __init__(self, limits: MtxLimits | None = None, output: OutputFormat = PROJECT) -> None:
+    def __init__(self, limits: MtxLimits | None = None, output: OutputFormat = mt.PROJECT) -> None:
         limits = limits or MtxLimits()
         self._frames = FrameReader()
         self._output = output
         self._limits = np.array([limits.accel_m_s2, limits.gyro_rad_s, limits.mag, limits.quaternion_error])
-        self._tally = np.zeros(LOST + 1, np.int64)
+        self._tally = np.zeros(gates.LOST + 1, np.int64)
         self._state = np.array([-1, -1, -1, 0])
-        self._waiting = NO_MESSAGES  # a sample whose counter jumped; one at most
+        self._waiting = gates.NO_MESSAGES  # a sample whose counter jumped; one at most
         self._bad_length = self._other = self._wake_ups = self._errors = 0
 
     @property
@@ -134,21 +110,21 @@ class MtxReader:
         """Counts since the start."""
         tally = self._tally.tolist()
         return MtxCounts(
-            good=tally[GOOD],
-            other_device=tally[OTHER_DEVICE],
+            good=tally[gates.GOOD],
+            other_device=tally[gates.OTHER_DEVICE],
             skipped_bytes=self._frames.counts.skipped_bytes,
             bad_checksum=self._frames.counts.bad_checksum,
             bad_length=self._bad_length,
-            incomplete=tally[INCOMPLETE],
-            bad_quaternion=tally[BAD_QUATERNION],
-            not_finite=tally[NOT_FINITE],
-            out_of_range=tally[OUT_OF_RANGE],
-            repeated=tally[REPEATED],
-            bad_counter=tally[BAD_COUNTER],
+            incomplete=tally[gates.INCOMPLETE],
+            bad_quaternion=tally[gates.BAD_QUATERNION],
+            not_finite=tally[gates.NOT_FINITE],
+            out_of_range=tally[gates.OUT_OF_RANGE],
+            repeated=tally[gates.REPEATED],
+            bad_counter=tally[gates.BAD_COUNTER],
             other_messages=self._other,
             wake_ups=self._wake_ups,
             device_errors=self._errors,
-            lost=tally[LOST],
+            lost=tally[gates.LOST],
         )
 
     @property
@@ -167,10 +143,16 @@ class MtxReader:
             return EMPTY
         messages = joined(self._waiting, self._decode(frames))
         passed, waits = apply_gates(messages, self._limits, self._state, self._tally)
-        self._waiting = messages.at(np.arange(waits, waits + 1)) if waits >= 0 else NO_MESSAGES
+        self._waiting = messages.at(np.arange(waits, waits + 1)) if waits >= 0 else gates.NO_MESSAGES
         values, counter, _, _, end = messages if passed.all() else messages.at(np.flatnonzero(passed))
         return MtBatch(
-            counter, values[:, ACCEL], values[:, GYRO], values[:, MAG], values[:, ATTITUDE], values[:, CELSIUS], end
+            counter,
+            values[:, mt.ACCEL],
+            values[:, mt.GYRO],
+            values[:, mt.MAG],
+            values[:, mt.ATTITUDE],
+            values[:, mt.CELSIUS],
+            end,
         )
 
     def _decode(self, frames: MtFrames) -> Messages:
@@ -181,7 +163,7 @@ class MtxReader:
             return Messages(*decode_mtdata(rows, self._output), frames.bus, frames.end)
         self._count_others(frames)
         count = len(frames.mid)
-        decoded = Decoded(np.empty((count, COLUMNS)), np.empty(count, np.int64), np.empty((count, 4), np.bool_))
+        decoded = Decoded(np.empty((count, mt.COLUMNS)), np.empty(count, np.int64), np.empty((count, 4), np.bool_))
         usable = legacy.copy()
         first, second = np.flatnonzero(legacy), np.flatnonzero(frames.mid == MTDATA2)
         if len(first):

@@ -23,6 +23,7 @@ from rich.progress import track
 
 from echostep.errors import EchostepError
 from echostep_app.output.table import console
+from echostep_app.printing.lines import put_aside
 from echostep_studies.frame.report import as_dict
 
 RunRow = TypeVar("RunRow")
@@ -98,12 +99,14 @@ class Journal(Generic[RunRow]):
         self.path = path
         self.runs: dict[int, list[RunRow]] = {}
         self._kinds = {kind.__name__: kind for kind in kinds}
+        if path.is_dir():
+            put_aside(path, "its runs are made anew")
         path.touch()
         lines = path.read_text(errors="replace").splitlines(keepends=True)
         for line in lines:
             try:
                 self._keep(json.loads(line))
-            except (ValueError, KeyError, TypeError):
+            except (ValueError, KeyError, TypeError, RecursionError, msgspec.MsgspecError):
                 continue  # the last line before a kill may be incomplete
         if lines and not lines[-1].endswith("\n"):
             with path.open("a") as file:

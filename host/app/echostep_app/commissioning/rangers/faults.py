@@ -23,17 +23,13 @@ SIDES = ("left", "right")
 AHEAD_DEG = (-60, -45, -30, 30, 45, 60)  # axes that are tried beside abeam; smaller errors are within the beam
 OPPOSITE_DEG = 180
 POSE_SD_M = 0.2  # of places that the tracker found with a faulty ranger, assumed
-SURE_SD, LEAST_GAIN = (
-    4.0,
-    0.1,
-)  # another axis explains the pings better by this many standard deviations, and by this many nats a ping
+# Another axis explains the pings better by this many standard deviations, and by this many nats a ping
+SURE_SD, LEAST_GAIN = 4.0, 0.1
 COVER_M, COVERED = 0.3, 0.6  # cloth or a hand: most echoes come from nearer
 HEARD = 0.05  # share of echoes of a ranger that hears nothing
 ARM_M, ARM = 0.75, 0.15  # an arm's length; share of pings that something there answers, though no wall is that near
-FLOOR_M, FLOOR = (
-    (0.75, 2.5),
-    0.2,
-)  # the floor from a hip, aslant; share of pings with one and the same range that no wall explains
+# The floor from a hip, aslant; share of pings with one and the same range that no wall explains
+FLOOR_M, FLOOR = (0.75, 2.5), 0.2
 SAME_M = 0.1
 SWAPPED = "The rangers are swapped: each hears the walls of the other side. Swap their plugs."
 WALL_SD = 4.0  # a range within this many of its deviations of a source is that source's

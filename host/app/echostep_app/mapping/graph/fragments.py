@@ -25,9 +25,8 @@ FARTHEST_M = 5.0  # range: beyond, echoes alternate between two walls
 CONE_RAD = math.radians(30.0)  # half of the ranger's cone, and the heading's own error
 SD_M, SD_RAD = 0.04, math.radians(1.0)  # least standard deviations: sway of the trunk, bias of a ranger
 RANGE_SD_M = 0.04
-NOISE_M = (
-    0.025  # of one range, from a flat wall [Robot Electronics, sonar FAQ]: residuals beyond it come from the surface
-)
+# Of one range, from a flat wall [Robot Electronics, sonar FAQ]: residuals beyond it come from the surface
+NOISE_M = 0.025
 # Slope of the line fitted to a surface of this standard deviation, of half length 1: off by as much at each end
 SLOPE = math.sqrt(3.0)
 

@@ -32,11 +32,12 @@ from echostep_app.ports.arrival_clock import SleepWatch, now_ns
 from echostep_app.ports.serial_ports import SerialPorts, check_different
 from echostep_app.ports.usb_number import usb_number
 from echostep_app.printing.console import console, print_notices
+from echostep_app.printing.lines import put_aside
 from echostep_app.printing.people import outlast_output
 from echostep_app.printing.progress import with_bar
 from echostep_app.recording.recorder import Recorder
 from echostep_app.session.chunk_streams import portions_of, recorded, with_messages
-from echostep_app.session.last_place import PlaceKeeper, read_kept, start_last
+from echostep_app.session.last_place import FILE, DamagedPlaceError, PlaceKeeper, read_kept, start_last
 from echostep_app.session.metadata import (
     LAST,
     check_start,
@@ -130,8 +131,13 @@ def _live(
 
 
 def _last_start(folder: Path, plan: Plan, board: str, settings: Settings) -> Start:
-    """The start where the last run in a folder ended; it is printed."""
-    start, words = start_last(read_kept(folder), plan, board, settings.climb, datetime.now(UTC))
+    """The start where the last run in a folder ended; it is printed. Anywhere when that is damaged: a tracker starts after a power failure."""
+    try:
+        kept = read_kept(folder)
+    except DamagedPlaceError:
+        put_aside(folder / FILE, "the whole building is searched")
+        return Start()
+    start, words = start_last(kept, plan, board, settings.climb, datetime.now(UTC))
     console.print(words, markup=False, highlight=False)
     return start
 

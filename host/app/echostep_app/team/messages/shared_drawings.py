@@ -23,9 +23,8 @@ MOST_LENGTH_M = 50_000.0  # of all walls together: a walk of four hours has 13 k
 MOST_EXTENT_M = 5_000.0  # of the walls along x and y: one site
 MOST_STOREYS = 64  # assumed: no building has more
 MOST_OTHERS = 2_000  # assumed: a walk draws doors and stairs, and no rooms
-MOST_MEETINGS = (
-    200_000  # pairs of walls of a storey whose boxes meet, each with itself; assumed: a drawn wall meets a few others
-)
+# Pairs of walls of a storey whose boxes meet, each with itself; assumed: a drawn wall meets a few others
+MOST_MEETINGS = 200_000
 AT_ONCE = 200  # walls, of a search that may find all others
 
 

@@ -40,9 +40,8 @@ AFTER_ECHO, AFTER_SILENCE = 0, 1
 # Shares after an echo, and after silence: of echoes expected by the entry that are missing all the same; of "no echo" where none is expected (the
 # others are second reflections and things that no plan shows); of views that are hidden; of "no echo" in these
 MISSED, QUIET, HIDDEN, HIDDEN_QUIET = (0.02, 0.1), (0.3, 0.8), (0.1, 0.2), (0.1, 0.6)
-USUAL_SILENT = (
-    1.0 - EchoSettings().stray
-)  # share of silence, by second reflections, for which QUIET stands: it goes with a ranger's own
+# Share of silence, by second reflections, for which QUIET stands: it goes with a ranger's own
+USUAL_SILENT = 1.0 - EchoSettings().stray
 MOST_QUIET = 0.95
 AROUND = 2  # cells about the floor, at its walls, that share the nearest row
 UNKNOWN = -1  # no row: outside the building

@@ -20,13 +20,7 @@ from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, SECTORS, Tab
 from echostep.localization.echoes.unplanned import PlacedPings, RangeMemory
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.heights import GridHeights
-from echostep.localization.grid.kernels import (
-    GridStates,
-    halved,
-    shift_and_weigh,
-    spread,
-    weigh_levels,
-)
+from echostep.localization.grid.kernels import GridStates, halved, shift_and_weigh, spread, weigh_levels
 from echostep.localization.height.levels import HeightChange
 from echostep.localization.particle_arrays import DrawnPoses, Move, PingBatch
 from echostep.localization.particles.kernels import MovePiece, piece_of, systematic

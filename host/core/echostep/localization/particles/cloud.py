@@ -30,12 +30,7 @@ from echostep.localization.height.levels import (
     set_levels_by_pressure,
 )
 from echostep.localization.particle_arrays import DrawnPoses, Move, PingBatch
-from echostep.localization.particles.kernels import (
-    NOISE_BEND,
-    NOISE_TURN,
-    effective_size,
-    systematic,
-)
+from echostep.localization.particles.kernels import NOISE_BEND, NOISE_TURN, effective_size, systematic
 from echostep.localization.particles.particles import GATHERED_REST, Particles
 from echostep.localization.particles.reweighting import CloudModel, EchoMemory, MoveProgress, propagate_and_reweight
 from echostep.localization.particles.sampling import kld_size, log_mode_weight, spread_evenly

@@ -27,9 +27,8 @@ from echostep.localization.particles.kernels import (
 from echostep.walls.echo_sources import MOST_SOURCES, Limits, Receiver, SourceList, first_sources
 from echostep.walls.index import WallIndex
 
-NEGLIGIBLE_WEIGHT = (
-    1e-9  # of the greatest, below which no likelihood is computed: the next resampling drops such particles
-)
+# Of the greatest, below which no likelihood is computed: the next resampling drops such particles
+NEGLIGIBLE_WEIGHT = 1e-9
 LEAST_TOP = 1e-100  # greatest weight below which all are rescaled: far from the least number
 LEAST_DENSITY = 1e-12  # of a range, so that its logarithm exists
 

@@ -24,9 +24,8 @@ LAST_OPCODE = 0x0F
 # Assumed.
 VALID_RUN = 4  # this many consecutive records are not valid by chance
 OTHER_LIMIT = 1 << 20  # bytes; only messages and chunk records are larger
-LARGE = (
-    1 << 12
-)  # bytes; a larger message must be followed by a possible record: one wrong bit of its length would swallow many others
+# Bytes; a larger message must be followed by a possible record: one wrong bit of its length would swallow many others
+LARGE = 1 << 12
 
 
 def map_file(path: Path) -> Octets:
