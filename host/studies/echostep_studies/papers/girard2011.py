@@ -4,7 +4,7 @@
 In: the motion vector and heading of each step, one ping of each ranger. Out: the position estimate. Owns its particles; draws from the generator
 that it is given. The numbers 1 to 8 are the paper's (section 3.2). Where the paper leaves something open:
 
-- A new particle inherits its parent's weight; step 5 compares these weights. Step 6 then sets the weight anew, as printed, from this
+- A new particle inherits its parent's weight; step 5 compares these weights. Step 6 then replaces the weight, as printed, from this
   step's pings alone. Without rangers the inherited and merged weights go on to steps 7 and 8, so that the middle of the
   cloud is kept: it stops growing at about 0.4 m, unlike Figure 11. Drawing those that go in step 7 lets it grow, but misses the paper's row
   "with model" (0.33 m instead of 0.45 m; 0.47 m printed).

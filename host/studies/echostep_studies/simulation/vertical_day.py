@@ -40,7 +40,7 @@ def climb(
     rng: np.random.Generator,
     ways: Literal["stairs", "lift", "both"] = "both",
 ) -> VerticalMove:
-    """So many seconds about the building from a random floor, at 50 Hz; each stay ends with a way to another floor."""
+    """A walk of `seconds` about the building from a random floor, at 50 Hz; each stay ends with a way to another floor."""
     floor = int(rng.integers(len(heights_m)))
     pieces: list[tuple[Floats, bool, bool]] = []
     left = seconds

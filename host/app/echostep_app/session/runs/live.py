@@ -76,7 +76,7 @@ class Guide(Protocol):
 
 
 def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions, guide: Guide | None = None) -> Path:
-    """Track a wearer and record everything, with the taps of a guide if there is one; returns the recording."""
+    """Track a wearer and record everything, with the taps of a guide, if any; returns the recording."""
     plan = plan_of(tracking)
     path = tracking.settings_path
     settings_toml = read_settings(path) if path else ""
