@@ -135,7 +135,7 @@ def resident_mb(process: str) -> float:
 
 
 def run(seconds: float, folder: Path, wrap: int, before_s: float = BEFORE_WRAP_S) -> Measured:
-    """Walk so many simulated seconds; the board's clock starts so many seconds before it reaches `wrap`. Files go into `folder`."""
+    """Walk for `seconds`, simulated; the board's clock starts `before_s` before it reaches `wrap`. Files go into `folder`."""
     plan, measured, start = load_plan(PLAN), Measured(seconds), wrap - round(before_s * TICKS_S)
     elf = late_firmware(start, folder.resolve() / "firmware")
     board = BoardProcess([TWIN[0], "--elf", str(elf), "--seed", str(SEED)])

@@ -25,13 +25,13 @@ from echostep_app.simulation.people.walker import Person, Waypoint
 from echostep_app.simulation.scenario import BLOCK_MS, START_NS, USB_LATENCY_NS, Scenario
 
 MODEL = MtxModel(drift_ppm=50.0)
-SAMPLES, SPAN_MS = 2000, 20_001  # so many samples of MODEL's crystal are a whole number of milliseconds
+SAMPLES, SPAN_MS = 2000, 20_001  # samples of MODEL's crystal that take a whole number of milliseconds
 STAND_S = 25.0  # at both ends of a round: longer than SPAN_MS, so that its seam can be chosen
 CUT_MS = 1000  # of the first standing
 
 
 def _once(room_s: float) -> tuple[Waypoint, ...]:
-    """The demo's way from the corridor's middle and back there, so many seconds in each of its two rooms."""
+    """The demo's way from the corridor's middle and back there, `room_s` seconds in each of its two rooms."""
     return (
         (16.0, 7.5), (24.0, 7.5), (24.0, 2.0), (17.6, 2.0), (17.6, 4.4, room_s), (17.6, 2.0), (2.0, 2.0), (2.0, 7.5),
         (9.5, 7.5), (9.5, 10.8, room_s), (9.5, 7.5), (16.0, 7.5),

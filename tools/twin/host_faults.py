@@ -142,7 +142,7 @@ def unplug(walk: LiveWalk, *, board: bool = False, mtx: bool = False) -> None:
 
 
 def plug(walk: LiveWalk, *, board: bool = False, mtx: bool = False) -> None:
-    """Plug them in again; its cable feeds the MTx, too, so that it starts anew."""
+    """Plug them in again; its cable feeds the MTx, too, so that it restarts."""
     if board:
         walk.board.fault("usb=plug")
     if mtx:

@@ -104,7 +104,7 @@ class LiveWalk:
         self.opened.close()
 
     def link(self, *, board: bool = True, mtx: bool = True) -> None:
-        """Make the ports' names anew, of those that are plugged in."""
+        """Recreate the names of the ports that are plugged in."""
         for name, port, there in (("board", self.board.port, board), ("mtx", self.mtx.port, mtx)):
             (self.folder / name).unlink(missing_ok=True)
             if there:

@@ -2,7 +2,7 @@
 """The twin in real time: a simulated walk in the demo building, the board and the MTx on two pseudo terminals (`make twin`).
 
 In: the ELF and the twin; the MTx begins with its factory settings and accepts its configuration. Out: two ports for `echostep live`, and the
-true path in out/twin/truth.csv. The walk begins when the board's port is opened, each time anew, and is repeated until Ctrl-C. With
+true path in out/twin/truth.csv. The walk begins when the board's port is opened, from its start each time, and is repeated until Ctrl-C. With
 `--beacons udp://127.0.0.1:9000` a simulated gateway sends the readings of beacons along the walk to that port. With `--still`
 the wearer moves as `echostep calibrate` requests; boxes of the kit of 2026 lie as `calibrate accelerometers` requests. Owns both pseudo terminals.
 """
@@ -146,7 +146,7 @@ class PtyMtx:
         self._ends = ()
 
     def power_on(self) -> None:
-        """The MTx had no power: it starts anew, with the settings that it was given [Xsens MT0101P], and counts its samples from 0."""
+        """The MTx had no power: it restarts with the settings that it was given [Xsens MT0101P], and counts its samples from 0."""
         self._counted = self.counter
         self._write(self.device.power_on(time.monotonic()))
 
@@ -231,7 +231,7 @@ def announce(command: str, hint: str = "", **ports: str) -> None:
 
 
 def walk_with_mtx(options: argparse.Namespace) -> None:
-    """Play the walk with the parts of the papers, and a gateway if one is wanted, anew at each opening of the board's port."""
+    """Play the walk with the parts of the papers, and a gateway if wanted; each opening of the board's port restarts it."""
     truth = options.out / "truth.csv"
     more = f" --beacons {options.beacons} --guide Meeting" if options.beacons else ""
     with contextlib.closing(PtyBoard()) as board:
@@ -250,7 +250,7 @@ def walk_with_mtx(options: argparse.Namespace) -> None:
 
 
 def walk_with_two_boards(options: argparse.Namespace) -> None:
-    """Play the walk with both boards of 2026, anew at each opening of the belt board's port."""
+    """Play the walk with both boards of 2026; each opening of the belt board's port restarts it."""
     with contextlib.closing(PtyBoard()) as board, contextlib.closing(PtyBoard(FOOT_BOARD)) as foot_board:
         announce(
             f"live --plan {PLAN} --board {board.port} --foot {foot_board.port}", board=board.port, foot=foot_board.port

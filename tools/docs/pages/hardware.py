@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """firmware/README.md: its tables of parts, reasons and wires, from firmware/hardware; and the drawings and schematics from the same tables.
 
-In: parts.toml, wiring.toml. Out: the page with its marked tables made anew; SVG of each board's wiring, KiCad schematics. Owns nothing.
+In: parts.toml, wiring.toml. Out: the page with its marked tables regenerated; SVG of each board's wiring, KiCad schematics. Owns nothing.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Row = dict[str, Any]
 
 
 def page() -> str:
-    """The page as it is, with its tables made anew."""
+    """The page with its tables regenerated."""
     made = {f"parts {kit}": parts_table(kit) for kit in KITS}
     made |= {"reasons 2026": reasons_table("2026")}
     made |= {f"wires {board.name}": wires_table(board) for board in boards()}

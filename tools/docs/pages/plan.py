@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """host/docs/plan.md: its table of every field of plan.json, from the schema.
 
-In: host/core/echostep/plans/plan.schema.json. Out: the page with its tables made anew. Owns nothing.
+In: host/core/echostep/plans/plan.schema.json. Out: the page with its tables regenerated. Owns nothing.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ TYPES = "\n| type | meaning |\n|---|---|\n"
 
 
 def page() -> str:
-    """The page as it is, with its tables made anew."""
+    """The page with its tables regenerated."""
     schema = json.loads(SCHEMA.read_text(encoding="utf-8"))
     rows = [
         f"| `{name}` | {kind} | {'yes' if needed else ''} | {meaning} |\n"

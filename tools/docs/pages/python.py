@@ -92,7 +92,7 @@ def _signature(name: str, value: Any) -> str:
 
 
 def _parameter(parameter: inspect.Parameter) -> str:
-    """`name: type = default`; a default that is made anew for each call is `...`."""
+    """`name: type = default`; a default that is made for each call is `...`."""
     text = f"{parameter.name}: {_annotation(parameter.annotation)}"
     if parameter.default is parameter.empty:
         return text

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """host/docs/recordings.md: its table of derived messages, from their schemas.
 
-In: `echostep_app.output`. Out: the page with its table made anew. Owns nothing.
+In: `echostep_app.output`. Out: the page with its table regenerated. Owns nothing.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SHOWN_BY = {
 
 
 def page() -> str:
-    """The page as it is, with its table of derived messages made anew."""
+    """The page with its table of derived messages regenerated."""
     rows = [
         f"| `{t.name}` | `{t.schema_name}` | {SHOWN_BY.get(t.name) or _fields(t)} |\n"
         for t in (*TOPICS, POSE, FRAME, SCENE, LOCATION, LOG)

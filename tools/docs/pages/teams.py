@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """host/docs/teams.md: its tables of every field of a report, and the report's JSON Schema, from the dataclasses that the host checks with.
 
-In: `echostep_app.team.messages.report`. Out: the page with its tables made anew, and the text of report.schema.json. Owns nothing.
+In: `echostep_app.team.messages.report`. Out: the page with its tables regenerated, and the text of report.schema.json. Owns nothing.
 """
 
 from __future__ import annotations
@@ -69,5 +69,5 @@ def tree() -> dict[str, Any]:
 
 
 def page() -> str:
-    """The page as it is, with its tables made anew."""
+    """The page with its tables regenerated."""
     return between_marks((DOCS / "teams.md").read_text(), tables(tree()))

@@ -53,7 +53,7 @@ def calls_made() -> int:
 
 
 def preload() -> None:
-    """Start this program anew with the library, unless it has it."""
+    """Restart this program with the library, unless it is loaded."""
     if LOADED in os.environ:
         return
     BUILT.parent.mkdir(parents=True, exist_ok=True)

@@ -19,7 +19,7 @@ from echostep_studies.simulation.devices.mtx_setup import pack
 
 BLOCK = 20_000  # frames mutated together
 MAX_PENDING = MAX_LENGTH + 6  # bytes of the longest unfinished frame
-SETUP_SHARE = 50  # one block in so many is also fed to the setup and to the packet reader, which are slower
+SETUP_SHARE = 50  # one block in SETUP_SHARE is also fed to the setup and to the packet reader, which are slower
 OTHER_OUTPUTS = (OutputFormat(0x0004, 0x0001), OutputFormat(0x0007, 0x0108), OutputFormat(0x4000, 0x0001))
 SAMPLE = MtSample(0, (0.5, -0.25, 9.75), (0.125, 0.0, -1.5), (0.5, 0.0, -0.875), (0.5, 0.5, -0.5, 0.5))
 

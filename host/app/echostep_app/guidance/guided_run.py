@@ -90,7 +90,7 @@ class GuidedRun(CueList):
         self.cues.append(self._guide.cue(e, self._tracker.state.beacon_heard_s))
 
     def _find_route(self, e: Estimate) -> None:
-        """Find the route from an estimate; if there is none, the next estimate is tried."""
+        """Find the route from an estimate; without a route the next estimate is tried."""
         try:
             route = self._routes.way(RoutePlace(e.x_m, e.y_m, e.level), self._to)
         except EchostepError:

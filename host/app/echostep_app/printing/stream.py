@@ -29,7 +29,7 @@ GONE = "its reader has gone"
 
 
 class PeopleStream(io.TextIOBase):
-    """Writes to `stream`; None: there is none, as after `>&-`. `fault` says why nothing is written any more, empty as long as it is."""
+    """Writes to `stream`; None: closed, as after `>&-`. `fault` says why nothing is written any more, empty as long as it is."""
 
     def __init__(self, stream: TextIO | None, name: str) -> None:
         self.fault = "" if stream else f"{name} is closed"

@@ -26,7 +26,7 @@ class OutputOptions:
     page: Address | None = None  # address to serve the page at; None: no page
     page_stays: bool = False  # serve the page until Ctrl-C after the run is over
     outlet: Outlet | None = None  # where estimates are published; None: nowhere
-    browser: bool = False  # open the page in a browser, where there is one
+    browser: bool = False  # open the page in a browser, if installed
     foxglove: FoxgloveAddress | None = None  # where viewers of Foxglove's protocol connect; None: nowhere
 
     @property

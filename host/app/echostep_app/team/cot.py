@@ -59,7 +59,7 @@ def event(report: Report) -> bytes | None:
 
 
 def events(report: Report) -> list[bytes]:
-    """The event of a report, unless it has no position on Earth, and that of its emergency if there is one."""
+    """The event of a report, unless it has no position on Earth, and that of its emergency, if any."""
     return [made for made in (event(report), emergency(report)) if made is not None]
 
 

@@ -32,7 +32,7 @@ PrintLine = Callable[[str], None]
 
 
 def drawing_wearer(plan: Path | None) -> str | None:
-    """The name in `--plan wearer:NAME`; None where the plan is a file, or there is none. Raises EchostepError for a name that cannot be."""
+    """The name in `--plan wearer:NAME`; None for a file or no plan. Raises EchostepError for a name that cannot be."""
     given = "" if plan is None else str(plan)
     return checked_name(f"--plan {PREFIX}", given.removeprefix(PREFIX)) if given.startswith(PREFIX) else None
 

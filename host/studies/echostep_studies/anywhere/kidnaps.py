@@ -32,7 +32,7 @@ def carried(walk: SimulatedWalk, from_m: float, over_m: float) -> Kidnapped:
 
 
 def off_in_lift(walk: SimulatedWalk) -> Kidnapped:
-    """Board and tracker are off during a ride: it goes on where it was, and the heights by pressure begin anew at what they were before."""
+    """Board and tracker are off during a ride: it goes on where it was, and the heights by pressure restart at their last value."""
     before, after, rise_m = _ride(walk)
     zeroed = tuple(replace(s, height_m=s.height_m - rise_m, barometer_starts=1) for s in after)
     return replace(walk, segments=(*before, *zeroed)), after[0].segment.t0_s

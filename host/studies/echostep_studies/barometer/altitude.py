@@ -26,7 +26,7 @@ HIGH_SPEED_PA = 3.0  # noise of the SCP1000's high-speed mode [SCP1000 data shee
 QUIETEST_PA = 0.2
 LOWEST_PA, HIGHEST_PA = 20_000.0, 120_000.0
 FIRST_S = 0.05  # before the first sample
-# A barometer's first readings may be its reset value, or of a filter that still settles: within so many samples a step that no lift makes is no rise
+# A barometer's first readings may be its reset value, or of a filter that still settles: within SETTLING samples a step that no lift makes is no rise
 SETTLING = 9  # samples: about a second of the SCP1000; assumed
 FASTEST_PA_S = 120.0  # an express lift, 10 m/s; assumed
 STEP_PA = 18.0  # that noise makes: six standard deviations of the high-speed mode

@@ -81,7 +81,7 @@ def noise_of_record(samples: Pressures, few: Pressures) -> float:
 
 
 def find_storeys(samples: Pressures, noise_pa: float) -> Floats:
-    """Heights (k,) above the lowest floor of all floors with a stay; raises EchostepError when there is one only.
+    """Heights (k,) above the lowest floor of all floors with a stay; raises EchostepError for a single floor.
 
     1. Rises between stays give changes of floor: the floor after a change is a known one of the same height, or a new one.
     2. Least squares over all changes gives the heights.

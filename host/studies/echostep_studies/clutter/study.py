@@ -87,7 +87,7 @@ def _draw(logs: tuple[Path, ...], seed: int, folder: Path, rows: Sequence[LogRow
 
 
 def clutter_study(data: Path, starts: int, seed: int) -> Study[LogRow, Row]:
-    """The study of all logs of a folder, with so many unknown starts each; raises EchostepError that names log and line."""
+    """The study of all logs of a folder, `starts` unknown starts each; raises EchostepError that names log and line."""
     logs = tuple(logs_in(data))
     for path in logs:
         read_log(path)

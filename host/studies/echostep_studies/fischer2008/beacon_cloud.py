@@ -3,7 +3,7 @@
 
 In: dead reckoning, and what beacons measure. Out: particles and their beliefs of the beacons. Owns `BeaconCloud`.
 
-The rules are the tracker's: when to resample, where a beacon is first placed and where anew. The number of particles is constant; the tracker's
+The rules are the tracker's: when to resample, where a beacon is placed first and where again. The number of particles is constant; the tracker's
 `Cloud` lets it follow the spread.
 """
 

@@ -37,8 +37,8 @@ SWEEPS: dict[str, tuple[float, ...]] = {
     "outliers": (0.0, 0.2, 0.4),
     "period_s": (1.0, 2.0, 5.0),
 }
-SAMPLE = 20  # rows of the sweeps and of rare conditions have one return for so many of the main rows
-CLOSER = 4  # rows of the conditions that matter most likewise
+SAMPLE = 20  # returns of a main row for each return of a sweep or of a rare condition
+CLOSER = 4  # the same for the conditions that matter most
 COLUMNS = {"name": "", "percent": "% out", "low_percent": "from", "high_percent": "to (95 %)", "runs": "runs"}
 
 
@@ -46,7 +46,7 @@ COLUMNS = {"name": "", "percent": "% out", "low_percent": "from", "high_percent"
 class Case:
     """A row: the system, the ground, the time between measurements, the person's obedience.
 
-    `deployed`: the beacons' places are known from the way in alone. `every`: the row has one of so many returns.
+    `deployed`: the beacons' places are known from the way in alone. `every`: the row has one in `every` returns.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BatchRun:
-    """So many returns of a row, and how many of them reached the exit."""
+    """Number of returns of a row, and number of those that reached the exit."""
 
     name: str
     runs: int

@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.board.calibration import ICM20649_M_S2, ICM20649_RAD_S
 from echostep.foot.ins import GRAVITY_M_S2, Noise
 from echostep.foot.steps import walk_track
 from echostep.odometry import ICM20649_NOISE
 from echostep_app.commissioning.imu_errors import fit_errors, pose_of
-from echostep_app.simulation.devices.foot_board import measure_foot
-from echostep_app.simulation.devices.mtx import MtxModel, measure
+from echostep_app.simulation.devices.foot_board import MODEL
+from echostep_app.simulation.devices.mtx import MtxModel, means, measure, specific_force_and_rate
 from echostep_app.simulation.people.walker import RATE_HZ, Person, Walk, walk
 from echostep_studies.simulation.sites import otb
 
@@ -49,6 +50,22 @@ def rows(seed: int) -> list[KitRun]:
             errors = errors_m(walked, samples, noise)
             runs.append(KitRun(name=f"foot alone, {pace}, {name}", seed=seed, errors_m=errors, inside95=[]))
     return runs
+
+
+def measure_foot(walk: Walk, rng: np.random.Generator) -> Samples:
+    """Samples of a foot board on a whole walk: t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s. Equal generators draw equal biases."""
+    m = MODEL
+    biases = [m.accel_bias_m_s2 * rng.standard_normal(3), m.gyro_bias_rad_s * rng.standard_normal(3)]
+    t_s: Floats = np.arange(10.0 * m.period_s, walk.t_s[-1] - 0.05, m.period_s)
+    force, rate = (means(v, t_s, m.period_s) for v in specific_force_and_rate(walk, np.eye(3)))
+    measured = []
+    for true, bias, noise, unit, limit in (
+        (force, biases[0], m.accel_noise_m_s2, ICM20649_M_S2, m.force_limit_counts),
+        (rate, biases[1], m.gyro_noise_rad_s, ICM20649_RAD_S, m.rate_limit_counts),
+    ):
+        noisy = true + bias + noise * rng.standard_normal(true.shape)
+        measured.append(unit * np.clip(np.rint(noisy / unit), -limit, limit))
+    return t_s, measured[0], measured[1]
 
 
 def devices(walked: Walk, seed: int) -> dict[str, tuple[Samples, Noise]]:

@@ -183,7 +183,7 @@ def _measured_segment(segment: PathSegment, walk: MarkerWalk, since_s: float) ->
 
 
 def _segments(walk: MarkerWalk) -> Iterator[tuple[PathSegment | None, PathSegment]]:
-    """The turn on the spot before each step, if there is one, and the step, with the covariance that the unit states."""
+    """The turn on the spot before each step (None: no turn), and the step, with the covariance that the unit states."""
     sd_m = math.hypot(STEP_SD_M, STEP_M * math.radians(ImuModel().noise_deg))
     before = walk.start_heading_rad
     for k, heading in enumerate(walk.heading_rad.tolist()):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Public recordings of feet and trunks through the detection of falls: how many it claims where there is none.
+"""Public recordings of feet and trunks through the detection of falls: number of falls claimed without a fall.
 
 In: a folder laid out like ../shared/data. Out: rows. Owns nothing. The strides, by which the standing directions are learnt, are those of the foot.
 """
@@ -39,7 +39,7 @@ def recorded(folder: Path) -> list[NoFallRun]:
 
 
 class TrunkRecording(NamedTuple):
-    """Samples of a trunk, t_s (n,), force, rate (n, 3), with the force of a thigh (n, 3), and of a foot of the same wearer, where there is one."""
+    """Samples of a trunk, t_s (n,), force, rate (n, 3), with the force of a thigh (n, 3), and of a foot of the same wearer, if recorded."""
 
     t_s: Floats
     force: Floats

@@ -96,7 +96,7 @@ def loop_walls(rng: np.random.Generator) -> Floats:
 
 
 def furnished(plan: Plan, pieces: int, rng: np.random.Generator) -> Plan:
-    """The plan with so many cupboards along the walls of each level, clear of doors, stairs and each other."""
+    """The plan with `pieces` cupboards along the walls of each level, clear of doors, stairs and each other."""
     stairs = shapely.union_all([shapely.Polygon(c.outline_m) for c in plan.connectors])
     return replace(plan, levels=tuple(_furnished(level, pieces, stairs, rng) for level in plan.levels))
 

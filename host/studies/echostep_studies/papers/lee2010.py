@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """The ambulatory system of Lee and Lee 2010 as printed: distance from thigh and calf gyros, heading by compass and belt gyro, floor by pressure.
 
-In: angles and rates of thigh and calf (forward positive), compass and belt gyro, pressure. Out: travel, velocity, covariance, heading, place, floor.
-Owns the state of `Walker`: the leg's angles, heading and place. Equation numbers are those of [Lee 2010]. What the paper leaves open is decided
-here: angles are wrapped before they are fused, and a period of the leg ends where the thigh turns round behind the body.
+In: angles and rates of thigh and calf (forward positive), compass and belt gyro, pressure. Out: travel, velocity, heading, place, floor. Owns the
+state of `Walker`: the leg's angles, heading and place. Equation numbers are those of [Lee 2010]; the covariance of the travel (eqs. 6 to 11), which
+the paper's method does not use, is left out. What the paper leaves open is decided here: angles are wrapped before they are fused, and a period of
+the leg ends where the thigh turns round behind the body.
 """
 
 from __future__ import annotations
@@ -68,37 +69,6 @@ def nominal(plus: float, minus: float) -> float:
     return 0.5 * (plus + minus)
 
 
-def change(plus: float, minus: float) -> float:
-    """The change of an angle [Lee 2010, eqs. 6 and 7]."""
-    return 0.5 * (plus - minus)
-
-
-def travel(thigh: float, thigh_change: float, calf: float, calf_change: float, legs: Lee2010Legs) -> float:
-    """D by nominal angles and changes [Lee 2010, eq. 8]."""
-    return hip_travel(thigh + thigh_change, thigh - thigh_change, calf + calf_change, calf - calf_change, legs)
-
-
-def jacobian(thigh: float, thigh_change: float, calf: float, calf_change: float, legs: Lee2010Legs) -> Floats:
-    """F (4,): of D by nominal thigh angle, its change, nominal calf angle, its change [Lee 2010, eq. 10]."""
-    a, b = math.cos(thigh - thigh_change), math.cos(thigh + thigh_change)
-    c, d = math.cos(calf - calf_change), math.cos(calf + calf_change)
-    return np.array([legs.thigh_m * (a + b), legs.thigh_m * (b - a), legs.calf_m * (c + d), legs.calf_m * (d - c)])
-
-
-def angle_covariance(thigh_sd: float, calf_sd: float) -> Floats:
-    """C_theta (4, 4), diagonal [Lee 2010, eq. 11].
-
-    The paper prints two variances for four angles: each is that of a measured angle, and nominal angle and change of two
-    independent readings have half of it each.
-    """
-    return np.diag(0.5 * np.array([thigh_sd**2, thigh_sd**2, calf_sd**2, calf_sd**2]))
-
-
-def travel_variance(f: Floats, c_theta: Floats) -> float:
-    """C_D = F C F' [Lee 2010, eq. 9]."""
-    return float(f @ c_theta @ f)
-
-
 def fuse(compass_rad: float, compass_variance: float, gyro_rad: float, gyro_variance: float) -> Fused:
     """The weighted least squares of compass and gyro angle, in [-pi, pi) [Lee 2010, eqs. 12 to 18].
 
@@ -108,12 +78,6 @@ def fuse(compass_rad: float, compass_variance: float, gyro_rad: float, gyro_vari
     total = compass_variance + gyro_variance
     weight = gyro_variance / total if total > 0.0 else 0.5
     return Fused(wrap(gyro_rad + weight * off), compass_variance * weight)
-
-
-def weighted_mean(values: Sequence[float], variances: Sequence[float]) -> float:
-    """The value that makes S least, with weights 1 / variance [Lee 2010, eqs. 12 to 16]."""
-    weights = [1.0 / v for v in variances]
-    return sum(w * x for w, x in zip(weights, values, strict=True)) / sum(weights)
 
 
 def advance(x_m: float, y_m: float, v_m_s: float, heading_rad: float, dt_s: float) -> tuple[float, float]:
@@ -189,7 +153,7 @@ class Walker:
         self._bearing = math.nan
 
     def feed(self, t_s: Floats, thigh: Floats, calf: Floats, belt: Floats, compass: Floats) -> Floats:
-        """Samples (n,) each, rates in rad/s, compass as a heading in rad, NaN where there is none."""
+        """Samples (n,) each, rates in rad/s, compass as a heading in rad, NaN if missing."""
         rows = [
             self._sample(*sample)
             for sample in zip(*(c.tolist() for c in (t_s, thigh, calf, belt, compass)), strict=True)

@@ -35,7 +35,7 @@ class ImuModel:
     """Heading errors of the foot-mounted MTx, degrees.
 
     `iron_deg`: mean amplitude of a deviation that goes with the sine of the direction and grows along the walk, from 0.15 to 1.85 of it;
-    `wander_deg`: random walk, per step; `noise_deg`: each step anew. The three sizes and the growth were chosen once, on a grid, so that dead
+    `wander_deg`: random walk, per step; `noise_deg`: of each step. The three sizes and the growth were chosen once, on a grid, so that dead
     reckoning over the paper's 52 steps has the paper's mean, deviation, maximum and end (tests/test_girard_study.py holds them to 15 %).
     """
 

@@ -74,7 +74,7 @@ def glide(t: Floats, begin: float, end: float) -> Floats:
 
 
 def course(manner: FootManner, steps: int, rng: np.random.Generator | None = None) -> Course:
-    """Stand, take so many steps, stand; the steps are equal, or given a generator differ by SCATTER and WANDER_RAD."""
+    """Stand, take `steps` steps, stand; the steps are equal, or given a generator differ by SCATTER and WANDER_RAD."""
     m = manner
     longer, slower, aside = np.zeros((3, steps)) if rng is None else rng.standard_normal((3, steps))
     swing_s, stance_s = m.swing_s * (1.0 + SCATTER * slower), m.stance_s * (1.0 + SCATTER * slower)

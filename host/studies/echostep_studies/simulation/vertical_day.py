@@ -39,10 +39,9 @@ def climb(
     seconds: float,
     rng: np.random.Generator,
     ways: Literal["stairs", "lift", "both"] = "both",
-    first: int | None = None,
 ) -> VerticalMove:
-    """So many seconds about the building from the floor `first` (None: a random one), at 50 Hz; each stay ends with a way to another floor."""
-    floor = int(rng.integers(len(heights_m))) if first is None else first
+    """A walk of `seconds` about the building from a random floor, at 50 Hz; each stay ends with a way to another floor."""
+    floor = int(rng.integers(len(heights_m)))
     pieces: list[tuple[Floats, bool, bool]] = []
     left = seconds
     while left > 0.0:

@@ -78,7 +78,7 @@ class Guide(Protocol):
 
 
 def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions, guide: Guide | None = None) -> Path:
-    """Track a wearer and record everything, with the taps of a guide if there is one; returns the recording."""
+    """Track a wearer and record everything, with the taps of a guide, if any; returns the recording."""
     plan = plan_of(tracking)
     if port_of(ports.foot) is None:
         return _live(plan, tracking, ports, output, guide)

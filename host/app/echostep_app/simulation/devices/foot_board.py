@@ -15,14 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.arrays import Floats
 from echostep.board.calibration import ICM20649_M_S2, ICM20649_RAD_S
 from echostep.board.frames import encode
 from echostep.ports.chunks import FOOT, Chunk
 from echostep_app.board.subscription import SUBSCRIBE
 from echostep_app.simulation.devices.board import Board
 from echostep_app.simulation.devices.mtx import means, specific_force_and_rate
-from echostep_app.simulation.people.attitude import rotations
 from echostep_app.simulation.people.walker import RATE_HZ, Walk
 from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC
 
@@ -37,7 +35,7 @@ CELSIUS = 24.0
 
 @dataclass(frozen=True, slots=True)
 class FootBoardModel:
-    """Errors of an ICM-20649 behind its 120 Hz filter, and its mounting: `mounting_rpy_rad`, sensor -> foot."""
+    """Errors of an ICM-20649 behind its 120 Hz filter; it is mounted along the foot's axes."""
 
     gyro_noise_rad_s: float = math.radians(0.0175 * math.sqrt(154.3))
     gyro_bias_rad_s: float = math.radians(5.0 / 3.0)
@@ -46,60 +44,40 @@ class FootBoardModel:
     force_limit_counts: int = 30 * 1024
     rate_limit_counts: int = 32_767
     period_s: float = 5.0 / 1125.0
-    mounting_rpy_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+MODEL = FootBoardModel()
 
 
 class FootBoardSensors:
     """Makes the rows of any stretch of a walk, asked for in order; before its beginning the first posture is held."""
 
-    def __init__(self, walk: Walk, rng: np.random.Generator, model: FootBoardModel | None = None) -> None:
-        self._model = m = model or FootBoardModel()
+    def __init__(self, walk: Walk, rng: np.random.Generator) -> None:
         self._rng = rng
-        mounting = rotations(np.array([m.mounting_rpy_rad]))[0]
         t_s = (np.arange(len(walk.t_s)) + 1.0) / RATE_HZ  # a row is reached at the end of its millisecond
-        force, rate = (means(v, t_s, m.period_s) for v in specific_force_and_rate(walk, mounting))
-        self._force = force + m.accel_bias_m_s2 * rng.standard_normal(3)
-        self._rate = rate + m.gyro_bias_rad_s * rng.standard_normal(3)
+        force, rate = (means(v, t_s, MODEL.period_s) for v in specific_force_and_rate(walk, np.eye(3)))
+        self._force = force + MODEL.accel_bias_m_s2 * rng.standard_normal(3)
+        self._rate = rate + MODEL.gyro_bias_rad_s * rng.standard_normal(3)
 
     def rows(self, start: int, stop: int) -> NDArray[np.void]:
         """Rows of the milliseconds start..stop-1 of the walk."""
-        m = self._model
-        at = np.clip(np.arange(start, stop), int(1e3 * m.period_s) + 2, len(self._rate) - 3)
+        at = np.clip(np.arange(start, stop), int(1e3 * MODEL.period_s) + 2, len(self._rate) - 3)
         rows = np.zeros(len(at), EXTENDED_ROW)
         rows["row"]["sync_us"], rows["row"]["temperature"] = NO_SYNC, round(20.0 * CELSIUS)
         for name, values, noise, unit, limit in (
-            ("rate", self._rate, m.gyro_noise_rad_s, ICM20649_RAD_S, m.rate_limit_counts),
-            ("force", self._force, m.accel_noise_m_s2, ICM20649_M_S2, m.force_limit_counts),
+            ("rate", self._rate, MODEL.gyro_noise_rad_s, ICM20649_RAD_S, MODEL.rate_limit_counts),
+            ("force", self._force, MODEL.accel_noise_m_s2, ICM20649_M_S2, MODEL.force_limit_counts),
         ):
             noisy = values[at] + INTERPOLATED * noise * self._rng.standard_normal((len(at), 3))
             rows["motion"][name][:, 0] = np.clip(np.rint(noisy / unit), -limit, limit)
         return rows
 
 
-def measure_foot(
-    walk: Walk, rng: np.random.Generator, model: FootBoardModel | None = None
-) -> tuple[Floats, Floats, Floats]:
-    """Samples of a whole walk without a board: t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s. Equal generators draw equal biases."""
-    m = model or FootBoardModel()
-    biases = [m.accel_bias_m_s2 * rng.standard_normal(3), m.gyro_bias_rad_s * rng.standard_normal(3)]
-    t_s: Floats = np.arange(10.0 * m.period_s, walk.t_s[-1] - 0.05, m.period_s)
-    mounting = rotations(np.array([m.mounting_rpy_rad]))[0]
-    force, rate = (means(v, t_s, m.period_s) for v in specific_force_and_rate(walk, mounting))
-    measured = []
-    for true, bias, noise, unit, limit in (
-        (force, biases[0], m.accel_noise_m_s2, ICM20649_M_S2, m.force_limit_counts),
-        (rate, biases[1], m.gyro_noise_rad_s, ICM20649_RAD_S, m.rate_limit_counts),
-    ):
-        noisy = true + bias + noise * rng.standard_normal(true.shape)
-        measured.append(unit * np.clip(np.rint(noisy / unit), -limit, limit))
-    return t_s, measured[0], measured[1]
-
-
 class FootBoardPort:
     """The port of a foot board during a walk, beside the belt's; both are driven block by block."""
 
-    def __init__(self, walk: Walk, rng: np.random.Generator, board: Board, model: FootBoardModel | None = None) -> None:
-        self.sensors = FootBoardSensors(walk, rng, model)
+    def __init__(self, walk: Walk, rng: np.random.Generator, board: Board) -> None:
+        self.sensors = FootBoardSensors(walk, rng)
         self.board = board
         board.fault("kit=foot")
         board.fault("crystal=drift")

@@ -73,9 +73,9 @@ class BeaconGround(NamedTuple):
     reach_m: float
 
 
-def ground(settings: GroundSettings, rng: np.random.Generator, trail: Floats | None = None) -> BeaconGround:
-    """A ground with beacons and sources along a trail (k, 2), by default a random one."""
-    trail = draw_trail(rng) if trail is None else trail
+def ground(settings: GroundSettings, rng: np.random.Generator) -> BeaconGround:
+    """A ground with beacons and sources along a random trail."""
+    trail = draw_trail(rng)
     total = way_m(trail)
     count = max(int(total / settings.spacing_m) + 1, 2)
     dropped = np.empty((count, 3))

@@ -36,7 +36,7 @@ SLOWEST = PRESETS["LONG_SLOW"]  # of those in use: assumed for a preset that is 
 
 
 def airtime_s(modem: Modem, payload: int) -> float:
-    """Seconds on air of a packet with so many bytes of payload, explicit header and checksum [Semtech, AN1200.13, 4]."""
+    """Seconds on air of a packet with `payload` bytes of payload, explicit header and checksum [Semtech, AN1200.13, 4]."""
     symbol_s = 2**modem.spreading / modem.bandwidth_hz
     slow = 2 if symbol_s > SLOW_SYMBOL_S else 0
     bits = 8 * (payload + OVERHEAD) - 4 * modem.spreading + 28 + 16

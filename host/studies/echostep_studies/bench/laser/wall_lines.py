@@ -2,7 +2,7 @@
 """Wall segments from occupied places: straight pieces first, in order of decreasing length, then the rest in small pieces.
 
 In: places (n, 2). Out: segments (k, 4): x0, y0, x1, y1. Owns nothing. A straight piece is grown from a place whose neighbours lie on a line: the
-places near that line without a gap are fitted anew by least squares, until they stay the same.
+places near that line without a gap are refitted by least squares, until they stay the same.
 """
 
 from __future__ import annotations

@@ -100,7 +100,7 @@ def _openshoe(path: Path) -> Iterator[FootRecording]:
     whole = [line for line in lines if len(line) == OPENSHOE_FIELDS]
     table, mag = np.array([line[1:8] for line in whole], float), np.array([line[14:17] for line in whole], float)
     ticks = np.diff(table[:, 6])
-    ticks[(ticks < 0) | (ticks > 2 * OPENSHOE_PERIOD)] = OPENSHOE_PERIOD  # the counter starts anew once
+    ticks[(ticks < 0) | (ticks > 2 * OPENSHOE_PERIOD)] = OPENSHOE_PERIOD  # the counter restarts once
     t_s = np.concatenate([[0.0], np.cumsum(ticks)]) * OPENSHOE_TICK_S
     name = path.stem.removeprefix("Measurement_100521_")
     judge = partial(closure, peer=OPENSHOE_PEERS.get(name), height_peer=("openshoe", 0.58))
