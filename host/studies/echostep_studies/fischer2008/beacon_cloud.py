@@ -15,19 +15,18 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.aiding import BeaconSettings
-from echostep.aiding.beacons.beliefs import BeaconMeasurement, empty_beliefs, set_beliefs
+from echostep.aiding.beacons.beliefs import BeaconBeliefs, BeaconMeasurement, empty_beliefs, set_beliefs
 from echostep.aiding.beacons.model import BeaconModel, beacon_model
 from echostep.aiding.beacons.slam import initial_health, propose_heading_jumps
 from echostep.aiding.beacons.step import Beacons, no_waiting, update_by_reading
 from echostep.arrays import Floats, Ints
-from echostep.jit import part
+from echostep.jit import kernel, part
 from echostep.localization import CloudSettings
 from echostep.localization.particle_arrays import Move, ParticleArrays
 from echostep.localization.particles.kernels import systematic
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex
 from echostep_app.simulation.world.beacon_ground import BeaconGround, is_in_reach, measure
-from echostep_studies.fischer2008.resampling import resample_beliefs
 from echostep_studies.fischer2008.walker import GuidedWalker
 
 CLOUD = CloudSettings()
@@ -135,3 +134,9 @@ def _keep_chosen(particles: ParticleArrays, chosen: Ints) -> None:
     x, y, turn, scale, log_weight = particles
     x[:], y[:], turn[:], scale[:] = x[chosen], y[chosen], turn[chosen], scale[chosen]
     log_weight[:] = 0.0
+
+
+@kernel
+def resample_beliefs(beliefs: BeaconBeliefs, chosen: Ints) -> None:
+    """Replace the beliefs by those of the chosen particles (n,) in place."""
+    beliefs.mean[:], beliefs.cov[:], beliefs.doubt[:] = beliefs.mean[chosen], beliefs.cov[chosen], beliefs.doubt[chosen]

@@ -35,7 +35,7 @@ from echostep.aiding.beacons.step import Beacons, no_waiting, update_by_reading
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex
-from echostep_studies.fischer2008.resampling import resample_beliefs
+from echostep_studies.fischer2008.beacon_cloud import resample_beliefs
 
 MODEL = beacon_model(BeaconSettings())
 Floats = np.ndarray

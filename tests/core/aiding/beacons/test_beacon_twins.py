@@ -33,7 +33,7 @@ from echostep.aiding.beacons.step import MOST_READINGS, Beacons, no_waiting, upd
 from echostep.arrays import Floats
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.index import build_index
-from echostep_studies.fischer2008.resampling import resample_beliefs
+from echostep_studies.fischer2008.beacon_cloud import resample_beliefs
 from naive import beacon_readings as naive_readings
 from naive import beacons as naive
 
