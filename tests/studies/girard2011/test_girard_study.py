@@ -82,7 +82,6 @@ def test_the_command_writes_rows_json_parquet_and_the_picture(tmp_path: Path) ->
 def test_what_rangers_hear(tmp_path: Path) -> None:
     run_study(echoes_study(fit=False), StudyRequest(1, 1, tmp_path / "e.json", tmp_path))
     rows = {row["name"]: row for row in json.loads((tmp_path / "e.json").read_text())["rows"]}
-    assert (tmp_path / "figures1-5.png").stat().st_size > 50_000
     for name in ("incidence", "near and far", "oblique", "limits", "door frames"):
         assert rows[name]["log_p"] > rows[name]["uniform"], name
     assert "-6 dB at 27.5 degrees" in rows["angular response"]["finding"]
