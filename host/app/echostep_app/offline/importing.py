@@ -92,11 +92,8 @@ def _samples(imu: Imu, chunks: ImuChunks) -> Iterator[Chunk]:
 def _frames(messages: list[tuple[float, Message]], begin_s: float) -> Iterator[Chunk]:
     """A board's messages, each arriving at its time."""
     for k, (t_s, message) in enumerate(messages):
-        yield Chunk(BOARD, round(1e9 * (t_s - begin_s)), encode(message._replace(ticks=_ticks(t_s - begin_s)), k))
-
-
-def _ticks(t_s: float) -> int:
-    return round(TICKS_S * t_s) & 0xFFFF_FFFF
+        ticks = round(TICKS_S * (t_s - begin_s)) & 0xFFFF_FFFF
+        yield Chunk(BOARD, round(1e9 * (t_s - begin_s)), encode(message._replace(ticks=ticks), k))
 
 
 def _messages(beside: Beside) -> tuple[list[tuple[float, Message]], str]:
