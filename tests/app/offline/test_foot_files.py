@@ -147,6 +147,9 @@ def refused(folder: Path, name: str, content: bytes) -> str:
 def test_what_a_file_lacks_is_one_sentence(tmp_path: Path) -> None:
     assert "no XML" in refused(tmp_path, "a.mvnx", b"<mvnx><frame")
     assert "no MAT file that can be read" in refused(tmp_path, "a.mat", b"MATLAB 5.0 MAT-file" + bytes(200))
+    savemat(tmp_path / "huge.mat", {"ts": np.arange(300) / 100.0, "imu": np.full((300, 6), 1e300)})
+    with pytest.raises(EchostepError, match=r"huge\.mat: t_s does not advance"):
+        load_foot(tmp_path / "huge.mat")
     savemat(tmp_path / "b.mat", {"angles": np.eye(3)})
     with pytest.raises(EchostepError, match=r"b\.mat: no timestamps_all or .* there are angles"):
         load_foot(tmp_path / "b.mat")

@@ -51,18 +51,6 @@ def titles(accel: str, gyro: str, letters: str) -> list[str]:
     return [title.format(letter) for title in (accel, gyro) for letter in letters]
 
 
-XIO_TITLES = titles("Gyroscope {} (deg/s)", "Accelerometer {} (g)", "XYZ")
-
-
-@pytest.mark.parametrize(("logger", "time", "factor"), [("NGIMU", "Time (s)", 1.0), ("x-IMU3", "Timestamp (us)", 1e6)])
-def test_files_of_xio_are_in_degrees_and_g(
-    logger: str, time: str, factor: float, table: np.ndarray, tmp_path: Path
-) -> None:
-    rows = np.column_stack([table[:, 0] * factor, np.degrees(table[:, 4:7]), table[:, 1:4] / G])
-    path = write(tmp_path / "a.csv", ",".join([time, *XIO_TITLES]), rows)
-    assert same(path, table) == (f"read as an export of {logger}",)
-
-
 @pytest.mark.parametrize("separator", [",", "\t"])
 def test_a_file_of_phyphox_is_in_si_with_its_titles_in_quotes(
     separator: str, table: np.ndarray, tmp_path: Path

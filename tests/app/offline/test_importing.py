@@ -35,9 +35,9 @@ def write(file: Path, imu: Imu) -> None:
     np.savetxt(file, rows, delimiter=",", header="t_s,ax,ay,az,gx,gy,gz", comments="", fmt="%.9g")
 
 
-def hall(file: Path) -> Path:
-    """The plan of a hall of 18 by 49 m."""
-    walls = [[-9, -9, 9, -9], [9, -9, 9, 40], [9, 40, -9, 40], [-9, 40, -9, -9]]
+def hall(file: Path, aside: int = 9) -> Path:
+    """The plan of a hall of 49 m, `aside` m to either side of its middle."""
+    walls = [[-aside, -9, aside, -9], [aside, -9, aside, 40], [aside, 40, -aside, 40], [-aside, 40, -aside, -9]]
     file.write_text(json.dumps({"echostep_plan": 1, "name": "Hall", "levels": [{"name": "0", "walls": walls}]}))
     return file
 
@@ -92,6 +92,37 @@ def test_the_readmes_command_draws_a_walk_on_a_dxf(walk: Imu, tmp_path: Path) ->
     assert tracked.returncode == 0, tracked.stderr
     assert {path.suffix for path in (tmp_path / "out/foot").iterdir()} >= {".mcap", ".csv", ".png"}
     assert "files: track.csv and track.png in out/foot" in tracked.stdout
+
+
+def test_ranges_pressure_and_legs_beside_are_recorded_and_used(walk: Imu, tmp_path: Path) -> None:
+    """A corridor 4 m wide, walked 0.7 m right of the middle, from a start that is known to 1 m: the echoes find the side."""
+    plan = hall(tmp_path / "plan.json", 2)
+    write(tmp_path / "imu.csv", walk)
+    t_s = np.repeat(walk.t_s[:: len(walk.t_s) // 60], 2)
+    direction, range_m = np.tile([90.0, -90.0], len(t_s) // 2), np.tile([2.7, 1.3], len(t_s) // 2)
+    table = {"ranges": ("t_s,direction_deg,range_m", [t_s, direction, range_m])}
+    table["pressure"] = ("t (ms),pressure_pa (hPa)", [1e3 * t_s, 1013.0 + 0.01 * (np.arange(len(t_s)) % 3)])
+    swing = np.sin(2.0 * np.pi * walk.t_s)
+    table["legs"] = ("t_s,thigh_rad_s,shank_rad_s", [walk.t_s, swing, 2.0 * swing**3])
+    for name, (header, columns) in table.items():
+        rows = np.column_stack(columns)
+        np.savetxt(tmp_path / f"{name}.csv", rows, delimiter=",", header=header, comments="", fmt="%.9g")
+    (tmp_path / "rangers.toml").write_text("[echo]\nmaximum_m = 5.0\n")
+    beside = [word for name in table for word in (f"--{name}", f"{name}.csv")]
+    made = run("import", "imu.csv", "-o", "walk.mcap", *beside, "--settings", "rangers.toml", cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    assert "messages of ranges, pressure, legs, 0 left out" in made.stdout
+    decoded = list(echostep.read_capture(tmp_path / "walk.mcap"))
+    pings = [message for message in decoded if isinstance(message, echostep.messages.Ping)]
+    assert [round(0.5e-6 * ping.time_of_flight_us * 343.2, 2) for ping in pings[:2]] == [2.7, 1.3]
+    (first, *_) = [message for message in decoded if isinstance(message, echostep.messages.Pressure)]
+    assert first.pressure == 4 * 101_300
+    start = echostep.localization.Start(echostep.plan.Pose(0.0, 2.0, np.pi / 2), 1.0, 0.05)
+    end = echostep.replay(tmp_path / "walk.mcap", plan, start=start).estimates[-1]
+    assert end.x_m == pytest.approx(0.7, abs=0.15)
+    (tmp_path / "ranges.csv").write_text("t_s,direction_deg,range_m\n0,0,1\n1,0,1\n")
+    refused = run("import", "imu.csv", "-o", "other.mcap", *beside, cwd=tmp_path)
+    assert "ranges.csv: direction_deg 0: expected one ranger to the left (90)" in refused.stderr
 
 
 def test_arrays_of_any_length_are_tracked_as_the_recording_is(walk: Imu, tmp_path: Path) -> None:

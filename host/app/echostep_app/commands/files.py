@@ -11,7 +11,17 @@ from typing import Annotated
 
 import typer
 
-from echostep_app.commands.options import Columns, OptionalPlan, Shank, Start, Thigh, Units, needs, picture_option
+from echostep_app.commands.options import (
+    Columns,
+    OptionalPlan,
+    SettingsFile,
+    Shank,
+    Start,
+    Thigh,
+    Units,
+    needs,
+    picture_option,
+)
 from echostep_app.extras import require
 
 app = typer.Typer()
@@ -43,12 +53,22 @@ def import_command(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT", help="The recording to write.")],
     columns: Columns = None,
     units: Units = None,
+    pressure: Annotated[
+        Path | None, typer.Option("--pressure", metavar="CSV", help="A barometer: t_s,pressure_pa.")
+    ] = None,
+    ranges: Annotated[
+        Path | None,
+        typer.Option("--ranges", metavar="CSV", help="Two rangers: t_s,direction_deg (left 90, right -90),range_m."),
+    ] = None,
+    legs: Annotated[Path | None, typer.Option("--legs", metavar="CSV", help="Leg gyros, as of legs.")] = None,
+    settings: SettingsFile = None,
 ) -> None:
-    """Make a recording of a foot IMU's file, for replay and export."""
+    """Make a recording of a foot IMU's file, and of other sensors' on its clock, for replay and export."""
     from echostep_app.commands.actions import offline
     from echostep_app.offline.foreign_columns import parse_naming
+    from echostep_app.offline.importing import Beside
 
-    offline.import_foot(imu, out, parse_naming(columns, units))
+    offline.import_foot(imu, out, parse_naming(columns, units), Beside(pressure, ranges, legs, settings))
 
 
 @app.command()

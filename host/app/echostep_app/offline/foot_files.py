@@ -23,7 +23,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.offline.csv_table import column_of, header_of, lines_of, open_samples, read_rows
+from echostep.offline.csv_table import GREATEST, column_of, header_of, lines_of, open_samples, read_rows
 from echostep.offline.imu_csv import LIMITS, Imu, imu_of, load_imu
 from echostep_app.extras import require
 from echostep_app.offline.foreign_columns import OWN, Naming, read_header
@@ -48,7 +48,8 @@ def load_foot(path: Path, naming: Naming = OWN) -> Imu:
         if path.stat().st_size > MOST_BYTES:
             raise EchostepError(f"{path}: larger than {MOST_BYTES >> 30} GB: cut the recording into parts")
     try:
-        return imu_of(*reader(path))
+        table, notes = reader(path)
+        return imu_of(np.where(np.abs(table) <= GREATEST, table, np.nan), notes)
     except ValueError as error:
         raise EchostepError(f"{path}: {error}") from error
 

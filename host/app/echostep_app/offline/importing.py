@@ -1,38 +1,78 @@
 # SPDX-License-Identifier: MIT
-"""A foot IMU's file as a recording that the tracker replays.
+"""A foot IMU's file as a recording that the tracker replays, with files of other sensors beside it.
 
-In: `Imu`. Out: an MCAP recording of MTData2 messages that hold the samples as 32-bit floats. Owns nothing.
+In: `Imu`; files of rangers, a barometer, leg gyros on the same clock. Out: an MCAP recording of MTData2 messages that hold the samples as 32-bit
+floats, and of a board's messages. Owns nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import heapq
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.board.calibration import ADIS16100_RAD_S, MOST_AHEAD_DEG, SPEED_OF_SOUND_M_S
+from echostep.board.frames import encode
+from echostep.board.messages import GYROS_INVALID, PRESSURE_TEMPERATURE_INVALID, Gyros, Outcome, Ping, Pressure, Ranger
+from echostep.errors import EchostepError
+from echostep.offline.csv_table import column_of, lines_of, open_samples, read_rows
 from echostep.offline.imu_chunks import ImuChunks
-from echostep.offline.imu_csv import Imu
-from echostep.settings import imu_settings
+from echostep.offline.imu_csv import LIMITS, Imu
+from echostep.ports.chunks import BOARD, Chunk
+from echostep.settings import imu_settings, parse_settings, read_settings
+from echostep_app.offline.foreign_columns import OWN, read_header
+from echostep_app.offline.leg_csv import load_pair
 from echostep_app.recording.recorder import Recorder
 
+Message = Ping | Pressure | Gyros
 GAP = 1.5  # periods: a longer step is a gap
+AT_ONCE = 10_000  # samples, which bound the memory
+TICKS_S = 2e6  # of a board [protocol/messages.toml]
+FARTHEST_M = 0.5 * 65_535e-6 * SPEED_OF_SOUND_M_S  # that a ping can state
+PASCALS = (20_000.0, 120_000.0)  # of air where people are; assumed
 
 
-def import_imu(imu: Imu, name: str, out: Path, about: Mapping[str, str]) -> str:
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """Files beside the foot's, None without: `ranges` t_s, direction_deg (left positive), range_m; `pressure` t_s, pressure_pa; `legs` as of the
+    command; `settings` (TOML) of the rangers, for instance.
+    """
+
+    pressure: Path | None = None
+    ranges: Path | None = None
+    legs: Path | None = None
+    settings: Path | None = None
+
+
+def import_imu(imu: Imu, name: str, out: Path, about: Mapping[str, str], beside: Beside = Beside()) -> str:
     """Record the samples of the file `name` in the new file `out`, `about` beside them; returns what was recorded, in words. Raises EchostepError."""
-    rate_hz = rate_of(imu.t_s)
+    rate_hz, begin_s = rate_of(imu.t_s), float(imu.t_s[0])
+    messages, settings = _messages(beside)
+    within = [each for each in messages if begin_s <= each[0] <= imu.t_s[-1]]
+    text = imu_settings(rate_hz) + settings
+    parse_settings(text, str(beside.settings or name))
     chunks = ImuChunks(rate_hz)
-    note = f"imported from {name}: a foot IMU, no other sensor"
-    with Recorder(out, {**about, "note": note, "settings_toml": imu_settings(rate_hz)}) as recorder:
-        for chunk in chunks.of(imu.t_s, imu.accel, imu.gyro):
+    sensors = ", ".join(each for each in ("ranges", "pressure", "legs") if getattr(beside, each)) or "no other sensor"
+    with Recorder(
+        out, {**about, "note": f"imported from {name}: a foot IMU, {sensors}", "settings_toml": text}
+    ) as recorder:
+        for chunk in heapq.merge(_samples(imu, chunks), _frames(within, begin_s), key=lambda chunk: chunk.t_arrival_ns):
             recorder.wait_for_disk(chunk)
             recorder.write(chunk)
     recorder.check_whole()
-    begin = f"t_s of its track counts from {imu.t_s[0]:.3f} s in the file"
     kept = len(imu.t_s) - chunks.left_out
-    return f"{kept} samples at {rate_hz:.4g} Hz, {chunks.left_out} left out as within the same period; {begin}"
+    outside = len(messages) - len(within)
+    more = (
+        f"{len(within)} messages of {sensors}, {outside} left out as before or after the foot's; " if messages else ""
+    )
+    told = f"{kept} samples at {rate_hz:.4g} Hz, {chunks.left_out} left out as within the same period; {more}"
+    return f"{told}t_s of its track counts from {begin_s:.3f} s in the file"
 
 
 def rate_of(t_s: Floats) -> float:
@@ -40,3 +80,77 @@ def rate_of(t_s: Floats) -> float:
     steps = np.diff(t_s)
     steps = steps[steps > 0.0]
     return round(1.0 / float(steps[steps < GAP * np.median(steps)].mean()), 3)
+
+
+def _samples(imu: Imu, chunks: ImuChunks) -> Iterator[Chunk]:
+    """The samples' chunks, some at a time."""
+    for k in range(0, len(imu.t_s), AT_ONCE):
+        part = slice(k, k + AT_ONCE)
+        yield from chunks.of(imu.t_s[part], imu.accel[part], imu.gyro[part])
+
+
+def _frames(messages: list[tuple[float, Message]], begin_s: float) -> Iterator[Chunk]:
+    """A board's messages, each arriving at its time."""
+    for k, (t_s, message) in enumerate(messages):
+        ticks = round(TICKS_S * (t_s - begin_s)) & 0xFFFF_FFFF
+        yield Chunk(BOARD, round(1e9 * (t_s - begin_s)), encode(message._replace(ticks=ticks), k))
+
+
+def _messages(beside: Beside) -> tuple[list[tuple[float, Message]], str]:
+    """Times and messages of the other sensors in order of time, and the settings that they need."""
+    found: list[tuple[float, Message]] = []
+    settings = read_settings(beside.settings) if beside.settings else ""
+    if beside.pressure:
+        rows = _columns(beside.pressure, ("t_s", "pressure_pa"))
+        if not PASCALS[0] < np.median(rows[:, 1]) < PASCALS[1]:
+            raise EchostepError(
+                f"{beside.pressure}: pressure_pa is {rows[0, 1]:g}: pascals are expected, or a column pressure_pa (hPa)"
+            )
+        found += [
+            (t, Pressure(0, round(4.0 * p), PRESSURE_TEMPERATURE_INVALID)) for t, p in rows.tolist() if 0.0 < p < 2e5
+        ]
+    if beside.ranges:
+        pings, ahead_deg = _pings(beside.ranges)
+        found += pings
+        settings = f"\n[ranger]\nspeed_of_sound_m_s = {SPEED_OF_SOUND_M_S}\nahead_deg = {ahead_deg!r}\n\n{settings}"
+    if beside.legs:
+        leg = load_pair([beside.legs])[0]
+        counts = np.column_stack([leg.thigh, leg.shank, leg.belt]) / ADIS16100_RAD_S
+        counts = np.where(np.abs(counts) < -GYROS_INVALID, np.round(counts), GYROS_INVALID).astype(int)
+        found += [(t, Gyros(0, *row)) for t, row in zip(leg.t_s.tolist(), counts.tolist(), strict=True)]
+    return sorted(found, key=lambda each: each[0]), settings
+
+
+def _pings(path: Path) -> tuple[list[tuple[float, Message]], float]:
+    """Times and pings of a file of ranges, an empty range being no echo; how far ahead of abeam (deg) its rangers look."""
+    rows = _columns(path, ("t_s", "direction_deg", "range_m"), required=2)
+    ahead = np.unique(90.0 - np.abs(rows[:, 1]))
+    if len(ahead) != 1 or abs(ahead[0]) > MOST_AHEAD_DEG:
+        raise EchostepError(
+            f"{path}: direction_deg {', '.join(f'{each:g}' for each in np.unique(rows[:, 1])[:4])}: expected one ranger to the left (90) and one to "
+            f"the right (-90), both as far ahead, at most {MOST_AHEAD_DEG:g} degrees"
+        )
+    pings: list[tuple[float, Message]] = []
+    for t_s, direction, range_m in rows.tolist():
+        heard = 0.0 < range_m < FARTHEST_M
+        flight_us = round(2e6 * range_m / SPEED_OF_SOUND_M_S) if heard else 0
+        side = Ranger.LEFT if direction > 0.0 else Ranger.RIGHT
+        pings.append((t_s, Ping(0, side, Outcome.ECHO if heard else Outcome.NO_ECHO, flight_us)))
+    return pings, float(ahead[0])
+
+
+def _columns(path: Path, names: tuple[str, ...], required: int = 2) -> Floats:
+    """Columns (n, k) of these names in SI, rows without a number in one of the first `required` left out; raises EchostepError."""
+    rows = open_samples(path, partial(_read_columns, names=names, required=required))
+    return rows[np.isfinite(rows[:, :required]).all(axis=1)]
+
+
+def _read_columns(file: TextIO, names: tuple[str, ...], required: int) -> Floats:
+    lines = lines_of(file, LIMITS)
+    head = read_header(lines, OWN)
+    columns = [column_of(head.names, name) for name in names]
+    if -1 in columns:
+        raise ValueError(f"expected the columns {','.join(names)}; there are {', '.join(head.names)[:300]}")
+    return head.in_si(
+        read_rows(lines, (head.names, head.separator), columns, required, LIMITS, head.line + 1).values, names
+    )

@@ -159,7 +159,7 @@ class Arrivals:
         """A sentence for each port from which nothing came at the end, or at all."""
         lines = []
         for name, words in NAMES.items():
-            if name not in self.urls and name not in self._newest:
+            if (name not in self.urls and name not in self._newest) or (name == MTX and LINES in self._newest):
                 continue
             port = f" ({self.urls[name]})" if name in self.urls else ""
             if name not in self._newest:

@@ -132,7 +132,7 @@ def segments_of(recording: Recording) -> list[MeasuredSegment]:
     if way_m < LEAST_WAY_M:
         raise EchostepError(f"{recording.path}: only {way_m:.1f} m of steps in it: walk past the walls, then draw them")
     if not any(np.isfinite(s.range_m).any() for s in segments):
-        imported = recording.metadata.get("note", "").startswith("imported")
+        imported = recording.metadata.get("note", "").endswith("no other sensor")
         why = (
             "it is a foot's alone, and walls are drawn from echoes"
             if imported

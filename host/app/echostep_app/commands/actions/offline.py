@@ -19,7 +19,7 @@ from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import OutputFormats
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.foreign_columns import OWN, Naming
-from echostep_app.offline.importing import import_imu
+from echostep_app.offline.importing import Beside, import_imu
 from echostep_app.offline.leg_csv import load_pair
 from echostep_app.offline.leg_lengths import calibrated_scale, checked_lengths
 from echostep_app.offline.leg_pair import track_pair
@@ -40,10 +40,12 @@ from echostep_app.session.runs.replay import replay
 SCALE_RANGE = (0.5, 2.0)  # of --scale: beyond it the lengths of the leg are wrong
 
 
-def import_foot(path: Path, out: Path, naming: Naming = OWN) -> None:
+def import_foot(path: Path, out: Path, naming: Naming = OWN, beside: Beside | None = None) -> None:
     """Make a recording of a foot IMU's file."""
     imu = _told(path, naming)
-    console.print(f"{path.name}: {import_imu(imu, path.name, out, version_metadata())}", markup=False)
+    console.print(
+        f"{path.name}: {import_imu(imu, path.name, out, version_metadata(), beside or Beside())}", markup=False
+    )
     console.print(f"recording: {out}", markup=False)
 
 

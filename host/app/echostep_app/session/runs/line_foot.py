@@ -31,10 +31,12 @@ HEADER = "t_s,ax,ay,az,gx,gy,gz"
 
 
 def port_of(foot: str | None) -> str | None:
-    """The port in `lines:PORT[#HEADER]`, with tcp:// as this project's ports name it; None for another foot."""
+    """The port in `lines:PORT[#HEADER]`, with tcp:// as this project's ports name it; None for another foot. Raises EchostepError."""
     if foot is None or not foot.startswith(SCHEME):
         return None
     port = foot.removeprefix(SCHEME).partition("#")[0]
+    if not port:
+        raise EchostepError(f"--foot {foot}: expected a port behind it, as lines:/dev/ttyUSB0 or lines:-")
     return "socket://" + port.removeprefix("tcp://") if port.startswith("tcp://") else port
 
 
@@ -95,11 +97,10 @@ class LineFoot:
         ports.unused = heard
         if len(samples) > FEWEST:
             return samples
-        what = (
-            f"{len(samples)} samples came"
-            if self._reader.header
-            else f"no line named the columns: print {HEADER} each second, or add #{HEADER}"
-        )
+        what = f"{len(samples)} samples came"
+        if not self._reader.header:
+            what = f"no line named the columns (print {HEADER} each second, or add #{HEADER})"
+        heard_s = time.monotonic() - end_s + PATIENCE_S
         raise EchostepError(
-            f"--foot {self._foot}: {what} within {PATIENCE_S:.0f} s; {self._reader.unreadable} lines were no sample"
+            f"--foot {self._foot}: in {heard_s:.0f} s {what}; {self._reader.unreadable} lines were no sample"
         )

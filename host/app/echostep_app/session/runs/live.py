@@ -163,7 +163,8 @@ def record(ports: PortOptions, out: Path) -> Path:
                     byte_count[chunk.port] += len(chunk.data)
         print_notices(recorder.notices)
     from_gateway = f", {byte_count[GATEWAY]} from the gateway" if ports.beacons else ""
-    foot = f"{byte_count[FOOT]} from the foot board" if ports.foot else f"{byte_count[MTX]} from the MTx"
+    name, device = (FOOT, "the foot board") if ports.foot else (MTX, "the MTx")
+    foot = f"{byte_count[LINES]} in the foot's lines" if lines else f"{byte_count[name]} from {device}"
     console.print(f"{recorder.path}: {byte_count[BOARD]} bytes from the board, {foot}{from_gateway}")
     recorder.check_whole()
     return Path(recorder.path)
