@@ -25,7 +25,7 @@ from echostep.recording.clock import log_offset_ns
 from echostep.recording.damage.ending import Ending, begins_as_mcap, checksum_matches, read_ending
 from echostep.recording.damage.notes import FileDamage, made_of
 from echostep.recording.damage.placing import Placement
-from echostep.recording.damage.scan import map_file, next_valid_run, record_end
+from echostep.recording.damage.scan import begin_in_chunk, map_file, next_valid_run, record_end
 from echostep.recording.mcap_records import (
     DAMAGE_NAME,
     HEAD_SIZE,
@@ -204,8 +204,10 @@ class Recording:
             if end < 0 and offset < len(file) and self.grows:
                 return
             if end < 0 and offset < len(file):
-                end = next_valid_run(file, offset + 1, channels.known)
-                damage.skip(offset, end, len(file))
+                end = begin_in_chunk(file, offset)
+                if end < 0:
+                    end = next_valid_run(file, offset + 1, channels.known)
+                    damage.skip(offset, end, len(file))
             elif end >= 0 and file[offset] != MESSAGE:
                 opcode, body = int(file[offset]), file[offset + HEAD_SIZE : end].tobytes()
                 if opcode == Opcode.CHANNEL:
