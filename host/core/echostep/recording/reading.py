@@ -18,7 +18,7 @@ from mcap.opcode import Opcode
 from mcap.records import Header, Metadata
 
 from echostep.arrays import Octets
-from echostep.errors import EchostepError
+from echostep.errors import EchostepError, replaced
 from echostep.ports.chunks import Chunk, Portion
 from echostep.recording.being_written import is_being_written
 from echostep.recording.clock import log_offset_ns
@@ -233,7 +233,8 @@ def open_recording(path: Path | str) -> Recording:
     try:
         recording.grows = is_being_written(recording.path)
         with recording.path.open("rb") as file:
-            is_mcap = begins_as_mcap(file.read(len(MCAP_MAGIC)))
+            begin = file.read(32)
+            is_mcap, what = begins_as_mcap(begin[: len(MCAP_MAGIC)]), replaced(begin)
         for record in recording._records() if is_mcap else ():
             if isinstance(record, MessageRun):
                 has_bytes = True
@@ -247,4 +248,4 @@ def open_recording(path: Path | str) -> Recording:
         raise EchostepError(f"{path}: cannot read the recording: {error.strerror}") from error
     if has_bytes:
         return recording
-    raise EchostepError(f"{path}: no recorded bytes in it: is this an echostep recording (.mcap)?")
+    raise EchostepError(f"{path}: {what or 'no recorded bytes in it: is this an echostep recording (.mcap)?'}")
