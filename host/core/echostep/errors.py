@@ -4,6 +4,10 @@
 In: nothing. Out: `EchostepError`, `IncompleteError`; any error in words. Owns nothing.
 """
 
+PACKED = {  # by the first bytes [file(1)]
+    b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ": "xz", b"PK\x03\x04": "zip", b"(\xb5/\xfd": "zstd", b"7z\xbc\xaf": "7z",
+}  # fmt: skip
+
 
 class EchostepError(Exception):
     """A wrong file, port, option, setting or firmware; its text is one line that says what is wrong and what to do (exit status 2)."""
@@ -18,3 +22,11 @@ def words_of(error: BaseException) -> str:
     if isinstance(error, OSError):
         return f"{error.filename or 'a file'}: {error.strerror or error}"
     return str(error) if isinstance(error, EchostepError) else f"{type(error).__name__}: {error}"
+
+
+def replaced(begin: bytes) -> str:
+    """What a file that begins so has instead of a table or a recording, and the next step; empty if nothing is known of it."""
+    if begin.startswith(b"version https://git-lfs"):
+        return "a pointer of Git LFS in place of the file: git lfs pull brings it"
+    packed = next((name for magic, name in PACKED.items() if begin.startswith(magic)), "")
+    return f"packed by {packed}: unpack it first" if packed else ""

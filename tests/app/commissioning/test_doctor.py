@@ -23,6 +23,7 @@ from echostep_app.commissioning.diagnosis import Diagnosis, judge_board, judge_m
 from echostep_app.commissioning.doctor import examine
 from echostep_app.commissioning.probe import ProbeResult, _Probe, drift_of
 from echostep_app.commissioning.serial_ports import PortSeen, Role
+from echostep_app.ports.access import TAKERS, refusal, taker_of
 from players import babbling_port, pseudo_terminal, python_board, some_noise, twin_board
 
 
@@ -302,3 +303,17 @@ def test_the_parts_of_2026_are_named_and_so_is_the_one_that_fails() -> None:
     ):
         assert words in done.stdout, (words, done.stdout)
     assert "without noise" not in done.stdout  # at rest its noise is less than a count
+
+
+@pytest.mark.parametrize("taker", list(TAKERS))
+def test_a_service_that_takes_ports_is_named_with_the_next_step(tmp_path: Path, taker: str) -> None:
+    assert "plug it in" in str(refusal("/dev/ttyUSB9", tmp_path))
+    (tmp_path / "77/fd").mkdir(parents=True)
+    (tmp_path / "77/comm").write_text(f"{taker}\n")
+    (tmp_path / "port").touch()
+    (tmp_path / "77/fd/3").symlink_to(tmp_path / "port")
+    (finding,) = ports.holder_findings("board", str(tmp_path / "port"), tmp_path)
+    assert finding.remedy == TAKERS[taker]
+    assert ("apt remove brltty" in str(refusal("/dev/ttyUSB9", tmp_path))) == (taker == "brltty")
+    assert taker_of(processes=tmp_path) == TAKERS[taker]
+    assert taker_of(["minicom"], tmp_path) == ""

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
@@ -85,6 +86,31 @@ def test_a_flipped_bit_in_a_chunk_that_is_not_compressed_is_told_without_the_fil
     assert len(found) == len(CHUNKS)
     for told in (recording.damage(), info(path), repair(path, tmp_path / "b.mcap")):
         assert CHECKSUM in "\n".join(told)
+
+
+def message_ends(raw: bytes, offset: int, end: int) -> list[int]:
+    """Offsets after the messages, also of those in chunks that are not compressed; in front of the summary."""
+    ends = []
+    while offset < end and raw[offset] != Opcode.DATA_END:
+        after = offset + HEAD_SIZE + int.from_bytes(raw[offset + 1 : offset + HEAD_SIZE], "little")
+        ends += [after] if raw[offset] == Opcode.MESSAGE else []
+        ends += message_ends(raw, offset + HEAD_SIZE + 40, after) if raw[offset] == Opcode.CHUNK else []
+        offset = after
+    return ends
+
+
+@pytest.mark.parametrize("kind", ["cut", "repair"])
+def test_a_file_in_chunks_that_is_cut_anywhere_is_read_to_its_last_whole_message(tmp_path: Path, kind: str) -> None:
+    """Also within the first chunk, whose head claims more than the file has."""
+    whole, path, rng = made(tmp_path, kind), tmp_path / "b.mcap", random.Random(2)
+    ends = message_ends(whole, 8, len(whole))
+    for size in (ends[0], *(rng.randrange(ends[0], ends[-1]) for _ in range(20))):
+        path.write_bytes(whole[:size])
+        there = [chunk for chunk, end in zip(CHUNKS, ends, strict=True) if end <= size]
+        assert read(path)[1] == there
+        repair(path, tmp_path / "c.mcap")
+        assert read(tmp_path / "c.mcap")[1] == there
+        (tmp_path / "c.mcap").unlink()
 
 
 def test_a_flipped_bit_of_what_export_writes_costs_less_than_a_second(tmp_path: Path) -> None:

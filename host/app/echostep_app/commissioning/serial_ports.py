@@ -21,7 +21,7 @@ from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep_app.board.faults.health import Finding, Severity
 from echostep_app.commissioning.probe import BAUD
-from echostep_app.ports.access import holders, is_url, refusal
+from echostep_app.ports.access import TAKERS, holders, is_url, refusal, taker_of
 from echostep_app.ports.serial_ports import SerialPorts
 from echostep_app.recording.device import LISTENED_BYTES, sender
 
@@ -126,7 +126,11 @@ def holder_findings(subject: str, port: str, processes: Path = Path("/proc")) ->
     if not held:
         return []
     what = f"{port} is also open in {', '.join(held)}"
-    return [Finding(Severity.WARNING, subject, what, "close that program: it takes bytes of the port")]
+    remedy = (
+        taker_of([name for name in TAKERS if name in what], processes)
+        or "close that program: it takes bytes of the port"
+    )
+    return [Finding(Severity.WARNING, subject, what, remedy)]
 
 
 def latency_findings(subject: str, port: str, system: Path = Path("/sys")) -> list[Finding]:

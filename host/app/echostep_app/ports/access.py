@@ -8,10 +8,16 @@ from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 LONGEST_COMMAND = 60  # characters that are shown of a command
+# Services of Linux that open ports of others, by the name of their process, and how to end that.
+TAKERS = {
+    "brltty": "brltty takes USB serial adapters for braille displays: sudo apt remove brltty, then plug it in again",
+    "ModemManager": "ModemManager asks each new port whether it is a modem: sudo systemctl stop ModemManager, or echostep doctor --udev",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,13 +36,15 @@ def is_url(port: str) -> bool:
     return "://" in port
 
 
-def refusal(port: str) -> Refusal | None:
+def refusal(port: str, processes: Path = Path("/proc")) -> Refusal | None:
     """Why this user cannot open the port; None when it can be tried. Raises nothing."""
     path = Path(port)
     if is_url(port) or port == "-" or os.name != "posix":
         return None
     if not path.exists():
         remedy = "plug it in and look again; see which ports there are: ls /dev/serial/by-id"
+        if (taker := taker_of(["brltty"], processes)) and path.is_relative_to("/dev"):
+            remedy += f"; {taker}"
         return Refusal(f"{port}: there is no such port", remedy)
     if not path.is_char_device():
         return Refusal(f"{port} is no serial port", "name one such as /dev/ttyACM0")
@@ -59,6 +67,15 @@ def holders(port: str, processes: Path = Path("/proc")) -> list[str]:
             if any(os.path.realpath(link) == target for link in (folder / "fd").iterdir()):
                 held.append(f"{_command(folder)} (process {folder.name})")
     return held
+
+
+def taker_of(names: Iterable[str] = TAKERS, processes: Path = Path("/proc")) -> str:
+    """How to end a service of these names that runs, and takes ports; empty when none does. Processes of other users show their names, too."""
+    running = set()
+    for comm in processes.glob("[0-9]*/comm"):
+        with contextlib.suppress(OSError):
+            running.add(comm.read_text().strip())
+    return next((TAKERS[name] for name in names if name in TAKERS and name in running), "")
 
 
 def _command(process: Path) -> str:

@@ -25,7 +25,7 @@ from serial import rfc2217
 
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
-from echostep_app.ports.access import holders, is_url, refusal
+from echostep_app.ports.access import TAKERS, holders, is_url, refusal, taker_of
 from echostep_app.ports.arrival_clock import now_ns
 from echostep_app.ports.chunk_queue import ChunkQueue
 from echostep_app.ports.port_faults import PORT_FAULTS
@@ -233,7 +233,10 @@ def _open(url: str, baud: int) -> AnyPort:
         )
     except PORT_FAULTS as error:
         if getattr(error, "errno", None) in (errno.EWOULDBLOCK, errno.EBUSY):
-            held = ", ".join(holders(url)) or "a program of another user"
-            raise EchostepError(f"{url} is in use by {held}: end that program, or give another port") from error
+            held = ", ".join(holders(url))
+            known = [name for name in TAKERS if name in held or not held]
+            remedy = taker_of(known) or "end that program, or give another port"
+            held = held or "a program of another user"
+            raise EchostepError(f"{url} is in use by {held}: {remedy}") from error
         there = "is what gives the port (ser2net) running there?" if is_url(url) else SEE_PORTS
         raise EchostepError(f"{url}: cannot open the port: {error}; {there}") from error

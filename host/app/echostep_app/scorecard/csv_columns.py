@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.errors import EchostepError
+from echostep.errors import EchostepError, replaced
 from echostep.offline.csv_table import GREATEST, SEPARATORS, CsvLimits, lines_of, separator_of
 
 MOST_ROWS = 1_000_000  # of a track: eight hours at 30 positions a second
@@ -106,6 +106,9 @@ def _read_tum(
 def read_csv(path: Path) -> CsvColumns:
     """Read a file; raises EchostepError. Empty lines are skipped, and comments (#) above the names; a # before the names is, too."""
     try:
+        with path.open("rb") as begin:
+            if what := replaced(begin.read(32)):
+                raise EchostepError(f"{path}: {what}")
         with path.open(newline="", encoding="utf-8-sig") as file:
             lines = lines_of(file, CsvLimits())
             comments = 0

@@ -8,64 +8,52 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from echostep.board.messages import (
-    BoardHealth,
-    Configuration,
-    Electrical,
-    FootHealth,
-    GyroHealth,
-    Identity,
-    Loop,
-    Message,
-    Parts,
-    Sensors,
-    Status,
-)
+from echostep.board import messages
 
 
 @dataclass(slots=True)
 class BoardReports:
     """The board's newest reports about itself, and the previous status: a counter that has increased since then is a new problem."""
 
-    identity: Identity | None = None
-    configuration: Configuration | None = None
-    status: Status | None = None
-    previous_status: Status | None = None
-    board_health: BoardHealth | None = None
+    identity: messages.Identity | None = None
+    configuration: messages.Configuration | None = None
+    status: messages.Status | None = None
+    previous_status: messages.Status | None = None
+    board_health: messages.BoardHealth | None = None
     usual_supply_mv: int = 0  # highest voltage so far
-    gyros: dict[int, GyroHealth] = field(default_factory=dict)
-    parts: Parts | None = None
-    foot: FootHealth | None = None  # of a foot board
-    previous_foot: FootHealth | None = None
-    electrical: Electrical | None = None
-    loop: Loop | None = None
+    gyros: dict[int, messages.GyroHealth] = field(default_factory=dict)
+    parts: messages.Parts | None = None
+    foot: messages.FootHealth | None = None  # of a foot board
+    previous_foot: messages.FootHealth | None = None
+    electrical: messages.Electrical | None = None
+    loop: messages.Loop | None = None
 
-    def add(self, message: Message) -> None:
+    def add(self, message: messages.Message) -> None:
         """Keep a message if it is a report; after a restart of the board there is no previous status."""
-        if isinstance(message, Identity):
+        if isinstance(message, messages.Identity):
             self.identity = message
-        elif isinstance(message, Configuration):
+        elif isinstance(message, messages.Configuration):
             self.configuration = message
-        elif isinstance(message, BoardHealth):
+        elif isinstance(message, messages.BoardHealth):
             self.board_health = message
             self.usual_supply_mv = max(self.usual_supply_mv, message.supply_mv)
-        elif isinstance(message, Parts):
+        elif isinstance(message, messages.Parts):
             self.parts = message
-        elif isinstance(message, FootHealth):
+        elif isinstance(message, messages.FootHealth):
             self.previous_foot, self.foot = self.foot, message
-        elif isinstance(message, Electrical):
+        elif isinstance(message, messages.Electrical):
             self.electrical = message
-        elif isinstance(message, Loop):
+        elif isinstance(message, messages.Loop):
             self.loop = message
-        elif isinstance(message, GyroHealth):
+        elif isinstance(message, messages.GyroHealth):
             self.gyros[message.gyro] = message
-        elif isinstance(message, Status):
+        elif isinstance(message, messages.Status):
             restarted = self.status is not None and message.ticks < self.status.ticks  # or the ticks have wrapped
             self.previous_status, self.status = None if restarted else self.status, message
 
     @property
-    def sensors(self) -> Sensors:
+    def sensors(self) -> messages.Sensors:
         """The sensors that are switched on; all of them before the first `Configuration`, none on a foot board."""
         if self.foot is not None:
-            return Sensors(0)
-        return Sensors(0xFF if self.configuration is None else self.configuration.sensors)
+            return messages.Sensors(0)
+        return messages.Sensors(0xFF if self.configuration is None else self.configuration.sensors)

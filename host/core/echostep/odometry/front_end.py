@@ -19,23 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Floats, Ints
+from echostep.board import messages
 from echostep.board.air import Air
 from echostep.board.calibration import GyroSettings, Imus, RangerSettings, heights, ranges, six_axes
 from echostep.board.frames import BoardReader, Frames
-from echostep.board.messages import (
-    BoardHealth,
-    Configuration,
-    GyroHealth,
-    Identity,
-    Message,
-    Motion,
-    Outcome,
-    Parts,
-    Ping,
-    Pressure,
-    Status,
-    Sync,
-)
 from echostep.board.reports import BoardReports
 from echostep.foot.alignment import Alignment
 from echostep.foot.steps import Foot, FootEvents, FootSettings, Step
@@ -56,7 +43,14 @@ from echostep.ports.people.meeting import MEETING
 from echostep.ports.people.team_beacons import TEAM_BEACONS
 from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
 
-_REPORTS = (Identity, Configuration, Status, GyroHealth, BoardHealth, Parts)
+_REPORTS = (
+    messages.Identity,
+    messages.Configuration,
+    messages.Status,
+    messages.GyroHealth,
+    messages.BoardHealth,
+    messages.Parts,
+)
 
 
 @dataclass(slots=True)
@@ -93,8 +87,8 @@ class FrontEnd:
         self.heading_fusion = HeadingFusion()
         self.path = TrunkPath(gait)
         self.handover = FootLegsHandover(wearer or WearerSettings(), iron)
-        self.status: Status | None = None
-        self.identity: Identity | None = None
+        self.status: messages.Status | None = None
+        self.identity: messages.Identity | None = None
         self.reports = BoardReports()
         self.pings = 0
         self.watch = watch or WearerWatch()
@@ -186,21 +180,21 @@ class FrontEnd:
         """Keep the board's newest reports about itself."""
         for report in frames.each(_REPORTS):
             self.reports.add(report)
-        if (status := _newest_timed(frames, times, Status)) is not None:
-            self.status = Status.unpack(status)
-        if (identity := _newest_timed(frames, times, Identity)) is not None:
-            self.identity = Identity.unpack(identity)
+        if (status := _newest_timed(frames, times, messages.Status)) is not None:
+            self.status = messages.Status.unpack(status)
+        if (identity := _newest_timed(frames, times, messages.Identity)) is not None:
+            self.identity = messages.Identity.unpack(identity)
 
     def _collect_pings(self, frames: Frames, times: Times) -> None:
         """Hand pings without a bus error, and heights by pressure, to the synchronizer, in order of their messages."""
-        ping_row, reports = frames.rows(Ping)
+        ping_row, reports = frames.rows(messages.Ping)
         self.pings += len(ping_row)
         pings = np.zeros(len(ping_row), MEASUREMENT)
         pings["t_s"] = times.board_s[ping_row] + self._ranger.delay_s
         pings["source"] = reports["ranger"]
         pings["ranger_part"] = self._parts_of(frames, ping_row, reports["ranger"])
-        usable = ~np.isnan(pings["t_s"]) & (reports["outcome"] != Outcome.BUS_ERROR)
-        height_row, samples = frames.rows(Pressure)
+        usable = ~np.isnan(pings["t_s"]) & (reports["outcome"] != messages.Outcome.BUS_ERROR)
+        height_row, samples = frames.rows(messages.Pressure)
         pings["value_m"] = ranges(reports, self._ranger, self.air.speeds(ping_row, height_row, samples))
         height = np.zeros(len(height_row), MEASUREMENT)
         height["t_s"] = times.board_s[height_row]
@@ -218,7 +212,7 @@ class FrontEnd:
 
     def _watch_belt(self, frames: Frames, times: Times) -> None:
         """Hand samples of the belt's six axes, with the thigh's forces, to the watch of the wearer."""
-        row, samples = frames.rows(Motion)
+        row, samples = frames.rows(messages.Motion)
         timed = ~np.isnan(times.board_s[row])
         row, samples = row[timed], samples[timed]
         if len(row):
@@ -228,7 +222,7 @@ class FrontEnd:
 
     def _parts_of(self, frames: Frames, ping_row: Ints, ranger: Ints) -> Ints:
         """The part (n,) that the board's newest report before each ping names in its ranger's place; 0 before the first."""
-        report_row, reports = frames.rows(Parts)
+        report_row, reports = frames.rows(messages.Parts)
         named = np.column_stack([reports["part_ranger_left"], reports["part_ranger_right"]]).astype(np.int64)
         known = np.concatenate([self._ranger_parts, named])
         self._ranger_parts = known[-1:]
@@ -314,8 +308,8 @@ def _board_arrivals(frames: Frames, chunk_row: Ints, t_arrival_ns: Ints) -> Arri
     """The board's messages for the timeline; `chunk_row` (n,): row of the chunk that completed each."""
     ticks = np.ascontiguousarray(frames.body[:, :4]).view("<u4")[:, 0].astype(np.int64)
     kind = np.where(frames.is_timed, PLAIN, SILENT)
-    kind[frames.rows(Identity)[0]] = FIRST_MESSAGE
-    sync_row, edges = frames.rows(Sync)
+    kind[frames.rows(messages.Identity)[0]] = FIRST_MESSAGE
+    sync_row, edges = frames.rows(messages.Sync)
     kind[sync_row] = edges["edge"]
     return Arrivals(ticks, chunk_row, t_arrival_ns[chunk_row], kind)
 
@@ -325,7 +319,7 @@ def _foot_arrivals(samples: FootSamples, t_arrival_ns: Ints) -> Arrivals:
     return Arrivals(samples.value, samples.row, t_arrival_ns[samples.row], np.full(len(samples.row), PLAIN))
 
 
-def _newest_timed(frames: Frames, times: Times, kind: type[Message]) -> bytes | None:
+def _newest_timed(frames: Frames, times: Times, kind: type[messages.Message]) -> bytes | None:
     """Body of the last message of a kind that has a time."""
     frame_row, bodies = frames.rows(kind)
     timed = np.flatnonzero(~np.isnan(times.board_s[frame_row]))

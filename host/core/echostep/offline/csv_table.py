@@ -18,7 +18,7 @@ from typing import TextIO, TypeVar
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.errors import EchostepError
+from echostep.errors import EchostepError, replaced
 
 LONGEST_LINE = 10_000  # characters: no line of numbers is longer
 EARLY_ROWS = 2000  # rows after which a file of garbage is given up
@@ -82,7 +82,10 @@ def open_samples(path: Path | str, read: Callable[[TextIO], Result]) -> Result:
     """Result of `read` on the file; OSError and ValueError become an EchostepError that names the file."""
     try:
         with Path(path).open("rb") as begin:
-            encoding = "utf-16" if begin.read(2) in UTF_16 else "utf-8-sig"
+            first = begin.read(32)
+        if what := replaced(first):
+            raise ValueError(what)
+        encoding = "utf-16" if first[:2] in UTF_16 else "utf-8-sig"
         with Path(path).open(newline=None, encoding=encoding, errors="replace") as file:
             return read(file)
     except OSError as error:

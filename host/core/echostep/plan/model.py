@@ -20,7 +20,7 @@ from msgspec import UNSET
 
 from echostep.additions import svg_of
 from echostep.arrays import Floats
-from echostep.errors import EchostepError
+from echostep.errors import EchostepError, replaced
 from echostep.fields import checked, short
 from echostep.plan import plan_file
 from echostep.plan.plan_file import ConnectorFields, DoorFields, LevelFields, PlanFields, QuestionFields, RoomFields
@@ -228,6 +228,8 @@ def parse_plan(raw: bytes) -> Plan:
     try:
         tree = json.loads(raw)
     except (ValueError, RecursionError) as error:
+        if what := replaced(raw[:32]):
+            raise ValueError(what) from error
         where = f", line {error.lineno}, column {error.colno}" if isinstance(error, json.JSONDecodeError) else ""
         raise NotJsonError(f"not a plan: it is not JSON{where}") from error
     return _plan(tree, hashlib.sha256(raw).hexdigest())

@@ -18,14 +18,14 @@ from mcap.opcode import Opcode
 from mcap.records import Header, Metadata
 
 from echostep.arrays import Octets
-from echostep.errors import EchostepError
+from echostep.errors import EchostepError, replaced
 from echostep.ports.chunks import Chunk, Portion
 from echostep.recording.being_written import is_being_written
 from echostep.recording.clock import log_offset_ns
 from echostep.recording.damage.ending import Ending, begins_as_mcap, checksum_matches, read_ending
 from echostep.recording.damage.notes import FileDamage, made_of
 from echostep.recording.damage.placing import Placement
-from echostep.recording.damage.scan import map_file, next_valid_run, record_end
+from echostep.recording.damage.scan import begin_in_chunk, map_file, next_valid_run, record_end
 from echostep.recording.mcap_records import (
     DAMAGE_NAME,
     HEAD_SIZE,
@@ -204,8 +204,10 @@ class Recording:
             if end < 0 and offset < len(file) and self.grows:
                 return
             if end < 0 and offset < len(file):
-                end = next_valid_run(file, offset + 1, channels.known)
-                damage.skip(offset, end, len(file))
+                end = begin_in_chunk(file, offset)
+                if end < 0:
+                    end = next_valid_run(file, offset + 1, channels.known)
+                    damage.skip(offset, end, len(file))
             elif end >= 0 and file[offset] != MESSAGE:
                 opcode, body = int(file[offset]), file[offset + HEAD_SIZE : end].tobytes()
                 if opcode == Opcode.CHANNEL:
@@ -231,7 +233,8 @@ def open_recording(path: Path | str) -> Recording:
     try:
         recording.grows = is_being_written(recording.path)
         with recording.path.open("rb") as file:
-            is_mcap = begins_as_mcap(file.read(len(MCAP_MAGIC)))
+            begin = file.read(32)
+            is_mcap, what = begins_as_mcap(begin[: len(MCAP_MAGIC)]), replaced(begin)
         for record in recording._records() if is_mcap else ():
             if isinstance(record, MessageRun):
                 has_bytes = True
@@ -245,4 +248,4 @@ def open_recording(path: Path | str) -> Recording:
         raise EchostepError(f"{path}: cannot read the recording: {error.strerror}") from error
     if has_bytes:
         return recording
-    raise EchostepError(f"{path}: no recorded bytes in it: is this an echostep recording (.mcap)?")
+    raise EchostepError(f"{path}: {what or 'no recorded bytes in it: is this an echostep recording (.mcap)?'}")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from echostep.errors import replaced
 from echostep.offline import imu_csv
 from echostep.offline.csv_table import LONGEST_LINE, UTF_16, header_of
 from echostep.ports.chunks import BOARD
@@ -20,12 +21,10 @@ PACKETS = (
     "packets of a network or of USB: take the port's bytes out of it, then echostep decode reads them: "
     "tshark -r FILE -T fields -e usb.capdata -e udp.payload | xxd -r -p > port.bin"
 )
-PACKED = "packed: unpack it first"
 PICTURE = "a picture: where it is that of a plan, echostep plan edit PLAN --picture FILE draws over it"
 BEGINNINGS = {  # of files [their specifications; file(1)]
     b"\xd4\xc3\xb2\xa1": PACKETS, b"\xa1\xb2\xc3\xd4": PACKETS, b"\x4d\x3c\xb2\xa1": PACKETS, b"\xa1\xb2\x3c\x4d": PACKETS,  # pcap
     b"\x0a\x0d\x0d\x0a": PACKETS,  # pcapng
-    b"\x1f\x8b": PACKED, b"PK\x03\x04": PACKED, b"\x28\xb5\x2f\xfd": PACKED, b"\x04\x22\x4d\x18": PACKED, b"7z\xbc\xaf": PACKED, b"\xfd7zXZ": PACKED,
     b"\x89PNG": PICTURE, b"\xff\xd8\xff": PICTURE,
     b"%PDF": "a PDF: echostep plan import FILE says how it becomes a plan",
     b"SQLite format 3": "a database (SQLite), as of a GeoPackage or a bag of ROS 2: convert a bag to MCAP (ros2 bag convert)",
@@ -53,7 +52,7 @@ def foreign(path: Path) -> str:
     if not head:
         return "an empty file"
     said = next((said for beginning, said in BEGINNINGS.items() if head.startswith(beginning)), "")
-    return (said or _of_bytes(path) or _of_text(head)).replace("FILE", str(path))
+    return (said or replaced(head) or _of_bytes(path) or _of_text(head)).replace("FILE", str(path))
 
 
 def _of_bytes(path: Path) -> str:

@@ -26,7 +26,7 @@ from echostep.recording import MCAP_MAGIC, is_being_written
 from echostep.recording.damage.ending import begins_as_mcap, checksum_matches, read_ending
 from echostep.recording.damage.notes import FileDamage
 from echostep.recording.damage.placing import Placement
-from echostep.recording.damage.scan import CHUNK, map_file, next_valid_run, record_end
+from echostep.recording.damage.scan import CHUNK, begin_in_chunk, map_file, next_valid_run, record_end
 from echostep.recording.mcap_records import (
     CHANNEL_IDS,
     DAMAGE_NAME,
@@ -127,8 +127,10 @@ class Recovery:
             if end < 0 and self.grows and next_valid_run(file, begin + 1, self._is_channel) == size:
                 return
             if end < 0:
-                end = next_valid_run(file, begin + 1, self._is_channel)
-                yield begin, end, None
+                end = begin_in_chunk(file, begin)
+                if end < 0:
+                    end = next_valid_run(file, begin + 1, self._is_channel)
+                    yield begin, end, None
                 begin = end
                 continue
             opcode, body = view[begin], begin + HEAD_SIZE

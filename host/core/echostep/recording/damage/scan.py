@@ -19,7 +19,7 @@ from echostep.jit import kernel, part
 from echostep.recording.mcap_records import HEAD_SIZE, MCAP_MAGIC, MESSAGE, MESSAGE_SIZE, RECORD_LIMIT, read_uint
 
 # [MCAP format specification]
-CHUNK = 0x06  # opcode
+CHUNK, CHUNK_SIZE = 0x06, 40  # opcode; bytes before the records of a chunk that is not compressed
 LAST_OPCODE = 0x0F
 # Assumed.
 VALID_RUN = 4  # this many consecutive records are not valid by chance
@@ -62,6 +62,14 @@ def _may_follow(file: Octets, begin: int) -> bool:
     if begin + HEAD_SIZE > len(file):
         return True
     return 1 <= file[begin] <= LAST_OPCODE and 0 <= read_uint(file, begin + 1, 8) <= RECORD_LIMIT
+
+
+@kernel
+def begin_in_chunk(file: Octets, begin: int) -> int:
+    """Offset of the first record in a chunk that is not compressed and of which the file has the beginning only; -1 if there is none at `begin`."""
+    records = begin + HEAD_SIZE + CHUNK_SIZE
+    is_plain = records <= len(file) and file[begin] == CHUNK and read_uint(file, records - 12, 4) == 0
+    return records if is_plain else -1
 
 
 @kernel
