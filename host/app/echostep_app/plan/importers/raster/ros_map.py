@@ -18,9 +18,9 @@ from shapely.affinity import affine_transform
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan import Plan
+from echostep_app.plan.georeference import EARTH_M, IN_GRID, grid_origin
 from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import DrawnLevel
-from echostep_app.plan.importers.far import EARTH_M, IN_GRID, grid_origin
 from echostep_app.plan.importers.parsing import finite, read_text
 from echostep_app.plan.importers.raster.tracing import grey, trace
 from echostep_app.plan.importers.report import ImportReport
