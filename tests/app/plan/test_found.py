@@ -97,10 +97,6 @@ def ring(x: float = 0.0) -> list[list[float]]:
     return [[8.0 + (x + a) * DEG, 53.0 + b * DEG] for a, b in ((0, 0), (20, 0), (20, 10), (0, 10), (0, 0))]
 
 
-def feature(kind: str, coordinates: Any, **tags: str) -> dict[str, Any]:
-    return {"type": "Feature", "properties": tags, "geometry": {"type": kind, "coordinates": coordinates}}
-
-
 def osm(ways: str) -> str:
     nodes = "".join(f'<node id="{k}" lon="{lon!r}" lat="{lat!r}"/>' for k, (lon, lat) in enumerate(ring()[:4], 1))
     return f'<osm version="0.6">{nodes}{ways}</osm>'

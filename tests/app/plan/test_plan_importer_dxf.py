@@ -37,14 +37,6 @@ def walls_of(plan: Plan) -> set[tuple[tuple[float, ...], ...]]:
     return {tuple(sorted((tuple(w[:2]), tuple(w[2:])))) for w in plan.levels[0].walls.tolist()}
 
 
-def test_no_units_are_asked_for(tmp_path: Path) -> None:
-    doc, space = drawing(0)
-    space.add_line((0, 0), (5000, 0), {"layer": "A-WALL"})
-    with pytest.raises(EchostepError, match=r"ground.dxf.*units.*--units mm"):
-        imported(doc, tmp_path)
-    assert walls_of(imported(doc, tmp_path, units="mm")) == {((0, 0), (5, 0))}
-
-
 def test_lines_of_all_kinds(tmp_path: Path) -> None:
     doc, space = drawing()
     space.add_lwpolyline([(0, 0), (10, 0), (10, 5)], close=True, dxfattribs={"layer": "A-WALL"})
@@ -60,17 +52,6 @@ def test_lines_of_all_kinds(tmp_path: Path) -> None:
     assert np.hypot(arc[:, 0] - 40, arc[:, 1]) == pytest.approx(2.0, abs=0.01)
     assert len(plan.levels[0].windows) == 1
     assert plan.levels[0].walls[:, 1].max() < 40
-
-
-def test_blocks_are_taken_apart(tmp_path: Path) -> None:
-    """A wall on layer 0 of a block lies on the layer of the block, turned and moved with it."""
-    doc, space = drawing()
-    block = doc.blocks.new("ROOM")
-    block.add_line((0, 0), (3, 0), {"layer": "0"})
-    outer = doc.blocks.new("WING")
-    outer.add_blockref("ROOM", (1, 0), {"layer": "0"})
-    space.add_blockref("WING", (10, 20), {"layer": "A-WALL", "rotation": 90})
-    assert walls_of(imported(doc, tmp_path)) == {((10, 21), (10, 24))}
 
 
 def test_layers_are_chosen(tmp_path: Path) -> None:
@@ -97,29 +78,6 @@ def with_gap() -> tuple[Any, Any]:
     return doc, space
 
 
-@pytest.mark.parametrize("loose", [True, False])
-def test_a_swing_is_a_door(tmp_path: Path, loose: bool) -> None:
-    doc, space = with_gap()
-    target = space if loose else doc.blocks.new("DOOR")
-    target.add_arc((4, 0), 1, 0, 90, dxfattribs={"layer": "A-DOOR"})
-    target.add_line((4, 0), (4, 1), {"layer": "A-DOOR"})
-    if not loose:
-        space.add_blockref("DOOR", (0, 0), {"layer": "A-DOOR"})
-    doors = imported(doc, tmp_path).levels[0].doors
-    assert len(doors) == 1
-    assert doors[0].line == pytest.approx((4, 0, 5, 0), abs=0.01)
-
-
-def test_a_double_door(tmp_path: Path) -> None:
-    doc, space = with_gap()
-    block = doc.blocks.new("DOOR")
-    block.add_arc((4, 0), 0.5, 0, 90)
-    block.add_arc((5, 0), 0.5, 90, 180)
-    space.add_blockref("DOOR", (0, 0), {"layer": "A-DOOR"})
-    doors = imported(doc, tmp_path).levels[0].doors
-    assert [door.line for door in doors] == [pytest.approx((4, 0, 5, 0), abs=0.01)]
-
-
 def test_a_plain_line_is_a_door_and_cuts_the_wall(tmp_path: Path) -> None:
     doc, space = drawing()
     space.add_line((0, 0), (9, 0), {"layer": "A-WALL"})
@@ -127,22 +85,6 @@ def test_a_plain_line_is_a_door_and_cuts_the_wall(tmp_path: Path) -> None:
     plan = imported(doc, tmp_path)
     assert walls_of(plan) == {((0, 0), (4, 0)), ((5, 0), (9, 0))}
     assert plan.levels[0].doors[0].line == pytest.approx((4, 0, 5, 0), abs=0.002)
-
-
-def test_storeys_with_stairs_and_names(tmp_path: Path) -> None:
-    for name in ("ground", "first"):
-        doc, space = drawing()
-        space.add_lwpolyline([(0, 0), (10, 0), (10, 5), (0, 5)], close=True, dxfattribs={"layer": "A-WALL"})
-        for i in range(10):
-            space.add_line((1 + 0.3 * i, 1), (1 + 0.3 * i, 2), {"layer": "Stairs"})
-        space.add_text("Hall " + name, dxfattribs={"layer": "A-ROOM", "insert": (5, 3)})
-        space.add_mtext("Store\\P2", dxfattribs={"layer": "A-ROOM", "insert": (8, 3)})
-        doc.saveas(tmp_path / f"{name}.dxf")
-    plan = import_plan(tmp_path / "ground.dxf", Hints(storey_height_m=3.0), [tmp_path / "first.dxf"])
-    assert [(level.name, level.height_m) for level in plan.levels] == [("ground", 0.0), ("first", 3.0)]
-    assert [room.name for room in plan.levels[1].rooms] == ["Hall first", "Store 2"]
-    assert [(c.kind, c.levels) for c in plan.connectors] == [("stairs", (0, 1))]
-    assert np.ptp(plan.connectors[0].outline_m, axis=0) == pytest.approx([2.7, 1.0], abs=0.15)
 
 
 def test_hostile_drawings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

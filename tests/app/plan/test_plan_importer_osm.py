@@ -58,12 +58,6 @@ def imported(folder: Path, elements: Any, name: str = "house.json") -> Plan:
     return import_plan(folder / name)
 
 
-def test_xml_and_json_are_one_plan(tmp_path: Path) -> None:
-    plan = imported(tmp_path, HOUSE)
-    assert plan.digest == imported(tmp_path, HOUSE, "house.osm").digest
-    assert (plan.name, [level.height_m for level in plan.levels]) == ("House", [0.0, 3.5])
-
-
 def test_what_becomes_of_a_house(tmp_path: Path) -> None:
     plan = imported(tmp_path, HOUSE)
     ground, upper = plan.levels

@@ -17,6 +17,14 @@ from echostep.plan import Georeference, Plan
 from echostep_app.extras import require
 
 WGS84 = "EPSG:4326"
+FAR_M, EARTH_M = 1e4, 1e8  # larger coordinates are in a national grid; beyond that in none: twice around the Earth
+IN_GRID = "{} lies in a national grid: the plan's origin is x {:.0f} m, y {:.0f} m there"
+
+
+def grid_origin(points_m: Floats) -> tuple[float, float]:
+    """The median of points (n, 2) in whole metres, so that a stray one does not count; 0, 0 where that is near, or in no grid."""
+    x, y = np.floor(np.median(points_m, axis=0)) if len(points_m) else (0.0, 0.0)
+    return (float(x), float(y)) if FAR_M < max(abs(x), abs(y)) <= EARTH_M else (0.0, 0.0)
 
 
 class EarthTransform:
@@ -26,18 +34,12 @@ class EarthTransform:
         """Raises ValueError when pyproj does not know the coordinate system, or when it is not in degrees; EchostepError without pyproj."""
         require("the plan's georeference", "pyproj")
         from pyproj import CRS, Transformer
-        from pyproj.exceptions import CRSError
 
-        try:
-            crs = CRS.from_user_input(georeference.crs)
-        except CRSError as error:
-            raise ValueError(
-                f"georeference.crs: {georeference.crs[:60]!r} is not a coordinate system that pyproj knows"
-            ) from error
-        if not crs.is_geographic:
-            raise ValueError(f"georeference.crs: {georeference.crs[:60]!r} is not in longitude and latitude")
         stated = georeference.longitude_deg, georeference.latitude_deg
-        lon, lat = Transformer.from_crs(crs, WGS84, always_xy=True).transform(*stated)
+        try:
+            lon, lat = to_wgs84(georeference.crs)(*stated)
+        except ValueError as error:
+            raise ValueError(f"georeference.crs: {error}") from error
         if not (np.isfinite(lon) and np.isfinite(lat)):
             raise ValueError(
                 f"georeference.origin: {stated[0]:g}, {stated[1]:g} is outside of {georeference.crs[:60]!r}"
@@ -63,16 +65,16 @@ class EarthTransform:
         return np.column_stack(self._to_degrees.transform(east, north))
 
 
-def to_wgs84(name: str) -> Callable[[float, float], tuple[float, float]] | None:
-    """From longitude and latitude in a coordinate system to WGS 84; None for one that pyproj does not know. Raises ValueError for one in metres."""
+def to_wgs84(name: str) -> Callable[[float, float], tuple[float, float]]:
+    """From longitude and latitude in a coordinate system to WGS 84; raises ValueError for one in metres, and for one that pyproj does not know."""
     require("a coordinate system", "pyproj")
     from pyproj import CRS, Transformer
     from pyproj.exceptions import CRSError
 
     try:
         crs = CRS.from_user_input(name)
-    except CRSError:
-        return None
+    except CRSError as error:
+        raise ValueError(f"{name[:60]!r} is not a coordinate system that pyproj knows") from error
     if not crs.is_geographic:
         raise ValueError(f"{name[:60]!r} is not in longitude and latitude")
     return Transformer.from_crs(crs, WGS84, always_xy=True).transform

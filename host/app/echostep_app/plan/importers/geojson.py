@@ -43,7 +43,7 @@ def _datum(crs: Any) -> Callable[[float, float], Place] | None:
     try:
         return to_wgs84(name) if name else None
     except ValueError as error:
-        raise ValueError(f"crs {name}: {PROJECTED}") from error
+        raise ValueError(f"crs: {error}: {PROJECTED}") from error
 
 
 def geometries(feature: dict[str, Any], where: str) -> Iterator[tuple[str, Any, str]]:

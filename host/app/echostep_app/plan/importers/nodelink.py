@@ -19,9 +19,9 @@ from shapely.geometry import LineString, Polygon
 from echostep.errors import EchostepError
 from echostep.fields import LIMIT_M
 from echostep.plan import Plan
+from echostep_app.plan.georeference import IN_GRID, grid_origin
 from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas
-from echostep_app.plan.importers.far import IN_GRID, grid_origin
 from echostep_app.plan.importers.parsing import beside, finite, read_text
 from echostep_app.plan.importers.report import ImportReport
 

@@ -20,6 +20,7 @@ from shapely.geometry.base import BaseGeometry
 
 from echostep.errors import EchostepError
 from echostep.plan import ConnectorKind, Plan, Question
+from echostep_app.plan.georeference import IN_GRID
 from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas
 from echostep_app.plan.importers.dxf.doors import PlacedDoors
@@ -39,7 +40,6 @@ from echostep_app.plan.importers.dxf.symbols import (
     symbol_of,
     symbols_of,
 )
-from echostep_app.plan.importers.far import IN_GRID
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.importers.straight import pieces_of

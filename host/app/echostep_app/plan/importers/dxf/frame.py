@@ -19,7 +19,7 @@ from shapely.geometry import LineString, Polygon
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.fields import LIMIT_M
-from echostep_app.plan.importers.far import EARTH_M, grid_origin
+from echostep_app.plan.georeference import EARTH_M, grid_origin
 
 METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 FLAT_M = 0.005  # greatest distance of an arc from the straight pieces that replace it

@@ -20,8 +20,8 @@ from shapely.geometry import MultiPoint, Polygon
 from echostep.arrays import Floats, Ints
 from echostep.errors import EchostepError
 from echostep.fields import LIMIT_M
+from echostep_app.plan.georeference import grid_origin
 from echostep_app.plan.importers.drawn_level import areas
-from echostep_app.plan.importers.far import grid_origin
 from echostep_app.plan.importers.report import ImportReport
 
 SAMPLES = 20  # walls that decide the origin

@@ -18,10 +18,9 @@ import numpy as np
 
 from echostep.errors import EchostepError
 from echostep.plan import ConnectorKind, Door, Georeference, Plan
-from echostep_app.plan.georeference import EarthTransform
+from echostep_app.plan.georeference import FAR_M, IN_GRID, EarthTransform
 from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, room
-from echostep_app.plan.importers.far import FAR_M, IN_GRID
 from echostep_app.plan.importers.ifc.bodies import Shapes, SolidBody
 from echostep_app.plan.importers.ifc.doors import placed_door
 from echostep_app.plan.importers.ifc.model import open_model, storeys_of

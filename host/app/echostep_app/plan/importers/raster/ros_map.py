@@ -18,9 +18,9 @@ from shapely.affinity import affine_transform
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan import Plan
+from echostep_app.plan.georeference import EARTH_M, IN_GRID, grid_origin
 from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import DrawnLevel
-from echostep_app.plan.importers.far import EARTH_M, IN_GRID, grid_origin
 from echostep_app.plan.importers.parsing import finite, read_text
 from echostep_app.plan.importers.raster.tracing import grey, trace
 from echostep_app.plan.importers.report import ImportReport
@@ -29,9 +29,11 @@ OCCUPIED = 0.65  # default of map_server
 LARGEST_PIXEL_M = 10.0
 UNKNOWN = 128  # value of a transparent pixel: neither free nor occupied
 FIELD = re.compile(
-    r"""^\s*["']?(\w+)["']?[ \t]*:[ \t]*(\[[^\]]*\]|(?:[ \t]*(?:#[^\n]*)?\n[ \t]*-[ \t][^\n]*)+|[^\n]*)""", re.MULTILINE
+    r"""^["']?(\w+)["']?[ \t]*:[ \t]*(\[[^\]]{0,999}\]|(?:[ \t]*(?:#[^\n]*)?\n[ \t]*-[ \t][^\n]*){1,9}|[^\n]*)""",
+    re.MULTILINE,
 )
-FLOW_COMMA = re.compile(r",(?![^\[]*\])")  # outside of lists
+FLOW_COMMA = re.compile(r",[ \t]*(?![^\[\]]{0,999}\])")  # outside of lists
+LONGEST_NAME = 255
 YES, NO = ("true", "yes", "on", "y"), ("false", "no", "off", "n")
 RAW_MOST = 100.0  # in raw mode, a greater value is unknown
 
@@ -45,7 +47,7 @@ def import_ros_map(path: Path, report: ImportReport) -> Plan:
     if pixel_m <= 0.0:
         raise EchostepError(f"{path}: resolution: expected metres a pixel, more than 0")
     x, y, yaw = _origin(path, fields)
-    picture = path.parent / fields["image"]
+    picture = path.parent / fields["image"][:LONGEST_NAME]
     probability = _probability(path, fields, grey(picture, UNKNOWN))
     outlines, noise = trace(probability > _number(path, fields, "occupied_thresh", 1.0, OCCUPIED), picture)
     if not outlines:
