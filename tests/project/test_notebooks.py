@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import json
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,11 @@ import pytest
 
 import echostep
 from board_runs import ROOT
+from echostep_app.extras import EXTRAS
 from needs_data import data_or_skip
 
 FOLDER = ROOT / "host/docs/notebooks"
+INSTALLED = re.findall(r"\w+", re.findall(r"pip install ([^`]+)`", (FOLDER / "README.md").read_text())[0])
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 
 
@@ -31,6 +34,9 @@ def run(name: str, monkeypatch: pytest.MonkeyPatch, folder: Path) -> tuple[dict[
     """What the cells of a notebook have named, and the values that it shows below them."""
     monkeypatch.chdir(folder)
     monkeypatch.setenv("MPLBACKEND", "agg")
+    for package, extra in EXTRAS.items():  # as after what the README installs
+        if not {package, extra} & set(INSTALLED):
+            monkeypatch.setitem(sys.modules, package, None)
     names: dict[str, Any] = {"__name__": "__main__"}
     shown = []
     for number, cell in enumerate(cells(FOLDER / f"{name}.ipynb")):

@@ -47,7 +47,7 @@ PLACE = ("longitude_deg", "latitude_deg")  # columns beside those of track.csv, 
 def columns_of(estimates: list[Estimate], plan: Plan) -> Columns:
     """The estimates' fields by name, and longitude and latitude where the plan has a georeference and the estimate claims a place.
 
-    Without echostep-app there are no longitudes.
+    Without echostep-app or pyproj there are no longitudes.
     """
     columns: Columns = {f.name: [getattr(e, f.name) for e in estimates] for f in fields(Estimate)}
     columns["status"] = [e.status.value for e in estimates]
