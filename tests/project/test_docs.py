@@ -276,7 +276,6 @@ def test_the_commands_for_a_team_run(tmp_path: Path) -> None:
             assert done.returncode == 0, done.stderr
             printed += done.stdout
     assert re.search(r"red/anna +ended", printed)
-    assert (tmp_path / "team.png").stat().st_size > 10_000
 
 
 @pytest.mark.parametrize("page", [ROOT / "README.md", ROOT / "host/README.md", *MANUAL], ids=name_of)

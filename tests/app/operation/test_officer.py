@@ -18,6 +18,7 @@ from operation.teams import STOREYS, TOWER, ServedTeam, Team
 from operation.test_table_page import READY, WIDE, WORDS
 from page.browser import HELD_MS, loaded_page, overflow, spot, wait_for
 from page.outage import Wire
+from page.test_language import violations
 from page.web.test_page_silence import OUTBOX, STATUS
 from page.web.test_page_sizes import SIZES, UNREACHED
 from waiting import until
@@ -97,7 +98,7 @@ def test_all_storeys_feet_and_the_log(browser: Any, tmp_path: Path) -> None:
             page.set_viewport_size({"width": width, "height": height})
             wait_for(page, f"{IS_FITTED} && {OVER_EACH_OTHER}")
             page.screenshot(path=tmp_path / f"storeys-{width}.png")
-            assert page.evaluate(UNREACHED) == []
+            assert (page.evaluate(UNREACHED), violations(page)) == ([], [])
         page.set_viewport_size(WIDE["viewport"])
         wait_for(page, f"{IS_FITTED} && {OVER_EACH_OTHER}")
         x, y = page.evaluate(f"{SHOWN}.find((row) => row.place.level === 2).at")
@@ -118,11 +119,10 @@ def test_all_storeys_feet_and_the_log(browser: Any, tmp_path: Path) -> None:
         page.click("#log summary")
         page.fill("#log-note", "cleared, 12 m of smoke")
         page.keyboard.press("Enter")
-        wait_for(page, "document.querySelector('#log-note').value === ''")
         assert until(lambda: bool(team.scene().log))
         served.show()
         wait_for(page, "/Ann: cleared, 12 m of smoke$/.test(document.querySelector('#log-list').innerText)")
-        assert page.evaluate(UNREACHED) == []
+        assert (page.evaluate(UNREACHED), violations(page)) == ([], [])
         assert not page.wrong
         page.context.close()
 

@@ -106,7 +106,7 @@ def violations(page: Any) -> list[str]:
 
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
-    with served(Mailbox(seven_floors(), "A walk", replay=False)) as (server, mailbox):
+    with served(Mailbox(seven_floors(), "A walk (simulated, 3 x real time)", replay=False)) as (server, mailbox):
         mailbox.publish(scene())
         yield server.url
 
@@ -139,6 +139,7 @@ def test_names_stay_as_they_are_and_the_sentence_about_them_does_not(browser: An
 @pytest.mark.parametrize("lang", OTHERS)
 def test_every_text_of_the_source_has_an_entry(browser: Any, url: str, lang: str) -> None:
     page = page_of(browser, url, lang, READY)
+    assert lang != "de" or page.inner_text("#title").startswith("A walk (simuliert, 3-fache Echtzeit): ")
     texts = page_texts() | host_texts()
     assert len(texts) > 200
     page.evaluate("(texts) => texts.forEach((text) => echostep.tr(text))", sorted(texts))

@@ -28,7 +28,6 @@ from echostep.localization import Estimate, claims_place
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.ports.chunks import BOARD, Portion
 from echostep.tracker import Tracker
-from echostep_app.extras import lacks
 from echostep_app.output.foxglove import (  # fmt: skip
     ELLIPSE,
     LEFT_BEAM,
@@ -109,7 +108,7 @@ class Derived:
         """`log_offset_ns`: times of the messages minus those of the arrivals."""
         self._tracker, self._log_offset_ns = tracker, log_offset_ns
         tracker.arrival_ns(0.0)  # compiles its kernel before the run starts
-        self._earth = None if lacks("/location", "pyproj") else earth_of(tracker.plan)
+        self._earth = earth_of(tracker.plan)
         # The board's bytes are decoded a second time here: `Tracker.take` cuts a portion at check-ins and beacon readings, and its front end
         # decodes the pieces one by one; the recorded messages are ordered by kind over the whole portion.
         self._board = BoardReader()

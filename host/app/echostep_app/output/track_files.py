@@ -38,8 +38,8 @@ def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recordi
     """
     if out.suffix not in FORMATS:
         raise EchostepError(f"{out}: unknown kind of file: choose from {', '.join(FORMATS)}")
-    if out.suffix == ".parquet":
-        require(str(out), "pyarrow")
+    if needed := "pyarrow" if out.suffix == ".parquet" else "pyproj" if out.suffix in NEEDS_GEOREFERENCE else "":
+        require(str(out), needed)
     recording, plan = open_parts([path]), open_limited(plan_path)
     if earth_of(plan) is None and out.suffix in NEEDS_GEOREFERENCE:
         raise EchostepError(

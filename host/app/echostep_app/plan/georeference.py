@@ -14,7 +14,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan import Georeference, Plan
-from echostep_app.extras import require
+from echostep_app.extras import lacks, require
 
 WGS84 = "EPSG:4326"
 FAR_M, EARTH_M = 1e4, 1e8  # larger coordinates are in a national grid; beyond that in none: twice around the Earth
@@ -81,8 +81,8 @@ def to_wgs84(name: str) -> Callable[[float, float], tuple[float, float]]:
 
 
 def earth_of(plan: Plan) -> EarthTransform | None:
-    """The transform of a plan to longitude and latitude, None without a georeference; raises EchostepError when it is not valid."""
+    """The transform of a plan to longitude and latitude, None without a georeference or without pyproj; raises EchostepError when it is not valid."""
     try:
-        return None if plan.georeference is None else EarthTransform(plan.georeference)
+        return None if plan.georeference is None or lacks("it", "pyproj") else EarthTransform(plan.georeference)
     except ValueError as error:
         raise EchostepError(f"plan {plan.name}: {error}") from error

@@ -233,9 +233,8 @@ def test_windows_and_what_is_wrong(browser: Any, house: EditServer) -> None:
     page.click("#check")
     found = f"{len(check_plan(load_plan(house.file.path)))} findings: "
     assert until(lambda: found in status(page)), status(page)
-    first = status(page)
     page.click("#check")
-    assert until(lambda: status(page).startswith(f"2 of {found}")), (first, status(page))
+    assert until(lambda: status(page).startswith(f"2 of {found}")), status(page)
     page.click('[data-tool="erase"]')
     page.select_option("#level", "0")
     page.click("#whole")

@@ -121,7 +121,9 @@ def test_names_give_way_to_signs(browser: Any) -> None:
     with served(Mailbox(PLAN, "test", replay=False)) as (server, mailbox):
         spots = [room.at_m for room in PLAN.levels[0].rooms[:2]]
         assert estimate
-        places = tuple(replace_place(h, *at) for h, at in zip(estimate.hypotheses, spots, strict=True))
+        places = tuple(
+            replace(h, x_m=x_m, y_m=y_m, level=0) for h, (x_m, y_m) in zip(estimate.hypotheses, spots, strict=True)
+        )
         mailbox.publish(replace(moments()[2], estimate=replace(estimate, level=0, hypotheses=places)))
         page = opened(browser, server.url, (360, 740), READY)
         wait_for(page, "echostep.last.told.hypotheses.length === 2")
@@ -134,14 +136,6 @@ def test_names_give_way_to_signs(browser: Any) -> None:
         page = opened(browser, table.page.url, (360, 740), TABLE_READY)
         assert not covered(page, spots)
         page.context.close()
-
-
-def replace_place(likely: Any, x_m: float, y_m: float) -> Any:
-    return (
-        likely._replace(x_m=x_m, y_m=y_m, level=0)
-        if hasattr(likely, "_replace")
-        else replace(likely, x_m=x_m, y_m=y_m, level=0)
-    )
 
 
 def covered(page: Any, spots: list[tuple[float, float]]) -> list[Any]:

@@ -67,7 +67,7 @@ export function startLegend(button, groups, keys, onUnit) {
   dialog.setAttribute('aria-label', tr('Legend'));
   const rows = (entries) => entries.map(([picture, words]) => `<li><svg viewBox="-16 -12 32 24" aria-hidden="true">${picture}</svg><span>${words}</span></li>`).join('');
   const names = Object.entries(keys).map(([key, words]) => `<li><kbd>${key}</kbd><span>${words}</span></li>`).join('');
-  dialog.innerHTML = `<form method="dialog"><h2>Legend</h2><label for="language" class="unseen">Language</label><select id="language"></select><label for="unit" class="unseen">Lengths in</label><select id="unit"><option value="m">metres</option><option value="ft">feet</option></select><button aria-label="Close">✕</button></form><div tabindex="0" role="group" aria-label="Signs">${groups.map(([title, entries]) => `<h3>${title}</h3><ul>${rows(entries)}</ul>`).join('')}<h3 id="keys-title">Keys on the map</h3><ul>${names}</ul></div>`;
+  dialog.innerHTML = `<form method="dialog"><h2>Legend</h2><label for="language" class="unseen">Language</label><select id="language"></select><label for="unit" class="unseen">Lengths in</label><select id="unit"><option>m</option><option>ft</option></select><button aria-label="Close">✕</button></form><div tabindex="0" role="group" aria-label="Signs">${groups.map(([title, entries]) => `<h3>${title}</h3><ul>${rows(entries)}</ul>`).join('')}<h3 id="keys-title">Keys on the map</h3><ul>${names}</ul></div>`;
   dialog.onclick = ({ target }) => { if (target === dialog) dialog.close(); };  // beside it
   localise(dialog);
   document.body.append(dialog);

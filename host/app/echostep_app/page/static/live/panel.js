@@ -26,7 +26,7 @@ export class Panel {
     this.plan = plan;
     this.shownGoal = null;
     this.fault('');
-    $('title').textContent = `${title}: ${plan.name}`;
+    $('title').textContent = `${title.replace(/\((.*)\)$/, (_, how) => `(${how.split(', ').map(tr).join(', ')})`)}: ${plan.name}`;
     document.title = title;
     $('goal').replaceChildren(new Option(tr('Go to…'), ''), new Option(tr('a place on the map'), 'map'),
       ...plan.levels.flatMap(({ rooms, name }, level) => rooms.map((room, k) => new Option(plan.levels.length > 1 ? `${room.name} (${name})` : room.name, `${level} ${k}`))));
