@@ -24,14 +24,8 @@ NEWEST = {
     "demo": ("-e", "host/core", "-e", "host/app[page,plots]", "pyproj"),
     "tests": ("-e", "host/core", "-e", "host/app[dev]", "-e", "host/studies[cluster]"),
 }
-PIP = [
-    sys.executable,
-    "-m",
-    "pip",
-    "install",
-    "--disable-pip-version-check",
-    "--no-compile",
-]  # imports compile what they need
+# Imports compile what they need
+PIP = [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", "--no-compile"]
 LOOK_S = 0.2  # between two looks at how far pip is
 
 

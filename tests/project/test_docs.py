@@ -55,14 +55,8 @@ PAGES = [
     *NOTEBOOK,
     *RESULTS,
 ]
-PROGRAMS = (
-    "python3",
-    ".",
-    ".venv/bin/pip",
-    "pip",
-    "pipx",
-    "sudo",
-)  # that console blocks may call besides echostep and make
+# That console blocks may call besides echostep and make
+PROGRAMS = ("python3", ".", ".venv/bin/pip", "pip", "pipx", "sudo")
 
 
 FILE_NAMES = {path.name for folder in ("host", "tools", "tests", "protocol") for path in (ROOT / folder).rglob("*.py")}

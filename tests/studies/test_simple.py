@@ -15,9 +15,8 @@ from echostep_studies.simple.buildings import BUILDINGS
 from echostep_studies.simple.faults import FAULTS, PASSER_M
 from echostep_studies.simple.study import NAMES, SimpleRow, simple_run
 
-WORST_M = (
-    0.35  # mean error of one walk with a ranger; of 20 walks it is below 0.2 m in every row but a corridor of 60 m
-)
+# Mean error of one walk with a ranger; of 20 walks it is below 0.2 m in every row but a corridor of 60 m
+WORST_M = 0.35
 
 
 def made_walk() -> SimulatedWalk:

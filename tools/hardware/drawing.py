@@ -15,12 +15,8 @@ from hardware.pen import SOFT, Pen
 from hardware.wiring import POWER, Device, WiredBoard
 
 ROW, LANE = 24.0, 18.0  # pixels
-TOP, HEAD, FOOT, GAP = (
-    110.0,
-    72.0,
-    6.0,
-    18.0,
-)  # of the first part; above and below its pins; between two parts: whole rows together
+# Of the first part; above and below its pins; between two parts: whole rows together
+TOP, HEAD, FOOT, GAP = (110.0, 72.0, 6.0, 18.0)
 PART, PROCESSOR = 290.0, 250.0  # widths
 STUB = 62.0  # of a wire beside a part, for its label
 MARGIN = 30.0

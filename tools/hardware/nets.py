@@ -20,11 +20,8 @@ PROCESSOR_V = 5.0  # level of its outputs
 PULL_UP_OHM = (20e3, 50e3)  # of the processor [ATmega32U4 data sheet, table 29-1]
 # What it reads for certain: 0.2 VCC - 0.1 V and 0.2 VCC + 0.9 V [the same, from memory]
 LOW_MAX_V, HIGH_MIN_V = 0.9, 1.9
-BOOTLOADER_DRIVES = (
-    "PC7",
-    "PB0",
-    "PD5",
-)  # for 8 s, its LEDs [Caterina.h of Leonardo and Micro; tools/twin/mcu/board.c]
+# For 8 s, its LEDs [Caterina.h of Leonardo and Micro; tools/twin/mcu/board.c]
+BOOTLOADER_DRIVES = ("PC7", "PB0", "PD5")
 
 
 def problems(board: WiredBoard) -> list[str]:

@@ -15,11 +15,8 @@ from numpy.typing import NDArray
 
 Triangles = NDArray[np.float64]
 LIGHT = np.array([-0.35, 0.65, 0.68])  # direction to the light, in the picture's axes
-PAPER, SHADE, EDGE = (
-    255.0,
-    np.array([125.0, 165.0, 200.0]),
-    0.25,
-)  # grey of the background, colour of a face towards the light
+# Grey of the background, colour of a face towards the light
+PAPER, SHADE, EDGE = (255.0, np.array([125.0, 165.0, 200.0]), 0.25)
 
 
 def read_stl(path: Path) -> Triangles:

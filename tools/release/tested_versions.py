@@ -22,12 +22,8 @@ from release.licences import for_developers
 
 FILE = ROOT / "host/tested-versions.txt"
 OLDEST = "3.11.2"  # Debian 12's
-DEMO = (
-    "./host/core",
-    "./host/app[page,plots]",
-    "pyproj",
-    "hatchling",
-)  # pyproj: longitude and latitude of the demo; hatchling installs the checkout
+# Pyproj: longitude and latitude of the demo; hatchling installs the checkout
+DEMO = ("./host/core", "./host/app[page,plots]", "pyproj", "hatchling")
 ALL = ("./host/core", "./host/app[dev]", "./host/studies[cluster]", "hatchling")
 HEAD = (
     "# Versions with which the tests have passed, and the hashes of their files, for every system and Python: "

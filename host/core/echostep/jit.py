@@ -37,11 +37,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 # A division by zero is inf or NaN, as in numpy. The wrapper left out is the one by which C would call a kernel.
 _KERNEL: dict[str, Any] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-_PART: dict[str, Any] = {
-    **_KERNEL,
-    "no_cpython_wrapper": True,
-    "cache": False,
-}  # the kernel that calls it is cached with it
+# The kernel that calls it is cached with it
+_PART: dict[str, Any] = {**_KERNEL, "no_cpython_wrapper": True, "cache": False}
 _LEAN, _COUNTED, _INLINE = {"_nrt": False}, {"_nrt": True}, {"forceinline": True}
 DIGEST = 4  # bytes of the check sum, behind the pickle
 ASIDE = ".damaged"

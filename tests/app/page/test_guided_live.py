@@ -77,15 +77,8 @@ def walking(beacons: str, truth: Path) -> Iterator[tuple[str, str]]:
     with pseudo_terminal() as (ours, port):
         board, mtx = PortBoard(ours), run.PtyMtx()
         scenario = Scenario(load_plan(PLAN), WALK, SEED, board)
-        arguments = (
-            PLAN,
-            truth,
-            beacons,
-            2.0,
-            1.0,
-            SEED,
-            lambda: board.t_s,
-        )  # in step with the board, however late that is
+        # In step with the board, however late that is
+        arguments = (PLAN, truth, beacons, 2.0, 1.0, SEED, lambda: board.t_s)
         gateway = threading.Thread(target=simulate_gateway, args=arguments, daemon=True)
         walk_chunks(1.0)  # its kernels are compiled or loaded before the wearer walks
 

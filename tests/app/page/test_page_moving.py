@@ -28,10 +28,8 @@ from page.browser import LOCAL, PICTURES, PLAN, READY, loaded_page, wait_for
 NAME = "page.webp"
 TITLE = "A simulated walk"
 SIZE = (860, 520)
-STEP_S, SHOWN_MS = (
-    1.0,
-    150,
-)  # of the walk between two frames, for which each is shown: 6.7 times as fast as it was walked
+# Of the walk between two frames, for which each is shown: 6.7 times as fast as it was walked
+STEP_S, SHOWN_MS = (1.0, 150)
 SMALL_S = 8.0  # of the walk, where the picture is not kept
 PORTION = 16  # chunks, as in a run
 MOST_BYTES = 1_500_000

@@ -20,14 +20,8 @@ from plan.imported_plans import seven_floors
 SIZES = {"desk": (1280, 800), "phone": (360, 740), "sideways": (740, 360)}
 DRAWN = "[...document.querySelectorAll('#walls path')].map((e) => e.classList[0])"
 WAYS = "[...document.querySelectorAll('#rooms .way')].filter((e) => e.getAttribute('visibility') === 'visible').map((e) => e.textContent)"
-KINDS = {
-    "wall",
-    "door",
-    "unknown",
-    "stairs",
-    "lift",
-    "ramp",
-}  # in the near view; the window is out of it in a low window
+# In the near view; the window is out of it in a low window
+KINDS = {"wall", "door", "unknown", "stairs", "lift", "ramp"}
 
 
 def building() -> Plan:

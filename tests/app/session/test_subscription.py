@@ -15,14 +15,8 @@ from echostep_app.session.runs.live import _with_subscription
 def test_the_board_is_asked_and_no_chunk_is_lost() -> None:
     identity = m.Identity(0, m.SCHEMA_HASH, 1, 2, 0, m.ResetCause.POWER_ON)
     health = m.BoardHealth(0, 5_000, 5_000, 1, 0, 0, 0, 0)
-    messages: list[m.Message] = [
-        identity,
-        health,
-        identity,
-        health,
-        identity,
-        identity,
-    ]  # at the fifth it has restarted
+    # At the fifth it has restarted
+    messages: list[m.Message] = [identity, health, identity, health, identity, identity]
     chunks = [Chunk(BOARD, k, encode(message, k)) for k, message in enumerate(messages)]
     stream = [None, Chunk(MTX, 0, b"\xfa"), *chunks]
     sent: list[tuple[str, bytes]] = []

@@ -53,12 +53,8 @@ class Broker:
     def __init__(self, folder: Path, *more: str, port: int | None = None) -> None:
         self.port = port or free_port()
         self._configuration = folder / f"mosquitto-{self.port}.conf"
-        lines = (
-            "user root",
-            f"listener {self.port} 127.0.0.1",
-            "allow_anonymous true",
-            *more,
-        )  # root: it reads our folder
+        # Root: it reads our folder
+        lines = ("user root", f"listener {self.port} 127.0.0.1", "allow_anonymous true", *more)
         self._configuration.write_text("\n".join(lines) + "\n")
         self._log = folder / f"mosquitto-{self.port}.log"
         self._running: subprocess.Popen[bytes] | None = None

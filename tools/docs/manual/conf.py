@@ -15,11 +15,8 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[3]
 MANUAL = Path("host/docs")
-SERIES = (
-    "host/docs/design",
-    "host/docs/decisions",
-    "host/studies/notebook",
-)  # folders whose README lists the other pages
+# Folders whose README lists the other pages
+SERIES = ("host/docs/design", "host/docs/decisions", "host/studies/notebook")
 
 project = "echostep"
 version = release = tomllib.loads((ROOT / "host/core/pyproject.toml").read_text())["project"]["version"]

@@ -24,10 +24,8 @@ SOURCES = [
     ROOT / "tests/firmware/fuzz_codec.c",
     *(FIRMWARE / name for name in ("cobs.c", "frame.c", "messages.c", "link.c", "status.c")),
 ]
-WHOLE = [
-    ROOT / "tests/firmware/fuzz_firmware.c",
-    *sorted(FIRMWARE.glob("*.c")),
-]  # on a board that does what the input says
+# On a board that does what the input says
+WHOLE = [ROOT / "tests/firmware/fuzz_firmware.c", *sorted(FIRMWARE.glob("*.c"))]
 CORPUS = ROOT / "tests/firmware/corpus.txt"
 FOLDER = OUT / "fuzz"
 FLAGS = ["-std=c11", "-O2", "-g", f"-I{FIRMWARE}", "-DLIBFUZZER", "-fsanitize=fuzzer,address,undefined"]

@@ -81,9 +81,8 @@ class LivePage:
         self.truth: TruePath | None = None  # shown beside the estimates
         self.receipt_of: Callable[[int], str] | None = None  # delivery of a mayday; None: the run's reports go nowhere
         self.fault_sources: list[Callable[[], str]] = []  # present faults of the run's output, in words
-        self.acknowledged_by: Callable[[int], str | None] | None = (
-            None  # name of the acknowledging commander, by the alarm's number
-        )
+        # Name of the acknowledging commander, by the alarm's number
+        self.acknowledged_by: Callable[[int], str | None] | None = None
         self._owns_server = isinstance(address, Address)
         self.server = PageServer(self.mailbox, address) if isinstance(address, Address) else address
         self._model = echo_model(tracker.settings.echo)

@@ -98,9 +98,8 @@ class Mailbox:
         ] = ()  # in order of `t_s`; a live run has the newest only; replaced, never changed
         self.team: tuple[str, ...] = ()  # names of the teammates who can be met; replaced, never changed
         self.points: ShownPoints | None = None  # of an acceptance walk; replaced, never changed
-        self.on_press: Callable[[PointPress], bool] | None = (
-            None  # takes taps at points at once, in the server's thread
-        )
+        # Takes taps at points at once, in the server's thread
+        self.on_press: Callable[[PointPress], bool] | None = None
         self.on_publish: Callable[[], None] | None = None
         self.exchange = Exchange()
         self.check_ins: queue.Queue[CheckIn | Undo | Call] = queue.Queue(MOST_CHECK_INS)

@@ -23,9 +23,8 @@ from echostep.plan import Georeference
 from echostep_app.plan.georeference import EarthTransform
 
 LEAST_M = 5.0  # between the points, assumed: a map's error of 0.5 m turns the plan by 6 degrees over this distance
-MOST_SHARE = (
-    0.05  # of the plan's distance by which the distance on Earth may differ, assumed: 1 m of a map's error over 20 m
-)
+# Of the plan's distance by which the distance on Earth may differ, assumed: 1 m of a map's error over 20 m
+MOST_SHARE = 0.05
 TURNS = 3  # of the fit: an error of 0.2 mm is left for a plan 100 km from its origin
 
 

@@ -79,9 +79,8 @@ class Recorder:
         self._begin(BackgroundWriter(path), metadata)
         self._waited_ns: int | None = None  # arrival time of the chunk of the last wait
         self.lost_chunks = 0  # not recorded: more than `RAW_LIMIT` bytes waited for the disk
-        self.skipped_messages = (
-            0  # derived ones, not recorded: more than `DERIVED_LIMIT` bytes waited, or the disk is nearly full
-        )
+        # Derived ones, not recorded: more than `DERIVED_LIMIT` bytes waited, or the disk is nearly full
+        self.skipped_messages = 0
 
     def _begin(self, file: BackgroundWriter, metadata: Mapping[str, str]) -> None:
         """Write to this file from now on."""

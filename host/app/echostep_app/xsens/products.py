@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import re
 
-FORCE_RANGE_G = {
-    "1": 16.0,
-    "600": 10.0,
-}  # by series, of MTi [MTi 1-series and MTi 600-series data sheets, as remembered: compare them with a copy]
+# By series, of MTi [MTi 1-series and MTi 600-series data sheets, as remembered: compare them with a copy]
+FORCE_RANGE_G = {"1": 16.0, "600": 10.0}
 _TEXT = re.compile(r"[ -~]+")
 
 

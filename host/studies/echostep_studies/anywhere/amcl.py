@@ -43,19 +43,13 @@ from echostep_studies.anywhere.amcl_kernels import weight_by_ping
 from echostep_studies.bench.filtering import WARM_UP, Claim, FilterRun
 
 SIZE = 20_000
-ALPHA_SLOW, ALPHA_FAST = (
-    0.001,
-    0.1,
-)  # decay rates of the long-term and the short-term mean likelihood, a ping; those of the ROS node amcl
+# Decay rates of the long-term and the short-term mean likelihood, a ping; those of the ROS node amcl
+ALPHA_SLOW, ALPHA_FAST = (0.001, 0.1)
 SCALE_SD = 0.02  # of the lengths, at the start
 CELL_M, NEAR_M = 1.0, 1.5  # the estimate is the mean of the particles within NEAR_M of the heaviest cell's mean
 HEIGHT_SD_M, HEIGHT_SAMPLES = 0.15, 9  # of a median of heights by pressure
-SURE, SURE_M, UNSURE, UNSURE_M = (
-    0.95,
-    1.0,
-    0.5,
-    5.0,
-)  # tracking: so much weight so near; lost: less than so much so near
+# Tracking: so much weight so near; lost: less than so much so near
+SURE, SURE_M, UNSURE, UNSURE_M = (0.95, 1.0, 0.5, 5.0)
 RISK = 1e-3
 
 

@@ -42,11 +42,8 @@ HELD_FADES, FADING_HOLDS = 0.3, 0.1
 SHIFTS, GUST_SHIFTS = 1 / 1200, 1 / 60  # the pressure of the building changes for good
 CLIMB_BEGINS, CLIMB_ENDS, CLIMB_TURNS = 1 / 150, 0.5, 1 / 60
 RIDE_BEGINS, RIDE_ENDS = 1 / 200, 1.0
-RESTS, UNDER_WAY, WANDERED_M = (
-    0.5,
-    0.2,
-    10.0,
-)  # after a gap: least probability of the same level; of stairs or a lift otherwise; sd of the height without levels
+# After a gap: least probability of the same level; of stairs or a lift otherwise; sd of the height without levels
+RESTS, UNDER_WAY, WANDERED_M = (0.5, 0.2, 10.0)
 BETWEEN_S = 40.0  # mean time on stairs and in lifts
 
 WEATHER_M = 0.015  # random walk in a second

@@ -25,13 +25,8 @@ from echostep_studies.simulation.tower import CORRIDOR_Y, LENGTH_M, LIFT_AT, STO
 
 OFFICE_PLAN = Path(str(files("echostep"))) / "plans" / "demo.json"
 STOREYS = 3
-ROOMS, ROOM_M, CORRIDOR_M, SOUTH_M, NORTH_M = (
-    4,
-    7.0,
-    3.0,
-    -4.0,
-    7.0,
-)  # of its rooms along the corridor: number, width, and y of their walls
+# Of its rooms along the corridor: number, width, and y of their walls
+ROOMS, ROOM_M, CORRIDOR_M, SOUTH_M, NORTH_M = (4, 7.0, 3.0, -4.0, 7.0)
 TOUR_M = 90.0  # least length of a tour
 OFFICE_DOOR, LOBBY = RoutePlace(2.0, 7.5), RoutePlace(LIFT_AT[0] - 2.0, CORRIDOR_Y)  # from where all places are reached
 EXIT_M = 1.2  # width of the door to the yard

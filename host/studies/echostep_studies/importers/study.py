@@ -28,13 +28,8 @@ from echostep_app.plan.places.spaces import find_spaces
 from echostep_studies.frame.report import as_dict
 from echostep_studies.frame.study import Study, StudyRequest
 
-WHOLE = (
-    "level.geojson",
-    "level.json",
-    "manifest.json",
-    "main.json",
-    "core.txt",
-)  # a folder with one of them is one building
+# A folder with one of them is one building
+WHOLE = ("level.geojson", "level.json", "manifest.json", "main.json", "core.txt")
 COLUMNS = {
     "file": "file", "outcome": "outcome", "seconds": "s", "levels": "levels", "size": "m", "walls": "walls", "doors": "doors", "in_gaps": "in gaps",
     "rooms": "rooms", "enclosed": "enclosed", "left_out": "left out", "says": "first note or refusal",

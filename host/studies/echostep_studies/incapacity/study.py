@@ -36,24 +36,14 @@ BREATH_HZ, BREATH_RAD_S = 0.3, math.radians(1.5)  # of a belt on a wearer who li
 # Sway of a wearer who stands or crouches, rad/s: standard deviation within half a second, each axis of the foot, thigh, shank. Medians of quiet
 # standing in public recordings (Voisard's MTw on feet, legs of qmt: 15 to 25 s each), less the sensors' noise.
 SWAY_RAD_S = (0.0015, 0.0015, 0.0015, 0.004, 0.006)
-SWAY_HZ, SWAY_SPREAD, SWAY_TONES = (
-    (0.3, 2.5),
-    0.5,
-    6,
-)  # range; of the logarithm of its size, from one movement to the next; assumed; sinusoids
-TWITCH_PAUSE_S, TWITCH_S, TWITCH_RAD_S = (
-    5.0,
-    (0.1, 0.4),
-    (0.02, 0.08),
-)  # of every second wearer who cannot move; assumed
+# Range; of the logarithm of its size, from one movement to the next; assumed; sinusoids
+SWAY_HZ, SWAY_SPREAD, SWAY_TONES = ((0.3, 2.5), 0.5, 6)
+# Of every second wearer who cannot move; assumed
+TWITCH_PAUSE_S, TWITCH_S, TWITCH_RAD_S = (5.0, (0.1, 0.4), (0.02, 0.08))
 PORTION_S = 0.25  # that comes at once
 DAY_S = 8.0 * 3600.0
-PAUSES_S = {
-    "walk": 0.55,
-    "crawl": 0.8,
-    "crouch": 10.0,
-    "wait": 15.0,
-}  # mean time between two movements of a foot; assumed
+# Mean time between two movements of a foot; assumed
+PAUSES_S = {"walk": 0.55, "crawl": 0.8, "crouch": 10.0, "wait": 15.0}
 SPANS_S = {"walk": (20.0, 300.0), "crawl": (20.0, 120.0), "crouch": (30.0, 600.0), "wait": (20.0, 300.0)}
 ANSWER_S, ANSWERED = (1.0, 6.0), 0.98  # how soon, and how often, the question is answered by a movement; assumed
 

@@ -27,12 +27,8 @@ from echostep_app.simulation.people.leg_angles import HALF_PELVIS_M, KNEE_DEG, T
 RATE_HZ = 500
 ANKLE_DEG = (1, -3, -1, 3, 6, 8, 10, 11, 12, 13, 9, -2, -14, -16, -7, -2, 1, 2, 2, 2)  # dorsiflexion
 LOADED = 0.30  # of the stride: until then the knee's flexion is that under load
-PUSHES = (
-    0.28,
-    0.48,
-    0.66,
-    0.82,
-)  # of the stride: begin and end of the rise and of the fall of what the pace does to the push-off
+# Of the stride: begin and end of the rise and of the fall of what the pace does to the push-off
+PUSHES = (0.28, 0.48, 0.66, 0.82)
 DOUBLE = 0.12  # of the stride on both feet, twice [Perry 1992]
 LONGEST_STEP_S = 1.0
 CARRY_M = 0.004  # a point so much above the other carries a third as much

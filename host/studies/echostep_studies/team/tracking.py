@@ -30,10 +30,8 @@ from echostep_studies.team.walks import Encounter, TeamWalks
 
 TAP_S = 1.0  # from the encounter to the tap, at most; assumed
 PORTION = 1000  # chunks that a tracker gets at once
-RADIO_SD_M, RADIO_BIAS_M = (
-    0.15,
-    0.1,
-)  # of a range by ultra-wideband radio between two bodies: it is hardly ever short
+# Of a range by ultra-wideband radio between two bodies: it is hardly ever short
+RADIO_SD_M, RADIO_BIAS_M = (0.15, 0.1)
 LIAR = 0  # number of the wearer whose reports are false
 LIE_M = (6.0, 0.0)  # from the true place
 LIE_SD_M = 0.05

@@ -71,11 +71,8 @@ ADDRESSES = {  # on I2C, 7 bits
     Healthy.RANGER_RIGHT: 0x71,
     Healthy.COMPASS: 0x60,
 }
-SELECTS = {
-    Healthy.THIGH: "D8",
-    Healthy.CALF: "D9",
-    Healthy.BELT: "D10",
-}  # pins of the chip selects [firmware/README.md]
+# Pins of the chip selects [firmware/README.md]
+SELECTS = {Healthy.THIGH: "D8", Healthy.CALF: "D9", Healthy.BELT: "D10"}
 
 
 def part_in(reports: BoardReports, device: Healthy) -> Part:

@@ -60,16 +60,10 @@ MEMORY_BYTES = 2560  # of the processor
 MEMORY_MAX_BYTES = 2200  # [firmware/README.md, budgets]
 RATE_LEAST = 0.9  # of the expected rate; assumed
 RATE_FAULT = 0.5  # of the expected rate, below it the finding is a fault; assumed
-PINGS_HZ = {
-    Schedule.CONCURRENT: 28.0,
-    Schedule.SEQUENTIAL: 13.5,
-    Schedule.SIMULTANEOUS: 28.0,
-}  # both rangers [firmware/README.md]
-MAXSONAR_PINGS_HZ = {
-    Schedule.CONCURRENT: 19.0,
-    Schedule.SEQUENTIAL: 9.5,
-    Schedule.SIMULTANEOUS: 19.0,
-}  # both rangers [firmware/ranger.h]
+# Both rangers [firmware/README.md]
+PINGS_HZ = {Schedule.CONCURRENT: 28.0, Schedule.SEQUENTIAL: 13.5, Schedule.SIMULTANEOUS: 28.0}
+# Both rangers [firmware/ranger.h]
+MAXSONAR_PINGS_HZ = {Schedule.CONCURRENT: 19.0, Schedule.SEQUENTIAL: 9.5, Schedule.SIMULTANEOUS: 19.0}
 PRESSURE_HZ = {PressureMode.HIGH_SPEED: 9.0, PressureMode.HIGH_RESOLUTION: 1.8}
 DEFAULT_GYROS_HZ, DEFAULT_COMPASS_HZ = 200.0, 10.0  # [protocol/README.md]
 _STREAMS = {  # by message: subject and unit of a finding, devices

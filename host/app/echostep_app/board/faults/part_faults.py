@@ -71,10 +71,8 @@ _TEXTS: dict[Part, dict[Fault, tuple[str, str]]] = {
     Part.LIS3MDL: _LIS3MDL,
     Part.ICM20649: _ICM20649,
 }
-_WANTED = {
-    Healthy.PRESSURE: "0x60 is a BMP390",
-    Healthy.COMPASS: "0x3D is a LIS3MDL",
-}  # identities of the parts that the firmware knows, by place
+# Identities of the parts that the firmware knows, by place
+_WANTED = {Healthy.PRESSURE: "0x60 is a BMP390", Healthy.COMPASS: "0x3D is a LIS3MDL"}
 LIKE_FOOT_PARTS = {0xE0: "ICM-20648", 0xE1: "ICM-20649", 0xEA: "ICM-20948"}  # by WHO_AM_I; 0xE0 from memory
 
 

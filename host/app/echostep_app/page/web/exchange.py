@@ -44,9 +44,8 @@ class Exchange:
     async def once(self, identity: str, act: Callable[[], Awaitable[str]]) -> str:
         """The answer to a request, which is carried out when it comes for the first time: the reason of a refusal, or nothing."""
         if identity not in self._answers:
-            self._answers[identity] = (
-                "The program failed on this."  # stays if it does: such a request does not come for ever
-            )
+            # Stays if it does: such a request does not come for ever
+            self._answers[identity] = "The program failed on this."
             self._answers[identity] = await act()
             if len(self._answers) > MOST_ANSWERS:
                 self._answers.popitem(last=False)

@@ -21,19 +21,8 @@ from echostep_app.plan.importers.parsing import FORMATS, GML
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.writer import plan_json
 
-PICTURES = (
-    ".png",
-    ".jpg",
-    ".jpeg",
-    ".pgm",
-    ".ppm",
-    ".pbm",
-    ".bmp",
-    ".tif",
-    ".tiff",
-    ".gif",
-    ".webp",
-)  # traced with --scale
+# Traced with --scale
+PICTURES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".pbm", ".bmp", ".tif", ".tiff", ".gif", ".webp")
 TRACE = (
     "a picture: --scale X0,Y0,X1,Y1=M traces what is dark in it (two points in pixels, their distance in metres), "
     "or echostep plan edit PLAN --picture FILE draws over it (PNG, JPEG)"
@@ -51,19 +40,8 @@ NEXT_STEPS = {  # formats that are not read, and what to do
     ".gml": GML,
     **dict.fromkeys((".shp", ".gpkg", ".kml", ".kmz"), "export it as DXF (QGIS: Project, Import/Export), or map it as OpenStreetMap indoor tags"),
 }  # fmt: skip
-OTHERS = {
-    ".dxf",
-    ".geojson",
-    ".ifc",
-    ".ifczip",
-    ".imdf",
-    ".osm",
-    ".xml",
-    ".yaml",
-    ".yml",
-    ".zip",
-    *NEXT_STEPS,
-}  # files that are not read as plan.json
+# Files that are not read as plan.json
+OTHERS = {".dxf", ".geojson", ".ifc", ".ifczip", ".imdf", ".osm", ".xml", ".yaml", ".yml", ".zip", *NEXT_STEPS}
 HALF_STOREY_M = 1.5  # closer levels are told; assumed
 SNIFFED_BYTES = 4096  # read to recognise a format
 

@@ -21,9 +21,8 @@ Areas = NDArray[np.object_]
 # Assumed:
 NARROWEST_M, WIDEST_M = 0.5, 1.6  # of an opening that a door could close
 LONGEST_JAMB_M = 0.301  # a shorter wall at the end of another one is a jamb: the longer one still ends free
-LONGEST_FACED_M = (
-    1.2  # the same of a jamb that another one of its length faces across an opening: old walls are that thick
-)
+# The same of a jamb that another one of its length faces across an opening: old walls are that thick
+LONGEST_FACED_M = 1.2
 TOUCH_M = 0.02  # walls with a smaller distance touch
 BESIDE_M = 5e-3  # a wall's end this far beside an opening's line ends it: coordinates are rounded
 AWRY_M = 0.05  # from there to where the line crosses that wall: beyond, it runs along the wall

@@ -85,11 +85,8 @@ class LineChunks:
     def __init__(self, rate_hz: float) -> None:
         self.jumps = 0
         self._chunks = ImuChunks(rate_hz)
-        self._set_s, self._newest_s, self._arrival_ns = (
-            0.0,
-            math.nan,
-            0,
-        )  # added to the device's times; of the newest sample
+        # Added to the device's times; of the newest sample
+        self._set_s, self._newest_s, self._arrival_ns = (0.0, math.nan, 0)
 
     @property
     def left_out(self) -> int:

@@ -23,10 +23,8 @@ JITTER_SMOOTH_MS = 401  # the trunk's angle to the feet changes within a step
 
 GROUND_PRESSURE_PA = 101_325.0  # at height 0
 Mode = Literal["high-speed", "high-resolution"]
-PRESSURE_NOISE_PA: dict[Mode, float] = {
-    "high-speed": 3.0,
-    "high-resolution": 1.5,
-}  # 15 bit, 17 bit [SCP1000 data sheet]
+# 15 bit, 17 bit [SCP1000 data sheet]
+PRESSURE_NOISE_PA: dict[Mode, float] = {"high-speed": 3.0, "high-resolution": 1.5}
 PRESSURE_DRIFT_PA = 0.1  # random walk in a second: weather and doors
 TEMPERATURE_NOISE_C = 0.1
 
@@ -42,9 +40,8 @@ class WornGyro:
     walking adds, by the rotations about the other axes. `jitter_rad`: of the trunk against the feet, correlated over `jitter_s`.
     """
 
-    scale: float = (
-        0.02  # two belts of real walks: 0.7 % between them, 2.3 % against motion capture [legs_qmt, legs_gaittoolbox]
-    )
+    # Two belts of real walks: 0.7 % between them, 2.3 % against motion capture [legs_qmt, legs_gaittoolbox]
+    scale: float = 0.02
     wander_rad_s: float = math.radians(0.03)  # of a gyro of its class, 0.02 to 0.1
     wander_s: float = 100.0
     walking_rad_s: float = math.radians(

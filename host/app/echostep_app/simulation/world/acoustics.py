@@ -35,9 +35,8 @@ class Acoustics(NamedTuple):
     threshold_sd_db: float = 1.5  # of the comparison, from ping to ping
     minimum_m: float = 0.15  # the transducer still rings [SRF02 technical specification]
     maximum_m: float = 6.0  # the ranger stops listening
-    noise_m: float = (
-        0.025  # which wavefront crosses the threshold, phasing; with the bias 3-4 cm [Robot Electronics, sonar FAQ]
-    )
+    # Which wavefront crosses the threshold, phasing; with the bias 3-4 cm [Robot Electronics, sonar FAQ]
+    noise_m: float = 0.025
     bias_m: float = 0.025  # standard deviation over rangers
     # Share of the first echoes that are missed though they are loud enough, and share of the places where the beam meets a wall that scatter it back
     # if no echo came by mirrors. Known of other rangers in a small room (`evaluate echoes`), not of an SRF02 in a building

@@ -19,10 +19,8 @@ SIDES = np.array(
     [(0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], np.float64
 )  # upward in the box, one after the other
 TILT_SD_RAD = math.radians(4.0)  # of a box on a table, and of the part in its box; assumed
-OFFSET_M_S2, SCALE_ERROR = (
-    0.050 * 9.80665,
-    0.01,
-)  # limits of the errors [ICM-20649 data sheet DS-000192, table 2, as remembered]
+# Limits of the errors [ICM-20649 data sheet DS-000192, table 2, as remembered]
+OFFSET_M_S2, SCALE_ERROR = (0.050 * 9.80665, 0.01)
 RATE_BIAS_RAD_S = math.radians(5.0)  # limit [table 1]
 SKEW = 0.005  # sd of the angle between axes that should be at right angles: the data sheet's 2 % is its limit
 # Of an LSM6DSO and of an ICM-20649: unit and noise of a force, m/s2; of a rate, rad/s [data sheets].

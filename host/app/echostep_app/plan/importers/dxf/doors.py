@@ -34,11 +34,8 @@ BESIDE_M = 6.0  # greatest width of a hole in which a door stands beside a windo
 BEYOND_M = 0.3  # so far a wall goes on beyond a leaf that is drawn in it; assumed
 SAME_M = 0.25  # two doors with nearer middles are one, as are two lines across one wall; assumed
 NEAR_JAMB_M = 0.02  # closer faces need no end between them
-THINNEST_PANEL_M, EVEN, FOLDED = (
-    0.1,
-    1.3,
-    1.3,
-)  # of folding doors: least width, ratio of widths, ratio of panels to their part of the gap; assumed
+# Of folding doors: least width, ratio of widths, ratio of panels to their part of the gap; assumed
+THINNEST_PANEL_M, EVEN, FOLDED = (0.1, 1.3, 1.3)
 Line = tuple[float, float, float, float]
 
 

@@ -44,20 +44,12 @@ BESIDE = (
     "*dämm*", "*furn*", "*möbel*", "*moebel*", "*muebl*", "*mobil*", "*sanit*", "*plumb*", "*clng*", "*ceil*", "*elec*", "*hvac*", "*equip*",
     "*tile*", "*-iden*", "*-tag*", "*-symb*",
 )  # fmt: skip
-DRAWN = (
-    "walls",
-    "columns",
-    "windows",
-    "doors",
-    "stairs",
-    "lifts",
-)  # kinds whose layers come with layers of hatching or measures
+# Kinds whose layers come with layers of hatching or measures
+DRAWN = ("walls", "columns", "windows", "doors", "stairs", "lifts")
 THINNEST_M, THICKEST_M = 0.05, 0.5  # distance of the two faces of a wall; assumed
 LONG_M = 1.0  # of a piece of wall
-CROWD_M, MOST_BESIDE = (
-    0.65,
-    3,
-)  # within this distance of a face, at most this number of other parallels: cavities, plaster, linings; assumed
+# Within this distance of a face, at most this number of other parallels: cavities, plaster, linings; assumed
+CROWD_M, MOST_BESIDE = (0.65, 3)
 PAIRED = 0.5  # share of the lines of a layer of walls that have such a partner; assumed
 LEAST_M = 5.0  # a layer with less length of them is not a layer of walls; assumed
 MOST_PIECES = 20_000  # examined pieces of one layer

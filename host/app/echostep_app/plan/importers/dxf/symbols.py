@@ -23,10 +23,8 @@ from echostep.arrays import Floats
 
 NARROWEST_M, WIDEST_M = 0.4, 2.5  # radius of a swing: width of a leaf; assumed
 LEAST_SWEEP_RAD, MOST_SWEEP_RAD = math.radians(20), math.radians(200)  # assumed
-LEAST_TURN_RAD, MOST_TURN_RAD = (
-    math.radians(0.5),
-    math.radians(46),
-)  # at a corner of a curve that is drawn as a polyline; assumed
+# At a corner of a curve that is drawn as a polyline; assumed
+LEAST_TURN_RAD, MOST_TURN_RAD = (math.radians(0.5), math.radians(46))
 OFF = 0.04  # greatest distance of a swing's corners from its circle, relative to its radius: splines are not circles; assumed
 JOIN_M = 0.06  # drawn lines nearer than this are one symbol; assumed
 LEAF_M = 0.15  # greatest distance of a leaf's ends from the hinge and the end of the arc; assumed

@@ -17,9 +17,8 @@ from echostep_app.plan.importers.imdf.archive import Archive
 from echostep_app.plan.importers.parsing import read_bytes
 from echostep_app.plan.importers.report import ImportReport
 
-REFERENCE_M = (
-    1.0  # a storey without walls, doors and rooms nearer than this to another one is its reference level; assumed
-)
+# A storey without walls, doors and rooms nearer than this to another one is its reference level; assumed
+REFERENCE_M = 1.0
 CONTENTS = ("IfcWall", "IfcDoor", "IfcWindow", "IfcSpace", "IfcCurtainWall")
 
 

@@ -14,10 +14,8 @@ from echostep.errors import EchostepError
 from echostep_app.plan.importers.parsing import decode, read_text
 
 LARGEST_BYTES = 256 * 2**20
-MOST_RATIO, FREE_BYTES = (
-    100,
-    2**20,
-)  # ratio of unpacked to packed size, beyond the first MiB: GeoJSON packs 5 to 30 times
+# Ratio of unpacked to packed size, beyond the first MiB: GeoJSON packs 5 to 30 times
+MOST_RATIO, FREE_BYTES = (100, 2**20)
 MOST_FILES = 1000
 
 
