@@ -38,8 +38,10 @@ STARTED_BY = {
     "reliability.fuzz.codec": HERE,
     "reliability.fuzz.host": HERE,
     "reliability.kill_recorder": HERE,
+    "reliability.left_behind": "tools/test_left_behind.py",
     "reliability.soak": "tools/test_soak.py",
     "twin.acceptance_walk": "app/session/acceptance/test_acceptance_command.py",
+    "twin.line_foot": "app/commands/test_lines.py",
     "twin.measure": HERE,
     "twin.run": "app/commands/test_live.py",
 }

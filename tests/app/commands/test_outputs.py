@@ -24,7 +24,7 @@ from board_runs import ROOT
 from command_line import PROGRAM, interrupt_once_called
 from echostep.recording import open_recording
 from echostep_app.cli import main
-from echostep_app.operation.page import TablePage
+from echostep_app.operation.session import TableFeed
 from players import pseudo_terminal, python_board
 from waiting import PATIENCE_S, until
 
@@ -100,8 +100,8 @@ def test_the_commanders_page_and_recording_tell_that_nothing_is_printed_any_more
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shown: list[str] = []
-    monkeypatch.setattr(TablePage, "publish", lambda _, scene: shown.append(scene.fault))
-    interrupt_once_called(TablePage, "publish", monkeypatch, lambda *_: "standard output" in shown[-1])
+    monkeypatch.setattr(TableFeed, "publish", lambda _, scene: shown.append(scene.fault))
+    interrupt_once_called(TableFeed, "publish", monkeypatch, lambda *_: "standard output" in shown[-1])
     with FULL.open("w") as full, mock.patch.object(sys, "stdout", full):
         monkeypatch.setattr(sys, "argv", ["echostep", *COMMAND, "--out", str(tmp_path / "o.mcap")])
         with pytest.raises(SystemExit) as end:

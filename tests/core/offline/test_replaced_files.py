@@ -43,6 +43,9 @@ def test_the_kind_and_the_next_step_are_named(tmp_path: Path, command: tuple[str
     content, said = KINDS[kind]
     (tmp_path / "a").write_bytes(content)
     done = echostep(*command, cwd=tmp_path)
+    if (command[0], kind) == ("foot", "zip"):  # which is read, as phones write it
+        assert done.stderr == "echostep: a: imu.csv: t_s does not advance\n"
+        return
     assert (done.returncode, done.stderr) == (2, f"echostep: a: {said}\n"), done.stdout
     assert said in echostep("info", "a", cwd=tmp_path).stdout + echostep("info", "a", cwd=tmp_path).stderr
 

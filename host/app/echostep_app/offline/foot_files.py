@@ -32,7 +32,7 @@ from echostep_app.printing.lines import as_error
 SESSIONS = ("inertial", "sensors", "raw data")  # files of one session that have both sensors: x-IMU3, NGIMU, phyphox
 MAT_IMU, MAT_TIME = ("imu_data", "imu"), ("timestamps_all", "timestamps", "ts", "t_s")
 GRAVITY_M_S2 = np.array([0.0, 0.0, 9.80665])  # specific force at rest, z up
-MOST_BYTES = 1 << 30  # of a packed table, and of a MAT or MVNX file; assumed
+MOST_BYTES = 1 << 30  # of the tables of a zip, and of a MAT or MVNX file; assumed
 
 
 def load_foot(path: Path, naming: Naming = OWN) -> Imu:
@@ -58,10 +58,16 @@ def _zip(path: Path, naming: Naming) -> Imu:
     """A zip of tables."""
     try:
         with zipfile.ZipFile(path) as packed, TemporaryDirectory() as folder:
-            for each in packed.infolist():
-                if each.filename.lower().endswith(".csv") and each.file_size <= MOST_BYTES:
-                    packed.extract(each, folder)
-            return _folder(path, Path(folder).rglob("*.csv"), naming)
+            tables = [each for each in packed.infolist() if each.filename.lower().endswith(".csv")]
+            if sum(each.file_size for each in tables) > MOST_BYTES:
+                raise EchostepError(
+                    f"{path}: its tables are larger than {MOST_BYTES >> 30} GB: cut the recording into parts"
+                )
+            packed.extractall(folder, tables)
+            try:
+                return _folder(path, Path(folder).rglob("*.csv"), naming)
+            except EchostepError as error:
+                raise EchostepError(str(error).replace(f"{folder}/", f"{path}: ")) from error
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, EOFError) as error:
         raise EchostepError(f"{path}: cannot unpack it: {error}") from error
 
@@ -69,7 +75,8 @@ def _zip(path: Path, naming: Naming) -> Imu:
 def _folder(path: Path, files: Iterable[Path], naming: Naming) -> Imu:
     """A session: one table with both sensors, or one for each, of which the accelerometer's is brought to the gyro's times."""
     tables = {file.stem.lower(): file for file in sorted(files)}
-    for name in SESSIONS:
+    alone = [name for name in tables if len(tables) == 1 and not re.search("acc|gyr", name)]
+    for name in (*SESSIONS, *alone):
         if name in tables:
             return load_imu(tables[name], partial(read_header, naming=naming))
     names = [name for name in tables if "uncal" not in name]
