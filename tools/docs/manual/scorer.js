@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Order of the search's results: what explains before why it was decided so and what was tried. The other numbers are Sphinx' own.
 var Scorer = {
   score: ([page, , , , score]) => (/\/(decisions|notebook)\//.test(page) ? score - 20 : score),

@@ -137,7 +137,7 @@ def keep(broker: Broker, payload: bytes, name: str = "anna") -> None:
 
 @needs_broker
 def test_a_drawing_comes_from_the_broker_into_a_file_that_stays(tmp_path: Path) -> None:
-    """A large one too; the same one again is the same file, a newer one another."""
+    """A large one too; the same one again is the same file, a newer one another; a file with other bytes is put aside."""
     walls = [[0.0, round(0.01 * k, 2), 4.0, round(0.01 * k, 2)] for k in range(8000)]
     large = drawing(walls=walls)
     assert len(large) > 3 * 65_536
@@ -154,11 +154,12 @@ def test_a_drawing_comes_from_the_broker_into_a_file_that_stays(tmp_path: Path) 
         assert newer.read_bytes() == drawing()
         assert path.read_bytes() == large
         newer.write_bytes(b"mine")
-        with pytest.raises(EchostepError, match="not overwritten"):
-            fetch("red")
-        assert newer.read_bytes() == b"mine"
+        assert fetch("red") == newer
+        assert newer.read_bytes() == drawing()
+        aside = newer.with_name(f"{newer.name}.damaged")
+        assert aside.read_bytes() == b"mine"
     assert "drawn by anna: 8000 walls, to 5 cm (1 sd)" in said[1]
-    assert sorted(tmp_path.glob("out/*")) == sorted([path, newer])
+    assert sorted(tmp_path.glob("out/*")) == sorted([path, newer, aside])
 
 
 def fetcher(broker: Broker, folder: Path, said: list[str]) -> Callable[[str], Path]:
