@@ -59,7 +59,7 @@ def test_what_is_wrong_is_said_in_words() -> None:
         "check its plug and 5 V, SDA (D2) and SCL (D3)",
         "calf gyro: failed its self-test",
         "belt gyro: does not answer",
-        "firmware 1.7.0",
+        "firmware 1.8.0",
         "thigh gyro: answers, 20 degC, self-test passed",
         "belt gyro: FAILS",
     ):

@@ -78,6 +78,12 @@ def test_a_wall_that_ends_in_a_corner_makes_a_gap_to_it() -> None:
     assert gap.line == pytest.approx((2.0, 0.9, 2.0, 0.0))
 
 
+def test_a_wall_just_behind_the_widest_gap_is_not_reached() -> None:
+    """Nearer to the line's end than walls are apart by rounding, and not met: the distance to it was no number."""
+    walls = np.array([[0, 0, 2, 0], [2, 0, 2, 3], [2, 3, 0, 3], [0, 3, 0, 0], [0, 1, -1, 1], [-2.602, 0, -2.602, 2]])
+    assert door_gaps(Level("G", 0.0, walls)) == ()
+
+
 @pytest.mark.parametrize(
     ("at", "reason", "nearest"),
     [

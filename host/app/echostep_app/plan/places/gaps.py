@@ -53,9 +53,15 @@ def door_gaps(level: Level) -> tuple[Door, ...]:
 
 
 def _reach_m(begin: Areas, rays: Areas, walls: Areas) -> Floats:
-    """How far each ray (n,) is free: to where it crosses its wall, or runs into the wall's end within `BESIDE_M`, whatever the last bit says."""
-    crossing = shapely.distance(begin, shapely.intersection(rays, walls))
-    beside = shapely.distance(begin, shapely.intersection(shapely.buffer(rays, BESIDE_M, cap_style="flat"), walls))
+    """How far each ray (n,) is free: to where it crosses its wall, or runs into the wall's end within `BESIDE_M`, whatever the last bit says.
+
+    Infinite where it does neither, as for a wall just behind its end: the distance to nothing is NaN.
+    """
+    crossed = (
+        shapely.intersection(rays, walls),
+        shapely.intersection(shapely.buffer(rays, BESIDE_M, cap_style="flat"), walls),
+    )
+    crossing, beside = (np.nan_to_num(shapely.distance(begin, place), nan=np.inf) for place in crossed)
     return np.where(crossing < beside + AWRY_M, crossing, beside)
 
 
