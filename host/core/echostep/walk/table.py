@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -37,8 +36,8 @@ def columns_of(estimates: list[Estimate], plan: Plan) -> Columns:
     columns["hypotheses"] = [" ".join(map(str, e.hypotheses)) for e in estimates]
     if plan.georeference and (earth_of := added("earth")):
         columns |= dict.fromkeys(PLACE, [None] * len(estimates))
-        with suppress(EchostepError):  # pyproj is not installed
-            degrees = earth_of(plan).degrees(np.array([(e.x_m, e.y_m) for e in estimates]))
+        if earth := earth_of(plan):  # pyproj is installed
+            degrees = earth.degrees(np.array([(e.x_m, e.y_m) for e in estimates]))
             for name, column in zip(PLACE, degrees.T.tolist(), strict=True):
                 columns[name] = [v if claims_place(e) else None for v, e in zip(column, estimates, strict=True)]
     return columns
