@@ -92,7 +92,7 @@ def test_a_note_stays_in_the_log_and_in_the_table_at_the_end(tmp_path: Path) -> 
     ((identity, note),) = team.operation._board.log.items()
     topic, payload = note_message(identity, note)
     for other in (b"", payload, note_message(identity, Order(1, "nothing", "Ben", note.unix_s + 1.0))[1]):
-        team.put_bytes(topic, other)  # nobody takes it back or writes over it
+        team.put_bytes(topic, other)  # a note is not taken back or overwritten
     team.pass_time(1.0)
     assert [event.text for event in team.scene().log] == ["Ann: stairs B are closed"]
     assert team.scene().log is team.scene().log  # a page gets it when it changes

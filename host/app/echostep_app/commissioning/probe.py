@@ -160,7 +160,8 @@ class _Probe:
         """Read for `seconds`, and longer for a self-test that was requested, or a board that has just started."""
         if BOARD in self._names:
             self._send(Identify())
-            self._set_schedule(self._schedule)
+            if self._schedule is not None:
+                self._configure(self._schedule)
         for chunk in self._ports.chunks():
             now_s = clock_s() - self._start_s
             if chunk is not None:
@@ -172,16 +173,16 @@ class _Probe:
             late_s = self._first_message_s + self._least_board_s if self._first_message_s <= seconds else 0.0
             if now_s >= max(seconds + self.extra_s, late_s):
                 break
-        self._set_schedule(self._schedule and Schedule.CONCURRENT)
+        if self._schedule is not None:
+            self._configure(Schedule.CONCURRENT)
         self.result.seconds = clock_s() - self._start_s
         self.result.rejected, self.result.lost = self._board.counts.rejected, self._board.counts.lost
         self.result.notices += self._ports.notices
         self.result.mtx_product = self._start.product
 
-    def _set_schedule(self, schedule: Schedule | None) -> None:
-        """Configure the board as after a start, but for this schedule; None: leave it as it is."""
-        if schedule is not None:
-            self._send(Configure(0xFF, schedule, 200, 10, PressureMode.HIGH_SPEED))
+    def _configure(self, schedule: Schedule) -> None:
+        """Set the board as after a start, but for this schedule."""
+        self._send(Configure(0xFF, schedule, 200, 10, PressureMode.HIGH_SPEED))
 
     def _send(self, message: Message) -> None:
         self._ports.send(BOARD, encode(message, self._sequence))

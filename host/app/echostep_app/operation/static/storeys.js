@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// All storeys over each other, the lowest one below, seen obliquely: who is on which. A tap chooses a wearer, or leads to a storey.
+// All storeys over each other, the lowest one below, seen obliquely, with the wearers on each. A tap chooses a wearer, or leads to a storey.
 
 import { boxOf, linesOf } from '../static/plan.js';
 import { View } from '../static/view.js';

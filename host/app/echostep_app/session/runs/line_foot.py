@@ -27,7 +27,7 @@ LISTEN_S = 2.0  # of samples, from which their rate is measured
 PATIENCE_S = 20.0  # longest wait for them; a board that starts and joins a network takes 10 s; assumed
 FEWEST = 100  # samples
 RATE_SHARE = 0.02  # by which the settings' rate may differ from the measured one
-HEADER = "t_s,ax,ay,az,gx,gy,gz"
+HEADER = ",".join(COLUMNS)
 
 
 def port_of(foot: str | None) -> str | None:
@@ -45,8 +45,7 @@ class LineFoot:
 
     def __init__(self, ports: SerialPorts, foot: str) -> None:
         self._foot, self._reader = foot, LineReader()
-        header, self._chunks = foot.partition("#")[2], LineChunks(1.0)
-        samples = self._listen(ports, header)
+        samples = self._listen(ports, foot.partition("#")[2])
         if wrong := complaint(samples, COLUMNS):
             raise EchostepError(f"--foot {foot}: {wrong}; units go into the header, as t (ms), ax (g), gx (deg/s)")
         self.rate_hz = rate_of(samples[:, 0])
