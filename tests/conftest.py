@@ -18,7 +18,7 @@ import pytest
 from hypothesis import settings
 
 import layers
-from echostep_app.interruption import ENDS
+from echostep_app.interruption import ENDS, end_by_signals
 
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
@@ -42,9 +42,10 @@ def _computer_of_one_user(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(autouse=True)
 def _signals_as_they_were() -> Iterator[None]:
-    """A command that ran in this process leaves its handlers, or ignores a signal: the next test's processes would ignore it too."""
+    """A command that ran in this process leaves its handlers, ignores a signal, or was ended by one: what comes next would, too."""
     handlers = [(number, signal.getsignal(number)) for number in (signal.SIGINT, *ENDS)]
     yield
+    end_by_signals()  # no signal has come
     for number, handler in handlers:
         signal.signal(number, handler)
 

@@ -26,6 +26,7 @@ from echostep.recording import open_recording
 from echostep.xsens import MtxReader
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.ports.serial_ports import SerialPorts
+from echostep_app.ports.udp import BYTES_A_SECOND
 from echostep_app.session.runs import line_foot
 from echostep_app.session.runs.line_foot import LineFoot, port_of
 from foot.foot_walks import MANNERS, course, samples
@@ -78,6 +79,7 @@ def udp() -> Iterator[tuple[str, Callable[[bytes], object]]]:
 def test_each_kind_of_port_gives_the_samples(kind: Callable[[], object], walk: Path) -> None:
     """The columns are named behind the port, as for a device that prints samples alone."""
     sent = [line.encode() + b"\n" for _, line in lines(walk) if line != HEADER]
+    pace_s = max(map(len, sent)) / (0.8 * BYTES_A_SECOND) if kind is udp else 0.0005  # of datagrams no more are taken
     with kind() as (port, send):  # type: ignore[attr-defined]
         foot = f"lines:{port}#{HEADER}"
         with closing(SerialPorts({LINES: str(port_of(foot))}, {LINES: 115200})) as ports:
@@ -85,7 +87,7 @@ def test_each_kind_of_port_gives_the_samples(kind: Callable[[], object], walk: P
 
             def play() -> None:
                 for line in sent:
-                    if over.wait(0.0005):  # datagrams that wait are few
+                    if over.wait(pace_s):
                         return
                     send(line)
 
