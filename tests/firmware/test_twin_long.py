@@ -11,13 +11,14 @@ import pytest
 
 from board_runs import TWIN, Bench, kinds, needs_twin, pings
 from echostep.board import messages as m
+from echostep.timing.timeline import TICKS_PER_S
 from echostep_app.board.subscription import SUBSCRIBE
 from echostep_app.simulation.devices.board import BoardProcess
 from echostep_app.simulation.stimulus import NO_SYNC, ROW
-from twin.late_clock import HALF_WRAP, TICKS_S, TIMER_WRAP, WRAP, late_firmware
+from twin.late_clock import HALF_WRAP, TIMER_WRAP, WRAP, late_firmware
 
 pytestmark = needs_twin
-HALF_WRAP_S = HALF_WRAP / TICKS_S
+HALF_WRAP_S = HALF_WRAP / TICKS_PER_S
 SECOND = np.zeros(1_000, ROW)
 SECOND["own_us"], SECOND["sync_us"] = 500, NO_SYNC
 
@@ -36,7 +37,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("wrap", [HALF_WRAP, WRAP])
 def test_nothing_happens_when_the_clock_wraps(folder: Path, wrap: int, before_s: float) -> None:
     """17.9 minutes after the start comparisons of times turn round, after 35.8 the clock itself."""
-    start = wrap - int(before_s * TICKS_S)
+    start = wrap - int(before_s * TICKS_PER_S)
     for kit in ("papers", "2026", "foot"):
         status = check_run(late_firmware(start, folder / str(start)), kit)
         assert (status.ticks ^ start) >> 31  # the wrap lies between

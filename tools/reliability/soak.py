@@ -29,6 +29,7 @@ from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk
+from echostep.timing.timeline import TICKS_PER_S
 from echostep.tracker import Tracker
 from echostep.walk.recorded import SIMULATED
 from echostep_app.page.server import Address
@@ -45,7 +46,7 @@ from places import OUT, PLAN, TWIN
 from reliability.campaign import Figure, none, options, report
 from reliability.fault_outcomes import SURE_M, FaultOutcome, columns, judge_estimates
 from reliability.soak_walk import EndlessWalk
-from twin.late_clock import HALF_WRAP, TICKS_S, WRAP, late_firmware
+from twin.late_clock import HALF_WRAP, WRAP, late_firmware
 
 SEED = 1
 PORTION = 100  # chunks that are tracked together: about a tenth of a second
@@ -136,7 +137,7 @@ def resident_mb(process: str) -> float:
 
 def run(seconds: float, folder: Path, wrap: int, before_s: float = BEFORE_WRAP_S) -> Measured:
     """Walk for `seconds`, simulated; the board's clock starts `before_s` before it reaches `wrap`. Files go into `folder`."""
-    plan, measured, start = load_plan(PLAN), Measured(seconds), wrap - round(before_s * TICKS_S)
+    plan, measured, start = load_plan(PLAN), Measured(seconds), wrap - round(before_s * TICKS_PER_S)
     elf = late_firmware(start, folder.resolve() / "firmware")
     board = BoardProcess([TWIN[0], "--elf", str(elf), "--seed", str(SEED)])
     walk = EndlessWalk(plan, SEED, board)
@@ -165,7 +166,7 @@ def run(seconds: float, folder: Path, wrap: int, before_s: float = BEFORE_WRAP_S
     measured.recorded_mb = (folder / "walk.mcap").stat().st_size / 1e6
     t_s, xy_m, sure = columns(session.estimates)
     measured.estimates = len(t_s)
-    judge_estimates(measured.outcome, (t_s - start / TICKS_S) % (1e-3 * walk.length_ms), xy_m, sure, walk.truth)
+    judge_estimates(measured.outcome, (t_s - start / TICKS_PER_S) % (1e-3 * walk.length_ms), xy_m, sure, walk.truth)
     measured.replays = replays(folder)
     return measured
 
@@ -198,7 +199,7 @@ def wraps(clock: Sequence[tuple[float, int]]) -> Figure:
     """Of the board's clock: as its ticks show them, and as many as the time after the first look makes."""
     (first_s, first), (last_s, _) = clock[0], clock[-1]
     seen = sum(after < before for (_, before), (_, after) in pairwise(clock))
-    due = (first + round((last_s - first_s) * TICKS_S)) // WRAP
+    due = (first + round((last_s - first_s) * TICKS_PER_S)) // WRAP
     return Figure("wraps of the board's clock", f"{seen}", f"{due}", seen == due)
 
 

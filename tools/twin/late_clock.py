@@ -11,7 +11,6 @@ from pathlib import Path
 
 from places import ROOT
 
-TICKS_S = 2_000_000  # of the board's clock [host/docs/design/time-and-frames.md]
 # Of Timer1; where comparisons of two times turn round; of the clock
 TIMER_WRAP, HALF_WRAP, WRAP = 1 << 16, 1 << 31, 1 << 32
 BUILD_MAX_S = 120.0

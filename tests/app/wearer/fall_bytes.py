@@ -9,11 +9,11 @@ from echostep.board.calibration import LSM6DSO_M_S2, LSM6DSO_RAD_S
 from echostep.board.frames import encode
 from echostep.board.messages import Motion
 from echostep.ports.chunks import BOARD, MTX, Chunk
+from echostep.timing.timeline import TICKS_PER_S
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
 from echostep_studies.simulation.falling import BodySamples
 
 BEGIN_NS = 1_000_000_000
-TICKS_HZ = 2e6
 
 
 def fall_chunks(samples: BodySamples, *, belt: bool) -> list[Chunk]:
@@ -31,7 +31,7 @@ def fall_chunks(samples: BodySamples, *, belt: bool) -> list[Chunk]:
             for rate, force in zip(rates, forces, strict=True)
         )
         counts = np.r_[thigh, invalid, invalid, trunk] if belt else np.full(18, -32768)
-        message = Motion(round(t_s * TICKS_HZ) & 0xFFFFFFFF, *counts.astype(int).tolist())
+        message = Motion(round(t_s * TICKS_PER_S) & 0xFFFFFFFF, *counts.astype(int).tolist())
         found.append((t_s + 0.002, Chunk(BOARD, _ns(t_s + 0.002), encode(message, k & 0xFF))))
     return [chunk for _, chunk in sorted(found, key=lambda pair: pair[0])]
 

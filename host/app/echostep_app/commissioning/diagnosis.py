@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from echostep.board.messages import GYROS_INVALID, SCHEMA_HASH, Gyro, Healthy, Identity, Outcome, Part, Ranger, SelfTest
 from echostep.board.reports import BoardReports
 from echostep.ports.chunks import BOARD, MTX
-from echostep.timing.timeline import MtxTiming
+from echostep.timing.timeline import TICK_S, MtxTiming
 from echostep_app.board.faults.electrical import electrical_findings, level_line
-from echostep_app.board.faults.findings import TICK_S, part_in, part_text_of
+from echostep_app.board.faults.findings import part_in, part_text_of
 from echostep_app.board.faults.health import (
     NAMES,
     SELECTS,

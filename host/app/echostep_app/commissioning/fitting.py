@@ -21,7 +21,8 @@ from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import StrideSettings
 from echostep.legs.strides import StrideEstimator
 from echostep.settings import Settings
-from echostep_app.commissioning.probe import TICKS_PER_S, ProbeResult
+from echostep.timing.timeline import TICKS_PER_S
+from echostep_app.commissioning.probe import ProbeResult
 from echostep_app.offline.leg_lengths import calibrated_scale
 
 Values = dict[str, float | bool]

@@ -18,9 +18,10 @@ from echostep.board.calibration import GYROS, ImuSettings, foot_axes, six_axes
 from echostep.board.messages import FOOT_HEALTH_TEMPERATURE_INVALID, ROWS, Foot, Gyro, Motion
 from echostep.errors import EchostepError
 from echostep.foot.ins import GRAVITY_M_S2
+from echostep.timing.timeline import TICKS_PER_S
 from echostep_app.board.faults.device_faults import foot_celsius, gyro_celsius
 from echostep_app.commissioning.imu_errors import POSES, RestPose, check_unlike, fit_errors, pose_of
-from echostep_app.commissioning.probe import SETTLED_S, TICKS_PER_S, ProbeResult
+from echostep_app.commissioning.probe import SETTLED_S, ProbeResult
 
 TRIES = 3  # of each pose; assumed
 FOOT_PLACE = "foot"

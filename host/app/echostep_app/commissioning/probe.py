@@ -36,7 +36,7 @@ from echostep.board.messages import (
 from echostep.board.reports import BoardReports
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, MTX, Chunk
-from echostep.timing.timeline import MtxTiming
+from echostep.timing.timeline import TICKS_PER_S, MtxTiming
 from echostep.xsens import MtxReader
 from echostep.xsens.reader import warm_up
 from echostep_app.board.subscription import SUBSCRIBE_ELECTRICAL, BoardSubscription
@@ -46,7 +46,6 @@ from echostep_app.recording.device import LISTENED_BYTES
 from echostep_app.xsens.startup import MtxStart
 
 BAUD = {BOARD: 115200, MTX: 115200}
-TICKS_PER_S = 2_000_000
 QUERY_PERIOD_S = 0.2  # of clock queries
 HEALTH_S = 1.6  # by then every gyro has reported its health
 SELF_TEST_S = 2.2  # for a self-test and its report

@@ -26,6 +26,7 @@ from echostep.offline.imu_chunks import ImuChunks
 from echostep.offline.imu_csv import LIMITS, Imu
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import imu_settings, parse_settings, read_settings
+from echostep.timing.timeline import TICKS_PER_S
 from echostep_app.offline.foreign_columns import OWN, read_header
 from echostep_app.offline.leg_csv import load_pair
 from echostep_app.recording.recorder import Recorder
@@ -33,7 +34,6 @@ from echostep_app.recording.recorder import Recorder
 Message = Ping | Pressure | Gyros
 GAP = 1.5  # periods: a longer step is a gap
 AT_ONCE = 10_000  # samples, which bound the memory
-TICKS_S = 2e6  # of a board [protocol/messages.toml]
 FARTHEST_M = 0.5 * 65_535e-6 * SPEED_OF_SOUND_M_S  # that a ping can state
 PASCALS = (20_000.0, 120_000.0)  # of air where people are; assumed
 
@@ -92,7 +92,7 @@ def _samples(imu: Imu, chunks: ImuChunks) -> Iterator[Chunk]:
 def _frames(messages: list[tuple[float, Message]], begin_s: float) -> Iterator[Chunk]:
     """A board's messages, each arriving at its time."""
     for k, (t_s, message) in enumerate(messages):
-        ticks = round(TICKS_S * (t_s - begin_s)) & 0xFFFF_FFFF
+        ticks = round(TICKS_PER_S * (t_s - begin_s)) & 0xFFFF_FFFF
         yield Chunk(BOARD, round(1e9 * (t_s - begin_s)), encode(message._replace(ticks=ticks), k))
 
 

@@ -26,7 +26,8 @@ from echostep.timing.arrival_envelope import CONFIRMING
 from echostep.timing.device_clock import DeviceClock
 from echostep.timing.sync_edges import SyncEdges
 
-TICK_S = 0.5e-6  # of the board's counter [protocol/messages.toml, ticks]
+TICKS_PER_S = 2_000_000  # of the board's counter [protocol/messages.toml, ticks]
+TICK_S = 1.0 / TICKS_PER_S
 BOARD_LATENCY_S = 0.001  # at best: a frame waits for the next USB millisecond
 MIN_STEP_S = 1e-6  # between two MTx samples: times must increase
 SILENT, PLAIN, FIRST_MESSAGE = -3, -2, -1  # kinds of board messages; a kind from 0 on is the count of a SyncOut edge

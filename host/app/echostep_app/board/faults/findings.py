@@ -15,8 +15,7 @@ from echostep.board.messages import (
     Status,
 )
 from echostep.board.reports import BoardReports
-
-TICK_S = 0.5e-6  # of the board's counter [protocol/messages.toml, ticks]
+from echostep.timing.timeline import TICK_S
 
 
 class Severity(IntEnum):
