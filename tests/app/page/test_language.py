@@ -33,6 +33,7 @@ from page.frames import scene, served
 from page.sentences import editor_texts, host_texts, page_texts
 from page.web.test_page_sizes import RATES, UNREACHED, moments
 from plan.imported_plans import seven_floors
+from waiting import until
 
 TABLE_READY = (
     "window.echostep?.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
@@ -75,6 +76,11 @@ CUES = (
     "No beacon hears you. Go back to the last known place",
     "You left the way: it is 12 metres off",
 )
+
+
+def settles(page: Any) -> bool:
+    """Whether nothing is cut once the page has laid itself out."""
+    return until(lambda: page.evaluate(CUT) == [])
 
 
 def catalogue(name: str) -> dict[str, Any]:
@@ -212,13 +218,13 @@ def test_nothing_is_cut_off_on_the_wearers_page(browser: Any, lang: str, tmp_pat
             mailbox.publish(moment)
             wait_for(page, f"echostep.last.t_s === {moment.t_s}")
             page.screenshot(path=tmp_path / f"{lang}-{k}.png")
-            assert page.evaluate(CUT) == [], moment.status_text
+            assert settles(page), (moment.status_text, page.evaluate(CUT))
             assert overflow(page) == (0, 0)
         assert violations(page) == []
         for button in ("#legend-button", "#tools-button"):
             page.click(button)
             page.screenshot(path=tmp_path / f"{lang}-{button[1:]}.png")
-            assert page.evaluate(CUT) == []
+            assert settles(page), page.evaluate(CUT)
             assert violations(page) == []
             page.keyboard.press("Escape")
         assert page.evaluate(UNREACHED) == []
@@ -256,7 +262,7 @@ def test_nothing_is_cut_off_on_the_commanders_page(browser: Any, lang: str, tmp_
 
         def check() -> None:
             page.screenshot(path=tmp_path / f"table-{lang}-{next(shots)}.png")
-            assert page.evaluate(CUT) == []
+            assert settles(page), page.evaluate(CUT)
             assert overflow(page) == (0, 0)
             assert violations(page) == []
 
@@ -292,7 +298,7 @@ def test_nothing_is_cut_off_in_the_editor(browser: Any, lang: str, tmp_path: Pat
 
         def check(*, axe: bool = True) -> None:
             page.screenshot(path=tmp_path / f"editor-{lang}-{next(shots)}.png")
-            assert page.evaluate(CUT) == [], status(page)
+            assert settles(page), (status(page), page.evaluate(CUT))
             assert overflow(page) == (0, 0)
             assert not axe or violations(page) == [], status(page)
 
