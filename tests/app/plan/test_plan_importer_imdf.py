@@ -226,6 +226,15 @@ def test_assumed_doors_pass_walls_drawn_with_a_thickness(tmp_path: Path) -> None
     assert [finding.kind for finding in check_plan(plan)] == []
 
 
+def test_an_opening_passes_both_faces_of_a_wall(tmp_path: Path) -> None:
+    tree = files(1)
+    hall, shop, *_ = tree["unit.geojson"]["features"]
+    hall["properties"]["category"], shop["geometry"] = "room", box(0, 5.15, 5, 8)
+    plan = import_plan(folder(tmp_path / "a", tree))
+    assert sorted(round(door.line[1], 2) for door in plan.levels[0].doors) == [5.0, 5.0, 5.15]
+    assert check_plan(plan) == []
+
+
 def test_an_opening_drawn_as_a_point_gets_the_width(tmp_path: Path) -> None:
     tree = without_openings(2)
     opening = feature(

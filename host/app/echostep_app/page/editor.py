@@ -66,7 +66,7 @@ class PlanFile:
     def read(self) -> tuple[str, str]:
         """The plan as JSON, and the SHA-256 of the file; an empty plan and `NO_FILE` without a file."""
         if not self.path.exists():
-            return plan_json(_empty(self.path.stem)), NO_FILE
+            return plan_json(Plan(self.path.stem, (Level("Ground floor", 0.0, np.zeros((0, 4))),), None, "")), NO_FILE
         plan = load_plan(self.path)
         return plan_json(plan), plan.digest
 
@@ -225,11 +225,6 @@ async def _body(request: Request) -> bytes | Response:
 
 def _error(status: int, reason: str) -> Response:
     return JSONResponse({"error": reason[:500]}, status)
-
-
-def _empty(name: str) -> Plan:
-    """A plan with one level without walls."""
-    return Plan(name, (Level("Ground floor", 0.0, np.zeros((0, 4))),), None, "")
 
 
 def _picture(path: Path) -> tuple[bytes, str]:

@@ -7,11 +7,11 @@ findings a person can answer, and how many are asked.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
 import shapely
 
 from echostep.plan import Level, Plan, Question
@@ -77,14 +77,10 @@ def _of_finding(finding: PlanFinding, level: Level) -> Iterator[Question]:
     elif finding.kind == "door":
         yield Question(f"{finding.text}: is it right?", "door", at, lines)
     elif finding.kind in ("open room", "unreachable"):
-        room = min(level.rooms, key=lambda one: _apart_m(one.at_m, lines[0][:2] if lines else at))
+        room = min(level.rooms, key=lambda one: math.dist(one.at_m, lines[0][:2] if lines else at))
         yield Question(f"{finding.text}: is it right?", "room", room.at_m)
     elif finding.kind == "no door":
         yield Question(f"{finding.text}: is it right?", "room", at)
-
-
-def _apart_m(one: tuple[float, float], other: tuple[float, float]) -> float:
-    return float(np.hypot(one[0] - other[0], one[1] - other[1]))
 
 
 def _of_widths(level: Level) -> Iterator[Question]:
