@@ -260,18 +260,6 @@ def test_the_import_says_that_there_are_no_doors(tmp_path: Path) -> None:
     assert "no door openings" not in done.stdout
 
 
-@pytest.mark.parametrize("name", ["plan.xml", "plan.osm"])
-def test_indoorgml_is_answered_with_what_to_export(tmp_path: Path, name: str) -> None:
-    (tmp_path / name).write_text(
-        '<?xml version="1.0"?><IndoorFeatures xmlns="http://www.opengis.net/indoorgml/1.0/core"/>'
-    )
-    with pytest.raises(
-        EchostepError,
-        match="<IndoorFeatures>, not <osm>: IndoorGML or CityGML is not read: export the building as IFC, IMDF or DXF",
-    ):
-        import_plan(tmp_path / name)
-
-
 def test_doors_are_for_imdf(tmp_path: Path) -> None:
     with pytest.raises(EchostepError, match="--doors is for IMDF alone"):
         import_plan(tmp_path / "plan.osm", Hints(doors_m=0.9))

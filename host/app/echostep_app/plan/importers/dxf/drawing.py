@@ -198,7 +198,8 @@ def _drawn_level(storey: _Storey, drawn: DrawnLevel, report: ImportReport) -> Dr
     drawn.doors, drawn.cuts = doors.doors, doors.cuts
     drawn.questions = [*doors.questions(), *_left_out_walls(storey)]
     drawn.walls, drawn.windows = [*storey.lines("walls", "columns"), *doors.jambs], list(storey.lines("windows"))
-    drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(_noded(storey.lines("obstacles")))))
+    obstacles = shapely.node(MultiLineString(storey.lines("obstacles")))
+    drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(shapely.get_parts(obstacles))))
     rooms = rooms_of(sheet.kinds["rooms"], storey.frame, sheet.file, report, storey.texts())
     drawn.rooms = [room for room in rooms if storey.holds(Point(room.at_m))]
     for kind, layer in (("stairs", "stairs"), ("lift", "lifts")):
@@ -319,7 +320,3 @@ def _parts(block: Any, file: Path, depth: int = DEEPEST_SYMBOL) -> list[Any]:
     deeper = [part for part in inner if part.dxftype() == "INSERT"] if depth else []
     own = [part for part in inner if part.dxftype() != "INSERT"]
     return own + [found for part in deeper for found in _parts(part, file, depth - 1)]
-
-
-def _noded(lines: list[LineString]) -> list[Any]:
-    return list(shapely.get_parts(shapely.node(MultiLineString(lines)))) if lines else []
