@@ -32,10 +32,6 @@ def imported(path: Path, **hints: object) -> tuple[Plan, ImportReport]:
     return import_plan(path, Hints(**hints), report=report), report  # type: ignore[arg-type]
 
 
-def doors_of(plan: Plan) -> list[int]:
-    return [len(level.doors) for level in plan.levels]
-
-
 @pytest.mark.parametrize(("crs", "lon", "lat", "east", "north"), [
     ("EPSG:4314", 13.4, 52.5, 13.39825048, 52.49859207), ("EPSG:4258", 13.4, 52.5, 13.4, 52.5), ("EPSG:4326", 13.4, 52.5, 13.4, 52.5),
 ])  # fmt: skip
@@ -132,7 +128,7 @@ def found() -> Path:
     ("stacked/stacked.osm", [2, 1, 1]), ("stacked/stacked.geojson", [2, 1, 1]), ("geom/out_geom.osm", [2, 2, 2]), ("josm-deleted/josm.osm", [0]),
 ])  # fmt: skip
 def test_doors_found(found: Path, name: str, doors: list[int]) -> None:
-    assert doors_of(imported(found / name)[0]) == doors
+    assert [len(level.doors) for level in imported(found / name)[0].levels] == doors
 
 
 @pytest.mark.parametrize(("name", "size", "walls"), [
