@@ -58,7 +58,8 @@ def test_gaps_are_judged() -> None:
     begin_s, end_s = 20.0, 50.0
     regular = [begin_s + 0.1 * k for k in range(round(10 * (end_s - begin_s)))]
     times_s = {name: [t for t in regular if not begin_s + 2.0 < t < begin_s + 5.0] for name in NORMAL_S}
-    dense = dict.fromkeys(("thigh", "calf", "belt", "sync", "foot"), _dense(begin_s, end_s))
+    often = [begin_s + 0.02 * k for k in range(round(50 * (end_s - begin_s)))]
+    dense = dict.fromkeys(("thigh", "calf", "belt", "sync", "foot"), often)
     outcome = FaultOutcome("x=y")
     judge_streams(outcome, times_s | dense, begin_s, end_s)
     assert set(outcome.silent_s) == {"left", "right", "pressure", "compass"}
@@ -100,7 +101,3 @@ def test_a_killed_run_is_started_again_while_the_mtx_is_unplugged(tmp_path: Path
     assert not second.own_damage.truncated
     assert set(outcome.silent_s) == set(NORMAL_S)
     assert outcome.wrongly_sure == 0
-
-
-def _dense(begin_s: float, end_s: float) -> list[float]:
-    return [begin_s + 0.02 * k for k in range(round(50 * (end_s - begin_s)))]

@@ -5,16 +5,21 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
+from echostep.errors import EchostepError
+from echostep.plan import load_plan
+from echostep_app.commissioning.calibrate import write_sections
+from echostep_app.page.editor import PlanFile
 from echostep_app.team.wearer_plan import _kept
 from echostep_studies.frame.runs import Journal
 from reliability import left_behind
 from reliability.campaign import CampaignJournal
-from reliability.left_behind import CASES, OWN, WAYS, run_again
+from reliability.left_behind import CASES, OWN, PLAN, WAYS, run_again
 
 DAMAGED = [b"", b"\0" * 40, b"\xff\x00[[[", b"[1]\n3\nnull\n", b'{"name": "a", "n": 1}\n{"name": "b", "n']
 
@@ -85,3 +90,24 @@ def test_a_teammates_drawing_that_a_power_failure_damaged_is_put_aside(tmp_path:
     assert _kept(b"drawing", "anna", tmp_path).read_bytes() == b"drawing"
     aside = path.with_name(f"{path.name}.damaged")
     assert aside.is_dir() if left is None else aside.read_bytes() == left
+
+
+def test_settings_that_cannot_be_written_whole_leave_those_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "s.toml"
+    write_sections(out, {"gyro": {"thigh_bias_rad_s": 0.01}})
+    before = out.read_text()
+    monkeypatch.setattr("os.fsync", mock.Mock(side_effect=OSError(28, "No space left on device")))
+    with pytest.raises(EchostepError, match=r"s\.toml: cannot write the settings: No space left"):
+        write_sections(out, {"gyro": {"thigh_bias_rad_s": 0.02}})
+    assert [path.read_text() for path in tmp_path.iterdir()] == [before]
+
+
+def test_a_folder_in_the_place_of_the_plan_before_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "plan.json"
+    path.write_bytes(PLAN.read_bytes())
+    path.with_suffix(".json.bak").mkdir()
+    with pytest.raises(EchostepError, match=r"plan\.json\.bak: cannot write the plan: Is a directory"):
+        PlanFile(path).write(replace(load_plan(path), name="Other"))
+    assert path.read_bytes() == PLAN.read_bytes()

@@ -12,8 +12,7 @@ import random
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -21,6 +20,7 @@ from pathlib import Path
 from board_runs import ROOT
 from command_line import echostep
 from places import OUT
+from players import pseudo_terminal
 from reliability.campaign import CampaignJournal, none, options, report
 
 PLAN, WALK = ROOT / "host/core/echostep/plans/demo.json", ROOT / "tests/captures/walk.mcap"
@@ -33,6 +33,21 @@ CASES = {  # by name: the file, what is in it, the command that meets it, whose 
     "recording, repaired": ("walk.mcap", WALK.read_bytes(), "repair walk.mcap -o whole.mcap", ""),
     "plan": ("plan.json", PLAN.read_bytes(), "plan check plan.json", ""),
     "settings": ("s.toml", b"[ranger]\nlearn = false\n", f"{REPLAY} --settings s.toml", ""),
+    "settings, calibrated": ("s.toml", b"[ranger]\nlearn = false\n", "calibrate gyros --board PORT --out s.toml", ""),
+    "plan in work": ("plan.json", PLAN.read_bytes(), "plan edit plan.json --headless", ""),
+    "truth": ("truth.csv", b"t_s,x_m,y_m\n1,1,0\n2,2,0\n", f"{REPLAY} --truth truth.csv", ""),
+    "key of a gateway": (
+        "key.hex",
+        b"0123456789abcdef" * 2,
+        f"{LIVE} 2,7.5,0 --beacons udp://127.0.0.1:0?key=key.hex",
+        "",
+    ),
+    "authority": (
+        "ca.pem",
+        b"-----BEGIN CERTIFICATE-----\nMIIB\n",
+        "command mqtts://[::1]:1?ca=ca.pem --plan plan.json --no-page --seconds 0.2",
+        "",
+    ),
     "track": ("track.csv", b"t_s,x_m\n1,2\n", REPLAY, RESULT),
     "last place": ("last.json", LAST, f"{LIVE} last", OWN),
     "last place, half written": ("last.new", LAST, f"{LIVE} 2,7.5,0", OWN),
@@ -56,21 +71,10 @@ class Ended:
     said: str = ""
 
 
-@contextmanager
-def closing_pty() -> Iterator[str]:
-    """A port from which nothing comes."""
-    ends = os.openpty()
-    try:
-        yield os.ttyname(ends[1])
-    finally:
-        for end in ends:
-            os.close(end)
-
-
 def run_again(case: tuple[str, bytes, str, str], damage: Callable[[Path], object]) -> Ended:
     """Put the file there, damage it, run the command."""
     name, content, command, whose = case
-    with tempfile.TemporaryDirectory() as folder, closing_pty() as port:
+    with tempfile.TemporaryDirectory() as folder, pseudo_terminal() as (_, port):
         for source, copy in ((PLAN, "plan.json"), (WALK, "walk.mcap")):
             shutil.copy(source, Path(folder, copy))
         path = Path(folder, name)

@@ -98,9 +98,12 @@ RENAMED = {("echo", "short"): "hidden"}  # fields of older recordings, by their 
 def read_settings(path: Path | str) -> str:
     """TOML text of a settings file; raises EchostepError that names the file."""
     try:
-        return Path(path).read_text(encoding="utf-8")
+        if text := Path(path).read_text(encoding="utf-8"):
+            return text
     except (OSError, UnicodeDecodeError) as error:
-        raise EchostepError(f"{path}: cannot read the settings: {error}") from error
+        why = getattr(error, "strerror", "not UTF-8")
+        raise EchostepError(f"{path}: cannot read the settings: {why}") from error
+    raise EchostepError(f"{path}: an empty file, as a power failure leaves one: calibrate again, or give no settings")
 
 
 def parse_settings(text: str, origin: str) -> Settings:

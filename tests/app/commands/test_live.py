@@ -13,6 +13,7 @@ import subprocess
 import time
 import tty
 from collections import Counter
+from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from echostep.plan import load_plan
 from echostep.recording import open_recording
 from echostep_app.ports.serial_ports import SerialPorts
 from echostep_app.session.last_place import read_kept
+from players import pseudo_terminal
 from waiting import PATIENCE_S, until
 
 PLAN = ROOT / "host/core/echostep/plans/demo.json"
@@ -266,14 +268,7 @@ def test_a_port_that_goes_away_is_opened_again(tmp_path: Path) -> None:
 
 
 def test_bytes_that_came_together_are_one_chunk() -> None:
-    ours, theirs = os.openpty()
-    tty.setraw(theirs)
-    ports = SerialPorts({"board": os.ttyname(theirs)}, {"board": 115200})
-    try:
+    with pseudo_terminal() as (ours, name), closing(SerialPorts({"board": name}, {"board": 115200})) as ports:
         os.write(ours, b"0123456789")
         chunks = (chunk for chunk in ports.chunks() if chunk is not None)
         assert next(chunks).data == b"0123456789"
-    finally:
-        ports.close()
-        os.close(ours)
-        os.close(theirs)

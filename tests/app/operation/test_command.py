@@ -33,10 +33,6 @@ def header_of(raw: bytes) -> dict[str, Any]:
     return made
 
 
-def socket_of(url: str) -> str:
-    return url.replace("http", "ws", 1) + "socket"
-
-
 @needs_broker
 def test_the_command_serves_what_a_tracker_reports(tmp_path: Path) -> None:
     with Broker(tmp_path) as broker:
@@ -77,7 +73,7 @@ def test_other_sites_cannot_open_the_socket_and_hostile_requests_do_nothing() ->
     with ServedTeam(whole_team()) as served:
         url = served.page.url
         with pytest.raises(InvalidStatus):
-            connect(socket_of(url), origin=Origin("http://evil.example")).__enter__()
+            connect(url.replace("http", "ws", 1) + "socket", origin=Origin("http://evil.example")).__enter__()
         with opened_url(url) as page:
             page.recv(PATIENCE_S)
             first = header_of(page.recv(PATIENCE_S))  # type: ignore[arg-type]

@@ -226,6 +226,15 @@ def test_assumed_doors_pass_walls_drawn_with_a_thickness(tmp_path: Path) -> None
     assert [finding.kind for finding in check_plan(plan)] == []
 
 
+def test_an_opening_passes_both_faces_of_a_wall(tmp_path: Path) -> None:
+    tree = files(1)
+    hall, shop, *_ = tree["unit.geojson"]["features"]
+    hall["properties"]["category"], shop["geometry"] = "room", box(0, 5.15, 5, 8)
+    plan = import_plan(folder(tmp_path / "a", tree))
+    assert sorted(round(door.line[1], 2) for door in plan.levels[0].doors) == [5.0, 5.0, 5.15]
+    assert check_plan(plan) == []
+
+
 def test_an_opening_drawn_as_a_point_gets_the_width(tmp_path: Path) -> None:
     tree = without_openings(2)
     opening = feature(
@@ -249,18 +258,6 @@ def test_the_import_says_that_there_are_no_doors(tmp_path: Path) -> None:
     done = command_line.echostep("plan", "import", source, "-o", out, "--doors", "0.9")
     assert "9 doors are assumed" in done.stdout
     assert "no door openings" not in done.stdout
-
-
-@pytest.mark.parametrize("name", ["plan.xml", "plan.osm"])
-def test_indoorgml_is_answered_with_what_to_export(tmp_path: Path, name: str) -> None:
-    (tmp_path / name).write_text(
-        '<?xml version="1.0"?><IndoorFeatures xmlns="http://www.opengis.net/indoorgml/1.0/core"/>'
-    )
-    with pytest.raises(
-        EchostepError,
-        match="<IndoorFeatures>, not <osm>: IndoorGML or CityGML is not read: export the building as IFC, IMDF or DXF",
-    ):
-        import_plan(tmp_path / name)
 
 
 def test_doors_are_for_imdf(tmp_path: Path) -> None:

@@ -31,12 +31,12 @@ def way(key: int, nodes: list[int], **tags: str) -> dict[str, Any]:
 
 HOUSE = [
     node(1, 0, 0), node(2, 10, 0), node(3, 10, 8), node(4, 0, 8),
-    node(5, 6, 0), node(6, 6, 8), node(7, 6, 4, door="yes", width="1.2"), node(8, 0, 4, entrance="main", level="0"),
+    node(5, 6, 0), node(6, 6, 8), node(7, 6, 4, door="yes", width="120 cm"), node(8, 0, 4, entrance="main", level="0"),
     node(9, 2, 2), node(10, 4, 2), node(11, 8, 6, highway="elevator", level="0;1"), node(12, 6, 3),
     way(20, [1, 5, 2, 3, 6, 4, 8, 1], building="yes", name="House"),
     way(21, [5, 2, 3, 6, 7, 12, 5], indoor="room", level="0-1", name="Hall"),
     way(22, [1, 5, 12, 7, 6, 4, 8, 1], indoor="corridor", level="0;1", name="Corridor"),
-    way(23, [9, 10], highway="steps", level="0;1", width="2"),
+    way(23, [9, 10], highway="steps", level="0;1", width="2,0"),
 ]  # fmt: skip
 
 
@@ -96,6 +96,7 @@ def test_multipolygons_glass_and_locked_doors(tmp_path: Path) -> None:
         ({"level": "0"}, [0]),
         ({"level": "1;0"}, [0, 1]),
         ({"level": "-2--1"}, [-2, -1]),
+        ({"level": "\u22122"}, [-2]),
         ({"level": "-1-1"}, [-1, 0, 1]),
         ({"level": "0.5"}, [0.5]),
         ({"level": "0", "repeat_on": "2-3"}, [0, 2, 3]),
@@ -176,7 +177,7 @@ def test_geojson_of_overpass_turbo(tmp_path: Path, name: str) -> None:
             ("Point", [8.0001, 50.0], {"door": "yes", "level": "0"}),
             ("Point", [8.00005, 50.00005], {"door": "yes", "level": "0"}),
             ("LineString", [[8.0001, 50.0], [8.0002, 50.0]], {"indoor": "wall", "level": "0"}),
-            ("MultiPolygon", [[RING]], {"indoor": "room", "level": "1", "name": "Room 2"}),
+            ("MultiPolygon", [[RING[:-1]]], {"indoor": "room", "level": "1", "name": "Room 2"}),
         )
     )
     report = ImportReport()

@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw
 import command_line
 from echostep.errors import EchostepError
 from echostep.plan import load_plan
-from echostep_app.plan.importers.formats import NEXT_STEPS, PICTURES, import_plan
+from echostep_app.plan.importers.formats import PICTURES, import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.raster.picture import threshold
 from echostep_app.plan.importers.report import ImportReport
@@ -93,16 +93,3 @@ def test_the_threshold_lies_between_ink_and_paper() -> None:
         values = np.full((50, 50), float(paper))
         values[:10] = ink
         assert ink <= threshold(values) < paper
-
-
-@pytest.mark.parametrize(
-    ("suffix", "step"),
-    [
-        (".pdf", "pdftoppm -png -r 150 FILE page"),
-        (".dwg", "DWG: save it as DXF"),
-        (".svg", "SVG: save it as DXF"),
-        (".gml", "IndoorGML or CityGML is not read: export the building as IFC, IMDF or DXF"),
-    ],
-)
-def test_what_is_not_read_has_a_next_step(suffix: str, step: str) -> None:
-    assert step in NEXT_STEPS[suffix]

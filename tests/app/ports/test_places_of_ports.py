@@ -5,9 +5,6 @@ from __future__ import annotations
 
 import os
 import socket
-import tty
-from collections.abc import Iterator
-from contextlib import contextmanager
 from types import SimpleNamespace
 
 import pytest
@@ -16,19 +13,8 @@ from serial.tools import list_ports
 from echostep.errors import EchostepError
 from echostep_app.ports.serial_ports import SerialPorts
 from echostep_app.ports.usb_number import port_of_number, usb_number
+from players import pseudo_terminal
 from waiting import PATIENCE_S, until
-
-
-@contextmanager
-def terminal() -> Iterator[tuple[int, str]]:
-    """The device's end of a pseudo terminal, and the port's name."""
-    ours, theirs = os.openpty()
-    tty.setraw(theirs)
-    try:
-        yield ours, os.ttyname(theirs)
-    finally:
-        for end in (ours, theirs):
-            os.close(end)
 
 
 def plugged(monkeypatch: pytest.MonkeyPatch, **numbers: str) -> None:
@@ -45,7 +31,7 @@ def test_a_number_that_two_devices_share_tells_nothing(monkeypatch: pytest.Monke
 
 
 def test_a_device_under_a_new_name_is_found_by_its_number(monkeypatch: pytest.MonkeyPatch) -> None:
-    with terminal() as (board, was), terminal() as (again, now), terminal() as (stranger, other):
+    with pseudo_terminal() as (board, was), pseudo_terminal() as (again, now), pseudo_terminal() as (stranger, other):
         plugged(monkeypatch, **{was.replace("/", "_"): "7"})
         ports = SerialPorts({"board": was}, {"board": 115200})
         try:

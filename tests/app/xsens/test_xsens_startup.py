@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from echostep.recording import open_recording
 from echostep.xsens import PROJECT, MtxReader, OutputFormat
 from echostep_app.xsens.startup import MtxStart
 from echostep_studies.simulation.devices.mtx_setup import FACTORY, MtxDevice
+from players import pseudo_terminal
 from waiting import PATIENCE_S
 from xsens.mt_lines import on_a_terminal
 
@@ -26,12 +26,8 @@ PLAN = ROOT / "host/core/echostep/plans/demo.json"
 @contextlib.contextmanager
 def mute_port() -> Iterator[str]:
     """A board that says nothing."""
-    ours, theirs = os.openpty()
-    try:
-        yield os.ttyname(theirs)
-    finally:
-        os.close(ours)
-        os.close(theirs)
+    with pseudo_terminal() as (_, port):
+        yield port
 
 
 @pytest.mark.parametrize("output", [FACTORY, PROJECT])

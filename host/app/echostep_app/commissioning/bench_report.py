@@ -20,6 +20,7 @@ from echostep_app.board.faults.findings import Finding, Severity
 from echostep_app.commissioning.diagnosis import Diagnosis
 from echostep_app.commissioning.doctor import examine
 from echostep_app.commissioning.probe import ProbeResult
+from echostep_app.printing.lines import as_error
 
 MEASUREMENTS = (  # the headings of firmware/bench.md
     "Serial number",
@@ -45,10 +46,8 @@ def write(board: str | None, foot: str | None, seconds: float, out: Path, schedu
     report = examine(board, None, seconds, foot, electrical=True, schedule=schedule)
     if not report.probed:
         raise EchostepError(str(report.findings[0]) if report.findings else "no board has answered")
-    try:
+    with as_error(f"cannot write {out}"):
         out.write_text("\n".join(text(report)) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise EchostepError(f"cannot write {out}: {error.strerror}") from None
     return f"{out}: fill in the lines of the measurements (firmware/bench.md) and send it in"
 
 

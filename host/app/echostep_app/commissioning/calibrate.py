@@ -29,6 +29,7 @@ from echostep_app.commissioning.poses import described, measure_poses
 from echostep_app.commissioning.probe import ProbeResult, probe
 from echostep_app.commissioning.serial_ports import access_findings, find_boards, list_seen
 from echostep_app.offline.leg_lengths import checked_lengths
+from echostep_app.printing.lines import as_error, write_whole
 
 STILL_S, TURN_S, WALK_S = 10.0, 20.0, 20.0  # duration of each measurement
 POSE_S = 3.0  # of a board in each pose: a second passes before it sends all axes, the mean of 200 samples is known to 0.003 m/s2
@@ -202,8 +203,6 @@ def write_sections(out: Path, sections: Sections, notes: Sequence[str] = ()) -> 
     """Write a settings file; raises EchostepError for values that no settings can have, and for a file that cannot be written."""
     text = _text(sections, notes)
     parse_settings(text, str(out))
-    try:
+    with as_error(f"{out}: cannot write the settings"):
         out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise EchostepError(f"{out}: cannot write the settings: {error.strerror}") from error
+        write_whole(out, text.encode())

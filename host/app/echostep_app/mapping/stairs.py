@@ -66,7 +66,8 @@ def with_wells(level: Level, index: int, wells: list[Well]) -> Level:
         if index not in well.levels:
             continue
         outside, doubtful = (_outside(walls, well) for walls in (level.walls, level.doubtful))
-        doors = [door for door in level.doors if not _line_of(door).intersects(well.area)]
+        lines = shapely.linestrings(np.array([door.line for door in level.doors]).reshape(-1, 2, 2))
+        doors = [door for door, line in zip(level.doors, lines, strict=True) if not line.intersects(well.area)]
         rim, ways = _rim(well, index)
         doors += [Door((float(a), float(b), float(c), float(d)), "open") for a, b, c, d in ways]
         walls = np.concatenate([outside, np.array(rim).reshape(-1, 4)])
@@ -79,10 +80,6 @@ def _outside(walls: Floats, well: Well) -> Floats:
     lines = shapely.difference(shapely.linestrings(walls.reshape(-1, 2, 2)), well.area.buffer(CLEAR_M))
     parts = [part for part in shapely.get_parts(lines) if part.length > LEAST_M]
     return np.array([np.array(part.coords).ravel() for part in parts]).reshape(-1, 4)
-
-
-def _line_of(door: Door) -> shapely.LineString:
-    return shapely.LineString((door.line[:2], door.line[2:]))
 
 
 def _rim(well: Well, index: int) -> tuple[list[Floats], list[Floats]]:

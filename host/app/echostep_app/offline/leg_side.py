@@ -61,7 +61,10 @@ def leg_left_m(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> flo
 
     `heading` (n,): of the trunk at `t_s` (n,), rad, positive to the left. The odds follow from two normal distributions about +-TWIST_RAD.
     """
-    twists = np.array([_twist(stride, t_s, heading) for stride in strides if _shows(stride)])
+    seen = [
+        s for s in strides if s.length_m > LEAST_STRIDE_M and not s.flags & (Flag.EDGE | Flag.GAP)
+    ]  # the pelvis turns visibly
+    twists = np.array([_twist(stride, t_s, heading) for stride in seen])
     twists = twists[np.isfinite(twists)]
     if not len(twists):
         return 0.0
@@ -69,11 +72,6 @@ def leg_left_m(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> flo
     stride_variance = (STRIDE_SD_RAD**2 + float(((twists - mean) ** 2).sum())) / len(twists)
     variance = PERSON_SD_RAD**2 + stride_variance / len(twists)
     return -HALF_PELVIS_M * math.tanh(TWIST_RAD * mean / variance)
-
-
-def _shows(stride: Stride) -> bool:
-    """Whether the pelvis turns visibly in a stride."""
-    return stride.length_m > LEAST_STRIDE_M and not stride.flags & (Flag.EDGE | Flag.GAP)
 
 
 def _twist(stride: Stride, t_s: Floats, heading: Floats) -> float:

@@ -9,11 +9,11 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-from echostep.errors import EchostepError
 from echostep.file_mode import claim
 from echostep.legs.stride import Flag
 from echostep_app.offline.leg_side import distance_sd_m
 from echostep_app.offline.leg_track import LegTrack
+from echostep_app.printing.lines import as_error
 
 TRACK_COLUMNS = ("t_s", "distance_m", "speed_m_s", "heading_rad", "x", "y")
 PARTIAL = Flag.EDGE | Flag.STANDING | Flag.UNSEEN | Flag.BACKWARD | Flag.GAP  # not a whole stride of known length
@@ -26,13 +26,13 @@ FLAG_WORDS = {
 
 def write_leg_track(path: Path | str, track: LegTrack) -> None:
     """`TRACK_COLUMNS`, a row a sample (the paper's: ten a second); raises EchostepError when the file cannot be written."""
-    try:
-        with claim(Path(path)).open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(TRACK_COLUMNS)
-            writer.writerows([f"{v:.6f}" for v in row] for row in track.rows.tolist())
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the track: {error.strerror}") from error
+    with (
+        as_error(f"{path}: cannot write the track"),
+        claim(Path(path)).open("w", encoding="utf-8", newline="") as file,
+    ):
+        writer = csv.writer(file)
+        writer.writerow(TRACK_COLUMNS)
+        writer.writerows([f"{v:.6f}" for v in row] for row in track.rows.tolist())
 
 
 def describe_legs(track: LegTrack) -> str:

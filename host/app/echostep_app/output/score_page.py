@@ -62,7 +62,10 @@ def short_names(paths: Sequence[Path]) -> list[str]:
 
 def page(report: ScoreReport) -> str:
     """The page as HTML."""
-    parts = [*(f'<p class="note">{escape(line)}</p>' for line in _notes(report)), _table(report)]
+    parts = [
+        *(f'<p class="note">{escape(line)}</p>' for one in report.scored for line in notes(one.card)),
+        _table(report),
+    ]
     parts += ["<h2>Distribution of the errors</h2>"]
     parts.append(picture(draw_distribution(report.scored, report.names), "Share of the points below each error.", ""))
     for one, name in zip(report.scored, report.names, strict=True):
@@ -90,10 +93,6 @@ def document(title: str, parts: Sequence[str]) -> str:
         f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{escape(title)}</title>'
         f"<style>{STYLE}</style></head>\n<body><main>\n{body}\n</main></body>\n</html>\n"
     )
-
-
-def _notes(report: ScoreReport) -> list[str]:
-    return [line for one in report.scored for line in notes(one.card)]
 
 
 def _table(report: ScoreReport) -> str:

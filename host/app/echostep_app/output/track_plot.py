@@ -71,7 +71,7 @@ def _draw_level(axes: Axes, level: Level, estimates: Sequence[Estimate], truth_m
         axes.text(*room.at_m, room.name, ha="center", va="center", color="#888888", fontsize=8, parse_math=False)
     if truth_m is not None:
         axes.plot(*truth_m.T, color=TRUTH_COLOUR, linewidth=4, alpha=0.45, label="truth")
-    for e in _evenly_spaced(estimates, MAX_ELLIPSES):
+    for e in estimates[:: max(1, len(estimates) // MAX_ELLIPSES)]:
         ellipse = e.ellipse95
         patch = Patch(
             (e.x_m, e.y_m),
@@ -119,8 +119,3 @@ def _height(level: Level) -> float:
         return 6.5
     width, height = np.ptp(level.solid.reshape(-1, 2), axis=0)
     return float(np.clip(1.0 + 9.2 * height / max(width, 1e-9), 4.0, 12.0))
-
-
-def _evenly_spaced(estimates: Sequence[Estimate], most: int) -> Sequence[Estimate]:
-    """About `most` of the estimates, evenly spaced."""
-    return estimates[:: max(1, len(estimates) // most)]

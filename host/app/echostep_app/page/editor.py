@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
-import os
 import secrets
-import shutil
 import sys
 import threading
 from collections.abc import Callable
@@ -37,7 +35,7 @@ from echostep_app.page.web.gated_server import GatedServer
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.two_points import parse_two_points
 from echostep_app.plan.writer import georeference_fields, plan_json
-from echostep_app.printing.lines import say
+from echostep_app.printing.lines import as_error, say, write_whole
 
 PAGE = Path(__file__).parent / "edit"
 # Files of the live page
@@ -68,7 +66,7 @@ class PlanFile:
     def read(self) -> tuple[str, str]:
         """The plan as JSON, and the SHA-256 of the file; an empty plan and `NO_FILE` without a file."""
         if not self.path.exists():
-            return plan_json(_empty(self.path.stem)), NO_FILE
+            return plan_json(Plan(self.path.stem, (Level("Ground floor", 0.0, np.zeros((0, 4))),), None, "")), NO_FILE
         plan = load_plan(self.path)
         return plan_json(plan), plan.digest
 
@@ -78,11 +76,13 @@ class PlanFile:
         try:
             previous = self.path.read_bytes() if self.path.exists() else None
             if previous is not None and previous != raw:
-                self._replace(self.path.with_name(self.path.name + ".bak"), previous)
+                write_whole(self.path.with_name(self.path.name + ".bak"), previous)
             if previous != raw:
-                self._replace(self.path, raw)
+                write_whole(self.path, raw)
         except OSError as error:
-            raise EchostepError(f"{self.path}: cannot write the plan: {error.strerror or error}") from error
+            raise EchostepError(
+                f"{error.filename2 or self.path}: cannot write the plan: {error.strerror or error}"
+            ) from error
         return hashlib.sha256(raw).hexdigest()
 
     def state(self) -> str:
@@ -93,20 +93,6 @@ class PlanFile:
             return NO_FILE
         except OSError as error:
             raise EchostepError(f"{self.path}: cannot read the plan: {error.strerror or error}") from error
-
-    def _replace(self, path: Path, raw: bytes) -> None:
-        """Write a temporary file in the same folder, sync it to the disk, and rename it to `path`."""
-        new = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
-        try:
-            with new.open("xb") as file:
-                file.write(raw)
-                file.flush()
-                os.fsync(file.fileno())
-            if self.path.exists():
-                shutil.copymode(self.path, new)
-            new.replace(path)
-        finally:
-            new.unlink(missing_ok=True)
 
 
 class EditServer:
@@ -241,19 +227,12 @@ def _error(status: int, reason: str) -> Response:
     return JSONResponse({"error": reason[:500]}, status)
 
 
-def _empty(name: str) -> Plan:
-    """A plan with one level without walls."""
-    return Plan(name, (Level("Ground floor", 0.0, np.zeros((0, 4))),), None, "")
-
-
 def _picture(path: Path) -> tuple[bytes, str]:
     """Bytes and media type of a picture: PNG, JPEG or SVG, recognised by the file's contents."""
-    try:
+    with as_error(f"{path}: cannot read the picture"):
         if path.stat().st_size > MOST_PICTURE:
             raise EchostepError(f"{path}: larger than {MOST_PICTURE // 1_000_000} MB: make the picture smaller")
         raw = path.read_bytes()
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot read the picture: {error.strerror or error}") from error
     if raw.startswith(b"\x89PNG\r\n\x1a\n"):
         return raw, "image/png"
     if raw.startswith(b"\xff\xd8\xff"):

@@ -7,11 +7,11 @@ findings a person can answer, and how many are asked.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
 import shapely
 
 from echostep.plan import Level, Plan, Question
@@ -23,6 +23,7 @@ from echostep_app.plan.places.spaces import find_spaces
 DOORS_M = (0.6, 3.0)  # widths between which nobody asks; assumed: DIN 18040 has 0.8 m and more, closets less
 MOST_WALLS = 50_000  # of a plan that is checked at an import: a few seconds
 SAME_WALL_M = 0.65  # gaps with nearer middles are both faces of one wall; assumed
+MARK_M = 0.1
 MOST_ALIKE = 5  # on a level; more get one answer
 DETAIL = re.compile(r"'[^']*'|\d+([.]\d+)?")
 MOST_QUESTIONS = 60  # of a level: more take longer than two minutes
@@ -47,19 +48,21 @@ def _once(questions: list[Question]) -> tuple[Question, ...]:
     for question in reversed(by_element.values()):
         by_text.setdefault((DETAIL.sub("", question.text), question.is_proposed), []).append(question)
     groups = [
-        _together(group) if len(group) > MOST_ALIKE and all(q.lines_m for q in group) else group
+        _together(group) if len(group) > MOST_ALIKE and all(q.lines_m or q.about == "room" for q in group) else group
         for group in by_text.values()
     ]
     return tuple(question for group in groups for question in group)[:MOST_QUESTIONS]
 
 
 def _together(group: list[Question]) -> list[Question]:
-    """One question for all alike: the answer is for each of them."""
+    """One question for all alike: the answer is for each of them. That of a room is a short line which begins at its place."""
     return [
         replace(
             group[0],
             text=f"{len(group)} alike: {group[0].text}",
-            lines_m=tuple(line for one in group for line in one.lines_m),
+            lines_m=tuple(
+                line for one in group for line in one.lines_m or [(*one.at_m, one.at_m[0] + MARK_M, one.at_m[1])]
+            ),
         )
     ]
 
@@ -77,14 +80,10 @@ def _of_finding(finding: PlanFinding, level: Level) -> Iterator[Question]:
     elif finding.kind == "door":
         yield Question(f"{finding.text}: is it right?", "door", at, lines)
     elif finding.kind in ("open room", "unreachable"):
-        room = min(level.rooms, key=lambda one: _apart_m(one.at_m, lines[0][:2] if lines else at))
+        room = min(level.rooms, key=lambda one: math.dist(one.at_m, lines[0][:2] if lines else at))
         yield Question(f"{finding.text}: is it right?", "room", room.at_m)
     elif finding.kind == "no door":
         yield Question(f"{finding.text}: is it right?", "room", at)
-
-
-def _apart_m(one: tuple[float, float], other: tuple[float, float]) -> float:
-    return float(np.hypot(one[0] - other[0], one[1] - other[1]))
 
 
 def _of_widths(level: Level) -> Iterator[Question]:

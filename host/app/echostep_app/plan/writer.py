@@ -12,17 +12,15 @@ import re
 from pathlib import Path
 from typing import Any
 
-from echostep.errors import EchostepError
 from echostep.fields import UNWRITABLE
 from echostep.plan import FORMAT_VERSION, Connector, Door, Georeference, Level, Plan, Pose, Question, Room
+from echostep_app.printing.lines import as_error
 
 
 def save_plan(plan: Plan, path: Path | str) -> None:
     """Write a plan; `load_plan` reads back an equal plan with another digest. Raises EchostepError when the file cannot be written."""
-    try:
+    with as_error(f"{path}: cannot write the plan"):
         Path(path).write_text(plan_json(plan), encoding="utf-8")
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the plan: {error.strerror or error}") from error
 
 
 def plan_json(plan: Plan) -> str:

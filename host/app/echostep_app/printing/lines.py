@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
+import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -57,3 +59,19 @@ def put_aside(path: Path, remedy: str) -> None:
     with as_error(f"{path}: is damaged, and cannot be renamed"):
         path.rename(aside)
     complain(f"echostep: {path}: is damaged, as after a power failure: kept as {aside.name}; {remedy}")
+
+
+def write_whole(path: Path, raw: bytes) -> None:
+    """Write a file in one step: whatever ends the program, the old one is there, or the new one. Raises OSError."""
+    path = path.resolve()
+    new = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    try:
+        with new.open("xb") as file:
+            file.write(raw)
+            file.flush()
+            os.fsync(file.fileno())
+        if path.exists():
+            shutil.copymode(path, new)
+        new.replace(path)
+    finally:
+        new.unlink(missing_ok=True)

@@ -106,7 +106,7 @@ def load_path(path: Path, plan: Plan | None) -> ScoredPath:
     covariance = np.column_stack([m for m in moments if m is not None]) if all(m is not None for m in moments) else None
     radius = optional("radius95")
     if radius is None and covariance is not None:
-        radius = _radius95(covariance)
+        radius = np.array([ellipse95(*row).major_m for row in covariance.tolist()])
     lost = np.array([s.lower() == "lost" for s in table.texts(columns["status"])]) if "status" in columns else None
     return ScoredPath(
         path, t_s, xy_m,
@@ -159,8 +159,3 @@ def _level(table: CsvColumns, row: int, name: str, text: str, index_of: Callable
     if value != round(value) or abs(value) > 1000:
         raise table.error(row, name, f"{text[:40]!r} is not a whole number of a floor")
     return value
-
-
-def _radius95(covariance_m2: Floats) -> Floats:
-    """Longer half axis (m) of the 95 % ellipse of covariances (n, 3)."""
-    return np.array([ellipse95(*row).major_m for row in covariance_m2.tolist()])

@@ -17,6 +17,7 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization import Estimate
 from echostep.offline.csv_table import GREATEST
+from echostep_app.printing.lines import as_error
 from echostep_app.scorecard.error_statistics import error_statistics
 
 NEARBY_S = 2.5  # estimates come at each step, and twice a second while standing
@@ -60,12 +61,12 @@ class Errors:
 def load_truth(path: Path | str) -> Truth:
     """Truth from a CSV file; raises EchostepError that names the file."""
     try:
-        with warnings.catch_warnings(action="ignore"):  # of a file without rows: reported below
+        # Warnings of a file without rows: reported below
+        with as_error(f"{path}: cannot read the truth"), warnings.catch_warnings(action="ignore"):
             table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot read the truth: {error}") from error
     except ValueError as error:
-        raise EchostepError(f"{path}: not a truth file (t_s,x,y,...): {error}") from error
+        why = "no text" if isinstance(error, UnicodeError) else error
+        raise EchostepError(f"{path}: not a truth file (t_s,x,y,...): {why}") from error
     if table.shape[1] < 3 or not len(table) or not (np.abs(table) <= GREATEST).all():
         raise EchostepError(
             f"{path}: not a truth file: rows of t_s,x,y[,heading_rad] expected, numbers up to {GREATEST:g}"

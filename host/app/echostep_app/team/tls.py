@@ -144,7 +144,7 @@ def _content(endpoint: Endpoint, name: str) -> bytes:
 def _file_words(error: Exception) -> str:
     """Why files do not make a context."""
     if isinstance(error, ssl.SSLError):
-        reason = error.reason or str(error).partition(" (_ssl")[0].removeprefix("[SSL] ")
+        reason = error.reason or str(error).partition(" (_ssl")[0].rpartition("] ")[2]
         return WORDS.get(reason.replace(" ", "_").upper(), reason)
     return str(error)
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from ezdxf.filemanagement import new
 
-from echostep.plan import Level, Plan, Room, load_plan
+from echostep.plan import Door, Level, Plan, Room, load_plan
 from echostep_app.page.editor import EditServer
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers.formats import import_plan
@@ -101,6 +101,27 @@ def test_an_import_asks_about_what_is_doubtful(doubtful: Plan) -> None:
     assert questions == [("door", True), ("wall", True), ("wall", True), ("door", False)], texts
     for words, text in zip(("in no wall", "layer X-NEW", "0.040 m apart", "0.50 m wide"), texts, strict=True):
         assert words in text
+
+
+def test_rooms_alike_are_one_question(browser: Any, tmp_path: Path) -> None:
+    """Seven names beside the house, as of a table of its rooms."""
+    walls = np.array([[0, 0, 16, 0], [17, 0, 20, 0], [20, 0, 20, 8], [20, 8, 0, 8], [0, 8, 0, 0]], dtype=float)
+    rooms = [Room(f"R{k}", (2.0 * k, -3.0)) for k in range(7)]
+    level = Level("G", 0.0, walls, (*rooms, Room("Hall", (10.0, 5.0))), (Door((16.0, 0.0, 17.0, 0.0)),))
+    plan = with_questions(Plan("house", (level,), None, ""))
+    (question,) = plan.levels[0].questions
+    assert question.text.startswith("7 alike: room 'R0' ")
+    save_plan(plan, tmp_path / "plan.json")
+    with EditServer(tmp_path / "plan.json", port=0) as server:
+        page = opened(browser, server)
+        asks(page, "1 of 1: 7 alike")
+        page.click("#answer-no")
+        page.locator("#questions").wait_for(state="hidden")
+        page.click("#save")
+        page.get_by_text("Saved plan.json").wait_for()
+        assert not page.wrong
+        page.context.close()
+    assert [room.name for room in load_plan(tmp_path / "plan.json").levels[0].rooms] == ["Hall"]
 
 
 def asks(page: Any, words: str) -> None:

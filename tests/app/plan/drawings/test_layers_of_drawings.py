@@ -229,15 +229,16 @@ def test_a_reference_that_is_not_in_the_file_is_named(tmp_path: Path) -> None:
 
 
 def test_outlines_of_rooms(tmp_path: Path) -> None:
-    """An outline takes the texts inside it; without a text it is numbered; small ones are symbols and counted."""
+    """An outline takes the texts inside it, each once, but no sizes; without a text it is numbered; small ones are symbols and counted."""
     doc, space = sheet()
     house(space)
     for box in ((0.3, 0.3, 4, 7.7), (4.1, 0.3, 9.7, 7.7), (5, 5, 5.5, 5.5)):
         space.add_lwpolyline(corners(box), close=True, dxfattribs={"layer": "Rooms"})
-    space.add_text("Hall", dxfattribs={"layer": "Rooms", "insert": (1, 1), "height": 0.3})
+    for text in ("%%uHall", "%%uHall", "23,40 m2", "H=2.70"):
+        space.add_text(text, dxfattribs={"layer": "Rooms", "insert": (1, 1), "height": 0.3})
     space.add_text("Outside", dxfattribs={"layer": "Rooms", "insert": (20, 1), "height": 0.3})
     plan, report = imported(doc, tmp_path)
     assert [(room.name, room.outline_m is not None) for room in plan.levels[0].rooms] == [
         ("Outside", False), ("Hall", True), ("room 2", True)
     ]  # fmt: skip
-    assert report.left_out == {"LWPOLYLINE on Rooms": 1}
+    assert report.left_out == {"LWPOLYLINE on Rooms": 1, "TEXT on Rooms": 2}

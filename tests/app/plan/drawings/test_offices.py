@@ -49,21 +49,9 @@ def test_doors_of_all_habits(tmp_path: Path, door: Doors, turn: float) -> None:
     assert is_right(plan), facts(plan)
 
 
-@pytest.mark.parametrize(
-    "layers", [("AR_Innenwände", "AR_Türen"), ("CLOISONS", "PORTES"), ("墙体", "门窗"), ("A-WALL", "A-WALL")]
-)
-def test_layers_of_doors(tmp_path: Path, layers: tuple[str, str]) -> None:
-    """门窗 holds doors and windows; A-WALL both walls and doors."""
-    plan = import_plan(write_office(tmp_path / "a.dxf", layers=layers))
+def test_what_stands_beside_the_walls(tmp_path: Path) -> None:
+    plan = import_plan(write_office(tmp_path / "a.dxf", extra=drawn.furnished))
     assert is_right(plan), facts(plan)
-
-
-def test_a_mirrored_block_and_what_stands_beside_the_walls(tmp_path: Path) -> None:
-    for plan in (
-        import_plan(write_office(tmp_path / "a.dxf", mirrored=True)),
-        import_plan(write_office(tmp_path / "b.dxf", extra=drawn.furnished)),
-    ):
-        assert is_right(plan), facts(plan)
 
 
 def test_rooms_behind_gaps_are_asked_about_at_once(tmp_path: Path) -> None:

@@ -281,6 +281,8 @@ DRAWN = [
     *(Cell("dxf", "hidden", drawn(change=partial(dxf.blocked, clip=True)), move, right=THICK) for move in (STAY, *FAR)),
     *cells("dxf", "packed", drawn(fmt="bin"), *(drawn(change=partial(dxf.blocked, **about)) for about in IN_BLOCKS), right=THICK),
     *cells("dxf", "own layers", drawn(change=dxf.exits), drawn(layers=("walls", "doors")), drawn(layers=("A-WALL", "A-WALL")), right=THICK),
+    *cells("dxf", "own layers", *(drawn(layers=pair) for pair in (("AR_Innenwände", "AR_Türen"), ("墙体", "门窗"))), right=THICK),
+    *cells("dxf", "copied storeys", dxf.files, asks="names the storeys are EG, 1. OG, 2. OG from the lowest", level_names=("1. OG", "2. OG", "EG")),
     *cells("dxf", "own layers", drawn(layers=("0", "0")), asks="--layer walls=0"),
     *cells("dxf", "spellings", *(drawn(names=layer) for layer in ("0", "TEXT", "A-ANNO-NOTE")), right=THICK),
 ]  # fmt: skip
@@ -292,6 +294,12 @@ MODELS = [
     *cells("ifc", "units", *(partial(model.write, units=name) for name in ("FEET", "INCHES", "METERS")), right=SOLID),
     *cells("ifc", "spellings", partial(model.write, schema="IFC2X3"), partial(model.write, z=312.4), right=SOLID),
     *cells("ifc", "far", partial(model.write, change=model.storeys_anywhere), right=SOLID),
+    *cells(
+        "ifc",
+        "datum",
+        partial(model.write, change=lambda made: made.file.create_entity("IfcProjectedCRS", "A")),
+        asks="map conversion",
+    ),
     *cells("ifc", "thick walls", partial(model.write, thick=0.6), right=Right(0.6)),
 ]
 

@@ -34,17 +34,12 @@ def walk(lengths: str = CORRIDOR, *, twin: bool = False) -> tuple[Protocol, tupl
         board.send(encode(Identify(), 0))
     scenario = Scenario(plan, waypoints(protocol.points, visits, plan), 3, board, WEARER)
     taps = tuple(
-        tap_chunk(START_NS + round(t_s * 1e9), Tap(visit.point, visit.standing, START_NS + round(t_s * 1e9)))
+        Chunk(POINT, t_ns := START_NS + round(t_s * 1e9), Tap(visit.point, visit.standing, t_ns).encode())
         for t_s, visit in zip(times_s(scenario.walk, protocol.points, visits), visits, strict=True)
     )
     chunks = tuple(scenario.chunks())
     scenario.close()
     return protocol, chunks, taps
-
-
-def tap_chunk(t_arrival_ns: int, tap: Tap) -> Chunk:
-    """A tap as a chunk."""
-    return Chunk(POINT, t_arrival_ns, tap.encode())
 
 
 def record(

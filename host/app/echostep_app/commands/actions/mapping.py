@@ -158,10 +158,11 @@ def described(mapped: Mapped, plan: Plan) -> list[str]:
     walls = np.concatenate([level.heard for level in plan.levels])
     doors = [door for level in plan.levels for door in level.doors]
     length_m = _length_m(walls)
+    walked_m = sum(np.hypot(*np.diff(path, axis=0).T).sum() for path in mapped.graph.paths())
     opened = sum(door.state == "open" for door in doors)
     lines = [
         f"{len(walls)} walls, {length_m:.0f} m, to {100.0 * (plan.uncertainty_m or 0.0):.0f} cm (1 sd) beside the path of"
-        f" {_walked_m(mapped):.0f} m; {len(doors)} openings, {opened} walked through"
+        f" {walked_m:.0f} m; {len(doors)} openings, {opened} walked through"
     ]
     places = np.concatenate([level.place_sd[:, 2] for level in plan.levels])
     if len(places):
@@ -190,11 +191,6 @@ def described(mapped: Mapped, plan: Plan) -> list[str]:
 def _length_m(walls: Floats) -> float:
     """Length of segments (n, 4)."""
     return float(np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum())
-
-
-def _walked_m(mapped: Mapped) -> float:
-    """Length of all paths."""
-    return float(sum(np.hypot(*np.diff(path, axis=0).T).sum() for path in mapped.graph.paths()))
 
 
 def _join_line(join: Join) -> str:

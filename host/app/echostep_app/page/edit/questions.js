@@ -8,11 +8,11 @@ const WALL_REACH_M = 1; // a door is put into a wall that is nearer than this
 
 const alike = (a, b) => ends(a).every((end, k) => same(end, ends(b)[k]));
 const doorOf = (level, { lines }) => (level.doors ?? []).findIndex((door) => lines.some((line) => alike(door.line, line)));
-const roomOf = (level, { at }) => (level.rooms ?? []).findIndex((room) => same(room.at, at));
+const isOf = ({ at, lines }) => (room) => [at, ...lines.map((line) => line.slice(0, 2))].some((place) => same(room.at, place));
 const without = (level, question) => ({ ...level, questions: level.questions.filter((other) => other !== question) });
 
 const isOpen = (level, question) => question.proposed
-  || (question.about === 'door' ? doorOf(level, question) >= 0 : question.about === 'room' ? roomOf(level, question) >= 0 : level.walls.some((wall) => question.lines.some((line) => alike(wall, line))));
+  || (question.about === 'door' ? doorOf(level, question) >= 0 : question.about === 'room' ? (level.rooms ?? []).some(isOf(question)) : level.walls.some((wall) => question.lines.some((line) => alike(wall, line))));
 
 // The level without the questions that a change has answered.
 export function settled(level) {
@@ -32,7 +32,7 @@ export function accept(level, question) {
 export function reject(level, question) {
   const left = without(level, question);
   if (question.proposed) return left;
-  if (question.about === 'room') return { ...left, rooms: left.rooms.toSpliced(roomOf(left, question), 1) };
+  if (question.about === 'room') return { ...left, rooms: left.rooms.filter((room) => !isOf(question)(room)) };
   if (question.about === 'door') return question.lines.reduce((kept, line) => {
     const k = doorOf(kept, { lines: [line] });
     return k < 0 ? kept : fillDoor(kept, k).level;
@@ -40,12 +40,12 @@ export function reject(level, question) {
   return { ...left, walls: left.walls.filter((wall) => !question.lines.some((line) => alike(wall, line))) };
 }
 
-// Put a door or a room where it belongs: a door into the wall nearest to p. Null where there is none, for walls, and for many doors.
+// Put a door or a room where it belongs: a door into the wall nearest to p. Null where there is none, for walls, and for many doors or rooms.
 export function put(level, question, p) {
   if (question.about === 'wall' || question.lines.length > 1) return null;
   const left = without(level, question);
   if (question.about === 'room') {
-    const k = roomOf(left, question);
+    const k = left.rooms.findIndex(isOf(question));
     return { ...left, rooms: left.rooms.with(k, { ...left.rooms[k], at: p.map(onGrid) }) };
   }
   const k = question.proposed ? -1 : doorOf(left, question), { line, ...kept } = k < 0 ? { line: question.lines[0], state: 'unknown' } : left.doors[k];

@@ -96,6 +96,14 @@ const age_s = ({ at_ms }) => (Date.now() - at_ms) / 1000;
 function stored(prefix) {
   try {
     const keys = Object.keys(localStorage).filter((key) => key.startsWith(prefix));
-    return keys.map((key) => JSON.parse(localStorage[key])).sort((a, b) => a.at_ms - b.at_ms);
+    return keys.flatMap((key) => whole(localStorage[key])).sort((a, b) => a.at_ms - b.at_ms);
+  } catch { return []; }
+}
+
+// A damaged request is none, and hides no other one.
+function whole(text) {
+  try {
+    const request = JSON.parse(text);
+    return request.kind in LABELS && request.request && request.at_ms > 0 ? [request] : [];
   } catch { return []; }
 }

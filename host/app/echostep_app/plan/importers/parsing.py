@@ -14,6 +14,7 @@ from typing import Any
 
 from echostep.errors import EchostepError
 from echostep.fields import short
+from echostep_app.printing.lines import as_error
 
 PROJECTED = "are these metres of a projected system? save it as EPSG:4326 (longitude, latitude)"
 GML = "IndoorGML or CityGML is not read: export the building as IFC, IMDF or DXF"
@@ -23,14 +24,12 @@ LARGEST_BYTES = 512 * 2**20
 
 def read_bytes(path: Path) -> bytes:
     """The bytes of a file that is not larger than `LARGEST_BYTES`."""
-    try:
+    with as_error(f"{path}: cannot be read"):
         if not path.is_file():
             raise EchostepError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
         if path.stat().st_size > LARGEST_BYTES:
             raise EchostepError(f"{path}: larger than {LARGEST_BYTES // 2**20} MiB: export one building only")
         return path.read_bytes()
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot be read: {error.strerror or error}") from error
 
 
 def read_text(path: Path) -> str:

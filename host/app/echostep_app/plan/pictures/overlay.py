@@ -24,6 +24,7 @@ from echostep.plan import Plan
 from echostep_app.plan.cropping import Bounds, extent
 from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.pictures.drawing import draw_bare_level
+from echostep_app.printing.lines import as_error
 
 KML = "http://www.opengis.net/kml/2.2"
 PIXELS_PER_M, MOST_PX = 40.0, 4096  # a door is 36 pixels wide; the largest texture of older phones
@@ -48,13 +49,10 @@ def write_overlays(plan: Plan, out: Path) -> list[Overlay]:
     if out.suffix.casefold() != ".kmz":
         raise EchostepError(f"{out}: give a name that ends in .kmz")
     pictures = overlays(plan)
-    try:
-        with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr(zipfile.ZipInfo("doc.kml", EPOCH), _document(plan, pictures))
-            for k, overlay in enumerate(pictures):
-                archive.writestr(zipfile.ZipInfo(_file_name(k), EPOCH), overlay.png)
-    except OSError as error:
-        raise EchostepError(f"{out}: cannot write the overlay: {error.strerror or error}") from error
+    with as_error(f"{out}: cannot write the overlay"), zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(zipfile.ZipInfo("doc.kml", EPOCH), _document(plan, pictures))
+        for k, overlay in enumerate(pictures):
+            archive.writestr(zipfile.ZipInfo(_file_name(k), EPOCH), overlay.png)
     return pictures
 
 

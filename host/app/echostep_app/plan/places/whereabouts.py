@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import shapely
 
-from echostep.plan import Door, Plan, Room
+from echostep.plan import Plan, Room
 from echostep_app.plan.cropping import is_clear
 from echostep_app.plan.places.faces import OUTSIDE
 from echostep_app.plan.places.spaces import PlanSpaces, Spaces
@@ -63,7 +63,7 @@ class Whereabouts:
         if spaces.is_corridor(face):
             corridor = "in the corridor"
         doors = [
-            (_away(door, x_m, y_m), name)
+            (shapely.LineString((door.line[:2], door.line[2:])).distance(shapely.Point(x_m, y_m)), name)
             for door, a, b in spaces.doors
             if face in (a, b) and (name := _room_of_face(spaces, b if a == face else a))
         ]
@@ -105,11 +105,6 @@ def _room_of_face(spaces: Spaces, face: int) -> str:
         return ""
     middle = spaces.faces.areas[face].representative_point()
     return _in_an_outline(spaces, middle.x, middle.y).removeprefix("in ")
-
-
-def _away(door: Door, x_m: float, y_m: float) -> float:
-    """Distance from a door."""
-    return float(shapely.LineString((door.line[:2], door.line[2:])).distance(shapely.Point(x_m, y_m)))
 
 
 def _by_distance(rooms: Sequence[Room], x_m: float, y_m: float) -> list[Room]:

@@ -117,7 +117,8 @@ def _track(
     tracker = Tracker(plan, start, seed=options.seed)
     speed = options.speed or (WATCHED_SPEED if console.is_terminal and output.watched else None)
     title = "echostep demo (simulated" + (f", {speed:g} x real time)" if speed else ")")
-    end = _place_text(plan, waypoints) if options.guide else None
+    to = waypoints[-1]
+    end = f"{to[0]!r},{to[1]!r},{start_of(plan, waypoints[::-1]).level}" if options.guide else None
     with Session(tracker, title, "simulated", output, end) as session:
         session.prepare(SIMULATION)
         with progress_line("Simulating the walk"):
@@ -147,20 +148,10 @@ def _again(recording: Path, options: DemoOptions) -> str:
     return shlex.join(["echostep", "replay", paths[0], "--plan", paths[1], "--page"])
 
 
-def _place_text(plan: Plan, waypoints: Sequence[Waypoint]) -> str:
-    """X,Y,LEVEL of the end of the walk."""
-    return f"{waypoints[-1][0]!r},{waypoints[-1][1]!r},{start_of(plan, waypoints[::-1]).level}"
-
-
 def _portions(chunks: Iterator[Chunk], session: Session, recorder: Recorder, speed: float | None) -> Iterator[Portion]:
     """The simulated chunks, recorded; a run that is watched is slowed down and tracked in small portions."""
     source = paced(chunks, speed) if speed else chunks
-    with_people = with_messages(source, session.message_sources, _arrival_ns)
+    with_people = with_messages(source, session.message_sources, lambda before: before.t_arrival_ns if before else 0)
     return portions_of(
         recorded(with_people, recorder, wait_for_disk=True), WATCHED_PORTION if speed else UNSEEN_PORTION
     )
-
-
-def _arrival_ns(chunk: Chunk | None) -> int:
-    """Arrival time of a check-in on the simulated clock: that of the chunk before it."""
-    return chunk.t_arrival_ns if chunk else 0

@@ -52,7 +52,7 @@ def room_tour(plan: Plan) -> list[Waypoint]:
         rooms = _places(plan, level)
         visited = 0
         while rooms and visited < most and walked_m < MOST_TOUR_M:
-            goal = _nearest(rooms, here)
+            goal = min(rooms, key=lambda room: math.hypot(room.x_m - here.x_m, room.y_m - here.y_m))
             rooms.remove(goal)
             try:
                 route = routes.way(here, goal)
@@ -65,10 +65,6 @@ def room_tour(plan: Plan) -> list[Waypoint]:
     if len(way) < 2:
         raise EchostepError(f"plan {plan.name}: a tour needs two places with a way between them: name some rooms in it")
     return _spaced(_round_walls(plan, routes, way))
-
-
-def _nearest(rooms: Sequence[RoutePlace], here: RoutePlace) -> RoutePlace:
-    return min(rooms, key=lambda room: math.hypot(room.x_m - here.x_m, room.y_m - here.y_m))
 
 
 def _first_place(plan: Plan) -> RoutePlace:

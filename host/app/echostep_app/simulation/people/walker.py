@@ -109,7 +109,7 @@ def round_corners(points: Floats, radius_m: float) -> Floats:
         u = np.linspace(0.0, 1.0, 60)[:, None]
         pieces.append((1 - u) ** 2 * start + 2 * u * (1 - u) * corner + u**2 * end)
     corners = np.vstack([*pieces, points[-1:]])
-    along = _along(corners)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners[:, :2], axis=0).T))])  # m, seen from above
     even = np.linspace(0.0, along[-1], max(3, int(along[-1] / PATH_STEP_M)))
     return np.column_stack([np.interp(even, along, corners[:, k]) for k in range(points.shape[1])])
 
@@ -139,11 +139,6 @@ def _above(before: Floats, after: Floats) -> bool:
 def _turn(before: Floats, corner: Floats, after: Floats) -> float:
     a, b = corner - before, after - corner
     return abs(math.atan2(a[0] * b[1] - a[1] * b[0], a @ b))
-
-
-def _along(points: Floats) -> Floats:
-    """Length of the polyline up to each point, seen from above."""
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
 
 
 def _toil(points: Floats, stride_m: float) -> Floats:

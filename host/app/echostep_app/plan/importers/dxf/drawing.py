@@ -29,7 +29,14 @@ from echostep_app.plan.importers.dxf.frame import DrawingFrame
 from echostep_app.plan.importers.dxf.gaps import WallBands
 from echostep_app.plan.importers.dxf.rooms import Written, named_spaces, rooms_of, written
 from echostep_app.plan.importers.dxf.sheet import Sheet, read_sheet
-from echostep_app.plan.importers.dxf.storeys import alignment, bounds_of, lies_over, storey_boxes, window_words
+from echostep_app.plan.importers.dxf.storeys import (
+    alignment,
+    bounds_of,
+    in_order,
+    lies_over,
+    storey_boxes,
+    window_words,
+)
 from echostep_app.plan.importers.dxf.symbols import (
     LEAF_M,
     Swing,
@@ -100,7 +107,12 @@ def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Pla
     if hints.windows:
         storeys = [_in_window(storeys[0], window) for window in hints.windows]
     _lay_over(storeys, hints, report)
-    names = [*hints.level_names, *(_names(files, len(storeys))[len(hints.level_names) :])]
+    usual = [file.stem for file in files] if len(storeys) == len(files) else [f"level {i}" for i in range(len(storeys))]
+    names = [*hints.level_names, *usual[len(hints.level_names) :]]
+    if (order := in_order(names)) != names:
+        report.doubt(
+            f"by their names the storeys are {', '.join(order)[:200]} from the lowest: give them in this order"
+        )
     drawn_levels = [
         _drawn_level(storey, DrawnLevel(name, round(i * hints.storey_height_m, 6)), report)
         for i, (storey, name) in enumerate(zip(storeys, names, strict=False))
@@ -118,10 +130,6 @@ def _with_names(plan: Plan, storeys: list[_Storey], report: ImportReport) -> Pla
     if count := sum(len(level.rooms) for level in levels):
         report.doubt(f"no layer is named for rooms: the names of {count} are the texts inside them")
     return replace(plan, levels=tuple(levels))
-
-
-def _names(files: Sequence[Path], levels: int) -> list[str]:
-    return [file.stem for file in files] if levels == len(files) else [f"level {i}" for i in range(levels)]
 
 
 def _in_window(storey: _Storey, window: Sequence[float]) -> _Storey:
@@ -190,7 +198,8 @@ def _drawn_level(storey: _Storey, drawn: DrawnLevel, report: ImportReport) -> Dr
     drawn.doors, drawn.cuts = doors.doors, doors.cuts
     drawn.questions = [*doors.questions(), *_left_out_walls(storey)]
     drawn.walls, drawn.windows = [*storey.lines("walls", "columns"), *doors.jambs], list(storey.lines("windows"))
-    drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(_noded(storey.lines("obstacles")))))
+    obstacles = shapely.node(MultiLineString(storey.lines("obstacles")))
+    drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(shapely.get_parts(obstacles))))
     rooms = rooms_of(sheet.kinds["rooms"], storey.frame, sheet.file, report, storey.texts())
     drawn.rooms = [room for room in rooms if storey.holds(Point(room.at_m))]
     for kind, layer in (("stairs", "stairs"), ("lift", "lifts")):
@@ -311,7 +320,3 @@ def _parts(block: Any, file: Path, depth: int = DEEPEST_SYMBOL) -> list[Any]:
     deeper = [part for part in inner if part.dxftype() == "INSERT"] if depth else []
     own = [part for part in inner if part.dxftype() != "INSERT"]
     return own + [found for part in deeper for found in _parts(part, file, depth - 1)]
-
-
-def _noded(lines: list[LineString]) -> list[Any]:
-    return list(shapely.get_parts(shapely.node(MultiLineString(lines)))) if lines else []

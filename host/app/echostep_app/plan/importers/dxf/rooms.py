@@ -23,7 +23,14 @@ from echostep_app.plan.places.spaces import find_spaces
 
 LEAST_M2 = 1.0  # smaller closed lines are frames of texts, symbols, furniture; assumed
 SAME_HEIGHT = 0.8  # ratio of letters to the largest ones in a room, down to which they belong to its name; assumed
-MEASURE = re.compile(r"[^\w]*\d[\d.,'x× ]*([.,]\d+|\s*(mm|cm|m|m2|m²|qm|sqm|sq ?ft))\.?$", re.IGNORECASE)
+MEASURE = re.compile(r"\W*\d[\d.,'x× ]*[.,]\d+\.?$")
+UNIT = r"(?:mm|cm|m|m2|m²|qm|sqm|sq ?ft|sf|['\"])"
+KINDS = r"(?:[AFHUP]|NGF|BGF|[LR]H|[OU]K\w*)"  # areas, perimeters and heights, in English and German
+# What is no name on any layer
+SIZE = re.compile(
+    rf"\W*(?:{KINDS} ?[=:] ?[+±-]?\d[\d.,]*(?: ?{UNIT})?|\d[\d.,'x× ]*{UNIT}|(?<=[+±])\d[\d.,]*)\W*", re.IGNORECASE
+)
+SIZES = re.compile("AREA|FLAE|FLÄ|SUPERF|SURF|HEIGHT|HOEHE|HÖHE", re.IGNORECASE)  # in the tag of an attribute
 TEXTS = ("TEXT", "MTEXT", "ATTRIB")
 
 
@@ -39,7 +46,7 @@ def rooms_of(
     entities: Sequence[tuple[Any, str]], frame: DrawingFrame, file: Path, report: ImportReport, texts: Sequence[Written]
 ) -> list[Room]:
     """A room for each text, with the smallest outline around it, and for each outline without one, named by the `texts` of other layers in it."""
-    names: list[Room] = []
+    names: dict[tuple[str, tuple[float, float]], Room] = {}  # one of each that is drawn twice
     outlines: list[Polygon] = []
     for entity, layer in entities:
         named = _named(entity, frame)
@@ -47,13 +54,14 @@ def rooms_of(
             area for line in frame.lines(entity, file) if line.is_closed for area in areas([Polygon(line.coords)])
         ]
         large = [area for area in closed if area.area >= LEAST_M2]
-        names += [named] if named else []
+        if named:
+            names[named.name, named.at_m] = named
         outlines += large
         if not named and not large:
             report.leave_out(f"{entity.dxftype()} on {layer[:40]}")
         else:
             report.use("rooms", layer)
-    return _matched(names, outlines, texts, report)
+    return _matched([*names.values()], outlines, texts, report)
 
 
 def _matched(names: list[Room], outlines: list[Polygon], texts: Sequence[Written], report: ImportReport) -> list[Room]:
@@ -101,9 +109,12 @@ def written(entity: Any, layer: str, frame: DrawingFrame) -> Written | None:
 
 
 def _named(entity: Any, frame: DrawingFrame) -> Room | None:
-    """A text entity as a room; None when it is empty, far away, or not a text."""
-    if entity.dxftype() not in TEXTS:
+    """A text entity as a room; None when it is empty, a size, far away, or not a text."""
+    if entity.dxftype() not in TEXTS or (
+        entity.dxftype() == "ATTRIB" and (entity.is_invisible or SIZES.search(entity.dxf.tag))
+    ):
         return None
-    words = " ".join((entity.plain_text() if entity.dxftype() == "MTEXT" else entity.dxf.text).split())[:80]
+    lines = [line for line in entity.plain_text().splitlines() if not SIZE.fullmatch(line)]
+    words = " ".join(" ".join(lines).split())[:80]
     x, y = frame.metres(entity.dxf.insert if entity.dxftype() == "MTEXT" else entity.ocs().to_wcs(entity.dxf.insert))
     return Room(words, (round(x, 3), round(y, 3))) if words and max(abs(x), abs(y)) < LIMIT_M else None

@@ -7,6 +7,7 @@ In: walls of levels. Out: windows of a drawing, the move that lays one level ove
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -26,7 +27,24 @@ ALIKE = 0.4  # two storeys of one building differ by less than this share of the
 OVER = 0.3  # share of the smaller level's rectangle that lies over the other one's, in one building; assumed
 GRID_M = 0.02  # step of the search for the move that aligns two levels
 MOST_CELLS = 200_000
+GROUND = {"eg", "erdgeschoss", "ground", "gf", "rdc"}
+BELOW = {"kg", "ug", "keller", "kellergeschoss", "untergeschoss", "basement"}
+ABOVE = {"og", "obergeschoss", "stock", "etage", "floor", "storey", "level", "ebene"}
 Box = tuple[float, float, float, float]
+
+
+def in_order(names: Sequence[str]) -> list[str]:
+    """The storeys' names from the lowest; as they are where one does not tell its storey."""
+    told = [_storey(name.casefold()) for name in names]
+    return list(names) if None in told else [name for _, name in sorted(zip(told, names, strict=True))]
+
+
+def _storey(name: str) -> int | None:
+    """The number of a storey by its name; None where it has none, or several."""
+    words, numbers = set(re.findall(r"[^\W\d_]+", name)), [int(digits) for digits in re.findall(r"\d+", name)]
+    if words & (GROUND | BELOW):
+        return -(numbers or [1])[0] if words & BELOW else 0
+    return numbers[0] if len(numbers) == 1 and words & ABOVE else None
 
 
 def storey_boxes(walls: Sequence[LineString]) -> list[Box]:

@@ -57,7 +57,7 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
         )
     projects = model.by_type("IfcProject")
     name = str((projects[0].LongName or projects[0].Name) if projects else "") or path.stem
-    return plan_of(name, drawn_levels, report, _moved(_georeference(model), model, shapes, report))
+    return plan_of(name, drawn_levels, report, _moved(_georeference(model, report), model, shapes, report))
 
 
 def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: ImportReport) -> None:
@@ -123,8 +123,12 @@ def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorK
     return "" if passed else NO_STOREY
 
 
-def _georeference(model: Any) -> Georeference | None:
+def _georeference(model: Any, report: ImportReport) -> Georeference | None:
     """Longitude, latitude and true north of the model's site; None where the model does not state them."""
+    if model.schema != "IFC2X3" and (systems := model.by_type("IfcProjectedCRS")):
+        report.doubt(
+            f"its map conversion ({str(systems[0].Name)[:40]}) is not read, only the site's latitude: echostep plan edit takes two known points"
+        )
     sites = [site for site in model.by_type("IfcSite") if site.RefLatitude and site.RefLongitude]
     if not sites:
         return None

@@ -19,7 +19,6 @@ import shapely
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan import ConnectorKind, Door, DoorState, Georeference, Plan
 from echostep_app.plan.georeference import EarthTransform
@@ -27,10 +26,10 @@ from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, pieces, room
 from echostep_app.plan.importers.geojson import features, geometries, label, properties, shape
 from echostep_app.plan.importers.imdf.archive import Archive
-from echostep_app.plan.importers.imdf.assumed_doors import ASSUMED, doors_at, doors_of_rooms
+from echostep_app.plan.importers.imdf.assumed_doors import ASSUMED, ONE_LINE_M, THICKEST_M, doors_at, doors_of_rooms
 from echostep_app.plan.importers.parsing import number, parse_json, text
 from echostep_app.plan.importers.report import ImportReport
-from echostep_app.plan.importers.straight import merge_collinear, pieces_of
+from echostep_app.plan.importers.straight import pieces_of
 
 OPEN = {
     "walkway",
@@ -245,24 +244,30 @@ def _doors(one: Feature) -> list[Door]:
 
 
 def _place_doors(drawn: DrawnLevel, openings: list[Feature], report: ImportReport) -> None:
-    """Add the doors of openings, each on the wall beside it; those in no wall stay where they are, and are told."""
-    walls = merge_collinear(pieces_of(pieces([*drawn.walls, *(area.exterior for area in drawn.filled)])))
-    lines, astray = shapely.linestrings(walls.reshape(-1, 2, 2)), 0
+    """Add the doors of openings, each on the wall beside it and on that wall's other face; those in no wall stay where they are, and are told."""
+    walls = pieces([*drawn.walls, *(area.exterior for area in drawn.filled)])
+    tree, astray = shapely.STRtree(walls), 0
     for door in (door for one in openings for door in _doors(one)):
-        off = shapely.distance(lines, Point((door.line[0] + door.line[2]) / 2, (door.line[1] + door.line[3]) / 2))
-        k = int(off.argmin()) if len(walls) else 0
-        is_near = len(walls) > 0 and off[k] < ON_M
+        middle = LineString((door.line[:2], door.line[2:])).centroid
+        around = [walls[k] for k in tree.query(middle, predicate="dwithin", distance=THICKEST_M)]
+        near = sorted(around, key=middle.distance)[:2]  # behind these is another room
+        is_near = bool(near) and near[0].distance(middle) < ON_M
         astray += not is_near
-        drawn.doors.append(replace(door, line=_onto(door.line, walls[k])) if is_near else door)
+        own, *others = [_onto(door.line, wall, middle) for wall in near if is_near] or [door.line]
+        apart = [LineString((own[:2], own[2:])).distance(LineString((line[:2], line[2:]))) for line in others]
+        faces = [line for line, m in zip(others, apart, strict=True) if line != door.line and m > ONE_LINE_M]
+        drawn.doors += [replace(door, line=line) for line in (own, *faces)]
     if astray:
         report.doubt(
             f"{drawn.name}: {astray} of {len(drawn.doors)} openings lie in no wall: compare them with the building"
         )
 
 
-def _onto(line: Line, wall: Floats) -> Line:
-    """A door's line moved onto a wall's line, where it runs along it."""
-    ends, start, along = np.array(line).reshape(2, 2), wall[:2], wall[2:] - wall[:2]
+def _onto(line: Line, wall: BaseGeometry, middle: Point) -> Line:
+    """A door's line moved onto the line of the nearest straight piece of a wall, where it runs along it."""
+    ends, rows = np.array(line).reshape(2, 2), pieces_of([wall])
+    nearest = rows[shapely.distance(shapely.linestrings(rows.reshape(-1, 2, 2)), middle).argmin()]
+    start, along = nearest[:2], nearest[2:] - nearest[:2]
     along = along / np.hypot(*along)
     moved = (start + ((ends - start) @ along)[:, None] * along).round(3)
     if np.hypot(*(moved[1] - moved[0])) < ALONG * np.hypot(*(ends[1] - ends[0])):

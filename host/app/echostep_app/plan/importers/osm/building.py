@@ -8,6 +8,7 @@ building's outline is a wall on each of its levels; a door is a node on a wall. 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,6 +33,10 @@ DOOR_M, STAIRS_M, LIFT_M = 0.9, 1.5, 1.8  # widths where the map states none: us
 OFF_M = 0.02  # of a straight wall's nodes from its line: twice OpenStreetMap's resolution
 ON_M = 0.1  # greatest distance of a door's node from its wall; assumed
 MOST_LEVELS = 200
+UNITS_M = {"": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "'": 0.3048, '"': 0.0254}
+WIDTH = re.compile(
+    r"""(\d+(?:[.,]\d+)?) ?(m|cm|mm|ft|'|"|)(?: ?(\d+)")?"""
+)  # as 0.9, 90 cm, 3'6" [OpenStreetMap wiki, Map features/Units]
 
 
 @dataclass(slots=True)
@@ -185,6 +190,7 @@ def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
         level: merge_collinear(pieces_of([*drawn.walls, *drawn.windows]), OFF_M)
         for level, drawn in site.drawn_levels.items()
     }
+    lost = []
     for node, tags in elements.nodes():
         if not _is_door(tags):
             continue
@@ -192,11 +198,16 @@ def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
         gaps = {
             level: _gap(walls[level], elements.at_m[node], _metres(tags, DOOR_M)) for level in own if level in walls
         }
-        report.leave_out("door on no wall", not any(gaps.values()))
+        lost += [] if any(gaps.values()) else [f"node {node}"]
         for level, gap in gaps.items():
             doors = site.drawn_levels[level].doors
             if gap is not None and all(gap != door.line for door in doors):
                 doors.append(Door(gap, _state(tags), (tags.get("name") or tags.get("ref") or "")[:80]))
+    if lost:
+        report.leave_out("door on no wall", len(lost))
+        report.doubt(
+            f"doors on no wall were left out ({', '.join(lost[:5])}{', ...' * (len(lost) > 5)}): corridors and areas have no walls"
+        )
 
 
 def _gap(walls: Floats, at_m: tuple[float, float], wide_m: float) -> tuple[float, float, float, float] | None:
@@ -259,8 +270,8 @@ def _ways(site: OsmSite, kind: ConnectorKind, tags: Tags, area: BaseGeometry, le
 
 def _metres(tags: Tags, otherwise: float) -> float:
     """The tagged width in metres; `otherwise` when it is absent or not between 0.3 m and 20 m."""
-    try:
-        width = float(tags.get("width", "").removesuffix("m").strip())
-    except ValueError:
+    stated = WIDTH.fullmatch(tags.get("width", "").strip())
+    if stated is None:
         return otherwise
+    width = float(stated[1].replace(",", ".")) * UNITS_M[stated[2]] + float(stated[3] or 0) * UNITS_M['"']
     return width if 0.3 <= width <= 20.0 else otherwise

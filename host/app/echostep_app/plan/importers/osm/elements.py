@@ -33,7 +33,7 @@ Tags = dict[str, str]
 
 def levels_of(tags: Mapping[str, str], where: str = "") -> list[float]:
     """The level numbers of an element; empty when no tag can be read. Raises EchostepError for an impossible range."""
-    texts = f"{tags.get('level', '')};{tags.get('repeat_on', '')}".split(";")
+    texts = f"{tags.get('level', '')};{tags.get('repeat_on', '')}".replace("\u2212", "-").split(";")
     levels: set[float] = set()
     for text in (text.strip() for text in texts):
         if match := RANGE.match(text):
@@ -191,7 +191,7 @@ def _add(elements: Elements, row: Any) -> None:
     if isinstance(key, bool) or not isinstance(key, int):
         raise ValueError(f"{str(kind)[:20]} {str(key)[:20]!r}: its id is not a whole number")
     where = f"{str(kind)[:20]} {key}"
-    tags = _tags(row.get("tags") or {}, where)
+    tags = {str(k): str(text)[:500] for k, text in typed(row.get("tags") or {}, f"{where}: tags", dict).items()}
     if kind == "node":
         elements.degrees[key] = _degrees(row, where)
         elements.node_tags[key] = tags
@@ -242,10 +242,6 @@ def _ref(value: Any, where: str) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise ValueError(f"{where}: {str(value)[:20]!r} is not the id of an element")
     return value
-
-
-def _tags(value: Any, where: str) -> Tags:
-    return {str(key): str(text)[:500] for key, text in typed(value, f"{where}: tags", dict).items()}
 
 
 def _resolve(elements: Elements) -> None:

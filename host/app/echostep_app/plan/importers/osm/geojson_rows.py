@@ -25,7 +25,8 @@ def geojson_rows(tree: Any) -> list[dict[str, Any]]:
         for kind, nested, _ in geometries(feature, where):
             if kind == "Point":
                 rows.append({"type": "node", "id": next(ids), "tags": tags} | _place(nested))
-            for k, line in enumerate({"LineString": [nested], "Polygon": nested}.get(kind, [])):
+            rings = [ring if ring[0] == ring[-1] else [*ring, ring[0]] for ring in nested] if kind == "Polygon" else []
+            for k, line in enumerate([nested] if kind == "LineString" else rings):
                 own = tags if k == 0 else without_names(tags)
                 rows.append({"type": "way", "id": next(ids), "tags": own, "geometry": list(map(_place, line))})
     return rows
