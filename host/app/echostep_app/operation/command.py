@@ -65,17 +65,12 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
         with suppress(KeyboardInterrupt):
             _follow(run, page, console, math.inf if seconds is None else seconds, views)
         run.look(time.monotonic())
-        _write_crews(operation, recording.path, console)
+        if operation.crew_log.events:
+            path = recording.path.with_name(f"{recording.path.stem}-crews.csv")
+            operation.crew_log.write(path)
+            console.print(f"Crews: {path}", highlight=False, markup=False)
     views.finish(operation, time.monotonic())
     recording.check_whole()
-
-
-def _write_crews(operation: Operation, recording: Path, console: Console) -> None:
-    """Write what the crews did beside the recording, where there were any."""
-    if operation.crew_log.events:
-        path = recording.with_name(f"{recording.stem}-crews.csv")
-        operation.crew_log.write(path)
-        console.print(f"Crews: {path}", highlight=False, markup=False)
 
 
 @dataclass(frozen=True, slots=True)

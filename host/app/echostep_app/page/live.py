@@ -225,7 +225,11 @@ class LivePage:
         if not later or later[-1].t1_s <= self._lookahead_s:
             return
         self._lookahead_s = later[-1].t1_s
-        moved = self._steady.shown(extrapolate(estimate, state.last_segment, later), self._tracker)
+        moved = replace(estimate, t_s=self._lookahead_s)  # a mean that is no place would come to lie in one
+        if is_placed(estimate, self._tracker.plan):
+            moved = extrapolate(estimate, state.last_segment, later)
+        if moved.status is not estimate.status:  # it is worse
+            self._steady.worst(moved.t_s, moved.status)
         particles, guidance = self._scene.particles, self._scene.guidance
         dx_m, dy_m = moved.x_m - estimate.x_m, moved.y_m - estimate.y_m
         self._lookahead = replace(

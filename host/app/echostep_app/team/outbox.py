@@ -175,7 +175,8 @@ class Outbox:
         offered_s, report = entry
         self._sequence += 1
         age_s = time.monotonic() - offered_s
-        return steadied(stamped(report, self._sequence, time.time(), age_s, self.counts.overtaken), self._steady)
+        made = stamped(report, self._sequence, time.time(), age_s, self.counts.overtaken)
+        return steadied(made, age_s, self._steady)
 
     def _over(self) -> bool:
         with self._changed:
@@ -222,14 +223,14 @@ def stamped(report: Report, sequence: int, unix_s: float, age_s: float, overtake
     return without_place(report, last) if last else replace(report, position=position, place=place)
 
 
-def steadied(report: Report, steady: SteadyStatus) -> Report:
-    """The report with a steady status, at the time of its position; where that is lost, the position is the last one."""
+def steadied(report: Report, age_s: float, steady: SteadyStatus) -> Report:
+    """The report as lost for HOLD_S, in its position's time, after one that was lost by its age; its position is the last one then."""
     known = report.position or report.last_place
     if known is None:
         return report
-    status = steady.worst(known.t_s + known.age_s, TrackStatus(report.status))
-    report = replace(report, status=status.value)
-    return without_place(report, known) if status is TrackStatus.LOST else report
+    by_age = TrackStatus.LOST if age_s > SETTLED_S else TrackStatus.TRACKING
+    is_lost = steady.worst(known.t_s + known.age_s, by_age) is TrackStatus.LOST
+    return without_place(replace(report, status="lost"), known) if is_lost else report
 
 
 def without_place(report: Report, last: Position | None) -> Report:
