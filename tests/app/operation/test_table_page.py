@@ -110,15 +110,3 @@ TRAIL_SEEN = f"""(() => {{
     const {{ x: sx, y: sy }} = placed.transformPoint({{ x, y }});
     return sheet.getContext('2d').getImageData(Math.round(sx) - 3, Math.round(sy) - 3, 7, 7).data.some((value) => value > 0);
 }})()"""  # the sheet of the trails that is shown has something within 3 px of (12, 2) m
-
-
-def test_a_broker_that_dies_is_said_and_the_last_state_stays(browser: Any) -> None:
-    with ServedTeam(whole_team()) as served:
-        page = table(browser, served.page.url, "phone")
-        served.show(connected=False, fault="connection refused")
-        wait_for(page, "document.querySelector('#status-text').textContent.startsWith('no broker')")
-        wait_for(page, "document.querySelector('#refused').textContent === 'connection refused'")
-        assert page.locator("#list li").count() == 8
-        served.show(connected=True)
-        wait_for(page, "document.querySelector('#words').dataset.status === 'tracking'")
-        page.context.close()

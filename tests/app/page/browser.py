@@ -163,10 +163,10 @@ def loaded_page(browser: Any, url: str, how: dict[str, Any], ready: str) -> Any:
 
 
 def overflow(page: Any) -> tuple[int, int]:
-    """How many pixels a page is wider than its window, and how many of its buttons and lists reach beyond the right edge."""
+    """How many pixels a page is wider than its window, and how many of its controls reach beyond the right edge."""
     wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
     cut = page.evaluate(
-        "[...document.querySelectorAll('button, select')].filter((e) => e.offsetParent && e.getBoundingClientRect().right > innerWidth).length"
+        "[...document.querySelectorAll('button, select, input')].filter((e) => e.offsetParent && e.getBoundingClientRect().right > innerWidth).length"
     )
     return wide, cut
 

@@ -274,22 +274,3 @@ def test_the_arrow_turns_the_short_way_and_is_gone_when_the_heading_is_unknown(b
         wait_for(page, "document.querySelector('#guidance').hidden")
         assert page.evaluate(f"{GUIDED}.sentence") == ""
         page.context.close()
-
-
-@pytest.mark.long
-def test_ten_pages_at_once_and_one_that_comes_back(browser: Any) -> None:
-    with Walk(10.0, 2.0, stands=True) as walk:
-        pages = [looking(browser, walk.page.url, "bright") for _ in range(10)]
-        assert until(lambda: walk.page.server.pages == 10)
-        pages[0].evaluate("echostep.link.wait = 1e6, echostep.link.socket.close()")  # away until it is told to return
-        assert until(lambda: walk.page.server.pages == 9)
-        missed = pages[0].evaluate("echostep.scene.trail.count")
-        walk.go_on()
-        wait_for(pages[1], f"echostep.scene.trail.count > {missed + 5}")
-        pages[0].evaluate("echostep.link.open()")
-        assert until(lambda: walk.page.server.pages == 10)
-        wait_for(pages[0], f"echostep.scene.trail.count > {missed + 5}")
-        for page in pages[1:]:
-            wait_for(page, "echostep.frames > 5")
-        for page in pages:
-            page.context.close()

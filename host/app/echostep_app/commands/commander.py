@@ -47,7 +47,7 @@ def command(
 ) -> None:
     """Follow a team on one plan, lost and silent ones first, on a page and as a table, and record it; or show a recording again."""
     from echostep_app.operation import command as commander
-    from echostep_app.operation.views import Views
+    from echostep_app.operation.recorded.replay import Views
 
     views = Views(page_address(page, host, port, lang), as_json=as_json)
     commander.command(_plan_file(plan, broker, team, out.parent), broker, team, seconds, views, out)

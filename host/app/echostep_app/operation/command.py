@@ -21,13 +21,11 @@ from rich.live import Live
 from echostep.plan import Plan, load_plan
 from echostep_app.operation.operation import Operation
 from echostep_app.operation.recorded.record import OperationRecorder
-from echostep_app.operation.recorded.replay import replay
+from echostep_app.operation.recorded.replay import Views, replay
 from echostep_app.operation.restorer import Restorer, restore
-from echostep_app.operation.views import Views, finish, open_page
 from echostep_app.page.protocol import FRAME_S
 from echostep_app.printing.console import console_for_people, print_notices
 from echostep_app.printing.people import FaultNews, outlast_output, output_faults
-from echostep_app.recording.recorder import Recorder
 from echostep_app.team.commander import table
 from echostep_app.team.endpoint import Endpoint, parse_endpoint
 from echostep_app.team.inbox import Inbox, ListenerThread, Subscription
@@ -54,8 +52,9 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
     with ExitStack() as opened:
         recorder = OperationRecorder(out, operation, str(endpoint))
         recording = recorder.file
-        opened.callback(_end_recording, recording, console)
-        page = open_page(opened, operation, "echostep command", views, recorder.tape, console)
+        opened.callback(print_notices, recording.notices, console)
+        opened.callback(recording.close)
+        page = views.open_page(opened, operation, "echostep command", recorder.tape, console)
         console.print(f"Recording: {recording.path}", highlight=False)
         receiver = _receiver(endpoint, checked, operation.plan, inbox, lambda text: console.print(text, markup=False))
         opened.callback(receiver.close)
@@ -66,17 +65,12 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
         with suppress(KeyboardInterrupt):
             _follow(run, page, console, math.inf if seconds is None else seconds, views)
         run.look(time.monotonic())
-        _write_crews(operation, recording.path, console)
-    finish(operation, time.monotonic(), views)
+        if operation.crew_log.events:
+            path = recording.path.with_name(f"{recording.path.stem}-crews.csv")
+            operation.crew_log.write(path)
+            console.print(f"Crews: {path}", highlight=False, markup=False)
+    views.finish(operation, time.monotonic())
     recording.check_whole()
-
-
-def _write_crews(operation: Operation, recording: Path, console: Console) -> None:
-    """Write what the crews did beside the recording, where there were any."""
-    if operation.crew_log.events:
-        path = recording.with_name(f"{recording.stem}-crews.csv")
-        operation.crew_log.write(path)
-        console.print(f"Crews: {path}", highlight=False, markup=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,11 +90,6 @@ class _Run:
         if self.restorer:
             restore(self.restorer, self.operation, self.receiver, believed, now_s)
         self.recorder.add(believed, now_s, unix_s, connected=connected, faults=output_faults())
-
-
-def _end_recording(recording: Recorder, console: Console) -> None:
-    recording.close()
-    print_notices(recording.notices, console)
 
 
 def _receiver(

@@ -29,6 +29,7 @@ from echostep_app.board.faults.health import Finding, Severity, all_findings
 from echostep_app.board.gateway_words import gateway_words
 from echostep_app.plan.places.bearing import heading_words
 from echostep_app.printing.running import running_note
+from echostep_app.wearer.steady_status import SteadyStatus
 
 REFRESH_S = 0.1
 MAX_FINDINGS = 3  # shown at a time
@@ -112,6 +113,7 @@ class TerminalView:
         self._fraction = progress
         self._bar = self._progress.add_task("walk", total=1.0 if progress else None)
         self._last: Estimate | None = None
+        self._steady = SteadyStatus()
         self._drawn_s = 0.0
         self._live = Live(console=console, auto_refresh=False, transient=False)
         self._canvas = self._empty()
@@ -144,7 +146,7 @@ class TerminalView:
                 self._level = e.level
                 self._canvas = self._empty()
             self._canvas.extend_track(e)
-            self._last = e
+            self._last = self._steady.shown(e, self._tracker)
         now = time.monotonic()
         if not final and now - self._drawn_s < REFRESH_S:
             return

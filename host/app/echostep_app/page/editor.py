@@ -30,8 +30,7 @@ from echostep.errors import EchostepError
 from echostep.plan import Level, Plan, load_plan, parse_plan
 from echostep_app.page.server import STATIC, STOP_S, Address, open_listener, page_in
 from echostep_app.page.web.access import AccessControl
-from echostep_app.page.web.connections import Connections
-from echostep_app.page.web.gated_server import GatedServer
+from echostep_app.page.web.connections import Connections, GatedServer
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.two_points import parse_two_points
 from echostep_app.plan.writer import georeference_fields, plan_json
@@ -39,7 +38,7 @@ from echostep_app.printing.lines import as_error, say, write_whole
 
 PAGE = Path(__file__).parent / "edit"
 # Files of the live page
-SHARED = "style.css", "icon.svg", "storage.js", "theme.js", "view.js", "language.js", "*-*.json"
+SHARED = "style.css", "icon.svg", "storage.js", "theme.js", "view.js", "plan.js", "language.js", "*-*.json"
 MOST_BODY = 8_000_000  # bytes of a plan: a browser draws this much smoothly
 MOST_PICTURE = 32_000_000  # bytes
 MOST_FOUND = 200  # findings of a check

@@ -37,6 +37,7 @@ from echostep_app.page.shared import SharedDrawing
 from echostep_app.plan.routing import RoutePlace
 from echostep_app.ports.arrival_clock import now_ns
 from echostep_app.printing.running import running_note
+from echostep_app.wearer.steady_status import SteadyStatus
 from echostep_app.wearer.watch import watch_of
 
 # All assumed:
@@ -101,7 +102,7 @@ class LivePage:
         self._trail_end: Estimate | None = None
         self._trail_breaks = False  # before its next point
         self._check_ins = (0, 0)  # check-ins and undoings
-        self._undo_clock, self._numbers = UndoClock(), PlaceNumbers()
+        self._undo_clock, self._numbers, self._steady = UndoClock(), PlaceNumbers(), SteadyStatus()
         self._drawing: DrawingProcess | None = None  # of a walk without a plan
         if not replay:
             self.mailbox.publish(self._scene)
@@ -224,7 +225,11 @@ class LivePage:
         if not later or later[-1].t1_s <= self._lookahead_s:
             return
         self._lookahead_s = later[-1].t1_s
-        moved = extrapolate(estimate, state.last_segment, later)
+        moved = replace(estimate, t_s=self._lookahead_s)  # a mean that is no place would come to lie in one
+        if is_placed(estimate, self._tracker.plan):
+            moved = extrapolate(estimate, state.last_segment, later)
+        if moved.status is not estimate.status:  # it is worse
+            self._steady.worst(moved.t_s, moved.status)
         particles, guidance = self._scene.particles, self._scene.guidance
         dx_m, dy_m = moved.x_m - estimate.x_m, moved.y_m - estimate.y_m
         self._lookahead = replace(
@@ -261,7 +266,7 @@ class LivePage:
 
     def _watch(self, measured: MeasuredSegment | None, estimate: Estimate) -> None:
         """Make a scene of the tracker's new estimate. `measured` None: the foot is silent, and there are no new echoes."""
-        self._lookahead = None
+        self._lookahead, estimate = None, self._steady.shown(estimate, self._tracker)
         self._extend_trail(estimate)
         if self._drawing and measured is not None:
             self._drawing.add(measured, estimate, len(self.mailbox.trail))

@@ -36,10 +36,8 @@ from echostep_app.page.shared import PageCounts, Shared
 from echostep_app.page.web import users
 from echostep_app.page.web.access import LOOPBACK, AccessControl
 from echostep_app.page.web.addresses import page_urls
-from echostep_app.page.web.connections import Connections
-from echostep_app.page.web.faults import Faults
-from echostep_app.page.web.gated_server import GatedServer
-from echostep_app.page.web.log_budget import logged_to
+from echostep_app.page.web.connections import Connections, GatedServer
+from echostep_app.page.web.faults import Faults, logged_to
 from echostep_app.page.web.uploads import Uploads
 
 STATIC = Path(__file__).parent / "static"
@@ -101,7 +99,9 @@ class SocketServer(Generic[S]):
         host, port = self._listener.getsockname()[:2]
         self.urls = page_urls(host, port, token)  # the likeliest first
         self.connections = Connections(self._listener)
-        self.access_control = AccessControl(self._application(token), token, self.connections, site.faults.tell)
+        self.access_control = AccessControl(
+            self._application(token), token, self.connections, site.faults.notices.append
+        )
         self._loop: asyncio.AbstractEventLoop | None = None
         self._wake_pending = False
         settings = uvicorn.Config(

@@ -35,7 +35,7 @@ def _joined(parts: list[str]) -> str:
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
 
 
-def _reasons(counts: tuple[tuple[int, str], ...]) -> str:
+def _reasons(*counts: tuple[int, str]) -> str:
     """Those of the counts that are not zero, as "3 of a wrong length"."""
     return _joined([f"{count} {reason}" for count, reason in counts if count])
 
@@ -46,12 +46,10 @@ def _board_lines(name: str, reader: BoardReader) -> Iterator[str]:
     if not counts.good and not counts.rejected:
         return
     reasons = _reasons(
-        (
-            (counts.bad_length, "of a wrong length"),
-            (counts.bad_cobs, "with bytes that are no COBS"),
-            (counts.bad_crc, "with a wrong checksum"),
-            (counts.bad_message, "with an unknown message"),
-        )
+        (counts.bad_length, "of a wrong length"),
+        (counts.bad_cobs, "with bytes that are no COBS"),
+        (counts.bad_crc, "with a wrong checksum"),
+        (counts.bad_message, "with an unknown message"),
     )
     rejected = f", {counts.rejected} were rejected ({reasons})" if counts.rejected else ", none was rejected"
     end = f" {counted(reader.pending, 'byte')} at the end are no whole frame." if reader.pending else ""
@@ -103,14 +101,12 @@ def _tracker_line(decoder: Decoder) -> str:
 def refusals(counts: MtxCounts) -> str:
     """Numbers of the samples that the tracker does not use, each with its cause; empty for none."""
     return _reasons(
-        (
-            (counts.incomplete, "without counter, accel or gyro"),
-            (counts.bad_length, "of another length"),
-            (counts.other_device, "of another device"),
-            (counts.not_finite, "with a number that is not finite"),
-            (counts.bad_quaternion, "with an impossible quaternion"),
-            (counts.out_of_range, "beyond the sensor's range"),
-            (counts.repeated, "with a repeated counter"),
-            (counts.bad_counter, "with a counter that does not follow"),
-        )
+        (counts.incomplete, "without counter, accel or gyro"),
+        (counts.bad_length, "of another length"),
+        (counts.other_device, "of another device"),
+        (counts.not_finite, "with a number that is not finite"),
+        (counts.bad_quaternion, "with an impossible quaternion"),
+        (counts.out_of_range, "beyond the sensor's range"),
+        (counts.repeated, "with a repeated counter"),
+        (counts.bad_counter, "with a counter that does not follow"),
     )

@@ -100,26 +100,17 @@ def _by_hand(state: TrackerState) -> str:
 def skipped(recording: Recording, streams: StreamState) -> list[str]:
     """One line for each kind of damage; none for a whole recording of undisturbed ports."""
     front_end, damage = streams.front_end, recording.damage()
-    facts = [
-        (
-            front_end.bad_arrivals,
-            f"{front_end.bad_arrivals} arrival times contradict the devices' counters and were not used",
-        ),
-        (front_end.clock_steps, f"the host's clock stepped or stood still {front_end.clock_steps} times"),
-        (front_end.barometer_jumps, "the barometer's first readings were not air pressure and were not used"),
-        (
-            front_end.stray_edges,
-            f"{front_end.stray_edges} edges on the SyncOut input were none of the MTx's and were not used",
-        ),
-        (front_end.bad_times, f"{front_end.bad_times} messages had impossible times and were dropped"),
-        (front_end.unknown_ports, f"{front_end.unknown_ports} chunks came from unknown ports"),
-        (streams.board.rejected, f"{streams.board.rejected} damaged frames of the board were dropped"),
-        (
-            streams.mtx.bad_checksum,
-            f"{streams.mtx.bad_checksum} damaged messages of the {streams.foot_name} were dropped",
-        ),
-    ]
-    lines = [*damage, *(text for applies, text in facts if applies)]
+    counts = {
+        "{} arrival times contradict the devices' counters and were not used": front_end.bad_arrivals,
+        "the host's clock stepped or stood still {} times": front_end.clock_steps,
+        "the barometer's first readings were not air pressure and were not used": front_end.barometer_jumps,
+        "{} edges on the SyncOut input were none of the MTx's and were not used": front_end.stray_edges,
+        "{} messages had impossible times and were dropped": front_end.bad_times,
+        "{} chunks came from unknown ports": front_end.unknown_ports,
+        "{} damaged frames of the board were dropped": streams.board.rejected,
+        f"{{}} damaged messages of the {streams.foot_name} were dropped": streams.mtx.bad_checksum,
+    }
+    lines = [*damage, *(text.format(count) for text, count in counts.items() if count)]
     lines = [f"{recording.path}: {line}" for line in lines]
     advice = [
         f"  echostep repair {path} -o OUT makes a whole file of what is readable" for path in recording.to_repair()

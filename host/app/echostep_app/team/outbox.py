@@ -19,10 +19,11 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Protocol
 
-from echostep.localization import RISK, WALKER_M_S, ellipse95, trust
+from echostep.localization import RISK, WALKER_M_S, TrackStatus, ellipse95, trust
 from echostep_app.printing.lines import moment
 from echostep_app.team.faults import in_words
 from echostep_app.team.messages.report import Position, Report, ReportedAlarm
+from echostep_app.wearer.steady_status import SteadyStatus
 
 # After so long without a new estimate the last one is sent again, with its age and a larger covariance
 HEARTBEAT_S = 2.0
@@ -84,7 +85,7 @@ class Outbox:
         self._transport, self.name, self._print_line = transport, name, print_line
         self._queue: deque[tuple[float, Report]] = deque()
         self._last: tuple[float, Report] | None = None
-        self._sequence = 0
+        self._sequence, self._steady = 0, SteadyStatus()
         self._changed = threading.Condition()
         self._closing_s: float | None = None
         self._open = False
@@ -173,7 +174,9 @@ class Outbox:
     def _stamped(self, entry: tuple[float, Report]) -> Report:
         offered_s, report = entry
         self._sequence += 1
-        return stamped(report, self._sequence, time.time(), time.monotonic() - offered_s, self.counts.overtaken)
+        age_s = time.monotonic() - offered_s
+        made = stamped(report, self._sequence, time.time(), age_s, self.counts.overtaken)
+        return steadied(made, age_s, self._steady)
 
     def _over(self) -> bool:
         with self._changed:
@@ -218,6 +221,16 @@ def stamped(report: Report, sequence: int, unix_s: float, age_s: float, overtake
         status=status,
     )
     return without_place(report, last) if last else replace(report, position=position, place=place)
+
+
+def steadied(report: Report, age_s: float, steady: SteadyStatus) -> Report:
+    """The report as lost for HOLD_S, in its position's time, after one that was lost by its age; its position is the last one then."""
+    known = report.position or report.last_place
+    if known is None:
+        return report
+    by_age = TrackStatus.LOST if age_s > SETTLED_S else TrackStatus.TRACKING
+    is_lost = steady.worst(known.t_s + known.age_s, by_age) is TrackStatus.LOST
+    return without_place(replace(report, status="lost"), known) if is_lost else report
 
 
 def without_place(report: Report, last: Position | None) -> Report:

@@ -41,6 +41,7 @@ from echostep_app.team.messages.report import (
     printable,
 )
 from echostep_app.team.outbox import HEARTBEAT_S, Delivery, Outbox, Transport, without_place
+from echostep_app.wearer.steady_status import SteadyStatus
 from echostep_app.wearer.watch import AlarmWatch, watch_of
 
 Source = Literal["live", "replay", "simulated"]
@@ -64,7 +65,7 @@ class Publishing:
         """`recorded`: arrival time in ns -> Unix time of a recording that is replayed."""
         self._recorded = recorded
         self._tracker, self._print_line = tracker, print_line
-        self._watch = watch_of(tracker)
+        self._watch, self._steady = watch_of(tracker), SteadyStatus()
         self._history, self._levels = ReportHistory(), tracker.plan.levels
         self._history_before_estimate, self._offered_s = ReportHistory(), time.monotonic()
         self.run = run = secrets.token_hex(4)
@@ -86,7 +87,7 @@ class Publishing:
             return
         self._offered_s = math.inf
         streams = self._history.streams(self._tracker, estimates[0].t_s)
-        for estimate in estimates:
+        for estimate in (self._steady.shown(each, self._tracker) for each in estimates):
             where = printable(self._whereabouts.words(estimate.x_m, estimate.y_m, estimate.level), 100)
             motion = self._history.motion(estimate)
             report = report_of(self._empty, self._levels, self._ground, estimate, motion, streams)

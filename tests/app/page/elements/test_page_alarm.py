@@ -16,7 +16,7 @@ from echostep_app.page.elements.alarm import ShownAlarm, shown_alarm
 from echostep_app.page.mailbox import Mailbox, popped
 from echostep_app.page.requests import parse_request
 from echostep_app.page.server import PageServer
-from page.browser import HELD_MS, LOCAL, PLAN, Walk, looking, picture, wait_for
+from page.browser import LOCAL, PLAN, looking, picture, wait_for
 from page.frames import scene
 from waiting import until
 
@@ -94,20 +94,6 @@ def test_the_page_asks_and_nothing_keeps_anybody_from_answering(browser: Any, lo
         assert not page.wrong
         page.context.close()
     assert found.violations_count == 0, found.generate_report()
-
-
-def test_help_is_called_for_and_taken_back(browser: Any) -> None:
-    with Walk(24.0, 1.0) as walk:
-        page = looking(browser, walk.page.url, "bright")
-        page.evaluate("() => { window.said = []; speechSynthesis.speak = ({ text }) => said.push(text); }")
-        page.click("#help", delay=HELD_MS)
-        wait_for(page, f"{TEXT}.startsWith('Mayday: you asked for help.')")
-        wait_for(page, "said.some((text) => text.startsWith('Mayday.'))")  # although speech is off
-        page.click("#fine")
-        wait_for(page, f"{TEXT} === 'The mayday is over.'")
-        assert page.locator("#fine").is_hidden()
-        assert not page.wrong
-        page.context.close()
 
 
 UNSPOKEN = "document.querySelector('#unspoken')"

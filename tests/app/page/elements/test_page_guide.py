@@ -170,6 +170,9 @@ def test_without_bytes_a_guided_page_says_stop(chunks: list[Chunk]) -> None:
         with opened_url(live.url) as page:
             page.recv(timeout=PATIENCE_S)
             frame = until(page, lambda frame: frame["guidance"]["kind"] == "stop")
+    assert frame["words"].startswith("lost: nothing from the foot for ")
+    assert (frame["told"]["status"], frame["told"]["heading_known"]) == ("lost", False)
+    assert frame["told"]["major_m"] > 5.0
     assert frame["guidance"]["text"] == "Stop. There is nothing from the foot"
     assert frame["guidance"]["arrow_rad"] is None
     assert frame["beacons"]

@@ -166,7 +166,7 @@ def test_the_track_has_a_gap_where_no_place_was_claimed() -> None:
     known, lost = TrackStatus.TRACKING, TrackStatus.LOST
     with LivePage(Tracker(PLAN), "test", LOCAL) as page:
         for k, status in enumerate((lost, known, known, lost, lost, known)):
-            page._watch(None, told(2.0 + k, 7.5, float(k), status))
+            page._watch(None, told(2.0 + k, 7.5, 3.0 * k, status))
         rows = np.frombuffer(page.mailbox.trail.part(0, 9), "<f4").reshape(-1, 3)
     assert np.array_equal(rows[:, 0], [3.0, 4.0, math.nan, 7.0], equal_nan=True)
 

@@ -72,27 +72,13 @@ def outage(wearer: Any, table: Any, broker: Broker) -> None:
 @needs_broker
 def test_a_dead_broker_is_told_and_what_is_asked_for_arrives_once(browser: Any, tmp_path: Path) -> None:
     with Broker(tmp_path) as broker:
-        walk = (
-            "demo",
-            "--speed",
-            "1",
-            "--port",
-            0,
-            "--publish",
-            broker.url,
-            "--name",
-            "anna",
-            "--out",
-            tmp_path / "demo",
-        )
+        walk = f"demo --speed 1 --port 0 --publish {broker.url} --name anna --out {tmp_path / 'demo'}".split()
         follow = ("command", broker.url, "--plan", PLAN, "--port", 0, "--out", tmp_path / "operation.mcap")
         with program(*walk, "--page", "--no-open") as wearer_url, program(*follow) as table_url:
             for k, (width, height) in enumerate(SIZES):
                 how = {"viewport": {"width": width, "height": height}}
-                wearer, table = (
-                    loaded_page(browser, wearer_url, how, READY),
-                    loaded_page(browser, table_url, how, TABLE_READY),
-                )
+                wearer = loaded_page(browser, wearer_url, how, READY)
+                table = loaded_page(browser, table_url, how, TABLE_READY)
                 table.fill("#me", "Ben")
                 outage(wearer, table, broker)
                 for role, page in (("wearer", wearer), ("table", table)):

@@ -20,7 +20,7 @@ from echostep_app.team.messages.crews import Crew
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.teams import TOWER, ServedTeam, Team, place
 from page.browser import READY, loaded_page, wait_for
-from page.frames import PLAN, scene, served
+from page.frames import PLAN, scene, served, told
 from page.web.test_page_sizes import RATES, RUNNING, TABLE_READY, moments
 from plan.imported_plans import seven_floors
 
@@ -116,7 +116,7 @@ NAMES = """[...document.querySelectorAll('#rooms text')].filter((e) => e.getAttr
 
 
 def test_names_give_way_to_signs(browser: Any) -> None:
-    """Those of the places that fit, and on a commander's page those of wearers who move."""
+    """Those of the places that fit, the wearer's own, and on a commander's page those of wearers who move."""
     estimate = moments()[2].estimate
     with served(Mailbox(PLAN, "test", replay=False)) as (server, mailbox):
         spots = [room.at_m for room in PLAN.levels[0].rooms[:2]]
@@ -128,6 +128,9 @@ def test_names_give_way_to_signs(browser: Any) -> None:
         page = opened(browser, server.url, (360, 740), READY)
         wait_for(page, "echostep.last.told.hypotheses.length === 2")
         assert not covered(page, spots)
+        mailbox.publish(replace(scene(5.0), estimate=told(18.5, 7.5)))  # where North corridor is written
+        wait_for(page, f"echostep.last.t_s === 5 && {NAMES}.length && echostep.view.shows([18.5, 7.5, 18.5, 7.5])")
+        assert not covered(page, [(18.5, 7.5)])
         page.context.close()
     team = Team()
     spots = [TOWER.levels[0].rooms[0].at_m]
@@ -135,7 +138,17 @@ def test_names_give_way_to_signs(browser: Any) -> None:
     with ServedTeam(team) as table:
         page = opened(browser, table.page.url, (360, 740), TABLE_READY)
         assert not covered(page, spots)
+        left, right = page.evaluate(NAME_AT_EDGE)
+        assert 0 < left < right < 180  # on the other side of the sign, where the map's edge would cut it
         page.context.close()
+
+
+NAME_AT_EDGE = """async () => {
+    const { Painter } = await import(new URL('table/paint.js', document.baseURI)), painter = new Painter(document.createElement('canvas')), at = [];
+    painter.sprites.draw = (_pen, _name, x, _y, [half]) => at.push(x - half, x + half);
+    painter.names({ width: 200 }, [{ id: 1, name: 'Anna', state: 'mayday', at: [180, 50] }], null);
+    return at;
+}"""
 
 
 def covered(page: Any, spots: list[tuple[float, float]]) -> list[Any]:

@@ -126,6 +126,7 @@ def test_a_responder_is_guided_and_calls(browser: Any, name: str, tmp_path: Path
                 )
                 assert page.inner_text("#errand") == "Ben sends you to Finn, in distress"
             look("1-sent")
+            pages[3].evaluate("() => { window.said = []; speechSynthesis.speak = ({ text }) => said.push(text); }")
             pages[3].click("#help", delay=HELD_MS)  # at 400 %
             assert until(lambda: called(visit, "mayday"))
             visit.walk(0.1)
@@ -133,6 +134,7 @@ def test_a_responder_is_guided_and_calls(browser: Any, name: str, tmp_path: Path
                 wait_for(
                     page, "document.querySelector('#alarm-text').textContent.startsWith('Mayday: you asked for help.')"
                 )
+            wait_for(pages[3], "said.some((text) => text.startsWith('Mayday.'))")  # although speech is off
             look("2-mayday")
             pages[1].click("#fine")
             assert until(lambda: called(visit, "over"))

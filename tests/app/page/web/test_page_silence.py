@@ -31,6 +31,9 @@ SLEEPS = f"(() => {{ const now = Date.now; Date.now = () => now() + {1000 * SLEP
 WITHIN_S = 5.0  # of which the tick of the page and the answer of the browser have their share
 DATED = """(id) => getComputedStyle(document.querySelector(id), '::before').content"""
 BEATS = "echostep.link.pulse.heard"
+BACKGROUND = """(() => { const { pulse } = echostep.link, tick = pulse.tick; let last = 0;
+    pulse.tick = function () { const now = performance.now(); if (now - last > 1600) { last = now; tick.call(this); } };
+})()"""  # a browser's timers come late in a tab that is not seen
 OUTBOX = "document.querySelector('#outbox').textContent"
 
 
@@ -148,11 +151,35 @@ def test_a_call_survives_a_reload_and_the_end_of_the_program(browser: Any) -> No
         page.context.close()
 
 
+def test_no_call_is_lost_by_a_clock_that_is_set_nor_in_one_of_two_tabs(browser: Any) -> None:
+    with Feeder("wearer") as feeder, Wire(feeder.url) as wire:
+        page = loaded_page(browser, wire.url, {"viewport": {"width": 360, "height": 740}}, READY["wearer"])
+        tab = page.context.new_page()
+        tab.goto(wire.url)
+        wait_for(tab, READY["wearer"])
+        with outage("stopped", feeder, wire):
+            shown(page, "wearer")
+            ask(page, "wearer")
+            wait_for(tab, f"{OUTBOX}.startsWith('Help!: sending for ')")
+            page.evaluate("(() => { const { now } = Date; Date.now = () => now() - 3600e3; })()")
+            wait_for(page, f"/sending for [1-9]\\d* s/.test({OUTBOX})")
+        for each in (page, tab):
+            wait_for(each, f"!{OUTBOX}.includes('sending') && !echostep.link.outbox.kept.length")
+        tab.close()
+        old = "{ kind: 'call', help: true, request: '1-2-3-4', at_ms: Date.now() - 3600e3 }"  # of another day
+        page.evaluate(f"localStorage['request / 1-2-3-4'] = JSON.stringify({old})")
+        page.reload()
+        wait_for(page, f"{OUTBOX} === 'Help!: not sent: too late by now, do it again'")
+        assert feeder.lines == ["Call(help=True)"]
+        page.context.close()
+
+
 def test_a_run_that_hangs_behind_its_server_is_told_and_what_has_nothing_to_say_is_not_silent(browser: Any) -> None:
     with served(Mailbox(PLAN, "echostep live", replay=False)) as (server, mailbox):
         page = loaded_page(browser, server.url, {}, "window.echostep?.link.isOpen")
         wait_for(page, f"{BEATS} > 3")  # no estimate yet
         assert page.is_hidden("#silence")
+        page.evaluate(BACKGROUND)
         mailbox.publish(scene())
         mailbox.exchange.note_alive()
         wait_for(page, "document.body.dataset.silent === 'present' && document.querySelector('#here').disabled")

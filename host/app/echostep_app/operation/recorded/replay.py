@@ -2,13 +2,17 @@
 """`echostep command OPERATION.mcap`: a recorded operation, shown again by the code that showed it live.
 
 In: a recording, a plan. Out: the page, the final table, the roster as JSON. Owns the loop. The page can be used while the file is read.
+`Views`: where a team is shown, live too.
 """
 
 from __future__ import annotations
 
+import json
 import math
+import sys
 import time
 from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,12 +25,38 @@ from echostep_app.operation.operation import Operation
 from echostep_app.operation.recorded.player import Player, load
 from echostep_app.operation.recorded.record import KIND
 from echostep_app.operation.recorded.tape import Tape
-from echostep_app.operation.views import Views, finish, open_page
 from echostep_app.page.protocol import FRAME_S
-from echostep_app.team.commander import table
+from echostep_app.team.commander import as_tree, table
 
 if TYPE_CHECKING:
     from echostep_app.operation.page import TablePage
+    from echostep_app.page.server import Address
+
+
+@dataclass(frozen=True, slots=True)
+class Views:
+    """`page` None: no page. `as_json`: the roster at the end, instead of the table."""
+
+    page: Address | None = None
+    as_json: bool = False
+
+    def open_page(
+        self, opened: ExitStack, operation: Operation, title: str, tape: Tape, console: Console
+    ) -> TablePage | None:
+        """The page, served until `opened` is closed, and its address printed; None where there is none."""
+        if self.page is None:
+            return None
+        from echostep_app.operation.page import TablePage
+        from echostep_app.page.web.addresses import print_page
+
+        page = opened.enter_context(TablePage(operation, title, self.page, tape))
+        print_page(console, page.server.urls)
+        return page
+
+    def finish(self, operation: Operation, now_s: float) -> None:
+        """Print the roster where asked for; `now_s` on the operation's clock."""
+        if self.as_json:
+            sys.stdout.write(json.dumps(as_tree(operation.roster, operation.plan, now_s), indent=2) + "\n")
 
 
 def replay(path: Path, plan: Plan, seconds: float | None, views: Views, console: Console) -> None:
@@ -40,7 +70,7 @@ def replay(path: Path, plan: Plan, seconds: float | None, views: Views, console:
         )
     operation, tape = Operation(plan), Tape(path, grows=False)
     with ExitStack() as opened:
-        page = open_page(opened, operation, "echostep command, recorded", views, tape, console)
+        page = views.open_page(opened, operation, "echostep command, recorded", tape, console)
         with suppress(KeyboardInterrupt):
             player = _read(tape, operation, page)
             if player is None:
@@ -51,7 +81,7 @@ def replay(path: Path, plan: Plan, seconds: float | None, views: Views, console:
     if not views.as_json:
         lines = table(operation.roster, plan, tape.end_s, connected=True, columns=console.width)
         console.print(lines)
-    finish(operation, tape.end_s, views)
+    views.finish(operation, tape.end_s)
 
 
 def _read(tape: Tape, operation: Operation, page: TablePage | None) -> Player | None:

@@ -48,7 +48,7 @@ export class Painter {
   wearers(view, wearers, chosen) {
     const shown = wearers.filter(({ at: [sx, sy] }) => sx > -200 && sy > -200 && sx < view.width + 200 && sy < view.height + 200);
     for (const wearer of [...shown].reverse()) this.wearer(view, wearer, wearer.id === chosen);
-    this.names(shown, chosen);
+    this.names(view, shown, chosen);
   }
 
   trail(view, points, level) {
@@ -107,15 +107,16 @@ export class Painter {
     if (state === 'lost') for (const s of [-1, 1]) { pen.moveTo(-4, -4 * s); pen.lineTo(4, 4 * s); pen.stroke(); }
   }
 
-  // Names beside their signs, right or left, the most urgent first; none covers another name or a mayday's sign, but for the chosen one, and other signs
-  // are covered only where both sides are taken.
-  names(shown, chosen) {
+  // Names beside their signs, right or left, the most urgent first; none covers another name or a mayday's sign, but for the chosen one; other signs
+  // are covered, and the map's edge cuts a name, only where both sides are taken.
+  names(view, shown, chosen) {
+    const isWhole = ([left, , right]) => left >= 0 && right <= view.width;
     const around = ({ id, at: [sx, sy] }, half) => [sx - half, sy - half, sx + half, sy + half, id], signs = shown.map((wearer) => around(wearer, SIGN_PX));
     const taken = shown.filter(({ state }) => state === 'mayday').map((wearer) => around(wearer, MAYDAY_PX)), first = shown.filter(({ id }) => id === chosen);
     for (const { id, name, state, at: [sx, sy] } of [...first, ...shown.filter((wearer) => wearer.id !== chosen)]) {
       const width = this.width(name), far = (state === 'mayday' ? MAYDAY_PX : SIGN_PX + 8) + 3;
       const sides = [sx + far, sx - far - width], boxes = (this.isLeft.has(id) ? sides.reverse() : sides).map((left) => [left, sy - 9, left + width, sy + 9, id]), free = boxes.filter((box) => !taken.some((other) => cover(box, other)));
-      const box = free.find((one) => !signs.some((other) => cover(one, other))) ?? free[0] ?? (id === chosen ? boxes[0] : null);
+      const box = free.find((one) => isWhole(one) && !signs.some((other) => cover(one, other))) ?? free.find(isWhole) ?? free[0] ?? (id === chosen ? boxes[0] : null);
       if (!box) continue;
       this.isLeft[box[0] < sx ? 'add' : 'delete'](id);  // it stays on its side while that is free
       taken.push(box);

@@ -36,7 +36,7 @@ export class Storeys {
     const scale = Math.max(Math.min((r - l - 2 * MARGIN_PX) / (c * w + s * h), (band - GAP_PX) / FLAT / (s * w + c * h)), 0.1);
     this.floors.forEach((floor, k) => {
       floor.view = Object.assign(new Storey(), { x: (x0 + x1) / 2, y: (y0 + y1) / 2, scale, turn, width, height, middle: [(l + r) / 2, b - band * (k + 0.5)] });
-      floor.edge = [l + 4, b - band * k - 4];
+      floor.edge = [l + 4, Math.min(b - band * k - 4, floor.view.middle[1] + FLAT * scale * (s * w + c * h) / 2 + GAP_PX - 4)];
     });
   }
 

@@ -4,6 +4,7 @@
 import { ends, length } from './geometry.js';
 import { middle, outlined, outlineOf, sides, size, startOn } from './shapes.js';
 import { tr } from './language.js';
+import { halfOf, isFree } from './plan.js';
 import { KINDS, WORDS } from './words.js';
 
 const SVG = 'http://www.w3.org/2000/svg';
@@ -42,13 +43,21 @@ function startMark({ x, y, heading_deg }, view, chosen) {
   return made;
 }
 
-// The elements that are outlines; names of stairs, lifts and ramps in their middle. Returns the names and the start.
+// The elements that are outlines; names of rooms, and of stairs, lifts and ramps in their middle. Returns the names and the start.
 function paintShapes({ tree, sheet: { k }, chosen }, view) {
   const rows = outlined(tree, k), closed = (kind) => rows.filter((row) => row.kind === kind).map(({ outline }) => `M${outline.map((p) => p.join(' ')).join('L')}Z`).join('');
   byId('obstacles').setAttribute('d', closed('obstacle'));
   byId('connectors').setAttribute('d', closed('connector'));
-  const names = rows.filter(({ way }) => way).map(({ outline, way, name }) => mark('text', view.toScreen(...middle(outline)), name || tr(KINDS[way])));
+  const ways = rows.filter(({ way }) => way).map(({ outline, way, name }) => ({ at: middle(outline), name: name || tr(KINDS[way]) }));
+  const rooms = (tree.levels[k].rooms ?? []).map((room, n) => ({ ...room, isChosen: chosen?.kind === 'room' && chosen.k === n }));
+  const names = paintNames([...rooms, ...ways].sort((a, b) => (b.isChosen ?? false) - (a.isChosen ?? false)), view);
   return startOn(tree, k) ? [...names, startMark(tree.start, view, chosen?.kind === 'start')] : names;
+}
+
+// Names of which none covers an earlier one.
+function paintNames(rows, view) {
+  const taken = [], placed = rows.map((row) => ({ ...row, spot: [...view.toScreen(...row.at), halfOf(row.name)] }));
+  return placed.filter(({ spot }) => isFree(taken, spot) && taken.push(spot)).map(({ spot, name, isChosen }) => mark('text', spot, name, isChosen));
 }
 
 // The segments of the selected element.
@@ -67,7 +76,7 @@ function measured({ draft, box, live }, rows) {
 }
 
 export function paint(tools, view, shown) {
-  const { level, picture, chosen, draft, box, chain, cross, points } = tools, doors = level.doors ?? [];
+  const { level, picture, draft, box, chain, cross, points } = tools, doors = level.doors ?? [];
   byId('world').setAttribute('transform', `matrix(${view.matrix().join(' ')})`);
   const image = byId('image');
   image.toggleAttribute('hidden', !picture);
@@ -80,8 +89,7 @@ export function paint(tools, view, shown) {
   const rows = chosenRows(tools), drawn = chain?.corners ? sides(chain.corners).slice(0, -1) : [];
   byId('chosen').setAttribute('d', path(rows));
   byId('draft').setAttribute('d', path([...drawn, ...(box ? sides(box) : draft ? [draft] : [])]));
-  const marks = (level.rooms ?? []).map((room, k) => mark('text', view.toScreen(...room.at), room.name, chosen?.kind === 'room' && chosen.k === k));
-  for (const p of [...rows.flatMap(ends), ...points]) marks.push(mark('circle', view.toScreen(...p)));
+  const marks = [...rows.flatMap(ends), ...points].map((p) => mark('circle', view.toScreen(...p)));
   byId('marks').replaceChildren(...marks, ...paintShapes(tools, view), ...paintQuestions(level.questions ?? [], shown, view));
   byId('cross').setAttribute('transform', `translate(${view.toScreen(...cross).join(' ')})`);
   const [text, at] = measured(tools, rows), [x, y] = view.toScreen(...at), label = byId('measure');

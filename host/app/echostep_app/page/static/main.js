@@ -221,7 +221,7 @@ function draw() {
     connection();  // the frame may be older than the end of the connection
     taps.undoable(scene.frame.undo);
     panel.floors(scene.level, estimate);
-    replay.frame(scene.frame.play);
+    replay.frame(scene.frame.play, scene.frame.ended);
     charts.frame(scene.frame.play);
     if (moment !== null && scene.frame.play?.end_s >= moment) { link.send('play', { playing: false }); seek(moment); moment = null; }
     if (!estimate && !invited && scene.frame.words.startsWith('tap')) { invited = true; enter('here'); }

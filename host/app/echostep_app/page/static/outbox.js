@@ -11,6 +11,7 @@ const LABELS = {
 };
 const FRESH_S = { check_in: 5, undo: 5, met: 5, at_point: 2, no_tap: 2 };  // what is said of this moment is wrong later; assumed
 const STORED_S = 600;  // what an earlier page left behind is sent for so long; assumed
+const TOO_LATE = 'not sent: too late by now, do it again';
 const SLOW_S = 1, SHOWN_MS = 6000, REFUSED_MS = 20000, REMIND_S = 10, MOST_NEWS = 2;
 const $ = (id) => document.getElementById(id);
 
@@ -18,14 +19,20 @@ export class Outbox {
   // `transmit(request)`: sends it if there is a connection; `onUnsent(text)`: a call for help has not gone out, each REMIND_S; `serverNow_s()`: or null
   constructor(transmit, onUnsent, serverNow_s) {
     Object.assign(this, { transmit, onUnsent, serverNow_s, prefix: `request ${location.pathname} `, run: null, kept: [], news: [], waiting: 0 });
-    this.kept = stored(this.prefix).filter((request) => age_s(request) < STORED_S);
+    this.kept = stored(this.prefix);
+    for (const request of this.kept) if (age_s(request) >= STORED_S) this.drop(request, TOO_LATE);
     setInterval(() => this.tick(), 1000 * SLOW_S);
+    window.addEventListener('storage', ({ key, newValue }) => {  // of another tab of this page
+      const kept = this.kept.filter(({ request }) => key !== this.prefix + request);
+      this.kept = newValue && key.startsWith(this.prefix) ? [...kept, ...whole(newValue)] : kept;
+      this.show();
+    });
   }
 
   static keeps(kind) { return kind in LABELS; }
 
   put(kind, fields) {
-    const request = { ...fields, kind, request: crypto.getRandomValues(new Uint32Array(4)).join('-'), run: this.run, at_ms: Date.now(), reminded: 0 };
+    const request = { ...fields, kind, request: crypto.getRandomValues(new Uint32Array(4)).join('-'), run: this.run, at_ms: Date.now(), mark_ms: performance.now(), reminded: 0 };
     const now_s = this.serverNow_s();
     if (kind in FRESH_S && now_s !== null) request.until_s = now_s + FRESH_S[kind];  // it may lie in the wire
     this.kept.push(request);
@@ -52,14 +59,14 @@ export class Outbox {
 
   isFresh(request) {
     const fresh = age_s(request) < (FRESH_S[request.kind] ?? Infinity);
-    if (!fresh) this.drop(request, 'not sent: too late by now, do it again');
+    if (!fresh) this.drop(request, TOO_LATE);
     return fresh;
   }
 
   drop(request, news) {
     this.kept = this.kept.filter((one) => one !== request);
     remember(this.prefix + request.request, null);
-    if (news) this.news.push({ text: `${label(request)}: ${news}`, ends: Date.now() + (news === 'sent' ? SHOWN_MS : REFUSED_MS) });
+    if (news) this.news.push({ text: `${label(request)}: ${news}`, ends: performance.now() + (news === 'sent' ? SHOWN_MS : REFUSED_MS) });
     this.show();
   }
 
@@ -82,7 +89,7 @@ export class Outbox {
 
   show() {
     const waiting = this.kept.filter((request) => request.kind === 'call' || age_s(request) > SLOW_S).map((request) => `${label(request)}: sending for ${Math.round(age_s(request))} s`);
-    this.news = this.news.filter(({ ends }) => ends > Date.now()).slice(-MOST_NEWS);
+    this.news = this.news.filter(({ ends }) => ends > performance.now()).slice(-MOST_NEWS);
     if (this.waiting) waiting.push(`Requests that wait for the broker: ${this.waiting}`);
     const text = [...waiting, ...this.news.map(({ text: news }) => news)].map(tr).join('. ');
     if ($('outbox').textContent !== text) $('outbox').textContent = text;
@@ -91,7 +98,7 @@ export class Outbox {
 }
 
 const label = ({ kind, help }) => (kind === 'call' && !help ? 'I am all right' : LABELS[kind]);
-const age_s = ({ at_ms }) => (Date.now() - at_ms) / 1000;
+const age_s = ({ at_ms, mark_ms }) => Math.max(Date.now() - at_ms, performance.now() - mark_ms) / 1000;  // as in pulse.js
 
 function stored(prefix) {
   try {
@@ -103,7 +110,7 @@ function stored(prefix) {
 // A damaged request is none, and hides no other one.
 function whole(text) {
   try {
-    const request = JSON.parse(text);
+    const request = { ...JSON.parse(text), mark_ms: performance.now() };
     return request.kind in LABELS && request.request && request.at_ms > 0 ? [request] : [];
   } catch { return []; }
 }

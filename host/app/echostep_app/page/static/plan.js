@@ -23,7 +23,7 @@ export class PlanView {
       const text = document.createElementNS(SVG, 'text');
       text.textContent = name;
       text.classList.add(kind);
-      return { x, y, text, half: 4 * name.length + 4 };
+      return { x, y, text, half: halfOf(name) };
     });
     this.roomsGroup.replaceChildren(...this.rooms.map((room) => room.text));
   }
@@ -41,12 +41,12 @@ export class PlanView {
   // Names of rooms that do not cover each other; one that would cover a sign, whose pixels are `signs`, is moved aside, or left out.
   names(view, signs = this.signs) {
     this.signs = signs;
-    const taken = [], isFree = (sx, sy, half) => taken.every(([tx, ty, other]) => Math.abs(tx - sx) > other + half || Math.abs(ty - sy) > 18);
+    const taken = [];
     for (const room of this.rooms) {
       const [sx, at] = view.toScreen(room.x, room.y), beside = signs.filter(([x]) => Math.abs(x - sx) < room.half + KEPT_PX);
       const covered = (y) => beside.find(([, sign]) => Math.abs(sign - y) < KEPT_PX), sign = covered(at);
       const places = sign ? [-KEPT_PX, KEPT_PX].map((by) => sign[1] + by).sort((a, b) => Math.abs(a - at) - Math.abs(b - at)) : [at];
-      const sy = places.find((place) => isFree(sx, place, room.half) && !covered(place));
+      const sy = places.find((place) => isFree(taken, [sx, place, room.half]) && !covered(place));
       const shown = sy !== undefined && sx > -room.half && sx < view.width + room.half && sy > -10 && sy < view.height + 10;
       if (shown) taken.push([sx, sy, room.half]);
       setNew(room.text, 'visibility', shown ? 'visible' : 'hidden');
@@ -54,6 +54,10 @@ export class PlanView {
     }
   }
 }
+
+// Half of a name's width in pixels; whether a name [x, y, half] covers none of those that are taken.
+export const halfOf = (name) => 4 * name.length + 4;
+export const isFree = (taken, [x, y, half]) => taken.every(([tx, ty, other]) => Math.abs(tx - x) > other + half || Math.abs(ty - y) > 18);
 
 function setNew(element, name, value) {
   if (element.getAttribute(name) !== value) element.setAttribute(name, value);

@@ -29,11 +29,11 @@ export class Pulse {
   get now_s() { return this.server_s === null ? null : this.server_s + this.since_s; }  // of the server
   get ago() { return this.age_s < 120 ? `${Math.floor(this.age_s)} s` : `${Math.floor(this.age_s / 60)} min`; }
 
-  // After a pause of the browser itself the beats that wait come first.
+  // After a pause of the browser itself the beats that wait come first. In the background each tick is late.
   tick() {
     const paused = Date.now() - this.ticked > 3 * TICK_MS;
-    this.ticked = Date.now();
-    if (!paused) this.judge();
+    if (!paused || this.paused) this.judge();
+    Object.assign(this, { ticked: Date.now(), paused });
   }
 
   judge() {

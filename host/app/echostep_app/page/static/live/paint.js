@@ -199,11 +199,15 @@ export class Painter {
     const { pen } = this, [sx, sy] = view.toScreen(x_m, y_m);
     pen.beginPath();
     pen.ellipse(sx, sy, Math.max(major_m * view.scale, 1), Math.max(minor_m * view.scale, 1), -(angle_rad + view.turn), 0, 2 * Math.PI);
-    pen.fillStyle = pen.strokeStyle = this.colour.here;
-    pen.globalAlpha = 0.15;
+    this.disc(this.colour.here, 2);
+  }
+
+  // What was begun, in a light tone with an edge.
+  disc(colour, width) {
+    const { pen } = this;
+    Object.assign(pen, { fillStyle: colour, strokeStyle: colour, lineWidth: width, globalAlpha: 0.15 });
     pen.fill();
     pen.globalAlpha = 1;
-    pen.lineWidth = 2;
     pen.stroke();
   }
 
@@ -275,12 +279,7 @@ export class Painter {
     const [sx, sy] = view.toScreen(x_m, y_m), { pen } = this;
     pen.beginPath();
     pen.arc(sx, sy, Math.max(SD_95 * sd_m * view.scale, 9), 0, 2 * Math.PI);
-    pen.strokeStyle = pen.fillStyle = this.colour.goal;
-    pen.globalAlpha = 0.15;
-    pen.fill();
-    pen.globalAlpha = 1;
-    pen.lineWidth = 3;
-    pen.stroke();
+    this.disc(this.colour.goal, 3);
     if (heading_rad === null && kept_rad === null) return;
     this.heading([sx, sy], heading_rad ?? kept_rad, view, heading_rad === null ? [3, 7] : []);
   }

@@ -29,10 +29,11 @@ export class Replay {
 
   forget() { this.last = null; }
 
-  frame(play) {
+  // `ended`: this is the end of the walk, from which Play begins anew.
+  frame(play, ended) {
     if (!play) return;
     this.last = play;
-    const { t_s, begin_s, end_s, playing } = play, bar = $('time');
+    const { t_s, begin_s, end_s } = play, playing = play.playing && !ended, bar = $('time');
     this.playing = playing;
     [bar.min, bar.max] = [begin_s, end_s];
     if (!this.holding) bar.value = t_s;

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: MIT
+"""The word that people read: worse at once, better once it has held.
+
+In: statuses with the estimates' own times, so that a live run and its replay say the same. Out: the worst of the last HOLD_S. Owns those.
+The one rule for page, speech, terminal and reports; files, and whatever computes on, have each estimate's own status.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from echostep.localization import Estimate, TrackStatus
+from echostep.tracker import Tracker
+
+HOLD_S = 2.0  # assumed: two strides, and twice the second after which silence makes the next dropout
+_WORSE = list(TrackStatus)
+
+
+class SteadyStatus:
+    """Call `worst` with each status in order of time."""
+
+    def __init__(self) -> None:
+        self._recent: list[tuple[float, TrackStatus]] = []
+        self._check_ins = 0, 0  # with undoings
+
+    def worst(self, t_s: float, status: TrackStatus) -> TrackStatus:
+        """The worst status of the last HOLD_S before `t_s`, this one among them."""
+        self._recent = [(at_s, each) for at_s, each in self._recent if at_s > t_s - HOLD_S] + [(t_s, status)]
+        return max((each for _, each in self._recent), key=_WORSE.index)
+
+    def shown(self, estimate: Estimate, tracker: Tracker) -> Estimate:
+        """The estimate with its steady status; a check-in, or its undoing, is a new beginning."""
+        state = tracker.state
+        if self._check_ins != (check_ins := (state.check_ins, state.undone)):
+            self._recent, self._check_ins = [], check_ins
+        return replace(estimate, status=self.worst(estimate.t_s, estimate.status))
