@@ -49,7 +49,6 @@ def shown(chunks: list[Chunk], size: int, *, replay: bool) -> tuple[list[Estimat
 
 
 def words_of(estimates: list[Estimate]) -> list[str]:
-    """Each word that is said, once while it stays."""
     return [word.value for word, _ in groupby(e.status for e in estimates)]
 
 

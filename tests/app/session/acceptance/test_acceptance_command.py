@@ -36,6 +36,7 @@ def test_the_twin_walks_the_protocol(tmp_path: Path) -> None:
         url = next(line.split()[-1] for line in iter(live.stdout.readline, "") if line.startswith("The page:"))
         reached = (line for line in iter(twin.stdout.readline, "") if line.startswith("at point"))
         with opened_url(url) as page:
+            assert '"title":"echostep acceptance' in page.recv(timeout=PATIENCE_S)
             for number in range(TAPS):
                 next(reached)
                 if number % 2:

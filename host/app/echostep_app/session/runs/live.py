@@ -104,7 +104,7 @@ def _live(
     start = _last_start(output.folder, plan, number, settings) if is_last else start_given(tracking, plan)
     tracker = Tracker(plan, start, settings, seed)
     check_start(plan, tracker.start, given=tracking.start is not None and not is_last, recorded=is_last)
-    session = Session(tracker, "echostep live", "live", output, tracking.guide_to)
+    session = Session(tracker, f"echostep {'acceptance' if guide else 'live'}", "live", output, tracking.guide_to)
     session.prepare(SEARCH)  # a search may begin with the first steps
     folder = output_folder(output.folder)
     tracker.watchers.append(PlaceKeeper(folder, tracker, number).note)
