@@ -37,6 +37,13 @@ def table() -> np.ndarray:
     return np.column_stack([np.arange(len(mean)) / 100.0, mean])
 
 
+def gliding(t: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A foot that stands for 3 s, then glides at 0.06 m/s, speed and pitch trembling at 3 Hz."""
+    wave, slope = ((t > 3.0) * each(6.0 * np.pi * t) for each in (np.sin, np.cos))
+    samples = np.column_stack([1.13 * slope - 0.052 * wave, 0 * t, 9.81 + 0 * t, 0 * t, 0.1 * slope, 0 * t])
+    return np.column_stack([t, samples + rng.standard_normal(samples.shape) * np.repeat([0.03, 0.006], 3)])
+
+
 def write(folder: Path, table: np.ndarray, header: str = HEADER) -> Path:
     path = folder / "imu.csv"
     np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.13g")
@@ -100,16 +107,6 @@ def test_a_walk_is_tracked_and_drawn(tmp_path: Path, table: np.ndarray) -> None:
     assert "steps" in done.stdout
 
 
-@pytest.mark.parametrize("mounting", [(1, 0, 2), (2, 1, 0), (0, 2, 1)])
-def test_any_mounting_gives_the_same_way(tmp_path: Path, table: np.ndarray, mounting: tuple[int, int, int]) -> None:
-    turn = np.eye(3)[list(mounting)]
-    turn[0] *= np.linalg.det(turn)
-    turned = np.column_stack([table[:, 0], table[:, 1:4] @ turn.T, table[:, 4:7] @ turn.T])
-    assert run(write(tmp_path, turned)).returncode == 0
-    rows = list(csv.DictReader((tmp_path / "track.csv").read_text().splitlines()))
-    assert np.hypot(float(rows[-1]["x"]), float(rows[-1]["y"])) == pytest.approx(13.0, rel=0.03)
-
-
 @pytest.mark.parametrize(
     ("spoil", "note"),
     [
@@ -124,6 +121,7 @@ def test_any_mounting_gives_the_same_way(tmp_path: Path, table: np.ndarray, moun
         (lambda t, _r: np.column_stack([t[:, :4], np.clip(t[:, 4:], -4.5, 4.5)]), "is cut off at 4.5"),
         (lambda t, _r: np.column_stack([t[:, 0], np.clip(t[:, 1:4], -25.0, 25.0), t[:, 4:]]), "is cut off at"),
         (lambda t, _r: t * [1, 1, -1, -1, 1, -1, -1], "steps"),  # upside down
+        (lambda t, _r: t[:, [0, 2, 3, 1, 5, 6, 4]], "steps"),  # on its side
         (lambda t, _r: t[150:], "steps"),
         (lambda t, _r: t[:-150], "steps"),
         (lambda t, _r: t + [1.7e9, 0, 0, 0, 0, 0, 0], "steps"),  # a clock that counts from 1970
@@ -153,7 +151,11 @@ def test_what_can_be_mended_is_said_and_the_track_is_right_or_known_to_be_less_c
         (lambda t, _r: np.column_stack([0 * t[:, 0], t[:, 1:]]), "does not advance"),
         (lambda t, r: np.where(r.random(t.shape) < 0.3, np.nan, t), "no number"),
         (lambda t, _r: np.column_stack([np.tile(t[:300, 0], 9)[: len(t)], t[:, 1:]]), "t_s"),
-        (lambda t, r: r.standard_normal(t.shape) * [0, 6, 6, 6, 3, 3, 3] + t * [1, 0, 0, 0, 0, 0, 0], "never stands"),
+        (
+            lambda t, r: r.standard_normal(t.shape) * [0, 6, 6, 6, 3, 3, 3] + t * [1, 0, 0, 0, 0, 0, 0],
+            "never still in these",
+        ),
+        (lambda t, r: gliding(t[:, 0], r), "never still: it seems to stand"),
         (lambda t, _r: t * [1, 1, 1, 1, 1, -1, 1], "are the units"),  # left-handed
         (lambda t, _r: np.column_stack([t[:, :4], np.radians(t[:, 4:])]), "are the units"),  # converted twice
         (lambda t, _r: t[:, [0, 1, 2, 3, 5, 4, 6]], "are the units"),  # gx and gy swapped
@@ -169,11 +171,6 @@ def test_wrong_input_is_named(tmp_path: Path, table: np.ndarray, foot: Command, 
     assert not told.track.exists()
 
 
-def with_header(text: str, header: str | None) -> str:
-    lines = text.splitlines(keepends=True)
-    return "".join(([] if header is None else [header + "\n"]) + lines[1:])
-
-
 @pytest.mark.parametrize(
     "spell",
     [
@@ -184,30 +181,19 @@ def with_header(text: str, header: str | None) -> str:
         lambda text: text.replace(",", "\t"),
         lambda text: text.replace("\n", "\n\n"),
         lambda text: text[:-20],
-        lambda text: with_header(text, "gz, gy,gx ,az,ay,ax,t_s,colour").replace("\n", ",7\n"),
+        lambda text: "\n".join(
+            ",".join([*line.split(",")[::-1], "7"]) for line in text.replace("ay", " ay ").splitlines()
+        ),
     ],
 )
 def test_every_spelling_of_a_table_is_read(tmp_path: Path, table: np.ndarray, spell: Callable[[str], str]) -> None:
     plain = load_foot(write(tmp_path, table))
     text = spell((tmp_path / "imu.csv").read_text())
-    if "colour" in text:
-        text = spell(
-            "\n".join(",".join(line.split(",")[::-1]) for line in (tmp_path / "imu.csv").read_text().splitlines())
-            + "\n"
-        )
     (tmp_path / "imu.csv").write_bytes(text.encode())
     read = load_foot(tmp_path / "imu.csv")
     assert np.array_equal(read.accel[:-1], plain.accel[: len(read.accel) - 1])
     assert np.array_equal(read.gyro[:-1], plain.gyro[: len(read.gyro) - 1])
     assert len(read.t_s) in (len(plain.t_s), len(plain.t_s) - 1)
-
-
-def test_a_missing_header_is_named(tmp_path: Path, table: np.ndarray, foot: Command) -> None:
-    write(tmp_path, table)
-    (tmp_path / "imu.csv").write_text(with_header((tmp_path / "imu.csv").read_text(), None))
-    told = foot(tmp_path / "imu.csv")
-    assert told.status == 2
-    assert "the first line must name the columns" in told.err
 
 
 @pytest.mark.parametrize(
@@ -229,10 +215,13 @@ def test_a_gigabyte_of_garbage_ends_at_once_and_takes_no_memory(tmp_path: Path, 
         assert time.process_time() - began < 20.0
 
 
-@pytest.mark.parametrize("content", ["", "a,b,c\n1,2,3\n", "\x00\x01\x02", HEADER + "\n", HEADER + "\nx,y\n"])
+NO_TABLES = ["", "a,b,c\n1,2,3\n", "\x00\x01\x02", HEADER + "\n", HEADER + "\nx,y\n", "0,0,0,9.81,0,0,0\n"]
+
+
+@pytest.mark.parametrize("content", NO_TABLES)
 def test_what_is_no_table_is_named(tmp_path: Path, content: str) -> None:
     (tmp_path / "x.csv").write_text(content)
-    with pytest.raises(EchostepError, match=r"x\.csv"):
+    with pytest.raises(EchostepError, match=r"x\.csv" + ": .*first line must name" * content.startswith("0,")):
         load_foot(tmp_path / "x.csv")
 
 

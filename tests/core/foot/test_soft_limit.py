@@ -3,13 +3,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from echostep.arrays import Floats
+from echostep.foot import soft_limit, stance
 from echostep.foot.steps import walk_track
+from echostep.jit import lean_kernel
 from echostep_studies.bench.recordings.feet import SETS, FootRecording
 from echostep_studies.feet.study import track_of
 from echostep_studies.frame.recordings import DATA, recordings_in
@@ -39,6 +42,14 @@ def test_a_soft_limit_costs_a_percent_and_no_step(name: str, rate_hz: int) -> No
     assert way == pytest.approx(float(np.hypot(*np.diff(course.prints_m, axis=0)[:, :2].T).sum()), rel=0.01)
     error = (track.steps[-1].heading_rad - STEPS * manner.turn_rad + np.pi) % (2.0 * np.pi) - np.pi
     assert abs(error) < np.radians(8.0)
+
+
+def test_a_rate_at_the_value_of_the_last_plateau_may_be_rounder() -> None:
+    window = stance.new_window()
+    for k, rate in enumerate((8.9, 9.01)):  # 2.4 per second: more than 2, less than 3
+        stance.add_sample(window, 0.005 * k, np.zeros(3), np.full(3, rate))
+    flat: Callable[..., bool] = lean_kernel(lambda window, limit: soft_limit._flat(window, 0, 0, 1, limit))
+    assert [flat(window, limit) for limit in (0.0, 8.95, 9.2)] == [False, True, False]
 
 
 @pytest.mark.parametrize("name", ["walking", "running", "turning", "downstairs"])

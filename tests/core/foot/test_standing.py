@@ -84,13 +84,13 @@ def test_a_run_is_said_to_be_one(stood_s: float, said: str) -> None:
 @pytest.mark.slow
 @needs_data()
 def test_feet_in_a_hurry_are_no_further_off_than_they_say() -> None:
-    """Four trials with motion capture: 2D within 0.2 m, heights within 0.05 m, lengths of strides within their deviation."""
+    """Motion capture: 2D within 0.14 m (0.18 by the shape of plateaus alone), heights within 0.05 m, lengths of strides within their deviation."""
     recordings = [recording for recording in recordings_in(DATA, SETS) if recording.group == "vicon_more"]
     assert len(recordings) >= 4
     for recording in recordings:
         track = walk_track(recording.t_s, recording.accel, recording.gyro)
         figures = {figure.metric: figure.value for figure in recording.judge(track)}
-        assert figures["2D RMSE where the truth moves"] < 0.2, recording.name
+        assert figures["2D RMSE where the truth moves"] < 0.14, recording.name
         assert figures["height RMSE"] < 0.05, recording.name
         assert recording.truth_m is not None
         assert 0.5 < _normalized(track.steps, track.position_m[:, :2], recording.truth_m, recording.t_s) < 1.6

@@ -179,7 +179,7 @@ def _navigate(
     dt, t_s, accel, gyro = sample
     ins.propagate(nav, dt, s.period_s, s.force, accel, s.rate, gyro)
     _inflate_at_limits(s, nav, dt, accel, gyro)
-    s.saturated += soft_limit.restore(nav, window, s.period_s, s.rate_peak)
+    s.saturated += soft_limit.restore(nav, window, s.period_s, s.rate_peak, s.rate_plateau)
     if not s.in_stance:
         s.swing_rad_s = max(s.swing_rad_s, math.sqrt(ins.dot(gyro, gyro)))
         s.flight_s += dt

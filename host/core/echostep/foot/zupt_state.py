@@ -42,6 +42,7 @@ class ZuptState(Protocol):
     force_limit_s: Floats  # duration of each axis at its limit
     rate_limit_s: Floats
     rate_peak: Floats  # greatest rate of each axis
+    rate_plateau: Floats  # height of its last plateau, see `soft_limit`; 0: none yet
     swing_rad_s: float  # greatest rate since the last stance
     rest_s: float
     rest_end_s: float

@@ -34,7 +34,6 @@ REGULAR_SHARE = 0.01  # largest share of sorted times that follow each other wit
 BACK_SHARE = 0.02  # largest share of rows whose time goes back
 REPEATED_SHARE = 0.6  # largest share of rows that repeat the time before
 MISSING_SHARE = 0.02  # share of missing samples that is reported
-STEEP = (STEEP_M_S2, STEEP_RAD_S)  # equal readings beyond these are a sensor at its limit
 CLIPPED_SHARE = 1e-3  # least share of readings at the limit that is reported
 FEWEST_REPEATS = 3  # of equal neighbours at the limit
 FEWEST_ROWS = 100  # fewer rows do not show a dead sensor
@@ -46,6 +45,8 @@ FASTEST_WALK_M_S = 8.0  # median speed of the foot over a step
 FORCED_SAMPLES = 5  # samples of rest accepted against the innovation gate
 LOST_SHARE = 0.2  # standard deviation of the end over the length of the path
 HIGHEST_STEP_M = 1.0  # median rise of a step
+GLIDING_SHARE = 0.85  # of rest in a contradictory walk: a foot that glides more slowly than its sensor tells from rest
+NEEDED = "zero-velocity navigation needs a foot that stands in each step"
 LEAST_FAULT = 0.1  # excess of the force at rest that may be why a track is no foot's
 
 
@@ -140,7 +141,7 @@ def notes(table: Floats, columns: Sequence[str]) -> tuple[str, ...]:
     if (missing := missing_share(steps)) > MISSING_SHARE:
         remarks.append(f"{100 * missing:.0f} % of the samples are missing: the track is less certain")
     for k, name in enumerate(columns[1:SENSOR_COLUMNS], start=1):
-        if clipped := _clipped(table[:, k], STEEP[0] if k < RATE.start else STEEP[1]):
+        if clipped := _clipped(table[:, k], STEEP_M_S2 if k < RATE.start else STEEP_RAD_S):
             limit, share = clipped
             remarks.append(
                 f"{name} is cut off at {limit:.4g} in {100 * share:.1f} % of the rows: the sensor's range is too small, the track is less certain"
@@ -157,9 +158,8 @@ def missing_share(steps: Floats) -> float:
 def _clipped(column: Floats, steep: float) -> tuple[float, float] | None:
     """The extreme value that a column (n,) repeats, and its share of the rows; None if it repeats no value beyond `steep`."""
     for limit in (float(column.max()), float(column.min())):
-        at_limit = column == limit
-        repeated = at_limit[1:] & at_limit[:-1]
-        if abs(limit) > steep and repeated.sum() >= FEWEST_REPEATS and at_limit.mean() > CLIPPED_SHARE:
+        cut = column == limit
+        if abs(limit) > steep and (cut[1:] & cut[:-1]).sum() >= FEWEST_REPEATS and cut.mean() > CLIPPED_SHARE:
             return limit, float((np.abs(column) >= abs(limit)).mean())
     return None
 
@@ -169,8 +169,8 @@ def contradiction(track: Track) -> str:
     steps, counts, wrong = track.steps, track.counts, ""
     speeds = [np.hypot(*s.move_m[:2]) / max(s.t_end_s - s.t_start_s, SHORTEST_STEP_S) for s in steps]
     if not track.stance.any():
-        wrong = "the foot never stands in these samples"
-    elif speeds and float(np.median(speeds)) > FASTEST_WALK_M_S:
+        return f"the foot was never still in these samples: {NEEDED}"
+    if speeds and float(np.median(speeds)) > FASTEST_WALK_M_S:
         wrong = f"half of the steps are faster than {np.median(speeds):.0f} m/s"
     elif steps and float(np.median([abs(s.move_m[2]) for s in steps])) > HIGHEST_STEP_M:
         wrong = "half of the steps rise or fall by more than a metre"
@@ -178,8 +178,10 @@ def contradiction(track: Track) -> str:
         wrong = "the foot is at rest where its computed motion excludes it"
     if not wrong:
         return ""
-    if steps and LEAST_FAULT < abs(steps[0].excess) < 1.0:
+    if LEAST_FAULT < abs(steps[0].excess) < 1.0:
         return f"{wrong}: {steps[0].doubts()[-1]}"
+    if (share := float(track.stance[np.searchsorted(track.t_s, steps[0].t_start_s) :].mean())) > GLIDING_SHARE:
+        return f"the foot was never still: it seems to stand in {100 * share:.0f} % of the walk, against its motion: {NEEDED}"
     return f"{wrong}: is the sensor on the foot, are the units m/s2 and rad/s, and the axes right-handed?"
 
 
