@@ -59,14 +59,15 @@ def whole_rows(table: Floats) -> tuple[Floats, tuple[str, ...]]:
 
 
 def sorted_by_time(table: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """The rows sorted by time, with a note, if sorting makes the times regular: this repairs shuffled rows, but not a clock that was set back."""
+    """The rows sorted by time, with a note, if that makes the times regular: shuffled rows. Raises ValueError for a clock that began anew."""
     t_s = table[:, TIME]
     back = int((np.diff(t_s) < 0.0).sum())
     if back == 0:
         return table, ()
     order = np.argsort(t_s, kind="stable")
-    steps = np.diff(t_s[order])
-    steps = steps[steps > 0.0]
+    ahead, steps = (each[each > 0.0] for each in (np.diff(t_s), np.diff(t_s[order])))
+    if len(steps) and back < BACK_SHARE * len(t_s) and np.median(steps) < 0.75 * np.median(ahead):
+        raise ValueError("t_s begins anew within the file: are these several recordings? Cut it there")
     if len(steps) and float((steps < 0.5 * np.median(steps)).mean()) < REGULAR_SHARE:
         return table[order], (f"{back} rows were not in the order of t_s: sorted by it",)
     return table, ()
