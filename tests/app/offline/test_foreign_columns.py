@@ -135,7 +135,7 @@ def test_names_and_units_of_any_file_are_given(table: np.ndarray, tmp_path: Path
     (None, "g,mg", "--units g,mg: two units of one quantity"),
     ("t_s=clock", None, "a.csv: --columns t_s=clock: no column clock; there are time, acc_x"),
     (None, "hPa", "a.csv: --units hPa: no column has such a unit"),
-    (None, None, "other names: --columns OURS=THEIRS,...; other units: --units deg/s,g"),
+    (None, None, "no column ax, ay, az, gx, gy, gz; there are t_s, acc_x, acc_y, acc_z, gyr_x, gyr_y, gyr_z; other names: --columns OURS"),
 ])  # fmt: skip
 def test_what_does_not_fit_is_one_line_that_names_it(
     columns: str | None, units: str | None, said: str, tmp_path: Path

@@ -119,6 +119,7 @@ def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
     columns, units = dict(naming.columns), dict(naming.units)
     notes: tuple[str, ...] = ()
     names = [_own(title) for title in theirs]
+    names = ["t_s" if name == "time" and "t_s" not in names else name for name in names]
     if not columns and "t_s" not in names:
         columns, more, notes = _recognised(theirs, above)
         units = more | units

@@ -71,7 +71,7 @@ def _table(lines: Iterator[str], read_header: HeaderReader) -> tuple[Floats, tup
     header = head.names
     if missing := [name for name in COLUMNS if name not in header]:
         hint = ": the first line must name the columns" if all(map(math.isfinite, map(number_of, header))) else ""
-        raise ValueError(f"no column {', '.join(missing)}{hint}; expected {','.join(COLUMNS)}[,mx,my,mz]{head.advice}")
+        raise ValueError(f"no column {', '.join(missing)}{hint}; there are {', '.join(header)[:300]}{head.advice}")
     wanted = COLUMNS + MAG_COLUMNS if all(name in header for name in MAG_COLUMNS) else COLUMNS
     columns = [column_of(header, name) for name in wanted]
     half = [name for name in MAG_COLUMNS if name in header and name not in wanted]
