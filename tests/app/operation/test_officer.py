@@ -105,7 +105,7 @@ def test_all_storeys_feet_and_the_log(browser: Any, tmp_path: Path) -> None:
         page.mouse.click(*page.evaluate(ON_PAGE, [x, y + 40]))
         wait_for(page, "!document.querySelector('#map.stacked') && echostep.scene.level === 2")
         page.click("#all-floors")
-        wait_for(page, f"document.querySelector('#map.stacked') && {OVER_EACH_OTHER}")
+        wait_for(page, f"document.querySelector('#map.stacked') && echostep.storeys.stamp && {OVER_EACH_OTHER}")
         page.mouse.click(*page.evaluate(ON_PAGE, page.evaluate(f"{SHOWN}.find((row) => row.place.level === 1).at")))
         wait_for(page, "echostep.scene.chosen !== null && echostep.scene.level === 1")
         page.click("#legend-button")

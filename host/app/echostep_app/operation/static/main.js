@@ -229,6 +229,7 @@ function measured(position, level) {
 
 function tapped(position, pixel) {
   if (storeys.on) {
+    if (!storeys.stamp) return;  // not painted yet
     const { id, level } = storeys.at(pixel, TAP_PX);
     return id === undefined ? visit(level) : list.choose(id);
   }

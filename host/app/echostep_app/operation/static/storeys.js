@@ -27,7 +27,7 @@ export class Storeys {
     const rows = answers.map(linesOf), boxes = rows.map((one) => boxOf(one, []));
     this.box = [0, 1, 2, 3].map((side) => Math[side < 2 ? 'min' : 'max'](...boxes.map((box) => box[side])));
     this.floors = levels.map(({ name, height_m }, level) => ({ name, height_m, level, path: pathOf(rows[level]) })).sort((a, b) => a.height_m - b.height_m);
-    Object.assign(this, { on: true, stamp: '' });
+    Object.assign(this, { on: true, stamp: '', shown: [] });
   }
 
   // The storeys in the free part of the map.
