@@ -69,6 +69,8 @@ def test_a_check_in_is_believed_at_once() -> None:
     (*_, last) = tracker.take(portion_of(walked()))
     assert steady.shown(replace(last, status=TrackStatus.LOST), tracker).status is TrackStatus.LOST
     assert steady.shown(last, tracker).status is TrackStatus.LOST
+    assert steady.worst(last.t_s - 60.0, last.status) is last.status  # a clock that went back
+    assert steady.worst(last.t_s, TrackStatus.LOST) is TrackStatus.LOST
     (stated,) = tracker.feed(Chunk(PERSON, 0, CheckIn(last.x_m, last.y_m, None, 0.1).encode()))
     assert steady.shown(stated, tracker).status is stated.status is TrackStatus.TRACKING
 

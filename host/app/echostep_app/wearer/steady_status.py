@@ -24,8 +24,8 @@ class SteadyStatus:
         self._check_ins = 0, 0  # with undoings
 
     def worst(self, t_s: float, status: TrackStatus) -> TrackStatus:
-        """The worst status of the last HOLD_S before `t_s`, this one among them."""
-        self._recent = [(at_s, each) for at_s, each in self._recent if at_s > t_s - HOLD_S] + [(t_s, status)]
+        """The worst status within HOLD_S of `t_s`, this one among them; times that went back hold nothing."""
+        self._recent = [(at_s, each) for at_s, each in self._recent if abs(at_s - t_s) < HOLD_S] + [(t_s, status)]
         return max((each for _, each in self._recent), key=_WORSE.index)
 
     def shown(self, estimate: Estimate, tracker: Tracker) -> Estimate:
