@@ -75,7 +75,7 @@ class PlanFile:
         try:
             previous = self.path.read_bytes() if self.path.exists() else None
             if previous is not None and previous != raw:
-                write_whole(self.path.with_name(self.path.name + ".bak"), previous)
+                write_whole(self.path.with_name(self.path.name + ".bak"), previous, like=self.path)
             if previous != raw:
                 write_whole(self.path, raw)
         except OSError as error:

@@ -61,17 +61,17 @@ def put_aside(path: Path, remedy: str) -> None:
     complain(f"echostep: {path}: is damaged, as after a power failure: kept as {aside.name}; {remedy}")
 
 
-def write_whole(path: Path, raw: bytes) -> None:
-    """Write a file in one step: whatever ends the program, the old one is there, or the new one. Raises OSError."""
-    path = path.resolve()
+def write_whole(path: Path, raw: bytes, like: Path | None = None) -> None:
+    """Write a file in one step, with the rights of the old one or of `like`; whatever ends the program, one of both is there. Raises OSError."""
+    path, rights = path.resolve(), like or path
     new = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     try:
         with new.open("xb") as file:
             file.write(raw)
             file.flush()
             os.fsync(file.fileno())
-        if path.exists():
-            shutil.copymode(path, new)
+        if rights.exists():
+            shutil.copymode(rights, new)
         new.replace(path)
     finally:
         new.unlink(missing_ok=True)

@@ -120,6 +120,7 @@ def test_other_sites_and_wrong_tokens_cannot_post(served: EditServer) -> None:
 
 def test_saving_keeps_the_former_file(served: EditServer) -> None:
     path, before = served.file.path, served.file.path.read_bytes()
+    path.chmod(0o600)
     tree = json.loads(asked(served, "plan")[1])
     tree["levels"][0]["walls"][0] = [0, 0, 1.25, 2]
     status, _, headers = asked(served, "plan", json.dumps(tree).encode())
@@ -129,7 +130,8 @@ def test_saving_keeps_the_former_file(served: EditServer) -> None:
     assert headers["etag"] == f'"{load_plan(path).digest}"'
     assert asked(served, "plan", json.dumps(tree).encode())[0] == 200  # nothing new: the former file stays
     assert path.with_name("plan.json.bak").read_bytes() == before
-    assert {found.name for found in path.parent.iterdir()} == {"plan.json", "plan.json.bak"}
+    rights = {found.name: found.stat().st_mode & 0o777 for found in path.parent.iterdir()}
+    assert rights == {"plan.json": 0o600, "plan.json.bak": 0o600}
 
 
 def test_a_page_that_read_an_older_file_is_told(served: EditServer) -> None:
