@@ -96,6 +96,38 @@ class HeightArrays(NamedTuple):
     lag_m: Floats
 
 
+@kernel
+def rise_cost(rise_m: float, change: HeightChange, model: LevelChangeModel) -> float:
+    """Log-weight that a rise of the foot costs where none is possible; 0 without a foot."""
+    if not math.isfinite(change.felt_sd_m):
+        return 0.0
+    sd_m = math.hypot(model.flat_sd_m, change.felt_sd_m)
+    return min(0.5 * (rise_m / sd_m) ** 2, model.unlikely)
+
+
+@kernel
+def pressure_cost(innovation_m: float, variance_m2: float, model: LevelChangeModel) -> float:
+    """Log-weight that an innovation of the height by pressure costs; 0 where its variance is infinite: no pressure."""
+    if math.isinf(variance_m2):
+        return 0.0
+    return min(2.0 * math.log1p(innovation_m * innovation_m / (PRESSURE_TAIL * variance_m2)), model.unlikely)
+
+
+@kernel
+def climb(
+    z_m: float, lag_m: float, rise_m: float, connector: int, knows_lag: bool, change: HeightChange, model: LevelChangeModel,
+    sheet: LevelSheet,
+) -> tuple[float, float, float]:  # fmt: skip
+    """In a connector: the new height, how far a rise of the foot led beyond its ends, and the height by pressure to compare it with."""
+    if sheet.kind[connector] != LIFT and math.isfinite(change.felt_sd_m):
+        end_m = end_of_connector(z_m + rise_m, connector, model.landing_sd_m, sheet)
+        return end_m, z_m + rise_m - end_m, change.height_m
+    if knows_lag:
+        z_m = end_of_connector(change.riding_m - lag_m, connector, model.landing_sd_m, sheet)
+        return z_m, 0.0, change.riding_m
+    return z_m, 0.0, change.height_m
+
+
 @lean_kernel
 def change_levels(
     particles: ParticleArrays, heights: HeightArrays, move: Move, noise: Floats, change: HeightChange,
@@ -106,42 +138,36 @@ def change_levels(
     """
     x, y, turn, scale, log_weight = particles
     z, lag = heights
-    has_foot, has_pressure = math.isfinite(change.felt_sd_m), math.isfinite(change.height_sd_m)
-    variance = lag_variance + change.height_sd_m**2 if has_pressure else np.inf
-    gain = lag_variance / variance if has_pressure else 0.0
-    knows_lag = has_pressure and lag_variance < UNKNOWN_LAG_M2
-    flat_sd, top, before, after = math.hypot(model.flat_sd_m, change.felt_sd_m), -np.inf, 0.0, 0.0
+    variance = lag_variance + change.height_sd_m**2
+    gain = lag_variance / variance if math.isfinite(variance) else 0.0
+    knows_lag = math.isfinite(variance) and lag_variance < UNKNOWN_LAG_M2
+    top, before, after = -np.inf, 0.0, 0.0
     for i in range(len(x)):
         before += math.exp(log_weight[i])
         level = level_on_sheet(x[i], sheet)
         inside = connector_at(x[i] - level * sheet.pitch_m, y[i], level, sheet)
-        connector, height = inside, change.height_m
+        connector, height, cost = inside, change.height_m, 0.0
         if inside < 0:
             dx = scale[i] * (math.cos(turn[i]) * move.dx_m - math.sin(turn[i]) * move.dy_m)
             dy = scale[i] * (math.sin(turn[i]) * move.dx_m + math.cos(turn[i]) * move.dy_m)
             connector = _connector_left(x[i], y[i], dx, dy, level, sheet)
         if connector >= 0:
-            if sheet.kind[connector] != LIFT and has_foot:
-                z[i] += change.felt_m + change.felt_sd_m * noise[i]
-                beyond = z[i] - end_of_connector(z[i], connector, model.landing_sd_m, sheet)
-                log_weight[i] -= min(0.5 * (beyond / flat_sd) ** 2, model.unlikely)
-                z[i] -= beyond
-            elif knows_lag:
-                height = change.riding_m
-                z[i] = end_of_connector(height - lag[i], connector, model.landing_sd_m, sheet)
+            rise = change.felt_m + change.felt_sd_m * noise[i]
+            z[i], beyond, height = climb(z[i], lag[i], rise, connector, knows_lag, change, model, sheet)
+            cost += rise_cost(beyond, change, model)
             new_level = nearest_level(z[i], connector, sheet)
             x[i] += (new_level - level) * sheet.pitch_m
             level = new_level
-        elif has_foot:
-            log_weight[i] -= min(0.5 * (change.felt_m / flat_sd) ** 2, model.unlikely)
+        else:
+            cost += rise_cost(change.felt_m, change, model)
         if inside < 0:
-            log_weight[i] -= min(0.5 * ((z[i] - sheet.height_m[level]) / model.landing_sd_m) ** 2, model.unlikely)
+            cost += min(0.5 * ((z[i] - sheet.height_m[level]) / model.landing_sd_m) ** 2, model.unlikely)
             z[i] = sheet.height_m[level]
-        if has_pressure:
-            innovation = height - z[i] - lag[i]
-            log_weight[i] -= min(2.0 * math.log1p(innovation * innovation / (PRESSURE_TAIL * variance)), model.unlikely)
-            if innovation * innovation < THREE_SD2 * variance:
-                lag[i] += gain * innovation
+        innovation = height - z[i] - lag[i]
+        cost += pressure_cost(innovation, variance, model)
+        if innovation * innovation < THREE_SD2 * variance:
+            lag[i] += gain * innovation
+        log_weight[i] -= cost
         top = max(top, log_weight[i])
     for i in range(len(x)):
         log_weight[i] -= top
