@@ -26,7 +26,9 @@ from echostep.localization.echoes.likelihood import (
     EchoModel,
     EchoSettings,
     MissedEchoes,
+    detection,
     echo_density,
+    echo_model,
     normal,
 )
 from echostep.localization.particle_arrays import PingBatch
@@ -34,11 +36,11 @@ from echostep.path import MeasuredSegment, Odometer
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import Floor
 from echostep.walls.index import WallIndex
+from echostep.walls.tile_points import WALL
 
 # Assumed, not measured.
 # Of a new wall's normal about the ranger's axis: half of the angle at which walls answer
 AXIS_SD_RAD = math.radians(20.0)
-SEEN_RAD = math.radians(50.0)  # of the normal from the axis: the angle at which near walls answer, and the axis' error
 TURN_SD_RAD = 0.05  # change of the normal on a metre of path
 VIEW_M = 2.5  # mean length of the path between two changes of a view: walls, doors, corners
 POSES = 400  # drawn on the floor: their mean is then good to 5 %
@@ -68,11 +70,13 @@ class LastWall:
         self._var_rad2 += TURN_SD_RAD**2 * math.hypot(dx_m, dy_m)
 
     def density(self, range_m: float, axis_rad: float, blur_m: float) -> float:
-        """Density (1/m) of an echo of this wall, blurred by a standard deviation; 0 when it is out of the ranger's sight."""
-        if abs(wrap(self.normal_rad - axis_rad)) > SEEN_RAD:
-            return 0.0
+        """Density (1/m) of an echo of this wall, if it is detected; blurred by a standard deviation."""
         variance_m2 = self._var_m2 + self._error_m(axis_rad) ** 2 + blur_m**2
         return normal(range_m - self.distance_m, math.sqrt(variance_m2))
+
+    def detected(self, axis_rad: float, model: EchoModel) -> float:
+        """Probability that the wall is detected, as of a wall of the plan."""
+        return detection(self.distance_m, abs(wrap(self.normal_rad - axis_rad)), WALL, model)
 
     def update(self, range_m: float, axis_rad: float, power: float) -> None:
         """Correct the line by an echo, whose error counts by `power`: errors of successive echoes are alike."""
@@ -94,7 +98,7 @@ class UnplannedView:
     """The view of one ranger without a plan: for each ping call `move`, `density`, `update`, in this order."""
 
     def __init__(self, echo: EchoSettings) -> None:
-        self._echo = echo
+        self._echo, self._model = echo, echo_model(echo)
         self._wall: LastWall | None = None  # None before the first echo
         self._x_m, self._y_m = math.nan, math.nan
 
@@ -118,9 +122,11 @@ class UnplannedView:
 
         `stray`: probability of a second reflection where nothing answers.
         """
-        if self._wall is None:
-            return 1.0 - stray if range_m <= 0.0 else stray / (self._echo.maximum_m - self._echo.minimum_m)
-        return 0.0 if range_m <= 0.0 else self._wall.density(range_m, axis_rad, blur_m)
+        detected = 0.0 if self._wall is None else self._wall.detected(axis_rad, self._model)
+        if range_m <= 0.0:
+            return (1.0 - stray) * (1.0 - detected)
+        strays = (1.0 - detected) * stray / (self._echo.maximum_m - self._echo.minimum_m)
+        return strays + (detected * self._wall.density(range_m, axis_rad, blur_m) if self._wall is not None else 0.0)
 
     def update(self, range_m: float, axis_rad: float, power: float, goes_on: bool) -> None:
         """Take in a ping; `goes_on`: whether the view goes on, by the densities."""
