@@ -22,10 +22,11 @@ ROOM = Building(Walls(np.array([[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0
 STEP_M = 0.5
 
 
-def pings(range_m: float, count: int) -> PingBatch:
-    """So many of ranger 0 at the beginning, all with this range (0: silent)."""
+def pings(range_m: float, count: int, travel_m: float = 1.0) -> PingBatch:
+    """So many of ranger 0 at the beginning, all with this range (0: silent) and way since the one before."""
     one = np.ones(count)
-    return PingBatch(0.0 * one, one, range_m * one, one, np.zeros(count, np.int64), one, one, 0.0 * one, one, one)
+    travels = travel_m * one
+    return PingBatch(0.0 * one, one, range_m * one, one, np.zeros(count, np.int64), travels, one, 0.0 * one, one, one)
 
 
 def gather(grid: SearchGrid, share: float) -> None:
@@ -42,27 +43,31 @@ def searching(map_filter: MapFilter) -> Search:
 def test_a_ping_counts_by_the_way_since_the_one_before() -> None:
     used, powers = TablePings(), []
     for way_m in (0.0, 0.5 * INDEPENDENT_M, 3.0 * INDEPENDENT_M):
-        used.odometer.add(way_m)
-        ping = used.take(pings(1.2, 1), 0, 0.0)
+        ping = used.take(pings(1.2, 1, way_m), 0, is_straight=True)
         assert ping is not None
         powers.append(ping.power)
     assert powers == pytest.approx([1.0, 0.5, 1.0])
 
 
 def test_pings_from_nearly_one_place_are_used_once() -> None:
-    used, both = TablePings(), pings(1.2, 2)
-    assert used.take(both, 0, 0.0) is not None
-    assert used.take(both, 1, 0.9 * USED_M) is None
-    assert used.take(both, 1, 1.1 * USED_M) is not None
+    used, three = TablePings(), pings(1.2, 3, 0.6 * USED_M)
+    assert [used.take(three, k, is_straight=True) is not None for k in range(3)] == [True, False, True]
+
+
+def test_pings_in_a_turn_are_left_to_the_way_after_it() -> None:
+    used, three = TablePings(), pings(1.2, 3, USED_M)
+    found = [used.take(three, k, is_straight=k != 1) for k in range(3)]
+    assert found[1] is None
+    assert found[2] is not None
+    assert found[2].power == pytest.approx(2.0 * USED_M / INDEPENDENT_M)
 
 
 def test_a_ping_knows_whether_that_before_it_was_silent() -> None:
     used, after = TablePings(), []
     for range_m in (0.0, 1.2, 0.0, 0.0):
-        ping = used.take(pings(range_m, 1), 0, 0.0)
+        ping = used.take(pings(range_m, 1), 0, is_straight=True)
         assert ping is not None
         after.append(ping.after)
-        used.odometer.add(1.0)
     assert after == [AFTER_SILENCE, AFTER_SILENCE, AFTER_ECHO, AFTER_SILENCE]
 
 

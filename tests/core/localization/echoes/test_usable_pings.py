@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -29,6 +31,23 @@ def powers(apart_m: float, echo: EchoSettings) -> list[float]:
 @pytest.mark.parametrize("own", [0.7, 1.0])
 def test_a_ping_counts_by_the_way_since_the_one_before(apart_m: float, share: float, own: float) -> None:
     assert powers(apart_m, EchoSettings(own=own)) == pytest.approx([own] + [own * share] * 4)
+
+
+def test_a_wearer_who_turns_on_the_spot_sees_something_new() -> None:
+    """While turning a ping counts little, for its axis is uncertain; the first one after the turn counts as after a way; the next ones do not."""
+    usable = UsablePings(ROOM.background(echo_model(EchoSettings())), EchoSettings())
+    found = []
+    for k, turn_deg in enumerate((0.0, 90.0, 0.0, 0.0)):
+        heading = math.radians(90.0 * (k > 1))
+        way = PathSegment(
+            k, k + 1.0, 0.0, 0.0, heading, heading + math.radians(turn_deg), sd_m=0.01, turn_sd_rad=0.001, step=1
+        )
+        one = MeasuredSegment(way, np.array([k + 0.5]), np.zeros(1, np.int64), np.full(1, 2.0))
+        found.append(usable.take(one)[0].power.tolist())
+    first, turning, after, still = found
+    assert first == [EchoSettings().own]
+    assert 0.0 < turning[0] < 0.2 * EchoSettings().own < after[0]
+    assert still == []
 
 
 @pytest.mark.parametrize("own", [0.0, -0.5, 1.5])

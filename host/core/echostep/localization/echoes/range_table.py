@@ -20,7 +20,6 @@ from echostep.arrays import Floats, Int32s
 from echostep.jit import kernel, lean_kernel
 from echostep.localization.echoes.likelihood import SILENT_SHARE, EchoModel, EchoSettings, detection, hidden_density
 from echostep.localization.particle_arrays import PingBatch
-from echostep.path import Odometer
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import CELL_M, Floor
 from echostep.walls.index import WallIndex
@@ -45,8 +44,8 @@ USUAL_SILENT = 1.0 - EchoSettings().stray
 MOST_QUIET = 0.95
 AROUND = 2  # cells about the floor, at its walls, that share the nearest row
 UNKNOWN = -1  # no row: outside the building
-USED_M = 0.25  # path between two pings of one ranger that are used: a cell of the table
-INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one ping: walls go on
+USED_M = 0.25  # way of a view between two pings of one ranger that are used: a cell of the table
+INDEPENDENT_M = 0.8  # way on which pings of one ranger bring the information of one ping: walls go on
 
 
 class RangeTable(NamedTuple):
@@ -156,16 +155,16 @@ class TablePings:
     """The memory of both rangers since the search began."""
 
     def __init__(self) -> None:
-        self.odometer = Odometer()
-        self._used_at_m = [-math.inf, -math.inf]  # mark on the path at the last ping of each ranger
+        self._since_m = [math.inf, math.inf]  # way of each ranger's view since its last ping that was used
         self._after = [AFTER_SILENCE, AFTER_SILENCE]  # whether that ping had an echo
 
-    def take(self, pings: PingBatch, k: int, way_m: float) -> TablePing | None:
-        """The k-th ping, `way_m` after the end of the path; None if it comes too soon after the last one of its ranger."""
-        ranger, at_m = int(pings.ranger[k]), self.odometer.path_m + way_m
-        travel_m, after = at_m - self._used_at_m[ranger], self._after[ranger]
-        if travel_m < USED_M:
+    def take(self, pings: PingBatch, k: int, *, is_straight: bool) -> TablePing | None:
+        """The k-th ping; None if it comes too soon after the last one of its ranger, or on a way that is not straight."""
+        ranger = int(pings.ranger[k])
+        self._since_m[ranger] += float(pings.travel_m[k])
+        since_m, after = self._since_m[ranger], self._after[ranger]
+        if since_m < USED_M or not is_straight:
             return None
         axis_rad, range_m, missed = (float(v[k]) for v in (pings.axis_rad, pings.range_m, pings.missed))
-        self._used_at_m[ranger], self._after[ranger] = at_m, AFTER_ECHO if range_m > 0.0 else AFTER_SILENCE
-        return TablePing(axis_rad, range_m, min(travel_m / INDEPENDENT_M, 1.0), missed, after)
+        self._since_m[ranger], self._after[ranger] = 0.0, AFTER_ECHO if range_m > 0.0 else AFTER_SILENCE
+        return TablePing(axis_rad, range_m, min(since_m / INDEPENDENT_M, 1.0), missed, after)

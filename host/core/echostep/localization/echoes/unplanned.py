@@ -35,7 +35,7 @@ from echostep.localization.particle_arrays import PingBatch
 from echostep.path import MeasuredSegment, Odometer
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import Floor
-from echostep.walls.index import WallIndex
+from echostep.walls.index import CONE_RAD, WallIndex
 from echostep.walls.tile_points import WALL
 
 # Assumed, not measured.
@@ -45,6 +45,7 @@ TURN_SD_RAD = 0.05  # change of the normal on a metre of path
 VIEW_M = 2.5  # mean length of the path between two changes of a view: walls, doors, corners
 POSES = 400  # drawn on the floor: their mean is then good to 5 %
 BIN_M = 0.05  # width of a bin of ranges
+VIEW_RAD = 2.0 * CONE_RAD  # mean turn of a ranger between two changes of its view: the width of its cone
 LEAST_POWER = 0.01  # share of independent information below which a ping is left out: it changes nothing
 # Turns on a segment at which its pings count half: headings between its ends are interpolated
 TURNING_RAD = math.radians(45.0)  # as weights of particles
@@ -100,22 +101,22 @@ class UnplannedView:
     def __init__(self, echo: EchoSettings) -> None:
         self._echo, self._model = echo, echo_model(echo)
         self._wall: LastWall | None = None  # None before the first echo
-        self._x_m, self._y_m = math.nan, math.nan
+        self._x_m, self._y_m, self._axis_rad = math.nan, math.nan, math.nan
 
     @property
     def is_silent(self) -> bool:
         """Whether the last ping had no echo, or there was no ping."""
         return self._wall is None
 
-    def move(self, x_m: float, y_m: float) -> float:
-        """Go on to the place of the next ping; returns the length of the way (m), infinite to the first one."""
-        dx_m, dy_m = x_m - self._x_m, y_m - self._y_m
-        self._x_m, self._y_m = x_m, y_m
+    def move(self, x_m: float, y_m: float, axis_rad: float) -> float:
+        """Go on to the place and axis of the next ping; returns the probability that the view is the same there, 0 for the first one."""
+        dx_m, dy_m, turn_rad = x_m - self._x_m, y_m - self._y_m, abs(wrap(axis_rad - self._axis_rad))
+        self._x_m, self._y_m, self._axis_rad = x_m, y_m, axis_rad
         if math.isnan(dx_m):
-            return math.inf
+            return 0.0
         if self._wall is not None:
             self._wall.move(dx_m, dy_m)
-        return math.hypot(dx_m, dy_m)
+        return math.exp(-math.hypot(dx_m, dy_m) / VIEW_M - turn_rad / VIEW_RAD)
 
     def density(self, range_m: float, axis_rad: float, stray: float, blur_m: float = 0.0) -> float:
         """Density (1/m) of a range if the view goes on, blurred by a standard deviation; range 0: the probability of no echo.
@@ -204,9 +205,9 @@ class RangeMemory:
             stray[k] = self._echo.stray * (STRAY_ON if view.is_silent else 1.0)
             missed[k] = self._missed.odds(which) if range_m <= 0.0 else 0.0
             self._missed.update(which, range_m)
-            travel_m = view.move(float(pings.x_m[k]), float(pings.y_m[k]))
-            changed[k] = 1.0 - (1.0 - self._echo.outlier) * math.exp(-travel_m / VIEW_M)
             axis_rad = float(pings.axis_rad[k])
+            same = view.move(float(pings.x_m[k]), float(pings.y_m[k]), axis_rad)
+            changed[k] = 1.0 - (1.0 - self._echo.outlier) * same
             alike[k] = view.density(range_m, axis_rad, float(stray[k]))
             blurred[k] = view.density(range_m, axis_rad, float(stray[k]), self._blur_m)
             goes_on = (1.0 - changed[k]) * (alike[k] + missed[k]) > changed[k] * anywhere[k]
@@ -242,8 +243,9 @@ def _loss(turn_rad: float, half_rad: float) -> float:
 
 
 class UsablePings:
-    """Pings from nearly one place repeat each other's errors: each counts by the path since the one before, up to `own` after `correlation_m`.
+    """Pings from nearly one place repeat each other's errors: each counts by the way of its view since the one before, up to `own` after `correlation_m`.
 
+    The axis within a turn is uncertain, so its pings count less, and what they leave is left to the first ping after it.
     Before a ranger was heard nothing tells that it works: it counts from its first echo on.
     """
 
@@ -253,7 +255,8 @@ class UsablePings:
         self.odometer = Odometer()
         self.set_ranger_model(background, echo)
         self._x_m, self._y_m = 0.0, 0.0  # end of the path in the walk frame
-        # Mark on the path at each ranger's last ping, from its first echo on
+        self._viewed_m = 0.0  # way of the views: the path, and `correlation_m` for each VIEW_RAD of turning
+        # Mark on that way at each ranger's last ping, from its first echo on; further back by what a turn has left unused
         self._last_ping_m = [-math.inf, -math.inf]
 
     def set_ranger_model(self, background: Background, echo: EchoSettings) -> None:
@@ -263,21 +266,26 @@ class UsablePings:
 
     @property
     def silent_m(self) -> float:
-        """Length of the path since the last ping."""
-        return self.odometer.since_m(max(self._last_ping_m))
+        """Way of the views since the last ping."""
+        return self._viewed_m - max(self._last_ping_m)
 
     def take(self, measured: MeasuredSegment) -> tuple[PingBatch, UnplannedDensities]:
         """The pings that bring information, with their share of the segment and their axis in the walk frame, and their densities without a plan."""
         segment = measured.segment
         length, span_s = math.hypot(segment.dx_m, segment.dy_m), segment.t1_s - segment.t0_s
+        viewed_m = length + self._correlation_m * abs(segment.turn_rad) / VIEW_RAD
         share = np.ones(len(measured.t_s))
         if span_s > 0.0:
             share = np.clip((measured.t_s - segment.t0_s) / span_s, 0.0, 1.0)
         axis = segment.heading0_rad + share * segment.turn_rad + measured.off_heading_rad
         range_m = np.where(np.isnan(measured.range_m), 0.0, measured.range_m)
-        travel_m = self._travels(measured.ranger, range_m, self.odometer.path_m + share * length)
-        power = self._own * np.minimum(travel_m / self._correlation_m, 1.0) / _loss(segment.turn_rad, TURNING_RAD)
+        travel_m = self._travels(measured.ranger, range_m, self._viewed_m + share * viewed_m)
+        loss = _loss(segment.turn_rad, TURNING_RAD)
+        power = self._own * np.minimum(travel_m / self._correlation_m, 1.0) / loss
         self.odometer.add(length)
+        self._viewed_m += viewed_m
+        unused_m = (1.0 - 1.0 / loss) * min(viewed_m, self._correlation_m)
+        self._last_ping_m = [mark_m - unused_m for mark_m in self._last_ping_m]
         used = power > LEAST_POWER
         way_x_m, way_y_m = segment.way_m(share)
         x_m, y_m = self._x_m + way_x_m, self._y_m + way_y_m
@@ -289,11 +297,11 @@ class UsablePings:
             unplanned.stray, unplanned.missed, unplanned.alike, np.exp(unplanned.either),
         ), unplanned  # fmt: skip
 
-    def _travels(self, ranger: Ints, range_m: Floats, path_m: Floats) -> Floats:
-        """Length of the path (k,) between each ping and the one before it of the same ranger; 0 before its first echo."""
-        last_m, travel_m = self._last_ping_m, np.zeros(len(path_m))
+    def _travels(self, ranger: Ints, range_m: Floats, viewed_m: Floats) -> Floats:
+        """Way of the view (k,) between each ping and the one before it of the same ranger; 0 before its first echo."""
+        last_m, travel_m = self._last_ping_m, np.zeros(len(viewed_m))
         for k, (which, heard_m, mark_m) in enumerate(
-            zip(ranger.tolist(), range_m.tolist(), path_m.tolist(), strict=True)
+            zip(ranger.tolist(), range_m.tolist(), viewed_m.tolist(), strict=True)
         ):
             if heard_m > 0.0 or last_m[which] > -math.inf:
                 travel_m[k], last_m[which] = mark_m - last_m[which], mark_m

@@ -58,6 +58,7 @@ class SearchGrid:
         self._turned_rad = 0.0  # of the walk frame since the search began
         self._scratch = np.zeros(len(cells.row), np.float32)
         self._pings, self._unplanned = TablePings(), unplanned
+        self.path_m = 0.0  # since the search began
         self._x_m = self._y_m = 0.0  # end of the path in the walk frame
         self._var_m2 = self._var_rad2 = 0.0
         self._begin()
@@ -98,11 +99,6 @@ class SearchGrid:
     def __len__(self) -> int:
         return len(self._states.cell)
 
-    @property
-    def path_m(self) -> float:
-        """Length of the path since the search began."""
-        return self._pings.odometer.path_m
-
     def turn_walk_frame(self, by_rad: float) -> None:
         """Rotate all states: the heading in the walk frame has changed while the heading on the map has not."""
         self._turned_rad += by_rad
@@ -116,7 +112,7 @@ class SearchGrid:
         table, log_ratio = np.empty(OUTSIDE_ENTRY + 1), 0.0
         for k in range(len(pings.share)):
             share = float(pings.share[k])
-            ping = None if bend > NO_PING_BEND * length else self._pings.take(pings, k, share * length)
+            ping = self._pings.take(pings, k, is_straight=bend <= NO_PING_BEND * length)
             if ping is not None:
                 log_densities(ping, model, table)
                 log_ratio += self._step(move, done, share, table, ping.axis_rad)
@@ -124,7 +120,7 @@ class SearchGrid:
                 done = share
         if done < 1.0:
             self._step(move, done, 1.0, np.zeros(len(table)), 0.0)
-        self._pings.odometer.add(length)
+        self.path_m += length
         self._x_m, self._y_m = self._x_m + move.dx_m, self._y_m + move.dy_m
         self._var_m2 += SPREAD_M**2 * length + move.sd_m**2 + bend**2
         self._var_rad2 += self._turn_variance * length + move.turn_sd_rad**2
