@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization import EchoModel, EchoSettings, echo_model
-from echostep.localization.echoes.likelihood import log_echo
+from echostep.localization import EchoModel, EchoSettings, echo_density, echo_model
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep_app.output.table import console
 from echostep_studies.simulation.marker_walk import lay_markers, walk_markers
@@ -29,7 +28,8 @@ def log_p(plan: Walls, pose: tuple[float, float, float], ranges_m: Floats, model
     axis = heading + 0.5 * math.pi
     index = plan.near(np.array([x]), np.array([y]))
     count = echo_sources(x, y, axis, index, away, off, kind)
-    return np.array([log_echo(0.0 if math.isnan(z) else z, count, away, off, kind, model) for z in ranges_m.tolist()])
+    heard_m = np.nan_to_num(ranges_m, nan=0.0).tolist()
+    return np.log([echo_density(z, count, away, off, kind, model) for z in heard_m])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +53,7 @@ def fitted(seed: int) -> list[SettingRow]:
         if chosen["stray"] >= 0.95:
             return math.inf
         model = echo_model(replace(EchoSettings(), **chosen))
-        return -float(np.mean([log_echo(z, n, d, off, kind, model) for z, n, d, off, kind in seen]))
+        return -float(np.log([echo_density(z, n, d, off, kind, model) for z, n, d, off, kind in seen]).mean())
 
     best = minimize(cost, start, method="Nelder-Mead", options={"maxfev": 400, "xatol": 0.02, "fatol": 1e-4})
     console.print(f"fit on {len(seen)} simulated pings: mean log p {-cost(start):.3f} as set, {-best.fun:.3f} fitted")

@@ -15,12 +15,12 @@ from echostep.localization import (
     EchoSettings,
     Start,
     TrackStatus,
+    echo_density,
     echo_model,
     ellipse95,
     estimate_of,
     trust,
 )
-from echostep.localization.echoes.likelihood import log_echo
 from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import BENDS, Cloud, cloud_about
 from echostep.localization.particles.kernels import (
@@ -59,7 +59,9 @@ def heard(axis_rad: float, range_m: float, count: int = 1, power: float = 0.3) -
 
 def log_p(range_m: float, sources: list[Source]) -> float:
     rows = np.array(sources, dtype=float).reshape(-1, 3)
-    return log_echo(range_m, len(rows), rows[:, 0].copy(), np.radians(rows[:, 1]), rows[:, 2].copy(), MODEL)
+    return math.log(
+        echo_density(range_m, len(rows), rows[:, 0].copy(), np.radians(rows[:, 1]), rows[:, 2].copy(), MODEL)
+    )
 
 
 @given(

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from echostep.arrays import Floats
-from echostep.jit import inline_kernel, inline_part, lean_kernel, lean_part
+from echostep.jit import inline_kernel, inline_part, lean_kernel
 from echostep.walls.tile_points import CORNER, EDGE
 
 # Assumed, not measured.
@@ -31,7 +31,6 @@ DB = 20.0 / math.log(10.0)  # decibels per unit of the natural logarithm of a di
 # Probability that no source so far was detected below which sources further away are left out, assumed
 NEGLIGIBLE_REST = 1e-4
 SILENT_SHARE = 0.2  # share of outliers and of hidden views that are "no echo", assumed
-HIDDEN_NEARER = 0.6  # share of echoes from hidden views that are nearer than the plan's first source: more is added to a room than removed
 # Of `stray`, when the ping before was silent too: among real clutter, of which `hidden` is a part, 0.70 to 0.86 are then silent where nothing is
 # expected (search-silence of the studies' notebook); with this share 0.79
 STRAY_ON = 0.25
@@ -197,32 +196,15 @@ def outlier_density(range_m: float, m: EchoModel) -> float:
     return SILENT_SHARE if range_m <= 0.0 else (1.0 - SILENT_SHARE) / (m.maximum_m - m.minimum_m)
 
 
-@inline_part
-def hidden_density(range_m: float, first_m: float, m: EchoModel) -> float:
-    """Density per metre of a range if the view is hidden, and the plan's first source is at `first_m`; range 0: the probability of no echo."""
-    if range_m <= 0.0:
-        return SILENT_SHARE
-    before = min(max(first_m, 2.0 * m.minimum_m), m.maximum_m) - m.minimum_m
-    nearer = HIDDEN_NEARER / before if range_m < m.minimum_m + before else 0.0
-    return (1.0 - SILENT_SHARE) * (nearer + (1.0 - HIDDEN_NEARER) / (m.maximum_m - m.minimum_m))
-
-
-@lean_part
+@lean_kernel
 def echo_density(
     range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel
 ) -> float:
-    """Density per metre of a range whose view has no history: hidden with probability `hidden`; range 0: the probability of no echo."""
-    outlier = outlier_density(range_m, m)
-    strays = 1.0 / (m.maximum_m - m.minimum_m)
+    """Density per metre of a range whose view has no history, as of a hidden view or an outlier where it is not as planned; range 0: of no echo."""
+    outlier, strays = outlier_density(range_m, m), 1.0 / (m.maximum_m - m.minimum_m)
+    as_planned = (1.0 - m.outlier) * (1.0 - m.hidden)
     planned = planned_density(range_m, count, distance_m, off_axis_rad, kind, m.stray, strays, m)
-    hidden = hidden_density(range_m, distance_m[0] if count else m.maximum_m, m)
-    return (1.0 - m.outlier) * ((1.0 - m.hidden) * planned + m.hidden * hidden) + m.outlier * outlier
-
-
-@lean_kernel
-def log_echo(range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel) -> float:
-    """Log p(range | sources), as `echo_density`."""
-    return math.log(echo_density(range_m, count, distance_m, off_axis_rad, kind, m))
+    return as_planned * planned + (1.0 - as_planned) * outlier
 
 
 @inline_kernel

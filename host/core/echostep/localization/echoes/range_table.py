@@ -18,7 +18,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Int32s
 from echostep.jit import kernel, lean_kernel
-from echostep.localization.echoes.likelihood import SILENT_SHARE, EchoModel, EchoSettings, detection, hidden_density
+from echostep.localization.echoes.likelihood import EchoModel, EchoSettings, detection
 from echostep.localization.particle_arrays import PingBatch
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import CELL_M, Floor
@@ -94,10 +94,9 @@ def log_densities(ping: TablePing, model: EchoModel, table: Floats) -> None:
     quiet = min(QUIET[ping.after] * ((1.0 - model.stray) / USUAL_SILENT), MOST_QUIET)
     hidden_share, hidden_quiet = HIDDEN[ping.after], HIDDEN_QUIET[ping.after]
     is_echo = range_m > 0.0
-    unlikely = (1.0 - quiet) / (model.maximum_m - model.minimum_m) if is_echo else quiet
-    of_hidden = (1.0 - hidden_quiet) / (1.0 - SILENT_SHARE) if is_echo else hidden_quiet / SILENT_SHARE
+    evenly = 1.0 / (model.maximum_m - model.minimum_m)
+    unlikely, hidden = ((1.0 - quiet) * evenly, (1.0 - hidden_quiet) * evenly) if is_echo else (quiet, hidden_quiet)
     for k in range(RANGES):
-        hidden = of_hidden * hidden_density(range_m, k * UNIT_M if k > 0 else model.maximum_m, model)
         likely = missed
         if is_echo:
             z = (range_m - k * UNIT_M) / TABLE_SD_M

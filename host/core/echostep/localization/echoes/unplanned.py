@@ -243,7 +243,7 @@ def _loss(turn_rad: float, half_rad: float) -> float:
 
 
 class UsablePings:
-    """Pings from nearly one place repeat each other's errors: each counts by the way of its view since the one before, up to `own` after `correlation_m`.
+    """Pings of nearly one view repeat each other's errors: each counts by the way of the view since the one before, up to `own` on `correlation_m`.
 
     The axis within a turn is uncertain, so its pings count less, and what they leave is left to the first ping after it.
     Before a ranger was heard nothing tells that it works: it counts from its first echo on.
