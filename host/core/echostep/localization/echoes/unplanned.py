@@ -70,14 +70,11 @@ class LastWall:
         self._covariance_m += across * self._var_rad2
         self._var_rad2 += TURN_SD_RAD**2 * math.hypot(dx_m, dy_m)
 
-    def density(self, range_m: float, axis_rad: float, blur_m: float) -> float:
-        """Density (1/m) of an echo of this wall, if it is detected; blurred by a standard deviation."""
+    def density(self, range_m: float, axis_rad: float, blur_m: float, model: EchoModel) -> float:
+        """Density (1/m) of an echo of this wall, blurred by a standard deviation; it is detected as a wall of the plan would be."""
+        detected = detection(self.distance_m, abs(wrap(self.normal_rad - axis_rad)), WALL, model)
         variance_m2 = self._var_m2 + self._error_m(axis_rad) ** 2 + blur_m**2
-        return normal(range_m - self.distance_m, math.sqrt(variance_m2))
-
-    def detected(self, axis_rad: float, model: EchoModel) -> float:
-        """Probability that the wall is detected, as of a wall of the plan."""
-        return detection(self.distance_m, abs(wrap(self.normal_rad - axis_rad)), WALL, model)
+        return detected * normal(range_m - self.distance_m, math.sqrt(variance_m2))
 
     def update(self, range_m: float, axis_rad: float, power: float) -> None:
         """Correct the line by an echo, whose error counts by `power`: errors of successive echoes are alike."""
@@ -123,11 +120,9 @@ class UnplannedView:
 
         `stray`: probability of a second reflection where nothing answers.
         """
-        detected = 0.0 if self._wall is None else self._wall.detected(axis_rad, self._model)
-        if range_m <= 0.0:
-            return (1.0 - stray) * (1.0 - detected)
-        strays = (1.0 - detected) * stray / (self._echo.maximum_m - self._echo.minimum_m)
-        return strays + (detected * self._wall.density(range_m, axis_rad, blur_m) if self._wall is not None else 0.0)
+        if self._wall is None:
+            return 1.0 - stray if range_m <= 0.0 else stray / (self._echo.maximum_m - self._echo.minimum_m)
+        return 0.0 if range_m <= 0.0 else self._wall.density(range_m, axis_rad, blur_m, self._model)
 
     def update(self, range_m: float, axis_rad: float, power: float, goes_on: bool) -> None:
         """Take in a ping; `goes_on`: whether the view goes on, by the densities."""
