@@ -20,10 +20,9 @@ from echostep.localization import CloudSettings, Start, TrackStatus
 from echostep.path import MeasuredSegment
 from echostep.plan import Plan
 from echostep_studies.bench.filtering import Claim, FilterRun
-from echostep_studies.bench.laser.building import building_of, walk_from
+from echostep_studies.bench.laser.building import building_of, hear, walk_from
 from echostep_studies.bench.laser.carmen_log import CarmenLog, logs_in, read_log
 from echostep_studies.bench.laser.odometry import odometry_of
-from echostep_studies.bench.laser.scan_pings import hear
 from echostep_studies.bench.laser.wall_lines import straight_pieces, wall_segments
 from echostep_studies.clutter import study
 from echostep_studies.frame.report import as_dicts

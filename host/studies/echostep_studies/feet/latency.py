@@ -12,7 +12,7 @@ import numpy as np
 
 from echostep.foot.steps import Foot, Step
 from echostep_studies.bench.recordings.feet import FootRecording
-from echostep_studies.feet.rows import FigureRow
+from echostep_studies.feet.leave_one_out import FigureRow
 
 LIVE_HZ = 200.0
 LIVE = "live"  # the `set` of these rows

@@ -17,11 +17,10 @@ from echostep.foot.ins import Noise
 from echostep.foot.steps import Track, walk_track
 from echostep_app.output.table import Table, console
 from echostep_studies.bench.recordings.feet import SETS, FootRecording
-from echostep_studies.bench.recordings.foot_metrics import FootFigure, way
+from echostep_studies.bench.recordings.foot_metrics import FootFigure, align, places, way
 from echostep_studies.feet.latency import LIVE, pace_rows
-from echostep_studies.feet.leave_one_out import describe, leave_one_out, with_left_out
-from echostep_studies.feet.pictures import draw_tracks
-from echostep_studies.feet.rows import FigureRow
+from echostep_studies.feet.leave_one_out import FigureRow, describe, leave_one_out, with_left_out
+from echostep_studies.frame.pictures import save
 from echostep_studies.frame.recordings import recordings_in
 from echostep_studies.frame.report import as_dict
 from echostep_studies.frame.study import Study, StudyRequest
@@ -130,3 +129,28 @@ def _printed(row: FigureRow) -> dict[str, Any]:
     peer = "" if row.peer is None else f"{row.peer:.3f} {row.peer_name}"
     digits = {key: f"{columns[key]:.3f}" for key in ("value", "left_out") if columns.get(key) is not None}
     return columns | digits | {"peer": peer}
+
+
+def draw_tracks(path: Path, recordings: list[FootRecording], tracks: list[Track]) -> None:
+    """Every track from above, on its truth where that is a path, as one picture."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure as Sheet
+    from matplotlib.lines import Line2D
+
+    from echostep_app.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
+
+    across = 6
+    down = -(-len(recordings) // across)
+    sheet = Sheet(figsize=(3 * across, 3 * down), dpi=80, layout="constrained")
+    FigureCanvasAgg(sheet)
+    for k, (recording, track) in enumerate(zip(recordings, tracks, strict=True)):
+        axes = sheet.add_subplot(down, across, k + 1, aspect="equal", title=f"{recording.group} {recording.name}")
+        xy = track.position_m[:, :2]
+        if recording.truth_m is not None and recording.truth_t_s is not None:
+            axes.plot(*recording.truth_m.T, color=TRUTH_COLOUR, linewidth=3, alpha=0.5)
+            xy = align(places(track, recording.truth_t_s), recording.truth_m)
+        axes.plot(*xy.T, color=TRACK_COLOUR, linewidth=1)
+        axes.set(xlabel="x / m", ylabel="y / m")
+    handles = [Line2D([], [], color=TRACK_COLOUR, label="track"), Line2D([], [], color=TRUTH_COLOUR, label="truth")]
+    sheet.legend(handles=handles, loc="outside lower center", ncols=2)
+    save(sheet, path)

@@ -17,10 +17,9 @@ from echostep.board.messages import SCHEMA_HASH
 from echostep.errors import EchostepError
 from echostep.ports.chunks import POINT, Chunk
 from echostep_app.ports.tap import Tap
-from echostep_app.session.acceptance.errors import by_point, score_taps
 from echostep_app.session.acceptance.page import page
 from echostep_app.session.acceptance.protocol import FIELD
-from echostep_app.session.acceptance.walked import Walked, walk_again
+from echostep_app.session.acceptance.walked import Walked, by_point, score_taps, walk_again
 from session.acceptance.simulated_walk import record, walk
 
 pytestmark = pytest.mark.slow

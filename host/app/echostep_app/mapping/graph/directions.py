@@ -5,6 +5,9 @@ In: nodes and fragments. Out: `Directions`. Owns the filter. A fragment has a di
 it has the path's direction. The one state is the direction of the building against the heading by odometry, modulo a right angle: at first it may be
 any, then it diffuses as the heading drifts. Its distribution is kept on a circle of cells, forward and backward along the path [Rabiner 1989], so
 that a few walls askew at the beginning do not decide. The evidence is the likelihood of all fragments against walls of any direction.
+Shelves, niches and machines stand before walls, so what seems one straight piece is several. A piece's residuals are in its own standard deviations
+already; echoes come from the parts that stand out, so only other pieces show the rest. The relief is the one by which the directions of all
+fragments are most probable.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.jit import kernel, part
 from echostep_app.mapping.graph.companions import density_along_path, people_share
-from echostep_app.mapping.graph.fragments import Fragments
+from echostep_app.mapping.graph.fragments import SLOPE, Fragments
 from echostep_app.mapping.graph.nodes import Nodes
 
 RIGHT_RAD = 0.5 * math.pi
@@ -141,3 +144,26 @@ def _diffuse(belief: Floats, variance: float) -> None:
 def right_angles_off(angle_rad: float) -> float:
     """The angle less the nearest multiple of a right angle."""
     return (angle_rad + 0.5 * RIGHT_RAD) % RIGHT_RAD - 0.5 * RIGHT_RAD
+
+
+# Standard deviation of the surface along a piece, beyond its residuals. In three real buildings, by laser: 0.01 to 0.10 m in all
+RELIEFS_M = (0.01, 0.02, 0.03, 0.045, 0.065)
+
+
+def find_relief(nodes: Nodes, fragments: Fragments) -> tuple[Fragments, Directions]:
+    """The walls are flat unless another relief has the odds that two directions of the building need."""
+    flat = best = fragments, find_directions(nodes, fragments)
+    for relief_m in RELIEFS_M:
+        tried = with_relief(fragments, relief_m)
+        directions = find_directions(nodes, tried)
+        if directions.evidence > max(best[1].evidence, flat[1].evidence + LEAST_EVIDENCE):
+            best = tried, directions
+    return best
+
+
+def with_relief(fragments: Fragments, relief_m: float) -> Fragments:
+    """The fragments of a surface with this standard deviation: it shifts a piece, and turns it the more the shorter it is."""
+    turned_rad = SLOPE * relief_m / np.maximum(fragments.half_m, 0.5 * relief_m)
+    return fragments._replace(
+        sd_m=np.hypot(fragments.sd_m, relief_m), sd_rad=np.minimum(np.hypot(fragments.sd_rad, turned_rad), math.pi)
+    )
