@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from echostep.foot.steps import walk_track
-from foot.navigation import Samples, moves, walking
+from foot.foot_walks import Samples, moves, walking
 
 RATE_HZ, STEPS = 100, 6
 GRAVITY_M_S2 = 9.81

@@ -24,7 +24,7 @@ from echostep.xsens.output_formats import BY_LENGTH, CONFIGURED, GIVEN, OutputFo
 from echostep_app.recording.capture_summary import summary
 from echostep_studies.frame.recordings import DATA
 from echostep_studies.simulation.devices.mtx_setup import pack
-from naive.mt_frames import valid_frames
+from naive.frames import valid_frames
 from needs_data import needs_data
 
 REAL = sorted(p for end in ("bin", "mtb", "xbus") for p in (DATA / "mtb").glob(f"**/*.{end}"))

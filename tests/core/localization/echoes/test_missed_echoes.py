@@ -1,12 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""Missed echoes: learnt from silent pings between echoes that are alike, and from nothing else."""
+"""Missed echoes: learnt from silent pings between echoes that are alike, and from nothing else.
+
+How much a ping counts: by the way since the one before, and never as a whole.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from echostep.errors import EchostepError
+from echostep.localization import Building, EchoSettings, echo_model
 from echostep.localization.echoes.likelihood import PRIOR_HEARD, PRIOR_MISSED, MissedEchoes
+from echostep.localization.echoes.unplanned import UsablePings
+from echostep.path import MeasuredSegment, PathSegment
+from echostep.settings import parse_settings
+from echostep.walls.echo_sources import Walls
 
 PRIOR = PRIOR_MISSED / PRIOR_HEARD
 
@@ -39,3 +48,27 @@ def test_doors_and_far_walls_teach_nothing() -> None:
 
 def test_each_ranger_has_odds_of_its_own() -> None:
     assert odds([1.0, 0.0] * 100, ranger=1) == PRIOR
+
+
+ROOM = Building(Walls(np.array([[0, 0, 30, 0], [30, 0, 30, 8], [30, 8, 0, 8], [0, 8, 0, 0]], float)), None)
+
+
+def powers(apart_m: float, echo: EchoSettings) -> list[float]:
+    """Powers of five pings of the left ranger on a straight way, so far apart."""
+    length = 5.0 * apart_m
+    way = PathSegment(0.0, 1.0, length, 0.0, 0.0, 0.0, sd_m=0.01, turn_sd_rad=0.001, step=1)
+    t_s = np.arange(5) / 5.0
+    measured = MeasuredSegment(way, t_s, np.zeros(5, np.int64), np.full(5, 2.0))
+    return UsablePings(ROOM.background(echo_model(echo)), echo).take(measured)[0].power.tolist()
+
+
+@pytest.mark.parametrize(("apart_m", "share"), [(0.05, 0.2), (0.125, 0.5), (0.25, 1.0), (3.0, 1.0)])
+@pytest.mark.parametrize("own", [0.7, 1.0])
+def test_a_ping_counts_by_the_way_since_the_one_before(apart_m: float, share: float, own: float) -> None:
+    assert powers(apart_m, EchoSettings(own=own)) == pytest.approx([own] + [own * share] * 4)
+
+
+@pytest.mark.parametrize("own", [0.0, -0.5, 1.5])
+def test_a_share_that_is_none_is_refused(own: float) -> None:
+    with pytest.raises(EchostepError, match=r"me\.toml: \[echo\] own: "):
+        parse_settings(f"[echo]\nown = {own}\n", "me.toml")
