@@ -11,10 +11,10 @@ from typing import Any, Self
 import pytest
 
 from echostep.plan import load_plan
+from echostep_app.operation.command import Restorer, restore
 from echostep_app.operation.operation import Operation
 from echostep_app.operation.page import TablePage
 from echostep_app.operation.requests import Acknowledge, SetMark, Unmark
-from echostep_app.operation.restorer import Restorer, restore
 from echostep_app.page.elements.marks import ShownMark
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.server import Address, PageServer

@@ -3,27 +3,64 @@
 
 In: the folder of recordings. Out: rows `{set, recording, metric, value, distance_m, peer, peer_name}`, JSON, a table, on request a picture.
 Owns nothing. Nothing is set for a recording: the foot has one setting, and it stays at its default.
+Latency: seconds of data from the begin of a stance to the step that it ends, fed sample by sample.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 from statistics import median
+from time import process_time
 from typing import Any
 
+import numpy as np
 from msgspec import UNSET
 
 from echostep.foot.ins import Noise
-from echostep.foot.steps import Track, walk_track
+from echostep.foot.steps import Foot, Step, Track, walk_track
 from echostep_app.output.table import Table, console
 from echostep_studies.bench.recordings.feet import SETS, FootRecording
 from echostep_studies.bench.recordings.foot_metrics import FootFigure, align, places, way
-from echostep_studies.feet.latency import LIVE, pace_rows
 from echostep_studies.feet.leave_one_out import FigureRow, describe, leave_one_out, with_left_out
 from echostep_studies.frame.pictures import save
 from echostep_studies.frame.recordings import recordings_in
 from echostep_studies.frame.report import as_dict
 from echostep_studies.frame.study import Study, StudyRequest
+
+LIVE_HZ = 200.0
+LIVE = "live"  # the `set` of these rows
+
+
+def pace(recording: FootRecording) -> tuple[list[float], float]:
+    """Latency (s) of each step, and processor seconds a sample."""
+    foot, late = Foot(), []
+    t_s, accel, gyro = recording.t_s, recording.accel, recording.gyro
+    began = process_time()
+    for k in range(len(t_s)):
+        for event in foot.feed(t_s[k : k + 1], accel[k : k + 1], gyro[k : k + 1]):
+            if isinstance(event, Step):
+                late.append(float(t_s[k] - event.t_end_s))
+    return late, (process_time() - began) / len(t_s)
+
+
+def pace_rows(recordings: list[FootRecording]) -> list[FigureRow]:
+    """Latency and cost over all recordings; the values are seconds and a share, as the metrics say."""
+    pace(recordings[0])  # not counted: kernels compile
+    paces = [pace(recording) for recording in recordings]
+    late = [seconds for part, _ in paces for seconds in part]
+    cost = float(np.mean([seconds for _, seconds in paces]))
+    figures = {
+        "step told after its stance began, median, s": float(np.median(late)),
+        "step told after its stance began, worst, s": max(late),
+        f"share of a core at {LIVE_HZ:.0f} Hz, sample by sample": cost * LIVE_HZ,
+    }
+    return [
+        FigureRow(
+            set=LIVE, recording="all", metric=metric, value=round(value, 4), distance_m=None, peer=None, peer_name=None
+        )
+        for metric, value in figures.items()
+    ]
+
 
 COLUMNS = {
     "set": "set",
