@@ -217,10 +217,9 @@ def test_odometry_states_its_own_errors(
 
 @pytest.mark.long
 def test_the_command_tracks_every_log_of_a_folder(log_file: Path, tmp_path: Path) -> None:
-    found = echostep(
-        "evaluate", "clutter", "--data", str(log_file.parent), "--starts", "0", "--json", "c.json", cwd=tmp_path
+    echostep(
+        "evaluate", "clutter", "--data", str(log_file.parent), "--starts", "0", "--json", "c.json", cwd=tmp_path, ends=0
     )
-    assert found.returncode == 0, found.stderr
     rows = {row["name"]: row for row in json.loads((tmp_path / "c.json").read_text())["rows"]}
     assert set(rows) == {"made/full/tracked", "made/walls/tracked"}
     assert rows["made/full/tracked"]["lost"] == 0

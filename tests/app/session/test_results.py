@@ -82,6 +82,5 @@ def test_runs_in_one_process_leave_no_tracker_and_no_page_behind(
     monkeypatch.setattr(demo, "DEMO_WAYPOINTS", DEMO_WAYPOINTS[:2])
     before = alive()
     for seed in (1, 2):
-        done = echostep("demo", "--port", 0, "--seed", seed, "--out", tmp_path, "--no-open")
-        assert done.returncode == 0, done.stderr
+        echostep("demo", "--port", 0, "--seed", seed, "--out", tmp_path, "--no-open", ends=0)
     assert alive() <= before
