@@ -18,6 +18,7 @@ from echostep.board import messages as m
 from echostep.board.frames import BoardReader, encode
 from echostep.board.reports import BoardReports
 from echostep_app.board.faults.health import board_findings
+from echostep_app.board.subscription import SUBSCRIBE
 from echostep_app.simulation.devices.board import BoardProcess
 from echostep_app.simulation.stimulus import NO_SYNC, ROW
 
@@ -72,6 +73,11 @@ class Bench:
         """Send a message to the board."""
         self.board.send(encode(message, self.asked))
         self.asked += 1
+
+    def subscribe(self) -> None:
+        """Ask the board for its optional messages, once it has started."""
+        self.run(300)
+        self.ask(SUBSCRIBE)
 
     def fault(self, text: str) -> None:
         """Throw a fault switch."""

@@ -26,9 +26,9 @@ PROGRAM = [sys.executable, "-m", "echostep"]  # for tests that need a process: s
 
 
 def echostep(
-    *arguments: object, cwd: Path | None = None, env: Mapping[str, str] | None = None
+    *arguments: object, cwd: Path | None = None, env: Mapping[str, str] | None = None, ends: int | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Exit status and output of `echostep ARGUMENTS`, in `cwd` and with `env` instead of the environment where given."""
+    """Exit status and output of `echostep ARGUMENTS`, in `cwd` and with `env` instead of the environment where given; it `ends` with that status."""
     out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
     command = ["echostep", *map(str, arguments)]
     with ExitStack() as stack:
@@ -46,6 +46,7 @@ def echostep(
             status = 0
         except SystemExit as end:
             status = end.code if isinstance(end.code, int) else int(end.code is not None)
+    assert ends in (None, status), f"exit status {status}: {_text(out)}{_text(err)}"
     return subprocess.CompletedProcess(command, status, _text(out), _text(err))
 
 

@@ -63,8 +63,16 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
         return (yield)
 
 
+@pytest.fixture
+def browser(chromium: Any) -> Iterator[Any]:
+    """Chromium; the pages that a test has opened are closed at its end."""
+    yield chromium
+    for context in chromium.contexts:
+        context.close()
+
+
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def chromium() -> Iterator[Any]:
     """Chromium, driven by Playwright; skips where one of them is missing."""
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: no page is looked at")
     if CHROMIUM is None:

@@ -198,8 +198,7 @@ def test_a_host_that_asks_for_other_sensors_gets_none(foot: Bench) -> None:
 @pytest.mark.parametrize("kit", ["papers", "2026"])
 def test_a_belt_board_is_none(bench: Bench, kit: str) -> None:
     bench.fault(f"kit={kit}")
-    bench.run(300)
-    bench.ask(SUBSCRIBE)
+    bench.subscribe()
     found = bench.run(3_000)
     assert not kinds(found)["Foot"] + kinds(found)["FootHealth"]
     parts = next(x for x in reversed(found) if isinstance(x, m.Parts))

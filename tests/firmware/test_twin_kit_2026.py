@@ -37,8 +37,7 @@ def pressures(found: list[m.Message]) -> list[m.Pressure]:
 def barometer(bench: Bench) -> Bench:
     """A board of the papers with a BMP390, subscribed."""
     bench.fault("part_pressure=bmp390")
-    bench.run(300)
-    bench.ask(SUBSCRIBE)
+    bench.subscribe()
     bench.run(1_200)
     return bench
 
@@ -116,8 +115,7 @@ def test_a_wrong_part_and_an_empty_memory_are_named_at_the_start(
 ) -> None:
     bench.fault("part_pressure=bmp390")
     bench.fault(f"bmp390={kind}")
-    bench.run(300)
-    bench.ask(SUBSCRIBE)
+    bench.subscribe()
     bench.run(2_500)
     assert not pressures(bench.messages)
     assert cause is None or bench.status.fault_pressure == cause
@@ -139,8 +137,7 @@ def test_a_board_that_nobody_has_asked_sends_no_parts(bench: Bench) -> None:
 
 
 def test_the_parts_of_the_papers_are_named(bench: Bench) -> None:
-    bench.run(300)
-    bench.ask(SUBSCRIBE)
+    bench.subscribe()
     bench.run(2_000)
     found = bench.parts
     assert found[1:9] == (
@@ -158,8 +155,7 @@ def rangers(bench: Bench) -> Bench:
     """A board of the papers with pulse rangers on both sides, subscribed."""
     bench.fault("part_ranger_left=pulse")
     bench.fault("part_ranger_right=pulse")
-    bench.run(300)
-    bench.ask(SUBSCRIBE)
+    bench.subscribe()
     bench.run(1_200)
     return bench
 
@@ -276,8 +272,7 @@ def test_hum_on_open_echo_lines_is_no_ranger(bench: Bench, kit: str) -> None:
 
 def test_rangers_of_two_kinds_are_refused_in_words(bench: Bench) -> None:
     bench.fault("part_ranger_right=pulse")
-    bench.run(300)
-    bench.ask(SUBSCRIBE)
+    bench.subscribe()
     bench.run(1_000)
     found = bench.run(2_000)
     assert {p.outcome for p in pings(found, m.Ranger.LEFT)} == {m.Outcome.ECHO}
@@ -331,8 +326,7 @@ def imus(bench: Bench) -> Bench:
     """A board of the papers with LSM6DSO on thigh, calf and belt, subscribed."""
     for place in PLACES:
         bench.fault(f"part_{place}=lsm6dso")
-    bench.run(300)
-    bench.ask(SUBSCRIBE)
+    bench.subscribe()
     bench.run(1_200)
     return bench
 
@@ -493,8 +487,7 @@ def test_a_part_that_is_neither_gyro_is_not_read(bench: Bench) -> None:
 def magnetometer(bench: Bench) -> Bench:
     """A board of the papers with a LIS3MDL, subscribed."""
     bench.fault("part_compass=lis3mdl")
-    bench.run(300)
-    bench.ask(SUBSCRIBE)
+    bench.subscribe()
     bench.run(1_200)
     return bench
 
@@ -540,8 +533,7 @@ def test_a_lis3mdl_that_fails_is_named_and_comes_back(
 def test_a_wrong_magnetometer_is_named(bench: Bench) -> None:
     bench.fault("part_compass=lis3mdl")
     bench.fault("lis3mdl=wrong_identity")
-    bench.run(300)
-    bench.ask(SUBSCRIBE)
+    bench.subscribe()
     bench.run(2_000)
     words = "compass: holds a part that the firmware does not know (identity register 0x40)"
     assert any(text.startswith(words) for text in bench.all_findings)
@@ -568,8 +560,7 @@ def test_an_older_host_reads_the_kit_of_2026_but_for_its_compass(bench: Bench) -
 
 def test_the_whole_kit_of_2026_at_once_keeps_all_rates(bench: Bench) -> None:
     bench.fault("kit=2026")
-    bench.run(300)
-    bench.ask(SUBSCRIBE)
+    bench.subscribe()
     bench.run(1_500)
     found = kinds(bench.run(5_000, extended_rows(5_000)))
     assert found["Ping"] >= 5 * 28

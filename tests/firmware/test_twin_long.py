@@ -12,7 +12,6 @@ import pytest
 from board_runs import TWIN, Bench, kinds, needs_twin, pings
 from echostep.board import messages as m
 from echostep.timing.timeline import TICKS_PER_S
-from echostep_app.board.subscription import SUBSCRIBE
 from echostep_app.simulation.devices.board import BoardProcess
 from echostep_app.simulation.stimulus import NO_SYNC, ROW
 from twin.late_clock import HALF_WRAP, TIMER_WRAP, WRAP, late_firmware
@@ -53,8 +52,7 @@ def check_run(elf: Path, kit: str) -> m.Status:
     """Six seconds after a start: all that is wanted comes, nothing is lost. The last status."""
     bench = Bench(BoardProcess([str(TWIN), "--elf", str(elf)]))
     bench.fault(f"kit={kit}")
-    bench.run(300)
-    bench.ask(SUBSCRIBE)
+    bench.subscribe()
     bench.run(1_500)
     rates = [kinds(bench.run(1_000)) for _ in range(4)]
     bench.board.close()

@@ -8,7 +8,6 @@ import pytest
 
 from board_runs import Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
-from echostep_app.board.subscription import SUBSCRIBE
 
 pytestmark = needs_twin
 
@@ -27,8 +26,7 @@ def plug(bench: Bench, part: str, *sides: str) -> None:
 def rangers(bench: Bench) -> Bench:
     """A board of the papers with MaxSonar rangers on both sides, subscribed."""
     plug(bench, "maxsonar")
-    bench.run(300)
-    bench.ask(SUBSCRIBE)
+    bench.subscribe()
     bench.run(1_700)
     return bench
 
@@ -140,8 +138,7 @@ def test_rangers_of_all_kinds_may_be_swapped_in_mid_walk(rangers: Bench) -> None
 def test_a_maxsonar_beside_another_kind_is_used_alone_and_named(bench: Bench, other: str, name: str) -> None:
     plug(bench, other, "left")
     plug(bench, "maxsonar", "right")
-    bench.run(300)
-    bench.ask(SUBSCRIBE)
+    bench.subscribe()
     bench.run(2_000)
     found = bench.run(2_000)
     assert outcomes(found, m.Ranger.RIGHT) == {m.Outcome.ECHO}

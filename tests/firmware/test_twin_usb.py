@@ -10,7 +10,6 @@ import pytest
 
 from board_runs import ELF, ROOT, TWIN, Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
-from echostep_app.board.subscription import SUBSCRIBE
 from echostep_app.simulation.devices.board import BoardProcess
 
 pytestmark = needs_twin
@@ -133,8 +132,7 @@ def test_a_bus_hung_at_power_up(bench: Bench, line: str) -> None:
 def test_pulse_rangers_are_found_beside_a_bus_that_is_stuck_from_the_start(bench: Bench) -> None:
     bench.fault("kit=2026")
     bench.fault("sda=stuck_forever")
-    bench.run(300)
-    bench.ask(SUBSCRIBE)
+    bench.subscribe()
     bench.run(1_500)
     found = bench.run(1_000)
     assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.ECHO}

@@ -15,21 +15,9 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep_studies.barometer import vertical_model as model
-from echostep_studies.barometer.vertical_model import (
-    CALM,
-    FADING,
-    GUST,
-    HEIGHT,
-    HELD,
-    LIFT_UP,
-    ON,
-    RATE,
-    STAIRS_UP,
-    WEATHER,
-)
 
 UNIT = np.eye(model.SIZE)
-SUM = UNIT[HEIGHT] + UNIT[WEATHER] + UNIT[GUST]  # what pressure measures
+SUM = UNIT[model.HEIGHT] + UNIT[model.WEATHER] + UNIT[model.GUST]  # what pressure measures
 
 
 class Gaussian(NamedTuple):
@@ -100,37 +88,37 @@ def near(g: Gaussian, a: int, value: float, width: float) -> tuple[float, Gaussi
 
 def motion(way: int) -> tuple[float, float, float]:
     """Mean, standard deviation and time constant of the vertical speed on stairs or in a lift."""
-    up = 1.0 if way in (STAIRS_UP, LIFT_UP) else -1.0
-    if way < LIFT_UP:
+    up = 1.0 if way in (model.STAIRS_UP, model.LIFT_UP) else -1.0
+    if way < model.LIFT_UP:
         return up * model.CLIMB_M_S, model.CLIMB_SD_M_S, model.CLIMB_S
     return up * model.RIDE_M_S, model.RIDE_SD_M_S, model.RIDE_S
 
 
 def propagated(g: Gaussian, air: int, way: int, dt: float) -> Gaussian:
     """New mean F x + b, new covariance F P F^T + Q: weather wanders, a gust wanders or fades, the speed returns to its mean."""
-    g = wider(g, WEATHER, model.WEATHER_M**2 * dt)
+    g = wider(g, model.WEATHER, model.WEATHER_M**2 * dt)
     f, b, q = UNIT.copy(), np.zeros(model.SIZE), np.zeros((model.SIZE, model.SIZE))
-    if air == HELD:
-        g = wider(g, GUST, model.HELD_WANDERS_M**2 * dt)
-    if air == FADING:
-        f[GUST, GUST] = fades = math.exp(-dt / model.FADES_S)
-        rate = model.FADING_WANDERS_M**2 + (model.FADING_WANDERS * g.mean[GUST]) ** 2
-        q[GUST, GUST] = 0.5 * model.FADES_S * (1.0 - fades**2) * rate
-    if way != ON:
+    if air == model.HELD:
+        g = wider(g, model.GUST, model.HELD_WANDERS_M**2 * dt)
+    if air == model.FADING:
+        f[model.GUST, model.GUST] = fades = math.exp(-dt / model.FADES_S)
+        rate = model.FADING_WANDERS_M**2 + (model.FADING_WANDERS * g.mean[model.GUST]) ** 2
+        q[model.GUST, model.GUST] = 0.5 * model.FADES_S * (1.0 - fades**2) * rate
+    if way != model.ON:
         speed, sd, tau = motion(way)
         keeps = math.exp(-dt / tau)
-        f[HEIGHT, RATE], f[RATE, RATE] = tau * (1.0 - keeps), keeps
-        b[HEIGHT], b[RATE] = speed * (dt - tau * (1.0 - keeps)), speed * (1.0 - keeps)
-        pair = np.ix_([HEIGHT, RATE], [HEIGHT, RATE])
+        f[model.HEIGHT, model.RATE], f[model.RATE, model.RATE] = tau * (1.0 - keeps), keeps
+        b[model.HEIGHT], b[model.RATE] = speed * (dt - tau * (1.0 - keeps)), speed * (1.0 - keeps)
+        pair = np.ix_([model.HEIGHT, model.RATE], [model.HEIGHT, model.RATE])
         q[pair] = sd**2 * (1.0 - keeps**2) * np.array([[dt**2 / 3.0, dt / 2.0], [dt / 2.0, 1.0]])
     return Gaussian(f @ g.mean + b, f @ g.cov @ f.T + q)
 
 
 def evidence(g: Gaussian, way: int, seen: Floats, dt: float) -> float:
     """Likelihood of a height beyond the range of levels: only stairs and lifts pay."""
-    height = g.mean[HEIGHT]
+    height = g.mean[model.HEIGHT]
     beyond = max(height - (seen[model.HIGHEST] + 1.0), (seen[model.LOWEST] - 1.0) - height, 0.0)
-    return 1.0 if way == ON else math.exp(-dt * model.RANGE_COST * beyond)
+    return 1.0 if way == model.ON else math.exp(-dt * model.RANGE_COST * beyond)
 
 
 def observed(g: Gaussian, way: int, seen: Floats, dt: float) -> tuple[float, Gaussian]:
@@ -165,9 +153,9 @@ def started(heights_m: Floats, prior: Floats, claimed_m: float, noise_m: float) 
     weights, gaussians = np.zeros(len(heights_m) * model.MODES), list[Gaussian]()
     for level, air, way in itertools.product(range(len(heights_m)), range(3), range(model.WAYS)):
         mean, cov = np.zeros(model.SIZE), np.zeros((model.SIZE, model.SIZE))
-        if (air, way) == (CALM, ON):
+        if (air, way) == (model.CALM, model.ON):
             weights[len(gaussians)] = prior[level] / prior.sum()
-            mean[HEIGHT], mean[WEATHER] = heights_m[level], claimed_m - heights_m[level]
-            cov[WEATHER, WEATHER] = noise_m**2
+            mean[model.HEIGHT], mean[model.WEATHER] = heights_m[level], claimed_m - heights_m[level]
+            cov[model.WEATHER, model.WEATHER] = noise_m**2
         gaussians.append(Gaussian(mean, cov))
     return weights, gaussians

@@ -12,20 +12,6 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep_studies.barometer import vertical_model as model
-from echostep_studies.barometer.vertical_model import (
-    CALM,
-    FADING,
-    GUST,
-    HEIGHT,
-    HELD,
-    LIFT_DOWN,
-    LIFT_UP,
-    ON,
-    RATE,
-    STAIRS_DOWN,
-    STAIRS_UP,
-    WEATHER,
-)
 from naive.vertical import (
     Gaussian,
     Successor,
@@ -40,7 +26,7 @@ from naive.vertical import (
     within,
 )
 
-STAIRS, LIFTS = (STAIRS_UP, STAIRS_DOWN), (LIFT_UP, LIFT_DOWN)
+STAIRS, LIFTS = (model.STAIRS_UP, model.STAIRS_DOWN), (model.LIFT_UP, model.LIFT_DOWN)
 
 
 class VerticalFilter:
@@ -93,44 +79,47 @@ class VerticalFilter:
         """All that may follow hypothesis s within dt; what does not leave stays as it is, though a stay between levels is short."""
         level, air, way = s // model.MODES, s % model.MODES // model.WAYS, s % model.WAYS
         here = Successor(level, air, way, 1.0, self.gaussians[s])
-        leaving = self._calm(here, seen, dt) if air == CALM else self._gust(here, dt)
-        leaving += self._departures(here, dt) if way == ON else self._arrivals(here, dt)
+        leaving = self._calm(here, seen, dt) if air == model.CALM else self._gust(here, dt)
+        leaving += self._departures(here, dt) if way == model.ON else self._arrivals(here, dt)
         stays = 1.0 - sum(successor.share for successor in leaving)
-        if way != ON:
+        if way != model.ON:
             stays *= math.exp(-dt / model.BETWEEN_S)
         return [*leaving, here._replace(share=stays)]
 
     def _calm(self, here: Successor, seen: Floats, dt: float) -> list[Successor]:
         """A gust begins; on level ground the weather term may jump, by far only where pressure is far off."""
         g = here.gaussian
-        gust = set_to(g, GUST, 0.0, model.GUST_M)
+        gust = set_to(g, model.GUST, 0.0, model.GUST_M)
         found = [
-            here._replace(air=air, share=within(0.5 * model.GUST_BEGINS, dt), gaussian=gust) for air in (HELD, FADING)
+            here._replace(air=air, share=within(0.5 * model.GUST_BEGINS, dt), gaussian=gust)
+            for air in (model.HELD, model.FADING)
         ]
-        if here.way == ON:
-            jump = wider(g, WEATHER, model.SHIFT_M**2)
+        if here.way == model.ON:
+            jump = wider(g, model.WEATHER, model.SHIFT_M**2)
             found.append(here._replace(share=within(model.SHIFTS, dt), gaussian=jump))
-            if abs(seen[model.CLAIMED] - g.mean[HEIGHT] - g.mean[WEATHER]) > model.SEALED_OFF_M:
-                lost = wider(g, WEATHER, model.SEALED_M**2)
+            if abs(seen[model.CLAIMED] - g.mean[model.HEIGHT] - g.mean[model.WEATHER]) > model.SEALED_OFF_M:
+                lost = wider(g, model.WEATHER, model.SEALED_M**2)
                 found.append(here._replace(share=within(model.SEALED, dt), gaussian=lost))
         return found
 
     def _gust(self, here: Successor, dt: float) -> list[Successor]:
         """A gust jumps, changes its kind, ends where it is about zero; on level ground a held one of a shift's size may become weather."""
         g = here.gaussian
-        found = [here._replace(share=within(model.GUST_JUMPS, dt), gaussian=set_to(g, GUST, 0.0, model.GUST_M))]
-        if here.air == HELD:
-            found.append(here._replace(air=FADING, share=within(model.HELD_FADES, dt)))
+        found = [here._replace(share=within(model.GUST_JUMPS, dt), gaussian=set_to(g, model.GUST, 0.0, model.GUST_M))]
+        if here.air == model.HELD:
+            found.append(here._replace(air=model.FADING, share=within(model.HELD_FADES, dt)))
         else:
-            found.append(here._replace(air=HELD, share=within(model.FADING_HOLDS, dt)))
-        over, ended = near(g, GUST, 0.0, model.GUST_OVER_M)
+            found.append(here._replace(air=model.HELD, share=within(model.FADING_HOLDS, dt)))
+        over, ended = near(g, model.GUST, 0.0, model.GUST_OVER_M)
         found.append(
-            here._replace(air=CALM, share=within(model.GUST_ENDS, dt) * over, gaussian=set_to(ended, GUST, 0.0, 0.0))
+            here._replace(
+                air=model.CALM, share=within(model.GUST_ENDS, dt) * over, gaussian=set_to(ended, model.GUST, 0.0, 0.0)
+            )
         )
-        if here.air == HELD and here.way == ON:
-            alike, shift = near(g, GUST, 0.0, model.SHIFT_M)
-            weather = handed_over(shift, WEATHER, GUST, 0.0)
-            found.append(here._replace(air=CALM, share=within(model.GUST_SHIFTS, dt) * alike, gaussian=weather))
+        if here.air == model.HELD and here.way == model.ON:
+            alike, shift = near(g, model.GUST, 0.0, model.SHIFT_M)
+            weather = handed_over(shift, model.WEATHER, model.GUST, 0.0)
+            found.append(here._replace(air=model.CALM, share=within(model.GUST_SHIFTS, dt) * alike, gaussian=weather))
         return found
 
     def _departures(self, here: Successor, dt: float) -> list[Successor]:
@@ -141,7 +130,7 @@ class VerticalFilter:
             (STAIRS, model.CLIMB_BEGINS, model.CLIMB_STOPS_M_S),
             (LIFTS, model.RIDE_BEGINS, model.RIDE_STOPS_M_S),
         ):
-            slow = set_to(here.gaussian, RATE, 0.0, sd)
+            slow = set_to(here.gaussian, model.RATE, 0.0, sd)
             found += [here._replace(way=way, share=within(often * rate, dt), gaussian=slow) for way in ways]
         return found
 
@@ -149,19 +138,19 @@ class VerticalFilter:
         """From stairs and lifts to a level that is near, at a speed near zero; on stairs the direction may turn."""
         g, stairs = here.gaussian, here.way in STAIRS
         ends = within(model.CLIMB_ENDS if stairs else model.RIDE_ENDS, dt)
-        slow, stopped = near(g, RATE, 0.0, model.CLIMB_STOPS_M_S if stairs else model.RIDE_STOPS_M_S)
+        slow, stopped = near(g, model.RATE, 0.0, model.CLIMB_STOPS_M_S if stairs else model.RIDE_STOPS_M_S)
         found = []
         for level, height in enumerate(self.heights_m.tolist()):
             share, arrived = ends * slow, stopped
             if not self.free:
                 width = math.hypot(model.LEVEL_SD_M, model.SCALE * (height - self.heights_m[here.level]))
-                if abs(g.mean[HEIGHT] - height) > 5.0 * math.sqrt(g.cov[HEIGHT, HEIGHT] + width**2):
+                if abs(g.mean[model.HEIGHT] - height) > 5.0 * math.sqrt(g.cov[model.HEIGHT, model.HEIGHT] + width**2):
                     continue
-                close, arrived = near(stopped, HEIGHT, height, width)
-                share, arrived = share * close, handed_over(arrived, WEATHER, HEIGHT, height)
-            found.append(Successor(level, here.air, ON, share, set_to(arrived, RATE, 0.0, 0.0)))
+                close, arrived = near(stopped, model.HEIGHT, height, width)
+                share, arrived = share * close, handed_over(arrived, model.WEATHER, model.HEIGHT, height)
+            found.append(Successor(level, here.air, model.ON, share, set_to(arrived, model.RATE, 0.0, 0.0)))
         if stairs:
-            other = STAIRS_DOWN if here.way == STAIRS_UP else STAIRS_UP
+            other = model.STAIRS_DOWN if here.way == model.STAIRS_UP else model.STAIRS_UP
             found.append(here._replace(way=other, share=within(model.CLIMB_TURNS, dt)))
         return found
 
@@ -169,31 +158,31 @@ class VerticalFilter:
         """After a gap: the same level, any level, or stairs and lifts; the weather has gone on, the building's pressure shifted or not."""
         level, way, before = s // model.MODES, s % model.WAYS, self.gaussians[s]
         rests = math.exp(-2.0 * (model.CLIMB_BEGINS + model.RIDE_BEGINS) * dt)
-        stays = max(model.RESTS, rests) if way == ON else 0.0
+        stays = max(model.RESTS, rests) if way == model.ON else 0.0
         trend = model.WEATHER_M**2 * dt + (model.TREND_M_S * dt) ** 2
-        rested = set_to(set_to(wider(before, WEATHER, trend), RATE, 0.0, 0.0), GUST, 0.0, 0.0)
+        rested = set_to(set_to(wider(before, model.WEATHER, trend), model.RATE, 0.0, 0.0), model.GUST, 0.0, 0.0)
         shifts = within(model.SHIFTS + 0.5 * model.GUST_BEGINS, dt)
         found = []
-        for probability, air in ((1.0 - shifts, rested), (shifts, wider(rested, WEATHER, model.SHIFT_M**2))):
+        for probability, air in ((1.0 - shifts, rested), (shifts, wider(rested, model.WEATHER, model.SHIFT_M**2))):
             for target, share, ground in self._grounds(level, stays, air):
-                found.append(Successor(target, CALM, ON, probability * share, ground))
+                found.append(Successor(target, model.CALM, model.ON, probability * share, ground))
         low, high = self.heights_m[0], self.heights_m[-1]
         middle, wide = 0.5 * (low + high), 0.5 * (high - low) + model.LEVEL_SD_M
         if self.free:
-            middle, wide = before.mean[HEIGHT], model.WANDERED_M
+            middle, wide = before.mean[model.HEIGHT], model.WANDERED_M
         for target in (*STAIRS, *LIFTS):
             speed, sd, _ = motion(target)
-            moving = set_to(set_to(rested, HEIGHT, middle, wide), RATE, speed, sd)
-            found.append(Successor(level, CALM, target, (1.0 - stays) * model.UNDER_WAY / 4.0, moving))
+            moving = set_to(set_to(rested, model.HEIGHT, middle, wide), model.RATE, speed, sd)
+            found.append(Successor(level, model.CALM, target, (1.0 - stays) * model.UNDER_WAY / 4.0, moving))
         return found
 
     def _grounds(self, level: int, stays: float, g: Gaussian) -> list[tuple[int, float, Gaussian]]:
         """Level, share and Gaussian of each level ground after a gap; without levels: where it was, or metres away."""
         moved = (1.0 - stays) * (1.0 - model.UNDER_WAY)
         if self.free:
-            return [(0, stays, g), (0, moved, wider(g, HEIGHT, model.WANDERED_M**2))]
+            return [(0, stays, g), (0, moved, wider(g, model.HEIGHT, model.WANDERED_M**2))]
         count = len(self.heights_m)
         return [
-            (target, stays * (target == level) + moved / count, set_to(g, HEIGHT, height, 0.0))
+            (target, stays * (target == level) + moved / count, set_to(g, model.HEIGHT, height, 0.0))
             for target, height in enumerate(self.heights_m.tolist())
         ]

@@ -266,8 +266,7 @@ def test_the_commands_for_a_team_run(tmp_path: Path) -> None:
         for line in lines:
             program, *arguments = shlex.split(line.replace("18830", str(broker.port)))
             assert program == "echostep"
-            done = echostep(*arguments, cwd=tmp_path, env=os.environ | {"COLUMNS": "120"})
-            assert done.returncode == 0, done.stderr
+            done = echostep(*arguments, cwd=tmp_path, env=os.environ | {"COLUMNS": "120"}, ends=0)
             printed += done.stdout
     assert re.search(r"red/anna +ended", printed)
 

@@ -2,14 +2,17 @@
 """A researcher's visit: the notebooks of the manual run as they stand, and show tables, pictures and small errors.
 
 The cells run in this process, one after the other, as a notebook's kernel runs them.
+The examples in the docstrings of the public names run as they stand in docs/python.md.
 """
 
 from __future__ import annotations
 
 import ast
+import doctest
 import json
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -21,6 +24,7 @@ from packaging.requirements import Requirement
 import echostep
 from board_runs import ROOT
 from echostep_app.extras import EXTRAS
+from walks import DEMO
 
 FOLDER = ROOT / "host/docs/notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
@@ -122,3 +126,27 @@ def test_a_foot_with_its_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) 
     assert "</svg>" in (shown[1]._repr_svg_() or "")
     assert 0.0 < names["card"]["ce50_m"] < 0.1 < names["card"]["ce95_m"] < 0.4
     assert "motion capture" in (tmp_path / "foot.svg").read_text()
+
+
+WITH_EXAMPLE = ("Chunk", "Estimate", "Settings", "Start", "Walk", "replay")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WITH_EXAMPLE)
+def test_an_example_gives_what_it_says(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copy(DEMO, tmp_path / "demo.json")
+    shutil.copy(ROOT / "tests/captures/walk.mcap", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    (example, *_) = [
+        test for test in doctest.DocTestFinder(recurse=False).find(getattr(echostep, name), name) if test.examples
+    ]
+    said: list[str] = []
+    failed, _ = doctest.DocTestRunner().run(example, out=said.append)
+    assert not failed, "".join(said)
+
+
+def test_the_page_shows_them_as_code() -> None:
+    page = (ROOT / "host/docs/python.md").read_text()
+    for name in WITH_EXAMPLE:
+        section = page.partition(f"### {name}\n")[2].partition("\n### ")[0]
+        assert "```python\n>>> import echostep\n" in section, name

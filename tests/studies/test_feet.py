@@ -20,7 +20,7 @@ from echostep.foot.ins import Noise
 from echostep_studies.bench.recordings.feet import SETS, FootRecording
 from echostep_studies.bench.recordings.foot_metrics import FootFigure, align, places, rmse
 from echostep_studies.feet import leave_one_out
-from echostep_studies.feet.rows import FigureRow
+from echostep_studies.feet.leave_one_out import FigureRow
 from echostep_studies.feet.study import track_of
 from echostep_studies.frame.recordings import DATA, recordings_in
 from foot.foot_walks import any_rotation

@@ -20,8 +20,7 @@ from echostep_app.simulation.people.walker import Walk
 from echostep_app.simulation.world.magnetic_field import EARTH_T, MagneticDipole, MagneticField, dipole
 from echostep_studies.papers import fischer2008
 from echostep_studies.simulation.fischer_trails import TRAILS, Trail, measure_trail, walk_trail
-from echostep_studies.trails.study import TrailRun, summaries
-from echostep_studies.trails.walks import METHODS, RATES_HZ, JudgedTrack, judge, track
+from echostep_studies.trails.study import METHODS, RATES_HZ, JudgedTrack, TrailRun, judge, summaries, track
 
 BY_NAME = {trail.name: trail for trail in TRAILS}
 SEEDS = (1, 2, 3)

@@ -1,20 +1,31 @@
 # SPDX-License-Identifier: MIT
-"""`make faults`: its list of faults exists in the twin, its judgement of gaps, its table; two faults of the host in short."""
+"""`make faults`: its list of faults exists in the twin, its judgement of gaps, its table; two faults of the host in short.
+
+`make soak` in short: seconds of the real firmware around the wraps of its clock, and the seam of the walk.
+"""
 
 from __future__ import annotations
 
 import re
+from itertools import islice
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from board_runs import ROOT, Bench, needs_twin
+from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, MTX
 from echostep.recording import open_recording
+from echostep.xsens import MtxReader
 from echostep_app.simulation.devices.board import PythonBoard
-from reliability import faults
+from echostep_app.simulation.stimulus import NO_SYNC
+from places import PLAN
+from reliability import faults, soak
 from reliability.fault_outcomes import NORMAL_S, FaultOutcome, judge_streams, table
+from reliability.soak_walk import EndlessWalk
 from twin.host_faults import kill, plug_mtx, unplug_mtx
+from twin.late_clock import HALF_WRAP, WRAP
 from twin.live_walk import HostFault, LiveWalk
 
 
@@ -101,3 +112,36 @@ def test_a_killed_run_is_started_again_while_the_mtx_is_unplugged(tmp_path: Path
     assert not second.own_damage.truncated
     assert set(outcome.silent_s) == set(NORMAL_S)
     assert outcome.wrongly_sure == 0
+
+
+ROUND = ((16.0, 7.5), (24.0, 7.5), (24.0, 2.0), (2.0, 2.0), (2.0, 7.5), (16.0, 7.5))
+
+
+@pytest.mark.long
+@needs_twin
+@pytest.mark.parametrize(("wrap", "wraps"), [(HALF_WRAP, 0), (WRAP, 1)])
+def test_seconds_of_the_real_firmware_around_a_wrap_of_its_clock(tmp_path: Path, wrap: int, wraps: int) -> None:
+    measured = soak.run(8.0, tmp_path, wrap, 4.0)
+    failed = {figure.what for figure in soak.figures(measured) if figure.passed is False}
+    assert failed <= {"memory of the host", "memory of the twin"}  # of seconds says nothing
+    assert soak.wraps(measured.clock).measured == str(wraps)
+    assert measured.outcome.tracking == 1.0
+
+
+@pytest.mark.slow
+def test_rounds_of_the_walk_have_no_seam() -> None:
+    walk = EndlessWalk(load_plan(PLAN), 1, PythonBoard(1), ROUND)
+    edges = np.flatnonzero(walk.rows["sync_us"] != NO_SYNC)
+    edges_us = 1000 * edges + walk.rows["sync_us"][edges]
+    apart_us = np.diff([*edges_us, edges_us[0] + 1000 * walk.length_ms])
+    assert len(edges) == len(walk.samples)
+    assert set(apart_us.tolist()) <= {10_000, 10_001}
+    ends_s = [0.0, 1e-3 * walk.length_ms]
+    assert max(np.ptp(np.interp(ends_s, walk.truth[:, 0], walk.truth[:, k])) for k in (1, 2)) < 0.1
+    reader, arrived = MtxReader(), []
+    for chunk in islice(walk.mtx_chunks(), len(walk.samples) + 200):
+        arrived.append(chunk.t_arrival_ns)
+        reader.feed(chunk.data)
+    assert np.diff(arrived).max() < 30e6
+    assert reader.counts.good >= len(walk.samples) + 199
+    assert reader.counts.lost == reader.counts.bad_counter == 0

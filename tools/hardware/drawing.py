@@ -4,15 +4,32 @@
 In: a `WiredBoard`. Out: SVG. Each wire is labelled at both ends, so that colours are an aid only; they are near those of Okabe and Ito, which differ
 for all kinds of colour vision. Owns the layout: ends of parts lie half a row beside those of the processor, so that no two wires lie on each
 other.
+Lanes of vertical wires: the left-edge algorithm of channel routing.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hardware.lanes import lanes
 from hardware.pen import SOFT, Pen
 from hardware.wiring import POWER, Device, WiredBoard
+
+LANE_GAP = 24.0  # least distance of two wires in one lane, pixels
+
+
+def lanes(ends: dict[str, list[float]]) -> dict[str, int]:
+    """Lane of each net, counted from 0. [Hashimoto and Stevens 1971]"""
+    free_from: list[float] = []  # height from which each lane is free
+    lane_of: dict[str, int] = {}
+    for net in sorted(ends, key=lambda net: (min(ends[net]), net)):
+        top, bottom = min(ends[net]), max(ends[net])
+        lane = next((n for n, free in enumerate(free_from) if free <= top), len(free_from))
+        if lane == len(free_from):
+            free_from.append(0.0)
+        free_from[lane] = bottom + LANE_GAP
+        lane_of[net] = lane
+    return lane_of
+
 
 ROW, LANE = 24.0, 18.0  # pixels
 # Of the first part; above and below its pins; between two parts: whole rows together

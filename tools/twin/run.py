@@ -38,8 +38,7 @@ from echostep_app.simulation.kits import Kit
 from echostep_app.simulation.scenario import DEMO_WAYPOINTS, Scenario, demo_scenario
 from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 from echostep_studies.simulation.devices.mtx_setup import MtxDevice
-from echostep_studies.simulation.devices.poses import LyingParts
-from echostep_studies.simulation.devices.rehearsal import Act, Rehearsal
+from echostep_studies.simulation.devices.rehearsal import Act, LyingParts, Rehearsal
 from places import OUT, PLAN, TWIN
 
 BLOCK_MS, IDLE_MS = 10, 50

@@ -17,9 +17,9 @@ from echostep.board.gateway import FEW_S, MOST_BEACONS, Gateway
 from echostep.errors import EchostepError
 from echostep.ports.chunks import GATEWAY, MTX, Chunk
 from echostep_app.commands.actions.beacon_player import _open_sender
-from echostep_app.ports import chunk_queue, udp
-from echostep_app.ports.chunk_queue import ChunkQueue
+from echostep_app.ports import serial_ports, udp
 from echostep_app.ports.datagram_key import Opener, read_key, seal
+from echostep_app.ports.serial_ports import ChunkQueue
 from echostep_app.ports.udp import UdpPort
 from echostep_app.simulation.devices.beacon_gateway import message
 from free_ports import free_port
@@ -121,7 +121,7 @@ def test_a_query_that_is_not_a_key_is_refused(query: str) -> None:
 
 
 def test_a_queue_drops_and_counts_what_finds_no_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chunk_queue, "MOST_BYTES", 10_000)
+    monkeypatch.setattr(serial_ports, "MOST_BYTES", 10_000)
     queue = ChunkQueue()
     for k in range(100):
         queue.put(Chunk(GATEWAY, k, bytes(900)))

@@ -36,7 +36,7 @@ from echostep_app.commissioning.imu_errors import POSES, RestPose, check_unlike,
 from echostep_app.commissioning.poses import TRIES, measure_poses
 from echostep_app.commissioning.probe import ProbeResult, _Probe
 from echostep_app.simulation.devices.board import BoardProcess
-from echostep_studies.simulation.devices.poses import LyingParts
+from echostep_studies.simulation.devices.rehearsal import LyingParts
 from waiting import PATIENCE_S
 
 G = 9.81

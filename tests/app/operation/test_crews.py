@@ -20,7 +20,7 @@ from echostep_app.team.messages.marks import MarkBoard
 from echostep_app.team.messages.report import BadReportError
 from operation.teams import TOWER, ServedTeam, Team, place, whole_team
 from operation.test_table_page import LOOKS, shot, table
-from page.browser import loaded_page, overflow, wait_for
+from page.browser import loaded_page, overflow, violations, wait_for
 from page.web.test_page_sizes import SIZES, TABLE_READY, UNREACHED
 
 CREW = Crew(1, "0123abcd", "Attack 1", ("Anna", "Bo"), 30.0, "Ann", 1.8e9)
@@ -169,8 +169,7 @@ def test_a_commander_with_crews(browser: Any, monkeypatch: pytest.MonkeyPatch, t
         team.pass_time(60.0 * minutes)
         table_of.show()
 
-    with table_of:
-        page = table(browser, table_of.page.url, "wide")
+    with table_of, table(browser, table_of.page.url, "wide") as page:
         page.click("#crews-button")
         page.fill("#crew-name", "Attack 1")
         page.fill("#crew-members", "Anna, Eve")
@@ -209,7 +208,6 @@ def test_a_commander_with_crews(browser: Any, monkeypatch: pytest.MonkeyPatch, t
         page.click("#crew-list li:has-text('Attack 1') [data-does=check]")
         wait_for(page, f"{BUTTON} === 'Crews 1' && document.querySelector('#crew-due').hidden")
         assert not page.wrong
-        page.context.close()
     path = tmp_path / "crews.csv"
     team.operation.crew_log.write(path)
     rows = list(csv.DictReader(path.read_text().splitlines()))
@@ -221,8 +219,6 @@ def test_a_commander_with_crews(browser: Any, monkeypatch: pytest.MonkeyPatch, t
 
 @pytest.mark.parametrize("size", SIZES)
 def test_the_crews_keep_nobody_out(browser: Any, size: tuple[int, int], tmp_path: Path) -> None:
-    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
-
     team, table_of = served_crew()
     begin_s = team.unix_s
     for k, minutes in enumerate((1.0, 12.0, 40.0)):
@@ -239,19 +235,17 @@ def test_the_crews_keep_nobody_out(browser: Any, size: tuple[int, int], tmp_path
         page.screenshot(path=tmp_path / f"due-{size[0]}.png")
         page.click("#invitation")
         assert page.evaluate(UNREACHED) == []
-        found = Axe().run(page)
+        found = violations(page)
         page.click("#crews-button")
         states = page.evaluate(
             "[...document.querySelectorAll('#crew-list li')].map((e) => [e.dataset.state, e.innerText[0]])"
         )
         assert states == [["over", "▲"], ["due", "△"], ["inside", "●"]]  # to be told apart without colours
         page.screenshot(path=tmp_path / f"crews-{size[0]}.png")
-        again = Axe().run(page)
+        again = violations(page)
         assert overflow(page) == (0, 0)
         assert page.evaluate(
             "[...document.querySelectorAll('#crews *')].every((e) => e.getBoundingClientRect().right <= innerWidth)"
         )
         assert not page.wrong
-        page.context.close()
-    assert found.violations_count == 0, found.generate_report()
-    assert again.violations_count == 0, again.generate_report()
+    assert found == again == []

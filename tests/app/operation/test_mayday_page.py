@@ -11,7 +11,7 @@ import pytest
 
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.teams import TOWER, ServedTeam, Team, place, whole_team
-from page.browser import opened_page, spot, wait_for
+from page.browser import opened_page, spot, violations, wait_for
 from waiting import until
 
 SIZES = ((1280, 800), (360, 740), (740, 360), (320, 256), (1920, 1080))
@@ -53,11 +53,8 @@ def header_colour(page: Any) -> str:
 def test_a_mayday_is_heard_and_seen_and_leads_to_its_place_and_back(
     browser: Any, size: tuple[int, int], tmp_path: Path
 ) -> None:
-    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
-
     team = calm_team()
-    with ServedTeam(team) as served:
-        page = opened_table(browser, served.page.url, size)
+    with ServedTeam(team) as served, opened_table(browser, served.page.url, size) as page:
         calm, title = header_colour(page), page.title()
         assert page.inner_text("#words") == "● connected"
         page.click("#north")  # the first tap lets the page sound
@@ -73,7 +70,7 @@ def test_a_mayday_is_heard_and_seen_and_leads_to_its_place_and_back(
         x, y = spot(page, X_M + 9.0, Y_M)
         cover = page.evaluate("([x, y]) => document.elementFromPoint(x, y)?.closest('#map, #messages > *')?.id", [x, y])
         assert cover == "map"  # the place is on the screen, and nothing lies over it
-        found = Axe().run(page)
+        found = violations(page)
         page.screenshot(path=tmp_path / f"mayday-{size[0]}.png")
         page.click("#mayday-back")
         wait_for(page, f"JSON.stringify({VIEW}) === '{json.dumps(before, separators=(',', ':'))}'")
@@ -86,14 +83,12 @@ def test_a_mayday_is_heard_and_seen_and_leads_to_its_place_and_back(
         assert page.title() == title
         assert page.evaluate("rung") == 3  # once
         assert not page.wrong
-        page.context.close()
-    assert found.violations_count == 0, found.generate_report()
+    assert found == []
 
 
 def test_a_page_in_the_background_sounds_too(browser: Any) -> None:
     team = calm_team()
-    with ServedTeam(team) as served:
-        page = opened_table(browser, served.page.url, SIZES[0])
+    with ServedTeam(team) as served, opened_table(browser, served.page.url, SIZES[0]) as page:
         page.click("#north")
         page.evaluate("""() => {
             Object.defineProperty(document, 'hidden', { get: () => true });
@@ -108,7 +103,6 @@ def test_a_page_in_the_background_sounds_too(browser: Any) -> None:
         team.hear("Eve", place(TOWER, X_M, Y_M, 1), alarm=FALL)
         served.show()
         wait_for(page, "rung === 3 && document.title === '▲ MAYDAY Eve'")
-        page.context.close()
 
 
 def test_who_was_asked_after_a_fall_comes_to_the_top(browser: Any) -> None:
@@ -116,8 +110,7 @@ def test_who_was_asked_after_a_fall_comes_to_the_top(browser: Any) -> None:
     team.hear("Kim", place(TOWER, X_M, Y_M, 0), status="lost")
     team.hear("Gil", place(TOWER, X_M, Y_M, 2), alarm=ReportedAlarm("asking", "fall", 1, 4.0))
     team.hear("Eve", place(TOWER, X_M, Y_M, 1), alarm=ReportedAlarm("asking", "no motion", 1, 21.0))
-    with ServedTeam(team) as served:
-        page = opened_table(browser, served.page.url, SIZES[0])
+    with ServedTeam(team) as served, opened_table(browser, served.page.url, SIZES[0]) as page:
         names = page.evaluate("[...document.querySelectorAll('#list .name')].map((e) => e.textContent)")
         assert names[:2] == ["Gil", "Kim"]
         assert page.inner_text("#list li:first-child .said").startswith("asked after a fall, 2nd floor")
@@ -126,7 +119,6 @@ def test_who_was_asked_after_a_fall_comes_to_the_top(browser: Any) -> None:
         page.click("#list li:first-child button")
         wait_for(page, "!document.querySelector('#distress').hidden")
         assert page.is_hidden("#acknowledge")
-        page.context.close()
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -163,4 +155,3 @@ def test_details_of_one_in_distress_are_what_is_needed(browser: Any, size: tuple
         assert page.is_hidden("#distress")
         assert page.is_visible("#facts")
         assert not page.wrong
-        page.context.close()

@@ -16,9 +16,8 @@ from echostep_app.team.messages.report import ReportedAlarm
 from operation.crowd import walking
 from operation.teams import STOREYS, TOWER, ServedTeam, Team
 from operation.test_table_page import READY, WIDE, WORDS
-from page.browser import HELD_MS, loaded_page, overflow, spot, wait_for
+from page.browser import HELD_MS, loaded_page, overflow, spot, violations, wait_for
 from page.outage import Wire
-from page.test_language import violations
 from page.web.test_page_silence import OUTBOX, STATUS
 from page.web.test_page_sizes import SIZES, UNREACHED
 from waiting import until
@@ -53,8 +52,7 @@ def test_a_list_of_twenty_is_sorted_and_looked_through(browser: Any) -> None:
     """Calls for help stay on top; a place has coordinates, and a distance to a second one."""
     team = crowd(20)
     team.hear("wearer 13", walking(13, 0.0, 1), alarm=ReportedAlarm("mayday", "fall", 1, 14.0))
-    with ServedTeam(team) as served:
-        page = loaded_page(browser, served.page.url, WIDE, READY)
+    with ServedTeam(team) as served, loaded_page(browser, served.page.url, WIDE, READY) as page:
         page.select_option("#sort", "floor")
         floors = f"{WORDS}.map((text) => text.match(/(Ground|1st|2nd) floor/)?.[1])"
         shown(page, floors, ["1st", *["2nd"] * 6, *["1st"] * 6, *["Ground"] * 7])
@@ -80,7 +78,6 @@ def test_a_list_of_twenty_is_sorted_and_looked_through(browser: Any) -> None:
         wait_for(page, f"/^Distance: (2.9|3.0|3.1)/.test({HINT})")
         assert page.is_hidden("#sheet")
         assert not page.wrong
-        page.context.close()
 
 
 def test_all_storeys_feet_and_the_log(browser: Any, tmp_path: Path) -> None:
@@ -88,8 +85,7 @@ def test_all_storeys_feet_and_the_log(browser: Any, tmp_path: Path) -> None:
     team = crowd(6)
     team.unix_s = time.time()
     place_words = "document.querySelector('#list .said').textContent"
-    with ServedTeam(team) as served:
-        page = loaded_page(browser, served.page.url, WIDE, READY)
+    with ServedTeam(team) as served, loaded_page(browser, served.page.url, WIDE, READY) as page:
         served.page.feed.send = lambda *message: team.put_bytes(*message) or True  # type: ignore[func-returns-value]
         page.focus("#map")
         page.keyboard.press("v")
@@ -124,7 +120,6 @@ def test_all_storeys_feet_and_the_log(browser: Any, tmp_path: Path) -> None:
         wait_for(page, "/Ann: cleared, 12 m of smoke$/.test(document.querySelector('#log-list').innerText)")
         assert (page.evaluate(UNREACHED), violations(page)) == ([], [])
         assert not page.wrong
-        page.context.close()
 
 
 class Visit:
@@ -241,7 +236,6 @@ def officer(browser: Any, wearers: int, minutes: float, look: Callable[[Any, str
         kinds = [topic.split("/")[1] for topic in visit.sent]
         assert kinds == ["errand", "ack", "order", "order"]  # each once
         assert not [wrong for wrong in page.wrong if "WebSocket" not in wrong]
-        page.context.close()
 
 
 def test_an_officer_with_four_wearers_and_two_outages(browser: Any) -> None:

@@ -179,8 +179,6 @@ def test_everybody_is_ordered_out_and_says_so(browser: Any, tmp_path: Path, monk
         assert until(lambda: exchanged(table, told))
         table.click("#everybody-end")
         assert until(lambda: exchanged(table, "document.querySelector('#everybody').hidden"))
-        table.context.close()
-        wearer.context.close()
         box.close()
         subscription.close()
 

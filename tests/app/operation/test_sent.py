@@ -79,8 +79,6 @@ def test_who_is_sent_gets_the_way(browser: Any, tmp_path: Path, monkeypatch: pyt
         wait_for(rescuer, "document.querySelector('#errand').hidden && !echostep.last.guidance")
         sink.take(portion_of([]), [])
         wait_for(rescuer, "document.querySelector('#errand').hidden")  # it does not return by itself
-        for page in (rescuer, table):
-            page.context.close()
         for box in boxes:
             box.close()
         subscription.close()

@@ -45,8 +45,7 @@ WEIGHED = """() => {
 def test_frame_rate(browser: Any, wearers: int) -> None:
     """Wearers report ten times a second each, spread evenly over time; their trails are as long as they get."""
     print()
-    with Crowd(wearers) as crowd:
-        page = table(browser, crowd.served.page.url, "wide")
+    with Crowd(wearers) as crowd, table(browser, crowd.served.page.url, "wide") as page:
         page.evaluate(WEIGHED)
         console = page.context.new_cdp_session(page)
         console.send("Performance.enable", {"timeDomain": "threadTicks"})
@@ -61,7 +60,6 @@ def test_frame_rate(browser: Any, wearers: int) -> None:
         say(crowd, "map moved all the time", page, console)
         assert page.locator("#list li").count() == wearers
         assert not page.wrong
-        page.context.close()
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ from echostep_app.output.derived import STEP, Derived
 from echostep_app.output.terminal import TerminalView
 from echostep_app.page.live import LivePage
 from echostep_app.page.server import Address
-from echostep_app.printing.running import running_note
+from echostep_app.wearer.steady_status import running_note
 from echostep_studies.bench.recordings.feet import SETS
 from echostep_studies.frame.recordings import DATA, recordings_in
 from needs_data import needs_data

@@ -162,6 +162,15 @@ def loaded_page(browser: Any, url: str, how: dict[str, Any], ready: str) -> Any:
     return page
 
 
+def violations(page: Any, **options: Any) -> list[str]:
+    """What axe finds on a page: the rule and the first element of each."""
+    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
+
+    return [
+        f"{found['id']}: {found['nodes'][0]['html']}" for found in Axe().run(page, **options).response["violations"]
+    ]
+
+
 def overflow(page: Any) -> tuple[int, int]:
     """How many pixels a page is wider than its window, and how many of its controls reach beyond the right edge."""
     wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")

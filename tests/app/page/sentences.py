@@ -42,7 +42,7 @@ MODULES: dict[str, tuple[str, ...] | None] = {
     "plan/places/whereabouts.py": None,
     "session/acceptance/guide.py": ("_request", "_manner"),
     "session/results.py": ("summary_words",),
-    "printing/running.py": None,
+    "wearer/steady_status.py": None,
     "session/runs/dropped.py": ("DroppedFiles", "WAITING", "PREPARING", "_track"),
     "team/commander.py": ("notes",),
     "team/cot.py": ("alarm_words",),

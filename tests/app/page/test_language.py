@@ -26,7 +26,7 @@ from echostep_app.plan.writer import save_plan
 from echostep_app.team.messages.crews import Crew
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.teams import BASE, NAMES, TOWER, ServedTeam, place, whole_team
-from page.browser import READY, loaded_page, overflow, wait_for
+from page.browser import READY, loaded_page, overflow, violations, wait_for
 from page.edit.drawing import answer, answered, click, status
 from page.edit.test_editor_questions import doubtful_house
 from page.frames import scene, served
@@ -103,13 +103,6 @@ def page_of(browser: Any, url: str, lang: str, ready: str, **how: Any) -> Any:
     return loaded_page(browser, url, {"viewport": {"width": 360, "height": 740}, "locale": LOCALES[lang]} | how, ready)
 
 
-def violations(page: Any) -> list[str]:
-    """What axe finds, with the first element."""
-    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
-
-    return [f"{found['id']}: {found['nodes'][0]['html']}" for found in Axe().run(page).response["violations"]]
-
-
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
     with served(Mailbox(seven_floors(), "A walk (simulated, 3 x real time)", replay=False)) as (server, mailbox):
@@ -139,7 +132,6 @@ def test_names_stay_as_they_are_and_the_sentence_about_them_does_not(browser: An
         translated = page.evaluate("(texts) => texts.map((text) => echostep.tr(text))", filled)
         assert page.evaluate(MISSING) == []
         assert [text for text in translated if STRANGE not in text] == []
-        page.context.close()
 
 
 @pytest.mark.parametrize("lang", OTHERS)
@@ -150,13 +142,11 @@ def test_every_text_of_the_source_has_an_entry(browser: Any, url: str, lang: str
     assert len(texts) > 200
     page.evaluate("(texts) => texts.forEach((text) => echostep.tr(text))", sorted(texts))
     assert set(page.evaluate(MISSING)) - names(seven_floors()) - {"echostep", "GeoJSON"} == set()
-    page.context.close()
 
 
 @pytest.mark.parametrize("lang", OTHERS)
 def test_every_text_of_the_editor_has_an_entry(browser: Any, tmp_path: Path, lang: str) -> None:
-    with EditServer(tmp_path / "new.json", port=0) as server:
-        page = page_of(browser, server.url, lang, EDITOR_READY)
+    with EditServer(tmp_path / "new.json", port=0) as server, page_of(browser, server.url, lang, EDITOR_READY) as page:
         texts = editor_texts()
         assert len(texts) > 90
         page.evaluate("(texts) => texts.forEach((text) => echostep.tr(text))", sorted(texts))
@@ -167,7 +157,6 @@ def test_every_text_of_the_editor_has_an_entry(browser: Any, tmp_path: Path, lan
         count = "Questions of the import: {}, marked on the plan. Answer them one by one, or Move, Door and Delete as you like"
         told = [page.evaluate("(text) => echostep.tr(text)", count.format(n)) for n in (1, 2)]
         assert lang != "de" or [text.split(" des ")[0] for text in told] == ["1 Frage", "2 Fragen"]
-        page.context.close()
 
 
 def test_a_text_without_entry_is_found(browser: Any, url: str) -> None:
@@ -183,7 +172,6 @@ def test_a_text_without_entry_is_found(browser: Any, url: str) -> None:
     assert page.evaluate("echostep.tr('Take the stairs 3 up')") == "Treppe 3 hinauf"
     assert page.evaluate("echostep.tr('Take the lift A down.')") == "Aufzug A hinab."
     assert page.evaluate("echostep.tr('Take the Nordtreppe up')") == "Nordtreppe hinauf"
-    page.context.close()
 
 
 def test_how_a_language_is_chosen(browser: Any, url: str) -> None:
@@ -198,7 +186,6 @@ def test_how_a_language_is_chosen(browser: Any, url: str) -> None:
         with page.expect_navigation():  # it loads itself again
             page.select_option("#language", "en")
         wait_for(page, f"{LANG} === 'en' && document.querySelector('#help').textContent === 'Help!'")
-        page.context.close()
 
 
 def test_the_command_knows_the_languages_of_the_pages() -> None:
@@ -232,7 +219,6 @@ def test_nothing_is_cut_off_on_the_wearers_page(browser: Any, lang: str, tmp_pat
         left = set(page.evaluate(MISSING)) - names(plan)
         assert left <= {"echostep", "GeoJSON", "the board has no rangers", "look at its plug (docs/mistakes.md)"}
         assert not page.wrong
-        page.context.close()
 
 
 def wearers_moments() -> list[PageScene]:
@@ -253,8 +239,7 @@ def test_nothing_is_cut_off_on_the_commanders_page(browser: Any, lang: str, tmp_
     team.hear("Dana", place(TOWER, 12.0, 2.0, 2), alarm=ReportedAlarm("mayday", "fall", 1, 14.0))
     crew = Crew(1, "c" * 8, "Attack 1", ("Anna",), 30.0, "Ann", team.unix_s, team.unix_s - 1300.0)
     team.put_bytes(*crew.message)
-    with ServedTeam(team) as table:
-        page = page_of(browser, table.page.url, lang, TABLE_READY)
+    with ServedTeam(team) as table, page_of(browser, table.page.url, lang, TABLE_READY) as page:
         page.keyboard.press(
             "Shift"
         )  # no click on the invitation: where a script was evaluated before it was made, that counted as a gesture
@@ -284,7 +269,6 @@ def test_nothing_is_cut_off_on_the_commanders_page(browser: Any, lang: str, tmp_
         assert set(page.evaluate(MISSING)) - names(TOWER) - people == set()
         assert page.evaluate(LANG) == lang
         assert not page.wrong
-        page.context.close()
 
 
 @pytest.mark.long
@@ -292,8 +276,7 @@ def test_nothing_is_cut_off_on_the_commanders_page(browser: Any, lang: str, tmp_
 def test_nothing_is_cut_off_in_the_editor(browser: Any, lang: str, tmp_path: Path) -> None:
     doubtful = with_questions(import_plan(doubtful_house(tmp_path / "house.dxf")))
     save_plan(doubtful, tmp_path / "plan.json")
-    with EditServer(tmp_path / "plan.json", port=0) as server:
-        page = page_of(browser, server.url, lang, EDITOR_READY)
+    with EditServer(tmp_path / "plan.json", port=0) as server, page_of(browser, server.url, lang, EDITOR_READY) as page:
         shots = iter(range(100))
 
         def check(*, axe: bool = True) -> None:
@@ -337,7 +320,6 @@ def test_nothing_is_cut_off_in_the_editor(browser: Any, lang: str, tmp_path: Pat
         assert set(page.evaluate(MISSING)) - people == set()
         assert page.evaluate(LANG) == lang
         assert ["422" in text for text in page.wrong] == [True]  # the two points
-        page.context.close()
 
 
 def refuse_two_points(page: Any, check: Callable[[], None]) -> None:

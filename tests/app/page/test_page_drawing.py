@@ -79,7 +79,6 @@ def test_the_walls_grow_on_the_page(browser: Any, tmp_path: Path, size: str, how
         picture(page, f"drawing-{size}", tmp_path)
         assert overflow(page) == (0, 0)
         assert page.wrong == []
-        page.context.close()
     assert not live.server.shared.faults.notices
     walls, path = walls.reshape(-1, 5), path.reshape(-1, 2)
     assert np.hypot(*(path[-1] - end)) < 0.05

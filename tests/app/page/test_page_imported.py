@@ -75,5 +75,4 @@ def test_every_floor_of_an_imported_plan_is_on_the_page(browser: Any, kind: str,
             assert bool(page.evaluate(NAMES)) == bool(level.rooms)
         assert page.text_content("#fault") == ""
         assert not page.wrong
-        page.context.close()
     assert not server.shared.faults.notices

@@ -85,7 +85,6 @@ def test_the_moving_picture_is_the_page_while_a_walk_goes_on(browser: Any, tmp_p
         assert TITLE in page.inner_text("#title")
         frames = recorded(page)
         assert not page.wrong
-        page.context.close()
     assert len(frames) > 4
     assert all(ImageChops.difference(*pair).getbbox() for pair in zip(frames, frames[1:], strict=False))
     write((PICTURES or tmp_path) / NAME, frames)

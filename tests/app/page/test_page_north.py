@@ -74,17 +74,14 @@ def test_the_live_page_turns_to_the_north_of_its_words(
         assert "heading N 000°" in page.text_content("#place")
         check(page, plan, tmp_path / "live.png")
         assert not page.wrong
-        page.context.close()
 
 
 def test_the_commanders_page_turns_to_the_north_of_its_words(browser: Any, tmp_path: Path) -> None:
     plan = turned(30.0)
     team = Team(plan)
     team.hear("Anna", place(plan, 6.0, 7.5, 0, heading_rad=north_rad(plan)))
-    with ServedTeam(team) as team_page:
-        page = loaded_page(browser, team_page.page.url, DESK, TABLE_READY)
+    with ServedTeam(team) as team_page, loaded_page(browser, team_page.page.url, DESK, TABLE_READY) as page:
         page.click("#list button")
         wait_for(page, "document.querySelector('#facts').innerText.includes('N 000°')")
         check(page, plan, tmp_path / "table.png")
         assert not page.wrong
-        page.context.close()

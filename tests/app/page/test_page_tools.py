@@ -21,7 +21,7 @@ from echostep_app.page.elements.stream_rates import StreamRates
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.over_time import OverTime
 from echostep_app.page.server import PageServer
-from page.browser import LOCAL, READY, loaded_page, overflow, picture, spot, wait_for
+from page.browser import LOCAL, READY, loaded_page, overflow, picture, spot, violations, wait_for
 from page.frames import PLAN, scene, told
 from page.web.test_page_sizes import SIZES, UNREACHED
 from waiting import until
@@ -103,7 +103,6 @@ def test_layers_are_left_out_and_stay_so(browser: Any, url: str) -> None:
     page.reload()
     wait_for(page, f"{READY} && !echostep.scene.layers.shows('trail') && echostep.scene.layers.shows('cloud')")
     assert not page.wrong
-    page.context.close()
 
 
 def test_charts_show_the_walk_and_what_happened(browser: Any, url: str, tmp_path: Path) -> None:
@@ -136,7 +135,6 @@ def test_charts_show_the_walk_and_what_happened(browser: Any, url: str, tmp_path
     wait_for(page, "echostep.last.play.t_s === 60")
     picture(page, "charts", tmp_path)
     assert not page.wrong
-    page.context.close()
 
 
 @pytest.mark.long
@@ -160,7 +158,6 @@ def test_a_link_leads_to_its_view_and_moment(browser: Any, url: str) -> None:
     assert far.evaluate("echostep.scene.level") == 0
     for opened in (page, other, bad, far):
         assert not opened.wrong
-        opened.context.close()
 
 
 def test_two_taps_measure(browser: Any, url: str, tmp_path: Path) -> None:
@@ -182,7 +179,6 @@ def test_two_taps_measure(browser: Any, url: str, tmp_path: Path) -> None:
     page.keyboard.press("Enter")
     wait_for(page, f"{HINT}.startsWith('Distance: ')")
     assert not page.wrong
-    page.context.close()
 
 
 def saved(page: Any, button: str, folder: Path) -> Path:
@@ -206,15 +202,13 @@ def test_the_floor_is_saved_as_geojson(browser: Any, url: str, tmp_path: Path) -
     (position,) = (f for f in made_of["features"] if f["properties"]["kind"] == "position")
     assert position["geometry"]["coordinates"] == [7.0, 7.5]
     assert not page.wrong
-    page.context.close()
 
 
 def test_a_georeferenced_plan_gives_longitude_latitude_and_mgrs(browser: Any, tmp_path: Path) -> None:
     pytest.importorskip("pyproj")
     from echostep_app.team.georeference import GroundPlane
 
-    with PageServer(walked(PLACED), LOCAL) as server:
-        page = looking(browser, server.url)
+    with PageServer(walked(PLACED), LOCAL) as server, looking(browser, server.url) as page:
         page.mouse.click(*spot(page, 4.0, 7.5))
         wait_for(page, "/38S MB \\d{5} \\d{5}/.test(document.querySelector('#sheet-text').textContent)")
         said = page.inner_text("#sheet-text")
@@ -232,7 +226,6 @@ def test_a_georeferenced_plan_gives_longitude_latitude_and_mgrs(browser: Any, tm
             )
             assert found == wanted
         assert not page.wrong
-        page.context.close()
 
 
 MGRS = (  # the first: 38SMB4488 of the manual of GeoConvert; easting and northing of the others by the rule of the lettering
@@ -266,7 +259,6 @@ def test_lengths_in_feet_and_a_page_that_remembers(browser: Any, url: str) -> No
     ]
     page.reload()
     wait_for(page, f"{READY} && document.querySelector('#unit').value === 'ft'")
-    page.context.close()
 
 
 def test_keys_titles_and_what_was_said(browser: Any, url: str) -> None:
@@ -284,32 +276,27 @@ def test_keys_titles_and_what_was_said(browser: Any, url: str) -> None:
     wait_for(page, "document.querySelector('#heard').textContent.includes('Tap where you want to go.')")
     assert page.evaluate("document.querySelectorAll('#heard li').length") == 1
     assert not page.wrong
-    page.context.close()
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_the_tools_and_the_charts_keep_nobody_out(
     browser: Any, url: str, size: tuple[int, int], tmp_path: Path
 ) -> None:
-    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
-
     page = looking(browser, url, {"viewport": {"width": size[0], "height": size[1]}})
     page.focus("#map")
     page.keyboard.press("c")
     wait_for(page, "document.querySelector('#charts').ariaLabel.includes('foot 100.0')")
     page.screenshot(path=tmp_path / f"charts-{size[0]}.png")
     assert page.evaluate(UNREACHED) == []
-    found = Axe().run(page)
+    found = violations(page)
     page.click("#tools-button")
     page.screenshot(path=tmp_path / f"tools-{size[0]}.png")
-    again = Axe().run(page)
+    again = violations(page)
     assert overflow(page) == (0, 0)
     assert page.evaluate(
         "[...document.querySelectorAll('#tools *')].every((e) => e.getBoundingClientRect().right <= innerWidth)"
     )
-    page.context.close()
-    assert found.violations_count == 0, found.generate_report()
-    assert again.violations_count == 0, again.generate_report()
+    assert found == again == []
 
 
 def test_it_can_be_installed_as_an_app(browser: Any, url: str) -> None:
@@ -327,7 +314,6 @@ def test_it_can_be_installed_as_an_app(browser: Any, url: str) -> None:
     assert set(why) <= {"in-incognito"}
     assert asked
     assert all(address.startswith(url) for address in asked)  # it works without the internet
-    page.context.close()
 
 
 def test_the_keys_act_wherever_the_focus_is(browser: Any, url: str) -> None:
@@ -346,7 +332,6 @@ def test_the_keys_act_wherever_the_focus_is(browser: Any, url: str) -> None:
     assert not page.evaluate("echostep.last.play.playing")
     page.keyboard.press("Escape")
     assert not page.wrong
-    page.context.close()
 
 
 def test_what_happened_between_two_estimates_is_listed_too() -> None:

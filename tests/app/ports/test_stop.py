@@ -13,8 +13,7 @@ import pytest
 from command_line import echostep
 from echostep.ports.chunks import Chunk
 from echostep.recording import open_recording
-from echostep_app.ports.chunk_queue import ChunkQueue
-from echostep_app.ports.serial_ports import SerialPorts
+from echostep_app.ports.serial_ports import ChunkQueue, SerialPorts
 from echostep_app.recording.recorder import Recorder
 from echostep_app.session.runs import live
 from players import pseudo_terminal

@@ -10,7 +10,6 @@ from rich.console import Console
 
 from command_line import echostep
 from echostep.board.messages import SCHEMA_HASH
-from echostep_app.commissioning import listening_bar
 from echostep_app.printing import progress
 from waiting import PATIENCE_S, until
 
@@ -40,7 +39,7 @@ def test_bars_fill(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress, "console", console)
     assert list(progress.with_bar(range(3), "tracking walk.mcap", lambda: 0.5)) == [0, 1, 2]
     assert "tracking walk.mcap" in shown.getvalue()
-    with listening_bar.listening_bar("Listening for 1 s", 1.0, console):
+    with progress.listening_bar("Listening for 1 s", 1.0, console):
         assert until(lambda: "0:00:00" in shown.getvalue())
     assert "Listening for 1 s" in shown.getvalue()
 

@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Results of a run: the tables and the summary are there before the picture is drawn; a run without a page loads no server."""
+"""Results of a run: the tables and the summary are there before the picture is drawn; a run without a page loads no server.
+
+What a run leaves behind in its process when it has ended: nothing of its tracker, session and page.
+"""
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
 from pathlib import Path
@@ -12,9 +16,15 @@ from typing import Any
 import pytest
 
 from board_runs import ROOT
+from command_line import echostep
 from echostep.errors import EchostepError
 from echostep.plan import load_plan
+from echostep.tracker import Tracker
+from echostep_app.page.live import LivePage
 from echostep_app.session import results
+from echostep_app.session.runs import demo
+from echostep_app.session.session import Session
+from echostep_app.simulation.scenario import DEMO_WAYPOINTS
 from page.frames import told
 from waiting import PATIENCE_S
 
@@ -58,3 +68,19 @@ def test_a_replay_without_a_page_loads_no_server() -> None:
     code = "import sys, echostep_app.session.runs.replay; print({'uvicorn', 'starlette', 'pydantic', 'matplotlib'} & sys.modules.keys())"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE_S, check=True)
     assert done.stdout == "set()\n"
+
+
+def alive() -> set[int]:
+    gc.collect()
+    return {id(o) for o in gc.get_objects() if type(o) in {Tracker, Session, LivePage}}
+
+
+@pytest.mark.slow
+def test_runs_in_one_process_leave_no_tracker_and_no_page_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(demo, "DEMO_WAYPOINTS", DEMO_WAYPOINTS[:2])
+    before = alive()
+    for seed in (1, 2):
+        echostep("demo", "--port", 0, "--seed", seed, "--out", tmp_path, "--no-open", ends=0)
+    assert alive() <= before

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Reports for the tests of the team: one that is right, and its parts."""
+"""Reports for the tests of the team: one that is right, and its parts.
+
+Reports as a roster receives them.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +17,9 @@ from echostep.plan import Plan, load_plan
 from echostep.tracker import Tracker
 from echostep_app.printing.lines import moment
 from echostep_app.team.endpoint import Outlet
-from echostep_app.team.messages.report import Motion, Position, Report, ReportedPlace, StreamReport
+from echostep_app.team.messages.report import Motion, Position, Report, ReportedPlace, StreamReport, encode
 from echostep_app.team.publish import Publishing
+from echostep_app.team.roster import Roster
 
 PLAN = Path(ROOT / "host/core/echostep/plans/demo.json")
 POSITION = Position(12.5, 0.0, 3.0, 2.0, 0.04, 0.01, 0.09, 0.75, 0.5, 0.1, 0, "Ground floor", 0.98, 0.0, 0.1)
@@ -39,3 +43,17 @@ def offered(plan: Plan, *estimates: Estimate) -> list[Report]:
     publishing._offer = reports.append  # type: ignore[assignment, method-assign]
     publishing.publish(estimates)
     return reports
+
+
+NOW, UNIX = 1000.0, 1.8e9
+
+
+def heard(*reports: Report, at_s: float = NOW, retained: bool = False) -> Roster:
+    roster = Roster()
+    for r in reports:
+        roster.receive(f"echostep/{r.team}/{r.name}/estimate", encode(r), retained, at_s, UNIX)
+    return roster
+
+
+def said(name: str = "anna", sequence: int = 1, **fields: object) -> Report:
+    return report(name, sequence, UNIX, **fields)

@@ -22,8 +22,17 @@ from echostep.plan import load_plan
 from echostep_app.team.endpoint import parse_endpoint
 from echostep_app.team.inbox import Inbox, ListenerThread
 from echostep_app.team.mesh import mesh
-from echostep_app.team.mesh.airtime import INTERVAL_S, MOST_USED, PRESETS, airtime_s, interval_s
-from echostep_app.team.mesh.mesh import POSITION_EVERY, MeshListener, MeshNode, MeshTransport
+from echostep_app.team.mesh.mesh import (
+    INTERVAL_S,
+    MOST_USED,
+    POSITION_EVERY,
+    PRESETS,
+    MeshListener,
+    MeshNode,
+    MeshTransport,
+    airtime_s,
+    interval_s,
+)
 from echostep_app.team.mesh.mesh_report import Unpacker, pack
 from echostep_app.team.messages.report import Report, ReportedAlarm, decode, encode
 from echostep_app.team.outbox import Outbox

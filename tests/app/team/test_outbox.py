@@ -23,8 +23,7 @@ from echostep_app.team.georeference import GroundPlane
 from echostep_app.team.messages.report import BadReportError, Report, check_name, decode, encode
 from echostep_app.team.outbox import Delivery, Outbox, aged, stamped
 from echostep_app.team.publish import ReportHistory
-from team.letters import UNIX
-from team.team_reports import PLACE, PLAN, POSITION, report
+from team.team_reports import PLACE, PLAN, POSITION, UNIX, report
 from waiting import PATIENCE_S, ends, until
 
 

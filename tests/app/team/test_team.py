@@ -22,8 +22,7 @@ from echostep_app.team.commander import _cells, as_tree, notes, table
 from echostep_app.team.inbox import MESSAGES_PER_TOPIC, Inbox
 from echostep_app.team.messages.report import BadReportError, Motion, Presence, check_name, decode, encode, schema
 from echostep_app.team.roster import CONTRADICTION, MAX_MEMBERS, MAX_REASONS, MemberState, Roster
-from team.letters import NOW, UNIX, heard, said
-from team.team_reports import PLAN, POSITION, report
+from team.team_reports import NOW, PLAN, POSITION, UNIX, heard, report, said
 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 

@@ -16,9 +16,8 @@ from echostep.ports.people.check_in import PERSON, Call, CheckIn
 from echostep.tracker import Tracker
 from echostep_app.simulation.devices.board import PythonBoard
 from echostep_app.simulation.scenario import Scenario
-from echostep_app.wearer.alarm import ASK_S, MAYDAY_S, OVER_S, WearerAlarm
+from echostep_app.wearer.alarm import ASK_S, MAYDAY_S, OVER_S, WearerAlarm, watch_of
 from echostep_app.wearer.stillness import Window
-from echostep_app.wearer.watch import watch_of
 from echostep_app.wearer.wearer_signs import StepTaken
 
 PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")

@@ -12,10 +12,9 @@ from echostep.plan import Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import PERSON, Call
 from echostep.tracker import Tracker
-from echostep_app.wearer.alarm import ANSWER_S, WearerAlarm
+from echostep_app.wearer.alarm import ANSWER_S, WearerAlarm, watch_of
 from echostep_app.wearer.falls import Fall
 from echostep_app.wearer.stillness import Window
-from echostep_app.wearer.watch import watch_of
 from echostep_app.wearer.wearer_signs import StepTaken
 from echostep_studies.simulation.body_motion import MTX
 from echostep_studies.simulation.falling import sideways, walk_then

@@ -17,7 +17,7 @@ from echostep.board.gateway import MOST_BEACONS, NEW_CLOCK_MESSAGES, Gateway
 from echostep.board.messages import Beacon, Identity
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, GATEWAY, Chunk, portion_of
-from echostep_app.board.gateway_words import gateway_words
+from echostep_app.output.terminal import gateway_words
 from echostep_app.ports.serial_ports import SerialPorts
 from echostep_app.ports.udp import UdpPort
 from echostep_app.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, heard_at, lay_beacons, message

@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Courses of a rigid foot for tests (`rolling_foot`), and mountings of a sensor on it."""
+"""Courses of a rigid foot for tests (`rolling_foot`), and mountings of a sensor on it.
+
+Walks and comparisons of the foot.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.foot.steps import Stance, Step, Track
 from echostep_studies.simulation.rolling_foot import MANNERS, Course, FootManner, course, felt, pitched, samples
+from foot import foot_walks as fw
 
 __all__ = ["MANNERS", "Course", "FootManner", "any_rotation", "course", "felt", "pitched", "samples"]
 
@@ -15,3 +20,19 @@ def any_rotation(rng: np.random.Generator) -> Floats:
     """A random rotation matrix (3, 3)."""
     q, _ = np.linalg.qr(rng.standard_normal((3, 3)))
     return np.asarray(q * np.sign(np.linalg.det(q)))
+
+
+Samples = tuple[Floats, Floats, Floats]
+
+
+def moves(track: Track) -> Floats:
+    return np.array([step.move_m for step in track.steps])
+
+
+def same(a: list[Step | Stance], b: list[Step | Stance]) -> bool:
+    """Whether two lists of events are equal in every bit."""
+    return [repr(event) for event in a] == [repr(event) for event in b]
+
+
+def walking(steps: int = 5, rate_hz: int = 100, seed: int = 1) -> Samples:
+    return fw.samples(fw.course(fw.MANNERS["walking"], steps), rate_hz, rng=np.random.default_rng(seed))

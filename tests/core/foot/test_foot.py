@@ -11,7 +11,7 @@ import pytest
 from echostep.arrays import Floats
 from echostep.foot import ins
 from echostep.foot.steps import Foot
-from foot.navigation import walking
+from foot.foot_walks import walking
 
 
 def some_nav(rng: np.random.Generator) -> ins.Nav:

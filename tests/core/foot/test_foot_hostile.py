@@ -15,7 +15,7 @@ from echostep.arrays import Floats
 from echostep.foot.steps import Foot, walk_track
 from echostep.path import UNOBSERVED_SD_M
 from foot import foot_walks as fw
-from foot.navigation import moves, same, walking
+from foot.foot_walks import moves, same, walking
 
 
 def test_a_fifth_of_the_samples_may_be_missing() -> None:

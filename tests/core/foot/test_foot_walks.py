@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from echostep.foot.steps import Foot, FootSettings, Stance, Step, walk_track
 from foot import foot_walks as fw
-from foot.navigation import moves, same, walking
+from foot.foot_walks import moves, same, walking
 
 LATENCY_S = 0.05
 

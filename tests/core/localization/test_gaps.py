@@ -1,13 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""Gaps after which the wearer may be elsewhere, and those after which not."""
+"""Gaps after which the wearer may be elsewhere, and those after which not.
+
+Bytes that waited in the ports of a stopped program come after a dropout.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from board_runs import ROOT
+from echostep.localization import TrackStatus
 from echostep.localization.motion import LONG_S, MUTE_S, PAUSE_S, Gap, Gaps
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
+from echostep.plan import load_plan
+from echostep.tracker import Tracker
+from page.frames import told
 
 
 def segment(t0_s: float, t1_s: float, length_m: float = 0.7, sd_m: float = 0.02, pings: int = 5) -> MeasuredSegment:
@@ -54,3 +62,16 @@ def test_standing_without_a_ping_is_told_once_until_the_next_ping() -> None:
     gaps = found(segment(0.0, 1.0), *standing, segment(40.0, 41.0))
     assert gaps.index(Gap.MUTE) == MUTE_S + 1  # known while it lasts, not after it
     assert gaps.count(Gap.MUTE) == 1
+
+
+@pytest.mark.parametrize(
+    ("t_s", "status"), [(27.1, TrackStatus.LOST), (33.1, TrackStatus.TRACKING), (34.0, TrackStatus.TRACKING)]
+)
+def test_an_estimate_that_a_dropout_has_overtaken_claims_nothing(t_s: float, status: TrackStatus) -> None:
+    tracker = Tracker(load_plan(ROOT / "host/core/echostep/plans/demo.json"))
+    tracker._publish(None, told(t_s=33.4, status=TrackStatus.LOST))
+    late = tracker._publish(None, told(x_m=12.0, t_s=t_s))
+    assert late.status is status
+    assert late.t_s == max(t_s, 33.4)
+    assert late.x_m == 12.0
+    assert (late.xx_m2 > 50.0) == (status is TrackStatus.LOST)

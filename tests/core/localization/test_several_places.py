@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The position of a cloud that may be in several places."""
+"""The position of a cloud that may be in several places.
+
+The protection radius of a place in a building of several levels.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,8 @@ import numpy as np
 import pytest
 
 from echostep.localization import (
+    ANY_LEVEL,
+    RISK,
     CloudSettings,
     Estimate,
     Right,
@@ -20,6 +25,8 @@ from echostep.localization import (
 )
 from echostep.localization.particles.cloud import cloud_about
 from echostep.plan import Pose
+from echostep.walls.level_sheet import lay_out_levels
+from echostep_studies.simulation.tower import tower
 
 APART_M = 30.0
 
@@ -80,3 +87,18 @@ def test_the_likelier_place_is_claimed_beside_others() -> None:
     assert claims_place(_in_two_places(0.2))
     other_level = tuple(replace(place, level=1) for place in _in_two_places(0.2).hypotheses)
     assert not claims_place(replace(_in_two_places(0.2), hypotheses=other_level))
+
+
+SHEET = lay_out_levels(tower(2)).sheet
+
+
+@pytest.mark.parametrize(
+    ("level", "other", "is_finite"), [(0, 0.0, True), (ANY_LEVEL, 0.3 * RISK, True), (ANY_LEVEL, 3.0 * RISK, False)]
+)
+def test_a_level_that_is_not_sure_takes_part_of_the_risk(level: int, other: float, is_finite: bool) -> None:
+    """A place known to a decimetre, and this share of the weight on the other level."""
+    start = Start(Pose(5.0, 3.0, 0.0, level), 0.1)
+    cloud = cloud_about(CloudSettings(), start, 0.0, np.random.default_rng(1), SHEET)
+    share = np.where(cloud.level == 0, 1.0 - other, max(other, 1e-12))
+    cloud.log_weight = np.log(share / share.max())
+    assert math.isfinite(estimate_of(cloud, 0.0, 0.0, 0).protection_m) == is_finite

@@ -27,7 +27,7 @@ from echostep_app.simulation.devices.board import BoardProcess
 from echostep_app.simulation.devices.foot_board import HEAD_START_MS
 from echostep_app.simulation.kits import Kit
 from echostep_app.simulation.scenario import DEMO_WAYPOINTS, START_NS, Scenario
-from echostep_app.wearer.watch import watch_of
+from echostep_app.wearer.alarm import watch_of
 
 pytestmark = needs_twin
 

@@ -31,7 +31,7 @@ from echostep.timing.timeline import MtxTiming
 from echostep_app.simulation.devices.board import PythonBoard
 from echostep_app.simulation.devices.mtx import MtxModel
 from echostep_app.simulation.scenario import DEMO_WAYPOINTS, Scenario
-from echostep_app.wearer.watch import AlarmWatch
+from echostep_app.wearer.alarm import AlarmWatch
 
 Told = list[tuple[object, ...]]
 CORRECTED = 25_000  # chunks
@@ -86,7 +86,7 @@ def taken(chunks: list[Chunk], cuts: list[int]) -> tuple[Told, tuple[object, ...
         ours.status,
         ours.identity,
         ours.timeline.synchronised,
-        watch.signs.pop(),
+        watch.pop(),
     )
 
 

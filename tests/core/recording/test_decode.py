@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""`echostep decode` of an MT's bytes: every valid frame comes out, and what was found is said."""
+"""`echostep decode` of an MT's bytes: every valid frame comes out, and what was found is said.
+
+Captured logs: the twin's own captures decode to their golden text, from Python and from the command line.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ import json
 import math
 import random
 import struct
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import command_line
+import echostep
 from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.recording import Decoder, as_json, port_of_bytes, read_capture
@@ -24,7 +29,7 @@ from echostep.xsens.output_formats import BY_LENGTH, CONFIGURED, GIVEN, OutputFo
 from echostep_app.recording.capture_summary import summary
 from echostep_studies.frame.recordings import DATA
 from echostep_studies.simulation.devices.mtx_setup import pack
-from naive.mt_frames import valid_frames
+from naive.frames import valid_frames
 from needs_data import needs_data
 
 REAL = sorted(p for end in ("bin", "mtb", "xbus") for p in (DATA / "mtb").glob(f"**/*.{end}"))
@@ -311,3 +316,49 @@ def test_bytes_with_frames_by_chance_are_no_capture(tmp_path: Path) -> None:
     for seed in range(5):
         (tmp_path / "a.bin").write_bytes(random.Random(seed).randbytes(300_000))
         assert port_of_bytes(tmp_path / "a.bin") is None
+
+
+CAPTURES = ROOT / "tests/captures"
+NAMES = ("board.bin", "mtx.bin", "walk.mcap")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_capture_decodes_to_its_golden_text(name: str) -> None:
+    golden = [json.loads(line) for line in (CAPTURES / name).with_suffix(".jsonl").read_text().splitlines()]
+    found = [json.loads(json.dumps(as_json(message))) for message in echostep.read_capture(CAPTURES / name)]
+    assert found == golden
+    assert len(found) > 300
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_command_prints_the_same(name: str) -> None:
+    done = command_line.echostep("decode", CAPTURES / name)
+    assert done.stdout == (CAPTURES / name).with_suffix(".jsonl").read_text()
+
+
+def test_the_missing_bytes_are_counted() -> None:
+    decoder = Decoder()
+    kinds = Counter(type(message).__name__ for message in read_capture(CAPTURES / "board.bin", decoder))
+    counts = decoder.board.counts
+    assert 1 <= counts.rejected <= 2
+    assert 1 <= counts.lost <= 5
+    assert {"Identity", "Configuration", "Ping", "Gyros", "Pressure", "Compass", "Sync", "Status", "GyroHealth"} == set(
+        kinds
+    )
+
+
+def test_the_example_of_the_readme() -> None:
+    ranges = [
+        0.5 * 343.2e-6 * message.time_of_flight_us
+        for message in echostep.read_capture(CAPTURES / "board.bin")
+        if isinstance(message, echostep.messages.Ping) and message.outcome == echostep.messages.Outcome.ECHO
+    ]
+    assert all(0.1 < r < 6.1 for r in ranges)
+    assert len(ranges) > 40
+
+
+@pytest.mark.parametrize("content", [b"", b"hello world", bytes(1000), b"\x89MCAP0\r\n" + bytes(50)])
+def test_what_is_no_capture_is_named(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "x.bin").write_bytes(content)
+    with pytest.raises(EchostepError, match=r"x\.bin"):
+        list(read_capture(tmp_path / "x.bin"))

@@ -11,9 +11,8 @@ import pytest
 
 from command_line import echostep
 from echostep.xsens import MtxReader
-from echostep_app.xsens.products import force_range_g, product_text
 from echostep_app.xsens.requests import successor_requests
-from echostep_app.xsens.setup import State
+from echostep_app.xsens.setup import State, force_range_g, product_text
 from players import python_board
 from xsens.mt_lines import SAMPLE, Line, on_a_terminal
 from xsens.simulated_mti import MTI_1, MTI_3, MTI_630, Model, MtiDevice

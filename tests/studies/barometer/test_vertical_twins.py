@@ -11,10 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.arrays import Floats
-from echostep_studies.barometer import vertical_filter
+from echostep_studies.barometer import vertical_kernels
 from echostep_studies.barometer import vertical_model as model
-from echostep_studies.barometer.vertical_filter import smooth
-from echostep_studies.barometer.vertical_kernels import filter_samples, smooth_backward, start
+from echostep_studies.barometer.vertical_kernels import filter_samples, smooth, smooth_backward, start
 from echostep_studies.barometer.vertical_model import State
 from naive.vertical import Gaussian, propagated, smoothed, started
 from naive.vertical_steps import VerticalFilter
@@ -126,7 +125,7 @@ def test_smoothing_is_the_sum_over_all_paths(seed: int, n: int) -> None:
 @pytest.mark.slow
 def test_blocks_of_a_record_are_smoothed_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """Joint weights of five samples at once, against those of the whole record."""
-    monkeypatch.setattr(vertical_filter, "BLOCK", 5)
+    monkeypatch.setattr(vertical_kernels, "BLOCK", 5)
     rng = np.random.default_rng(2)
     heights, prior = levels(rng, 2), np.ones(2)
     seen = any_rows(rng, heights, 17)

@@ -24,12 +24,12 @@ from echostep.ports.chunks import BOARD
 from echostep.settings import Settings, parse_settings, read_settings
 from echostep_app.board.faults.health import Severity, board_findings
 from echostep_app.commissioning.fitting import Fit, Values, doubt, fit_compass, fit_gyros, fit_legs, fit_mounting
-from echostep_app.commissioning.listening_bar import listening_bar
 from echostep_app.commissioning.poses import described, measure_poses
 from echostep_app.commissioning.probe import ProbeResult, probe
 from echostep_app.commissioning.serial_ports import access_findings, find_boards, list_seen
 from echostep_app.offline.leg_lengths import checked_lengths
 from echostep_app.printing.lines import as_error, write_whole
+from echostep_app.printing.progress import listening_bar
 
 STILL_S, TURN_S, WALK_S = 10.0, 20.0, 20.0  # duration of each measurement
 POSE_S = 3.0  # of a board in each pose: a second passes before it sends all axes, the mean of 200 samples is known to 0.003 m/s2

@@ -28,7 +28,7 @@ from echostep_app.board.faults.health import (
 )
 from echostep_app.board.subscription import knows_subscriptions
 from echostep_app.commissioning.probe import Drift, ProbeResult, drift_of
-from echostep_app.xsens.products import force_range_g
+from echostep_app.xsens.setup import force_range_g
 
 DRIFT_MAX_PPM = 200.0  # a crystal is within 50, a ceramic resonator within 5000
 ANSWER_MAX_S = 0.02

@@ -15,7 +15,6 @@ from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep_app.board.faults.health import Finding, Severity
 from echostep_app.commissioning.diagnosis import Diagnosis, judge_board, judge_mtx
 from echostep_app.commissioning.foot_diagnosis import judge_foot_board
-from echostep_app.commissioning.listening_bar import listening_bar
 from echostep_app.commissioning.probe import probe
 from echostep_app.commissioning.serial_ports import (
     MTX_NAME,
@@ -31,6 +30,7 @@ from echostep_app.commissioning.serial_ports import (
     rules_text,
 )
 from echostep_app.printing.console import console_for_people
+from echostep_app.printing.progress import listening_bar
 from echostep_app.recording.device import sender, wrong_device
 
 PROBE_S = 6.0

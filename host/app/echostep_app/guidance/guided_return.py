@@ -22,8 +22,7 @@ from echostep.tracker import Tracker
 from echostep_app.guidance.cue_list import CueList
 from echostep_app.guidance.cues import Cue, CueKind, Guide
 from echostep_app.guidance.own_way import OwnWay
-from echostep_app.guidance.target import turn_ahead
-from echostep_app.plan.polyline import nearest, way_m
+from echostep_app.plan.polyline import nearest, turn_ahead, way_m
 from echostep_app.plan.routing import Route, RoutePlace, Stretch
 
 # Of the way, after which a return has begun or is over: more than the steps of a search in one room

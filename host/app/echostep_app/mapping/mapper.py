@@ -17,12 +17,11 @@ from echostep.path import MeasuredSegment
 from echostep_app.mapping.graph.association import KNOWN_M, associate
 from echostep_app.mapping.graph.bias import find_bias, without_bias
 from echostep_app.mapping.graph.closures import APART_M, STRETCH_M, find_closure
-from echostep_app.mapping.graph.directions import LEAST_EVIDENCE, Directions
+from echostep_app.mapping.graph.directions import LEAST_EVIDENCE, Directions, find_relief
 from echostep_app.mapping.graph.fragments import Fragments, find_fragments
 from echostep_app.mapping.graph.graph import ROUNDS, Closure, FittedWalls, Graph, contradicted
 from echostep_app.mapping.graph.levels import BETWEEN, find_levels
 from echostep_app.mapping.graph.nodes import Nodes, Pings, nodes_of
-from echostep_app.mapping.graph.relief import find_relief
 from echostep_app.mapping.graph.spots import with_spots
 from echostep_app.mapping.smoothed_heading import with_smoothed_headings
 from echostep_app.mapping.walls.drawing import Drawing, draw

@@ -2,6 +2,7 @@
 """The terminal view: plan, track and health of the streams, redrawn ten times a second.
 
 In: a tracker and its estimates. Out: text on the terminal. Owns the canvas.
+Messages of a beacon gateway are counted in words.
 """
 
 from __future__ import annotations
@@ -22,14 +23,13 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from echostep.arrays import Octets
+from echostep.board.gateway import Gateway
 from echostep.localization import Estimate, claims_place
 from echostep.plan import Level, Plan
 from echostep.tracker import Tracker
 from echostep_app.board.faults.health import Finding, Severity, all_findings
-from echostep_app.board.gateway_words import gateway_words
 from echostep_app.plan.places.bearing import heading_words
-from echostep_app.printing.running import running_note
-from echostep_app.wearer.steady_status import SteadyStatus
+from echostep_app.wearer.steady_status import SteadyStatus, running_note
 
 REFRESH_S = 0.1
 MAX_FINDINGS = 3  # shown at a time
@@ -199,3 +199,17 @@ def findings(tracker: Tracker) -> list[Finding]:
     streams = tracker.streams
     found = all_findings(streams.reports, streams.foot_reports)
     return [finding for finding in found if finding.severity > Severity.NOTE][:MAX_FINDINGS]
+
+
+def gateway_words(gateway: Gateway) -> str:
+    """The counts that are not zero, as text."""
+    counts = gateway.counts
+    parts = [
+        f"{value} {name.replace('_', ' ')}"
+        for name in counts.__dataclass_fields__
+        if name != "words" and (value := getattr(counts, name))
+    ]
+    rejected = f"; rejected: {', '.join(parts)}" if parts else ""
+    numbers = ", ".join(map(str, sorted(gateway.duplicates)))
+    duplicates = f"; two beacons have the number {numbers}" if numbers else ""
+    return f"beacons: {len(gateway.numbers)} heard, {counts.words} readings{rejected}{duplicates}"

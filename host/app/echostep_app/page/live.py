@@ -36,9 +36,8 @@ from echostep_app.page.server import Address, PageServer
 from echostep_app.page.shared import SharedDrawing
 from echostep_app.plan.routing import RoutePlace
 from echostep_app.ports.arrival_clock import now_ns
-from echostep_app.printing.running import running_note
-from echostep_app.wearer.steady_status import SteadyStatus
-from echostep_app.wearer.watch import watch_of
+from echostep_app.wearer.alarm import watch_of
+from echostep_app.wearer.steady_status import SteadyStatus, running_note
 
 # All assumed:
 TRAIL_STEP_M = 0.02  # the trail gets a point when x or y has changed by this much

@@ -18,8 +18,7 @@ from echostep.plan import Level, Plan
 from echostep_app.plan.places.faces import JAMB_M, OUTSIDE, TOUCH_M, Faces, extend, faces_under, find_faces
 from echostep_app.plan.places.findings import Lines, PlanFinding
 from echostep_app.plan.places.gaps import with_gaps
-from echostep_app.plan.places.leaks import narrowest_opening
-from echostep_app.plan.places.reachability import unreachable_rooms
+from echostep_app.plan.places.reachability import narrowest_opening, unreachable_rooms
 from echostep_app.plan.places.standing import StandingGround
 
 # Tolerances, assumed:

@@ -2,6 +2,7 @@
 """Polylines (k, 2) in metres: length, the point at a distance along them, the nearest point.
 
 In: polylines, points. Out: lengths, points, distances. Used by guidance, routing and simulation. Owns nothing.
+The turn to a point ahead on a path is that of [Fischer 2008, Figure 8]: `Guide` and the study of guided returns call the same kernel.
 """
 
 from __future__ import annotations
@@ -59,3 +60,10 @@ def nearest(line: Floats, x: float, y: float, from_m: float, to_m: float) -> tup
     if best == np.inf:
         best = math.hypot(line[0, 0] - x, line[0, 1] - y)
     return best_s, best
+
+
+@kernel
+def turn_ahead(path: Floats, s_m: float, x: float, y: float, heading_rad: float) -> float:
+    """Turn (rad) from a heading at (x, y) to the point at the length `s_m` along a path (k, 2)."""
+    to_x, to_y, _ = along(path, s_m)
+    return math.atan2(to_y - y, to_x - x) - heading_rad

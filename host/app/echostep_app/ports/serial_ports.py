@@ -5,6 +5,7 @@ In: URLs of ports (pyserial, udp://, or - for standard input, whose end ends the
 which are locked for this process, their threads.
 
 A lost port is opened again, under its device's new name if the device has a USB serial number. Its first chunk is then empty.
+The queue to the run is bounded for each port, so that one port never crowds out another.
 """
 
 from __future__ import annotations
@@ -27,11 +28,44 @@ from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
 from echostep_app.ports.access import TAKERS, holders, is_url, refusal, taker_of
 from echostep_app.ports.arrival_clock import now_ns
-from echostep_app.ports.chunk_queue import ChunkQueue
 from echostep_app.ports.port_faults import PORT_FAULTS
 from echostep_app.ports.tcp import StandardInput, TcpPort
 from echostep_app.ports.udp import UdpPort
 from echostep_app.ports.usb_number import port_of_number, usb_number
+
+MOST_BYTES = 1 << 24  # of one port that wait: minutes of the board's or the MTx's bytes
+CHUNK_BYTES = 100  # approximate memory that a chunk takes besides its bytes
+
+
+class ChunkQueue:
+    """Call `put` from any thread, `get` from one. `dropped`: chunks by port that found no room."""
+
+    def __init__(self) -> None:
+        self.dropped: Counter[str] = Counter()
+        self._chunks: deque[Chunk] = deque()
+        self._bytes: Counter[str] = Counter()  # that wait, by port
+        self._changed = threading.Condition()
+
+    def put(self, chunk: Chunk) -> None:
+        """Append a chunk; it is dropped and counted when too many bytes of its port wait."""
+        size = len(chunk.data) + CHUNK_BYTES
+        with self._changed:
+            if self._bytes[chunk.port] + size > MOST_BYTES:
+                self.dropped[chunk.port] += 1
+                return
+            self._bytes[chunk.port] += size
+            self._chunks.append(chunk)
+            self._changed.notify()
+
+    def get(self, timeout_s: float) -> Chunk | None:
+        """The oldest chunk; None after the timeout."""
+        with self._changed:
+            if not self._chunks and not self._changed.wait_for(lambda: bool(self._chunks), timeout_s):
+                return None
+            chunk = self._chunks.popleft()
+            self._bytes[chunk.port] -= len(chunk.data) + CHUNK_BYTES
+            return chunk
+
 
 AnyPort: TypeAlias = "serial.SerialBase | UdpPort | TcpPort | StandardInput"
 

@@ -5,21 +5,60 @@ In: a track, the truth, a plan. Out: `Scorecard`. Owns the definitions; `definit
 
 The numbers in brackets are clauses of [ISO/IEC 18305:2016]. Its coverage and availability are shares of places and of time for which the system gives
 a position; here a position is at most GAP_S old and not marked lost by the track itself.
+A zone is the outline of stairs or a lift, else the smallest outline of a room, else the space between the walls, all doors closed.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
-from echostep.arrays import Bools, Floats
+from echostep.arrays import Bools, Floats, Ints
 from echostep.localization import in_ellipse95
 from echostep.plan import Plan
+from echostep_app.plan.places.faces import OUTSIDE
+from echostep_app.plan.places.spaces import PlanSpaces, Spaces
 from echostep_app.scorecard.error_statistics import ErrorStatistics, error_statistics, quantile
 from echostep_app.scorecard.matching import Matched, is_surveyed, known, match
 from echostep_app.scorecard.track_columns import ScoredPath
-from echostep_app.scorecard.zones import NO_ZONE, Zones
+
+NO_ZONE = -1
+
+
+class Zones:
+    """Numbers of the zones of a plan, different on different levels."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._levels = len(plan.levels)
+        self._spaces = PlanSpaces(plan)
+
+    def of(self, xy_m: Floats, level: Floats) -> Ints:
+        """Places (n, 2), their levels (n,), NaN where unknown -> (n,) number of the zone, or NO_ZONE."""
+        number = np.full(len(xy_m), NO_ZONE, dtype=np.int64)
+        for k in range(self._levels):
+            here = np.flatnonzero(level == k)
+            spaces = self._spaces.on(k) if len(here) else None
+            if spaces is not None:
+                zone = _zones(spaces, xy_m[here])
+                number[here] = np.where(zone == NO_ZONE, NO_ZONE, zone * self._levels + k)
+        return number
+
+
+def _zones(spaces: Spaces, xy_m: Floats) -> Ints:
+    """Number of the zone around each place of one level: ways first, then outlines of rooms, then faces."""
+    face = spaces.faces.indices_of(xy_m)
+    areas = (*spaces.way_areas, *spaces.outlines)
+    zone = np.where(face == OUTSIDE, NO_ZONE, face + len(areas)).astype(np.int64)
+    size = np.full(len(xy_m), math.inf)
+    for k, area in enumerate(areas):
+        smaller = 0.0 if k < len(spaces.way_areas) else float(area.area)
+        inside = shapely.contains_xy(area, *xy_m.T) & (smaller < size)
+        zone[inside], size[inside] = k, smaller
+    return zone
+
 
 FLOOR_PENALTY_M = 15.0  # per floor [Potorti et al. 2017]
 CELL_M = 1.0  # side of the squares that coverage counts: a person's room

@@ -3,12 +3,13 @@
 
 In: a CSV file, the plan's levels. Out: `ScoredPath`s. Owns the names that columns may have. Metres, seconds, radians; x and y in the frame of the
 truth, which is the plan's if there is a plan.
+Our own estimates are scored without a file.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,7 +17,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.errors import EchostepError
-from echostep.localization import ellipse95
+from echostep.localization import Estimate, TrackStatus, ellipse95
 from echostep.plan import Plan
 from echostep_app.scorecard.csv_columns import CsvColumns, read_csv
 
@@ -159,3 +160,15 @@ def _level(table: CsvColumns, row: int, name: str, text: str, index_of: Callable
     if value != round(value) or abs(value) > 1000:
         raise table.error(row, name, f"{text[:40]!r} is not a whole number of a floor")
     return value
+
+
+def track_of(estimates: Sequence[Estimate], name: str = "estimates") -> ScoredPath:
+    """Estimates as a track."""
+    moments = [(e.xx_m2, e.xy_m2, e.yy_m2) for e in estimates]
+    return ScoredPath(
+        Path(name), np.array([e.t_s for e in estimates]), np.array([(e.x_m, e.y_m) for e in estimates]).reshape(-1, 2),
+        np.array([e.status is TrackStatus.LOST for e in estimates], dtype=bool), {},
+        height_m=np.array([e.z_m for e in estimates]), level=np.array([float(e.level) for e in estimates]),
+        covariance_m2=np.array(moments).reshape(-1, 3), radius95_m=np.array([e.ellipse95.major_m for e in estimates]),
+        protection_m=np.array([e.protection_m for e in estimates]),
+    )  # fmt: skip

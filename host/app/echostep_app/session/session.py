@@ -120,7 +120,7 @@ class Session:
         """A live walk without a plan is drawn for the team, by the page or, without one, unseen."""
         if self.recorded is not None or self.tracker.plan.is_drawn or self._broker is None:
             return
-        from echostep_app.session.team.drawing_share import UnseenDrawing, shared_drawing
+        from echostep_app.session.team.feeds import UnseenDrawing, shared_drawing
 
         assert self.output.outlet
         name = self.output.outlet.name

@@ -41,8 +41,8 @@ from echostep_app.team.messages.report import (
     printable,
 )
 from echostep_app.team.outbox import HEARTBEAT_S, Delivery, Outbox, Transport, without_place
+from echostep_app.wearer.alarm import AlarmWatch, watch_of
 from echostep_app.wearer.steady_status import SteadyStatus
-from echostep_app.wearer.watch import AlarmWatch, watch_of
 
 Source = Literal["live", "replay", "simulated"]
 AVERAGING_S = 3.0  # of speed and rates

@@ -8,6 +8,7 @@ The times follow NFPA 1982 (PASS), quoted from memory: alarm after 30 s without 
 copy of the standard before use. Differences: a mayday for lack of motion also ends when the wearer walks, there only by hand; a fall leads to a
 question and a mayday sooner, and motion alone, which ends a question for lack of motion, does not end this one. There is no sound of 95 dB, no
 housing and no test by the standard: this is not a PASS.
+`AlarmWatch` is the tracker's watch over its wearer: the signs, and the alarm that follows from them.
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ from collections import deque
 from collections.abc import Sequence
 
 from echostep.odometry import Alarm, AlarmKind, AlarmReason
+from echostep.tracker import Tracker
 from echostep_app.wearer.falls import Fall
 from echostep_app.wearer.stillness import WINDOW_S, Window
-from echostep_app.wearer.wearer_signs import Sign, StepTaken
+from echostep_app.wearer.wearer_signs import Sign, StepTaken, WearerSigns
 
 ASK_S, MAYDAY_S = 20.0, 30.0  # without motion
 ANSWER_S = 10.0  # to answer after a fall: as long as between question and mayday for lack of motion
@@ -134,3 +136,40 @@ class WearerAlarm:
     def _change(self, t_s: float, alarm: Alarm | None) -> None:
         self.alarm = alarm
         self.changes.append((t_s, alarm))
+
+
+def watch_of(tracker: Tracker) -> AlarmWatch:
+    """The watch over this tracker's wearer, which begins when it is first asked for."""
+    if not isinstance(tracker.watch, AlarmWatch):
+        tracker.watch = AlarmWatch()
+    assert isinstance(tracker.watch, AlarmWatch)
+    return tracker.watch
+
+
+class AlarmWatch(WearerSigns):
+    """The signs of a tracker's wearer, handed to the alarm message by message."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.wearer_alarm = WearerAlarm()
+
+    @property
+    def alarm(self) -> Alarm | None:  # type: ignore[override]  # read only
+        """The present alarm."""
+        return self.wearer_alarm.alarm
+
+    def trunk_tilt_rad(self, t_s: float) -> float:
+        """The trunk's tilt at a time; NaN if the belt does not give it."""
+        return self.falls.trunk_tilt_rad(t_s)
+
+    def advance(self) -> None:
+        """Hand the signs to the alarm."""
+        self.wearer_alarm.add(self.pop())
+
+    def call_for_help(self, t_s: float) -> None:
+        """Raise a mayday."""
+        self.wearer_alarm.call_for_help(t_s)
+
+    def answer(self, t_s: float, *, ends_help: bool) -> None:
+        """A tap is a sign of life."""
+        self.wearer_alarm.answer(t_s, ends_help=ends_help)

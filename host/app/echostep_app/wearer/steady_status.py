@@ -3,13 +3,15 @@
 
 In: statuses with the estimates' own times, so that a live run and its replay say the same. Out: the worst of the last HOLD_S. Owns those.
 The one rule for page, speech, terminal and reports; files, and whatever computes on, have each estimate's own status.
+`running_note`: a few words beside the status while the foot rests too briefly for a walk.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from echostep.localization import Estimate, TrackStatus
+from echostep.localization import Estimate, TrackStatus, claims_place
+from echostep.path import PathSegment
 from echostep.tracker import Tracker
 
 HOLD_S = 2.0  # assumed: two strides, and twice the second after which silence makes the next dropout
@@ -34,3 +36,12 @@ class SteadyStatus:
         if self._check_ins != (check_ins := (state.check_ins, state.undone)):
             self._recent, self._check_ins = [], check_ins
         return replace(estimate, status=self.worst(estimate.t_s, estimate.status))
+
+
+def running_note(segment: PathSegment | None, estimate: Estimate | None) -> str:
+    """That the foot runs, with the 95 % radius of a position that may be named; empty while it walks or stands, or is not worn."""
+    if segment is None or estimate is None or not segment.running:
+        return ""
+    if not claims_place(estimate):
+        return "running"
+    return f"running: position good to about {estimate.ellipse95.major_m:.1f} m"

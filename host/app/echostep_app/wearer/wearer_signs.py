@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from echostep.arrays import Floats, Ints
 from echostep.legs.trunk_path import GyroBlock
+from echostep.odometry import WearerWatch
 from echostep.path import PathSegment
 from echostep_app.wearer.falls import Fall, Falls
 from echostep_app.wearer.stillness import Stillness, Window
@@ -40,7 +41,7 @@ Sign = Window | StepTaken | Fall
 _Found = Window | StepTaken | _Stride | tuple[str, Tenth]
 
 
-class WearerSigns:
+class WearerSigns(WearerWatch):
     """Call the `add_` methods with the contents of a portion, then `settle`; `pop` when convenient."""
 
     def __init__(self) -> None:

@@ -11,10 +11,12 @@ In: bytes from the MT's port, and a clock in seconds. Out: bytes to send, and th
 A WakeUp starts again at any time, and so does a measurement in SILENT. A device that never answered is asked for GoToConfig again until it does.
 
 An acknowledgement carries the identifier of its request plus one; an error message carries a code instead [Manual 5.3.1 and 5.3.2].
+Which MT a device is, is known by its product code; the MTx's successors are the MTi 1 and 600 series.
 """
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from enum import Enum
 from typing import NamedTuple
@@ -25,7 +27,6 @@ from echostep.xsens.frames import ERROR, MTDATA, MTDATA2, WAKE_UP, Frame, FrameR
 from echostep.xsens.mtdata import PROJECT
 from echostep.xsens.mtdata2 import decode_mtdata2, find_packets
 from echostep.xsens.reader import MtxReader
-from echostep_app.xsens.products import firmware_text, product_text
 from echostep_app.xsens.requests import (
     GO_TO_CONFIG,
     GO_TO_MEASUREMENT,
@@ -35,6 +36,31 @@ from echostep_app.xsens.requests import (
     Request,
     error_text,
 )
+
+# By series, of MTi [MTi 1-series and MTi 600-series data sheets, as remembered: compare them with a copy]
+FORCE_RANGE_G = {"1": 16.0, "600": 10.0}
+_TEXT = re.compile(r"[ -~]+")
+
+
+def product_text(code: bytes) -> str:
+    """The product code as text, "" unless it is printable, padded with blanks or zeros [LLCP, ProductCode]."""
+    text = code.rstrip(b"\0").decode("latin-1").strip()
+    return text if _TEXT.fullmatch(text) else ""
+
+
+def firmware_text(answer: bytes) -> str:
+    """Major, minor and revision of the firmware; "" for another answer [LLCP, FirmwareRevision]."""
+    return ".".join(map(str, answer[:3])) if len(answer) >= 3 else ""
+
+
+def force_range_g(product: str) -> float | None:
+    """Largest force in g of an MTi by its product code, as `MTi-3-8A7G6`; None if unknown."""
+    match = re.match(r"MTi-(\d+)", product)
+    if match is None:
+        return None
+    number = int(match[1])
+    return FORCE_RANGE_G.get("1" if number < 10 else "600" if 600 <= number < 700 else "")
+
 
 TRIES = 4  # of each request: one more than Xsens' own library makes for GoToConfig [CMT]
 FIRST_TRIES = 7  # of GoToConfig: a device whose queue of samples is long answers after more than a second

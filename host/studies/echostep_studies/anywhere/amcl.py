@@ -3,6 +3,7 @@
 
 In: segments, a plan, a start. Out: `FilterRun`. Owns its particles. Random poses are mixed in as far as the mean likelihood falls behind its own
 long-term mean. Levels change as in this project's filter; the book knows one.
+Its measurement update is p(echo | pose) of this project without a memory, for each particle.
 """
 
 from __future__ import annotations
@@ -15,7 +16,17 @@ from statistics import median
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.localization import ClimbSettings, CloudSettings, EchoSettings, Start, TrackStatus, echo_model
+from echostep.jit import kernel
+from echostep.localization import (
+    ClimbSettings,
+    CloudSettings,
+    EchoModel,
+    EchoSettings,
+    Start,
+    TrackStatus,
+    echo_density,
+    echo_model,
+)
 from echostep.localization.height.levels import (
     UNKNOWN_LAG_M2,
     HeightArrays,
@@ -36,11 +47,31 @@ from echostep.localization.particles.kernels import (
 from echostep.localization.particles.start import draw_poses
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Plan
-from echostep.walls.echo_sources import Walls
+from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import walkable_floor
+from echostep.walls.index import WallIndex
 from echostep.walls.level_sheet import LevelSheet, lay_out_levels, level_of
-from echostep_studies.anywhere.amcl_kernels import weight_by_ping
 from echostep_studies.bench.filtering import WARM_UP, Claim, FilterRun
+
+
+@kernel
+def weight_by_ping(particles: ParticleArrays, axis: float, range_m: float, model: EchoModel, walls: WallIndex) -> float:
+    """Multiply each weight by p(range | pose); returns the mean likelihood before. The greatest log-weight becomes 0."""
+    x, y, turn, _, log_weight = particles
+    distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
+    top, weight, evidence = -np.inf, 0.0, 0.0
+    for i in range(len(x)):
+        count = echo_sources(x[i], y[i], axis + turn[i], walls, distance_m, off_axis_rad, kind)
+        likelihood = echo_density(range_m, count, distance_m, off_axis_rad, kind, model)
+        w = math.exp(log_weight[i])
+        weight += w
+        evidence += w * likelihood
+        log_weight[i] += math.log(likelihood)
+        top = max(top, log_weight[i])
+    for i in range(len(x)):
+        log_weight[i] -= top
+    return evidence / weight
+
 
 SIZE = 20_000
 # Decay rates of the long-term and the short-term mean likelihood, a ping; those of the ROS node amcl

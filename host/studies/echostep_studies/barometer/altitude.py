@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Heights from a record of pressures; effects of weather, doors and fans are separated from vertical motion.
 
-In: pressures with times, and temperatures where they are known. Out: rows of observations for `vertical_filter`, and `Heights` above the start of any
+In: pressures with times, and temperatures where they are known. Out: rows of observations, and `Heights` above the start of any
 building. Owns nothing.
 
 Pressure to height is hypsometric, dh = -(R T / g) dp / p, summed from sample to sample, so that a change of temperature alone moves no
@@ -18,7 +18,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep_studies.barometer import vertical_model as vertical
-from echostep_studies.barometer.vertical_filter import smooth
+from echostep_studies.barometer.vertical_kernels import smooth
 
 AIR_J_KG_K, G0_M_S2, ZERO_C_K = 287.053, 9.80665, 273.15
 INDOORS_C, COLDEST_C, WARMEST_C = 20.0, -30.0, 45.0

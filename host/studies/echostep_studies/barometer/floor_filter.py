@@ -17,7 +17,7 @@ from echostep.arrays import Floats, Ints
 from echostep.errors import EchostepError
 from echostep_studies.barometer import vertical_model as vertical
 from echostep_studies.barometer.altitude import Pressures, observations
-from echostep_studies.barometer.vertical_filter import smooth
+from echostep_studies.barometer.vertical_kernels import smooth
 
 TIED = 0.9  # of the best floor's probability: then the lowest of them is named
 CLOSEST_M, HIGHEST_M, MOST_STOREYS = 1.5, 2000.0, 64

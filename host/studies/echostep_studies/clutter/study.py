@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from matplotlib.collections import LineCollection
 
 from echostep.localization import CloudSettings, Start
 from echostep_app.output.table import Table
@@ -21,9 +22,23 @@ from echostep_studies.bench.judgement import JudgedRun, TruePlaces, judge
 from echostep_studies.bench.laser.building import LogBuilding, LogWalk, building_of, walk_from
 from echostep_studies.bench.laser.carmen_log import logs_in, read_log
 from echostep_studies.bench.stanford import draw_stanford
-from echostep_studies.clutter.pictures import draw_plans
+from echostep_studies.frame.pictures import BLACK, BLUE, axes_of, save
 from echostep_studies.frame.report import Row, as_dict
 from echostep_studies.frame.study import Study, StudyRequest
+
+
+def draw_plans(folder: Path, building: LogBuilding) -> None:
+    """Both plans side by side, and the way of the scans."""
+    figure, axes = axes_of(1, len(building.plans), (8.0 * len(building.plans), 8.0))
+    for ax, (name, plan) in zip(axes[0], building.plans.items(), strict=True):
+        walls = plan.levels[0].walls
+        ax.add_collection(LineCollection(list(walls.reshape(-1, 2, 2)), colors=BLACK, linewidths=1.0, label="walls"))
+        ax.plot(*building.log.pose[:, :2].T, color=BLUE, lw=0.6, label="way of the scans")
+        ax.set(aspect="equal", xlabel="x / m", ylabel="y / m")
+        ax.legend(loc="upper right", fontsize=8)
+        ax.set_title(f"{building.log.name}/{name}: {len(walls)} segments; {building.odometry.source}", fontsize=10)
+    save(figure, folder / f"{building.log.name}.png")
+
 
 UNKNOWN_M = 60.0  # length of the walks from unknown starts
 NOTES = (

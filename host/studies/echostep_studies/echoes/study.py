@@ -9,6 +9,7 @@ numbers.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -21,7 +22,6 @@ from echostep.walls.echo_sources import Walls
 from echostep_app.output.table import Table
 from echostep_app.simulation.world.acoustics import SRF02, directivity_db
 from echostep_studies.echoes.effects import Effect, pipe_range_m, simulated_effects
-from echostep_studies.echoes.findings import FINDINGS
 from echostep_studies.echoes.likelihood import SettingRow, fitted, log_p
 from echostep_studies.echoes.sweep_rows import ShareRow, SweepRow, share_rows, sweep_rows
 from echostep_studies.echoes.sweeps import SweepSet, read_sweeps, simulated_sweeps
@@ -29,6 +29,41 @@ from echostep_studies.frame.report import as_dicts
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.marker_walk import lay_markers, walk_markers
 from echostep_studies.simulation.sites import otb
+
+
+def _half_heard(effect: Effect) -> str:
+    share = np.array([np.mean(~np.isnan(h.range_m)) for h in effect.heard])
+    lost = effect.heard[int(np.argmax(share < 0.5))].place
+    return f"half of the echoes are lost at {lost:.0f} degrees"
+
+
+def _post_heard(effect: Effect) -> str:
+    near = [h.place for h in effect.heard if np.nanmedian(h.range_m) < h.place + 0.3]
+    return f"a thin post is heard up to {max(near, default=0.0):.1f} m, the wall behind it at 3 m"
+
+
+def _detour(effect: Effect) -> str:
+    medians = [(h.place, float(np.nanmedian(h.range_m))) for h in effect.heard if np.mean(~np.isnan(h.range_m)) > 0.5]
+    far = [(angle, z) for angle, z in medians if z > 1.2]
+    if not far:
+        return "no echo by two walls"
+    return f"beyond {far[0][0]:.0f} degrees {far[0][1]:.1f} m are reported, the wall is at 1.0 m"
+
+
+def _limits(effect: Effect) -> str:
+    received = [h for h in effect.heard if np.mean(~np.isnan(h.range_m)) > 0.5]
+    return f"between {np.nanmin(received[0].range_m):.2f} m and {received[-1].place:.2f} m"
+
+
+def _signature(effect: Effect) -> str:
+    medians = np.array([np.nanmedian(h.range_m) for h in effect.heard])
+    return f"an open door lengthens the range by {np.max(medians[medians < 2.5]) - np.min(medians):.2f} m before its frame is passed"
+
+
+FINDINGS: dict[str, Callable[[Effect], str]] = {
+    "incidence": _half_heard, "near and far": _post_heard, "oblique": _detour, "limits": _limits, "door frames": _signature,
+}  # fmt: skip
+
 
 UNIFORM = -math.log(6.0)  # log-density of a range of which nothing is known
 COLUMNS = {

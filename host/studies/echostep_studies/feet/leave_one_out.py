@@ -10,16 +10,31 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from statistics import fmean
 
+from msgspec import UNSET, UnsetType
 from rich.progress import track as progress
 
 from echostep.foot.ins import Noise
 from echostep.foot.steps import Track
 from echostep_app.output.table import console
 from echostep_studies.bench.recordings.feet import FootRecording
-from echostep_studies.feet.rows import FigureRow
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FigureRow:
+    """A figure in metres, or as the metric says; `left_out`: the same under the constants that the other sets would choose, where that was asked."""
+
+    set: str
+    recording: str
+    metric: str
+    value: float
+    distance_m: float | None
+    peer: float | None
+    peer_name: str | None
+    left_out: float | UnsetType | None = UNSET
+
 
 CONSTANTS = ("accel", "gyro_share", "change_share", "lever_m")
 FACTORS = (0.5, 1.0, 2.0)

@@ -15,21 +15,32 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.localization import Estimate, TrackStatus
+from echostep.plan import Plan
 from echostep_app.output.table import Table
 from echostep_app.scorecard.card import FLOOR_PENALTY_M, score
 from echostep_app.scorecard.error_statistics import error_statistics, quantile
-from echostep_app.scorecard.own_track import track_of
+from echostep_app.scorecard.track_columns import ScoredPath, track_of
 from echostep_studies.bench.judgement import true_levels
 from echostep_studies.frame.report import Row, as_dict, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
-from echostep_studies.operation.true_tracks import truth_of
 from echostep_studies.operation.walks import HALF_M, OperationWalk, operation
+
+
+def truth_of(truth: Floats, plan: Plan) -> ScoredPath:
+    """A simulated truth (n, 5), t_s, x, y, heading, height of the floor, as a true path: the nearest level is the true one."""
+    heights = np.array([level.height_m for level in plan.levels])
+    level = np.abs(truth[:, 4:5] - heights).argmin(1).astype(float)
+    return ScoredPath(
+        Path("truth"), truth[:, 0], truth[:, 1:3], np.zeros(len(truth), bool), {}, height_m=truth[:, 4], level=level
+    )
+
 
 ASKED_CE95_M, ASKED_FLOOR = 0.5, 0.995  # what an operation asks for, assumed: a door; hardly ever another floor
 ALL, RESUMED = "all", "all, resumed"  # the rows of all points

@@ -12,8 +12,8 @@ from unittest import mock
 import numpy as np
 
 from echostep_studies.papers import girard2011
+from echostep_studies.speed.among_walls import cloud, offices
 from echostep_studies.speed.comparison import Row, Scale, Work, compared
-from echostep_studies.speed.offices import cloud, offices
 from echostep_studies.speed.peers import MAPLESS, MISSING, plain_rays
 
 

@@ -21,7 +21,7 @@ from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.meeting import MEETING, MeetingMessage
 from echostep.ports.people.team_beacons import SHARE_S, TEAM_BEACONS, TeamBeacons
 from echostep.tracker import Tracker
-from echostep_app.ports.reported_meeting import meeting_with
+from echostep_app.session.team.teammate_feed import meeting_with
 from echostep_app.simulation.scenario import START_NS
 from echostep_app.team.outbox import aged
 from echostep_app.team.publish import position_of

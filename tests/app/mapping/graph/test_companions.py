@@ -10,9 +10,8 @@ import pytest
 
 from echostep.arrays import Ints
 from echostep.path import MeasuredSegment, PathSegment
-from echostep_app.mapping.graph import companions
-from echostep_app.mapping.graph.companions import density_along_path, people_share
-from echostep_app.mapping.graph.directions import find_directions
+from echostep_app.mapping.graph import directions
+from echostep_app.mapping.graph.directions import density_along_path, find_directions, people_share
 from echostep_app.mapping.graph.fragments import find_fragments
 from echostep_app.mapping.graph.nodes import Nodes, Pings, nodes_of
 
@@ -43,7 +42,7 @@ def test_people_in_a_hall_turn_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.count_nonzero(nodes.way_m[fragments.node] < HALL_M) == HALL_M // 10
     drift = find_directions(nodes, fragments).drift_rad
     assert math.degrees(abs(drift[0] - drift[-1])) < 3.0
-    monkeypatch.setattr(companions, "PEOPLE", 0.0)
+    monkeypatch.setattr(directions, "PEOPLE", 0.0)
     drift = find_directions(nodes, fragments).drift_rad
     assert math.degrees(abs(drift[0] - drift[-1])) > 20.0
 
@@ -53,8 +52,8 @@ def test_the_share_of_people_is_small_where_much_is_heard() -> None:
     nodes, pings = across_a_hall(10)
     fragments = find_fragments(nodes, pings)
     way_m, share = nodes.way_m[fragments.node], people_share(nodes, fragments)
-    assert share[way_m > HALL_M + companions.COUNTED_M].max() < 0.08
-    assert np.all(share[way_m < HALL_M - companions.COUNTED_M] == companions.MOST_PEOPLE)
+    assert share[way_m > HALL_M + directions.COUNTED_M].max() < 0.08
+    assert np.all(share[way_m < HALL_M - directions.COUNTED_M] == directions.MOST_PEOPLE)
 
 
 def test_a_person_has_the_direction_of_the_path() -> None:
@@ -63,7 +62,7 @@ def test_a_person_has_the_direction_of_the_path() -> None:
     fragments = find_fragments(nodes, pings)
     straight = np.abs(nodes.way_m[fragments.node] - HALL_M) > 3.0
     along = density_along_path(nodes, fragments)
-    sd = np.hypot(fragments.sd_rad, companions.ALONG_SD_RAD)
+    sd = np.hypot(fragments.sd_rad, directions.ALONG_SD_RAD)
     peak = 1.0 / (math.sqrt(2.0 * math.pi) * sd)
     np.testing.assert_allclose(along[straight], peak[straight], rtol=0.01)
     askew = fragments._replace(normal_rad=fragments.normal_rad + math.radians(45.0))

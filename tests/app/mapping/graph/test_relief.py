@@ -10,10 +10,10 @@ import pytest
 
 from echostep.arrays import Floats, Ints
 from echostep.path import MeasuredSegment, PathSegment
+from echostep_app.mapping.graph.directions import find_relief
 from echostep_app.mapping.graph.fragments import find_fragments
 from echostep_app.mapping.graph.graph import FittedWalls, Graph
 from echostep_app.mapping.graph.nodes import nodes_of
-from echostep_app.mapping.graph.relief import find_relief
 
 LENGTH_M = 120
 

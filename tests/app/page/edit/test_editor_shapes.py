@@ -12,7 +12,7 @@ from echostep.plan import Plan, Pose, load_plan, parse_plan
 from echostep_app.page.editor import EditServer
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.writer import save_plan
-from page.browser import wait_for
+from page.browser import violations, wait_for
 from page.edit.drawing import PHONES, answered, click, drag, on_phone, opened, says, status, tap
 from waiting import until
 
@@ -78,7 +78,6 @@ def test_an_obstacle_corner_by_corner_and_by_a_drag(browser: Any, house: EditSer
     page.click("#step-forth")
     says(page, "Again: Moved the obstacle by 2.06 m, 76.0°")
     assert not page.wrong
-    page.context.close()
 
 
 def test_stairs_and_a_lift_join_levels(browser: Any, house: EditServer) -> None:
@@ -125,7 +124,6 @@ def test_stairs_and_a_lift_join_levels(browser: Any, house: EditServer) -> None:
     page.click("#step-back")
     assert [(way.kind, way.name) for way in written(page, house).connectors] == [("stairs", ""), ("lift", "Lift A")]
     assert not page.wrong
-    page.context.close()
 
 
 def test_stairs_of_one_level_are_refused(browser: Any, drawn: EditServer) -> None:
@@ -134,7 +132,6 @@ def test_stairs_of_one_level_are_refused(browser: Any, drawn: EditServer) -> Non
     drag(page, (5.0, 5.0), (7.0, 7.0))
     says(page, "No stairs drawn: there is one level. Add the other one first (+ Level)")
     assert page.evaluate("[echostep.sheet.past.length, echostep.tools.chain]") == [0, None]
-    page.context.close()
 
 
 def test_the_start_is_set_moved_and_deleted(browser: Any, house: EditServer) -> None:
@@ -163,7 +160,6 @@ def test_the_start_is_set_moved_and_deleted(browser: Any, house: EditServer) -> 
     page.keyboard.press("Control+z")
     assert start_of(page, house).x_m == 6.0
     assert not page.wrong
-    page.context.close()
 
 
 def test_keys_alone_draw_stairs_and_the_start(browser: Any, house: EditServer) -> None:
@@ -189,34 +185,30 @@ def test_keys_alone_draw_stairs_and_the_start(browser: Any, house: EditServer) -
     assert (way.kind, way.levels, len(way.outline_m)) == ("stairs", (0, 1), 3)
     assert start_of(page, house).heading_rad == pytest.approx(3.1416, abs=1e-4)
     assert not page.wrong
-    page.context.close()
 
 
 @pytest.mark.parametrize("held", PHONES)
 def test_fingers_draw_stairs_on_a_phone_held_either_way(
     browser: Any, house: EditServer, held: str, tmp_path: Path
 ) -> None:
-    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
-
     page = on_phone(browser, house, held)
     page.tap('[data-tool="stairs"]')
     for x, y in ((2, 3), (5, 3), (5, 6), (2, 6), (2, 3)):
         tap(page, x, y)
     page.locator("#ways[open]").wait_for()
     page.screenshot(path=tmp_path / f"stairs-{held}.png")
-    found = Axe().run(page)
+    found = violations(page)
     page.tap("#ways [value='yes']")  # the tap that opened the dialog chose nothing in it
     says(page, "Stairs: Ground, First")
-    after = Axe().run(page)
+    after = violations(page)
     page.screenshot(path=tmp_path / f"drawn-{held}.png")
     wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
     cut = page.evaluate(
         "[...document.querySelectorAll('button')].filter((e) => e.offsetParent && e.scrollWidth > e.clientWidth).map((e) => e.textContent)"
     )
-    assert found.violations_count == after.violations_count == 0, found.generate_report() + after.generate_report()
+    assert found == after == []
     assert (wide, cut, page.wrong) == (0, [], [])
     assert written(page, house).connectors[0].outline_m.tolist() == [[2, 3], [5, 3], [5, 6], [2, 6]]
-    page.context.close()
 
 
 def test_windows_and_what_is_wrong(browser: Any, house: EditServer) -> None:
@@ -248,4 +240,3 @@ def test_windows_and_what_is_wrong(browser: Any, house: EditServer) -> None:
     page.set_viewport_size({"width": 320, "height": 256})
     wait_for(page, "document.querySelector('#status').clientWidth > 100")
     assert not page.wrong
-    page.context.close()

@@ -32,7 +32,6 @@ def test_one_floor_needs_no_button_and_seven_fit(browser: Any, look: str) -> Non
             if look == "bright" and plan is not PLAN:
                 page.select_option("#floor", "5")
                 wait_for(page, "echostep.scene.level === 5")
-            page.context.close()
 
 
 @pytest.mark.long
@@ -60,4 +59,3 @@ def test_a_fault_of_the_server_is_said_and_goes_when_it_is_gone(browser: Any, mo
             page,
             "document.querySelector('#fault').textContent === 'This page has a fault: Uncaught Error: of the page. Reload it.'",
         )
-        page.context.close()

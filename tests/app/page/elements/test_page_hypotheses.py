@@ -67,7 +67,6 @@ def test_places_that_fit_are_drawn_and_told(browser: Any, tmp_path: Path) -> Non
         wait_for(page, "document.querySelector('#places').hidden")
         assert "within 0.40 m · heading E 090° ±1°" in page.text_content("#place")
         assert not page.wrong
-        page.context.close()
 
 
 def test_the_sentence_names_each_place_once_with_the_numbers_of_its_rings() -> None:
@@ -127,7 +126,6 @@ def test_without_a_place_nothing_on_the_map_looks_like_one(browser: Any, size: t
         away, echo = marks(told(13.0, 5.0), 4.0)
         assert min(away, echo) > 20
         assert not page.wrong
-        page.context.close()
 
 
 def test_the_way_is_hidden_while_no_place_is_claimed(browser: Any, tmp_path: Path) -> None:
@@ -142,7 +140,6 @@ def test_the_way_is_hidden_while_no_place_is_claimed(browser: Any, tmp_path: Pat
             assert page.evaluate("echostep.last.guidance.path.length") == 2
             assert [ink_near(page, 2.0 + 7.5 * share, 7.5) for share in (0.1, 0.5, 0.9)] == [shown] * 3
         assert not page.wrong
-        page.context.close()
 
 
 def test_the_view_does_not_follow_a_mean_that_is_no_place(browser: Any) -> None:
@@ -159,7 +156,6 @@ def test_the_view_does_not_follow_a_mean_that_is_no_place(browser: Any) -> None:
             assert (page.evaluate("[echostep.view.x, echostep.view.y]") == stands) == (status is TrackStatus.LOST)
         assert page.get_attribute("#follow", "aria-pressed") == "true"
         assert not page.wrong
-        page.context.close()
 
 
 def test_the_track_has_a_gap_where_no_place_was_claimed() -> None:
@@ -177,4 +173,3 @@ def test_from_nowhere_two_corridors_fit_until_the_wearer_turns(browser: Any, tmp
         wait_for(page, f"{DRAWN}.includes(' · ')")
         picture(page, "search", tmp_path)
         assert not page.wrong
-        page.context.close()

@@ -13,9 +13,9 @@ from websockets.sync.client import ClientConnection
 from echostep_app.page.elements.taps import NO_TAP, PointPress, ShownPoints
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.ports.arrival_clock import now_ns
-from page.browser import READY, loaded_page, overflow, wait_for
+from page.browser import READY, loaded_page, overflow, violations, wait_for
 from page.frames import PLAN, next_frame, opened, scene, served
-from page.test_language import CUT, LOCALES, MISSING, settles, violations
+from page.test_language import CUT, LOCALES, MISSING, settles
 from page.web.test_page_sizes import UNREACHED
 from waiting import PATIENCE_S, until
 
@@ -131,4 +131,3 @@ def test_the_buttons_fit_a_phone_held_either_way(
         assert (presses[-1].number, presses[-1].typed) == (35, NO_TAP)
         assert set(page.evaluate(MISSING)) <= {"echostep", "GeoJSON"}
         assert not page.wrong
-        page.context.close()

@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""A page for other machines is named by addresses that these reach, and by a QR code on a terminal."""
+"""A page for other machines is named by addresses that these reach, and by a QR code on a terminal.
+
+On a computer of several users its address has a token, on loopback too.
+"""
 
 from __future__ import annotations
 
 import io
+import os
+import pwd
 import socket
 import sys
 
@@ -12,9 +17,10 @@ import pytest
 from rich.console import Console
 
 from echostep_app.page.server import Address
-from echostep_app.page.web import addresses
+from echostep_app.page.web import addresses, users
 from echostep_app.page.web.addresses import HALVES, own_addresses, page_urls, print_page, qr_code
-from page.frames import served
+from echostep_app.page.web.users import has_other_users
+from page.frames import fetched, served
 
 URL = "http://192.168.1.20:8420/AbCdEfGhIjKlMnOpQrStUv/"
 
@@ -81,3 +87,33 @@ def test_without_the_package_its_extra_is_named(monkeypatch: pytest.MonkeyPatch)
     print_page(Console(file=said, force_terminal=True, soft_wrap=True), (URL,))
     said.seek(0)
     assert "its QR code needs segno, which is not installed: pip install 'echostep[page]'" in said.read()
+
+
+def account(name: str, uid: int, shell: str) -> pwd.struct_passwd:
+    return pwd.struct_passwd((name, "x", uid, uid, "", f"/home/{name}", shell))
+
+
+@pytest.mark.parametrize(
+    ("uid", "shell", "counts"),
+    [(4321, "/bin/bash", True), (4321, "/usr/sbin/nologin", False), (33, "/bin/sh", False), (65534, "/bin/sh", False), (-1, "/bin/sh", False)],
+)  # fmt: skip
+def test_a_person_with_a_shell_is_another_user(
+    monkeypatch: pytest.MonkeyPatch, uid: int, shell: str, counts: bool
+) -> None:
+    """Not a service, and not this process's own user (-1)."""
+    monkeypatch.setattr(os, "getuid", lambda: 1234)
+    monkeypatch.setattr(
+        pwd, "getpwall", lambda: [account("root", 0, "/bin/sh"), account("one", 1234 if uid < 0 else uid, shell)]
+    )
+    assert has_other_users() == counts
+
+
+@pytest.mark.parametrize("several", [True, False])
+def test_a_computer_of_several_users_asks_for_the_token(monkeypatch: pytest.MonkeyPatch, several: bool) -> None:
+    monkeypatch.setattr(users, "has_other_users", lambda: several)
+    with served() as (server, _):
+        assert server.url.startswith("http://127.0.0.1:")
+        assert (server.url.count("/") == 4) == several
+        assert fetched(server.url).status == 200
+        root = server.url[: server.url.index("/", 8)] + "/"
+        assert fetched(root).status == (404 if several else 200)

@@ -91,5 +91,3 @@ def test_a_dead_broker_is_told_and_what_is_asked_for_arrives_once(browser: Any, 
                 table.evaluate("echostep.link.send('unmark', { id: echostep.scene.marks[0].id })")
                 wait_for(table, "!echostep.scene.marks.length")
                 assert [*wearer.wrong, *table.wrong] == [], k
-                wearer.context.close()
-                table.context.close()

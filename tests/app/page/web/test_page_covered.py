@@ -65,7 +65,6 @@ def test_the_wearer_is_seen_under_every_message(browser: Any, size: tuple[int, i
             wait_for(page, f"echostep.last.t_s === {t_s + 0.5}")
             page.screenshot(path=tmp_path / f"{size[0]}-{x_m:.0f}.png")
             assert page.evaluate(ABOVE, [x_m, 7.5]) == []
-        page.context.close()
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -74,8 +73,7 @@ def test_who_has_fallen_is_seen_under_every_message(browser: Any, size: tuple[in
     x_m, y_m = TOWER.levels[2].rooms[0].at_m
     for name in ("Anna", "Eve"):
         team.hear(name, place(TOWER, x_m, y_m, 0))
-    with ServedTeam(team) as table:
-        page = opened(browser, table.page.url, size, TABLE_READY)
+    with ServedTeam(team) as table, opened(browser, table.page.url, size, TABLE_READY) as page:
         for name, far_m in (("Gil", 12.0), ("Kim", -9.0)):
             team.hear(name, place(TOWER, x_m + far_m, y_m, 2), alarm=ReportedAlarm("mayday", "fall", 1, 14.0))
             table.show()
@@ -94,7 +92,6 @@ def test_who_has_fallen_is_seen_under_every_message(browser: Any, size: tuple[in
             )
             page.screenshot(path=tmp_path / f"fallen-{size[0]}-{name}.png")
             assert page.evaluate(ABOVE, [x_m + far_m, y_m]) == [], name
-        page.context.close()
 
 
 def test_the_first_view_of_a_big_house_is_about_the_wearer(browser: Any, tmp_path: Path) -> None:
@@ -108,7 +105,6 @@ def test_the_first_view_of_a_big_house_is_about_the_wearer(browser: Any, tmp_pat
             wait_for(page, "echostep.view.shows([2, 7.5, 2, 7.5])")
             assert page.evaluate("echostep.view.shows([1, 1, 25, 13])") is is_whole
             assert 20.0 < page.evaluate("echostep.view.width / echostep.view.scale") < 35.0
-            page.context.close()
 
 
 NAMES = """[...document.querySelectorAll('#rooms text')].filter((e) => e.getAttribute('visibility') === 'visible')
@@ -135,12 +131,10 @@ def test_names_give_way_to_signs(browser: Any) -> None:
     team = Team()
     spots = [TOWER.levels[0].rooms[0].at_m]
     team.hear("Anna", place(TOWER, *spots[0], 0))
-    with ServedTeam(team) as table:
-        page = opened(browser, table.page.url, (360, 740), TABLE_READY)
+    with ServedTeam(team) as table, opened(browser, table.page.url, (360, 740), TABLE_READY) as page:
         assert not covered(page, spots)
         left, right = page.evaluate(NAME_AT_EDGE)
         assert 0 < left < right < 180  # on the other side of the sign, where the map's edge would cut it
-        page.context.close()
 
 
 NAME_AT_EDGE = """async () => {

@@ -23,7 +23,7 @@ from echostep_app.plan.writer import plan_json
 from echostep_app.recording.recorder import Recorder
 from echostep_app.session.metadata import run_metadata
 from echostep_app.session.runs import dropped
-from page.browser import loaded_page, overflow, wait_for
+from page.browser import loaded_page, overflow, violations, wait_for
 from page.frames import PLAN, scene, served
 from page.web.test_page_sizes import SIZES, UNREACHED
 from waiting import PATIENCE_S
@@ -75,8 +75,7 @@ def dropping(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
 def test_a_dropped_recording_plays_and_another_one_after_it(
     browser: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    with dropping(monkeypatch) as url:
-        page = loaded_page(browser, url, DESK, WAITS)
+    with dropping(monkeypatch) as url, loaded_page(browser, url, DESK, WAITS) as page:
         assert page.is_hidden("#here")
         drop(page, recording(tmp_path, PLAN))  # the demo's plan is known
         wait_for(page, PLAYS.format("walk.mcap (simulated)"))
@@ -91,7 +90,6 @@ def test_a_dropped_recording_plays_and_another_one_after_it(
         wait_for(page, f"{HINT} === 'bad.mcap: no recorded bytes in it: is this an echostep recording (.mcap)?'")
         assert page.evaluate(PLAYS.format("second.mcap"))  # it plays on
         assert [text for text in page.wrong if "422" not in text] == []
-        page.context.close()
 
 
 def test_a_recording_of_another_building_waits_for_its_plan(
@@ -100,8 +98,7 @@ def test_a_recording_of_another_building_waits_for_its_plan(
     plan = tmp_path / "other.json"
     plan.write_text(plan_json(OTHER))
     walk = recording(tmp_path, replace(OTHER, digest="7" * 64))
-    with dropping(monkeypatch) as url:
-        page = loaded_page(browser, url, DESK, WAITS)
+    with dropping(monkeypatch) as url, loaded_page(browser, url, DESK, WAITS) as page:
         drop(page, walk)
         wait_for(page, f"{SAID} === 'walk.mcap: now drop its plan (Other building).'")
         page.screenshot(path=tmp_path / "drop.png")
@@ -111,13 +108,10 @@ def test_a_recording_of_another_building_waits_for_its_plan(
         assert not page.wrong
         page.reload()
         wait_for(page, PLAYS.format("walk.mcap (simulated): Other building"))
-        page.context.close()
-    with dropping(monkeypatch) as url:
-        page = loaded_page(browser, url, DESK, WAITS)
+    with dropping(monkeypatch) as url, loaded_page(browser, url, DESK, WAITS) as page:
         drop(page, walk)
         page.click("#drop-without")
         wait_for(page, PLAYS.format("walk.mcap (simulated): no plan"))
-        page.context.close()
 
 
 @pytest.mark.parametrize(
@@ -136,30 +130,24 @@ def test_a_file_that_is_neither_is_answered_by_one_sentence(
 ) -> None:
     if "larger" in said:
         monkeypatch.setattr(uploads, "MOST_FILE", 1000)
-    with dropping(monkeypatch) as url:
-        page = loaded_page(browser, url, DESK, WAITS)
+    with dropping(monkeypatch) as url, loaded_page(browser, url, DESK, WAITS) as page:
         page.evaluate(DROP, [[[name, base64.b64encode(contents).decode()]]])
         wait_for(page, f"{SAID}.startsWith({json.dumps(said)})")
         sentence = page.inner_text("#drop-text")
         assert "\n" not in sentence
         assert "echostep-page-" not in sentence  # nothing of the temporary folder
         assert page.evaluate("document.querySelector('#drop-text').dataset.wrong") == "true"
-        page.context.close()
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_the_waiting_page_keeps_nobody_out(
     browser: Any, monkeypatch: pytest.MonkeyPatch, size: tuple[int, int]
 ) -> None:
-    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
-
     with dropping(monkeypatch) as url:
         page = loaded_page(browser, url, {"viewport": {"width": size[0], "height": size[1]}}, WAITS)
-        found = Axe().run(page)
-        assert found.violations_count == 0, found.generate_report()
+        assert violations(page) == []
         assert overflow(page) == (0, 0)
         assert page.evaluate(UNREACHED) == []
-        page.context.close()
 
 
 def test_other_pages_take_no_files(browser: Any, tmp_path: Path) -> None:
@@ -171,4 +159,3 @@ def test_other_pages_take_no_files(browser: Any, tmp_path: Path) -> None:
         drop(page, path)
         wait_for(page, f"{HINT}.includes('plays on the page of: echostep page')")
         assert not page.wrong
-        page.context.close()

@@ -55,7 +55,6 @@ def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any, tmp
             page.click("#play")
             wait_for(page, f"{STATUS} === 'tracking' && echostep.last.play.playing && !echostep.last.ended")
             page.evaluate("echostep.link.send('seek', { t_s: 1e6 })")
-        page.context.close()
 
 
 @pytest.mark.long
@@ -104,7 +103,6 @@ def test_an_error_that_ends_the_run_is_on_the_page_in_the_words_of_the_terminal(
     wait_for(page, "echostep.link.failures > 4")  # the server is away; that it does not answer is no other error
     page.screenshot(path=tmp_path / f"failed-{size}.png")
     assert page.inner_text("#fault") == said
-    page.context.close()
 
 
 def rgb(colour: str) -> str:

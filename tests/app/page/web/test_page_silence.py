@@ -104,7 +104,6 @@ def check(browser: Any, role: str, kind: str, size: tuple[int, int], tmp_path: P
             wait_for(page, f"{READY[role]} && echostep.link.isOpen")
         assert sum(map(CARRIED_OUT[role], feeder.lines)) == 1
         assert not [wrong for wrong in page.wrong if "WebSocket" not in wrong and "net::" not in wrong]
-        page.context.close()
     assert late_s < WITHIN_S
 
 
@@ -148,7 +147,6 @@ def test_a_call_survives_a_reload_and_the_end_of_the_program(browser: Any) -> No
             wait_for(page, f"{OUTBOX}.includes('Go here: not sent: the program has been started anew')")
             assert other.lines == ["Call(help=True)"]
         assert not page.evaluate("Object.keys(localStorage).filter((key) => key.startsWith('request')).length > 3")
-        page.context.close()
 
 
 def test_no_call_is_lost_by_a_clock_that_is_set_nor_in_one_of_two_tabs(browser: Any) -> None:
@@ -171,7 +169,6 @@ def test_no_call_is_lost_by_a_clock_that_is_set_nor_in_one_of_two_tabs(browser: 
         page.reload()
         wait_for(page, f"{OUTBOX} === 'Help!: not sent: too late by now, do it again'")
         assert feeder.lines == ["Call(help=True)"]
-        page.context.close()
 
 
 def test_a_run_that_hangs_behind_its_server_is_told_and_what_has_nothing_to_say_is_not_silent(browser: Any) -> None:
@@ -188,7 +185,6 @@ def test_a_run_that_hangs_behind_its_server_is_told_and_what_has_nothing_to_say_
         assert page.is_hidden("#silence")
         assert page.is_enabled("#here")
         assert not page.wrong
-        page.context.close()
 
 
 def test_a_beat_comes_at_once_and_a_request_is_carried_out_once() -> None:
@@ -242,4 +238,3 @@ def test_help_is_held_and_a_brush_is_none(browser: Any, *, held: bool) -> None:
             page.click("#help")
             wait_for(page, "document.querySelector('#hint').textContent === 'Hold Help! for a second.'")
         assert list(popped(mailbox.check_ins)) == [Call(help=True)] * held
-        page.context.close()

@@ -16,7 +16,7 @@ from echostep_app.page.elements.stream_rates import StreamRates
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.teams import TOWER, ServedTeam, place, whole_team
-from page.browser import READY, loaded_page, overflow, wait_for
+from page.browser import READY, loaded_page, overflow, violations, wait_for
 from page.frames import scene, served, told
 from plan.imported_plans import seven_floors
 
@@ -80,13 +80,11 @@ def check(page: Any, size: tuple[int, int]) -> None:
 
 @pytest.mark.parametrize("size", SIZES)
 def test_the_live_page_keeps_its_map(browser: Any, size: tuple[int, int], tmp_path: Path) -> None:
-    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
-
     with served(Mailbox(seven_floors(), "A walk", replay=False)) as (server, mailbox):
         mailbox.set_team(("Anna", "Christopher"))
         mailbox.publish(scene())
         page = opened(browser, server.url, size, READY)
-        boxes, heights, violations = set(), set(), 0
+        boxes, heights, found = set(), set(), list[str]()
         for moment in moments():
             mailbox.publish(moment)
             wait_for(page, f"echostep.last.t_s === {moment.t_s}")
@@ -97,21 +95,17 @@ def test_the_live_page_keeps_its_map(browser: Any, size: tuple[int, int], tmp_pa
                 assert page.evaluate("document.querySelector('#fine').getBoundingClientRect().bottom <= innerHeight")
             else:
                 check(page, size)
-            violations += Axe().run(page).violations_count
+            found += violations(page)
         assert len(boxes) == 1
         assert len(heights) == 1 or size == LOW[1]  # there it scrolls beside the map, in the width of a word or two
-        assert violations == 0
+        assert found == []
         assert not page.wrong
-        page.context.close()
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_the_commanders_page_keeps_its_map(browser: Any, size: tuple[int, int], tmp_path: Path) -> None:
-    from axe_playwright_python.sync_playwright import Axe
-
     team = whole_team()
-    with ServedTeam(team) as table:
-        page = opened(browser, table.page.url, size, TABLE_READY)
+    with ServedTeam(team) as table, opened(browser, table.page.url, size, TABLE_READY) as page:
         boxes = {page.evaluate(BOX)}
         page.screenshot(path=tmp_path / f"table-{size[0]}-0.png")
         check(page, size)
@@ -129,8 +123,7 @@ def test_the_commanders_page_keeps_its_map(browser: Any, size: tuple[int, int], 
         page.click("#mayday-open")
         wait_for(page, "document.querySelectorAll('#rescuers li').length === 3")
         check(page, size)
-        assert Axe().run(page).violations_count == 0
+        assert violations(page) == []
         boxes.add(page.evaluate(BOX))
         assert len(boxes) == 1
         assert not page.wrong
-        page.context.close()

@@ -20,8 +20,7 @@ from page.frames import scene
 @pytest.mark.speed
 def test_latency_from_a_step_to_the_pixel(browser: Any) -> None:
     """Time from the landing of the foot to its bytes (data time), and from there to the drawn frame (wall clock)."""
-    with Walk(20.0, 3.0) as walk:
-        page = looking(browser, walk.page.url, "dark")
+    with Walk(20.0, 3.0) as walk, looking(browser, walk.page.url, "dark") as page:
         for _ in range(5):
             for session in walk.page.server.sessions:
                 session.latency_s.clear()
@@ -35,7 +34,6 @@ def test_latency_from_a_step_to_the_pixel(browser: Any) -> None:
                 f"drawn {1e3 * np.percentile(drawn_s, 95):.0f} ms later"
             )
         assert not page.wrong
-        page.context.close()
 
 
 @pytest.mark.speed

@@ -17,10 +17,9 @@ from echostep.board.messages import SCHEMA_HASH
 from echostep.errors import EchostepError
 from echostep.ports.chunks import POINT, Chunk
 from echostep_app.ports.tap import Tap
-from echostep_app.session.acceptance.errors import by_point, score_taps
 from echostep_app.session.acceptance.page import page
 from echostep_app.session.acceptance.protocol import FIELD
-from echostep_app.session.acceptance.walked import Walked, walk_again
+from echostep_app.session.acceptance.walked import Walked, by_point, score_taps, walk_again
 from session.acceptance.simulated_walk import record, walk
 
 pytestmark = pytest.mark.slow
@@ -87,8 +86,7 @@ def test_the_page_is_made_again_from_a_copy_of_the_recording(recording: Path, tm
     copy = Path(shutil.copy(recording, folder / "other-name.mcap"))
     pages = []
     for path in (recording, copy):
-        done = echostep("acceptance", "--recording", path)
-        assert done.returncode == 0, done.stderr
+        done = echostep("acceptance", "--recording", path, ends=0)
         assert "(simulated)" in done.stdout
         pages.append(path.with_suffix(".html").read_bytes())
     assert pages[0] == pages[1]
@@ -103,8 +101,7 @@ def test_the_page_is_made_again_from_a_copy_of_the_recording(recording: Path, tm
 @needs_twin
 def test_the_page_of_the_real_firmware(tmp_path: Path) -> None:
     """The firmware in the twin, whose wearer walks the protocol; the taps come at the moments when the trunk is at the points."""
-    done = echostep("acceptance", "--recording", record(tmp_path / "walk.mcap", *walk(twin=True)))
-    assert done.returncode == 0, done.stderr
+    done = echostep("acceptance", "--recording", record(tmp_path / "walk.mcap", *walk(twin=True)), ends=0)
     figures = re.search(
         r"17 taps with a position: mean [\d.]+ m, CE50 ([\d.]+) m, CE95 ([\d.]+) m \(simulated\)", done.stdout
     )

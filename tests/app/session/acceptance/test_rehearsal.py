@@ -10,8 +10,7 @@ import pytest
 
 from board_runs import needs_twin
 from echostep.localization import TrackStatus
-from echostep_app.session.acceptance.errors import score_taps
-from echostep_app.session.acceptance.walked import walk_again
+from echostep_app.session.acceptance.walked import score_taps, walk_again
 from session.acceptance.simulated_walk import record, walk
 
 MANUAL = Path(__file__).parents[4] / "host/docs/board.md"

@@ -19,8 +19,7 @@ from echostep_app.team.messages.report import BadReportError, ReportedAlarm, dec
 from echostep_app.team.publish import Publishing
 from echostep_app.team.roster import MemberState
 from team.cot_schema import faults
-from team.letters import NOW, heard, said
-from team.team_reports import PLACE, PLAN, report
+from team.team_reports import NOW, PLACE, PLAN, heard, report, said
 
 MAYDAY = ReportedAlarm("mayday", "no motion", 3, 34.0)
 OVER = ReportedAlarm("over", "no motion", 3, 2.0)

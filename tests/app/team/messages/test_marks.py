@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import structs
 
-from echostep_app.operation.restorer import RETAINED_S, Restorer
+from echostep_app.operation.command import RETAINED_S, Restorer
 from echostep_app.team.messages.marks import MOST_MARKS, MOST_REMOVED, ROOT, Mark, MarkBoard, ack_message
 from echostep_app.team.messages.report import BadReportError
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints, spans
 from echostep.plan import is_no_plan
-from echostep_app.mapping.graph.companions import ALONG_SD_RAD, course_of
+from echostep_app.mapping.graph.directions import ALONG_SD_RAD, course_of
 from echostep_app.mapping.graph.graph import Graph
 from echostep_app.mapping.graph.nodes import Pings
 from echostep_app.mapping.walls.evidence import (

@@ -19,10 +19,9 @@ from echostep_app.printing.lines import as_error
 from echostep_app.printing.progress import progress_line
 from echostep_app.scorecard.card import Scored
 from echostep_app.scorecard.definitions import METRICS, as_text
-from echostep_app.session.acceptance.errors import by_point, score_taps
 from echostep_app.session.acceptance.facts import clock_rows, loss_rows, version_rows
 from echostep_app.session.acceptance.heard import AGREES_M, REACH_M, heard_shares
-from echostep_app.session.acceptance.walked import Walked, walk_again
+from echostep_app.session.acceptance.walked import Walked, by_point, score_taps, walk_again
 
 SIMULATED = "Simulated: no board was worn. The figures show that the protocol works, not how well the tracker does."
 MEASURED = "Measured: recorded from a board's ports."

@@ -2,18 +2,21 @@
 """An acceptance walk tracked again from its recording, with the taps in between.
 
 In: a recording. Out: `Walked`: estimates, taps and pings with their times. Owns nothing. Live and replayed pages are made of this alone.
+Errors at the tapped points are those of ISO/IEC 18305, and against the radius that was stated there.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from echostep.errors import EchostepError
 from echostep.localization import Estimate
 from echostep.plan import Plan
 from echostep.ports.chunks import LATEST_NS, POINT
@@ -21,6 +24,9 @@ from echostep.recording import Recording, open_recording
 from echostep.tracker import Tracker
 from echostep_app.ports.tap import Tap, parse_tap
 from echostep_app.printing.progress import with_bar
+from echostep_app.scorecard.card import Scored, score
+from echostep_app.scorecard.matching import PATH_S
+from echostep_app.scorecard.track_columns import ScoredPath, track_of
 from echostep_app.session.acceptance.heard import SeenPings
 from echostep_app.session.acceptance.protocol import Protocol, recorded_protocol
 from echostep_app.session.losses import Arrivals, Losses
@@ -110,3 +116,48 @@ def _track(walked: Walked, due: deque[Tap]) -> None:
                 time_next()
     while due:
         time_next()
+
+
+class PointError(NamedTuple):
+    """A point by its name: taps, mean error vector and mean distance (m)."""
+
+    name: str
+    taps: int
+    x_m: float
+    y_m: float
+    mean_m: float
+
+
+def score_taps(walked: Walked, taps: Sequence[TimedTap]) -> Scored:
+    """Compare the estimates with the points at the times of their taps; raises EchostepError when there is nothing to compare."""
+    path, points, plan = walked.recording.path, walked.protocol.points, walked.plan
+    if not taps or not walked.estimates:
+        what = "no position" if taps else "no tap"
+        raise EchostepError(f"{path}: {what} in it, so no error: echostep info {path} shows what was recorded")
+    t_s = np.array([tap.t_s for tap in taps])
+    if len(taps) > 1 and float(np.median(np.diff(t_s))) <= PATH_S:
+        raise EchostepError(
+            f"{path}: most taps came within {PATH_S:g} s of the one before: no walk from point to point"
+        )
+    at = [points[tap.point] for tap in taps]
+    floors = len(plan.levels) > 1
+    truth = ScoredPath(
+        Path("points"), t_s, np.array([(p.x_m, p.y_m) for p in at]), np.zeros(len(taps), bool), {},
+        height_m=np.array([plan.levels[p.level].height_m for p in at]) if floors else None,
+        level=np.array([float(p.level) for p in at]) if floors else None,
+    )  # fmt: skip
+    return score(track_of(walked.estimates, str(path)), truth)
+
+
+def by_point(walked: Walked, scored: Scored) -> list[PointError]:
+    """The errors at each point that was tapped, in the order of the points."""
+    at = scored.matched
+    rows = []
+    for point in walked.protocol.points:
+        here = (at.true_xy_m == (point.x_m, point.y_m)).all(axis=1)
+        if at.true_level is not None:
+            here &= at.true_level == point.level
+        if here.any():
+            x_m, y_m = (at.xy_m - at.true_xy_m)[here].mean(axis=0).tolist()
+            rows.append(PointError(point.name, int(here.sum()), x_m, y_m, float(at.error_m[here].mean())))
+    return rows

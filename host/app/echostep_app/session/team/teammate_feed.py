@@ -12,17 +12,49 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from typing import Protocol
 
 from echostep.aiding import MOST_TEAMMATES
 from echostep.plan import Plan
+from echostep.ports.people.meeting import MeetingMessage, Status
+from echostep.ports.people.payloads import MOST_LEVELS, Spread
 from echostep.ports.people.team_beacons import BEACONS, SHARE_S, SharedBeacon, TeamBeacons, parse_team_beacons
 from echostep_app.page.shared import SharedDrawing
-from echostep_app.ports.reported_meeting import meeting_with
 from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.team.endpoint import Outlet
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.shared_drawings import drawing_topic
 from echostep_app.team.roster import Member, MemberState, Roster
+
+KNOWN: dict[str, Status] = {"tracking": "tracking", "uncertain": "uncertain"}  # any other state carries no position
+
+
+class ReportedPosition(Spread, Protocol):
+    """A position as teammates report it."""
+
+    @property
+    def x_m(self) -> float: ...
+    @property
+    def y_m(self) -> float: ...
+    @property
+    def floor(self) -> int: ...
+    @property
+    def floor_probability(self) -> float: ...
+    @property
+    def age_s(self) -> float: ...
+
+
+def meeting_with(
+    name: str, status: str, p: ReportedPosition, measured: tuple[float, float] | None = None
+) -> MeetingMessage | None:
+    """A meeting with a teammate, from its report; None on a floor that no plan has. `measured`: a radio range and its standard deviation (m)."""
+    if not 0 <= p.floor < MOST_LEVELS:
+        return None
+    range_m, range_sd_m = (None, 0.0) if measured is None else measured
+    return MeetingMessage(
+        name, KNOWN.get(status, "lost"), p.x_m, p.y_m, p.floor, p.xx_m2, p.xy_m2, p.yy_m2, p.age_s, p.floor_probability, range_m, range_sd_m,
+    )  # fmt: skip
+
 
 LISTED_S = 60.0  # a teammate without a report for longer is not listed; assumed
 

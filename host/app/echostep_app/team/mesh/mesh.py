@@ -6,6 +6,7 @@ package `meshtastic` is an optional part and GPL-3.0: it is loaded when a mesh:/
 
 A wearer sends at most every `interval_s` (mesh_airtime.py), each time the newest report, and a new alarm at once. Packets are not passed on by other
 nodes (hop limit 0): that would multiply the airtime. Meshtastic's own position message goes out too, less often, for the maps of its applications.
+How often each of several wearers may send follows from the airtime of LoRa packets [Meshtastic, radio settings: modem presets].
 """
 
 from __future__ import annotations
@@ -16,16 +17,54 @@ import random
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from typing import Any, NamedTuple
 
 from echostep.errors import EchostepError
 from echostep.plan import Plan
 from echostep_app.ports.port_faults import PORT_FAULTS
 from echostep_app.team.endpoint import Endpoint
-from echostep_app.team.mesh.airtime import INTERVAL_S, PRESETS, SLOWEST, Modem, interval_s
 from echostep_app.team.mesh.mesh_report import MOST_NAMES, Unpacker, pack
 from echostep_app.team.messages.report import Report, ReportedPlace, encode
 from echostep_app.team.outbox import Delivery
+
+INTERVAL_S = 10.0  # between two positions of a wearer where the airtime allows it
+MOST_USED = 0.25  # share of the channel's time that all wearers together take [Meshtastic, polite channel utilization]
+PREAMBLE = 16 + 4.25  # symbols of Meshtastic's preamble and of the synchronisation [AN1200.13]
+OVERHEAD = 16 + 8  # bytes beside the payload: Meshtastic's packet header, and the fields of its Data message
+SLOW_SYMBOL_S = 0.016  # longer symbols are sent with the low data rate optimisation [AN1200.13]
+
+
+class Modem(NamedTuple):
+    """Spreading factor, bandwidth in Hz, and the denominator of the coding rate 4/5 to 4/8."""
+
+    spreading: int
+    bandwidth_hz: float
+    coding: int
+
+
+PRESETS = {
+    "SHORT_TURBO": Modem(7, 500e3, 5), "SHORT_FAST": Modem(7, 250e3, 5), "SHORT_SLOW": Modem(8, 250e3, 5),
+    "MEDIUM_FAST": Modem(9, 250e3, 5), "MEDIUM_SLOW": Modem(10, 250e3, 5), "LONG_TURBO": Modem(11, 500e3, 8),
+    "LONG_FAST": Modem(11, 250e3, 5), "LONG_MODERATE": Modem(11, 125e3, 8), "LONG_SLOW": Modem(12, 125e3, 8),
+    "VERY_LONG_SLOW": Modem(12, 62.5e3, 8),
+}  # fmt: skip
+
+SLOWEST = PRESETS["LONG_SLOW"]  # of those in use: assumed for a preset that is not known
+
+
+def airtime_s(modem: Modem, payload: int) -> float:
+    """Seconds on air of a packet with `payload` bytes of payload, explicit header and checksum [Semtech, AN1200.13, 4]."""
+    symbol_s = 2**modem.spreading / modem.bandwidth_hz
+    slow = 2 if symbol_s > SLOW_SYMBOL_S else 0
+    bits = 8 * (payload + OVERHEAD) - 4 * modem.spreading + 28 + 16
+    blocks = max(math.ceil(bits / (4 * (modem.spreading - slow))), 0)
+    return (PREAMBLE + 8 + blocks * modem.coding) * symbol_s
+
+
+def interval_s(modem: Modem, payload: int, wearers: int) -> float:
+    """Time between two positions of each wearer, so that all of them take at most MOST_USED of the channel."""
+    return max(INTERVAL_S, wearers * airtime_s(modem, payload) / MOST_USED)
+
 
 PRIVATE_APP = 256  # port of Meshtastic for applications of one's own
 POSITION_EVERY = 6  # of our packets goes out as a position of Meshtastic's too

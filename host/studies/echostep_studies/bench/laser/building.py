@@ -2,6 +2,10 @@
 """A log as a building to be tracked in: two plans from its even scans, pings from its odd ones, and walks along its path.
 
 In: a log's file and a seed. Out: `LogBuilding`, `LogWalk`. Owns nothing.
+Beams that ended in or passed each cell are counted [the counting model of Haehnel 2003]: a cell is occupied, and no passer-by, where at least
+STANDING of the beams that reached it ended in it.
+The losses of pings are those of the simulated SRF02 (`acoustics`); scans end at 90 degrees, so the rear half of each cone is missing: the rangers
+look AHEAD_RAD ahead of abeam; the filter's settings state this.
 """
 
 from __future__ import annotations
@@ -14,14 +18,90 @@ from pathlib import Path
 import numpy as np
 
 from echostep.arrays import Floats, Ints
+from echostep.errors import EchostepError
+from echostep.jit import kernel
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Plan, Pose
+from echostep_app.simulation.world.acoustics import SRF02, Acoustics, wall_db
+from echostep_app.simulation.world.echoes import ranger_bias_m
 from echostep_studies.bench.laser.carmen_log import CarmenLog, read_log
-from echostep_studies.bench.laser.occupancy import standing_places
 from echostep_studies.bench.laser.odometry import Odometry, odometry_of
-from echostep_studies.bench.laser.scan_pings import AHEAD_RAD, hear
 from echostep_studies.bench.laser.wall_lines import straight_pieces, wall_segments
 from echostep_studies.bench.sites import plan_of
+
+HALF_CONE_RAD = math.radians(27.5)  # half of the 55 degree cone [Robot Electronics, sonar FAQ]
+AHEAD_RAD = 0.5 * HALF_CONE_RAD  # middle of the half before abeam
+
+
+def hear(log: CarmenLog, scans: Ints, rng: np.random.Generator, acoustics: Acoustics = SRF02) -> Floats:
+    """Ranges (k, 2) of the left and the right ranger at these scans, NaN where no echo is received."""
+    bias_m = ranger_bias_m(rng, acoustics)
+    ranges_m = np.full((len(scans), 2), np.nan)
+    for row, scan in enumerate(scans.tolist()):
+        for ranger, side in enumerate((1.0, -1.0)):
+            off_axis = np.abs(side * log.angles_rad - 0.5 * math.pi)
+            inside = off_axis <= HALF_CONE_RAD
+            threshold_db = acoustics.threshold_db + acoustics.threshold_sd_db * rng.standard_normal()
+            nearest = nearest_return(log.range_m[scan, inside], off_axis[inside], threshold_db, acoustics)
+            noisy = nearest + bias_m[ranger] + acoustics.noise_m * rng.standard_normal()
+            ranges_m[row, ranger] = max(noisy, acoustics.minimum_m)
+    return ranges_m
+
+
+def nearest_return(range_m: Floats, off_axis_rad: Floats, threshold_db: float, acoustics: Acoustics) -> float:
+    """The nearest of the returns (n,) that is louder than the threshold; NaN: none."""
+    for k in np.argsort(range_m).tolist():
+        if range_m[k] > acoustics.maximum_m:
+            break
+        if range_m[k] > 0.0 and wall_db(range_m[k], off_axis_rad[k], acoustics) >= threshold_db:
+            return float(range_m[k])
+    return math.nan
+
+
+CELL_M = 0.1
+STANDING = 0.25  # [GMapping's threshold of an occupied cell]
+USED_M = 10.0  # longer beams are left out: half a degree of pose error is 9 cm there
+NO_RETURN = 0.98  # a range above this share of the log's greatest is none
+MOST_CELLS = 40_000_000
+
+
+def standing_places(log: CarmenLog, scans: Ints) -> Floats:
+    """Mean end point (n, 2) of the beams in each cell that stands, from the scans of these numbers."""
+    pose, range_m = log.pose[scans], log.range_m[scans]
+    bearing = pose[:, 2:] + log.angles_rad
+    usable = (range_m > 0.0) & (range_m < min(USED_M, NO_RETURN * float(log.range_m.max())))
+    ends = pose[:, None, :2] + range_m[..., None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
+    begins = np.broadcast_to(pose[:, None, :2], ends.shape)[usable]
+    ends = ends[usable]
+    both = np.vstack([begins, ends]) if len(ends) else np.zeros((1, 2))
+    low = both.min(0) - CELL_M
+    columns, rows = (int(v) for v in np.ceil((both.max(0) + CELL_M - low) / CELL_M))
+    if columns * rows > MOST_CELLS:
+        raise EchostepError(f"{log.name}: scans over {columns * CELL_M:.0f} x {rows * CELL_M:.0f} m: too large a map")
+    hits, passes, sums = np.zeros((rows, columns)), np.zeros((rows, columns)), np.zeros((rows, columns, 2))
+    _count_beams((begins - low) / CELL_M, (ends - low) / CELL_M, hits, passes, sums)
+    stands = hits > STANDING * (hits + passes)
+    return np.asarray(low + CELL_M * sums[stands] / hits[stands, None])
+
+
+@kernel
+def _count_beams(begins: Floats, ends: Floats, hits: Floats, passes: Floats, sums: Floats) -> None:
+    """Add beams (n, 2), in cells, to the counts; a beam passes each cell before its last once. `sums`: of the end points in each cell."""
+    for k in range(len(ends)):
+        dx, dy = ends[k, 0] - begins[k, 0], ends[k, 1] - begins[k, 1]
+        last_row, last_column = int(ends[k, 1]), int(ends[k, 0])
+        steps = 2 * int(math.hypot(dx, dy)) + 1
+        row, column = -1, -1
+        for i in range(steps):
+            s = i / steps
+            r, c = int(begins[k, 1] + s * dy), int(begins[k, 0] + s * dx)
+            if (r != row or c != column) and (r != last_row or c != last_column):
+                passes[r, c] += 1.0
+            row, column = r, c
+        hits[last_row, last_column] += 1.0
+        sums[last_row, last_column, 0] += ends[k, 0]
+        sums[last_row, last_column, 1] += ends[k, 1]
+
 
 WALL_M = 1.5  # shortest straight piece that an architect's plan shows
 # Time is made up, for the logs' own is damaged in some: a slow walk, and turns on the spot.
