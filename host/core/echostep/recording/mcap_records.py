@@ -5,6 +5,8 @@ In: bytes of records, possibly damaged or hostile. Out: records as the MCAP libr
 
     record   opcode u8 | length u64 | body                                     HEAD_SIZE = 9 bytes before the body
     message  channel u16 | sequence u32 | log time u64 | publish time u64 | data      opcode MESSAGE, MESSAGE_SIZE = 22 bytes before the data
+    chunk    times 2 u64 | size u64 | checksum u32 | length of the compression's name u32, name | length u64 | records      opcode CHUNK,
+             CHUNK_HEAD = 49 bytes before the records where they are not compressed
 """
 
 from __future__ import annotations
@@ -29,6 +31,9 @@ MCAP_MAGIC = b"\x89MCAP0\r\n"
 HEAD_SIZE = 9
 MESSAGE = 0x05  # opcode
 MESSAGE_SIZE = 22
+CHUNK = 0x06  # opcode
+CHUNK_HEAD = HEAD_SIZE + 40  # bytes before the records of a chunk that is not compressed
+PRIVATE = 0x80  # opcodes from here on are not the specification's, and are skipped
 SEQUENCE_OFFSET = 2  # in the body of a message
 LOG_TIME_OFFSET = 6  # in the body of a message
 CHANNEL_IDS = 1 << 16  # a channel number has 16 bits
@@ -59,11 +64,8 @@ def is_misnamed(channel: Channel) -> bool:
     return (channel.message_encoding == RAW_ENCODING) != channel.topic.endswith("/bytes")
 
 
-def decompress_chunk(body: bytes) -> tuple[bytes, bool] | None:
-    """The records in a chunk record, and whether their checksum is right; None when it is larger than `RECORD_LIMIT` or cannot be opened.
-
-    Compressed records with a wrong checksum are not given; of others a flipped bit costs one.
-    """
+def decompress_chunk(body: bytes) -> bytes | None:
+    """The records in a compressed chunk; None when it is larger than `RECORD_LIMIT`, cannot be opened, or its checksum is wrong."""
     chunk = parse_record(ChunkRecord, body)
     if chunk is None or chunk.uncompressed_size > RECORD_LIMIT:
         return None
@@ -73,8 +75,7 @@ def decompress_chunk(body: bytes) -> tuple[bytes, bool] | None:
         return None
     if records is None or len(records) != chunk.uncompressed_size:
         return None
-    is_as_written = chunk.uncompressed_crc in (0, zlib.crc32(records))
-    return (records, is_as_written) if is_as_written or not chunk.compression else None
+    return records if chunk.uncompressed_crc in (0, zlib.crc32(records)) else None
 
 
 def _decompress(compression: str, compressed: bytes, size: int) -> bytes | None:
@@ -84,7 +85,7 @@ def _decompress(compression: str, compressed: bytes, size: int) -> bytes | None:
             return stream.read(size + 1)
     if compression == "lz4":
         return bytes(lz4.frame.LZ4FrameDecompressor().decompress(compressed, max_length=size + 1))
-    return compressed if not compression else None
+    return None
 
 
 @part
