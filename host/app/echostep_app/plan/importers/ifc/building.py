@@ -23,6 +23,7 @@ from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, room
 from echostep_app.plan.importers.ifc.bodies import Shapes, SolidBody
 from echostep_app.plan.importers.ifc.doors import placed_door
+from echostep_app.plan.importers.ifc.map_conversion import map_georeference
 from echostep_app.plan.importers.ifc.model import open_model, storeys_of
 from echostep_app.plan.importers.report import ImportReport
 
@@ -57,7 +58,7 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
         )
     projects = model.by_type("IfcProject")
     name = str((projects[0].LongName or projects[0].Name) if projects else "") or path.stem
-    return plan_of(name, drawn_levels, report, _moved(_georeference(model, report), model, shapes, report))
+    return plan_of(name, drawn_levels, report, _place_on_earth(model, shapes, report))
 
 
 def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: ImportReport) -> None:
@@ -123,12 +124,8 @@ def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorK
     return "" if passed else NO_STOREY
 
 
-def _georeference(model: Any, report: ImportReport) -> Georeference | None:
+def _georeference(model: Any) -> Georeference | None:
     """Longitude, latitude and true north of the model's site; None where the model does not state them."""
-    if model.schema != "IFC2X3" and (systems := model.by_type("IfcProjectedCRS")):
-        report.doubt(
-            f"its map conversion ({str(systems[0].Name)[:40]}) is not read, only the site's latitude: echostep plan edit takes two known points"
-        )
     sites = [site for site in model.by_type("IfcSite") if site.RefLatitude and site.RefLongitude]
     if not sites:
         return None
@@ -144,15 +141,17 @@ def _georeference(model: Any, report: ImportReport) -> Georeference | None:
     return Georeference(lon, lat, math.pi / 2 - math.atan2(y, x))
 
 
-def _moved(georeference: Georeference | None, model: Any, shapes: Shapes, report: ImportReport) -> Georeference | None:
-    """The georeference of the plan's origin, where that is not the model's own: the site's longitude and latitude are those of its placement."""
+def _place_on_earth(model: Any, shapes: Shapes, report: ImportReport) -> Georeference | None:
+    """The georeference of the plan's origin by the map conversion, else by the site: its longitude and latitude are those of its placement."""
     x, y = shapes.origin_m
-    if (x, y) == (0.0, 0.0):
-        return georeference
-    report.doubt(IN_GRID.format("the model", x, y))
-    if georeference is None:
-        return None
     scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
+    if (x, y) != (0.0, 0.0):
+        report.doubt(IN_GRID.format("the model", x, y))
+    georeference = _georeference(model)
+    if by_map := map_georeference(model, shapes.origin_m, scale_m, report):
+        return by_map
+    if georeference is None or (x, y) == (0.0, 0.0):
+        return georeference
     placement = model.by_type("IfcSite")[0].ObjectPlacement
     matrix = import_module("ifcopenshell.util.placement").get_local_placement(placement)
     off_m = np.array([[x, y]]) - np.asarray(matrix)[:2, 3] * scale_m
