@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
+from shapely.geometry import LineString, Point
 
 from echostep.errors import EchostepError
 from echostep.plan import ConnectorKind, Door, Georeference, Plan
@@ -28,6 +30,7 @@ from echostep_app.plan.importers.ifc.model import open_model, storeys_of
 from echostep_app.plan.importers.report import ImportReport
 
 NO_STOREY = "at the height of no storey"
+AT_FACE_M, THICKEST_M = 0.1, 1.0  # of a door from the face of its wall; of a wall; assumed
 CUT_M = 1.0  # height of the cut above the floor: about the rangers' height
 WALLS = ("IfcWall", "IfcColumn", "IfcCurtainWall", "IfcPlate", "IfcMember")
 CONNECTOR_KINDS: dict[str, ConnectorKind] = {
@@ -64,6 +67,7 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
 def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: ImportReport) -> None:
     """Add each door to the levels that it is open to at the height of the cut."""
     scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
+    solid: dict[int, list[LineString]] = {}  # doors without an opening, by id of the level
     for element in model.by_type("IfcDoor"):
         door = placed_door(element, shapes, scale_m)
         if door is None:
@@ -75,6 +79,22 @@ def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: I
             report.leave_out(f"{element.is_a()} {NO_STOREY}")
         for drawn in levels:
             drawn.doors.append(Door(door.line, name=str(element.Name or "")[:80]))
+            if not door.fills:
+                solid.setdefault(id(drawn), []).append(LineString([door.line[:2], door.line[2:]]))
+    for drawn in drawn_levels:
+        _open(drawn, solid.get(id(drawn), []))
+
+
+def _open(drawn: DrawnLevel, doors: list[LineString]) -> None:
+    """Cut the walls in which doors stand without an opening: a door's two ends and its middle are in the wall, or at its face."""
+    tree = shapely.STRtree(drawn.walls)
+    for door in doors:
+        stands = [
+            set(tree.query(Point(at), predicate="dwithin", distance=AT_FACE_M))
+            for at in (*door.coords, door.centroid.coords[0])
+        ]
+        for k in set.intersection(*stands):
+            drawn.walls[k] = drawn.walls[k].difference(door.buffer(THICKEST_M, cap_style="flat"))
 
 
 def _tell(model: Any, report: ImportReport) -> None:

@@ -190,10 +190,11 @@ def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
         level: merge_collinear(pieces_of([*drawn.walls, *drawn.windows]), OFF_M)
         for level, drawn in site.drawn_levels.items()
     }
-    lost = []
+    lost, odd = [], []
     for node, tags in elements.nodes():
         if not _is_door(tags):
             continue
+        odd += [f"node {node}: width={tags['width'][:20]}"] if "width" in tags and not _metres(tags, 0.0) else []
         own = levels_of(tags, f"node {node}") or sorted(site.levels_at.get(elements.through(node), site.order))
         gaps = {
             level: _gap(walls[level], elements.at_m[node], _metres(tags, DOOR_M)) for level in own if level in walls
@@ -203,6 +204,10 @@ def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
             doors = site.drawn_levels[level].doors
             if gap is not None and all(gap != door.line for door in doors):
                 doors.append(Door(gap, _state(tags), (tags.get("name") or tags.get("ref") or "")[:80]))
+    if odd:
+        report.doubt(
+            f"{len(odd)} doors were taken as {DOOR_M:g} m wide ({', '.join(odd[:3])}): write it in metres, as width=0.9, or with its unit"
+        )
     if lost:
         report.leave_out("door on no wall", len(lost))
         report.doubt(
