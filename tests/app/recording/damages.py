@@ -18,7 +18,8 @@ import numpy as np
 from echostep.localization import Estimate, TrackStatus
 from echostep.plan import load_plan
 from echostep.recording import MCAP_MAGIC, open_recording
-from echostep.recording.mcap_records import CHUNK, CHUNK_HEAD, HEAD_SIZE, LOG_TIME_OFFSET, MESSAGE
+from echostep.recording.damage.scan import CHUNK, CHUNK_HEAD
+from echostep.recording.mcap_records import HEAD_SIZE, LOG_TIME_OFFSET, MESSAGE
 from echostep_app.recording.recorder import Recorder
 from echostep_app.session.losses import skipped
 from echostep_app.session.options import TrackingOptions

@@ -16,7 +16,8 @@ import struct
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, Schema
 
-from echostep.recording.mcap_records import CHUNK_HEAD, HEAD_SIZE, MESSAGE, MESSAGE_SIZE, PRIVATE
+from echostep.recording.damage.scan import CHUNK_HEAD, PRIVATE
+from echostep.recording.mcap_records import HEAD_SIZE, MESSAGE, MESSAGE_SIZE
 from echostep_app.recording.background_writer import BackgroundWriter
 
 CHUNK_BYTES = 1 << 18  # of a closed chunk: some seconds of a walk; assumed

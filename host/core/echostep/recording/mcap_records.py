@@ -5,8 +5,7 @@ In: bytes of records, possibly damaged or hostile. Out: records as the MCAP libr
 
     record   opcode u8 | length u64 | body                                     HEAD_SIZE = 9 bytes before the body
     message  channel u16 | sequence u32 | log time u64 | publish time u64 | data      opcode MESSAGE, MESSAGE_SIZE = 22 bytes before the data
-    chunk    times 2 u64 | size u64 | checksum u32 | length of the compression's name u32, name | length u64 | records      opcode CHUNK,
-             CHUNK_HEAD = 49 bytes before the records where they are not compressed
+    chunk    times 2 u64 | size u64 | checksum u32 | compression u32, name | length u64 | records
 """
 
 from __future__ import annotations
@@ -31,9 +30,6 @@ MCAP_MAGIC = b"\x89MCAP0\r\n"
 HEAD_SIZE = 9
 MESSAGE = 0x05  # opcode
 MESSAGE_SIZE = 22
-CHUNK = 0x06  # opcode
-CHUNK_HEAD = HEAD_SIZE + 40  # bytes before the records of a chunk that is not compressed
-PRIVATE = 0x80  # opcodes from here on are not the specification's, and are skipped
 SEQUENCE_OFFSET = 2  # in the body of a message
 LOG_TIME_OFFSET = 6  # in the body of a message
 CHANNEL_IDS = 1 << 16  # a channel number has 16 bits
@@ -69,23 +65,17 @@ def decompress_chunk(body: bytes) -> bytes | None:
     chunk = parse_record(ChunkRecord, body)
     if chunk is None or chunk.uncompressed_size > RECORD_LIMIT:
         return None
+    most, records = chunk.uncompressed_size + 1, b""  # one byte too many shows that the stated size is wrong
     try:
-        records = _decompress(chunk.compression, chunk.data, chunk.uncompressed_size)
+        if chunk.compression == "zstd":
+            with zstandard.ZstdDecompressor(max_window_size=ZSTD_WINDOW).stream_reader(chunk.data) as stream:
+                records = stream.read(most)
+        elif chunk.compression == "lz4":
+            records = bytes(lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=most))
     except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError):  # RuntimeError: lz4
         return None
-    if records is None or len(records) != chunk.uncompressed_size:
-        return None
-    return records if chunk.uncompressed_crc in (0, zlib.crc32(records)) else None
-
-
-def _decompress(compression: str, compressed: bytes, size: int) -> bytes | None:
-    """At most `size` + 1 bytes: one byte too many shows that the stated size is wrong. None for an unknown compression."""
-    if compression == "zstd":
-        with zstandard.ZstdDecompressor(max_window_size=ZSTD_WINDOW).stream_reader(compressed) as stream:
-            return stream.read(size + 1)
-    if compression == "lz4":
-        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(compressed, max_length=size + 1))
-    return None
+    whole = len(records) == chunk.uncompressed_size and chunk.uncompressed_crc in (0, zlib.crc32(records))
+    return records if whole else None
 
 
 @part

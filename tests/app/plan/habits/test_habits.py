@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -278,6 +279,8 @@ RASTERS = [
         picture(other.deep), picture(other.deep, "a.tif"), picture(lambda: Image.fromarray(255 - other.pixels())),
         picture(lambda: Image.fromarray(other.pixels()).convert("CMYK"), "a.tif"), right=ONE, scale_m=0.05,
     ),
+    *(Cell("picture", "turned", picture(partial(other.askew, angle)), Move(turn=math.radians(angle)), right=ONE, hints={"scale_m": 0.05})
+      for angle in (10, 30, -17, 60, 75)),
     *cells("picture", "units", picture(lambda: Image.fromarray(other.pixels())), asks="--scale"),
 ]  # fmt: skip
 
@@ -307,6 +310,9 @@ DRAWN = [
     *cells("dxf", "own layers", *(drawn(layers=pair) for pair in (("AR_Innenwände", "AR_Türen"), ("墙体", "门窗"))), right=THICK),
     *cells("dxf", "copied storeys", dxf.files, asks="names the storeys are EG, 1. OG, 2. OG from the lowest", level_names=("1. OG", "2. OG", "EG")),
     *cells("dxf", "own layers", drawn(layers=("0", "0")), asks="--layer walls=0"),
+    *(Cell("dxf", "beside the house", drawn(change=partial(dxf.sheet, parts=parts)), move, r"--window -?[0-9.,-]+", THICK)
+      for parts in ("frame", "frame title", "title", "arrow", "frame title arrow") for move in (STAY, FAR[0])),
+    *cells("dxf", "beside the house", drawn(change=dxf.titles), asks="3 names lie beside the walls"),
     *cells("dxf", "spellings", *(drawn(names=layer) for layer in ("0", "TEXT", "A-ANNO-NOTE")), right=THICK),
 ]  # fmt: skip
 

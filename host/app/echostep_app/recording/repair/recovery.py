@@ -26,10 +26,9 @@ from echostep.recording import MCAP_MAGIC, is_being_written
 from echostep.recording.damage.ending import begins_as_mcap, checksum_matches, read_ending
 from echostep.recording.damage.notes import FileDamage
 from echostep.recording.damage.placing import Placement
-from echostep.recording.damage.scan import begin_in_chunk, chunk_matches, map_file, next_valid_run, record_end
+from echostep.recording.damage.scan import CHUNK, begin_in_chunk, chunk_matches, map_file, next_valid_run, record_end
 from echostep.recording.mcap_records import (
     CHANNEL_IDS,
-    CHUNK,
     DAMAGE_NAME,
     HEAD_SIZE,
     LIBRARY,

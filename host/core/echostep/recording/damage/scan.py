@@ -17,19 +17,11 @@ import numpy as np
 from echostep.arrays import Bools, Octets
 from echostep.errors import EchostepError
 from echostep.jit import kernel, part
-from echostep.recording.mcap_records import (
-    CHUNK,
-    CHUNK_HEAD,
-    HEAD_SIZE,
-    MCAP_MAGIC,
-    MESSAGE,
-    MESSAGE_SIZE,
-    PRIVATE,
-    RECORD_LIMIT,
-    read_uint,
-)
+from echostep.recording.mcap_records import HEAD_SIZE, MCAP_MAGIC, MESSAGE, MESSAGE_SIZE, RECORD_LIMIT, read_uint
 
-LAST_OPCODE = 0x0F  # of the specification's [MCAP format specification]
+# [MCAP format specification]
+CHUNK, CHUNK_HEAD = 0x06, HEAD_SIZE + 40  # opcode; bytes before the records of a chunk that is not compressed
+LAST_OPCODE, PRIVATE = 0x0F, 0x80  # of the specification; from here on they are other programs' own, and skipped
 # Assumed.
 VALID_RUN = 4  # this many consecutive records are not valid by chance
 OTHER_LIMIT = 1 << 20  # bytes; only messages and chunk records are larger
