@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
+from pyproj import Transformer
 
 from echostep.errors import EchostepError
 from echostep.plan import Plan
@@ -155,6 +156,56 @@ def test_its_place_on_earth(house: Plan) -> None:
     assert house.georeference is not None
     assert (house.georeference.longitude_deg, house.georeference.latitude_deg) == pytest.approx((8.85, 53.11))
     assert house.georeference.rotation_rad == 0.0
+
+
+PLACE, TURN = (489_000.0, 5_884_000.0), math.radians(30.0)  # in UTM zone 32: a degree of longitude west of its middle
+
+
+def mapped(
+    schema: Literal["IFC2X3", "IFC4"], name: str, unit_m: float = 1.0, at: tuple[float, float] = (0.0, 0.0)
+) -> Model:
+    """A wall at a place of the model, whose origin is `PLACE` on the map."""
+    from ifcopenshell.api import georeference, pset
+
+    model = Model(schema)
+    model.contain(model.storey("Ground", 0.0), model.box("IfcWall", (*at, 0), (6, 0.3, 2.8)))
+    stated = {
+        "Eastings": PLACE[0] / unit_m, "Northings": PLACE[1] / unit_m, "OrthogonalHeight": 0.0,
+        "XAxisAbscissa": math.cos(TURN), "XAxisOrdinate": math.sin(TURN), "Scale": 0.001 / unit_m,
+    }  # fmt: skip
+    if schema == "IFC4":
+        georeference.add_georeferencing(model.file)
+        georeference.edit_georeferencing(model.file, coordinate_operation=stated, projected_crs={"Name": name})
+        return model
+    for title, values in (("ePSet_MapConversion", stated), ("ePSet_ProjectedCRS", {"Name": name})):
+        pset.edit_pset(model.file, pset=pset.add_pset(model.file, product=model.site, name=title), properties=values)
+    return model
+
+
+@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
+@pytest.mark.parametrize("unit_m", [1.0, 0.001])
+@pytest.mark.parametrize("at", [(0.0, 0.0), (30_000.0, 0.0)])
+def test_its_place_on_a_map(
+    tmp_path: Path, schema: Literal["IFC2X3", "IFC4"], unit_m: float, at: tuple[float, float]
+) -> None:
+    """Eastings in metres or in the model's millimetres, without a stated unit; grid north is not north."""
+    plan, report = imported(mapped(schema, "EPSG:25832", unit_m, at), tmp_path)
+    assert plan.georeference is not None
+    c, s = math.cos(TURN), math.sin(TURN)
+    lon, lat = Transformer.from_crs("EPSG:25832", "EPSG:4326", always_xy=True).transform(
+        PLACE[0] + c * at[0], PLACE[1] + s * at[0]
+    )
+    assert (plan.georeference.longitude_deg, plan.georeference.latitude_deg) == pytest.approx((lon, lat), abs=1e-5)
+    convergence = math.radians((lon - 9.0) * math.sin(math.radians(lat)))
+    assert plan.georeference.rotation_rad == pytest.approx(TURN - convergence, abs=1e-4)
+    assert not any("map conversion" in doubt for doubt in report.doubts)
+
+
+@pytest.mark.parametrize("name", ["our own grid", "EPSG:27700", "EPSG:4326", ""])
+def test_a_map_that_cannot_be_is_asked_about(tmp_path: Path, name: str) -> None:
+    plan, report = imported(mapped("IFC4", name), tmp_path)
+    assert plan.georeference is None
+    assert any("its map conversion" in doubt and "two known points" in doubt for doubt in report.doubts)
 
 
 @pytest.mark.parametrize(

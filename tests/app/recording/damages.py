@@ -18,6 +18,7 @@ import numpy as np
 from echostep.localization import Estimate, TrackStatus
 from echostep.plan import load_plan
 from echostep.recording import MCAP_MAGIC, open_recording
+from echostep.recording.damage.scan import CHUNK, CHUNK_HEAD
 from echostep.recording.mcap_records import HEAD_SIZE, LOG_TIME_OFFSET, MESSAGE
 from echostep_app.recording.recorder import Recorder
 from echostep_app.session.losses import skipped
@@ -80,13 +81,13 @@ def falsely_tracking_m(estimates: Sequence[Estimate], expected: Sequence[Estimat
 
 
 def arrival_offsets(content: bytes) -> list[int]:
-    """Offsets of the log times of all messages."""
+    """Offsets of the log times of all messages, also in chunks that are not compressed."""
     offsets, offset = [], len(MCAP_MAGIC)
     while offset + HEAD_SIZE <= len(content):
         opcode, length = struct.unpack_from("<BQ", content, offset)
         if opcode == MESSAGE:
             offsets.append(offset + HEAD_SIZE + LOG_TIME_OFFSET)
-        offset += HEAD_SIZE + length
+        offset += CHUNK_HEAD if opcode == CHUNK else HEAD_SIZE + length
     return offsets
 
 

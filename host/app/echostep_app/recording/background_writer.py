@@ -29,7 +29,7 @@ RESERVE_BYTES = 1 << 28  # of free space: for more than an hour of the ports' by
 
 
 class BackgroundWriter:
-    """A new, append-only file; raises EchostepError when it cannot be created, or exists. `notices` holds messages about the disk."""
+    """A new file, to which bytes are appended; raises EchostepError when it cannot be created, or exists. `notices` holds messages about the disk."""
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
@@ -42,6 +42,7 @@ class BackgroundWriter:
         self._lock = threading.Condition()
         self._pending = bytearray()  # not yet seen by the thread
         self._written = 0  # bytes passed to the operating system
+        self._changes: list[tuple[int, bytes]] = []  # offset and bytes that come in the place of others
         self._length = 0  # bytes accepted by `write`
         self._closing = False
         self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
@@ -50,7 +51,7 @@ class BackgroundWriter:
     @property
     def unwritten_bytes(self) -> int:
         """Bytes that are not yet passed to the operating system."""
-        return self._length - self._written
+        return self._length - self._written + sum(len(data) for _, data in self._changes)
 
     def write(self, data: bytes) -> int:
         """Append to the buffer; never waits for the disk."""
@@ -59,8 +60,13 @@ class BackgroundWriter:
             self._length += len(data)
         return len(data)
 
+    def overwrite(self, offset: int, data: bytes) -> None:
+        """Replace bytes that were appended before; the file has them after all that was appended by now."""
+        with self._lock:
+            self._changes.append((offset, data))
+
     def tell(self) -> int:
-        """Bytes accepted so far: the position in the file, which the MCAP writer requires."""
+        """Bytes accepted so far: the position in the file."""
         return self._length
 
     def wait_until_written(self) -> None:
@@ -98,12 +104,15 @@ class BackgroundWriter:
                 closing = self._closing
                 unwritten += bytes(self._pending)
                 self._pending.clear()
+                changes = list(self._changes)
             count = self._write_to_file(unwritten)
+            done = self._change_file(changes) if count == len(unwritten) else 0
             with self._lock:
                 unwritten = unwritten[count:]
                 self._written += count
+                del self._changes[:done]
                 self._lock.notify_all()
-            dirty = dirty or count > 0
+            dirty = dirty or count > 0 or done > 0
             if dirty and (closing or time.monotonic() - synced_s >= SYNC_S):
                 self._sync()
                 self._check_space()
@@ -127,6 +136,17 @@ class BackgroundWriter:
             self.failed = False
             self.notices.append(f"{self.path}: the disk takes bytes again; the recording goes on")
         return count
+
+    def _change_file(self, changes: list[tuple[int, bytes]]) -> int:
+        """Write bytes in the place of others; returns how many changes were made."""
+        done = 0
+        for offset, data in changes:
+            os.lseek(self._file, offset, os.SEEK_SET)
+            if self._write_to_file(data) < len(data):
+                break
+            done += 1
+        os.lseek(self._file, 0, os.SEEK_END)
+        return done
 
     def _check_space(self) -> None:
         """Compare the free space with `RESERVE_BYTES`; a notice when it has become less."""

@@ -2,8 +2,8 @@
 """The recorder: every chunk is written to an MCAP file before it is used.
 
 In: chunks in order of arrival, and messages derived from them. Out: a file, which `reading.py` reads. Owns the open file.
-The file is MCAP without chunk records, written by a thread (`background_writer`). After a crash it is readable up to its last whole record, and
-a slow disk does not delay the tracker.
+The file is MCAP in chunks, whose records do not wait for their chunk's end (`open_chunk`), written by a thread (`background_writer`). After a crash
+it is readable up to its last whole record, and a slow disk does not delay the tracker.
 """
 
 from __future__ import annotations
@@ -16,18 +16,19 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
 
+from mcap.records import Channel, Schema
 from mcap.writer import CompressionType, IndexType, Writer
 
 from echostep.errors import IncompleteError
 from echostep.ports.chunks import Chunk
 from echostep.recording import log_offset_ns, with_log_time
-from echostep.recording.mcap_records import DAMAGE_NAME, LIBRARY, METADATA_NAME, RAW_ENCODING
+from echostep.recording.mcap_records import DAMAGE_NAME, LIBRARY, METADATA_NAME, RAW_ENCODING, RECORD_LIMIT
 from echostep_app.recording.background_writer import BackgroundWriter
+from echostep_app.recording.open_chunk import CHUNK_BYTES, OpenChunk
 
 # All assumed.
 WAIT_NS = 500_000_000  # arrival time between two waits of `wait_for_disk`
 RAW_LIMIT = 1 << 26  # bytes of chunks that may wait for a full disk: an hour and a half
-CHUNK_BYTES = 1 << 16  # of a chunk of an indexed file
 DERIVED_LIMIT = 1 << 20  # unwritten bytes from which derived messages are skipped: they can be computed again
 
 
@@ -49,17 +50,13 @@ class DerivedMessage:
     body: Mapping[str, Any]
 
 
-def begin_file(file: IO[bytes], *, indexed: bool = False) -> Writer:
-    """A writer of records without chunks: a flipped bit, or the end of a run without notice, costs one message.
-
-    `indexed`: in chunks that are not compressed, for other programs that read by an index of chunks alone.
-    """
+def begin_file(file: IO[bytes] | OpenChunk, chunk_bytes: int = CHUNK_BYTES) -> Writer:
+    """A writer of chunks that are not compressed: a flipped bit costs one message, and other programs read by the index of chunks alone."""
     writer = Writer(
-        file,
+        file,  # type: ignore[arg-type]  # it calls only `write`, `tell` and `flush`
         compression=CompressionType.NONE,
         index_types=IndexType.ALL,
-        use_chunking=indexed,
-        chunk_size=CHUNK_BYTES,
+        chunk_size=chunk_bytes,
         enable_data_crcs=True,
     )
     writer.start(profile="", library=LIBRARY)
@@ -85,7 +82,8 @@ class Recorder:
     def _begin(self, file: BackgroundWriter, metadata: Mapping[str, str]) -> None:
         """Write to this file from now on."""
         self._file = file
-        self._writer = begin_file(file)  # type: ignore[arg-type]  # the writer calls only `write` and `tell`
+        self._chunk = OpenChunk(file)
+        self._writer = begin_file(self._chunk, RECORD_LIMIT)  # chunks are closed by `_add_message`
         fields = with_log_time(metadata)
         self.log_offset_ns = log_offset_ns(fields)  # log time minus arrival time
         self._writer.add_metadata(METADATA_NAME, fields)
@@ -144,20 +142,35 @@ class Recorder:
     def write_damage(self, lines: Iterable[str]) -> None:
         """Record the damage of the recording from which the chunks come; nothing when it was whole."""
         if noted := numbered(lines):
-            self._writer.add_metadata(DAMAGE_NAME, noted)
+            self._add_metadata(DAMAGE_NAME, noted)
+
+    def _add_metadata(self, name: str, fields: Mapping[str, str]) -> None:
+        self._close_chunk()
+        self._writer.add_metadata(name, dict(fields))
 
     def _add_message(self, channel: int, t_ns: int, data: bytes) -> None:
+        self._chunk.lay_message(channel, self._sequence, t_ns, data)
         self._writer.add_message(channel, t_ns, data, t_ns, self._sequence)
         self._sequence += 1
+        if self._chunk.is_full:
+            self._close_chunk()
+
+    def _close_chunk(self) -> None:
+        self._writer.flush()  # type: ignore[no-untyped-call]
 
     def _register_port(self, port: str) -> int:
-        self._channels[port] = self._writer.register_channel(f"/{port}/bytes", RAW_ENCODING, schema_id=0)
-        return self._channels[port]
+        return self._register(port, f"/{port}/bytes", RAW_ENCODING, 0)
 
     def _register_topic(self, topic: Topic) -> int:
-        schema = self._writer.register_schema(topic.schema_name, "jsonschema", topic.schema.encode())
-        self._channels[topic.name] = self._writer.register_channel(topic.name, "json", schema)
-        return self._channels[topic.name]
+        name, encoding, schema = topic.schema_name, "jsonschema", topic.schema.encode()
+        number = self._writer.register_schema(name, encoding, schema)
+        self._chunk.lay(Schema(data=schema, encoding=encoding, id=number, name=name))
+        return self._register(topic.name, topic.name, "json", number)
+
+    def _register(self, key: str, topic: str, encoding: str, schema: int) -> int:
+        number = self._channels[key] = self._writer.register_channel(topic, encoding, schema)
+        self._chunk.lay(Channel(id=number, topic=topic, message_encoding=encoding, metadata={}, schema_id=schema))
+        return number
 
     def close(self) -> None:
         """Write summary and footer, and close the file."""

@@ -88,7 +88,7 @@ class SplitRecorder(Recorder):
             self._retry_ns = t_ns + RETRY_NS
             self.notices.append(f"{error}; the recording goes on in {self.path.name}")
             return
-        self._writer.add_metadata(PART_NAME, {NEXT: path.name})
+        self._add_metadata(PART_NAME, {NEXT: path.name})
         self._writer.finish()  # type: ignore[no-untyped-call]
         thread = Thread(target=self._file.close, name="recording part", daemon=True)
         thread.start()

@@ -5,6 +5,7 @@ In: bytes of records, possibly damaged or hostile. Out: records as the MCAP libr
 
     record   opcode u8 | length u64 | body                                     HEAD_SIZE = 9 bytes before the body
     message  channel u16 | sequence u32 | log time u64 | publish time u64 | data      opcode MESSAGE, MESSAGE_SIZE = 22 bytes before the data
+    chunk    times 2 u64 | size u64 | checksum u32 | compression u32, name | length u64 | records
 """
 
 from __future__ import annotations
@@ -59,32 +60,22 @@ def is_misnamed(channel: Channel) -> bool:
     return (channel.message_encoding == RAW_ENCODING) != channel.topic.endswith("/bytes")
 
 
-def decompress_chunk(body: bytes) -> tuple[bytes, bool] | None:
-    """The records in a chunk record, and whether their checksum is right; None when it is larger than `RECORD_LIMIT` or cannot be opened.
-
-    Compressed records with a wrong checksum are not given; of others a flipped bit costs one.
-    """
+def decompress_chunk(body: bytes) -> bytes | None:
+    """The records in a compressed chunk; None when it is larger than `RECORD_LIMIT`, cannot be opened, or its checksum is wrong."""
     chunk = parse_record(ChunkRecord, body)
     if chunk is None or chunk.uncompressed_size > RECORD_LIMIT:
         return None
+    most, records = chunk.uncompressed_size + 1, b""  # one byte too many shows that the stated size is wrong
     try:
-        records = _decompress(chunk.compression, chunk.data, chunk.uncompressed_size)
+        if chunk.compression == "zstd":
+            with zstandard.ZstdDecompressor(max_window_size=ZSTD_WINDOW).stream_reader(chunk.data) as stream:
+                records = stream.read(most)
+        elif chunk.compression == "lz4":
+            records = bytes(lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=most))
     except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError):  # RuntimeError: lz4
         return None
-    if records is None or len(records) != chunk.uncompressed_size:
-        return None
-    is_as_written = chunk.uncompressed_crc in (0, zlib.crc32(records))
-    return (records, is_as_written) if is_as_written or not chunk.compression else None
-
-
-def _decompress(compression: str, compressed: bytes, size: int) -> bytes | None:
-    """At most `size` + 1 bytes: one byte too many shows that the stated size is wrong. None for an unknown compression."""
-    if compression == "zstd":
-        with zstandard.ZstdDecompressor(max_window_size=ZSTD_WINDOW).stream_reader(compressed) as stream:
-            return stream.read(size + 1)
-    if compression == "lz4":
-        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(compressed, max_length=size + 1))
-    return compressed if not compression else None
+    whole = len(records) == chunk.uncompressed_size and chunk.uncompressed_crc in (0, zlib.crc32(records))
+    return records if whole else None
 
 
 @part

@@ -25,7 +25,7 @@ from echostep.recording.clock import log_offset_ns
 from echostep.recording.damage.ending import Ending, begins_as_mcap, checksum_matches, read_ending
 from echostep.recording.damage.notes import FileDamage, made_of
 from echostep.recording.damage.placing import Placement
-from echostep.recording.damage.scan import begin_in_chunk, map_file, next_valid_run, record_end
+from echostep.recording.damage.scan import begin_in_chunk, chunk_matches, map_file, next_valid_run, record_end
 from echostep.recording.mcap_records import (
     DAMAGE_NAME,
     HEAD_SIZE,
@@ -181,12 +181,9 @@ class Recording:
             before = record
 
     def _records_in_chunk(self, body: bytes, channels: PortChannels) -> Iterator[MessageRun | tuple[int, bytes]]:
-        opened = decompress_chunk(body)
-        if opened is None:
+        if (records := decompress_chunk(body)) is None:
             self.own_damage.unreadable_chunks += 1
             return
-        records, is_as_written = opened
-        self.own_damage.altered |= not is_as_written
         inside = FileDamage()
         for _, record in self._scan(np.frombuffer(records, np.uint8), 0, channels, inside):
             yield record
@@ -201,13 +198,14 @@ class Recording:
             if run:
                 yield offset, self._on_arrival_clock(run)
             end = record_end(file, offset, channels.known)
-            if end < 0 and offset < len(file) and self.grows:
+            if (inside := begin_in_chunk(file, offset)) >= 0:
+                damage.altered |= not self._intact and end >= 0 and not chunk_matches(file, inside, end)
+                end = inside
+            elif end < 0 and offset < len(file) and self.grows:
                 return
-            if end < 0 and offset < len(file):
-                end = begin_in_chunk(file, offset)
-                if end < 0:
-                    end = next_valid_run(file, offset + 1, channels.known)
-                    damage.skip(offset, end, len(file))
+            elif end < 0 and offset < len(file):
+                end = next_valid_run(file, offset + 1, channels.known)
+                damage.skip(offset, end, len(file))
             elif end >= 0 and file[offset] != MESSAGE:
                 opcode, body = int(file[offset]), file[offset + HEAD_SIZE : end].tobytes()
                 if opcode == Opcode.CHANNEL:

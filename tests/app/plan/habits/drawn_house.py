@@ -92,6 +92,24 @@ def hidden(doc: Any, state: str) -> None:
     doc.modelspace().add_line((2, 0), (2, 8), about)
 
 
+def sheet(doc: Any, parts: str) -> None:
+    """A frame, the title block at its corner, a north arrow: on the layer of the walls."""
+    shapes: dict[str, list[Any]] = {
+        "frame": [[(-8, -12), (34, -12), (34, 17.7), (-8, 17.7), (-8, -12)]],
+        "title": [[(16, -12), (34, -12), (34, -6), (16, -6), (16, -12)], *([(16, y), (34, y)] for y in (-10, -8))],
+        "arrow": [[(20, 4), (21, 7), (22, 4), (21, 4.6), (20, 4)]],
+    }
+    for part in parts.split():
+        for points in shapes[part]:
+            doc.modelspace().add_lwpolyline(points, dxfattribs={"layer": "A-WALL"})
+
+
+def titles(doc: Any) -> None:
+    """Words beside the house, on the layer of the rooms' names."""
+    for k, words in enumerate(("Ground floor", "Scale 1:100", "N")):
+        doc.modelspace().add_text(words, dxfattribs={"layer": "A-AREA-IDEN", "height": 0.3}).set_placement((14, 2 + k))
+
+
 def drawn_through(doc: Any) -> None:
     """The faces of the partition, through its door."""
     for x in (4.9, 5.1):

@@ -16,9 +16,15 @@ from plan.test_plan_importer_ifc import Model
 
 
 def model(
-    move: Move, units: str = "", z: float = 0.0, thick: float = 0.2, schema: Literal["IFC2X3", "IFC4"] = "IFC4"
+    move: Move,
+    units: str = "",
+    z: float = 0.0,
+    thick: float = 0.2,
+    schema: Literal["IFC2X3", "IFC4"] = "IFC4",
+    *,
+    voids: bool = True,
 ) -> Model:
-    """The house in millimetres, or in feet or inches; its lowest floor at height z."""
+    """The house in millimetres, or in feet or inches; its lowest floor at height z. Without `voids` its walls have no openings for doors."""
     made, h = Model(schema), thick / 2
     if units:
         unit.assign_unit(made.file, length={"is_metric": units.endswith("METERS"), "raw": units})
@@ -37,6 +43,9 @@ def model(
         for wall, (a, b, c, d) in [(partition, INNER), *([(south, ENTRANCE)] if k == 0 else [])]:
             x, y = (0.05, 0.0) if a == c else (0.0, 0.05)
             far = 1.0 + 20 * h
+            if not voids:
+                elements.append(put("IfcDoor", (a - x, b - y, c + x, d + y), floor, 2.05))
+                continue
             hole = put("IfcOpeningElement", (a - far * x, b - far * y, c + far * x, d + far * y), floor, 2.1)
             door = put("IfcDoor", (a - x, b - y, c + x, d + y), floor, 2.05)
             made.add(wall, hole)

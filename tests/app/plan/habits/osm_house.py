@@ -92,6 +92,11 @@ def changed(rows: list[Row], **tags: Any) -> list[Row]:
     return rows
 
 
+def tagged(rows: list[Row], **tags: str) -> list[Row]:
+    """The rows, doors with more tags."""
+    return [row | {"tags": row["tags"] | tags} if {"door", "entrance"} & row["tags"].keys() else row for row in rows]
+
+
 def as_json(rows: list[Row], move: Move) -> str:
     return json.dumps({"version": 0.6, "elements": move.ordered(rows)})
 

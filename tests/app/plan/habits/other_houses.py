@@ -125,6 +125,11 @@ def turned(how: int) -> tuple[Image.Image, Image.Exif]:
     return (image if back is None else image.transpose(Image.Transpose(back))), about
 
 
+def askew(degrees: float) -> Image.Image:
+    """The same on a scanner that it does not lie straight on."""
+    return Image.fromarray(pixels()).rotate(degrees, Image.Resampling.BICUBIC, expand=True, fillcolor=254)
+
+
 def ros(folder: Path, text: str = "", image: Any = None, name: str = "map.pgm") -> Path:
     """A map and its yaml, whose usual fields `text` replaces."""
     (Image.fromarray(pixels()) if image is None else image).save(folder / name)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ifcopenshell.api import georeference
 from PIL import Image
 from pyproj import Transformer
 
@@ -82,6 +84,23 @@ def in_system(name: str, write: Callable[..., Any]) -> Any:
     return write(pack, crs={"type": "name", "properties": {"name": name}})
 
 
+def exchanged(feature: Any) -> Any:
+    """Latitude before longitude."""
+
+    def there(value: Any) -> Any:
+        return value[::-1] if isinstance(value[0], float) else [there(one) for one in value]
+
+    feature["geometry"]["coordinates"] = there(feature["geometry"]["coordinates"])
+    return feature
+
+
+def twice(files: Any, by: float = 0.0) -> None:
+    """Each opening once more from its other end, beside the first one."""
+    for one in list(files["opening"]):
+        ends = [[x + by / 67_114.0, y + by / 111_315.0] for x, y in one["geometry"]["coordinates"][::-1]]
+        files["opening"].append(one | {"id": one["id"] + "again", "geometry": one["geometry"] | {"coordinates": ends}})
+
+
 def imdf_of(change: Any, **more: Any) -> Any:
     def each(files: Any) -> None:
         for features in files.values():
@@ -146,6 +165,8 @@ OSM = [
         ))),
         *cells(kind, "level ranges", rows(kind, level={"level": "0,1,2"}), rows(kind, level={"level": "0..2"}), asks="write level=0;1 or level=0-2"),
         *cells(kind, "spellings", rows(kind, sign=-1), rows(kind, entrance="entrance")),
+        *cells(kind, "units", rows(kind, partial(osm.tagged, width="90 cm"))),
+        *cells(kind, "units", *(rows(kind, partial(osm.tagged, width=wide)) for wide in ("90", "900", "wide")), asks="write it in metres"),
     )),
     *(cell for kind in ("osm", "json") for cell in (
         *cells(kind, "hidden", *(rows(kind, across(mark)) for mark in ({"action": "delete"}, {"visible": False}))),
@@ -158,6 +179,7 @@ OSM = [
     *cells("geojson", "bad references", geojson(shifted)),
     *cells("geojson", "datum", *(in_system(name, geojson) for name in ("EPSG:4314", "urn:ogc:def:crs:EPSG::4277", "urn:ogc:def:crs:OGC:1.3:CRS84"))),
     *cells("geojson", "projected", in_system("EPSG:25832", geojson), asks="save it as EPSG:4326"),
+    Cell("geojson", "exchanged", geojson(exchanged), Move(turn=0.3), asks="exchanged"),
 ]  # fmt: skip
 
 
@@ -199,6 +221,8 @@ IMDF = [
     *cells("imdf", "spellings", *map(imdf_of, (by_number, loud))),
     *cells("imdf", "datum", in_system("EPSG:4314", imdf_of)),
     *cells("imdf", "projected", in_system("EPSG:25832", imdf_of), asks="save it as EPSG:4326"),
+    Cell("imdf", "exchanged", imdf_of(exchanged), Move(turn=-0.2), asks="exchanged"),
+    *cells("imdf", "twice", altered(twice), altered(partial(twice, by=0.05))),
     *cells("imdf", "bad references", *(altered(partial(stale, kind="unit", count=n)) for n in (1, 9)), asks="export all files again"),
     *cells("imdf", "bad references", altered(lambda files: files.pop("unit")), asks="export all files again"),
     *cells("imdf", "no level", altered(lambda files: files["opening"][0]["properties"].pop("level_id")), asks="1 of 4 are of levels"),
@@ -255,6 +279,8 @@ RASTERS = [
         picture(other.deep), picture(other.deep, "a.tif"), picture(lambda: Image.fromarray(255 - other.pixels())),
         picture(lambda: Image.fromarray(other.pixels()).convert("CMYK"), "a.tif"), right=ONE, scale_m=0.05,
     ),
+    *(Cell("picture", "turned", picture(partial(other.askew, angle)), Move(turn=math.radians(angle)), right=ONE, hints={"scale_m": 0.05})
+      for angle in (10, 30, -17, 60, 75)),
     *cells("picture", "units", picture(lambda: Image.fromarray(other.pixels())), asks="--scale"),
 ]  # fmt: skip
 
@@ -284,6 +310,9 @@ DRAWN = [
     *cells("dxf", "own layers", *(drawn(layers=pair) for pair in (("AR_Innenwände", "AR_Türen"), ("墙体", "门窗"))), right=THICK),
     *cells("dxf", "copied storeys", dxf.files, asks="names the storeys are EG, 1. OG, 2. OG from the lowest", level_names=("1. OG", "2. OG", "EG")),
     *cells("dxf", "own layers", drawn(layers=("0", "0")), asks="--layer walls=0"),
+    *(Cell("dxf", "beside the house", drawn(change=partial(dxf.sheet, parts=parts)), move, r"--window -?[0-9.,-]+", THICK)
+      for parts in ("frame", "frame title", "title", "arrow", "frame title arrow") for move in (STAY, FAR[0])),
+    *cells("dxf", "beside the house", drawn(change=dxf.titles), asks="3 names lie beside the walls"),
     *cells("dxf", "spellings", *(drawn(names=layer) for layer in ("0", "TEXT", "A-ANNO-NOTE")), right=THICK),
 ]  # fmt: skip
 
@@ -297,9 +326,11 @@ MODELS = [
     *cells(
         "ifc",
         "datum",
-        partial(model.write, change=lambda made: made.file.create_entity("IfcProjectedCRS", "A")),
+        partial(model.write, change=lambda made: georeference.add_georeferencing(made.file)),
         asks="map conversion",
     ),
+    *cells("ifc", "solid walls", partial(model.write, voids=False), right=SOLID),
+    *cells("ifc", "solid walls", partial(model.write, voids=False, thick=0.4), right=Right(0.4)),
     *cells("ifc", "thick walls", partial(model.write, thick=0.6), right=Right(0.6)),
 ]
 

@@ -6,12 +6,14 @@ In: a `Plan`, its `ImportReport`. Out: lines. Owns how many there are of each.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 import shapely
 
+from echostep.arrays import Floats
 from echostep.plan import Door, Level, Plan
 from echostep_app.plan.cropping import extent
 from echostep_app.plan.importers.report import ImportReport
@@ -23,6 +25,7 @@ MOST_NAMES = 6  # kinds and layers in one line
 AT_WALL_M = 0.15  # greatest distance of both ends of a door from a wall: issue 44's bound for a door in a gap
 SIZES_M, DOORS_M = (2.5, 1500.0), (0.5, 3.0)  # plausible sizes of a level, and of half of the doors; assumed
 THROUGH_M = 0.2  # to both sides of a door, one of which must be free: half the thickness of a wall; assumed
+ASKEW = 1e-3  # of walls that are drawn at right angles, at most: a degree; assumed
 CLEAR_M = 0.01  # a wall nearer than this to a door's middle part runs through it
 
 
@@ -37,6 +40,8 @@ def summary(plan: Plan, report: ImportReport) -> list[str]:
         )
     facts = [f"units: {report.units}"] if report.units else []
     facts = [_connectors(plan), *facts] if len(plan.levels) > 1 else facts
+    if (earth := plan.georeference) is not None:
+        facts.append(f"at latitude {earth.latitude_deg:.4f}, longitude {earth.longitude_deg:.4f}")
     lines += ["; ".join(facts)] if facts else []
     if report.layers:
         lines.append("layers: " + "; ".join(f"{kind}: {_some(names)}" for kind, names in report.layers.items()))
@@ -119,7 +124,29 @@ def _implausible(plan: Plan) -> list[str]:
         said.append(
             f"half of the doors are {middle:.2f} m wide or {'less' if middle < 1 else 'more'}: is the scale right?"
         )
-    return said[:3]
+    return [*said[:3], *_exchanged(plan)]
+
+
+def _exchanged(plan: Plan) -> list[str]:
+    """One sentence when the walls are at right angles only where longitude and latitude are exchanged."""
+    if (earth := plan.georeference) is None or not (walls := plan.levels[0].walls).size:
+        return []
+    c, s = math.cos(earth.rotation_rad), math.sin(earth.rotation_rad)
+    east, north = np.array([[c, -s], [s, c]]) @ (walls[:, 2:] - walls[:, :2]).T
+    lon, lat = math.radians(earth.longitude_deg), math.radians(earth.latitude_deg)
+    own, other = _askew(east, north), _askew(north * math.cos(lon), east / math.cos(lat))
+    if own < ASKEW or other > 0.2 * own:
+        return []
+    return [
+        f"its walls are at right angles only with longitude and latitude exchanged: is its latitude {earth.longitude_deg:.4f}?"
+    ]
+
+
+def _askew(east: Floats, north: Floats) -> float:
+    """How far walls are from two directions at a right angle: 0 for a rectangle, 1 for all directions."""
+    return 1.0 - float(
+        abs(np.sum(np.hypot(east, north) * np.exp(4j * np.arctan2(north, east)))) / np.hypot(east, north).sum()
+    )
 
 
 def _without_doors(plan: Plan, remedy: str) -> list[str]:

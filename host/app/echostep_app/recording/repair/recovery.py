@@ -26,7 +26,7 @@ from echostep.recording import MCAP_MAGIC, is_being_written
 from echostep.recording.damage.ending import begins_as_mcap, checksum_matches, read_ending
 from echostep.recording.damage.notes import FileDamage
 from echostep.recording.damage.placing import Placement
-from echostep.recording.damage.scan import CHUNK, begin_in_chunk, map_file, next_valid_run, record_end
+from echostep.recording.damage.scan import CHUNK, begin_in_chunk, chunk_matches, map_file, next_valid_run, record_end
 from echostep.recording.mcap_records import (
     CHANNEL_IDS,
     DAMAGE_NAME,
@@ -124,13 +124,15 @@ class Recovery:
         size = len(file)
         while begin < size:
             end = record_end(file, begin, self._is_channel)
-            if end < 0 and self.grows and next_valid_run(file, begin + 1, self._is_channel) == size:
-                return
+            if (inside := begin_in_chunk(file, begin)) >= 0:
+                self.own_damage.altered |= not self.intact and end >= 0 and not chunk_matches(file, inside, end)
+                begin = inside
+                continue
             if end < 0:
-                end = begin_in_chunk(file, begin)
-                if end < 0:
-                    end = next_valid_run(file, begin + 1, self._is_channel)
-                    yield begin, end, None
+                end = next_valid_run(file, begin + 1, self._is_channel)
+                if self.grows and end == size:
+                    return
+                yield begin, end, None
                 begin = end
                 continue
             opcode, body = view[begin], begin + HEAD_SIZE
@@ -157,12 +159,9 @@ class Recovery:
         return RecordedMessage(self.channels[channel], sequence, t_ns, publish_ns, bytes(body[MESSAGE_SIZE:]))
 
     def _messages_in_chunk(self, body: bytes) -> Iterator[RecordedMessage]:
-        opened = decompress_chunk(body)
-        if opened is None:
+        if (records := decompress_chunk(body)) is None:
             self.own_damage.unreadable_chunks += 1
             return
-        records, is_as_written = opened
-        self.own_damage.altered |= not is_as_written
         whole = True
         for _, _, content in self._scan(np.frombuffer(records, np.uint8), 0):
             whole &= content is not None

@@ -33,7 +33,7 @@ class RewrittenRecording:
         self._schema_ids: dict[int, int] = {0: 0}  # by number in the source; 0: no schema
         self._channels: dict[tuple[str, str, int], int] = {}  # by topic, encoding and schema number in the source
         self._file = os.fdopen(create(path), "wb")
-        self._writer = begin_file(self._file, indexed=True)
+        self._writer = begin_file(self._file)
         self._sequence = 0
 
     def write_metadata(self, metadata: Mapping[str, str]) -> None:

@@ -9,6 +9,7 @@ at the next offset from which several consecutive records are valid.
 
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,8 @@ from echostep.jit import kernel, part
 from echostep.recording.mcap_records import HEAD_SIZE, MCAP_MAGIC, MESSAGE, MESSAGE_SIZE, RECORD_LIMIT, read_uint
 
 # [MCAP format specification]
-CHUNK, CHUNK_SIZE = 0x06, 40  # opcode; bytes before the records of a chunk that is not compressed
-LAST_OPCODE = 0x0F
+CHUNK, CHUNK_HEAD = 0x06, HEAD_SIZE + 40  # opcode; bytes before the records of a chunk that is not compressed
+LAST_OPCODE, PRIVATE = 0x0F, 0x80  # of the specification; from here on they are other programs' own, and skipped
 # Assumed.
 VALID_RUN = 4  # this many consecutive records are not valid by chance
 OTHER_LIMIT = 1 << 20  # bytes; only messages and chunk records are larger
@@ -47,7 +48,7 @@ def record_end(file: Octets, begin: int, is_channel: Bools) -> int:
     if body > len(file):
         return -1
     opcode, length = file[begin], read_uint(file, begin + 1, 8)
-    if not 1 <= opcode <= LAST_OPCODE or not 0 <= length <= min(RECORD_LIMIT, len(file) - body):
+    if not _is_opcode(opcode) or not 0 <= length <= min(RECORD_LIMIT, len(file) - body):
         return -1
     if opcode == MESSAGE:
         if length < MESSAGE_SIZE or not is_channel[read_uint(file, body, 2)]:
@@ -57,19 +58,30 @@ def record_end(file: Octets, begin: int, is_channel: Bools) -> int:
 
 
 @part
+def _is_opcode(opcode: int) -> bool:
+    return 1 <= opcode <= LAST_OPCODE or opcode >= PRIVATE
+
+
+@part
 def _may_follow(file: Octets, begin: int) -> bool:
     """Whether the file ends at `begin`, or a record may begin there; its body may be missing."""
     if begin + HEAD_SIZE > len(file):
         return True
-    return 1 <= file[begin] <= LAST_OPCODE and 0 <= read_uint(file, begin + 1, 8) <= RECORD_LIMIT
+    return _is_opcode(file[begin]) and 0 <= read_uint(file, begin + 1, 8) <= RECORD_LIMIT
 
 
 @kernel
 def begin_in_chunk(file: Octets, begin: int) -> int:
-    """Offset of the first record in a chunk that is not compressed and of which the file has the beginning only; -1 if there is none at `begin`."""
-    records = begin + HEAD_SIZE + CHUNK_SIZE
+    """Offset of the first record of the chunk at `begin` if it is not compressed, whatever its length; -1 if there is none."""
+    records = begin + CHUNK_HEAD
     is_plain = records <= len(file) and file[begin] == CHUNK and read_uint(file, records - 12, 4) == 0
     return records if is_plain else -1
+
+
+def chunk_matches(file: Octets, records: int, end: int) -> bool:
+    """Whether the records of a chunk that is not compressed, up to its end, are those that were written."""
+    expected = int.from_bytes(file[records - 16 : records - 12].tobytes(), "little")
+    return not expected or zlib.crc32(file[records:end].data) == expected
 
 
 @kernel

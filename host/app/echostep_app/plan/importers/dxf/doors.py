@@ -311,6 +311,8 @@ def _ends(line: Line) -> tuple[tuple[Point, Point], tuple[Point, Point]]:
 def _same(one: Line, other: Line) -> bool:
     """Whether two lines are one door: their middles lie together, along them or across one wall, and they point the same way."""
     (x, y), (p, q) = (((x0 + x1) / 2, (y0 + y1) / 2) for x0, y0, x1, y1 in (one, other))
+    if abs(p - x) + abs(q - y) > 2.0 * (SAME_M + THICKEST_M):
+        return False
     (a, b), (c, d) = _along(one), _along(other)
     along, across = abs((p - x) * a + (q - y) * b), abs((q - y) * a - (p - x) * b)
     return along < SAME_M and across < THICKEST_M and abs(a * d - b * c) < 0.5

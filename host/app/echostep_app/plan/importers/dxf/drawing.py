@@ -30,7 +30,9 @@ from echostep_app.plan.importers.dxf.gaps import WallBands
 from echostep_app.plan.importers.dxf.rooms import Written, named_spaces, rooms_of, written
 from echostep_app.plan.importers.dxf.sheet import Sheet, read_sheet
 from echostep_app.plan.importers.dxf.storeys import (
+    Box,
     alignment,
+    beside_house,
     bounds_of,
     in_order,
     lies_over,
@@ -153,14 +155,17 @@ def _lay_over(storeys: list[_Storey], hints: Hints, report: ImportReport) -> Non
             raise EchostepError(
                 f"{storey.sheet.file}: the layers of walls have no lines: give the right ones with --layer walls=NAME"
             )
-        if storey.window is None and len(boxes := storey_boxes(lines)) > 1:
-            moved = [
-                (x0 + storey.frame.x0_m, y0 + storey.frame.y0_m, x1 + storey.frame.x0_m, y1 + storey.frame.y0_m)
-                for x0, y0, x1, y1 in boxes
-            ]
+        if storey.window is not None:
+            continue
+        if len(boxes := storey_boxes(lines)) > 1:
             report.doubt(
                 f"{storey.sheet.file.name} looks like {len(boxes)} storeys beside each other: import them as levels with "
-                + window_words(moved, storey.frame.scale_m)
+                + _windows(storey, boxes)
+            )
+        elif found := beside_house(lines):
+            report.doubt(
+                f"{storey.sheet.file.name}: {found[0]} lines on the layers of walls lie around or beside the house (a frame, a title, an arrow?): "
+                f"{_windows(storey, [found[1]])} leaves them out"
             )
     for k in range(1, len(storeys)):
         storey = storeys[k]
@@ -177,6 +182,12 @@ def _lay_over(storeys: list[_Storey], hints: Hints, report: ImportReport) -> Non
             report.doubt(
                 f"{storey.sheet.file.name} does not lie over {first.file.name}: --align lays the storeys over each other"
             )
+
+
+def _windows(storey: _Storey, boxes: Sequence[Box]) -> str:
+    """Options for rectangles on the plan."""
+    x, y = storey.frame.x0_m, storey.frame.y0_m
+    return window_words([(x0 + x, y0 + y, x1 + x, y1 + y) for x0, y0, x1, y1 in boxes], storey.frame.scale_m)
 
 
 def _as_large(one: list[LineString], other: list[LineString]) -> bool:
@@ -202,6 +213,11 @@ def _drawn_level(storey: _Storey, drawn: DrawnLevel, report: ImportReport) -> Dr
     drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(shapely.get_parts(obstacles))))
     rooms = rooms_of(sheet.kinds["rooms"], storey.frame, sheet.file, report, storey.texts())
     drawn.rooms = [room for room in rooms if storey.holds(Point(room.at_m))]
+    house = MultiLineString(storey.lines("walls", "columns", "windows")).convex_hull
+    if beside := [room.name for room in drawn.rooms if not house.intersects(Point(room.at_m))]:
+        report.doubt(
+            f"{len(beside)} names lie beside the walls ({', '.join(beside)[:100]}): are they rooms? echostep plan edit moves or deletes them"
+        )
     for kind, layer in (("stairs", "stairs"), ("lift", "lifts")):
         blots = shapely.union_all([line.buffer(HALF_TREAD_M) for line in storey.lines(layer)])
         hulls = [blot.convex_hull.buffer(-HALF_TREAD_M) for blot in shapely.get_parts(blots)]

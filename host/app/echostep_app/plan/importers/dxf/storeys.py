@@ -61,6 +61,20 @@ def storey_boxes(walls: Sequence[LineString]) -> list[Box]:
     return next((found for found in tried if len(found) > 1), _storeys(lines, nearest))
 
 
+def beside_house(walls: Sequence[LineString]) -> tuple[int, Box] | None:
+    """How many lines lie around or beside the longest group of walls, and its rectangle (m): a frame, a title block, a north arrow."""
+    lines = np.array(list(walls), dtype=object)
+    x0, y0, x1, y1 = shapely.total_bounds(lines)
+    around = np.abs(shapely.bounds(lines) - (x0, y0, x1, y1)).max(axis=1) < APART * max(x1 - x0, y1 - y0)
+    if around.all():
+        return None
+    groups = _groups(lines[~around], 0.5)
+    which, group = shapely.STRtree(groups).query(lines[~around], predicate="intersects")
+    house = shapely.envelope(groups[np.bincount(group, shapely.length(lines[~around])[which]).argmax()])
+    beside = shapely.distance(lines, house) > np.where(around, BORDER_M, 0.0)
+    return (int(beside.sum()), house.bounds) if beside.any() else None
+
+
 def _is_border(lines: np.ndarray[Any, Any]) -> Bools:
     """Which lines (n,) frame all others, and touch none: the border of a sheet."""
     x0, y0, x1, y1 = shapely.total_bounds(lines)

@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
+from shapely.geometry import LineString, Point
 
 from echostep.errors import EchostepError
 from echostep.plan import ConnectorKind, Door, Georeference, Plan
@@ -23,10 +25,12 @@ from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, room
 from echostep_app.plan.importers.ifc.bodies import Shapes, SolidBody
 from echostep_app.plan.importers.ifc.doors import placed_door
+from echostep_app.plan.importers.ifc.map_conversion import map_georeference
 from echostep_app.plan.importers.ifc.model import open_model, storeys_of
 from echostep_app.plan.importers.report import ImportReport
 
 NO_STOREY = "at the height of no storey"
+AT_FACE_M, THICKEST_M = 0.1, 1.0  # of a door from the face of its wall; of a wall; assumed
 CUT_M = 1.0  # height of the cut above the floor: about the rangers' height
 WALLS = ("IfcWall", "IfcColumn", "IfcCurtainWall", "IfcPlate", "IfcMember")
 CONNECTOR_KINDS: dict[str, ConnectorKind] = {
@@ -57,12 +61,13 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
         )
     projects = model.by_type("IfcProject")
     name = str((projects[0].LongName or projects[0].Name) if projects else "") or path.stem
-    return plan_of(name, drawn_levels, report, _moved(_georeference(model, report), model, shapes, report))
+    return plan_of(name, drawn_levels, report, _place_on_earth(model, shapes, report))
 
 
 def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: ImportReport) -> None:
     """Add each door to the levels that it is open to at the height of the cut."""
     scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
+    solid: dict[int, list[LineString]] = {}  # doors without an opening, by id of the level
     for element in model.by_type("IfcDoor"):
         door = placed_door(element, shapes, scale_m)
         if door is None:
@@ -74,6 +79,22 @@ def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: I
             report.leave_out(f"{element.is_a()} {NO_STOREY}")
         for drawn in levels:
             drawn.doors.append(Door(door.line, name=str(element.Name or "")[:80]))
+            if not door.fills:
+                solid.setdefault(id(drawn), []).append(LineString([door.line[:2], door.line[2:]]))
+    for drawn in drawn_levels:
+        _open(drawn, solid.get(id(drawn), []))
+
+
+def _open(drawn: DrawnLevel, doors: list[LineString]) -> None:
+    """Cut the walls in which doors stand without an opening: a door's two ends and its middle are in the wall, or at its face."""
+    tree = shapely.STRtree(drawn.walls)
+    for door in doors:
+        stands = [
+            set(tree.query(Point(at), predicate="dwithin", distance=AT_FACE_M))
+            for at in (*door.coords, door.centroid.coords[0])
+        ]
+        for k in set.intersection(*stands):
+            drawn.walls[k] = drawn.walls[k].difference(door.buffer(THICKEST_M, cap_style="flat"))
 
 
 def _tell(model: Any, report: ImportReport) -> None:
@@ -123,12 +144,8 @@ def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorK
     return "" if passed else NO_STOREY
 
 
-def _georeference(model: Any, report: ImportReport) -> Georeference | None:
+def _georeference(model: Any) -> Georeference | None:
     """Longitude, latitude and true north of the model's site; None where the model does not state them."""
-    if model.schema != "IFC2X3" and (systems := model.by_type("IfcProjectedCRS")):
-        report.doubt(
-            f"its map conversion ({str(systems[0].Name)[:40]}) is not read, only the site's latitude: echostep plan edit takes two known points"
-        )
     sites = [site for site in model.by_type("IfcSite") if site.RefLatitude and site.RefLongitude]
     if not sites:
         return None
@@ -144,15 +161,17 @@ def _georeference(model: Any, report: ImportReport) -> Georeference | None:
     return Georeference(lon, lat, math.pi / 2 - math.atan2(y, x))
 
 
-def _moved(georeference: Georeference | None, model: Any, shapes: Shapes, report: ImportReport) -> Georeference | None:
-    """The georeference of the plan's origin, where that is not the model's own: the site's longitude and latitude are those of its placement."""
+def _place_on_earth(model: Any, shapes: Shapes, report: ImportReport) -> Georeference | None:
+    """The georeference of the plan's origin by the map conversion, else by the site: its longitude and latitude are those of its placement."""
     x, y = shapes.origin_m
-    if (x, y) == (0.0, 0.0):
-        return georeference
-    report.doubt(IN_GRID.format("the model", x, y))
-    if georeference is None:
-        return None
     scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
+    if (x, y) != (0.0, 0.0):
+        report.doubt(IN_GRID.format("the model", x, y))
+    georeference = _georeference(model)
+    if by_map := map_georeference(model, shapes.origin_m, scale_m, report):
+        return by_map
+    if georeference is None or (x, y) == (0.0, 0.0):
+        return georeference
     placement = model.by_type("IfcSite")[0].ObjectPlacement
     matrix = import_module("ifcopenshell.util.placement").get_local_placement(placement)
     off_m = np.array([[x, y]]) - np.asarray(matrix)[:2, 3] * scale_m

@@ -24,10 +24,11 @@ Line = tuple[float, float, float, float]
 
 
 class PlacedDoor(NamedTuple):
-    """A door's line from jamb to jamb, and the heights between which it is open."""
+    """A door's line from jamb to jamb, the heights between which it is open, whether it fills an opening."""
 
     line: Line
     z_m: tuple[float, float]
+    fills: bool = False
 
 
 def placed_door(element: Any, shapes: Shapes, scale_m: float) -> PlacedDoor | None:
@@ -36,7 +37,7 @@ def placed_door(element: Any, shapes: Shapes, scale_m: float) -> PlacedDoor | No
     for relation in element.FillsVoids:
         hole = shapes.body(relation.RelatingOpeningElement)
         if hole is not None:
-            return PlacedDoor(_across(hole, _host(relation.RelatingOpeningElement, shapes), width_m), hole.z_m)
+            return PlacedDoor(_across(hole, _host(relation.RelatingOpeningElement, shapes), width_m), hole.z_m, True)
     body = shapes.body(element)
     by_placement = _by_placement(element, width_m, scale_m, shapes.origin_m)
     if body is None:

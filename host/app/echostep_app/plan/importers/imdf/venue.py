@@ -257,10 +257,24 @@ def _place_doors(drawn: DrawnLevel, openings: list[Feature], report: ImportRepor
         apart = [LineString((own[:2], own[2:])).distance(LineString((line[:2], line[2:]))) for line in others]
         faces = [line for line, m in zip(others, apart, strict=True) if line != door.line and m > ONE_LINE_M]
         drawn.doors += [replace(door, line=line) for line in (own, *faces)]
+    if again := _again(drawn.doors):
+        drawn.doors = [door for k, door in enumerate(drawn.doors) if k not in again]
+        report.leave_out("opening that stands twice", len(again))
     if astray:
         report.doubt(
             f"{drawn.name}: {astray} of {len(drawn.doors)} openings lie in no wall: compare them with the building"
         )
+
+
+def _again(doors: list[Door]) -> set[int]:
+    """Which doors lie for the most part on an earlier one."""
+    lines = shapely.linestrings(np.array([door.line for door in doors]).reshape(-1, 2, 2))
+    bands = shapely.buffer(lines, ONE_LINE_M, cap_style="flat")
+    later, earlier = shapely.STRtree(bands).query(lines, predicate="intersects")
+    pairs = later > earlier
+    later, earlier = later[pairs], earlier[pairs]
+    shared = shapely.length(shapely.intersection(lines[later], bands[earlier]))
+    return set(later[shared > 0.5 * shapely.length(lines[later])].tolist())
 
 
 def _onto(line: Line, wall: BaseGeometry, middle: Point) -> Line:

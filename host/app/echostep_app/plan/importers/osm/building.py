@@ -190,19 +190,26 @@ def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
         level: merge_collinear(pieces_of([*drawn.walls, *drawn.windows]), OFF_M)
         for level, drawn in site.drawn_levels.items()
     }
-    lost = []
+    trees = {level: shapely.STRtree(shapely.linestrings(rows.reshape(-1, 2, 2))) for level, rows in walls.items()}
+    lines: dict[float, set[tuple[float, ...]]] = {level: set() for level in walls}
+    lost, odd = [], []
     for node, tags in elements.nodes():
         if not _is_door(tags):
             continue
+        odd += [f"node {node}: width={tags['width'][:20]}"] if "width" in tags and not _metres(tags, 0.0) else []
         own = levels_of(tags, f"node {node}") or sorted(site.levels_at.get(elements.through(node), site.order))
-        gaps = {
-            level: _gap(walls[level], elements.at_m[node], _metres(tags, DOOR_M)) for level in own if level in walls
-        }
+        wide_m, at_m = _metres(tags, DOOR_M), elements.at_m[node]
+        gaps = {level: _gap(walls[level], trees[level], at_m, wide_m) for level in own if level in walls}
         lost += [] if any(gaps.values()) else [f"node {node}"]
         for level, gap in gaps.items():
-            doors = site.drawn_levels[level].doors
-            if gap is not None and all(gap != door.line for door in doors):
-                doors.append(Door(gap, _state(tags), (tags.get("name") or tags.get("ref") or "")[:80]))
+            if gap is not None and gap not in lines[level]:
+                lines[level].add(gap)
+                name = (tags.get("name") or tags.get("ref") or "")[:80]
+                site.drawn_levels[level].doors.append(Door(gap, _state(tags), name))
+    if odd:
+        report.doubt(
+            f"{len(odd)} doors were taken as {DOOR_M:g} m wide ({', '.join(odd[:3])}): write it in metres, as width=0.9, or with its unit"
+        )
     if lost:
         report.leave_out("door on no wall", len(lost))
         report.doubt(
@@ -210,10 +217,11 @@ def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
         )
 
 
-def _gap(walls: Floats, at_m: tuple[float, float], wide_m: float) -> tuple[float, float, float, float] | None:
+def _gap(
+    walls: Floats, tree: shapely.STRtree, at_m: tuple[float, float], wide_m: float
+) -> tuple[float, float, float, float] | None:
     """A door's line along the longest of the walls (n, 4) at its node, of equal ones the first from west to north; within the wall's ends."""
-    lines = shapely.linestrings(walls.reshape(-1, 2, 2))
-    near = walls[shapely.distance(lines, Point(at_m)) < ON_M]
+    near = walls[tree.query(Point(at_m), predicate="dwithin", distance=ON_M)]
     if not len(near):
         return None
     x0, y0, x1, y1 = min(

@@ -21,7 +21,7 @@ from echostep_app.plan.importers.parsing import read_bytes
 
 MOST_PIXELS = 100_000_000
 
-STAIR = 1.0  # pixels by which an outline may leave the pixels' edges: a slanting wall is a stair of pixels
+STAIR = 1.5  # pixels by which an outline may leave the pixels' edges: the corners of a slanting wall's stair are up to 1.41 from its line
 LEAST_PIXELS = 4.0  # smaller groups are sensor noise; assumed
 MOST_RUNS = 2_000_000
 
