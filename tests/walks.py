@@ -3,14 +3,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from itertools import takewhile
+from pathlib import Path
+
+import numpy as np
 
 from board_runs import ROOT
+from echostep.localization import Estimate
 from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk
+from echostep_app.scorecard.card import Scorecard, score
+from echostep_app.scorecard.track_columns import ScoredPath, track_of
 from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import demo_scenario
+from echostep_app.simulation.scenario import Scenario, demo_scenario
 
 DEMO = ROOT / "host/core/echostep/plans/demo.json"
 
@@ -23,3 +30,14 @@ def walk_chunks(seconds: float = 15.0) -> tuple[Chunk, ...]:
     first = next(chunks)
     rest = takewhile(lambda chunk: chunk.t_arrival_ns - first.t_arrival_ns < seconds * 1e9, chunks)
     return (first, *rest)
+
+
+def truth_of(scenario: Scenario) -> ScoredPath:
+    """The trunk's true path."""
+    t_s = scenario.walk.t_s
+    return ScoredPath(Path("truth"), t_s, scenario.walk.trunk_m, np.zeros(len(t_s), bool), {})
+
+
+def card_of(estimates: Sequence[Estimate], truth: ScoredPath) -> Scorecard:
+    """Their scores."""
+    return score(track_of(estimates), truth).card

@@ -20,7 +20,6 @@ from echostep_app.offline.leg_csv import load_legs
 from echostep_app.plan.writer import save_plan
 from echostep_app.recording.recorder import Recorder
 from echostep_app.scorecard.track_columns import load_path
-from echostep_app.scorecard.truth import load_truth
 from echostep_app.session.options import TrackingOptions
 from echostep_app.session.runs.replay import tracker_of
 from walks import DEMO, walk_chunks
@@ -53,16 +52,6 @@ def test_a_number_that_no_track_has_is_named(tmp_path: Path, number: str) -> Non
     path.write_text(f"t_s,x_m,y_m,radius95_m\n1,1,2,{number}\n2,1,1,\n")
     with pytest.raises(EchostepError, match=r"s\.csv:2: column radius95_m"):
         load_path(path, None)
-    path.write_text(f"t_s,x,y\n1,{number},2\n2,1,1\n")
-    with pytest.raises(EchostepError, match="not a truth file"):
-        load_truth(path)
-
-
-@pytest.mark.filterwarnings("error")
-def test_a_truth_without_rows_is_one_error(tmp_path: Path) -> None:
-    (tmp_path / "t.csv").write_text("t_s,x,y\n")
-    with pytest.raises(EchostepError, match=r"t\.csv: not a truth file"):
-        load_truth(tmp_path / "t.csv")
 
 
 IMU = "t_s,ax,ay,az,gx,gy,gz,az\n" + "".join(f"{k / 100},0,0,9.8,0,0,0,1\n" for k in range(200))

@@ -21,7 +21,7 @@ from echostep.recording import open_recording
 from echostep.tracker import Tracker
 from echostep_app.page.elements.true_position import TruePath
 from echostep_app.page.live import LivePage
-from echostep_app.scorecard.truth import load_truth
+from echostep_app.scorecard.track_columns import load_path
 from echostep_app.session.browser import open_browser
 from echostep_app.session.runs import demo
 from echostep_app.simulation.people.tours import room_tour
@@ -121,7 +121,7 @@ def test_at_the_end_the_page_says_so_and_plays_the_run_again() -> None:
 
 def some_truth() -> TruePath:
     t_s = np.arange(0.0, 20.0, 0.1)
-    return TruePath(np.column_stack([t_s, 2.0 + 0.5 * t_s, 7.5 + 0.0 * t_s, 0.0 * t_s]), np.array([0.0]))
+    return TruePath(np.column_stack([t_s, 2.0 + 0.5 * t_s, 7.5 + 0.0 * t_s, 0.0 * t_s]))
 
 
 def test_a_browser_is_opened_only_where_there_is_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -163,7 +163,7 @@ def test_a_demo_on_another_plan_walks_through_its_rooms(tmp_path: Path) -> None:
     mean = re.search(r"error: mean ([\d.]+) m", done.stdout)
     assert mean
     assert float(mean[1]) < 0.5
-    truth = load_truth(tmp_path / "out/truth.csv").xy_m
+    truth = load_path(tmp_path / "out/truth.csv", None).xy_m
     for x, y in ((3.6, 11.2), (6.3, 4.9)):
         assert min(abs(truth - [x, y]).sum(axis=1)) < 1.0
     assert open_recording(tmp_path / "out/walk.mcap").metadata["source"] == "simulated"

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
@@ -22,24 +21,13 @@ from echostep.recording import open_recording
 from echostep.xsens import MtxReader
 from echostep_app.offline.importing import import_imu, rate_of
 from foot.foot_walks import MANNERS, course, samples
+from offline.imu_files import hall, write
 
 
 @pytest.fixture(scope="module")
 def walk() -> Imu:
     """A simulated walk of twelve steps."""
     return Imu(*samples(course(MANNERS["walking"], steps=12), 100, rng=np.random.default_rng(1)))
-
-
-def write(file: Path, imu: Imu) -> None:
-    rows = np.column_stack([imu.t_s, imu.accel, imu.gyro])
-    np.savetxt(file, rows, delimiter=",", header="t_s,ax,ay,az,gx,gy,gz", comments="", fmt="%.9g")
-
-
-def hall(file: Path, aside: int = 9) -> Path:
-    """The plan of a hall of 49 m, `aside` m to either side of its middle."""
-    walls = [[-aside, -9, aside, -9], [aside, -9, aside, 40], [aside, 40, -aside, 40], [-aside, 40, -aside, -9]]
-    file.write_text(json.dumps({"echostep_plan": 1, "name": "Hall", "levels": [{"name": "0", "walls": walls}]}))
-    return file
 
 
 def test_a_recording_holds_the_samples_and_the_gap(walk: Imu, tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ def replayed(seconds: float) -> Iterator[LivePage]:
     first_ns = chunks[0].t_arrival_ns
     chunks = [chunk for chunk in chunks if chunk.t_arrival_ns - first_ns < seconds * 1e9]
     with LivePage(tracker, TITLE, LOCAL, replay=True) as page:
-        page.truth = TruePath.of(scenario.truth, PLAN)
+        page.truth = TruePath(np.insert(scenario.truth[:, :3], 3, 0.0, axis=1))
         for begin in range(0, len(chunks), PORTION):
             portion = portion_of(chunks[begin : begin + PORTION])
             tracker.take(portion)

@@ -17,7 +17,6 @@ from echostep.plan import NO_PLAN, Plan, load_plan
 from echostep.ports.chunks import Chunk, Portion, portion_of
 from echostep.tracker import Tracker
 from echostep_app.page.server import Address
-from echostep_app.scorecard.truth import Truth, errors
 from echostep_app.session.metadata import run_metadata
 from echostep_app.session.options import OutputOptions
 from echostep_app.session.runs.recording import start_recording
@@ -32,6 +31,7 @@ from echostep_app.team.mqtt.publisher import Listener
 from echostep_app.team.wearer_plan import plan_file
 from page.browser import PLAN, demo_walk
 from team.team_broker import Broker, needs_broker
+from walks import card_of, truth_of
 
 PORTION = 500
 LEAST_M = 60.0  # of wall in the drawing of the demo's walk
@@ -100,9 +100,8 @@ def test_what_one_walk_has_drawn_tracks_a_teammate(tmp_path: Path, monkeypatch: 
             for chunk in portion:
                 recorder.write(chunk)
             estimates += wearer.take(portion_of(portion))
-    found = errors(estimates, Truth(scenario.truth[:, 0], scenario.truth[:, 1:3]))
-    assert found is not None
-    assert found.mean_m < 0.2
+    found = card_of(estimates, truth_of(scenario))
+    assert found.horizontal.mean_m < 0.2
     again = echostep("replay", recorder.path, "--plan", path, "--headless", "--out", tmp_path / "again", ends=0)
     assert "is not the plan" not in again.stdout
     rows = list(csv.DictReader((tmp_path / "again/track.csv").read_text().splitlines()))

@@ -18,13 +18,13 @@ from echostep.plan import Plan, load_plan
 from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata
-from echostep_app.scorecard.truth import Truth, errors
 from echostep_app.simulation.devices.board import PythonBoard
 from echostep_app.simulation.scenario import Scenario
 from echostep_studies.bench.recordings.feet import SETS
 from echostep_studies.frame.recordings import DATA, read_sets
 from foot import foot_walks as fw
 from needs_data import needs_data
+from walks import card_of, truth_of
 
 
 def axis_mountings() -> list[Floats]:
@@ -111,11 +111,10 @@ def test_live_the_mtx_may_sit_in_any_way(live: tuple[Plan, Scenario, list[Chunk]
             chunk = replace(chunk, data=b"".join(encode_frame(MTDATA, pack_mtdata(s)) for s in samples))
         turned.append(chunk)
     found = Tracker(plan, scenario.start, seed=0).take(portion_of(turned))
-    off = errors(found, Truth(scenario.walk.t_s, scenario.walk.trunk_m))
-    assert off is not None
-    assert off.mean_m < 0.2
-    assert off.max_m < 0.8
-    assert off.coverage95 > 0.8
+    off = card_of(found, truth_of(scenario))
+    assert off.horizontal.mean_m < 0.2
+    assert off.horizontal.max_m < 0.8
+    assert (off.ellipse95_holds or 0.0) > 0.8
 
 
 def test_a_foot_that_does_not_tip_is_taken_to_have_x_to_the_toe_until_it_tips() -> None:

@@ -16,17 +16,18 @@ from echostep.plan import Plan, Pose, load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.xsens import FrameReader, encode_frame
-from echostep_app.scorecard.truth import Truth, errors
+from echostep_app.scorecard.track_columns import ScoredPath
 from echostep_app.simulation.devices.board import BoardProcess, PythonBoard
 from echostep_app.simulation.scenario import Scenario, demo_scenario
+from walks import card_of, truth_of
 
 PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 WAYPOINTS = ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 7.5), (18.0, 7.5))
 
 
-def walk(plan: Plan = PLAN, seed: int = 5) -> tuple[list[Chunk], Truth, Scenario]:
+def walk(plan: Plan = PLAN, seed: int = 5) -> tuple[list[Chunk], ScoredPath, Scenario]:
     scenario = Scenario(plan, WAYPOINTS, seed, PythonBoard(seed))
-    return list(scenario.chunks()), Truth(scenario.walk.t_s, scenario.walk.trunk_m), scenario
+    return list(scenario.chunks()), truth_of(scenario), scenario
 
 
 CHUNKS, TRUTH, SCENARIO = walk()
@@ -39,11 +40,10 @@ def track(chunks: list[Chunk], seed: int = 0) -> tuple[Tracker, list[Estimate]]:
 
 def test_the_walk_is_tracked() -> None:
     tracker, found = track(CHUNKS)
-    off = errors(found, TRUTH)
-    assert off is not None
-    assert off.mean_m < 0.2
-    assert off.max_m < 0.6
-    assert off.coverage95 > 0.8
+    off = card_of(found, TRUTH)
+    assert off.horizontal.mean_m < 0.2
+    assert off.horizontal.max_m < 0.6
+    assert (off.ellipse95_holds or 0.0) > 0.8
     assert tracker.front_end.timeline.synchronised
     assert tracker.front_end.counts.late_pings == tracker.front_end.counts.bad_times == 0
     assert {e.status for e in found} == {TrackStatus.TRACKING}
@@ -80,9 +80,8 @@ def test_without_the_board_the_foot_goes_on_and_grows_less_sure() -> None:
     _, whole = track(CHUNKS)
     assert found[-1].t_s == pytest.approx(whole[-1].t_s, abs=1.5)
     assert found[-1].ellipse95.major_m > whole[-1].ellipse95.major_m
-    off = errors(found, TRUTH)
-    assert off is not None
-    assert off.max_m < 1.5
+    off = card_of(found, TRUTH)
+    assert off.horizontal.max_m < 1.5
 
 
 def test_without_a_board_at_all_the_plan_and_the_foot_remain() -> None:
@@ -99,21 +98,23 @@ def test_a_foot_that_falls_silent_is_never_shown_as_sure() -> None:
     assert tracker.front_end.status is not None
 
 
-def sure_but_wrong(found: list[Estimate], truth: Truth) -> list[Estimate]:
-    off = np.array([(e.x_m, e.y_m) for e in found]) - truth.at(np.array([e.t_s for e in found]))
+def sure_but_wrong(found: list[Estimate], truth: ScoredPath) -> list[Estimate]:
+    off = np.array([(e.x_m, e.y_m) for e in found]) - np.column_stack(
+        [np.interp([e.t_s for e in found], truth.t_s, column) for column in truth.xy_m.T]
+    )
     return [e for e, d in zip(found, np.hypot(*off.T), strict=True) if e.status == TrackStatus.TRACKING and d > 1.0]
 
 
 @pytest.fixture(scope="module")
-def long_walk() -> tuple[list[Chunk], Truth, Scenario]:
+def long_walk() -> tuple[list[Chunk], ScoredPath, Scenario]:
     scenario = demo_scenario(PLAN, 7, PythonBoard(7))
-    return list(scenario.chunks()), Truth(scenario.walk.t_s, scenario.walk.trunk_m), scenario
+    return list(scenario.chunks()), truth_of(scenario), scenario
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("start_s", "gap_s"), [(12, 1.5), (12, 4), (20, 6), (30, 4), (30, 8)])
 def test_after_a_silent_foot_no_wrong_place_is_shown_as_sure(
-    long_walk: tuple[list[Chunk], Truth, Scenario], start_s: float, gap_s: float
+    long_walk: tuple[list[Chunk], ScoredPath, Scenario], start_s: float, gap_s: float
 ) -> None:
     chunks, truth, scenario = long_walk
     tracker = Tracker(PLAN, scenario.start, seed=1)
@@ -126,7 +127,7 @@ def test_after_a_silent_foot_no_wrong_place_is_shown_as_sure(
 @pytest.mark.slow
 @pytest.mark.parametrize(("dx", "dy", "degrees"), [(0.0, 3.5, 0.0), (6.0, -4.0, 90.0), (0.0, 0.0, 180.0)])
 def test_a_wrong_start_is_noticed(
-    long_walk: tuple[list[Chunk], Truth, Scenario], dx: float, dy: float, degrees: float
+    long_walk: tuple[list[Chunk], ScoredPath, Scenario], dx: float, dy: float, degrees: float
 ) -> None:
     chunks, truth, scenario = long_walk
     there = scenario.start
@@ -150,9 +151,8 @@ def by_frame(chunks: list[Chunk]) -> list[Chunk]:
 def test_a_fifth_of_the_samples_may_be_missing() -> None:
     rng = random.Random(2)
     _, found = track([c for c in by_frame(CHUNKS) if c.port == BOARD or rng.random() > 0.2])
-    off = errors(found, TRUTH)
-    assert off is not None
-    assert off.max_m < 1.5
+    off = card_of(found, TRUTH)
+    assert off.horizontal.max_m < 1.5
 
 
 def test_noise_on_both_ports_is_survived() -> None:
@@ -164,9 +164,8 @@ def test_noise_on_both_ports_is_survived() -> None:
             body[rng.randrange(len(body))] ^= 1 << rng.randrange(8)
         noisy.append(replace(chunk, data=bytes(body)))
     tracker, found = track(noisy)
-    off = errors(found, TRUTH)
-    assert off is not None
-    assert off.max_m < 1.5
+    off = card_of(found, TRUTH)
+    assert off.horizontal.max_m < 1.5
     assert tracker.front_end.board.counts.rejected > 50
     assert tracker.front_end.foot_source.counts.bad_checksum > 10
 
@@ -195,9 +194,8 @@ def test_faults_of_the_real_board_in_mid_walk(fault: str) -> None:
     scenario.close()
     tracker = Tracker(PLAN, scenario.start)
     found = tracker.take(portion_of(chunks))
-    off = errors(found, TRUTH)
-    assert off is not None
-    assert off.max_m < 0.8
+    off = card_of(found, TRUTH)
+    assert off.horizontal.max_m < 0.8
     assert found[-1].t_s > TRUTH.t_s[-1] - 3.0
     assert tracker.front_end.timeline.board_restarts == (1 if fault == "reset=watchdog" else 0)
 
@@ -209,6 +207,5 @@ def test_the_demo_runs_through_the_real_firmware() -> None:
     tracker = Tracker(PLAN, scenario.start, seed=1)
     found = tracker.take(portion_of(list(scenario.chunks())))
     scenario.close()
-    off = errors(found, Truth(scenario.walk.t_s, scenario.walk.trunk_m))
-    assert off is not None
-    assert off.mean_m < 0.2
+    off = card_of(found, truth_of(scenario))
+    assert off.horizontal.mean_m < 0.2

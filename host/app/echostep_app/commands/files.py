@@ -26,6 +26,10 @@ from echostep_app.extras import require
 
 app = typer.Typer()
 TRACK = Path("track.csv")
+Truth = Annotated[
+    Path | None,
+    typer.Option("--truth", metavar="FILE", help="True path to compare with, as of score, on the foot's clock."),
+]
 
 
 @app.command("map")
@@ -61,6 +65,7 @@ def import_command(
         typer.Option("--ranges", metavar="CSV", help="Two rangers: t_s,direction_deg (left 90, right -90),range_m."),
     ] = None,
     legs: Annotated[Path | None, typer.Option("--legs", metavar="CSV", help="Leg gyros, as of legs.")] = None,
+    truth: Truth = None,
     settings: SettingsFile = None,
 ) -> None:
     """Make a recording of a foot IMU's file, and of other sensors' on its clock, for replay and export."""
@@ -68,7 +73,7 @@ def import_command(
     from echostep_app.offline.foreign_columns import parse_naming
     from echostep_app.offline.importing import Beside
 
-    offline.import_foot(imu, out, parse_naming(columns, units), Beside(pressure, ranges, legs, settings))
+    offline.import_foot(imu, out, parse_naming(columns, units), Beside(pressure, ranges, legs, settings), truth)
 
 
 @app.command()
@@ -90,9 +95,7 @@ def foot(
     units: Units = None,
     plan: OptionalPlan = None,
     start: Start = None,
-    truth: Annotated[
-        Path | None, typer.Option("--truth", metavar="FILE", help="With --plan: true path to compare with (CSV).")
-    ] = None,
+    truth: Truth = None,
 ) -> None:
     """Zero-velocity navigation of a recorded foot IMU; with --plan, on the plan: import and replay."""
     from echostep_app.commands.actions import offline
@@ -147,14 +150,21 @@ def legs(
 def score(
     tracks: Annotated[
         list[Path],
-        typer.Argument(metavar="TRACK...", help="CSV of any tracker: columns t_s, x_m, y_m, and more by their names."),
+        typer.Argument(
+            metavar="TRACK...",
+            help="CSV of any tracker: columns t_s, x_m, y_m, and more by their names; or a recording.",
+        ),
     ],
     truth: Annotated[
-        Path, typer.Option("--truth", metavar="FILE", help="True path, or surveyed points (CSV), on the same clock.")
-    ],
+        Path | None,
+        typer.Option(
+            "--truth", metavar="FILE", help="True path, or surveyed points (CSV), on the same clock; a recording's own."
+        ),
+    ] = None,
     plan: Annotated[
         Path | None, typer.Option("--plan", help="The building's plan, for floors by height, zones and the picture.")
     ] = None,
+    start: Start = None,
     html: Annotated[
         Path | None,
         typer.Option(
@@ -168,8 +178,9 @@ def score(
 ) -> None:
     """Score tracks against the truth by ISO/IEC 18305 and EvAAL."""
     from echostep_app.commands.actions import score as scoring
+    from echostep_app.session.options import TrackingOptions
 
-    scoring.score(tracks, truth, plan, html, setup, as_json=as_json)
+    scoring.score(tracks, truth, TrackingOptions(plan, start), html, setup, as_json=as_json)
 
 
 @app.command()

@@ -19,7 +19,7 @@ from echostep.localization import Estimate
 from echostep.plan import Level, Plan
 from echostep_app.plan.routing import Route
 from echostep_app.printing.picture_files import save_picture
-from echostep_app.scorecard.truth import Truth
+from echostep_app.scorecard.track_columns import ScoredPath
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 
 MAX_HEIGHT_INCHES = 40.0  # of the picture
+NEARBY_S = 2.5  # of the truth from an estimate: they come at each step, and twice a second while standing
 GAP_S = 5.0  # the line of the track is broken after so long on another level
 MAX_ELLIPSES = 60  # drawn per level
 ROUTE_COLOUR, BEACON_COLOUR = "#cc79a7", "#d55e00"
@@ -34,7 +35,7 @@ TRUTH_COLOUR, TRACK_COLOUR = "#009e73", "#0072b2"  # distinguishable with colour
 
 
 def draw_track(
-    path: Path, plan: Plan, estimates: Sequence[Estimate], truth: Truth | None, title: str,
+    path: Path, plan: Plan, estimates: Sequence[Estimate], truth: ScoredPath | None, title: str,
     route: Route | None = None, beacons: Sequence[BeaconPlace] = (),
 ) -> None:  # fmt: skip
     """Draw plan, true path, route, beacons, estimates and 95 % ellipses as PNG, SVG or PDF, by the ending of the name."""
@@ -42,7 +43,7 @@ def draw_track(
 
 
 def track_figure(
-    plan: Plan, estimates: Sequence[Estimate], truth: Truth | None, title: str,
+    plan: Plan, estimates: Sequence[Estimate], truth: ScoredPath | None, title: str,
     route: Route | None = None, beacons: Sequence[BeaconPlace] = (),
 ) -> Figure:  # fmt: skip
     """The picture: one panel for each visited level, the lowest at the bottom."""
@@ -54,11 +55,19 @@ def track_figure(
     figure.suptitle(title, parse_math=False)
     for axes, k in zip(figure.subplots(len(visited), squeeze=False)[::-1, 0], visited, strict=True):
         here = [e for e in estimates if e.level == k]
-        _draw_level(axes, plan.levels[k], here, truth.between(here) if truth else None)
+        _draw_level(axes, plan.levels[k], here, _near(truth, here) if truth else None)
         _draw_guidance(axes, k, route, [b for b in beacons if b.level == k])
         if len(plan.levels) > 1:
             axes.set_title(plan.levels[k].name, loc="left", fontsize=9, parse_math=False)
     return figure
+
+
+def _near(truth: ScoredPath, estimates: Sequence[Estimate]) -> Floats:
+    """True positions (n, 2) near the times of estimates; NaN where no estimate is within NEARBY_S."""
+    t_s = np.array([-np.inf, *(e.t_s for e in estimates), np.inf])
+    after = np.searchsorted(t_s[:-1], truth.t_s, side="right")
+    off_s = np.minimum(truth.t_s - t_s[after - 1], t_s[after] - truth.t_s)
+    return np.where((off_s < NEARBY_S)[:, None], truth.xy_m, np.nan)
 
 
 def _draw_level(axes: Axes, level: Level, estimates: Sequence[Estimate], truth_m: Floats | None) -> None:

@@ -139,9 +139,14 @@ def _levels(table: CsvColumns, name: str | None, height_m: Floats | None, plan: 
         return np.array([_level(table, k, name, text, index.get) for k, text in enumerate(table.texts(name))])
     if plan is None:
         return None
+    return levels_at(height_m, len(table.rows), plan)
+
+
+def levels_at(height_m: Floats | None, rows: int, plan: Plan) -> Floats | None:
+    """The level of the plan nearest to each height, else the plan's only one; None where neither is known."""
     heights = np.array([level.height_m for level in plan.levels])
     if height_m is None:
-        return np.zeros(len(table.rows)) if len(heights) == 1 else None
+        return np.zeros(rows) if len(heights) == 1 else None
     nearest = np.abs(height_m[:, None] - heights).argmin(1).astype(float)
     return np.asarray(np.where(np.isfinite(height_m), nearest, math.nan))
 

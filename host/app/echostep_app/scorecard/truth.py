@@ -1,95 +1,108 @@
 # SPDX-License-Identifier: MIT
-"""Errors of estimates against the truth, where it is known.
+"""The true path of a walk: from a file that `echostep score` reads, or from the recording that carries it.
 
-In: truth.csv (`t_s,x,y,heading_rad`, the trunk, map frame) and estimates. Out: `Errors`. Owns nothing.
+In: a file, a recording's metadata; estimates. Out: `ScoredPath`, metadata, the `Scorecard` of estimates. Owns the field of the metadata.
 """
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization import Estimate
-from echostep.offline.csv_table import GREATEST
+from echostep.plan import Plan
+from echostep.recording import MCAP_MAGIC, Recording, open_recording
+from echostep.walk.recorded import START_LIMIT_M, Coordinate
 from echostep_app.printing.lines import as_error
-from echostep_app.scorecard.error_statistics import error_statistics
+from echostep_app.scorecard.card import Scorecard, score
+from echostep_app.scorecard.matching import GAP_S
+from echostep_app.scorecard.track_columns import ScoredPath, levels_at, load_path, track_of
 
-NEARBY_S = 2.5  # estimates come at each step, and twice a second while standing
-
-
-@dataclass(frozen=True, slots=True)
-class Truth:
-    """True positions of the trunk: `t_s` (n,), `xy_m` (n, 2)."""
-
-    t_s: Floats
-    xy_m: Floats
-
-    def at(self, t_s: Floats) -> Floats:
-        """Positions (m, 2) at times (m,), linear between the rows."""
-        return np.column_stack([np.interp(t_s, self.t_s, self.xy_m[:, k]) for k in (0, 1)])
-
-    def between(self, estimates: Sequence[Estimate]) -> Floats:
-        """True positions (n, 2) near the times of estimates; NaN where no estimate is within NEARBY_S."""
-        t_s = np.array([e.t_s for e in estimates])
-        if not len(t_s):
-            return np.zeros((0, 2))
-        after = np.abs(self.t_s - t_s[np.clip(np.searchsorted(t_s, self.t_s), 0, len(t_s) - 1)])
-        before = np.abs(self.t_s - t_s[np.clip(np.searchsorted(t_s, self.t_s) - 1, 0, len(t_s) - 1)])
-        positions: Floats = np.where((np.minimum(after, before) < NEARBY_S)[:, None], self.xy_m, np.nan)
-        return positions
+FIELD = "truth"  # of a recording's metadata
+MOST_BYTES = 900_000  # of the field: a larger record of metadata is not read [echostep.recording.damage.scan]
+Column = Annotated[list[Coordinate], Meta(min_length=1)]
 
 
-@dataclass(frozen=True, slots=True)
-class Errors:
-    """Horizontal error in metres over the estimates; `coverage95`: share of them whose 95 % ellipse holds the truth."""
+class RecordedTruth(msgspec.Struct, omit_defaults=True):
+    """The field `truth`: the true path on the recording's clock; heights (m) and numbers of floors where they are known."""
 
-    mean_m: float
-    sd_m: float
-    max_m: float
-    min_m: float
-    ending_m: float
-    rmse_m: float
-    coverage95: float
+    t_s: Column
+    x_m: Column
+    y_m: Column
+    z_m: Column | None = None
+    level: Column | None = None
 
 
-def load_truth(path: Path | str) -> Truth:
-    """Truth from a CSV file; raises EchostepError that names the file."""
-    try:
-        # Warnings of a file without rows: reported below
-        with as_error(f"{path}: cannot read the truth"), warnings.catch_warnings(action="ignore"):
-            table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-    except ValueError as error:
-        why = "no text" if isinstance(error, UnicodeError) else error
-        raise EchostepError(f"{path}: not a truth file (t_s,x,y,...): {why}") from error
-    if table.shape[1] < 3 or not len(table) or not (np.abs(table) <= GREATEST).all():
-        raise EchostepError(
-            f"{path}: not a truth file: rows of t_s,x,y[,heading_rad] expected, numbers up to {GREATEST:g}"
-        )
-    return Truth(table[:, 0], table[:, 1:3])
+def is_recording(path: Path) -> bool:
+    """Whether a file begins as a recording; raises EchostepError when it cannot be read."""
+    with as_error(f"{path}: cannot read it"), path.open("rb") as file:
+        return file.read(len(MCAP_MAGIC)) == MCAP_MAGIC
 
 
-def errors(estimates: Sequence[Estimate], truth: Truth) -> Errors | None:
-    """Errors over the estimates within the truth's time, or None."""
-    inside = [e for e in estimates if truth.t_s[0] <= e.t_s <= truth.t_s[-1]]
-    if not inside:
+def load_truth(path: Path, plan: Plan | None) -> ScoredPath:
+    """The true path in a file, or in the recording `path`; raises EchostepError."""
+    truth = recorded_truth(open_recording(path), plan) if is_recording(path) else load_path(path, plan)
+    if truth is None:
+        raise EchostepError(f"{path}: no true path in it: give one with --truth FILE")
+    return truth
+
+
+def recorded_truth(recording: Recording, plan: Plan | None) -> ScoredPath | None:
+    """The true path that a recording carries, None without; raises EchostepError when it is damaged."""
+    text = recording.metadata.get(FIELD)
+    if text is None:
         return None
-    true_xy_m = truth.at(np.array([e.t_s for e in inside]))
-    off = np.array([(e.x_m, e.y_m) for e in inside]) - true_xy_m
-    distance = np.hypot(off[:, 0], off[:, 1])
-    held = [e.holds(x, y) for e, (x, y) in zip(inside, true_xy_m.tolist(), strict=True)]
-    statistics = error_statistics(distance)
-    return Errors(
-        statistics.mean_m,
-        statistics.sd_m,
-        statistics.max_m,
-        statistics.min_m,
-        statistics.ending_m,
-        statistics.rms_m,
-        float(np.mean(held)),
-    )
+    try:
+        truth = msgspec.json.decode(text, type=RecordedTruth)
+        columns = {name: np.array(values) for name, values in msgspec.structs.asdict(truth).items() if values}
+        if len({len(column) for column in columns.values()}) > 1 or (np.diff(columns["t_s"]) < 0.0).any():
+            raise ValueError
+    except (ValueError, RecursionError, msgspec.MsgspecError) as error:
+        raise EchostepError(f"{recording.path}: its true path is damaged: give one with --truth FILE") from error
+    t_s, height_m = columns["t_s"], columns.get("z_m")
+    level = columns.get("level", levels_at(height_m, len(t_s), plan) if plan else None)
+    xy_m = np.column_stack([columns["x_m"], columns["y_m"]])
+    return ScoredPath(recording.path, t_s, xy_m, np.zeros(len(t_s), bool), {}, height_m, level)
+
+
+def truth_field(truth: ScoredPath, samples_s: Floats, name: str) -> tuple[dict[str, str], str]:
+    """The metadata that carry a true path beside samples at these times (n,) of the file `name`, and the same in words; raises EchostepError."""
+    begin_s, end_s = samples_s[0], samples_s[-1]
+    within = (truth.t_s > begin_s - GAP_S) & (truth.t_s < end_s + GAP_S)
+    if not within.any():
+        raise EchostepError(
+            f"{truth.path}: no row from {begin_s:g} to {end_s:g} s, the time of {name}: both need the same clock"
+        )
+    optional = {"z_m": truth.height_m, "level": truth.level}
+    known = {name: column for name, column in optional.items() if column is not None and np.isfinite(column).all()}
+    columns = {"t_s": truth.t_s - begin_s, "x_m": truth.xy_m[:, 0], "y_m": truth.xy_m[:, 1], **known}
+    rows = {name: np.round(column[within], 4) for name, column in columns.items()}
+    if any(np.abs(column).max() >= START_LIMIT_M for column in rows.values()):
+        raise EchostepError(
+            f"{truth.path}: a place or time beyond {START_LIMIT_M:g} m: metres of the plan are expected, and seconds"
+        )
+    every = 1
+    while len(text := _text(rows, every)) > MOST_BYTES:
+        every *= 2
+    words = f"truth: {within.sum()} rows of {truth.path.name}" + (f", every {every}th kept" if every > 1 else "")
+    return {FIELD: text}, words
+
+
+def _text(rows: dict[str, Floats], every: int) -> str:
+    """The field of every so many rows."""
+    return msgspec.json.encode({name: column[::every].tolist() for name, column in rows.items()}).decode()
+
+
+def card_of(estimates: Sequence[Estimate], truth: ScoredPath) -> Scorecard | None:
+    """The scores of estimates, as `echostep score` gives them; None where they have no moment in common with the truth."""
+    try:
+        return score(track_of(estimates), truth).card if estimates else None
+    except EchostepError:
+        return None

@@ -21,7 +21,9 @@ from echostep_app.output.track_plot import draw_track
 from echostep_app.plan.places.whereabouts import Whereabouts
 from echostep_app.printing.console import console
 from echostep_app.printing.lines import as_error
-from echostep_app.scorecard.truth import Errors, Truth, errors
+from echostep_app.scorecard.card import Scorecard
+from echostep_app.scorecard.track_columns import ScoredPath
+from echostep_app.scorecard.truth import card_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +32,7 @@ class Result:
 
     title: str
     estimates: Sequence[Estimate]
-    truth: Truth | None = None
+    truth: ScoredPath | None = None
     elapsed_s: float | None = None
     losses: str = ""
     silent: Sequence[str] = ()
@@ -48,15 +50,15 @@ def write_results(folder: Path, tracker: Tracker, guided: CueList | None, result
 
     The picture comes last: drawing it takes longer than tracking a short walk.
     """
-    deviation = errors(result.estimates, result.truth) if result.truth else None
+    card = card_of(result.estimates, result.truth) if result.truth else None
     failure = _write_tables(folder, guided, result)
     for line in result.silent:
         console.print(line, markup=False, highlight=False)
     if result.estimates:
-        _print_summary(result, tracker.plan, deviation)
+        _print_summary(result, tracker.plan, card)
     undrawn = lacks("a picture", "matplotlib")
     if not undrawn:
-        failure = failure or _draw(folder, tracker, guided, result, deviation)
+        failure = failure or _draw(folder, tracker, guided, result, card)
     if not result.estimates:
         console.print(
             "No estimate: the foot never stood still, or no bytes of its sensor came; without one, no stride was seen."
@@ -83,10 +85,10 @@ def _write_tables(folder: Path, guided: CueList | None, result: Result) -> Echos
 
 
 def _draw(
-    folder: Path, tracker: Tracker, guided: CueList | None, result: Result, deviation: Errors | None
+    folder: Path, tracker: Tracker, guided: CueList | None, result: Result, card: Scorecard | None
 ) -> EchostepError | None:
     """Draw track.png; an error is returned."""
-    title = f"{result.title}: mean error {deviation.mean_m:.2f} m" if deviation else result.title
+    title = f"{result.title}: mean error {card.horizontal.mean_m:.2f} m" if card else result.title
     route = guided.route if guided else None
     beacons = tracker.beacon_places(result.estimates[-1].t_s) if result.estimates else []
     try:
@@ -96,24 +98,24 @@ def _draw(
     return None
 
 
-def summary_words(estimates: Sequence[Estimate], truth: Truth | None) -> str:
+def summary_words(estimates: Sequence[Estimate], truth: ScoredPath | None) -> str:
     """How well a run went, in a sentence for the page."""
     if not estimates:
         return "no position was found"
-    deviation = errors(estimates, truth) if truth else None
-    if deviation is None:
+    card = card_of(estimates, truth) if truth else None
+    if card is None:
         return f"{len(estimates)} positions in {estimates[-1].t_s - estimates[0].t_s:.0f} s"
-    return f"mean error {deviation.mean_m:.2f} m, at most {deviation.max_m:.2f} m"
+    return f"mean error {card.horizontal.mean_m:.2f} m, at most {card.horizontal.max_m:.2f} m"
 
 
-def _print_summary(result: Result, plan: Plan, deviation: Errors | None) -> None:
+def _print_summary(result: Result, plan: Plan, card: Scorecard | None) -> None:
     """The summary, a fact a line."""
-    if deviation is not None:
+    if card is not None:
+        h = card.horizontal
         console.print(
-            f"error: mean {deviation.mean_m:.2f} m, sd {deviation.sd_m:.2f}, max {deviation.max_m:.2f}, "
-            f"end {deviation.ending_m:.2f} m; RMSE {deviation.rmse_m:.2f} m"
+            f"error: mean {h.mean_m:.2f} m, sd {h.sd_m:.2f}, max {h.max_m:.2f}, end {h.ending_m:.2f} m; RMSE {h.rms_m:.2f} m"
         )
-        console.print(f"95 % ellipse: holds the truth {100 * deviation.coverage95:.0f} % of the time")
+        console.print(f"95 % ellipse: holds the truth {100 * (card.ellipse95_holds or 0.0):.0f} % of the time")
     estimates, end = result.estimates, result.estimates[-1]
     if result.losses:
         console.print(f"walk: {result.losses}", highlight=False)

@@ -37,7 +37,7 @@ from echostep_app.printing.console import console, print_notices
 from echostep_app.printing.people import FaultNews, outlast_output
 from echostep_app.printing.progress import progress_line
 from echostep_app.recording.recorder import DerivedMessage, Recorder
-from echostep_app.scorecard.truth import Truth
+from echostep_app.scorecard.track_columns import ScoredPath
 from echostep_app.session.browser import open_browser
 from echostep_app.session.chunk_streams import MessageSource
 from echostep_app.session.losses import Arrivals, Losses
@@ -93,6 +93,7 @@ class Session:
         self.estimates: list[Estimate] = []
         self.message_sources: list[MessageSource] = []  # what people and team send during the run
         self._publishing: Publishing | None = None
+        self._truth: ScoredPath | None = None
         self._drawing: SharedDrawing | None = None  # of a walk without a plan, for the team
         self._sinks: list[Sink] = []
         self._writers: list[Callable[[list[DerivedMessage]], None]] = []  # of what is derived from estimates
@@ -169,10 +170,11 @@ class Session:
             compile_parts([*TRACKING, *more], show)
             self.tracker.warm_up()
 
-    def show_truth(self, truth: TruePath) -> None:
-        """Show the true position beside the estimate, on the page."""
+    def show_truth(self, truth: ScoredPath | None) -> None:
+        """Show the true position beside the estimate, on the page, and compare with it at the end."""
+        self._truth = truth
         if self.page:
-            self.page.truth = truth
+            self.page.truth = TruePath.of(truth, self.tracker.plan)
 
     def _open_publishing(self, opened: ExitStack) -> None:
         if self.output.outlet is None:
@@ -277,17 +279,17 @@ class Session:
                 console.print(f"Longitude and latitude are left out: {words}", markup=False, highlight=False)
         return sinks
 
-    def finish(self, title: str, truth: Truth | None = None, elapsed_s: float | None = None) -> None:
+    def finish(self, title: str, elapsed_s: float | None = None) -> None:
         """Write track.csv, track.png and cues.csv and print a summary; raises EchostepError when a file cannot be written.
 
         The page shows the end of the run, and its summary.
         """
-        summary = summary_words(self.estimates, truth)
+        summary = summary_words(self.estimates, self._truth)
         for sink in self._sinks:
             sink.end(summary)
         losses = self.losses.describe(self.arrivals.worn_s)
         silent = [*self.arrivals.silent(), *self.tracker.streams.front_end.foot_doubts]
-        result = Result(title, self.estimates, truth, elapsed_s, losses, silent)
+        result = Result(title, self.estimates, self._truth, elapsed_s, losses, silent)
         write_results(self.output.folder, self.tracker, self.guided, result)
 
     def keep_page_open(self, again: str = "") -> None:

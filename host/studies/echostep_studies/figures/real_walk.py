@@ -28,7 +28,7 @@ from echostep.settings import parse_settings
 from echostep.tracker import Tracker
 from echostep.walk.table import write_track
 from echostep_app.output.track_plot import draw_track
-from echostep_app.scorecard.truth import load_truth
+from echostep_app.scorecard.track_columns import load_path
 from echostep_app.session.runs.recording import start_recording
 from echostep_studies.bench.recordings.foot_metrics import align, rmse
 from echostep_studies.bench.recordings.hallways import (
@@ -125,7 +125,7 @@ def main() -> int:
     from_start_m, aligned_m = foot_alone(walk, plan.start)
     write_track(options.out / "track.csv", estimates)
     title = f"{NAME}: real foot, echoes simulated; RMSE {error_m:.2f} m at the surveyed footprints"
-    draw_track(options.out / "track.png", plan, estimates, load_truth(options.out / "truth.csv"), title)
+    draw_track(options.out / "track.png", plan, estimates, load_path(options.out / "truth.csv", plan), title)
     console.print(f"{NAME}: {NOTE}.")
     console.print(f"2D RMSE at the {len(walk.print_t_s)} stride points, map frame, no alignment:")
     console.print(f"  foot alone       {from_start_m:.2f} m   ({aligned_m:.2f} m after rigid alignment)")

@@ -32,7 +32,7 @@ def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any, tmp
     t_s = np.arange(0.0, 20.0, 0.1)
     tracker, chunks = Tracker(PLAN, seed=1), walk_chunks()
     with LivePage(tracker, "echostep demo (simulated, 4 x real time)", LOCAL, keeps=True) as live:
-        live.truth = TruePath(np.column_stack([t_s, 2.0 + 0.5 * t_s, 7.5 + 0.0 * t_s, 0.0 * t_s]), np.array([0.0]))
+        live.truth = TruePath(np.column_stack([t_s, 2.0 + 0.5 * t_s, 7.5 + 0.0 * t_s, 0.0 * t_s]))
         page = opened_page(browser, viewport=SIZES[size])
         page.goto(live.url)
         for k in range(0, len(chunks), 20):

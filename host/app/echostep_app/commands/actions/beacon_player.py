@@ -22,7 +22,7 @@ from echostep_app.ports.datagram_key import seal
 from echostep_app.ports.port_faults import PORT_FAULTS
 from echostep_app.ports.udp import key_of
 from echostep_app.printing.console import console
-from echostep_app.scorecard.truth import load_truth
+from echostep_app.scorecard.track_columns import load_path
 from echostep_app.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
 
 BAUD = 115200
@@ -44,7 +44,8 @@ def simulate_gateway(
 
     `walk_s`: the time of a walk that is played elsewhere, with which the frames keep step; None: `pace` times as fast as real time.
     """
-    plan, truth = open_limited(plan_path), load_truth(truth_path)
+    plan = open_limited(plan_path)
+    truth = load_path(truth_path, plan)
     send, close = _open_sender(to)
     beacons_m = lay_beacons(truth.xy_m, spacing_m, np.random.default_rng([seed, 8]))
     arrival_ns = np.rint(truth.t_s * 1e9).astype(np.int64)

@@ -32,6 +32,7 @@ from echostep_app.printing.lines import complain
 from echostep_app.printing.people import is_unread
 from echostep_app.recording.capture_summary import summary
 from echostep_app.recording.names import new_name
+from echostep_app.scorecard.truth import load_truth, truth_field
 from echostep_app.session.metadata import version_metadata
 from echostep_app.session.options import OutputOptions, TrackingOptions
 from echostep_app.session.results import output_folder
@@ -40,12 +41,16 @@ from echostep_app.session.runs.replay import replay
 SCALE_RANGE = (0.5, 2.0)  # of --scale: beyond it the lengths of the leg are wrong
 
 
-def import_foot(path: Path, out: Path, naming: Naming = OWN, beside: Beside | None = None) -> None:
-    """Make a recording of a foot IMU's file."""
-    imu = _told(path, naming)
-    console.print(
-        f"{path.name}: {import_imu(imu, path.name, out, version_metadata(), beside or Beside())}", markup=False
-    )
+def import_foot(
+    path: Path, out: Path, naming: Naming = OWN, beside: Beside | None = None, truth: Path | None = None
+) -> None:
+    """Make a recording of a foot IMU's file, with the true path in it where there is one."""
+    imu, about = _told(path, naming), version_metadata()
+    if truth is not None:
+        field, words = truth_field(load_truth(truth, None), imu.t_s, path.name)
+        about |= field
+        console.print(words, markup=False)
+    console.print(f"{path.name}: {import_imu(imu, path.name, out, about, beside or Beside())}", markup=False)
     console.print(f"recording: {out}", markup=False)
 
 
@@ -55,8 +60,8 @@ def foot_on_plan(
     """Track a foot IMU's file on a plan: the recording and its results go into the folder."""
     output_folder(folder)
     recording = new_name(folder / f"{path.stem}.mcap")
-    import_foot(path, recording, naming)
-    replay([recording], TrackingOptions(plan, start), truth, OutputOptions(folder, terminal=False))
+    import_foot(path, recording, naming, truth=truth)
+    replay([recording], TrackingOptions(plan, start), None, OutputOptions(folder, terminal=False))
 
 
 def _told(path: Path, naming: Naming) -> Imu:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`echostep score`: tracks against the truth, by published metrics.
 
-In: CSV files, a plan. Out: a table, JSON or an HTML page. Owns nothing.
+In: CSV files, recordings, a plan. Out: a table, JSON or an HTML page. Owns nothing.
 """
 
 from __future__ import annotations
@@ -14,6 +14,9 @@ from pathlib import Path
 
 from rich.markup import escape
 
+from echostep.errors import EchostepError
+from echostep.plan import NO_PLAN, Plan
+from echostep.walk.walk import replay
 from echostep_app.output.score_page import ScoreReport, page, short_names
 from echostep_app.output.table import Table
 from echostep_app.plan.importers.limited import open_limited
@@ -21,22 +24,28 @@ from echostep_app.printing.console import console_for_people
 from echostep_app.printing.lines import as_error, complain, say
 from echostep_app.scorecard.card import score as score_track
 from echostep_app.scorecard.definitions import METRICS, as_text, notes
-from echostep_app.scorecard.track_columns import load_path
+from echostep_app.scorecard.track_columns import ScoredPath, load_path, track_of
+from echostep_app.scorecard.truth import is_recording, load_truth
+from echostep_app.session.metadata import start_given
+from echostep_app.session.options import TrackingOptions
 
 
 def score(
     tracks: Sequence[Path],
-    truth: Path,
-    plan_path: Path | None,
+    truth: Path | None,
+    tracking: TrackingOptions,
     html: Path | None,
     setup_s: float | None,
     *,
     as_json: bool,
 ) -> None:
     """Print the scores as a table, or as JSON; write them to a page. Raises EchostepError."""
-    plan = open_limited(plan_path) if plan_path else None
-    true = load_path(truth, plan)
-    loaded = [load_path(path, plan) for path in tracks]
+    plan = open_limited(tracking.plan_path) if tracking.plan_path else None
+    truth = truth or next((path for path in tracks if is_recording(path)), None)
+    if truth is None:
+        raise EchostepError("the true path is missing: give it with --truth FILE, or score a recording that carries it")
+    true = load_truth(truth, plan)
+    loaded = [_track(path, plan, tracking) for path in tracks]
     scored = [score_track(track, true, plan, setup_s) for track in loaded]
     report = ScoreReport(scored, short_names(tracks), truth.name, plan)
     if as_json:
@@ -50,6 +59,13 @@ def score(
     if html:
         _write(html, page(report))
         (complain if as_json else say)(f"page: {html}")
+
+
+def _track(path: Path, plan: Plan | None, tracking: TrackingOptions) -> ScoredPath:
+    """A file's track, or that of a recording, which is tracked again."""
+    if not is_recording(path):
+        return load_path(path, plan)
+    return track_of(replay(path, plan, start=start_given(tracking, plan or NO_PLAN)).estimates, str(path))
 
 
 def _table(report: ScoreReport) -> Table:

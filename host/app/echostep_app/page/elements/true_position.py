@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The true position beside the estimate, where it is known: in a simulation, or measured otherwise.
 
-In: rows of the truth. Out: `TruePosition` at a time. Owns nothing.
+In: the truth. Out: `TruePosition` at a time. Owns nothing.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.plan import Plan
+from echostep_app.scorecard.track_columns import ScoredPath
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,18 +26,19 @@ class TruePosition:
 
 @dataclass(frozen=True, slots=True)
 class TruePath:
-    """`rows` (n, 4): t_s, x, y, height of the floor; `heights_m` (k,) of the plan's levels."""
+    """`rows` (n, 4): t_s, x, y, index of the level."""
 
     rows: Floats
-    heights_m: Floats
 
     @classmethod
-    def of(cls, truth: Floats, plan: Plan) -> TruePath:
-        """From rows (n, 5) of t_s, x, y, heading_rad, height."""
-        return cls(truth[:, [0, 1, 2, 4]], np.array([level.height_m for level in plan.levels]))
+    def of(cls, truth: ScoredPath | None, plan: Plan) -> TruePath | None:
+        """Of a true path that was loaded with the plan; None without one, and where it is not known on which level it is."""
+        if truth is None or truth.level is None or not np.isin(truth.level, np.arange(len(plan.levels))).all():
+            return None
+        return cls(np.column_stack([truth.t_s, truth.xy_m, truth.level]))
 
     def at(self, t_s: float) -> TruePosition:
         """The position at a time, linear between the rows."""
-        t, x, y, z = self.rows.T
-        level = int(np.argmin(np.abs(self.heights_m - np.interp(t_s, t, z))))
-        return TruePosition(float(np.interp(t_s, t, x)), float(np.interp(t_s, t, y)), level)
+        t, x, y, level = self.rows.T
+        row = max(int(np.searchsorted(t, t_s, side="right")) - 1, 0)
+        return TruePosition(float(np.interp(t_s, t, x)), float(np.interp(t_s, t, y)), int(level[row]))

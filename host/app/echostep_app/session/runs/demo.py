@@ -22,7 +22,6 @@ from echostep.tracker import Tracker
 from echostep.walk.recorded import SIMULATED
 from echostep_app.interruption import until_asked
 from echostep_app.kernel_parts import Part
-from echostep_app.page.elements.true_position import TruePath
 from echostep_app.plan.importers.limited import open_limited
 from echostep_app.printing.console import console, print_notices
 from echostep_app.printing.progress import progress_line
@@ -128,14 +127,14 @@ def _track(
                 celsius=options.celsius,
             )  # fmt: skip
         scenario.write_truth(claim(output.folder / "truth.csv"))
-        session.show_truth(TruePath.of(scenario.truth, plan))
+        session.show_truth(load_truth(output.folder / "truth.csv", plan))
         metadata = run_metadata(plan, start, options.seed, "simulated walk, simulated sensors", source=SIMULATED)
         with start_recording(output.folder / "walk.mcap", metadata) as recorder:
             chunks = with_beacons(scenario, plan, options.seed) if options.guide else scenario.chunks()
             portions = _portions(chunks, session, recorder, speed)
             session.track(until_asked(portions), lambda: scenario.fraction, recorder)
         print_notices(recorder.notices)
-        session.finish("simulated walk", load_truth(output.folder / "truth.csv"))
+        session.finish("simulated walk")
         session.keep_page_open(_again(recorder.path, options))
     recorder.check_whole()
 

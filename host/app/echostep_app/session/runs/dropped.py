@@ -16,7 +16,7 @@ from pathlib import Path
 from echostep.errors import EchostepError, words_of
 from echostep.localization import Estimate
 from echostep.plan import NO_PLAN, Plan, load_plan
-from echostep.recording import MCAP_MAGIC, open_parts
+from echostep.recording import open_parts
 from echostep.tracker import Tracker
 from echostep.walk.recorded import shown_name
 from echostep_app.interruption import is_asked, until_asked
@@ -29,6 +29,7 @@ from echostep_app.page.web.addresses import print_page
 from echostep_app.page.web.uploads import Uploads
 from echostep_app.plan.importers.limited import open_limited
 from echostep_app.printing.console import console, print_notices
+from echostep_app.scorecard.truth import is_recording
 from echostep_app.session.browser import open_browser
 from echostep_app.session.options import TrackingOptions
 from echostep_app.session.results import summary_words
@@ -59,9 +60,7 @@ class DroppedFiles:
 
     def open_file(self, path: Path) -> str:
         """Take a recording or a plan; raises EchostepError for a file that is neither."""
-        with path.open("rb") as file:
-            is_recording = file.read(len(MCAP_MAGIC)) == MCAP_MAGIC
-        if not is_recording:
+        if not is_recording(path):
             self._plan = open_limited(path)
             _remove(path)
             return self._play(self._plan) if self._recording else f"{self._plan.name}: now drop a recording."

@@ -18,7 +18,7 @@ from echostep.walk.recorded import is_simulated, shown_name
 from echostep_app.interruption import until_asked
 from echostep_app.printing.console import console
 from echostep_app.printing.progress import with_bar
-from echostep_app.scorecard.truth import load_truth
+from echostep_app.scorecard.truth import load_truth, recorded_truth
 from echostep_app.session.chunk_streams import paced, portions_of
 from echostep_app.session.losses import skipped
 from echostep_app.session.metadata import check_start, plan_of, start_given
@@ -35,7 +35,7 @@ def replay(paths: Sequence[Path], tracking: TrackingOptions, truth_path: Path | 
     path = recording.path
     if other := plan_note(plan, recording):
         console.print(other, markup=False)
-    truth = load_truth(truth_path) if truth_path else None
+    truth = load_truth(truth_path, plan) if truth_path else recorded_truth(recording, plan)
     tracker = tracker_of(recording, plan, tracking)
     check_start(plan, tracker.start, given=tracking.start is not None, recorded="start_x_y_rad" in recording.metadata)
     output_folder(output.folder)
@@ -51,6 +51,7 @@ def replay(paths: Sequence[Path], tracking: TrackingOptions, truth_path: Path | 
         recording,
     ) as session:
         session.prepare()
+        session.show_truth(truth)
         start_s = time.perf_counter()
         portions = recording.portions()
         if output.foxglove:  # a viewer shows what comes, so it comes as it came
@@ -61,7 +62,7 @@ def replay(paths: Sequence[Path], tracking: TrackingOptions, truth_path: Path | 
         elapsed_s = time.perf_counter() - start_s
         for line in skipped(recording, tracker.streams):
             console.print(line, markup=False, highlight=False)
-        session.finish(path.name, truth, elapsed_s)
+        session.finish(path.name, elapsed_s)
         session.keep_page_open()
 
 
