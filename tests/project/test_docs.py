@@ -234,27 +234,6 @@ def test_the_plans_of_the_manual_load(tmp_path: Path, page: str, walls: int) -> 
 
 
 @pytest.mark.long
-def test_the_tutorials_commands_run_in_their_order(tmp_path: Path) -> None:
-    tutorial = ROOT / "host/docs/tutorial.md"
-    (tmp_path / "host").symlink_to(ROOT / "host")
-    (plan,) = blocks(tutorial, "json")
-    (tmp_path / "plan.json").write_text(plan)
-    printed: dict[str, str] = {}
-    for line in "".join(blocks(tutorial, "sh")).splitlines():
-        program, *arguments = shlex.split(line)
-        assert program == "echostep"
-        done = echostep(*arguments, cwd=tmp_path)
-        assert done.returncode == 0, f"{line}\n{done.stderr}"
-        printed[arguments[0]] = printed.get(arguments[0], "") + done.stdout
-    assert set(printed) == {"demo", "info", "replay", "cut", "export", "plan", "map"}
-    assert "/estimate" in printed["info"]
-    sha = re.compile(r"sha256 (\w{16})")
-    assert sha.findall(printed["demo"])[0] == sha.findall(printed["replay"])[0]
-    for name in ("first/track.png", "first/walk.mcap", "piece/track.csv", "track.parquet", "view.mcap", "plan.png"):
-        assert (tmp_path / "out" / name).stat().st_size > 1000
-
-
-@pytest.mark.long
 @needs_broker
 def test_the_commands_for_a_team_run(tmp_path: Path) -> None:
     (block,) = blocks(ROOT / "host/docs/teams.md", "sh")

@@ -3,15 +3,12 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ezdxf.filemanagement import new
 
 import echostep
-from board_runs import ROOT
 from command_line import echostep as run
 from echostep.errors import EchostepError
 from echostep.localization import digest
@@ -64,22 +61,6 @@ def test_two_commands_track_a_file_on_a_plan(walk: Imu, tmp_path: Path) -> None:
 def test_times_in_milliseconds_and_gaps_give_the_rate() -> None:
     t_s = np.round(np.arange(3000) / 204.8, 3)
     assert rate_of(np.delete(t_s, np.s_[800:1000])) == pytest.approx(204.8, rel=1e-3)
-
-
-@pytest.mark.process
-def test_the_readmes_command_draws_a_walk_on_a_dxf(walk: Imu, tmp_path: Path) -> None:
-    """A hall of 24 by 12 m, its walls in pieces of 4 m."""
-    drawing = new(units=6)
-    for k in range(0, 24, 4):
-        for wall in ((k, 0, k + 4, 0), (k, 12, k + 4, 12), *([(x, k, x, k + 4) for x in (0, 24)] if k < 12 else [])):
-            drawing.modelspace().add_line(wall[:2], wall[2:], {"layer": "A-WALL"})
-    drawing.saveas(tmp_path / "building.dxf")
-    write(tmp_path / "imu.csv", walk)
-    (line,) = re.findall(r"^echostep (foot .*)$", (ROOT / "README.md").read_text(), flags=re.M)
-    tracked = run(*line.split(), cwd=tmp_path)
-    assert tracked.returncode == 0, tracked.stderr
-    assert {path.suffix for path in (tmp_path / "out/foot").iterdir()} >= {".mcap", ".csv", ".png"}
-    assert "files: track.csv and track.png in out/foot" in tracked.stdout
 
 
 def test_ranges_pressure_and_legs_beside_are_recorded_and_used(walk: Imu, tmp_path: Path) -> None:
