@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -135,7 +136,7 @@ def test_names_and_units_of_any_file_are_given(table: np.ndarray, tmp_path: Path
     (None, "g,mg", "--units g,mg: two units of one quantity"),
     ("t_s=clock", None, "a.csv: --columns t_s=clock: no column clock; there are time, acc_x"),
     (None, "hPa", "a.csv: --units hPa: no column has such a unit"),
-    (None, None, "no column ax, ay, az, gx, gy, gz; there are t_s, acc_x, acc_y, acc_z, gyr_x, gyr_y, gyr_z; other names: --columns OURS"),
+    (None, None, "no column ax, ay, az, gx, gy, gz; there are t_s, acc_x, acc_y, acc_z, gyr_x, gyr_y, gyr_z; by their titles: --columns t_s=time,ax"),
 ])  # fmt: skip
 def test_what_does_not_fit_is_one_line_that_names_it(
     columns: str | None, units: str | None, said: str, tmp_path: Path
@@ -146,6 +147,45 @@ def test_what_does_not_fit_is_one_line_that_names_it(
     assert done.returncode == 2
     assert said in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+def axes(*names: str) -> str:
+    return ",".join(name.format(letter) for name in names for letter in "XYZ")
+
+
+@pytest.mark.parametrize(("titles", "factors"), [
+    (f"Timestamp (ms),{axes('Acc_{} [g]', 'Gyr_{} [deg/s]')},Temp", (1e3, 1 / G, 180 / np.pi)),
+    (f"time,{axes('Acc{}', 'w{} (deg/s)')}", (1, 1, 180 / np.pi)),
+    (f"time_us,{axes('accelerometer_{}', 'gyroscope_{}')}", (1e6, 1, 1)),
+    (f"time,{axes('acc_{}_g', 'gyro_{}_dps')},{axes('LinAcc{}', 'Mag{}')}", (1, 1 / G, 180 / np.pi)),
+    (f"%time,{axes('field.linear_acceleration.{}', 'field.angular_velocity.{}')}", (1, 1, 1)),
+])  # fmt: skip
+def test_the_options_that_a_file_needs_are_proposed_by_its_titles(
+    titles: str, factors: tuple[float, ...], table: np.ndarray, tmp_path: Path
+) -> None:
+    scale = np.repeat(factors, (1, 3, 3))
+    rows = np.hstack([table * scale, np.zeros((len(table), titles.count(",") - 6))])
+    path = write(tmp_path / "a.csv", titles, rows)
+    refused = echostep("foot", path, cwd=tmp_path)
+    assert refused.returncode == 2
+    options = refused.stderr.partition("by their titles: ")[2]
+    assert options, refused.stderr
+    done = echostep("foot", path, *shlex.split(options), cwd=tmp_path)
+    assert "6 steps" in done.stdout, done.stderr
+
+
+@pytest.mark.parametrize(("titles", "said"), [
+    (f"time,{axes('LinAcc{}', 'Gyro{}')}", "LinAccX is without gravity, which a track needs: record the accelerometer itself"),
+    (f"time,timestamp,{axes('Acc{}', 'Gyro{}')}", "other names: --columns OURS=THEIRS"),
+    (f"time,{axes('Acc{} (LSB)', 'Gyro{}')}", "other names: --columns OURS=THEIRS"),
+    (f"time,{axes('Acc{}', 'Acc.{}', 'Gyro{}')}", "other names: --columns OURS=THEIRS"),
+    ("time,Acc X (g),AccY (m/s2),AccZ (g),GyroX,GyroY,GyroZ", "other names: --columns OURS=THEIRS"),
+])  # fmt: skip
+def test_titles_that_are_not_certain_are_not_proposed(titles: str, said: str, tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", titles, np.zeros((9, titles.count(",") + 1)))
+    refused = echostep("foot", path, cwd=tmp_path)
+    assert said in refused.stderr
+    assert "by their titles" not in refused.stderr
 
 
 def test_a_line_is_named_by_its_number_in_the_file_below_a_preamble(tmp_path: Path) -> None:

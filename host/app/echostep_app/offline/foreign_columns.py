@@ -23,6 +23,7 @@ import numpy as np
 from echostep.errors import EchostepError
 from echostep.offline.csv_table import column_of, header_of
 from echostep.offline.header import Header
+from echostep_app.offline.proposed_columns import proposal
 
 # Quantity and factor to the SI unit of each unit; standard gravity [CGPM 1901].
 UNITS = {
@@ -126,7 +127,8 @@ def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
     counts_hz, period = _counter(columns.get("t_s"), above)
     names = _renamed(theirs, columns) if columns else names
     factors = _factors(names, theirs, units)
-    return Header(names, separator, len(above) + 1, factors, counts_hz, period, notes, ADVICE)
+    advice = ("" if naming.columns else proposal(theirs)) or ADVICE
+    return Header(names, separator, len(above) + 1, factors, counts_hz, period, notes, advice)
 
 
 def _preamble(lines: Iterator[str]) -> tuple[list[str], str]:
