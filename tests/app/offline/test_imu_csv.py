@@ -44,6 +44,13 @@ def gliding(t: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return np.column_stack([t, samples + rng.standard_normal(samples.shape) * np.repeat([0.03, 0.006], 3)])
 
 
+def rolling(t: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A wheelchair that gains 1 m/s in 2 s, and brakes as long before the end."""
+    push = 0.5 * ((t > 3.0) & (t < 5.0)) - 0.5 * ((t > t[-1] - 5.0) & (t < t[-1] - 3.0))
+    samples = np.column_stack([push, 0 * t, 9.81 + 0 * t, 0 * t, 0 * t, 0 * t])
+    return np.column_stack([t, samples + rng.standard_normal(samples.shape) * np.repeat([0.03, 0.006], 3)])
+
+
 def write(folder: Path, table: np.ndarray, header: str = HEADER) -> Path:
     path = folder / "imu.csv"
     np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.13g")
@@ -156,6 +163,7 @@ def test_what_can_be_mended_is_said_and_the_track_is_right_or_known_to_be_less_c
             "never still in these",
         ),
         (lambda t, r: gliding(t[:, 0], r), "never still: it seems to stand"),
+        (lambda t, r: rolling(t[:, 0], r), "s, yet the sensor moved, as on wheels"),
         (lambda t, _r: t * [1, 1, 1, 1, 1, -1, 1], "are the units"),  # left-handed
         (lambda t, _r: np.column_stack([t[:, :4], np.radians(t[:, 4:])]), "are the units"),  # converted twice
         (lambda t, _r: t[:, [0, 1, 2, 3, 5, 4, 6]], "are the units"),  # gx and gy swapped

@@ -67,6 +67,8 @@ def write_results(folder: Path, tracker: Tracker, guided: CueList | None, result
         raise failure
     if not result.estimates:
         return
+    if not result.estimates[-1].step:
+        console.print("No step was seen: the foot lay still or glided, as on wheels; it must stand in each step.")
     drawn = "" if undrawn else " and track.png"
     console.print(f"files: track.csv{drawn} in {folder}")
     if undrawn:

@@ -19,6 +19,7 @@ from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import OutputFormats
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.foreign_columns import OWN, Naming
+from echostep_app.offline.gliding import refuse_glide
 from echostep_app.offline.importing import Beside, import_imu
 from echostep_app.offline.leg_csv import load_pair
 from echostep_app.offline.leg_lengths import calibrated_scale, checked_lengths
@@ -75,7 +76,9 @@ def _told(path: Path, naming: Naming) -> Imu:
 def foot(path: Path, out: Path, profile: str, picture: Path | None, naming: Naming = OWN) -> None:
     """Track a recorded foot IMU with this project's method or that of a paper."""
     track_recording = method("foot", profile, own_track)
-    track = track_recording(_told(path, naming), path.name)
+    imu = _told(path, naming)
+    track = track_recording(imu, path.name)
+    refuse_glide(imu, track, path.name)
     write_foot_track(out, track)
     console.print(f"{path.name}: {describe_track(track)}")
     if picture is not None:
