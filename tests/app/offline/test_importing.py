@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ezdxf.filemanagement import new
 
 import echostep
 from command_line import echostep as run
@@ -56,6 +57,28 @@ def test_two_commands_track_a_file_on_a_plan(walk: Imu, tmp_path: Path) -> None:
     end = first.estimates[-1]
     assert end.x_m == pytest.approx(1.0, abs=0.5)
     assert end.y_m > 10.0
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(("plan", "start", "said"), [
+    ("plan.json", (), "No start is known, so the walk is sought anywhere: --start X,Y,DEG gives it."),
+    ("plan.json", ("--start", "1,2,0"), "the steps did not fit the plan: are start and heading right?"),
+    ("plan.json", ("--start", "30,2,90"), "--start 30,2,90: it is outside the building: the nearest possible place is 8."),
+    ("plan.dxf", ("--start", "1,2,90"), "echostep plan import plan.dxf -o plan.json --units "),
+])  # fmt: skip
+def test_what_a_newcomer_does_wrong_is_told(
+    walk: Imu, tmp_path: Path, plan: str, start: tuple[str, ...], said: str
+) -> None:
+    write(tmp_path / "imu.csv", walk)
+    hall(tmp_path / "plan.json")
+    drawing = new(units=0)
+    for wall in ((0, 0, 24, 0), (24, 0, 24, 12), (24, 12, 0, 12), (0, 12, 0, 0)):
+        drawing.modelspace().add_line(wall[:2], wall[2:], {"layer": "A-WALL"})
+    drawing.saveas(tmp_path / "plan.dxf")
+    done = run("foot", "imu.csv", "--plan", plan, *start, cwd=tmp_path)
+    assert said in done.stdout + done.stderr
+    assert done.returncode in (0, 2)
+    assert (tmp_path / "out").exists() == (done.returncode == 0)  # nothing is left of what was refused
 
 
 def test_times_in_milliseconds_and_gaps_give_the_rate() -> None:

@@ -24,6 +24,7 @@ LONGEST_S = 10.0  # between two estimates; a longer gap counts as so long: estim
 UNTRACKED_S = 5.0  # without an estimate, which is told: the first stride takes as long; assumed
 SILENT = "nothing came from the foot"
 UNFITTING = "the echoes did not fit the plan"
+UNFITTING_STEPS = "the steps did not fit the plan: are start and heading right?"
 ECHOLESS = "there were no echoes"
 SPREAD = "several places fitted"
 DRIFTED = "without a plan nothing corrects the drift"
@@ -41,6 +42,7 @@ class Losses:
         self._spent_s: dict[TrackStatus, Counter[str]] = {status: Counter() for status in TrackStatus}
         self._last: Estimate | None = None
         self._ping_s = 0.0  # time of the newest ping
+        self._heard = False  # whether there was one
         self._check_ins: dict[int, float] = {}  # number of a check-in: time of the estimate that it gave
         tracker.watchers.append(self._watch)
 
@@ -51,7 +53,7 @@ class Losses:
         if state.check_ins and state.check_ins not in self._check_ins:
             self._check_ins[state.check_ins] = e.t_s
         if measured is not None and len(measured.t_s):
-            self._ping_s = float(measured.t_s[-1])
+            self._ping_s, self._heard = float(measured.t_s[-1]), True
         if last is None:
             self._ping_s = max(self._ping_s, e.t_s)
             return
@@ -67,7 +69,8 @@ class Losses:
             return DRIFTED
         if state.right < PROBABLE:
             since = [t_s for t_s in self._check_ins.values() if t_s < e.t_s]
-            return f"{UNFITTING} after the position was set by hand at {since[-1]:.0f} s" if since else UNFITTING
+            unfitting = UNFITTING if self._heard else UNFITTING_STEPS
+            return f"{unfitting} after the position was set by hand at {since[-1]:.0f} s" if since else unfitting
         return ECHOLESS if e.t_s - self._ping_s > ECHOLESS_S else SPREAD
 
     def describe(self, worn_s: float = 0.0) -> str:

@@ -34,7 +34,7 @@ from echostep_app.printing.people import is_unread
 from echostep_app.recording.capture_summary import summary
 from echostep_app.recording.names import new_name
 from echostep_app.scorecard.truth import load_truth, truth_field
-from echostep_app.session.metadata import version_metadata
+from echostep_app.session.metadata import check_start, plan_of, start_given, version_metadata
 from echostep_app.session.options import OutputOptions, TrackingOptions
 from echostep_app.session.results import output_folder
 from echostep_app.session.runs.replay import replay
@@ -58,11 +58,14 @@ def import_foot(
 def foot_on_plan(
     path: Path, folder: Path, plan: Path, start: str | None, truth: Path | None, naming: Naming = OWN
 ) -> None:
-    """Track a foot IMU's file on a plan: the recording and its results go into the folder."""
+    """Track a foot IMU's file on a plan: the recording and its results go into the folder. A wrong plan or start leaves none."""
+    tracking = TrackingOptions(plan, start)
+    on = plan_of(tracking)
+    check_start(on, start_given(tracking, on), given=True)
     output_folder(folder)
     recording = new_name(folder / f"{path.stem}.mcap")
     import_foot(path, recording, naming, truth=truth)
-    replay([recording], TrackingOptions(plan, start), None, OutputOptions(folder, terminal=False))
+    replay([recording], tracking, None, OutputOptions(folder, terminal=False), on)
 
 
 def _told(path: Path, naming: Naming) -> Imu:

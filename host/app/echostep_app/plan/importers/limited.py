@@ -34,7 +34,11 @@ def open_limited(path: Path | str) -> Plan:
     path = Path(path)
     if not is_foreign(path):
         return load_plan(path)
-    plan, report = import_reported(path)
+    try:
+        plan, report = import_reported(path)
+    except EchostepError as error:  # other commands have no options for it
+        hint = f"make a plan of it with echostep plan import {path} -o plan.json --"
+        raise EchostepError(str(error).replace("give --", hint)) from error
     for doubt in report.doubts:
         print(f"{path}: note: {doubt}", file=sys.stderr)
     return plan

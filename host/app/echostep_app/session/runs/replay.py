@@ -29,15 +29,27 @@ from echostep_app.session.session import Session
 VIEWED_PORTION = 8  # chunks tracked at once while a viewer looks on: about 10 ms
 
 
-def replay(paths: Sequence[Path], tracking: TrackingOptions, truth_path: Path | None, output: OutputOptions) -> None:
-    """Track a recording, in one file or in parts; start, settings and seed are the recorded ones unless `tracking` gives others."""
-    recording, plan = open_parts(paths), plan_of(tracking)
+def replay(
+    paths: Sequence[Path],
+    tracking: TrackingOptions,
+    truth_path: Path | None,
+    output: OutputOptions,
+    opened: Plan | None = None,
+) -> None:
+    """Track a recording, in one file or in parts; start, settings and seed are the recorded ones unless `tracking` gives others.
+
+    `opened`: its plan, where it is open already.
+    """
+    recording, plan = open_parts(paths), opened or plan_of(tracking)
     path = recording.path
     if other := plan_note(plan, recording):
         console.print(other, markup=False)
     truth = load_truth(truth_path, plan) if truth_path else recorded_truth(recording, plan)
     tracker = tracker_of(recording, plan, tracking)
     check_start(plan, tracker.start, given=tracking.start is not None, recorded="start_x_y_rad" in recording.metadata)
+    known = plan.start or tracking.start or {"start", "start_x_y_rad"} & recording.metadata.keys()
+    if plan.is_drawn and not known:
+        console.print("No start is known, so the walk is sought anywhere: --start X,Y,DEG gives it.")
     output_folder(output.folder)
     if note := recording.metadata.get("note"):
         console.print(f"Recording: {note}")
