@@ -35,8 +35,8 @@ TABLES = {  # columns that such a table has, and what it is
     leg_csv.COLUMNS: "samples of a leg: echostep legs FILE tracks them",
     leg_csv.AXES["thigh_rad_s"]: "samples of a leg: echostep legs FILE tracks them",
     ("t_s", "pressure_pa"): "samples of a barometer: echostep floors FILE finds the storeys",
-    ("x_m", "y_m"): "a track: echostep score FILE TRUTH compares it with the truth",
-    ("x", "y"): "a track: echostep score FILE TRUTH compares it with the truth",
+    ("x_m", "y_m"): "a track: echostep score FILE --truth TRUTH compares it with the truth",
+    ("x", "y"): "a track: echostep score FILE --truth TRUTH compares it with the truth",
 }
 MOST_NAMES = 12  # columns that are named
 
