@@ -17,7 +17,7 @@ from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep_app.cli import app
 from echostep_app.commands import studies
-from echostep_app.offline import profiles
+from echostep_app.commands.actions import offline as profiles
 from echostep_studies.commands import OURS, PAPERS, REAL, STUDIES, StudyCommand
 
 PACKAGE = ROOT / "host/studies/echostep_studies"

@@ -40,7 +40,7 @@ WRITER = """
 import os, struct, sys, time
 from pathlib import Path
 from echostep.ports.chunks import Chunk
-from echostep_app.session.runs.recording import start_recording
+from echostep_app.session.metadata import start_recording
 from echostep_app.output.foxglove import pose
 path, pipe = sys.argv[1], int(sys.argv[2])
 number, busy = 0, [(k * 7919) % 100_003 for k in range(100_003)]

@@ -36,10 +36,9 @@ from echostep_app.page.server import Address
 from echostep_app.ports.serial_ports import SerialPorts
 from echostep_app.recording.recorder import Recorder
 from echostep_app.session.chunk_streams import portions_of
-from echostep_app.session.metadata import clock_metadata, run_metadata
+from echostep_app.session.metadata import clock_metadata, run_metadata, start_recording
 from echostep_app.session.options import OutputOptions
 from echostep_app.session.runs.live import _recorded_chunks
-from echostep_app.session.runs.recording import start_recording
 from echostep_app.session.session import Session
 from echostep_app.simulation.devices.board import BoardProcess
 from places import OUT, PLAN, TWIN

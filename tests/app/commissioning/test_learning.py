@@ -18,12 +18,11 @@ from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import Settings, parse_settings
 from echostep_app.cli import app
-from echostep_app.commands.actions import learning
-from echostep_app.commands.actions.learning import learn_rangers
+from echostep_app.commands.actions import rangers as learning
+from echostep_app.commands.actions.rangers import learn_rangers
 from echostep_app.commissioning.rangers.poses import PosedPings
-from echostep_app.session.metadata import run_metadata
+from echostep_app.session.metadata import run_metadata, start_recording
 from echostep_app.session.options import TrackingOptions
-from echostep_app.session.runs.recording import start_recording
 from walks import DEMO
 
 LEARN = "[ranger]\nlearn = true\n\n[foot]\nheight_m = 0.07\n"

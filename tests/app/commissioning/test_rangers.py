@@ -30,9 +30,8 @@ from echostep_app.commissioning.rangers.known_pings import KnownPings, known_pin
 from echostep_app.commissioning.rangers.poses import PosedPings
 from echostep_app.commissioning.rangers.report import RangerReport, report
 from echostep_app.printing.console import console_for_people
-from echostep_app.session.metadata import run_metadata
+from echostep_app.session.metadata import run_metadata, start_recording
 from echostep_app.session.options import TrackingOptions
-from echostep_app.session.runs.recording import start_recording
 from echostep_app.simulation.devices.board import PythonBoard
 from echostep_app.simulation.scenario import demo_scenario
 from echostep_app.simulation.world.acoustics import PULSE_RANGER, SRF02, Acoustics

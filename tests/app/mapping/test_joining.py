@@ -21,8 +21,7 @@ from echostep_app.mapping.joining import doubt_of, join_walks
 from echostep_app.mapping.mapper import Mapped, solve_walk
 from echostep_app.mapping.placing import Place, find_place
 from echostep_app.plan.writer import save_plan
-from echostep_app.session.metadata import run_metadata
-from echostep_app.session.runs.recording import start_recording
+from echostep_app.session.metadata import run_metadata, start_recording
 from echostep_app.simulation.devices.board import PythonBoard
 from echostep_app.simulation.people.walker import Person
 from echostep_app.simulation.scenario import Scenario

@@ -17,7 +17,7 @@ from echostep.localization import digest
 from echostep.offline.imu_csv import Imu
 from echostep.plan import Pose, load_plan
 from echostep.recording import open_recording
-from echostep_app.page.elements.true_position import TruePath, TruePosition
+from echostep_app.page.elements.scene import TruePath, TruePosition
 from echostep_app.scorecard.truth import FIELD, load_truth, recorded_truth
 from foot.foot_walks import MANNERS, course, samples
 from offline.imu_files import hall, write

@@ -16,9 +16,9 @@ from echostep.legs.stride import Flag, Stride, StrideSettings
 from echostep.legs.strides import StrideEstimator
 from echostep.legs.walking_bout import Swing, leaving_share, stairs_flag
 from echostep_app.offline.leg_csv import LegSamples
+from echostep_app.offline.leg_gyros import walking_axis
 from echostep_app.offline.leg_side import HALF_PELVIS_M, about_trunk, distance_sd_m, leg_left_m
 from echostep_app.offline.leg_track import doubts, track_default
-from echostep_app.offline.mounting import walking_axis
 from echostep_app.simulation.people.walker import Person, Walk, Waypoint, walk
 from foot.foot_walks import any_rotation
 

@@ -19,7 +19,7 @@ from PIL import Image, ImageChops
 from board_runs import ROOT
 from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
-from echostep_app.page.elements.true_position import TruePath
+from echostep_app.page.elements.scene import TruePath
 from echostep_app.page.live import LivePage
 from echostep_app.simulation.devices.board import PythonBoard
 from echostep_app.simulation.scenario import demo_scenario

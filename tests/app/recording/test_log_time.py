@@ -12,11 +12,10 @@ from mcap.reader import make_reader
 from echostep.ports.chunks import Chunk
 from echostep.recording import open_parts, open_recording, utc_offset_ns
 from echostep.recording.mcap_records import METADATA_NAME
-from echostep_app.recording.numbered import numbered_recorder
 from echostep_app.recording.recorder import Recorder, begin_file
 from echostep_app.recording.repair.contents import info
 from echostep_app.recording.repair.edit import cut, repair
-from echostep_app.recording.splitting import SplitLimit
+from echostep_app.recording.splitting import SplitLimit, numbered_recorder
 
 STARTED_NS = 987_654_321_987
 CLOCK = {"started_utc": "2026-11-26T10:00:00.123+00:00", "started_ns": str(STARTED_NS)}

@@ -16,7 +16,7 @@ from echostep.recording import open_recording
 from echostep_app.recording import background_writer, names
 from echostep_app.recording.recorder import DerivedMessage, Recorder, Topic
 from echostep_app.recording.repair.edit import cut, repair
-from echostep_app.session.runs.recording import start_recording
+from echostep_app.session.metadata import start_recording
 from players import pseudo_terminal
 
 
@@ -96,7 +96,7 @@ def test_two_runs_in_one_second_get_two_names(tmp_path: Path, monkeypatch: pytes
     taken = names.new_name(wanted)
     taken.write_bytes(b"of another process")
     made = iter([taken, tmp_path / "walk-0002-20260101T000000Z.mcap"])
-    monkeypatch.setattr("echostep_app.recording.numbered.new_name", lambda _: next(made))
+    monkeypatch.setattr("echostep_app.recording.splitting.new_name", lambda _: next(made))
     assert record(wanted, b"new").name == "walk-0002-20260101T000000Z.mcap"
     assert taken.read_bytes() == b"of another process"
 

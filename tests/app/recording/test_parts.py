@@ -13,11 +13,10 @@ from echostep.ports.chunks import Chunk
 from echostep.recording import open_parts, open_recording
 from echostep_app.output.derived import PRESSURE
 from echostep_app.recording import names
-from echostep_app.recording.numbered import numbered_recorder
 from echostep_app.recording.recorder import DerivedMessage
 from echostep_app.recording.repair.contents import info
 from echostep_app.recording.repair.edit import repair
-from echostep_app.recording.splitting import SplitLimit, parse_split
+from echostep_app.recording.splitting import SplitLimit, numbered_recorder, parse_split
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(600)]
 THREE_S = SplitLimit(span_ns=3_000_000_000)

@@ -18,10 +18,9 @@ from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
 from echostep.walk.table import write_track
 from echostep_app.scorecard import csv_columns
-from echostep_app.scorecard.card import NO_ZONE, Scorecard, Zones, score
+from echostep_app.scorecard.card import GAP_S, NO_ZONE, Scorecard, Zones, score
 from echostep_app.scorecard.csv_columns import read_csv
 from echostep_app.scorecard.definitions import METRICS
-from echostep_app.scorecard.matching import GAP_S
 from echostep_app.scorecard.track_columns import load_path
 from echostep_app.scorecard.truth import card_of, load_truth
 from echostep_app.simulation.devices.board import PythonBoard

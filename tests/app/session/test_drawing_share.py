@@ -17,9 +17,8 @@ from echostep.plan import NO_PLAN, Plan, load_plan
 from echostep.ports.chunks import Chunk, Portion, portion_of
 from echostep.tracker import Tracker
 from echostep_app.page.server import Address
-from echostep_app.session.metadata import run_metadata
+from echostep_app.session.metadata import run_metadata, start_recording
 from echostep_app.session.options import OutputOptions
-from echostep_app.session.runs.recording import start_recording
 from echostep_app.session.session import Session
 from echostep_app.session.team import teammate_feed
 from echostep_app.simulation.devices.board import PythonBoard

@@ -12,7 +12,7 @@ from echostep.arrays import Floats
 from echostep.legs.clipping import ClippingRepair
 from echostep.legs.stride import StrideSettings
 from echostep.legs.strides import StrideEstimator
-from echostep_app.offline.clipped_rates import find_clipping_limits, repair_clipping
+from echostep_app.offline.leg_gyros import find_clipping_limits, repair_clipping
 from echostep_studies.simulation.joint_gait import FAST, draw_person, simulate_gait
 
 LIMIT = math.radians(300.0)

@@ -18,8 +18,7 @@ from echostep.legs.strides import StrideEstimator
 from echostep_app.cli import app
 from echostep_app.offline.leg_csv import LegSamples, load_legs
 from echostep_app.offline.leg_side import distance_sd_m
-from echostep_app.offline.leg_summary import describe_legs
-from echostep_app.offline.leg_track import track_default
+from echostep_app.offline.leg_track import describe_legs, track_default
 from echostep_app.simulation.people.leg_angles import LegDimensions
 from echostep_app.simulation.people.walker import Person, Waypoint, walk
 from echostep_studies.papers.profiles import track_lee2010

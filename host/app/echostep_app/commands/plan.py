@@ -94,7 +94,7 @@ def import_(
     picture: Annotated[bool, typer.Option("--picture/--no-picture", help="Draw the plan as PNG, beside it.")] = True,
 ) -> None:
     """Make a plan of a building that is drawn in another format, and show what came in and what was left out."""
-    from echostep_app.commands.drawing_options import layers_of, scale_of, unit_of, windows_of
+    from echostep_app.commands.options import layers_of, scale_of, unit_of, windows_of
     from echostep_app.plan.importers.hints import Hints
     from echostep_app.plan.importers.limited import import_reported
     from echostep_app.plan.importers.summary import summary
@@ -244,6 +244,6 @@ def _level(plan: Plan, name: str) -> int:
 
 
 def _bounds(text: str | None) -> tuple[float, float, float, float] | None:
-    from echostep_app.commands.drawing_options import rectangle
+    from echostep_app.commands.options import rectangle
 
     return None if text is None else rectangle("--bounds", text, 1e6, "metres")

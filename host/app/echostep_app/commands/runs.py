@@ -92,7 +92,7 @@ def live(
     options = tracking.options(plan, seed)
     recording = live_run.live(options, ports.options(), outputs)
     if options.settings_path is not None:
-        from echostep_app.commands.actions.learning import learn_rangers
+        from echostep_app.commands.actions.rangers import learn_rangers
         from echostep_app.printing.console import console
 
         learn_rangers(recording, options, console)

@@ -27,7 +27,7 @@ from echostep_app.commissioning.fitting import Fit, Values, doubt, fit_compass, 
 from echostep_app.commissioning.poses import described, measure_poses
 from echostep_app.commissioning.probe import ProbeResult, probe
 from echostep_app.commissioning.serial_ports import access_findings, find_boards, list_seen
-from echostep_app.offline.leg_lengths import checked_lengths
+from echostep_app.offline.leg_track import checked_lengths
 from echostep_app.printing.lines import as_error, write_whole
 from echostep_app.printing.progress import listening_bar
 

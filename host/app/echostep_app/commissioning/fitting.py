@@ -23,7 +23,7 @@ from echostep.legs.strides import StrideEstimator
 from echostep.settings import Settings
 from echostep.timing.timeline import TICKS_PER_S
 from echostep_app.commissioning.probe import ProbeResult
-from echostep_app.offline.leg_lengths import calibrated_scale
+from echostep_app.offline.leg_track import calibrated_scale
 
 Values = dict[str, float | bool]
 Fit = tuple[dict[str, Values], str]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A foot IMU's recording as other programs keep it: a table, a folder or zip of tables, a MAT file, an MVNX file.
 
-In: a path. Out: `Imu`, or an EchostepError that names the file and what it lacks. Owns nothing.
+In: a path. Out: `Imu`, or an EchostepError that names the file and what it lacks, or that it glided. Owns nothing.
 
 MAT: the names of github.com/utiasSTARS/pyshoe and of the recordings that are published with it. MVNX: sensorFreeAcceleration is without gravity and
 in the global frame, as sensorOrientation gives it [MVN User Manual, MVNX]. Folders: UNITS.md of github.com/tszheichoi/awesome-sensor-logger;
@@ -23,7 +23,9 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.foot.steps import Track
 from echostep.offline.csv_table import GREATEST, column_of, header_of, lines_of, open_samples, read_rows
+from echostep.offline.imu_checks import NEEDED
 from echostep.offline.imu_csv import LIMITS, Imu, imu_of, load_imu
 from echostep_app.extras import require
 from echostep_app.offline.foreign_columns import OWN, Naming, read_header
@@ -195,3 +197,19 @@ def _frames(path: Path, sensors: list[str]) -> Iterator[Element]:
             if element.get("type", "normal") == "normal":
                 yield element
             element.clear()
+
+
+WITHIN_S, MOVED_M_S = 3.0, 0.4  # change of velocity within a time, which an offset of 0.1 m/s2 does not give; assumed
+
+
+def refuse_glide(imu: Imu, track: Track, name: str) -> None:
+    """Raises EchostepError for a track without a step of samples (n,) whose velocity changed."""
+    if track.steps:
+        return
+    steps_s = np.diff(imu.t_s, prepend=imu.t_s[0])
+    velocity = np.cumsum((imu.accel - np.median(imu.accel, axis=0)) * steps_s[:, None], axis=0)
+    before = np.searchsorted(imu.t_s, imu.t_s - WITHIN_S)
+    if float(np.abs(velocity - velocity[before]).max()) > MOVED_M_S:
+        raise EchostepError(
+            f"{name}: no step in {imu.t_s[-1] - imu.t_s[0]:.0f} s, yet the sensor moved, as on wheels, skates or in a car: {NEEDED}"
+        )

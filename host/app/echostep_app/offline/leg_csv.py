@@ -22,9 +22,8 @@ from echostep.errors import EchostepError
 from echostep.offline.bursts import spread
 from echostep.offline.csv_table import CsvLimits, column_of, lines_of, open_samples, read_rows
 from echostep.offline.imu_checks import MISSING_SHARE, missing_share, sorted_by_time, time_complaint
-from echostep_app.offline.clipped_rates import find_clipping_limits, repair_clipping
 from echostep_app.offline.foreign_columns import ADVICE, OWN, Naming, read_header
-from echostep_app.offline.mounting import walking_axis
+from echostep_app.offline.leg_gyros import find_clipping_limits, repair_clipping, walking_axis
 
 COLUMNS = ("t_s", "thigh_rad_s", "shank_rad_s")
 OPTIONAL = ("belt_rad_s", "compass_rad")

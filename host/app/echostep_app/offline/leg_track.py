@@ -1,23 +1,29 @@
 # SPDX-License-Identifier: MIT
-"""The track of a recorded leg, by this project's method.
+"""The track of a recorded leg, by this project's method; as a file and in words; the lengths that it takes.
 
 In: `LegSamples`, `StrideSettings`. Out: `LegTrack`. Owns nothing. The estimators are the same as live.
 """
 
 from __future__ import annotations
 
+import csv
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from echostep.arrays import Bools, Floats
+from echostep.errors import EchostepError
+from echostep.file_mode import claim
 from echostep.legs.heading import BIAS, Heading
+from echostep.legs.kinematics import USUAL_M, LegLengths
 from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings
 from echostep.legs.strides import StrideEstimator
-from echostep_app.offline.clipped_rates import repair_clipping
 from echostep_app.offline.leg_csv import LegSamples
-from echostep_app.offline.leg_side import about_trunk
+from echostep_app.offline.leg_gyros import repair_clipping
+from echostep_app.offline.leg_side import about_trunk, distance_sd_m
+from echostep_app.printing.lines import as_error
 
 # All assumed.
 START_SD_RAD = math.radians(3.0)  # of a heading given for the start, as read from a plan
@@ -177,3 +183,88 @@ def _adopt_errors(heading: Heading, known: Heading) -> None:
     """
     heading.state[BIAS:] = known.state[BIAS:]
     heading.P[BIAS:, BIAS:] = np.diag(np.diag(known.P)[BIAS:])
+
+
+# All assumed.
+LENGTH_RANGE_M = (0.2, 0.75)  # thigh or shank: a quarter of a height of 0.8 m, and 0.285 (to the floor) of 2.6 m
+CENTIMETRES = (15.0, 80.0)  # a number in this range is a length in centimetres: LENGTH_RANGE_M with a margin
+WALKED_RANGE_M = (3.0, 1000.0)  # length of the walk: two strides at least, and what can be measured on the ground
+SCALE_RANGE = (0.3, 3.0)  # computed over true length; beyond it another walk or unit is likely: 3.28 feet are a metre
+
+
+def checked_lengths(thigh_m: float | None, shank_m: float | None, scale: float = 1.0) -> LegLengths:
+    """The lengths, when a person can have them, the usual ones for None; raises EchostepError otherwise."""
+    thigh_m, shank_m = (USUAL_M if length is None else length for length in (thigh_m, shank_m))
+    for name, length in (("--thigh", thigh_m), ("--shank", shank_m)):
+        if not LENGTH_RANGE_M[0] <= length <= LENGTH_RANGE_M[1]:
+            hint = ": in centimetres? give metres" if CENTIMETRES[0] < length < CENTIMETRES[1] else ""
+            raise EchostepError(
+                f"{name} {length:g}: no such leg, expected {LENGTH_RANGE_M[0]} to {LENGTH_RANGE_M[1]} m{hint}"
+            )
+    return LegLengths(thigh_m, shank_m, scale)
+
+
+def calibrated_scale(distance_m: float, walked_m: float) -> float:
+    """Factor on all stride lengths: true length `walked_m` of a walk over its computed length; raises EchostepError when they do not fit."""
+    if not WALKED_RANGE_M[0] <= walked_m <= WALKED_RANGE_M[1]:
+        raise EchostepError(
+            f"--walked {walked_m:g}: expected the length of the walk in metres, 3 to 1000, best 10 or more"
+        )
+    if distance_m < SCALE_RANGE[0] * walked_m or distance_m > SCALE_RANGE[1] * walked_m:
+        raise EchostepError(
+            f"--walked {walked_m:g}: these samples hold {distance_m:.2f} m: is it the same walk, and are the legs in metres?"
+        )
+    return walked_m / distance_m
+
+
+TRACK_COLUMNS = ("t_s", "distance_m", "speed_m_s", "heading_rad", "x", "y")
+PARTIAL = Flag.EDGE | Flag.STANDING | Flag.UNSEEN | Flag.BACKWARD | Flag.GAP  # not a whole stride of known length
+MOST_LISTED = 40  # strides: a screenful
+FLAG_WORDS = {
+    Flag.SLOW: "slow", Flag.FAST: "fast", Flag.TURNING: "turning", Flag.STAIRS_UP: "up stairs", Flag.STAIRS_DOWN: "down stairs",
+    Flag.UNSEEN: "in place or sideways, not counted", Flag.BACKWARD: "backward, not counted", Flag.GAP: "gaps bridged by pace",
+}  # fmt: skip
+
+
+def write_leg_track(path: Path | str, track: LegTrack) -> None:
+    """`TRACK_COLUMNS`, a row a sample (the paper's: ten a second); raises EchostepError when the file cannot be written."""
+    with (
+        as_error(f"{path}: cannot write the track"),
+        claim(Path(path)).open("w", encoding="utf-8", newline="") as file,
+    ):
+        writer = csv.writer(file)
+        writer.writerow(TRACK_COLUMNS)
+        writer.writerows([f"{v:.6f}" for v in row] for row in track.rows.tolist())
+
+
+def describe_legs(track: LegTrack) -> str:
+    """Distance with its standard deviation, strides, speed, source of the heading, counts, flags and notes, in one line."""
+    distance = track.distance_m
+    if track.counts is None:
+        return f"{distance:.2f} m by [Lee 2010]; heading: {track.source}"
+    whole = [s for s in track.strides if not s.flags & PARTIAL]
+    moving_s = sum(s.t_end_s - s.t_start_s for s in track.strides if s.length_m > 0.0)
+    speed = distance / moving_s if moving_s > 0.0 else 0.0
+    flags = [f"{n} {word}" for flag, word in FLAG_WORDS.items() if (n := sum(flag in s.flags for s in track.strides))]
+    skipped = track.counts.impossible + track.counts.not_later
+    return (
+        f"{distance:.2f} m, known to {distance_sd_m(track.strides):.2f} m (1 sd); {len(whole)} whole strides, {speed:.2f} m/s while walking; "
+        f"heading: {track.source}; {track.counts.samples} samples, {skipped} skipped, {track.counts.gaps} gaps"
+        + "".join(f"; {flag}" for flag in flags)
+        + "".join(f"; {note}" for note in track.notes)
+    )
+
+
+def describe_strides(track: LegTrack) -> list[str]:
+    """A line for each stride: when, length with its own standard deviation, speed, what it is; of a long walk the first MOST_LISTED."""
+    steps = [s for s in track.strides if Flag.STANDING not in s.flags]
+    lines = []
+    for number, stride in enumerate(steps[:MOST_LISTED], start=1):
+        words = ["beginning or end of a walk"] if Flag.EDGE in stride.flags else []
+        words += [word for flag, word in FLAG_WORDS.items() if flag in stride.flags]
+        lines.append(
+            f"stride {number}: {stride.t_start_s:.2f} to {stride.t_end_s:.2f} s, {stride.length_m:.2f} m "
+            f"(sd {stride.length_sd_m:.2f}), {stride.speed_m_s:.2f} m/s" + "".join(f"; {word}" for word in words)
+        )
+    more = len(steps) - MOST_LISTED
+    return [*lines, f"and {more} more"] if more > 0 else lines

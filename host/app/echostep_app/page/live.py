@@ -27,9 +27,8 @@ from echostep_app.page.elements.guidance import ShownGuidance, guidance_of_cue
 from echostep_app.page.elements.likely_places import PlaceNumbers
 from echostep_app.page.elements.lookahead import extrapolate, moves_as_one
 from echostep_app.page.elements.marks import beacon_marks, shown_meeting
-from echostep_app.page.elements.scene import MOST_SHOWN, PageScene, is_placed, sample_of, status_text
+from echostep_app.page.elements.scene import MOST_SHOWN, PageScene, TruePath, is_placed, sample_of, status_text
 from echostep_app.page.elements.stream_rates import StreamRateMeter
-from echostep_app.page.elements.true_position import TruePath
 from echostep_app.page.elements.undo_offer import UndoClock, echoes_fit
 from echostep_app.page.mailbox import Mailbox, popped
 from echostep_app.page.server import Address, PageServer

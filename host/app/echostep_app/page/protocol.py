@@ -27,10 +27,9 @@ from echostep_app.page.elements.echo_lines import EchoLine
 from echostep_app.page.elements.guidance import ShownGuidance
 from echostep_app.page.elements.likely_places import numbered
 from echostep_app.page.elements.marks import BeaconMark, ShownMark, ShownMeeting, ShownOrder
-from echostep_app.page.elements.scene import PageScene, ParticleSample
+from echostep_app.page.elements.scene import PageScene, ParticleSample, TruePosition
 from echostep_app.page.elements.stream_rates import StreamRates
 from echostep_app.page.elements.taps import Considered, ShownPoints
-from echostep_app.page.elements.true_position import TruePosition
 from echostep_app.page.elements.undo_offer import UndoOffer
 from echostep_app.page.over_time import COLUMNS, Event, OverTime
 from echostep_app.page.replay_cursor import PlayState

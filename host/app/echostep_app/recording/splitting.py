@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A recorder that begins a new file at a size or after a time.
+"""A recorder on a new file of this run, and one that begins a new file at a size or after a time.
 
 In: chunks, as a `Recorder`. Out: `walk-0007-20261122T091500Z.mcap`, then `...Z-part0002.mcap` and so on: each a whole recording, with the metadata of
 the run. Owns the files that are being closed.
@@ -18,7 +18,7 @@ from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
 from echostep.recording.mcap_records import NEXT, PART, PART_NAME, RUN
 from echostep_app.recording.background_writer import BackgroundWriter
-from echostep_app.recording.names import part_name
+from echostep_app.recording.names import RecordingExistsError, new_name, part_name
 from echostep_app.recording.recorder import Recorder
 
 UNITS = {"MB": 1e6, "GB": 1e9, "min": 60e9, "h": 3600e9}  # bytes, or nanoseconds
@@ -102,3 +102,20 @@ class SplitRecorder(Recorder):
         super().close()
         for _, thread in self._closing:
             thread.join()
+
+
+TRIES = 10  # of a new name, while other processes take the same one; assumed
+
+
+def numbered_recorder(wanted: Path, metadata: Mapping[str, str], split: SplitLimit | None = None) -> Recorder:
+    """A recorder on a new file named after `wanted`, in parts by `split`; raises EchostepError."""
+    for _ in range(TRIES - 1):
+        try:
+            return _recorder(new_name(wanted), metadata, split)
+        except RecordingExistsError:
+            continue
+    return _recorder(new_name(wanted), metadata, split)
+
+
+def _recorder(path: Path, metadata: Mapping[str, str], split: SplitLimit | None) -> Recorder:
+    return SplitRecorder(path, metadata, split) if split else Recorder(path, metadata)

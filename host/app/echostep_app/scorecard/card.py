@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: MIT
 """The scorecard of one track: every metric that its columns, the truth and the plan allow.
 
-In: a track, the truth, a plan. Out: `Scorecard`. Owns the definitions; `definitions.py` has their names and sources.
+In: a track, the truth, a plan. Out: `Matched`, `Scorecard`. Owns the zones and definitions; `definitions.py` has their names and sources.
 
 The numbers in brackets are clauses of [ISO/IEC 18305:2016]. Its coverage and availability are shares of places and of time for which the system gives
 a position; here a position is at most GAP_S old and not marked lost by the track itself.
-A zone is the outline of stairs or a lift, else the smallest outline of a room, else the space between the walls, all doors closed.
 """
 
 from __future__ import annotations
@@ -17,48 +16,13 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Bools, Floats, Ints
+from echostep.errors import EchostepError
 from echostep.localization import in_ellipse95
 from echostep.plan import Plan
 from echostep_app.plan.places.faces import OUTSIDE
 from echostep_app.plan.places.spaces import PlanSpaces, Spaces
 from echostep_app.scorecard.error_statistics import ErrorStatistics, error_statistics, quantile
-from echostep_app.scorecard.matching import Matched, is_surveyed, known, match
 from echostep_app.scorecard.track_columns import ScoredPath
-
-NO_ZONE = -1
-
-
-class Zones:
-    """Numbers of the zones of a plan, different on different levels."""
-
-    def __init__(self, plan: Plan) -> None:
-        self._levels = len(plan.levels)
-        self._spaces = PlanSpaces(plan)
-
-    def of(self, xy_m: Floats, level: Floats) -> Ints:
-        """Places (n, 2), their levels (n,), NaN where unknown -> (n,) number of the zone, or NO_ZONE."""
-        number = np.full(len(xy_m), NO_ZONE, dtype=np.int64)
-        for k in range(self._levels):
-            here = np.flatnonzero(level == k)
-            spaces = self._spaces.on(k) if len(here) else None
-            if spaces is not None:
-                zone = _zones(spaces, xy_m[here])
-                number[here] = np.where(zone == NO_ZONE, NO_ZONE, zone * self._levels + k)
-        return number
-
-
-def _zones(spaces: Spaces, xy_m: Floats) -> Ints:
-    """Number of the zone around each place of one level: ways first, then outlines of rooms, then faces."""
-    face = spaces.faces.indices_of(xy_m)
-    areas = (*spaces.way_areas, *spaces.outlines)
-    zone = np.where(face == OUTSIDE, NO_ZONE, face + len(areas)).astype(np.int64)
-    size = np.full(len(xy_m), math.inf)
-    for k, area in enumerate(areas):
-        smaller = 0.0 if k < len(spaces.way_areas) else float(area.area)
-        inside = shapely.contains_xy(area, *xy_m.T) & (smaller < size)
-        zone[inside], size[inside] = k, smaller
-    return zone
-
 
 FLOOR_PENALTY_M = 15.0  # per floor [Potorti et al. 2017]
 CELL_M = 1.0  # side of the squares that coverage counts: a person's room
@@ -199,3 +163,119 @@ def _mean(values: Floats | None) -> float | None:
 def _quantile(values: Floats | None, share: float) -> float | None:
     finite = values[np.isfinite(values)] if values is not None else np.zeros(0)
     return quantile(finite, share) if len(finite) else None
+
+
+NO_ZONE = -1
+
+
+class Zones:
+    """Numbers of the zones of a plan, different on each level: stairs and lifts, else the smallest outline of a room, else what walls enclose."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._levels = len(plan.levels)
+        self._spaces = PlanSpaces(plan)
+
+    def of(self, xy_m: Floats, level: Floats) -> Ints:
+        """Places (n, 2), their levels (n,), NaN where unknown -> (n,) number of the zone, or NO_ZONE."""
+        number = np.full(len(xy_m), NO_ZONE, dtype=np.int64)
+        for k in range(self._levels):
+            here = np.flatnonzero(level == k)
+            spaces = self._spaces.on(k) if len(here) else None
+            if spaces is not None:
+                zone = _zones(spaces, xy_m[here])
+                number[here] = np.where(zone == NO_ZONE, NO_ZONE, zone * self._levels + k)
+        return number
+
+
+def _zones(spaces: Spaces, xy_m: Floats) -> Ints:
+    """Number of the zone around each place of one level: ways first, then outlines of rooms, then faces."""
+    face = spaces.faces.indices_of(xy_m)
+    areas = (*spaces.way_areas, *spaces.outlines)
+    zone = np.where(face == OUTSIDE, NO_ZONE, face + len(areas)).astype(np.int64)
+    size = np.full(len(xy_m), math.inf)
+    for k, area in enumerate(areas):
+        smaller = 0.0 if k < len(spaces.way_areas) else float(area.area)
+        inside = shapely.contains_xy(area, *xy_m.T) & (smaller < size)
+        zone[inside], size[inside] = k, smaller
+    return zone
+
+
+PATH_S = 0.5  # median distance of a path's rows, above which they are surveyed points: less than a step
+# Time without a row after which a track has no position: rows come at each step, and twice a second while standing
+GAP_S = 2.5
+
+
+@dataclass(frozen=True, slots=True)
+class Matched:
+    """A track and the truth at n points: places (n, 2) in metres, heights (n,), floors (n,); None where one of the two does not state them.
+
+    `row` (n,): the track's row at the point, or the newest one before it.
+    """
+
+    t_s: Floats
+    xy_m: Floats
+    true_xy_m: Floats
+    row: Ints
+    height_m: Floats | None
+    true_height_m: Floats | None
+    level: Floats | None
+    true_level: Floats | None
+
+    @property
+    def error_m(self) -> Floats:
+        """Horizontal errors (n,)."""
+        return np.asarray(np.hypot(*(self.xy_m - self.true_xy_m).T))
+
+
+def is_surveyed(truth: ScoredPath) -> bool:
+    """Whether the truth is surveyed points, not a path."""
+    return len(truth.t_s) < 2 or float(np.median(np.diff(truth.t_s))) > PATH_S
+
+
+def match(track: ScoredPath, truth: ScoredPath) -> Matched:
+    """The evaluation points: of a path the track's rows, of surveyed points theirs; raises EchostepError where there is no moment in common."""
+    surveyed = is_surveyed(truth)
+    grid, other = (truth, track) if surveyed else (track, truth)
+    chosen = np.flatnonzero((grid.t_s >= other.t_s[0]) & (grid.t_s <= other.t_s[-1]))
+    if surveyed:
+        chosen = chosen[_near(track.t_s, truth.t_s[chosen])]
+    if not len(chosen):
+        raise EchostepError(
+            f"{track.path}: no row within the time of {truth.path} ({truth.t_s[0]:g} to {truth.t_s[-1]:g} s; "
+            f"the track's is {track.t_s[0]:g} to {track.t_s[-1]:g} s): both need the same clock"
+        )
+    t_s = grid.t_s[chosen]
+    row = np.searchsorted(track.t_s, t_s, side="right") - 1 if surveyed else chosen
+    true_row = chosen if surveyed else np.searchsorted(truth.t_s, t_s, side="right") - 1
+    levels = track.level is not None and truth.level is not None
+    heights = track.height_m is not None and truth.height_m is not None
+    return Matched(
+        t_s,
+        np.column_stack([_at(track, track.xy_m[:, k], t_s, row, exact=not surveyed) for k in (0, 1)]),
+        np.column_stack([_at(truth, truth.xy_m[:, k], t_s, true_row, exact=surveyed) for k in (0, 1)]),
+        row,
+        _at(track, track.height_m, t_s, row, exact=not surveyed) if heights else None,
+        _at(truth, truth.height_m, t_s, true_row, exact=surveyed) if heights else None,
+        track.level[row] if levels and track.level is not None else None,
+        truth.level[true_row] if levels and truth.level is not None else None,
+    )
+
+
+def _at(path: ScoredPath, values: Floats | None, t_s: Floats, row: Ints, *, exact: bool) -> Floats:
+    """Values of a path at times (m,): the rows' values (m,) if they are exact, else linear between the rows."""
+    assert values is not None
+    return values[row] if exact else np.asarray(np.interp(t_s, path.t_s, values))
+
+
+def _near(t_s: Floats, at: Floats) -> Bools:
+    """Which times lie between two rows that are at most GAP_S apart."""
+    after = np.clip(np.searchsorted(t_s, at, side="left"), 0, len(t_s) - 1)
+    before = np.clip(np.searchsorted(t_s, at, side="right") - 1, 0, len(t_s) - 1)
+    return np.asarray(t_s[after] - t_s[before] <= GAP_S)
+
+
+def known(track: ScoredPath, t_s: Floats) -> Bools:
+    """At which times (m,) a track has a row at most GAP_S old that is not marked lost."""
+    row = np.searchsorted(track.t_s, t_s, side="right") - 1
+    fresh = (row >= 0) & (t_s - track.t_s[np.maximum(row, 0)] <= GAP_S)
+    return np.asarray(fresh & ~track.lost[np.maximum(row, 0)])

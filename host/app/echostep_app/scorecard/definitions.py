@@ -13,8 +13,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from echostep_app.scorecard.card import FLOOR_PENALTY_M, Scorecard
-from echostep_app.scorecard.matching import GAP_S
+from echostep_app.scorecard.card import FLOOR_PENALTY_M, GAP_S, Scorecard
 
 ISO = "ISO/IEC 18305:2016"
 EVAAL = "Potorti et al. 2017, Sensors 17(10) 2327 (EvAAL, IPIN)"

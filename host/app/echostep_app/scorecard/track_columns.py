@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tracks and true paths from CSV files of any tracker: which column means what.
+"""Tracks and true paths from CSV files of any tracker: which column means what; and our estimates as such a track.
 
 In: a CSV file, the plan's levels. Out: `ScoredPath`s. Owns the names that columns may have. Metres, seconds, radians; x and y in the frame of the
 truth, which is the plan's if there is a plan.

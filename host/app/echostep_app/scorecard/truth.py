@@ -21,8 +21,7 @@ from echostep.plan import Plan
 from echostep.recording import MCAP_MAGIC, Recording, open_recording
 from echostep.walk.recorded import START_LIMIT_M, Coordinate
 from echostep_app.printing.lines import as_error
-from echostep_app.scorecard.card import Scorecard, score
-from echostep_app.scorecard.matching import GAP_S
+from echostep_app.scorecard.card import GAP_S, Scorecard, score
 from echostep_app.scorecard.track_columns import ScoredPath, levels_at, load_path, track_of
 
 FIELD = "truth"  # of a recording's metadata

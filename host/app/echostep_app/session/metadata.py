@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The text fields that a recording holds beside the bytes: what a replay needs, and what its reader may want to know.
+"""A new recording, and the text fields that it holds beside the bytes: what a replay needs, and what its reader may want to know.
 
 In: plan, start, seed, settings; what the command line gave. Out: fields by name; a start, or EchostepError for one that cannot be. Owns nothing.
 `walk.recorded` reads the fields.
@@ -11,8 +11,10 @@ import importlib.metadata
 import json
 import math
 import platform
+from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
 
@@ -26,6 +28,9 @@ from echostep_app.plan.importers.limited import open_limited
 from echostep_app.plan.places.standing import refuse_impossible
 from echostep_app.ports.arrival_clock import now_ns
 from echostep_app.printing.console import console
+from echostep_app.recording.names import link_newest, remove_older
+from echostep_app.recording.recorder import Recorder
+from echostep_app.recording.splitting import SplitLimit, numbered_recorder
 from echostep_app.session.options import TrackingOptions
 
 ROOM_M = 2.0  # standard deviation of a start in a room without an outline: half a large room
@@ -166,3 +171,18 @@ def _parse_pose(text: str, plan: Plan) -> Pose:
     if not within or len(parts) > 4 or level < ANY_LEVEL:
         raise EchostepError(f"--start {text}: a number is out of range, or there are too many: {example}")
     return Pose(x, y, math.radians(degrees), level)
+
+
+def start_recording(
+    wanted: Path, metadata: Mapping[str, str], keep: int | None = None, split: SplitLimit | None = None
+) -> Recorder:
+    """A recorder on a new file named after `wanted`; raises EchostepError. `keep`: remove the oldest until so many are left. `split`: in parts."""
+    recorder = numbered_recorder(wanted, metadata, split)
+    if link_newest(recorder.path, wanted):
+        console.print(f"Recording: {recorder.path}, also named {wanted.name}", highlight=False)
+    else:
+        other = f"; {wanted.name} is another file and stays as it is" if wanted.exists() else ""
+        console.print(f"Recording: {recorder.path}{other}", highlight=False)
+    for path in remove_older(wanted, keep) if keep else ():
+        console.print(f"Removed: {path} (--keep {keep})", highlight=False)
+    return recorder

@@ -30,7 +30,7 @@ from echostep_app.guidance.guided_run import guidance_of
 from echostep_app.interruption import holding_signals, is_asked
 from echostep_app.kernel_parts import LATER, TRACKING, Part, compile_parts, compiling_later
 from echostep_app.output.terminal import TerminalView
-from echostep_app.page.elements.true_position import TruePath
+from echostep_app.page.elements.scene import TruePath
 from echostep_app.page.mailbox import popped
 from echostep_app.plan.places.refusals import refusals
 from echostep_app.printing.console import console, print_notices
@@ -38,7 +38,6 @@ from echostep_app.printing.people import FaultNews, outlast_output
 from echostep_app.printing.progress import progress_line
 from echostep_app.recording.recorder import DerivedMessage, Recorder
 from echostep_app.scorecard.track_columns import ScoredPath
-from echostep_app.session.browser import open_browser
 from echostep_app.session.chunk_streams import MessageSource
 from echostep_app.session.losses import Arrivals, Losses
 from echostep_app.session.options import OutputOptions
@@ -59,6 +58,9 @@ if TYPE_CHECKING:
     from echostep_app.session.team.subscription import TeamSubscription
     from echostep_app.team.endpoint import Endpoint, Outlet
     from echostep_app.team.publish import Publishing, Source
+import os
+import sys
+import webbrowser
 
 PAGE_POLL_S = 0.2
 _print_line = partial(console.print, markup=False, highlight=False)
@@ -314,3 +316,17 @@ class Session:
                 print_notices(page.server.shared.faults.notices)
         except KeyboardInterrupt:
             pass
+
+
+SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")  # one of them is set where windows can be shown, but for Windows and macOS
+
+
+def open_browser(url: str) -> bool:
+    """Start the user's browser; False on a machine without a screen, over ssh, or when none could be started."""
+    has_screen = sys.platform in ("win32", "darwin") or any(os.environ.get(name) for name in SCREENS)
+    if not has_screen or os.environ.get("SSH_CONNECTION"):
+        return False
+    try:
+        return webbrowser.open(url)
+    except webbrowser.Error:
+        return False

@@ -29,7 +29,7 @@ from echostep.tracker import Tracker
 from echostep.walk.table import write_track
 from echostep_app.output.track_plot import draw_track
 from echostep_app.scorecard.track_columns import load_path
-from echostep_app.session.runs.recording import start_recording
+from echostep_app.session.metadata import start_recording
 from echostep_studies.bench.recordings.foot_metrics import align, rmse
 from echostep_studies.bench.recordings.hallways import (
     LONG_STEP_M,

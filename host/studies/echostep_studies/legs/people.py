@@ -16,7 +16,7 @@ from echostep.arrays import Floats
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import StrideSettings
 from echostep.legs.strides import StrideEstimator
-from echostep_app.offline.clipped_rates import repair_clipping
+from echostep_app.offline.leg_gyros import repair_clipping
 from echostep_app.output.table import Table
 from echostep_studies.frame.report import Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest

@@ -18,10 +18,10 @@ import numpy as np
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import Flag, Stride, StrideSettings
 from echostep_app.offline.leg_csv import LegSamples
+from echostep_app.offline.leg_gyros import walking_axis
 from echostep_app.offline.leg_pair import track_pair
 from echostep_app.offline.leg_side import distance_sd_m
 from echostep_app.offline.leg_track import track_default
-from echostep_app.offline.mounting import walking_axis
 from echostep_app.output.table import Table
 from echostep_studies.bench.recordings.legs import SETS, LegRecording
 from echostep_studies.frame.recordings import recordings_in

@@ -14,7 +14,7 @@ from echostep.errors import EchostepError
 from echostep.ports.chunks import Portion, portion_of
 from echostep.tracker import Tracker
 from echostep_app import cli
-from echostep_app.page.elements.true_position import TruePath
+from echostep_app.page.elements.scene import TruePath
 from echostep_app.page.live import LivePage
 from echostep_app.session.options import OutputOptions
 from echostep_app.session.session import Session

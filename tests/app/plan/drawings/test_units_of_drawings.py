@@ -11,7 +11,7 @@ import pytest
 from ezdxf.filemanagement import new
 
 from echostep.errors import EchostepError
-from echostep_app.commands.drawing_options import scale_of as scale_option
+from echostep_app.commands.options import scale_of as scale_option
 from echostep_app.plan.importers.dxf.frame import METRES
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints

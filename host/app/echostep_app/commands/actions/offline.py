@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`echostep import`, `foot`, `legs` and `decode`: recorded files of single sensors, without a plan.
 
-In: CSV files of a foot IMU or of leg gyros, captured bytes. Out: track files and a summary; JSON lines. Owns nothing.
+In: files of a foot IMU or of leg gyros, captured bytes. Out: track files and a summary; JSON lines. Owns nothing.
 """
 
 from __future__ import annotations
@@ -9,7 +9,9 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from pathlib import Path
+from typing import TypeVar
 
 from echostep.errors import EchostepError
 from echostep.legs.stride import StrideSettings
@@ -17,16 +19,19 @@ from echostep.offline.imu_csv import Imu, describe_track, own_track, write_foot_
 from echostep.recording import Decoder, as_json, read_capture
 from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import OutputFormats
-from echostep_app.offline.foot_files import load_foot
+from echostep_app.offline.foot_files import load_foot, refuse_glide
 from echostep_app.offline.foreign_columns import OWN, Naming
-from echostep_app.offline.gliding import refuse_glide
 from echostep_app.offline.importing import Beside, import_imu
 from echostep_app.offline.leg_csv import load_pair
-from echostep_app.offline.leg_lengths import calibrated_scale, checked_lengths
 from echostep_app.offline.leg_pair import track_pair
-from echostep_app.offline.leg_summary import describe_legs, describe_strides, write_leg_track
-from echostep_app.offline.leg_track import track_default
-from echostep_app.offline.profiles import DEFAULT, method
+from echostep_app.offline.leg_track import (
+    calibrated_scale,
+    checked_lengths,
+    describe_legs,
+    describe_strides,
+    track_default,
+    write_leg_track,
+)
 from echostep_app.output.offline_plots import draw_foot, draw_legs
 from echostep_app.printing.console import console
 from echostep_app.printing.lines import complain
@@ -39,6 +44,9 @@ from echostep_app.session.options import OutputOptions, TrackingOptions
 from echostep_app.session.results import output_folder
 from echostep_app.session.runs.replay import replay
 
+Method = TypeVar("Method")
+DEFAULT = "default"  # the method of this project
+GROUP = "echostep.profiles"  # entry points of other methods: those of the papers are in echostep-studies
 SCALE_RANGE = (0.5, 2.0)  # of --scale: beyond it the lengths of the leg are wrong
 
 
@@ -157,3 +165,16 @@ def _bits(option: str, text: str | None, most: int) -> int | None:
     if not 0 <= value <= most:
         raise EchostepError(f"{option} {text}: a number up to 0x{most:X} is expected, as 0x0006")
     return value
+
+
+def method(part: str, name: str, own: Method) -> Method:
+    """The method of a profile for a part, `foot` or `legs`; a profile has the signature of `own`. Raises EchostepError."""
+    if name == DEFAULT:
+        return own
+    methods = {entry.name: entry for entry in entry_points(group=GROUP)}
+    if f"{part}.{name}" in methods:
+        loaded: Method = methods[f"{part}.{name}"].load()
+        return loaded
+    known = [DEFAULT, *sorted(entry.removeprefix(f"{part}.") for entry in methods if entry.startswith(f"{part}."))]
+    more = "" if methods else "; those of the papers come with: pip install echostep-studies"
+    raise EchostepError(f"--profile {name}: {part} has no such profile; it has {', '.join(known)}{more}")

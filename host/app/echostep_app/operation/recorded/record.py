@@ -27,7 +27,7 @@ from echostep.ports.chunks import Chunk
 from echostep_app.operation.operation import Operation
 from echostep_app.operation.recorded.tape import Keyframe, Tape
 from echostep_app.output.foxglove import log_line
-from echostep_app.recording.numbered import numbered_recorder
+from echostep_app.recording.splitting import numbered_recorder
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.report import MAX_PAYLOAD, printable
 from echostep_app.team.roster import MAX_REASONS

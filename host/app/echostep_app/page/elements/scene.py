@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.arrays import Octets
+from echostep.arrays import Floats, Octets
 from echostep.localization import PROBABLE, Estimate, TrackStatus, claims_place
 from echostep.plan import Plan
 from echostep.tracker.state import ParticleSnapshot
@@ -20,8 +20,8 @@ from echostep_app.page.elements.echo_lines import EchoLine
 from echostep_app.page.elements.guidance import ShownGuidance
 from echostep_app.page.elements.marks import BeaconMark, ShownMeeting
 from echostep_app.page.elements.stream_rates import StreamRates
-from echostep_app.page.elements.true_position import TruePosition
 from echostep_app.page.elements.undo_offer import UndoOffer
+from echostep_app.scorecard.track_columns import ScoredPath
 
 MOST_SHOWN = 10_000  # particles in a frame
 
@@ -113,3 +113,32 @@ def _height_words(z_m: float) -> str:
 def format_metres(distance_m: float) -> str:
     """A length as text, rounded as people need it: 0.2 m, 3 m, 40 m."""
     return f"{distance_m:.1f} m" if distance_m < 0.95 else f"{distance_m:.0f} m"
+
+
+@dataclass(frozen=True, slots=True)
+class TruePosition:
+    """Map metres, and the index of a level."""
+
+    x_m: float
+    y_m: float
+    level: int
+
+
+@dataclass(frozen=True, slots=True)
+class TruePath:
+    """`rows` (n, 4): t_s, x, y, index of the level."""
+
+    rows: Floats
+
+    @classmethod
+    def of(cls, truth: ScoredPath | None, plan: Plan) -> TruePath | None:
+        """Of a true path that was loaded with the plan; None without one, and where it is not known on which level it is."""
+        if truth is None or truth.level is None or not np.isin(truth.level, np.arange(len(plan.levels))).all():
+            return None
+        return cls(np.column_stack([truth.t_s, truth.xy_m, truth.level]))
+
+    def at(self, t_s: float) -> TruePosition:
+        """The position at a time, linear between the rows."""
+        t, x, y, level = self.rows.T
+        row = max(int(np.searchsorted(t, t_s, side="right")) - 1, 0)
+        return TruePosition(float(np.interp(t_s, t, x)), float(np.interp(t_s, t, y)), int(level[row]))

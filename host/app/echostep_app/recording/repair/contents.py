@@ -20,8 +20,7 @@ from echostep.recording.damage.notes import made_of
 from echostep.recording.mcap_records import port_of
 from echostep_app.printing.console import console_for_people
 from echostep_app.recording.capture_summary import refusals
-from echostep_app.recording.repair.arrival_order import ArrivalOrder
-from echostep_app.recording.repair.recovery import RecordedMessage, Recovery
+from echostep_app.recording.repair.recovery import ArrivalOrder, RecordedMessage, Recovery
 
 # All assumed.
 MESSAGES_PER_UPDATE = 5000  # of the progress bar

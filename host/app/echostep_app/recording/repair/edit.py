@@ -15,9 +15,8 @@ import msgspec
 
 from echostep.errors import EchostepError
 from echostep.recording.mcap_records import port_of
-from echostep_app.recording.repair.arrival_order import ArrivalOrder
 from echostep_app.recording.repair.contents import Contents, damage_notes, problems_of, with_progress
-from echostep_app.recording.repair.recovery import RecordedMessage, Recovery
+from echostep_app.recording.repair.recovery import ArrivalOrder, RecordedMessage, Recovery
 from echostep_app.recording.repair.rewrite import RewrittenRecording
 
 START = "start_x_y_rad"  # metadata key

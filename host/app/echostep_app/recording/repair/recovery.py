@@ -10,7 +10,8 @@ What a valid record is: `damage/scan.py`.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain, compress, islice
 from pathlib import Path
@@ -38,6 +39,7 @@ from echostep.recording.mcap_records import (
     decompress_chunk,
     is_misnamed,
     parse_record,
+    port_of,
 )
 
 PLACED_AT_ONCE = 8192  # messages whose places are decided together: some seconds of a walk; assumed
@@ -187,3 +189,59 @@ class Recovery:
                 self.metadata = dict(stored.metadata)
             elif stored.name == DAMAGE_NAME:
                 self.before = list(stored.metadata.values())
+
+
+MOST_WAITING = 4096  # messages: some seconds of a walk, while another port is silent
+
+
+@dataclass(slots=True)
+class _Waiting:
+    """A message that waits for the next one of its port; `port` is empty for a derived one, which does not wait."""
+
+    message: RecordedMessage
+    port: str
+    settled: bool
+
+
+@dataclass
+class ArrivalOrder:
+    """Corrects arrival times of one recording that are not between those of the port's neighbours: to the later one; `corrected` counts them."""
+
+    corrected: int = 0
+    _waiting: deque[_Waiting] = field(default_factory=deque)
+    _newest: dict[str, _Waiting] = field(default_factory=dict)  # by port
+    _before_ns: dict[str, int] = field(default_factory=dict)  # by port: time of the last settled chunk
+
+    def correct(self, messages: Iterable[RecordedMessage]) -> Iterator[RecordedMessage]:
+        """The messages, chunks with corrected times."""
+        for message in messages:
+            port = port_of(message.channel)
+            if port and port in self._newest:
+                self._settle(self._newest[port], message.t_ns)
+            waiting = _Waiting(message, port, not port)
+            if port:
+                self._newest[port] = waiting
+            self._waiting.append(waiting)
+            while self._waiting and (self._waiting[0].settled or len(self._waiting) > MOST_WAITING):
+                yield self._pop()
+        while self._waiting:
+            yield self._pop()
+
+    def _settle(self, waiting: _Waiting, next_ns: int) -> None:
+        """Decide the time of a chunk whose successor is known."""
+        if waiting.settled:
+            return
+        before_ns = self._before_ns.get(waiting.port, -1)
+        if before_ns <= next_ns and not before_ns <= waiting.message.t_ns <= next_ns:
+            waiting.message = waiting.message._replace(t_ns=next_ns)
+            self.corrected += 1
+        waiting.settled = True
+        self._before_ns[waiting.port] = waiting.message.t_ns
+
+    def _pop(self) -> RecordedMessage:
+        """The oldest message; without a successor its time stays."""
+        waiting = self._waiting.popleft()
+        if not waiting.settled:
+            waiting.settled = True
+            self._before_ns[waiting.port] = waiting.message.t_ns
+        return waiting.message

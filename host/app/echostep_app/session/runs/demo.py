@@ -28,10 +28,9 @@ from echostep_app.printing.progress import progress_line
 from echostep_app.recording.recorder import Recorder
 from echostep_app.scorecard.truth import load_truth
 from echostep_app.session.chunk_streams import paced, portions_of, recorded, with_messages
-from echostep_app.session.metadata import run_metadata
+from echostep_app.session.metadata import run_metadata, start_recording
 from echostep_app.session.options import OutputOptions
 from echostep_app.session.results import output_folder
-from echostep_app.session.runs.recording import start_recording
 from echostep_app.session.session import Session
 from echostep_app.simulation.devices.beacon_gateway import with_beacons
 from echostep_app.simulation.devices.board import Board, BoardProcess, PythonBoard

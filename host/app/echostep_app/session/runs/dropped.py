@@ -30,10 +30,10 @@ from echostep_app.page.web.uploads import Uploads
 from echostep_app.plan.importers.limited import open_limited
 from echostep_app.printing.console import console, print_notices
 from echostep_app.scorecard.truth import is_recording
-from echostep_app.session.browser import open_browser
 from echostep_app.session.options import TrackingOptions
 from echostep_app.session.results import summary_words
 from echostep_app.session.runs.replay import plan_note, tracker_of
+from echostep_app.session.session import open_browser
 
 DEMO_PLAN = Path(str(files("echostep"))) / "plans" / "demo.json"
 WAITING = "drop a recording and its plan here"

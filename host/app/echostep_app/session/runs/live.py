@@ -45,13 +45,13 @@ from echostep_app.session.metadata import (
     plan_of,
     run_metadata,
     start_given,
+    start_recording,
     version_metadata,
 )
 from echostep_app.session.options import OutputOptions, PortOptions, TrackingOptions
 from echostep_app.session.results import output_folder
 from echostep_app.session.runs.line_foot import LineFoot, port_of
 from echostep_app.session.runs.port_roles import with_right_names, with_role_check
-from echostep_app.session.runs.recording import start_recording
 from echostep_app.session.session import Session
 from echostep_app.xsens.startup import MtxStart
 

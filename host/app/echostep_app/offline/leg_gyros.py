@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The axis about which a leg swings in walking, in the frame of a gyro of three axes that is strapped on in any orientation.
+"""Gyros on a leg: peaks that were clipped, reconstructed; the axis of walking in the frame of three axes that are strapped on anyhow.
 
 In: angular rates of one sensor of a leg that walks. Out: `Mounting`: a unit vector, how well it is defined. Owns the frequencies.
 
@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.legs.clipping import ClippingRepair
 
 GRID_HZ = 50.0  # of the rates: far above BAND_HZ
 BAND_HZ = (0.4, 1.4)  # of strides: from a slow walk (1.6 s a stride, 0.6 Hz) to a run, with a margin below; assumed
@@ -48,3 +49,26 @@ def walking_axis(t_s: Floats, rates: Floats) -> Mounting:
     axis = axes[:, -1]
     ratio = float(np.sqrt(powers[-1] / max(powers[-2], 1e-12)))
     return Mounting(axis * np.sign(axis[int(np.argmax(np.abs(axis)))]), ratio)
+
+
+SLOWEST_LIMIT_RAD_S = 2.0  # no gyro on a leg has a smaller range
+SAME_PAIRS = 3  # equal neighbours at an extreme, which a sensor within its range does not show
+
+
+def find_clipping_limits(rates: Floats) -> tuple[Floats, Floats]:
+    """Lower and upper limits (k,) of sensors with rates (n, k), by equal neighbouring readings at their extremes; infinite where none are found."""
+    low, high = np.full(rates.shape[1], -np.inf), np.full(rates.shape[1], np.inf)
+    for k, column in enumerate(rates.T):
+        for limits, extreme in ((low, float(column.min())), (high, float(column.max()))):
+            cut = column == extreme
+            if abs(extreme) > SLOWEST_LIMIT_RAD_S and (cut[1:] & cut[:-1]).sum() >= SAME_PAIRS:
+                limits[k] = extreme
+    return low, high
+
+
+def repair_clipping(t_s: Floats, rates: Floats) -> Floats:
+    """The rates (n, k) of a whole record, with peaks reconstructed at the limits found in it."""
+    repair = ClippingRepair(*find_clipping_limits(rates))
+    _, first = repair.feed(t_s, rates)
+    _, rest = repair.finish()
+    return np.vstack([first, rest])
