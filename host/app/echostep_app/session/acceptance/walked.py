@@ -24,8 +24,7 @@ from echostep.recording import Recording, open_recording
 from echostep.tracker import Tracker
 from echostep_app.ports.tap import Tap, parse_tap
 from echostep_app.printing.progress import with_bar
-from echostep_app.scorecard.card import Scored, score
-from echostep_app.scorecard.card import PATH_S
+from echostep_app.scorecard.card import PATH_S, Scored, score
 from echostep_app.scorecard.track_columns import ScoredPath, track_of
 from echostep_app.session.acceptance.heard import SeenPings
 from echostep_app.session.acceptance.protocol import Protocol, recorded_protocol
