@@ -41,22 +41,18 @@ def merge_collinear(segments: Floats, off_m: float = OFF_M) -> Floats:
 
 def _grown(i: int, segments: Floats, tree: shapely.STRtree, free: Bools, off_m: float) -> Floats:
     """The wall that grows from piece i by every free piece (mask `free`) that lies on its line and touches it."""
-    wall, fresh = segments[i], True
+    wall, by_m = segments[i], max(GAP_M, off_m)
     free[i] = False
-    while fresh:
-        near = tree.query(shapely.box(*_bounds(wall, max(GAP_M, off_m))))
+    while True:
+        x0, y0, x1, y1 = wall.tolist()
+        near = tree.query(shapely.box(min(x0, x1) - by_m, min(y0, y1) - by_m, max(x0, x1) + by_m, max(y0, y1) + by_m))
         near = near[free[near]]
-        near = near[_on_line(wall, segments[near], off_m)]
-        fresh = len(near) > 0
-        if fresh:
-            free[near] = False
-            wall = _span(wall, segments[near])
-    return wall
-
-
-def _bounds(wall: Floats, by_m: float) -> tuple[float, float, float, float]:
-    x, y = wall[::2], wall[1::2]
-    return x.min() - by_m, y.min() - by_m, x.max() + by_m, y.max() + by_m
+        if len(near):
+            near = near[_on_line(wall, segments[near], off_m)]
+        if not len(near):
+            return wall
+        free[near] = False
+        wall = _span(wall, segments[near])
 
 
 def _on_line(wall: Floats, others: Floats, off_m: float) -> Bools:
@@ -65,11 +61,12 @@ def _on_line(wall: Floats, others: Floats, off_m: float) -> Bools:
     length = np.hypot(*along)
     along = along / length
     ends = others.reshape(-1, 2, 2) - start
-    off = np.abs(ends[..., 0] * along[1] - ends[..., 1] * along[0]).max(1)
+    off = np.abs(ends[..., 0] * along[1] - ends[..., 1] * along[0])
     way = ends @ along
-    touching = (way.min(1) <= length + GAP_M) & (way.max(1) >= -GAP_M)
-    straight = off <= np.minimum(off_m, np.maximum(0.05 * np.ptp(way, axis=1), ROUNDED_M))
-    inside = (way.min(1) >= -GAP_M) & (way.max(1) <= length + GAP_M) & (off <= off_m)
+    off, begin, end = np.maximum(*off.T), np.minimum(*way.T), np.maximum(*way.T)
+    touching = (begin <= length + GAP_M) & (end >= -GAP_M)
+    straight = off <= np.minimum(off_m, np.maximum(0.05 * (end - begin), ROUNDED_M))
+    inside = (begin >= -GAP_M) & (end <= length + GAP_M) & (off <= off_m)
     return np.asarray(touching & (straight | inside))
 
 
