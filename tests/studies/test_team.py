@@ -114,7 +114,7 @@ def test_a_short_team(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "team_walks", on_one_way)
     monkeypatch.setattr(study, "track_team", with_encounter)
     short = replace(study.team_study("office/tap", 12.0), journal=False)
-    run_study(short, StudyRequest(1, 3, tmp_path / "rows.json", tmp_path))
+    run_study(short, StudyRequest(1, 6, tmp_path / "rows.json", tmp_path))
     (row,) = json.loads((tmp_path / "rows.json").read_text())["rows"]
     assert set(study.COLUMNS) <= set(row)
     assert row["first_alone_m"] > 2.0  # its start is wrong, and the walk is short

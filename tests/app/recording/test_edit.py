@@ -143,6 +143,13 @@ def test_a_file_cut_off_anywhere_keeps_all_before(tmp_path: Path, draw: st.DataO
         assert chunks_of(tmp_path / "cut.mcap") == found
 
 
+def test_one_byte_between_others_costs_no_record_after_it(tmp_path: Path) -> None:
+    """Shifted bytes look like records of any kind: none may swallow what follows."""
+    whole = write(tmp_path / "a.mcap")
+    for begin in range(2000, len(whole) - 2000, 97):
+        assert len(saved(whole[:begin] + b"\0" + whole[begin:], tmp_path)) >= len(CHUNKS) - 8
+
+
 @pytest.mark.slow
 @given(st.data())
 @FIXTURE

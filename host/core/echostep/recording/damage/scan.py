@@ -21,7 +21,7 @@ from echostep.recording.mcap_records import HEAD_SIZE, MCAP_MAGIC, MESSAGE, MESS
 
 # [MCAP format specification]
 CHUNK, CHUNK_HEAD = 0x06, HEAD_SIZE + 40  # opcode; bytes before the records of a chunk that is not compressed
-LAST_OPCODE, PRIVATE = 0x0F, 0x80  # of the specification; from here on they are other programs' own, and skipped
+LAST_OPCODE, PRIVATE = 0x0F, 0x80  # of the specification; of the place that `open_chunk` keeps for the head of a chunk
 # Assumed.
 VALID_RUN = 4  # this many consecutive records are not valid by chance
 OTHER_LIMIT = 1 << 20  # bytes; only messages and chunk records are larger
@@ -54,12 +54,14 @@ def record_end(file: Octets, begin: int, is_channel: Bools) -> int:
         if length < MESSAGE_SIZE or not is_channel[read_uint(file, body, 2)]:
             return -1
         return body + length if length <= LARGE or _may_follow(file, body + length) else -1
+    if opcode == PRIVATE:
+        return body + length if body + length == begin + CHUNK_HEAD else -1
     return body + length if opcode == CHUNK or length <= OTHER_LIMIT else -1
 
 
 @part
 def _is_opcode(opcode: int) -> bool:
-    return 1 <= opcode <= LAST_OPCODE or opcode >= PRIVATE
+    return 1 <= opcode <= LAST_OPCODE or opcode == PRIVATE
 
 
 @part
