@@ -58,7 +58,9 @@ def test_a_busy_computer_says_lost_once() -> None:
     _, replayed = shown(chunks, 3000, replay=True)
     assert len(words_of(own)) > 8
     said = words_of(live)
-    assert said == ["tracking", "lost", "uncertain", "tracking"][: max(len(said), 3)]  # 11 m are short: it may end there
+    assert (
+        said == ["tracking", "lost", "uncertain", "tracking"][: max(len(said), 3)]
+    )  # 11 m are short: it may end there
     assert live == replayed  # although a live page shows steps ahead of their echoes, too
     assert all(WORSE.index(said.status) >= WORSE.index(was.status) for was, said in zip(own, live, strict=True))
     last_s = max(e.t_s for e in own if e.status is TrackStatus.LOST)

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.localization import Building, EchoSettings, echo_model
+from echostep.localization import Building, EchoSettings, MapFilter, Start, echo_model
 from echostep.localization.echoes.unplanned import UsablePings
 from echostep.path import MeasuredSegment, PathSegment
+from echostep.plan import Pose
 from echostep.settings import parse_settings
 from echostep.walls.echo_sources import Walls
 
@@ -48,6 +49,24 @@ def test_a_wearer_who_turns_on_the_spot_sees_something_new() -> None:
     assert first == [EchoSettings().own]
     assert 0.0 < turning[0] < 0.2 * EchoSettings().own < after[0]
     assert still == []
+
+
+def test_who_turns_at_the_end_of_a_corridor_is_placed_by_its_end() -> None:
+    """Along a corridor of 20 m the place is known to half a metre; turned by 90 degrees, one ranger hears the end, 1.1 m away."""
+    corridor = Building(Walls(np.array([[0, 0, 20, 0], [20, 0, 20, 2], [20, 2, 0, 2], [0, 2, 0, 0]], float)), None)
+    tracked = MapFilter(corridor, Start(Pose(18.9, 1.0, 0.0), sd_m=0.5), 0.0, np.random.default_rng(1))
+    sides, sd_m = np.array([0, 1]), []
+    for k, (turn_deg, range_m) in enumerate(
+        [(0, (1.0, 1.0)), (-90, (1.0, 1.0)), (0, (1.1, math.nan)), (0, (1.1, math.nan))]
+    ):
+        heading = math.radians(-90.0 * (k > 1))
+        way = PathSegment(
+            k, k + 1.0, 0.0, 0.0, heading, heading + math.radians(turn_deg), sd_m=0.01, turn_sd_rad=0.01, step=1
+        )
+        estimate = tracked.update(MeasuredSegment(way, np.full(2, k + 0.5), sides, np.array(range_m)))
+        sd_m.append(math.sqrt(estimate.xx_m2))
+    assert sd_m[0] > 0.4
+    assert sd_m[-1] < 0.5 * sd_m[0]
 
 
 @pytest.mark.parametrize("own", [0.0, -0.5, 1.5])
