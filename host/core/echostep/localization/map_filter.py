@@ -249,7 +249,7 @@ class MapFilter:
         if each.table is not None:
             each.weigh(share * each.table.advance(move, pings, self._model), evidence.log_path)
         elif self.building.has_walls:
-            log_ratio = float((evidence.log_pings - alone).sum())
+            log_ratio = float(unplanned.counts @ (evidence.log_pings - alone))
             each.weigh(share * log_ratio, self._passed(move, evidence.log_path))
 
     def _passed(self, move: Move, log_passed: float) -> float:

@@ -174,6 +174,7 @@ class UnplannedDensities(NamedTuple):
     its echo, 0 for an echo; `alike`, the density if like the ping before, without these two.
 
     Logs of densities to the pings' power, anywhere in the building or like the ping before: `either`, and `blurred` as for a scattered cloud.
+    `counts`: share that is evidence for a cloud: what a turn has left only selects its particles, since the trunk follows the foot late.
     """
 
     stray: Floats
@@ -181,6 +182,7 @@ class UnplannedDensities(NamedTuple):
     alike: Floats
     either: Floats
     blurred: Floats
+    counts: Floats
 
 
 class RangeMemory:
@@ -211,7 +213,7 @@ class RangeMemory:
             changed * (anywhere + missed) ** pings.power + (1.0 - changed) * (like + missed) ** pings.power
             for like in (alike, blurred)
         )
-        return UnplannedDensities(stray, missed, alike, np.log(either), np.log(either_blurred))
+        return UnplannedDensities(stray, missed, alike, np.log(either), np.log(either_blurred), np.ones(len(missed)))
 
 
 @kernel
@@ -251,8 +253,8 @@ class UsablePings:
         self.set_ranger_model(background, echo)
         self._x_m, self._y_m = 0.0, 0.0  # end of the path in the walk frame
         self._viewed_m = 0.0  # way of the views: the path, and `correlation_m` for each VIEW_RAD of turning
-        # Mark on that way at each ranger's last ping, from its first echo on; further back by what a turn has left unused
-        self._last_ping_m = [-math.inf, -math.inf]
+        # Mark on that way at each ranger's last ping, from its first echo on; what the last turn has left for its next one
+        self._last_ping_m, self._unused_m = [-math.inf, -math.inf], [0.0, 0.0]
 
     def set_ranger_model(self, background: Background, echo: EchoSettings) -> None:
         """Use these ranger settings, and this density of echoes without a plan, from the next segment on."""
@@ -274,13 +276,15 @@ class UsablePings:
             share = np.clip((measured.t_s - segment.t0_s) / span_s, 0.0, 1.0)
         axis = segment.heading0_rad + share * segment.turn_rad + measured.off_heading_rad
         range_m = np.where(np.isnan(measured.range_m), 0.0, measured.range_m)
-        travel_m = self._travels(measured.ranger, range_m, self._viewed_m + share * viewed_m)
+        travel_m, unused_m = self._travels(measured.ranger, range_m, self._viewed_m + share * viewed_m)
         loss = _loss(segment.turn_rad, TURNING_RAD)
         power = self._own * np.minimum(travel_m / self._correlation_m, 1.0) / loss
         self.odometer.add(length)
         self._viewed_m += viewed_m
-        unused_m = (1.0 - 1.0 / loss) * min(viewed_m, self._correlation_m)
-        self._last_ping_m = [mark_m - unused_m for mark_m in self._last_ping_m]
+        if loss > 1.0:
+            self._unused_m = [
+                left_m + (1.0 - 1.0 / loss) * min(viewed_m, self._correlation_m) for left_m in self._unused_m
+            ]
         used = power > LEAST_POWER
         way_x_m, way_y_m = segment.way_m(share)
         x_m, y_m = self._x_m + way_x_m, self._y_m + way_y_m
@@ -290,14 +294,15 @@ class UsablePings:
         return PingBatch(
             share[used], pings.axis_rad, pings.range_m, pings.power, pings.ranger, travel_m[used],
             unplanned.stray, unplanned.missed, unplanned.alike, np.exp(unplanned.either),
-        ), unplanned  # fmt: skip
+        ), unplanned._replace(counts=1.0 - unused_m[used] / travel_m[used])  # fmt: skip
 
-    def _travels(self, ranger: Ints, range_m: Floats, viewed_m: Floats) -> Floats:
-        """Way of the view (k,) between each ping and the one before it of the same ranger; 0 before its first echo."""
-        last_m, travel_m = self._last_ping_m, np.zeros(len(viewed_m))
+    def _travels(self, ranger: Ints, range_m: Floats, viewed_m: Floats) -> tuple[Floats, Floats]:
+        """Way of the view (k,) between each ping and the one before it of the same ranger, 0 before its first echo; what a turn has left of it."""
+        last_m, left_m, travel_m, unused_m = self._last_ping_m, self._unused_m, *np.zeros((2, len(viewed_m)))
         for k, (which, heard_m, mark_m) in enumerate(
             zip(ranger.tolist(), range_m.tolist(), viewed_m.tolist(), strict=True)
         ):
             if heard_m > 0.0 or last_m[which] > -math.inf:
-                travel_m[k], last_m[which] = mark_m - last_m[which], mark_m
-        return travel_m
+                unused_m[k], left_m[which] = left_m[which], 0.0
+                travel_m[k], last_m[which] = mark_m - last_m[which] + unused_m[k], mark_m
+        return travel_m, unused_m
