@@ -219,7 +219,10 @@ def test_a_demo_is_published_and_commanded(tmp_path: Path) -> None:
     roster = json.loads(out)
     assert [(m["name"], m["state"]) for m in roster["members"]] == [("bob", "lost"), ("anna", "ended")]
     assert roster["members"][1]["report"]["motion"]["steps"] > 10
-    assert roster["members"][1]["from_start_m"] > 1.0
+    ended = roster["members"][1]["report"]
+    assert (ended["position"] or ended["last_place"])[
+        "x_m"
+    ] > 3.0  # the last one, where a slow computer takes 2 s to end
     _replays_alike(tmp_path)
 
 
