@@ -1,7 +1,7 @@
 #!/bin/sh
 # One would expect a chunk without message indexes, which the specification makes optional, to be read as a whole: the chunk index is there.
 # McapIndexedReader of @mcap/core refuses the file at its beginning. mcap for Python, which wrote it by its own option, reads all five.
-# It hurts whoever leaves these indexes out (16 bytes a message, 30 % of a recording of small messages): Foxglove's reader opens none of it.
+# A recording without these indexes (16 bytes a message, 30 % where messages are small) is lost to its users: Foxglove's reader opens none of it.
 set -eu
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

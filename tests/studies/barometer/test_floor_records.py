@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Recorded barometers as phones have them: coarse steps, sensors that filter, silences, rows that repeat, storeys that nobody told.
+"""Recorded barometers as phones have them: coarse steps, sensors that filter, silences, rows that repeat, storeys that are not stated.
 
 First readings may be the reset value: they make no rise, and a file says that they were left out.
 """

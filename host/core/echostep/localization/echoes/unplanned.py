@@ -70,11 +70,12 @@ class LastWall:
         self._covariance_m += across * self._var_rad2
         self._var_rad2 += TURN_SD_RAD**2 * math.hypot(dx_m, dy_m)
 
-    def density(self, range_m: float, axis_rad: float, blur_m: float, model: EchoModel) -> float:
-        """Density (1/m) of an echo of this wall, blurred by a standard deviation; it is detected as a wall of the plan would be."""
+    def densities(self, range_m: float, axis_rad: float, blur_m: float, model: EchoModel) -> tuple[float, float]:
+        """Density (1/m) of an echo of this wall, and blurred by a standard deviation; it is detected as a wall of the plan would be."""
         detected = detection(self.distance_m, abs(wrap(self.normal_rad - axis_rad)), WALL, model)
-        variance_m2 = self._var_m2 + self._error_m(axis_rad) ** 2 + blur_m**2
-        return detected * normal(range_m - self.distance_m, math.sqrt(variance_m2))
+        off_m, variance_m2 = range_m - self.distance_m, self._var_m2 + self._error_m(axis_rad) ** 2
+        blurred = normal(off_m, math.sqrt(variance_m2 + blur_m**2))
+        return detected * normal(off_m, math.sqrt(variance_m2)), detected * blurred
 
     def update(self, range_m: float, axis_rad: float, power: float) -> None:
         """Correct the line by an echo, whose error counts by `power`: errors of successive echoes are alike."""
@@ -93,7 +94,7 @@ class LastWall:
 
 
 class UnplannedView:
-    """The view of one ranger without a plan: for each ping call `move`, `density`, `update`, in this order."""
+    """The view of one ranger without a plan: for each ping call `move`, `densities`, `update`, in this order."""
 
     def __init__(self, echo: EchoSettings) -> None:
         self._echo, self._model = echo, echo_model(echo)
@@ -115,14 +116,14 @@ class UnplannedView:
             self._wall.move(dx_m, dy_m)
         return math.exp(-math.hypot(dx_m, dy_m) / VIEW_M - turn_rad / VIEW_RAD)
 
-    def density(self, range_m: float, axis_rad: float, stray: float, blur_m: float = 0.0) -> float:
-        """Density (1/m) of a range if the view goes on, blurred by a standard deviation; range 0: the probability of no echo.
+    def densities(self, range_m: float, axis_rad: float, stray: float, blur_m: float) -> tuple[float, float]:
+        """Density (1/m) of a range if the view goes on, and blurred by a standard deviation; range 0: the probability of no echo.
 
         `stray`: probability of a second reflection where nothing answers.
         """
         if self._wall is None:
-            return 1.0 - stray if range_m <= 0.0 else stray / (self._echo.maximum_m - self._echo.minimum_m)
-        return 0.0 if range_m <= 0.0 else self._wall.density(range_m, axis_rad, blur_m, self._model)
+            return (1.0 - stray if range_m <= 0.0 else stray / (self._echo.maximum_m - self._echo.minimum_m),) * 2
+        return (0.0, 0.0) if range_m <= 0.0 else self._wall.densities(range_m, axis_rad, blur_m, self._model)
 
     def update(self, range_m: float, axis_rad: float, power: float, goes_on: bool) -> None:
         """Take in a ping; `goes_on`: whether the view goes on, by the densities."""
@@ -205,8 +206,7 @@ class RangeMemory:
             axis_rad = float(pings.axis_rad[k])
             same = view.move(float(pings.x_m[k]), float(pings.y_m[k]), axis_rad)
             changed[k] = 1.0 - (1.0 - self._echo.outlier) * same
-            alike[k] = view.density(range_m, axis_rad, float(stray[k]))
-            blurred[k] = view.density(range_m, axis_rad, float(stray[k]), self._blur_m)
+            alike[k], blurred[k] = view.densities(range_m, axis_rad, float(stray[k]), self._blur_m)
             goes_on = (1.0 - changed[k]) * (alike[k] + missed[k]) > changed[k] * anywhere[k]
             view.update(range_m, axis_rad, float(pings.power[k]), goes_on)
         either, either_blurred = (
