@@ -71,9 +71,7 @@ def outage(wearer: Any, table: Any, broker: Broker) -> None:
 @pytest.mark.long
 @needs_broker
 @pytest.mark.parametrize("size", SIZES)  # each with a walk of its own: at its end the page of a demo becomes its replay
-def test_a_dead_broker_is_told_and_what_is_asked_for_arrives_once(
-    browser: Any, size: tuple[int, int], tmp_path: Path
-) -> None:
+def test_a_dead_broker_is_told(browser: Any, size: tuple[int, int], tmp_path: Path) -> None:
     with Broker(tmp_path) as broker:
         walk = f"demo --speed 1 --port 0 --publish {broker.url} --name anna --out {tmp_path / 'demo'}".split()
         follow = ("command", broker.url, "--plan", PLAN, "--port", 0, "--out", tmp_path / "operation.mcap")
