@@ -66,7 +66,7 @@ class MapFilter:
         self._crossed = CrossedWalls()
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
-        self._way = RecentWay()  # since the last gap
+        self._way = RecentWay(start.walked_from(walk_heading_rad))  # since the last gap
         self._riding = RidingHeight(HEIGHT_SD_M)
         self._barometer_starts = 0  # before the last height by pressure
         if start.after_pause:
@@ -118,7 +118,7 @@ class MapFilter:
         # 7. What aids the filter weighs the tracked one.
         self._aid(segment)
         # 8. If the trunk is probably in none, it is searched.
-        self._search_if_doubted(segment.heading1_rad)
+        self._search_if_doubted()
         # 9. The estimate of the tracked one, and of its rival.
         return self._estimate(segment)
 
@@ -176,10 +176,10 @@ class MapFilter:
                 self.cloud, *self._table(), self.building.floor, self._settings, self._rng
             )
 
-    def _search_if_doubted(self, walk_heading_rad: float) -> None:
+    def _search_if_doubted(self) -> None:
         """Search the building if the trunk is probably in no cloud."""
         if self.belief.is_doubted and len(self.building.floor.x_m):
-            self._begin_search(Start(), walk_heading_rad)
+            self._begin_search(self._way.begin, 0.0)
 
     def _height_change(self, measured: MeasuredSegment) -> HeightChange:
         """The change of height over a segment. The lag of the height by pressure drifts over a pause; it is forgotten where the heights restart."""

@@ -18,6 +18,7 @@ from echostep.localization.grid.search import Search
 from echostep.localization.height.levels import HeightChange
 from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.start import Start
 from echostep.walls.echo_sources import Walls
 
 PAST_M = 40.0  # path that is passed again: the path on which a place is found
@@ -25,9 +26,11 @@ MOST_PIECES = 1_000  # of it: eight minutes of standing
 
 
 class RecentWay:
-    """The last PAST_M of the path."""
+    """The last PAST_M of the path. `begin`: where it begins; anywhere, once more has been walked or the path has begun anew."""
 
-    def __init__(self) -> None:
+    def __init__(self, begin: Start) -> None:
+        """`begin`: of the walk, with the heading at the walk frame's zero."""
+        self.begin = begin
         self._pieces: deque[tuple[Move, PingBatch, HeightChange]] = deque()
         self.length_m = 0.0
 
@@ -39,11 +42,13 @@ class RecentWay:
         self._pieces.append((move, pings, change))
         self.length_m += math.hypot(move.dx_m, move.dy_m)
         while self._pieces and (self.length_m > PAST_M or len(self._pieces) > MOST_PIECES):
+            self.begin = Start()
             first, _, _ = self._pieces.popleft()
             self.length_m -= math.hypot(first.dx_m, first.dy_m)
 
     def clear(self) -> None:
         """Forget the path: the next move may begin elsewhere."""
+        self.begin = Start()
         self._pieces.clear()
         self.length_m = 0.0
 

@@ -7,7 +7,7 @@ In: a `Start`. Out: poses drawn from it. Owns nothing.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -71,6 +71,18 @@ class Start:
         return self.pose is None and self.level == ANY_LEVEL and self.air is None
 
     @property
+    def wide(self) -> Start:
+        """The start if what is stated is wrong."""
+        sd_m, sd_rad = math.hypot(self.sd_m, WIDE_SD_M), math.hypot(self.heading_sd_rad, WIDE_SD_RAD)
+        return replace(self, sd_m=sd_m, heading_sd_rad=sd_rad)
+
+    def walked_from(self, walk_heading_rad: float) -> Start:
+        """What is left of a start that is wrong: `wide`, with the heading on the map at the walk frame's zero; anywhere without a pose."""
+        if self.pose is None:
+            return Start()
+        return replace(self.wide, pose=replace(self.pose, heading_rad=self.pose.heading_rad - walk_heading_rad), after_pause=False)
+
+    @property
     def lag_variance(self) -> float:
         """Variance (m2) of the offset of the height by pressure."""
         return UNKNOWN_LAG_M2 if self.air is None else self.air.sd_m**2
@@ -95,8 +107,8 @@ def draw_poses(
         x, y, heading = _on_floor(allowed_floor(floor, start, sheet), count, rng)
         return x, y, heading, np.zeros(count)
     is_wide = rng.random(count) < (WIDE_SHARE if len(floor.x_m) else 0.0)  # without walls nothing would correct it
-    sd_m = np.where(is_wide, math.hypot(start.sd_m, WIDE_SD_M), start.sd_m)
-    sd_rad = np.where(is_wide, math.hypot(start.heading_sd_rad, WIDE_SD_RAD), start.heading_sd_rad)
+    sd_m = np.where(is_wide, start.wide.sd_m, start.sd_m)
+    sd_rad = np.where(is_wide, start.wide.heading_sd_rad, start.heading_sd_rad)
     pose, noise = start.pose, rng.standard_normal((3, count))
     x, y = pose.x_m + sd_m * noise[0], pose.y_m + sd_m * noise[1]
     heading = pose.heading_rad + sd_rad * noise[2]
