@@ -106,9 +106,9 @@ def draw_poses(
     if start.pose is None:
         x, y, heading = _on_floor(allowed_floor(floor, start, sheet), count, rng)
         return x, y, heading, np.zeros(count)
-    is_wide = rng.random(count) < (WIDE_SHARE if len(floor.x_m) else 0.0)  # without walls nothing would correct it
-    sd_m = np.where(is_wide, start.wide.sd_m, start.sd_m)
-    sd_rad = np.where(is_wide, start.wide.heading_sd_rad, start.heading_sd_rad)
+    is_wide = rng.random((2, count)) < (WIDE_SHARE if len(floor.x_m) else 0.0)  # without walls nothing would correct it
+    sd_m = np.where(is_wide[0], start.wide.sd_m, start.sd_m)
+    sd_rad = np.where(is_wide[1], start.wide.heading_sd_rad, start.heading_sd_rad)
     pose, noise = start.pose, rng.standard_normal((3, count))
     x, y = pose.x_m + sd_m * noise[0], pose.y_m + sd_m * noise[1]
     heading = pose.heading_rad + sd_rad * noise[2]
@@ -118,7 +118,7 @@ def draw_poses(
     if sheet is not None:
         on_sheet = _levels(pose.level, count, sheet) * sheet.pitch_m
         x, east = x + on_sheet, east + on_sheet
-    log_weight = np.where(is_wide, math.log((1.0 - STATED) / WIDE_SHARE), math.log(STATED / (1.0 - WIDE_SHARE)))
+    log_weight = np.where(is_wide, math.log((1.0 - STATED) / WIDE_SHARE), math.log(STATED / (1.0 - WIDE_SHARE))).sum(0)
     is_behind = crossings(east, np.full(count, pose.y_m), x, y, walls)
     return x, y, heading, log_weight + UNPLANNED_DOOR * is_behind
 
