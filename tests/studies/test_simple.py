@@ -79,6 +79,15 @@ def test_a_known_start_is_tracked_whatever_the_rangers_do_at_first(building: str
 
 
 @pytest.mark.study
+@pytest.mark.parametrize("building", ["corridor-20", "room-8x6"])
+def test_a_heading_that_was_stated_wrong_is_found(building: str) -> None:
+    """Both buildings are their own mirror images: only the start tells which end is which."""
+    (row,) = simple_run([f"{building}/turned"], 6001)
+    assert row.mean_m < WORST_M
+    assert row.false_tracking == 0.0
+
+
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("building", "fault"),
     [("corridor-20", "/foot-alone"), ("flat", "/foot-alone"), ("hall", "/foot-alone"), ("flat", "/off-foot")],
@@ -93,7 +102,7 @@ def test_a_foot_alone_is_led_by_the_plan(building: str, fault: str) -> None:
 
 @pytest.mark.process
 def test_the_command_names_its_rows(tmp_path: Path) -> None:
-    assert len(NAMES) == len(set(NAMES)) == len(BUILDINGS) * (len(FAULTS) + 3)
+    assert len(NAMES) == len(set(NAMES)) == len(BUILDINGS) * (len(FAULTS) + 4)
     wrong = echostep("evaluate", "simple", "--rows", "corridor-7", "--out", tmp_path)
     assert wrong.returncode != 0
     assert "corridor-20/silent-3" in wrong.stderr

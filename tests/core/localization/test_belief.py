@@ -237,14 +237,16 @@ def test_a_place_is_as_sure_as_the_plan_that_it_is_on(fits: float, status: Track
     assert estimate.status is status
 
 
-def test_a_cloud_that_is_doubted_is_searched_for_and_not_claimed() -> None:
+@pytest.mark.parametrize(("start", "status"), [(Start(HERE), TrackStatus.UNCERTAIN), (Start(), TrackStatus.LOST)])
+def test_a_cloud_that_is_doubted_is_searched_for_and_not_claimed(start: Start, status: TrackStatus) -> None:
     doubted = filter_at(HERE)
+    doubted._way.begin = start.wide  # as long as all of the way from there is known; then anywhere
     doubted.belief = Belief(doubted.cloud, 0.2, PLAN_FITS)
     estimate = after_a_step(doubted)
     assert doubted.belief.search is not None
     assert doubted.belief.search.cloud.is_searching
     assert estimate.right < SURE
-    assert estimate.status is TrackStatus.LOST
+    assert estimate.status is status
 
 
 def test_a_wall_that_is_not_there_costs_a_believed_cloud_its_price_once() -> None:

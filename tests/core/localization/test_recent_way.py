@@ -74,7 +74,7 @@ def alike() -> Building:
 
 
 def way_in(where: Building, walked_m: float = WALKED_M) -> RecentWay:
-    way, usable = RecentWay(), UsablePings(where.background(MODEL), ECHO)
+    way, usable = RecentWay(Start(), 0.0), UsablePings(where.background(MODEL), ECHO)
     for measured in segments(walked_m):
         way.add(move_of(measured.segment), usable.take(measured)[0], height_change(measured, 0.0))
     return way

@@ -66,7 +66,7 @@ class MapFilter:
         self._crossed = CrossedWalls()
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
-        self._way = RecentWay(start.walked_from(walk_heading_rad))  # since the last gap
+        self._way = RecentWay(start.wide, walk_heading_rad)  # since the last gap
         self._riding = RidingHeight(HEIGHT_SD_M)
         self._barometer_starts = 0  # before the last height by pressure
         if start.after_pause:
@@ -118,7 +118,8 @@ class MapFilter:
         # 7. What aids the filter weighs the tracked one.
         self._aid(segment)
         # 8. If the trunk is probably in none, it is searched.
-        self._search_if_doubted()
+        if belief.is_doubted and len(self.building.floor.x_m):
+            self._begin_search(self._way.begin, self._way.walk_heading_rad)
         # 9. The estimate of the tracked one, and of its rival.
         return self._estimate(segment)
 
@@ -175,11 +176,6 @@ class MapFilter:
             self.belief.tracked.table = grid_about(
                 self.cloud, *self._table(), self.building.floor, self._settings, self._rng
             )
-
-    def _search_if_doubted(self) -> None:
-        """Search the building if the trunk is probably in no cloud."""
-        if self.belief.is_doubted and len(self.building.floor.x_m):
-            self._begin_search(self._way.begin, 0.0)
 
     def _height_change(self, measured: MeasuredSegment) -> HeightChange:
         """The change of height over a segment. The lag of the height by pressure drifts over a pause; it is forgotten where the heights restart."""
@@ -292,10 +288,8 @@ class MapFilter:
         """The estimate at the end of a segment."""
         belief = self.belief
         hidden_sd_m = HIDDEN_SD_M * self.cloud.hidden_share
-        sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M)
         map_sd_m = self._map_sd_m()
-        if map_sd_m > 0.0:
-            sd_m = math.hypot(sd_m, map_sd_m)
+        sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M, map_sd_m)
         right = Right(belief.right, belief.probability(belief.search))
         search = belief.search.cloud if belief.search else None
         new = estimate_of(

@@ -26,11 +26,10 @@ MOST_PIECES = 1_000  # of it: eight minutes of standing
 
 
 class RecentWay:
-    """The last PAST_M of the path. `begin`: where it begins; anywhere, once more has been walked or the path has begun anew."""
+    """The last PAST_M of the path; where it begins: anywhere, once more has been walked or it was cleared."""
 
-    def __init__(self, begin: Start) -> None:
-        """`begin`: of the walk, with the heading at the walk frame's zero."""
-        self.begin = begin
+    def __init__(self, begin: Start, walk_heading_rad: float) -> None:
+        self.begin, self.walk_heading_rad = begin, walk_heading_rad
         self._pieces: deque[tuple[Move, PingBatch, HeightChange]] = deque()
         self.length_m = 0.0
 

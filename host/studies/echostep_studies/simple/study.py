@@ -28,14 +28,15 @@ from echostep_studies.simple.buildings import BUILDINGS
 from echostep_studies.simple.faults import FAULTS
 
 LEGS = "/legs"
-OFF = {"/off": "", "/off-foot": "/foot-alone"}  # faults from a start that is off by its stated deviations
+# From a start that is off by its stated deviations, and from one that is turned by four of them
+OFF = {"/off": "", "/turned": "", "/off-foot": "/foot-alone"}
 NAMES = tuple(f"{building}{fault}" for building in BUILDINGS for fault in (*FAULTS, *OFF, LEGS))
 COLUMNS = {
     "name": "", "runs": "runs", "tracking": "says tracking %", "lost": "says lost %", "false_tracking": "false tracking %", "mean_m": "mean m",
     "rmse_m": "RMSE m", "worst_m": "worst m", "laid_m": "path laid on the plan m",
 }  # fmt: skip
 NOTES = (
-    "From the true place and heading of the trunk, with the default start: 0.15 m, 5 degrees; off: by as much. Shares are of all estimates.",
+    "From the true place and heading, with the default start: 0.15 m, 5 degrees; off: by as much; turned: by 20. Shares are of all estimates.",
     "false tracking: off by more than 1 m. path laid on the plan: RMSE of the measured path from that start, without a filter.",
 )
 
@@ -81,6 +82,8 @@ def _row(name: str, seed: int, walk: SimulatedWalk) -> SimpleRow:
     start = walk.pose_at(walk.segments[0].segment.t0_s)
     if name.endswith(tuple(OFF)):
         east, north, turn = np.random.default_rng([seed, 5]).standard_normal(3).tolist()
+        if name.endswith("/turned"):
+            east, north, turn = 0.0, 0.0, math.copysign(4.0, turn)
         start = Pose(start.x_m + 0.15 * east, start.y_m + 0.15 * north, start.heading_rad + math.radians(5.0) * turn)
     run = track(walk.segments, walk.built, Start(start), seed)
     t_s = np.array([claim.t_s for claim in run.claims])

@@ -281,10 +281,8 @@ class UsablePings:
         power = self._own * np.minimum(travel_m / self._correlation_m, 1.0) / loss
         self.odometer.add(length)
         self._viewed_m += viewed_m
-        if loss > 1.0:
-            self._unused_m = [
-                left_m + (1.0 - 1.0 / loss) * min(viewed_m, self._correlation_m) for left_m in self._unused_m
-            ]
+        left_m = (1.0 - 1.0 / loss) * min(viewed_m, self._correlation_m)
+        self._unused_m = [unused + left_m for unused in self._unused_m]
         used = power > LEAST_POWER
         way_x_m, way_y_m = segment.way_m(share)
         x_m, y_m = self._x_m + way_x_m, self._y_m + way_y_m

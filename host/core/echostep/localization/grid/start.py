@@ -79,5 +79,4 @@ def _facing(turn_rad: float, sd_rad: float) -> Floats:
     """Density in the sectors of the rotation walk -> map (SECTORS,) about one of them; even above TURN_AROUND_RAD."""
     sector_rad = 2.0 * math.pi / SECTORS
     off_rad: Floats = wrap(np.asarray((np.arange(SECTORS) + 0.5) * sector_rad - turn_rad))
-    even = np.ones(SECTORS)
-    return even if sd_rad > TURN_AROUND_RAD else np.exp(-0.5 * off_rad**2 / (sd_rad**2 + sector_rad**2))
+    return np.ones(SECTORS) if sd_rad > TURN_AROUND_RAD else np.exp(-0.5 * off_rad**2 / (sd_rad**2 + sector_rad**2))

@@ -20,11 +20,11 @@ from echostep.walls.index import NO_WALLS, WallIndex, crossings
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 ANY_LEVEL = -1  # level of a start that is not known
-# A stated start is sometimes wrong: a tap beside the place, a body that does not face the way the toes point. Assumed:
-STATED = 0.99  # probability that a stated start is right: its spread is never all that is possible
-# Standard deviations of a wrong start besides the stated ones: a stride, a foot that is set down turned
+# The place or the heading of a stated start is sometimes wrong: a tap beside it, a body that does not face the way the toes point. Assumed:
+STATED = 0.99  # probability that either is right: its spread is never all that is possible
+# Standard deviations of a wrong one besides the stated ones: a stride, a foot that is set down turned
 WIDE_SD_M, WIDE_SD_RAD = 0.9, math.radians(30.0)
-WIDE_SHARE = 0.07  # of the particles are such: enough to be found by the first echoes
+WIDE_SHARE = 0.07  # of the particles have either wrong: enough to be found by the first echoes
 TURN_AROUND_RAD = 1.5  # a heading with a greater standard deviation is drawn evenly from all
 
 
@@ -72,15 +72,9 @@ class Start:
 
     @property
     def wide(self) -> Start:
-        """The start if what is stated is wrong."""
+        """The start if what is stated is wrong: anywhere, without a pose."""
         sd_m, sd_rad = math.hypot(self.sd_m, WIDE_SD_M), math.hypot(self.heading_sd_rad, WIDE_SD_RAD)
-        return replace(self, sd_m=sd_m, heading_sd_rad=sd_rad)
-
-    def walked_from(self, walk_heading_rad: float) -> Start:
-        """What is left of a start that is wrong: `wide`, with the heading on the map at the walk frame's zero; anywhere without a pose."""
-        if self.pose is None:
-            return Start()
-        return replace(self.wide, pose=replace(self.pose, heading_rad=self.pose.heading_rad - walk_heading_rad), after_pause=False)
+        return replace(self, sd_m=sd_m, heading_sd_rad=sd_rad) if self.pose else Start()
 
     @property
     def lag_variance(self) -> float:
@@ -95,21 +89,16 @@ class Start:
 
 
 def draw_poses(
-    start: Start,
-    count: int,
-    floor: Floor,
-    sheet: LevelSheet | None,
-    rng: np.random.Generator,
-    walls: WallIndex = NO_WALLS,
-) -> tuple[Floats, Floats, Floats, Floats]:
+    start: Start, count: int, floor: Floor, sheet: LevelSheet | None, rng: np.random.Generator, walls: WallIndex = NO_WALLS
+) -> tuple[Floats, Floats, Floats, Floats]:  # fmt: skip
     """x, y on the sheet (m), heading (rad) and log-weight, each (count,); behind a wall from a pose is as improbable as a way through it."""
     if start.pose is None:
         x, y, heading = _on_floor(allowed_floor(floor, start, sheet), count, rng)
         return x, y, heading, np.zeros(count)
     is_wide = rng.random((2, count)) < (WIDE_SHARE if len(floor.x_m) else 0.0)  # without walls nothing would correct it
-    sd_m = np.where(is_wide[0], start.wide.sd_m, start.sd_m)
-    sd_rad = np.where(is_wide[1], start.wide.heading_sd_rad, start.heading_sd_rad)
-    pose, noise = start.pose, rng.standard_normal((3, count))
+    pose, wide, noise = start.pose, start.wide, rng.standard_normal((3, count))
+    sd_m = np.where(is_wide[0], wide.sd_m, start.sd_m)
+    sd_rad = np.where(is_wide[1], wide.heading_sd_rad, start.heading_sd_rad)
     x, y = pose.x_m + sd_m * noise[0], pose.y_m + sd_m * noise[1]
     heading = pose.heading_rad + sd_rad * noise[2]
     if start.heading_sd_rad > TURN_AROUND_RAD:
@@ -143,6 +132,5 @@ def allowed_floor(floor: Floor, start: Start, sheet: LevelSheet | None) -> Floor
 def _on_floor(floor: Floor, count: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
     """Poses drawn evenly over the floor, with any heading; at the origin for a plan without a floor."""
     heading = 2.0 * math.pi * rng.random(count)
-    if not len(floor.x_m):
-        return np.zeros(count), np.zeros(count), heading
-    return *floor.draw(count, rng), heading
+    x, y = floor.draw(count, rng) if len(floor.x_m) else np.zeros((2, count))
+    return x, y, heading
