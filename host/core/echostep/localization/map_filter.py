@@ -42,6 +42,7 @@ EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate: no plan 
 # Standard deviation per axis when all views are hidden: a plan that explains few echoes may be this far off
 HIDDEN_SD_M = 0.15
 BY_DEFINITION = 1.0 - 1e-6  # without a plan: the map begins where the walk began, and no echo can contradict that
+NEAR_SD_M = 2.0  # standard deviation of a place that was believed before a gap, per axis; assumed
 UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, assumed
 
 
@@ -166,7 +167,7 @@ class MapFilter:
         self._way.clear()
         on_levels = self.cloud.sheet is not None and air is None
         near = replace(self._believed(walk_heading_rad), level=ANY_LEVEL) if on_levels else None
-        self._begin_search(Start(near=near, air=air), walk_heading_rad)
+        self._begin_search(Start(near=near, sd_m=NEAR_SD_M, heading_sd_rad=math.pi, air=air), walk_heading_rad)
 
     def _begin_search(self, start: Start, walk_heading_rad: float) -> None:
         """Search the building along the last metres of the path."""

@@ -11,7 +11,8 @@ import pytest
 from echostep.localization import ANY_LEVEL, STATED, Building, EchoSettings, FilterSettings, Start, echo_model
 from echostep.localization.echoes.unplanned import RangeMemory
 from echostep.localization.grid.search_grid import SearchGrid
-from echostep.localization.grid.start import NEAR_SD_M, NEAR_SHARE, grid_of
+from echostep.localization.grid.start import NEAR_SHARE, grid_of
+from echostep.localization.map_filter import NEAR_SD_M
 from echostep.localization.particles.start import WIDE_SHARE, draw_poses
 from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.plan import Pose
@@ -34,7 +35,9 @@ def grid_in(building: Building, start: Start) -> SearchGrid:
 def test_near_a_place_of_unknown_level_is_above_and_below_it_too() -> None:
     """Most of the weight is there, as much on each level, and faces anywhere."""
     near = Pose(*LIFT_AT, 0.0, ANY_LEVEL)
-    poses, log_weight = grid_in(Building(TOWER.walls, TOWER.sheet), Start(near=near)).every()
+    poses, log_weight = grid_in(
+        Building(TOWER.walls, TOWER.sheet), Start(near=near, sd_m=NEAR_SD_M, heading_sd_rad=math.pi)
+    ).every()
     weight = np.exp(log_weight) / np.exp(log_weight).sum()
     level = level_of(poses.x_m, TOWER.sheet)
     is_near = np.hypot(poses.x_m - level * TOWER.sheet.pitch_m - near.x_m, poses.y_m - near.y_m) < 3.0 * NEAR_SD_M

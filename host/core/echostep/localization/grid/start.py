@@ -25,8 +25,7 @@ from echostep.plan import Pose
 from echostep.walls.floor import CELL_M, Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
 
-# Of a search, this share is about where the wearer was believed: errors are mostly small; assumed
-NEAR_SHARE, NEAR_SD_M, NEAR_SD_RAD = 0.6, 2.0, math.radians(20.0)
+NEAR_SHARE = 0.6  # of a search is about where the wearer was believed: errors are mostly small; assumed
 ROOM_SD_M = 3.0  # standard deviation of a start's place above which it is searched: a room
 
 
@@ -56,13 +55,11 @@ def grid_of(
     grid = SearchGrid(
         cells, (allowed.x_m, allowed.y_m), unplanned, heights, math.radians(settings.cloud.start_veer_sd_deg)
     )
-    if start.pose is not None:
-        place = _near(allowed, start.pose, start.sd_m, sheet)
-        grid.begin_with(place, _facing(start.pose.heading_rad - walk_heading_rad, start.heading_sd_rad), STATED)
-    elif start.near is not None:
-        heading_sd_rad = NEAR_SD_RAD if start.near.level != ANY_LEVEL else math.pi
-        place = _near(allowed, start.near, NEAR_SD_M, sheet)
-        grid.begin_with(place, _facing(start.near.heading_rad - walk_heading_rad, heading_sd_rad), NEAR_SHARE)
+    about = start.pose or start.near
+    if about is not None:
+        facing = _facing(about.heading_rad - walk_heading_rad, start.heading_sd_rad)
+        share = NEAR_SHARE if start.pose is None else STATED
+        grid.begin_with(_near(allowed, about, start.sd_m, sheet), facing, share)
     return grid
 
 

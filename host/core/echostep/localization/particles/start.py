@@ -7,7 +7,7 @@ In: a `Start`. Out: poses drawn from it. Owns nothing.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -42,8 +42,7 @@ class Start:
 
     `pose`: its mean, with a standard deviation `sd_m` per axis and `heading_sd_rad`; a pose with level ANY_LEVEL may be on any. Without a pose:
     evenly over the walkable floor, on any level and with any heading, within the outline `room_m` (k, 2) on `level` if given; a share of them
-    `near` a pose, if given: with level ANY_LEVEL, above and below it too, with
-    any heading. `air`: calibration of the heights by pressure.
+    `near` a pose, if given, with these deviations: with level ANY_LEVEL, above and below it too. `air`: calibration of the heights by pressure.
     `after_pause`: an earlier run ended at the pose, and the wearer may have gone on since, so the whole building is searched beside it.
 
     >>> import echostep
@@ -72,9 +71,9 @@ class Start:
 
     @property
     def wide(self) -> Start:
-        """The start if what is stated is wrong: anywhere, without a pose."""
+        """The start if what is stated is wrong: near its pose, if any."""
         sd_m, sd_rad = math.hypot(self.sd_m, WIDE_SD_M), math.hypot(self.heading_sd_rad, WIDE_SD_RAD)
-        return replace(self, sd_m=sd_m, heading_sd_rad=sd_rad) if self.pose else Start()
+        return Start(near=self.pose, sd_m=sd_m, heading_sd_rad=sd_rad)
 
     @property
     def lag_variance(self) -> float:
