@@ -159,6 +159,7 @@ def refused(folder: Path, name: str, content: bytes) -> str:
 
 
 def test_what_a_file_lacks_is_one_sentence(tmp_path: Path) -> None:
+    assert "a.xls: binary, not a table: export it as CSV" in refused(tmp_path, "a.xls", b"\xd0\xcf" + bytes(99))
     assert "no XML" in refused(tmp_path, "a.mvnx", b"<mvnx><frame")
     assert "no MAT file that can be read" in refused(tmp_path, "a.mat", b"MATLAB 5.0 MAT-file" + bytes(200))
     savemat(tmp_path / "huge.mat", {"ts": np.arange(300) / 100.0, "imu": np.full((300, 6), 1e300)})

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -59,8 +61,10 @@ def test_other_units_are_asked_about_with_the_remedy(tmp_path: Path, columns: Sa
 
 def test_a_clock_of_the_epoch_is_no_fault(tmp_path: Path) -> None:
     path = tmp_path / "foot.csv"
-    path.write_text(text_of((1.7e9 + T_S, ACCEL, GYRO)))
-    assert np.allclose(np.diff(load_imu(path).t_s), 0.01, atol=1e-4)
+    rows = text_of((1.7e9 + T_S, ACCEL, GYRO))
+    for text in (rows, re.sub(r"(?m)^1[\d.]+", lambda found: str(datetime.fromtimestamp(float(found[0]), UTC)), rows)):
+        path.write_text(text)
+        assert np.allclose(np.diff(load_imu(path).t_s), 0.01, atol=1e-4)
 
 
 def test_a_sensor_whose_range_is_too_small_is_told(tmp_path: Path) -> None:

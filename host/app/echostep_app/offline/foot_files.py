@@ -87,7 +87,7 @@ def _folder(path: Path, files: Iterable[Path], naming: Naming) -> Imu:
     forces.sort(key=lambda name: "total" not in name)
     if not gyros or not forces:
         lacks = "no table of a gyroscope" if forces else "no table of an accelerometer"
-        raise EchostepError(f"{path}: {lacks} (there are: {', '.join(tables)[:300] or 'none'}); record both")
+        raise EchostepError(f"{path}: {lacks} (there are: {', '.join(tables)[:300] or 'none'}); record both, as CSV")
     gyro = open_samples(tables[gyros[0]], partial(_vectors, ours="g"))
     force = open_samples(tables[forces[0]], partial(_vectors, ours="a"))
     accel = _at(gyro[:, 0], force)
