@@ -56,6 +56,18 @@ def sensor_logger_of_ios(folder: Path, walk: np.ndarray) -> Path:
     return folder
 
 
+def sensor_logger_of_an_iphone(folder: Path, walk: np.ndarray) -> Path:
+    """The signs of iOS, as Metadata.csv tells."""
+    (folder / "Metadata.csv").write_text('version,device name,platform,standardisation\n3,"A, B",ios,false\n')
+    return sensor_logger_of_ios(folder, walk * [1, -1, -1, -1, 1, 1, 1])
+
+
+def sensor_log(folder: Path, walk: np.ndarray) -> Path:
+    """An iPhone's, with the signs of iOS."""
+    names = "accelerometerTimestamp_sinceReboot(s)," + titles("accelerometerAcceleration{}(G)", "gyroRotation{}(rad/s)")
+    return table(folder / "walk.csv", names, walk[:, 0], walk[:, 4:7], -walk[:, 1:4] / G)
+
+
 def phyphox(folder: Path, walk: np.ndarray) -> Path:
     """The accelerometer's rows are others than the gyroscope's."""
     table(folder / "Accelerometer.csv", '"Time (s)","X (m/s^2)","Y (m/s^2)","Z (m/s^2)"', walk[:, :4])
@@ -97,7 +109,8 @@ def gaitmap(folder: Path, walk: np.ndarray) -> Path:
     return table(folder / "walk.csv", f"{above},{names},{names}", walk[:, 0], *left, walk[:, 1:7] * 0.5)
 
 
-FORMATS = (sensor_logger, sensor_logger_of_ios, phyphox, x_imu3, ngimu, pyshoe, sensor_connect, gaitmap)
+PHONES = (sensor_logger, sensor_logger_of_ios, sensor_logger_of_an_iphone, sensor_log, phyphox)
+FORMATS = (*PHONES, x_imu3, ngimu, pyshoe, sensor_connect, gaitmap)
 
 
 @pytest.mark.parametrize("made", FORMATS)
@@ -109,6 +122,7 @@ def test_one_walk_in_each_format(made: Callable[[Path, np.ndarray], Path], walk:
     assert np.allclose(imu.accel, walk[kept, 1:4], atol=1e-5)
     assert np.allclose(imu.gyro, walk[kept, 4:7], atol=1e-5)
     assert imu.notes[0].startswith("read ")
+    assert ("mirrored" in str(imu.notes)) == (made is sensor_logger_of_ios)
 
 
 def test_an_mvnx_file_gives_force_and_rates_of_the_foot(tmp_path: Path) -> None:
@@ -145,6 +159,7 @@ def refused(folder: Path, name: str, content: bytes) -> str:
 
 
 def test_what_a_file_lacks_is_one_sentence(tmp_path: Path) -> None:
+    assert "a.xls: binary, not a table: export it as CSV" in refused(tmp_path, "a.xls", b"\xd0\xcf" + bytes(99))
     assert "no XML" in refused(tmp_path, "a.mvnx", b"<mvnx><frame")
     assert "no MAT file that can be read" in refused(tmp_path, "a.mat", b"MATLAB 5.0 MAT-file" + bytes(200))
     savemat(tmp_path / "huge.mat", {"ts": np.arange(300) / 100.0, "imu": np.full((300, 6), 1e300)})

@@ -149,6 +149,15 @@ def test_what_does_not_fit_is_one_line_that_names_it(
     assert done.stderr.count("\n") == 1
 
 
+def test_a_stated_unit_is_believed_or_asked_about(table: np.ndarray, tmp_path: Path) -> None:
+    units = [1e3, 1 / G, 1, 1e3 / G, 180 / np.pi, 180 / np.pi, 1]
+    same(write(tmp_path / "a.csv", "t (msec),ax (G),ay (m/s/s),az (mg),gx (dps),gy (deg/sec),gz", table * units), table)
+    for title in ("gx (rpm)", "gx (rev/s)", "gx (deg)", "ax (LSB)", "t (min)"):
+        path = write(tmp_path / "b.csv", f"time,{title}", np.zeros((9, 2)))
+        with pytest.raises(EchostepError, match=r"b\.csv: .*: its unit is none of"):
+            load_foot(path)
+
+
 def axes(*names: str) -> str:
     return ",".join(name.format(letter) for name in names for letter in "XYZ")
 
@@ -213,7 +222,7 @@ def test_legs_take_degrees_of_both_legs(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("header", "naming", "notes"), [
     ('"Time (s)","Pressure (hPa)"', OWN, ("read as an export of phyphox",)),
-    ("seconds_elapsed,pressure", OWN, ("read as an export of Sensor Logger",)),
+    ("seconds_elapsed,pressure,time", OWN, ("read as an export of Sensor Logger",)),
     ("t,p", parse_naming("t_s=t,pressure_pa=p", "hPa"), ()),
 ])  # fmt: skip
 def test_pressures_of_phones_are_in_hectopascals(

@@ -112,9 +112,14 @@ def test_ranges_pressure_and_legs_beside_are_recorded_and_used(walk: Imu, tmp_pa
     start = echostep.localization.Start(echostep.plan.Pose(0.0, 2.0, np.pi / 2), 1.0, 0.05)
     end = echostep.replay(tmp_path / "walk.mcap", plan, start=start).estimates[-1]
     assert end.x_m == pytest.approx(0.7, abs=0.15)
-    (tmp_path / "ranges.csv").write_text("t_s,direction_deg,range_m\n0,0,1\n1,0,1\n")
-    refused = run("import", "imu.csv", "-o", "other.mcap", *beside, cwd=tmp_path)
-    assert "ranges.csv: direction_deg 0: expected one ranger to the left (90)" in refused.stderr
+    for lines, said in (
+        ("0,0,1\n1,0,1", "direction_deg 0: expected one ranger to the left (90)"),
+        ("0,90,150\n1,-90,250", "range_m is 200: metres up to 11 are expected"),
+        ("1e6,90,1\n1e6,-90,2", "nothing in it from "),
+    ):
+        (tmp_path / "ranges.csv").write_text(f"t_s,direction_deg,range_m\n{lines}\n")
+        refused = run("import", "imu.csv", "-o", "other.mcap", *beside, cwd=tmp_path)
+        assert f"ranges.csv: {said}" in refused.stderr
 
 
 def test_arrays_of_any_length_are_tracked_as_the_recording_is(walk: Imu, tmp_path: Path) -> None:

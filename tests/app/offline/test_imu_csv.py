@@ -114,25 +114,19 @@ def test_a_walk_is_tracked_and_drawn(tmp_path: Path, table: np.ndarray) -> None:
     assert "steps" in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("spoil", "note"),
-    [
-        (lambda t, r: t[r.random(len(t)) > 0.2], "% of the samples are missing"),
-        (lambda t, _r: t[(t[:, 0] % 5.0) > 0.5], "gaps"),
-        (lambda t, r: np.repeat(t, 1 + (r.random(len(t)) < 0.3), axis=0), "repeat the time before"),
-        (lambda t, r: r.permutation(t), "sorted by it"),
-        (
-            lambda t, r: np.where((r.random(len(t)) < 0.05)[:, None], np.array([1.0] + 6 * [np.nan]) * t, t),
-            "without a number",
-        ),
-        (lambda t, _r: np.column_stack([t[:, :4], np.clip(t[:, 4:], -4.5, 4.5)]), "is cut off at 4.5"),
-        (lambda t, _r: np.column_stack([t[:, 0], np.clip(t[:, 1:4], -25.0, 25.0), t[:, 4:]]), "is cut off at"),
-        (lambda t, _r: t * [1, 1, -1, -1, 1, -1, -1], "steps"),  # upside down
-        (lambda t, _r: t[:, [0, 2, 3, 1, 5, 6, 4]], "steps"),  # on its side
-        (lambda t, _r: t[150:], "steps"),
-        (lambda t, _r: t + [1.7e9, 0, 0, 0, 0, 0, 0], "steps"),  # a clock that counts from 1970
-    ],
-)
+@pytest.mark.parametrize(("spoil", "note"), [
+    (lambda t, r: t[r.random(len(t)) > 0.2], "% of the samples are missing"),
+    (lambda t, _r: t[(t[:, 0] % 5.0) > 0.5], "gaps"),
+    (lambda t, r: np.repeat(t, 1 + (r.random(len(t)) < 0.3), axis=0), "repeat the time before"),
+    (lambda t, r: r.permutation(t), "sorted by it"),
+    (lambda t, r: np.where((r.random(len(t)) < 0.05)[:, None], np.array([1.0] + 6 * [np.nan]) * t, t), "without a number"),
+    (lambda t, _r: np.column_stack([t[:, :4], np.clip(t[:, 4:], -4.5, 4.5)]), "is cut off at 4.5"),
+    (lambda t, _r: np.column_stack([t[:, 0], np.clip(t[:, 1:4], -25.0, 25.0), t[:, 4:]]), "is cut off at"),
+    (lambda t, _r: t * [1, 1, -1, -1, 1, -1, -1], "steps"),  # upside down
+    (lambda t, _r: t[:, [0, 2, 3, 1, 5, 6, 4]], "steps"),  # on its side
+    (lambda t, _r: t[150:], "steps"),
+    (lambda t, _r: t + [1.7e9, 0, 0, 0, 0, 0, 0], "steps"),  # a clock that counts from 1970
+])  # fmt: skip
 def test_what_can_be_mended_is_said_and_the_track_is_right_or_known_to_be_less_certain(
     tmp_path: Path, table: np.ndarray, foot: Command, spoil: Spoil, note: str
 ) -> None:
@@ -142,35 +136,30 @@ def test_what_can_be_mended_is_said_and_the_track_is_right_or_known_to_be_less_c
     assert abs(told.end_m() - 13.0) < max(3.0 * told.known_m(), 0.4)
 
 
-@pytest.mark.parametrize(
-    ("spoil", "named"),
-    [
-        (lambda t, _r: np.column_stack([t[:, 0], t[:, 1:4] / 9.80665, t[:, 4:]]), "look like g"),
-        (lambda t, _r: np.column_stack([t[:, 0], t[:, 1:4] * 100, t[:, 4:]]), "gravity is 9.8"),
-        (lambda t, _r: np.column_stack([t[:, :4], np.degrees(t[:, 4:])]), "deg/s"),
-        (lambda t, _r: np.column_stack([t[:, 0] * 1000, t[:, 1:]]), "milliseconds"),
-        (lambda t, _r: np.column_stack([t[:, 0] * 1e6, t[:, 1:]]), "microseconds"),
-        (lambda t, _r: t[::4], "a foot needs 50"),
-        (lambda t, _r: t - (t[:, :1] > 7.005) * [7.005, 0, 0, 0, 0, 0, 0], "begins anew"),
-        (lambda t, _r: np.column_stack([t[:, 0] / 20, t[:, 1:]]), "average them down"),
-        (lambda t, _r: np.column_stack([t[:, 0], t[:, 1:5], 0 * t[:, 5], t[:, 6]]), "gy is constant"),
-        (lambda t, _r: np.column_stack([t[:, :5], np.where(t[:, 0] > 6, 1.0, t[:, 5]), t[:, 6]]), "gy does not change"),
-        (lambda t, _r: np.column_stack([0 * t[:, 0], t[:, 1:]]), "does not advance"),
-        (lambda t, r: np.where(r.random(t.shape) < 0.3, np.nan, t), "no number"),
-        (lambda t, _r: np.column_stack([np.tile(t[:300, 0], 9)[: len(t)], t[:, 1:]]), "t_s"),
-        (
-            lambda t, r: r.standard_normal(t.shape) * [0, 6, 6, 6, 3, 3, 3] + t * [1, 0, 0, 0, 0, 0, 0],
-            "never still in these",
-        ),
-        (lambda t, r: gliding(t[:, 0], r), "never still: it seems to stand"),
-        (lambda t, r: rolling(t[:, 0], r), "s, yet the sensor moved, as on wheels"),
-        (lambda t, _r: t * [1, 1, 1, 1, 1, -1, 1], "are the units"),  # left-handed
-        (lambda t, _r: np.column_stack([t[:, :4], np.radians(t[:, 4:])]), "are the units"),  # converted twice
-        (lambda t, _r: t[:, [0, 1, 2, 3, 5, 4, 6]], "are the units"),  # gx and gy swapped
-        (lambda t, _r: t - [0, 0, 0, 9.81, 0, 0, 0], "gravity was removed"),
-        (lambda t, _r: t[:1], "no samples"),
-    ],
-)
+@pytest.mark.parametrize(("spoil", "named"), [
+    (lambda t, _r: np.column_stack([t[:, 0], t[:, 1:4] / 9.80665, t[:, 4:]]), "look like g"),
+    (lambda t, _r: np.column_stack([t[:, 0], t[:, 1:4] * 100, t[:, 4:]]), "gravity is 9.8"),
+    (lambda t, _r: np.column_stack([t[:, :4], np.degrees(t[:, 4:])]), "deg/s"),
+    (lambda t, _r: np.column_stack([t[:, 0] * 1000, t[:, 1:]]), "milliseconds"),
+    (lambda t, _r: np.column_stack([t[:, 0] * 1e6, t[:, 1:]]), "microseconds"),
+    (lambda t, _r: t[::4], "a foot needs 50"),
+    (lambda t, _r: t - (t[:, :1] > 7.005) * [7.005, 0, 0, 0, 0, 0, 0], "begins anew"),
+    (lambda t, _r: t - (t[:, :1] > 7.005) * [60, 0, 0, 0, 0, 0, 0], "begins anew"),
+    (lambda t, _r: np.column_stack([t[:, 0] / 20, t[:, 1:]]), "average them down"),
+    (lambda t, _r: np.column_stack([t[:, 0], t[:, 1:5], 0 * t[:, 5], t[:, 6]]), "gy is constant"),
+    (lambda t, _r: np.column_stack([t[:, :5], np.where(t[:, 0] > 6, 1.0, t[:, 5]), t[:, 6]]), "gy does not change"),
+    (lambda t, _r: np.column_stack([0 * t[:, 0], t[:, 1:]]), "does not advance"),
+    (lambda t, r: np.where(r.random(t.shape) < 0.3, np.nan, t), "no number"),
+    (lambda t, _r: np.column_stack([np.tile(t[:300, 0], 9)[: len(t)], t[:, 1:]]), "t_s"),
+    (lambda t, r: r.standard_normal(t.shape) * [0, 6, 6, 6, 3, 3, 3] + t * [1, 0, 0, 0, 0, 0, 0], "never still in these"),
+    (lambda t, r: gliding(t[:, 0], r), "never still: it seems to stand"),
+    (lambda t, r: rolling(t[:, 0], r), "s, yet the sensor moved, as on wheels"),
+    (lambda t, _r: t * [1, 1, 1, 1, 1, -1, 1], "are the units"),  # left-handed
+    (lambda t, _r: np.column_stack([t[:, :4], np.radians(t[:, 4:])]), "are the units"),  # converted twice
+    (lambda t, _r: t[:, [0, 1, 2, 3, 5, 4, 6]], "are the units"),  # gx and gy swapped
+    (lambda t, _r: t - [0, 0, 0, 9.81, 0, 0, 0], "gravity was removed"),
+    (lambda t, _r: t[:1], "no samples"),
+])  # fmt: skip
 def test_wrong_input_is_named(tmp_path: Path, table: np.ndarray, foot: Command, spoil: Spoil, named: str) -> None:
     told = foot(write(tmp_path, spoil(table, np.random.default_rng(4))))
     assert (told.status, told.err.count("\n")) == (2, 1), told.err + told.out
@@ -179,21 +168,18 @@ def test_wrong_input_is_named(tmp_path: Path, table: np.ndarray, foot: Command, 
     assert not told.track.exists()
 
 
-@pytest.mark.parametrize(
-    "spell",
-    [
-        lambda text: "\ufeff" + text,
-        lambda text: text.replace("\n", "\r\n"),
-        lambda text: text.replace(",", ";"),
-        lambda text: text.replace(",", ";").replace(".", ","),
-        lambda text: text.replace(",", "\t"),
-        lambda text: text.replace("\n", "\n\n"),
-        lambda text: text[:-20],
-        lambda text: "\n".join(
-            ",".join([*line.split(",")[::-1], "7"]) for line in text.replace("ay", " ay ").splitlines()
-        ),
-    ],
-)
+@pytest.mark.parametrize("spell", [
+    lambda text: "\ufeff" + text,
+    lambda text: text.replace("\n", "\r\n"),
+    lambda text: text.replace(",", ";"),
+    lambda text: text.replace(",", ";").replace(".", ","),
+    lambda text: text.replace(",", "\t"),
+    lambda text: text.replace("\n", "\n\n"),
+    lambda text: text[:-20],
+    lambda text: "\n".join(
+        ",".join([*line.split(",")[::-1], "7"]) for line in text.replace("ay", " ay ").splitlines()
+    ),
+])  # fmt: skip
 def test_every_spelling_of_a_table_is_read(tmp_path: Path, table: np.ndarray, spell: Callable[[str], str]) -> None:
     plain = load_foot(write(tmp_path, table))
     text = spell((tmp_path / "imu.csv").read_text())

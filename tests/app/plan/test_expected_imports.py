@@ -29,33 +29,27 @@ def imported(path: Path, **hints: object) -> tuple[Plan, ImportReport]:
     return import_plan(path, Hints(**hints), report=report), report  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    ("name", "line"),
-    [
-        ("dxf-door-swing-as-bulge/house.dxf", (4.05, 3.0, 4.05, 3.9)),
-        ("dxf-door-swing-as-bulge/as_polyline.dxf", (4.05, 3.0, 4.05, 3.9)),
-        ("dxf-door-arc-on-another-layer/house.dxf", (4.05, 3.0, 4.05, 3.9)),
-        ("dxf-double-door-loose-arcs/house.dxf", (4.05, 3.0, 4.05, 4.8)),
-        ("dxf-door-beside-window/house.dxf", (2.0, 0.15, 2.8, 0.15)),
-        ("dxf-some-wall-layers-not-recognised/house.dxf", (4.05, 3.0, 4.05, 3.9)),
-        ("ifc-door-drawn-open/house.ifc", (4.1, 3.0, 4.1, 5.0)),
-        ("ifc-doors-without-shape/house.ifc", (4.1, 3.0, 4.1, 5.0)),
-    ],
-)
+@pytest.mark.parametrize(("name", "line"), [
+    ("dxf-door-swing-as-bulge/house.dxf", (4.05, 3.0, 4.05, 3.9)),
+    ("dxf-door-swing-as-bulge/as_polyline.dxf", (4.05, 3.0, 4.05, 3.9)),
+    ("dxf-door-arc-on-another-layer/house.dxf", (4.05, 3.0, 4.05, 3.9)),
+    ("dxf-double-door-loose-arcs/house.dxf", (4.05, 3.0, 4.05, 4.8)),
+    ("dxf-door-beside-window/house.dxf", (2.0, 0.15, 2.8, 0.15)),
+    ("dxf-some-wall-layers-not-recognised/house.dxf", (4.05, 3.0, 4.05, 3.9)),
+    ("ifc-door-drawn-open/house.ifc", (4.1, 3.0, 4.1, 5.0)),
+    ("ifc-doors-without-shape/house.ifc", (4.1, 3.0, 4.1, 5.0)),
+])  # fmt: skip
 def test_doors(files: Path, name: str, line: tuple[float, ...]) -> None:
     plan, _ = imported(files / name)
     assert [sorted((door.line[:2], door.line[2:])) for door in plan.levels[0].doors] == [sorted((line[:2], line[2:]))]
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "dxf-hatch-on-wall-layer/house.dxf",
-        "dxf-hidden-layer/house.dxf",
-        "dxf-hidden-layer/off.dxf",
-        "dxf-room-outlines/house.dxf",
-    ],
-)
+@pytest.mark.parametrize("name", [
+    "dxf-hatch-on-wall-layer/house.dxf",
+    "dxf-hidden-layer/house.dxf",
+    "dxf-hidden-layer/off.dxf",
+    "dxf-room-outlines/house.dxf",
+])  # fmt: skip
 def test_walls(files: Path, name: str) -> None:
     plan, report = imported(files / name)
     assert len(plan.levels[0].walls) == 14

@@ -55,6 +55,18 @@ def kinds(plan: Plan) -> list[str]:
 ROOM = {"name": "A", "at": [2, 1]}
 
 
+def test_lengths_in_other_units() -> None:
+    wide = house(
+        [{"name": "0", "walls": [[100 * v for v in wall] for wall in box()], "doors": [{"line": [100, 0, 200, 0]}]}]
+    )
+    assert [finding.text for finding in check_plan(wide)] == ["door 0 is 100 m wide: is the plan in metres?"]
+    stairs = {"kind": "stairs", "levels": [0, 1], "outline": [[2, 1], [3, 1], [3, 2], [2, 2]]}
+    for height_m, count in ((0.0, 0), (3.5, 0), (-350.0, 1)):
+        levels = [{"name": str(k), "height_m": k * height_m, "walls": box(), "doors": [door()]} for k in (0, 1)]
+        texts = [finding.text for finding in check_plan(house(levels, connectors=[stairs]))]
+        assert texts == [f"levels 0 and 1 are {abs(height_m):g} m apart: are their heights in metres?"] * count
+
+
 def test_sound_plans() -> None:
     assert kinds(load_plan(DEMO)) == []
     assert kinds(flat(box(), doors=[door()], rooms=[ROOM])) == []
@@ -162,13 +174,7 @@ def test_stairs_behind_walls() -> None:
     levels[1] = levels[1] | {"walls": [*box(), *shut], "rooms": []}
     (finding,) = check_plan(house(levels, connectors=[STAIRS]))
     assert (finding.level, "no way out" in finding.text) == (1, True)
-    ajar = [
-        [0.4, 0.4, 1.6, 0.4],
-        [1.6, 0.4, 1.6, 1.6],
-        [1.6, 1.6, 1.4, 1.6],
-        [0.6, 1.6, 0.4, 1.6],
-        [0.4, 1.6, 0.4, 0.4],
-    ]
+    ajar = [*shut[:2], [1.6, 1.6, 1.4, 1.6], [0.6, 1.6, 0.4, 1.6], shut[3]]
     levels[1] = levels[1] | {"walls": [*box(), *ajar], "doors": [{"line": [0.6, 1.6, 1.4, 1.6]}, door()]}
     assert kinds(house(levels, connectors=[STAIRS])) == []
 

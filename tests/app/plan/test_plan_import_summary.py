@@ -52,11 +52,14 @@ def test_the_picture_beside_the_plan(tmp_path: Path) -> None:
 
 @pytest.mark.process
 def test_options_of_drawings_are_refused_elsewhere(tmp_path: Path) -> None:
-    (tmp_path / "a.osm").write_text("<osm/>")
+    for name in ("a.osm", "a.pdf"):
+        (tmp_path / name).write_text("<osm/>")
     for option in (("--units", "mm"), ("--window", "0,0,1,1"), ("--align",), ("--scale", "1"), ("--level", "a")):
         done = command_line.echostep("plan", "import", tmp_path / "a.osm", "-o", tmp_path / "plan.json", *option)
         assert f"{option[0]} is for drawings (DXF) alone" in done.stderr
         assert done.returncode == 2
+    done = command_line.echostep("plan", "import", tmp_path / "a.pdf", "-o", tmp_path / "p.json", "--scale", "1")
+    assert "a.pdf: PDF: make a picture of its page" in done.stderr
     done = command_line.echostep("plan", "import", tmp_path / "a.dxf", "-o", tmp_path / "p.json", "--window", "1,1,0,2")
     assert "--window 1,1,0,2: expected X0 < X1" in done.stderr
 

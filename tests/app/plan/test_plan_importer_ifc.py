@@ -208,18 +208,15 @@ def test_a_map_that_cannot_be_is_asked_about(tmp_path: Path, name: str) -> None:
     assert any("its map conversion" in doubt and "two known points" in doubt for doubt in report.doubts)
 
 
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        ("", "not an IFC file"),
-        ("hello", "not an IFC file"),
-        ("ISO-10303-21;\nHEADER;\nnonsense", "not an IFC file|storey"),
-        (
-            "ISO-10303-21;HEADER;FILE_DESCRIPTION((''),'2;1');FILE_NAME('','',(''),(''),'','','');FILE_SCHEMA(('IFC4'));ENDSEC;DATA;ENDSEC;END-ISO-10303-21;",
-            "storey|Storey",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("text", "named"), [
+    ("", "not an IFC file"),
+    ("hello", "not an IFC file"),
+    ("ISO-10303-21;\nHEADER;\nnonsense", "not an IFC file|storey"),
+    (
+        "ISO-10303-21;HEADER;FILE_DESCRIPTION((''),'2;1');FILE_NAME('','',(''),(''),'','','');FILE_SCHEMA(('IFC4'));ENDSEC;DATA;ENDSEC;END-ISO-10303-21;",
+        "storey|Storey",
+    ),
+])  # fmt: skip
 def test_no_model(tmp_path: Path, text: str, named: str) -> None:
     (tmp_path / "a.ifc").write_text(text)
     with pytest.raises(EchostepError, match=named) as caught:

@@ -134,23 +134,17 @@ def changed(name: str, place: int, **about: Any) -> dict[str, Any]:
     return tree
 
 
-@pytest.mark.parametrize(
-    ("tree", "named"),
-    [
-        ({"unit.geojson": "{}"}, "no level.geojson in it"),
-        ({"manifest.json": "{}"}, "level.geojson"),
-        (files() | {"unit.geojson": "[1"}, "unit.geojson: not JSON"),
-        (files() | {"unit.geojson": "[" * 100_000}, "unit.geojson: not JSON"),
-        (files() | {"level.geojson": {"type": "FeatureCollection", "features": []}}, "no levels"),
-        (changed("unit.geojson", 1, properties={"category": 4, "level_id": "L0"}), r"unit.geojson.*category"),
-        (
-            changed("unit.geojson", 1, geometry={"type": "Polygon", "coordinates": [[[0, 0]]]}),
-            r"unit.geojson: features\[1\].geometry",
-        ),
-        (changed("level.geojson", 1, properties={"ordinal": "x"}), r"level features\[1\].properties.ordinal"),
-        (changed("level.geojson", 0, geometry={"coordinates": []}), r"level.geojson: features\[0\].geometry"),
-    ],
-)
+@pytest.mark.parametrize(("tree", "named"), [
+    ({"unit.geojson": "{}"}, "no level.geojson in it"),
+    ({"manifest.json": "{}"}, "level.geojson"),
+    (files() | {"unit.geojson": "[1"}, "unit.geojson: not JSON"),
+    (files() | {"unit.geojson": "[" * 100_000}, "unit.geojson: not JSON"),
+    (files() | {"level.geojson": {"type": "FeatureCollection", "features": []}}, "no levels"),
+    (changed("unit.geojson", 1, properties={"category": 4, "level_id": "L0"}), r"unit.geojson.*category"),
+    (changed("unit.geojson", 1, geometry={"type": "Polygon", "coordinates": [[[0, 0]]]}), r"unit.geojson: features\[1\].geometry"),
+    (changed("level.geojson", 1, properties={"ordinal": "x"}), r"level features\[1\].properties.ordinal"),
+    (changed("level.geojson", 0, geometry={"coordinates": []}), r"level.geojson: features\[0\].geometry"),
+])  # fmt: skip
 def test_wrong_archives(tmp_path: Path, tree: dict[str, Any], named: str) -> None:
     with pytest.raises(EchostepError, match=named) as caught:
         import_plan(zipped(tmp_path / "a.zip", tree))

@@ -54,24 +54,21 @@ def test_biba() -> None:
     assert {(0, 1), (0, 1, 2, 3)} <= {c.levels for c in plan.connectors}
 
 
-@pytest.mark.parametrize(
-    ("file", "text", "named"),
-    [
-        ("core", "byProgram\nfloor,0\nheight,4\nscale,1\n", "core.txt: floor"),
-        ("core", "byProgram\nfloor,2\nheight,nan\nscale,1\n", "core.txt: height.*finite"),
-        ("core", "byProgram\nfloor,2\nheight,4\n", "core.txt: scale"),
-        ("core", SMALL["core.txt"] + "node,../node.txt", "core.txt: node"),
-        ("node", "id,layer,x,y\n0,0,0\n", r"node.txt: line 2: expected 4"),
-        ("node", "id,layer,x,y\n0,9,0,0\n", r"node.txt: line 2: floor 9"),
-        ("node", "id,layer,x,y\n0,0,a,0\n", r"node.txt: line 2: 'a'"),
-        ("node", "id,layer,x,y\n0,0,inf,0\n", r"node.txt: line 2: 'inf'"),
-        ("node", "id,layer,x,y\n0,0,1e9,0\n", r"node.txt: line 2: further"),
-        ("link", "id,type,nodeID0,nodeID1\n7,0,0,77\n", r"link.txt: line 2: there is no node '77'"),
-        ("polygon", "id,type,nodeNumber,nodeIDs\n5,1,3,1,2\n", r"polygon.txt: line 2: a zone"),
-        ("arrow", "id,type,nodeID0,nodeID1\n0,5,5,5\n", r"arrow.txt: line 2: type '5'"),
-        ("arrow", 'id,type\n"' + "x" * 200_000, r"arrow.txt: field"),
-    ],
-)
+@pytest.mark.parametrize(("file", "text", "named"), [
+    ("core", "byProgram\nfloor,0\nheight,4\nscale,1\n", "core.txt: floor"),
+    ("core", "byProgram\nfloor,2\nheight,nan\nscale,1\n", "core.txt: height.*finite"),
+    ("core", "byProgram\nfloor,2\nheight,4\n", "core.txt: scale"),
+    ("core", SMALL["core.txt"] + "node,../node.txt", "core.txt: node"),
+    ("node", "id,layer,x,y\n0,0,0\n", r"node.txt: line 2: expected 4"),
+    ("node", "id,layer,x,y\n0,9,0,0\n", r"node.txt: line 2: floor 9"),
+    ("node", "id,layer,x,y\n0,0,a,0\n", r"node.txt: line 2: 'a'"),
+    ("node", "id,layer,x,y\n0,0,inf,0\n", r"node.txt: line 2: 'inf'"),
+    ("node", "id,layer,x,y\n0,0,1e9,0\n", r"node.txt: line 2: further"),
+    ("link", "id,type,nodeID0,nodeID1\n7,0,0,77\n", r"link.txt: line 2: there is no node '77'"),
+    ("polygon", "id,type,nodeNumber,nodeIDs\n5,1,3,1,2\n", r"polygon.txt: line 2: a zone"),
+    ("arrow", "id,type,nodeID0,nodeID1\n0,5,5,5\n", r"arrow.txt: line 2: type '5'"),
+    ("arrow", 'id,type\n"' + "x" * 200_000, r"arrow.txt: field"),
+])  # fmt: skip
 def test_what_is_wrong_is_named(tmp_path: Path, file: str, text: str, named: str) -> None:
     with pytest.raises(EchostepError, match=named):
         import_plan(write(tmp_path, **{file: text}))

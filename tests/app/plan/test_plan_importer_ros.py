@@ -48,22 +48,19 @@ def test_a_slanting_wall_is_no_stair(tmp_path: Path) -> None:
     assert len(import_plan(tmp_path / "map.yaml").levels[0].walls) <= 8
 
 
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        ("", "no field image"),
-        ("a: 1", "no field image"),
-        ("image: none.pgm\nresolution: 0.05", "none.pgm: no such file"),
-        ("image: map.pgm", "resolution: '' is not a number"),
-        ("image: map.pgm\nresolution: 0", "resolution: expected metres"),
-        ("image: map.pgm\nresolution: nan", "resolution"),
-        ("image: map.pgm\nresolution: 0.05\norigin: [1]", "origin: expected"),
-        ("image: map.pgm\nresolution: 0.05\norigin: [1, x, 0]", "origin: 'x'|origin: ' x'"),
-        ("image: map.pgm\nresolution: 0.05\norigin: [1, 1e9, 0]", "origin"),
-        ("image: map.yaml\nresolution: 0.05", "not a picture"),
-        ("image: map.pgm\nresolution: 0.05\nnegate: 1\noccupied_thresh: 1", "no pixel is occupied"),
-    ],
-)
+@pytest.mark.parametrize(("text", "named"), [
+    ("", "no field image"),
+    ("a: 1", "no field image"),
+    ("image: none.pgm\nresolution: 0.05", "none.pgm: no such file"),
+    ("image: map.pgm", "resolution: '' is not a number"),
+    ("image: map.pgm\nresolution: 0", "resolution: expected metres"),
+    ("image: map.pgm\nresolution: nan", "resolution"),
+    ("image: map.pgm\nresolution: 0.05\norigin: [1]", "origin: expected"),
+    ("image: map.pgm\nresolution: 0.05\norigin: [1, x, 0]", "origin: 'x'|origin: ' x'"),
+    ("image: map.pgm\nresolution: 0.05\norigin: [1, 1e9, 0]", "origin"),
+    ("image: map.yaml\nresolution: 0.05", "not a picture"),
+    ("image: map.pgm\nresolution: 0.05\nnegate: 1\noccupied_thresh: 1", "no pixel is occupied"),
+])  # fmt: skip
 def test_wrong_maps(tmp_path: Path, text: str, named: str) -> None:
     Image.fromarray(grid()).save(tmp_path / "map.pgm")
     (tmp_path / "map.yaml").write_text(text)

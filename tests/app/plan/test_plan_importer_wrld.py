@@ -110,27 +110,24 @@ def test_a_wall_and_its_place(tmp_path: Path) -> None:
     assert walls.min() == pytest.approx(0.0, abs=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("features", "main", "named"),
-    [
-        (3, {}, "g.geojson: features: expected a list"),
-        ([3], {}, r"features\[0\]"),
-        ([feature("wall"), feature("wall", [[[-3, 56], [-3, 56]]])], {}, r"features\[1\].geometry.*four"),
-        ([feature("wall", [[[0, "a"]]])], {}, r"features\[0\].geometry.coordinates.*not a finite number"),
-        ([feature("wall", [[[0, 1e400]] * 4])], {}, r"not a number|JSON"),
-        ([feature("wall", [[[0, 95]] * 4])], {}, r"features\[0\].geometry.coordinates.*within 90 degrees"),
-        ([feature("wall", [[[60, 5], [61, 5], [61, 6], [60, 5]]])], {}, "100 km"),
-        ([feature("wall", name=[])], {}, r"features\[0\].properties.name"),
-        ([{"properties": {"type": "wall"}, "geometry": {"type": "Cube", "coordinates": []}}], {}, "Cube"),
-        ([], {"levels": []}, "main.json: levels"),
-        ([], {"levels": [{"name": "G", "z_order": 0, "filename": "../g.geojson"}]}, r"levels\[0\].filename"),
-        ([], {"levels": [{"name": "G", "z_order": 0, "filename": "no.geojson"}]}, "no such file"),
-        ([], {"levels": [{"name": "G", "z_order": "0", "filename": "g.geojson"}]}, r"levels\[0\].z_order"),
-        ([], {"location": {"coordinates": [500, 0]}}, "location.coordinates"),
-        ([], {"location": None}, "location"),
-        ([], {"name": 3}, "name"),
-    ],
-)
+@pytest.mark.parametrize(("features", "main", "named"), [
+    (3, {}, "g.geojson: features: expected a list"),
+    ([3], {}, r"features\[0\]"),
+    ([feature("wall"), feature("wall", [[[-3, 56], [-3, 56]]])], {}, r"features\[1\].geometry.*four"),
+    ([feature("wall", [[[0, "a"]]])], {}, r"features\[0\].geometry.coordinates.*not a finite number"),
+    ([feature("wall", [[[0, 1e400]] * 4])], {}, r"not a number|JSON"),
+    ([feature("wall", [[[0, 95]] * 4])], {}, r"features\[0\].geometry.coordinates.*within 90 degrees"),
+    ([feature("wall", [[[60, 5], [61, 5], [61, 6], [60, 5]]])], {}, "100 km"),
+    ([feature("wall", name=[])], {}, r"features\[0\].properties.name"),
+    ([{"properties": {"type": "wall"}, "geometry": {"type": "Cube", "coordinates": []}}], {}, "Cube"),
+    ([], {"levels": []}, "main.json: levels"),
+    ([], {"levels": [{"name": "G", "z_order": 0, "filename": "../g.geojson"}]}, r"levels\[0\].filename"),
+    ([], {"levels": [{"name": "G", "z_order": 0, "filename": "no.geojson"}]}, "no such file"),
+    ([], {"levels": [{"name": "G", "z_order": "0", "filename": "g.geojson"}]}, r"levels\[0\].z_order"),
+    ([], {"location": {"coordinates": [500, 0]}}, "location.coordinates"),
+    ([], {"location": None}, "location"),
+    ([], {"name": 3}, "name"),
+])  # fmt: skip
 def test_what_is_wrong_is_named(tmp_path: Path, features: Any, main: dict[str, Any], named: str) -> None:
     with pytest.raises(EchostepError, match=named) as caught:
         import_plan(write(tmp_path, features, main))

@@ -84,14 +84,11 @@ def test_a_wall_just_behind_the_widest_gap_is_not_reached() -> None:
     assert door_gaps(Level("G", 0.0, walls)) == ()
 
 
-@pytest.mark.parametrize(
-    ("at", "reason", "nearest"),
-    [
-        ((100.0, 7.0), "outside the building", (24.7, 7.0)),
-        ((5.0, 6.55), "inside a wall", (5.0, 6.8)),
-        ((2.0, 1.02), "inside a wall", (2.0, 1.3)),
-    ],
-)
+@pytest.mark.parametrize(("at", "reason", "nearest"), [
+    ((100.0, 7.0), "outside the building", (24.7, 7.0)),
+    ((5.0, 6.55), "inside a wall", (5.0, 6.8)),
+    ((2.0, 1.02), "inside a wall", (2.0, 1.3)),
+])  # fmt: skip
 def test_no_start_outside_or_in_a_wall_of_the_demo(
     at: tuple[float, float], reason: str, nearest: tuple[float, float]
 ) -> None:

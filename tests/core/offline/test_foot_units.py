@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -26,15 +28,12 @@ def text_of(columns: Samples) -> str:
     return "\n".join([NAMES, *rows]) + "\n"
 
 
-@pytest.mark.parametrize(
-    ("spelled", "encoding"),
-    [
-        (str, "utf-8"),
-        (lambda text: text.replace(",", ";").replace(".", ","), "utf-8-sig"),  # Excel in most of Europe
-        (lambda text: text.replace(",", "\t"), "utf-16"),  # Excel's "Unicode text"
-        (lambda text: text.replace("\n", "\r\n"), "utf-8"),
-    ],
-)
+@pytest.mark.parametrize(("spelled", "encoding"), [
+    (str, "utf-8"),
+    (lambda text: text.replace(",", ";").replace(".", ","), "utf-8-sig"),  # Excel in most of Europe
+    (lambda text: text.replace(",", "\t"), "utf-16"),  # Excel's "Unicode text"
+    (lambda text: text.replace("\n", "\r\n"), "utf-8"),
+])  # fmt: skip
 def test_spellings_are_read_alike(tmp_path: Path, spelled: Callable[[str], str], encoding: str) -> None:
     path = tmp_path / "foot.csv"
     path.write_text(spelled(text_of((T_S, ACCEL, GYRO))), encoding=encoding, newline="")
@@ -44,18 +43,15 @@ def test_spellings_are_read_alike(tmp_path: Path, spelled: Callable[[str], str],
     assert imu.notes == ()
 
 
-@pytest.mark.parametrize(
-    ("columns", "said"),
-    [
-        ((T_S, ACCEL / 9.81, GYRO), r"look like g \(at rest they are 1\.00\): multiply them by 9\.80665"),
-        ((T_S, ACCEL, np.degrees(GYRO)), "in deg/s\\? multiply them by pi/180"),
-        ((T_S, ACCEL, 0.2 * np.degrees(GYRO)), "in deg/s\\? multiply them by pi/180"),
-        ((1e3 * T_S, ACCEL, GYRO), "is it in milliseconds\\? divide it by 1000"),
-        ((1.7e18 + 1e9 * T_S, ACCEL, GYRO), "is it in nanoseconds\\? divide it by 1000000000"),
-        (samples(WALK, 10, rng=np.random.default_rng(3)), "a foot needs 50 at least"),
-        ((T_S, ACCEL - GRAVITY, GYRO), "gravity was removed"),
-    ],
-)
+@pytest.mark.parametrize(("columns", "said"), [
+    ((T_S, ACCEL / 9.81, GYRO), r"look like g \(at rest they are 1\.00\): multiply them by 9\.80665"),
+    ((T_S, ACCEL, np.degrees(GYRO)), "in deg/s\\? multiply them by pi/180"),
+    ((T_S, ACCEL, 0.2 * np.degrees(GYRO)), "in deg/s\\? multiply them by pi/180"),
+    ((1e3 * T_S, ACCEL, GYRO), "is it in milliseconds\\? divide it by 1000"),
+    ((1.7e18 + 1e9 * T_S, ACCEL, GYRO), "is it in nanoseconds\\? divide it by 1000000000"),
+    (samples(WALK, 10, rng=np.random.default_rng(3)), "a foot needs 50 at least"),
+    ((T_S, ACCEL - GRAVITY, GYRO), "gravity was removed"),
+])  # fmt: skip
 def test_other_units_are_asked_about_with_the_remedy(tmp_path: Path, columns: Samples, said: str) -> None:
     path = tmp_path / "foot.csv"
     path.write_text(text_of(columns))
@@ -65,8 +61,10 @@ def test_other_units_are_asked_about_with_the_remedy(tmp_path: Path, columns: Sa
 
 def test_a_clock_of_the_epoch_is_no_fault(tmp_path: Path) -> None:
     path = tmp_path / "foot.csv"
-    path.write_text(text_of((1.7e9 + T_S, ACCEL, GYRO)))
-    assert np.allclose(np.diff(load_imu(path).t_s), 0.01, atol=1e-4)
+    rows = text_of((1.7e9 + T_S, ACCEL, GYRO))
+    for text in (rows, re.sub(r"(?m)^1[\d.]+", lambda found: str(datetime.fromtimestamp(float(found[0]), UTC)), rows)):
+        path.write_text(text)
+        assert np.allclose(np.diff(load_imu(path).t_s), 0.01, atol=1e-4)
 
 
 def test_a_sensor_whose_range_is_too_small_is_told(tmp_path: Path) -> None:

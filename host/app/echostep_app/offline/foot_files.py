@@ -4,16 +4,18 @@
 In: a path. Out: `Imu`, or an EchostepError that names the file and what it lacks, or that it glided. Owns nothing.
 
 MAT: the names of github.com/utiasSTARS/pyshoe and of the recordings that are published with it. MVNX: sensorFreeAcceleration is without gravity and
-in the global frame, as sensorOrientation gives it [MVN User Manual, MVNX]. Folders: UNITS.md of github.com/tszheichoi/awesome-sensor-logger;
-the sessions in github.com/xioTechnologies/x-IMU3-CSV; exports of phyphox.
+in the global frame, as sensorOrientation gives it [MVN User Manual, MVNX]. Folders: UNITS.md, and CROSSPLATFORM.md for the signs of iOS, of
+github.com/tszheichoi/awesome-sensor-logger; the sessions in github.com/xioTechnologies/x-IMU3-CSV; exports of phyphox.
 """
 
 from __future__ import annotations
 
+import csv
 import re
 import zipfile
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TextIO
@@ -62,9 +64,7 @@ def _zip(path: Path, naming: Naming) -> Imu:
         with zipfile.ZipFile(path) as packed, TemporaryDirectory() as folder:
             tables = [each for each in packed.infolist() if each.filename.lower().endswith(".csv")]
             if sum(each.file_size for each in tables) > MOST_BYTES:
-                raise EchostepError(
-                    f"{path}: its tables are larger than {MOST_BYTES >> 30} GB: cut the recording into parts"
-                )
+                raise EchostepError(f"{path}: its tables exceed {MOST_BYTES >> 30} GB: cut the recording into parts")
             packed.extractall(folder, tables)
             try:
                 return _folder(path, Path(folder).rglob("*.csv"), naming)
@@ -87,7 +87,7 @@ def _folder(path: Path, files: Iterable[Path], naming: Naming) -> Imu:
     forces.sort(key=lambda name: "total" not in name)
     if not gyros or not forces:
         lacks = "no table of a gyroscope" if forces else "no table of an accelerometer"
-        raise EchostepError(f"{path}: {lacks} (there are: {', '.join(tables)[:300] or 'none'}); record both")
+        raise EchostepError(f"{path}: {lacks} (there are: {', '.join(tables)[:300] or 'none'}); record both, as CSV")
     gyro = open_samples(tables[gyros[0]], partial(_vectors, ours="g"))
     force = open_samples(tables[forces[0]], partial(_vectors, ours="a"))
     accel = _at(gyro[:, 0], force)
@@ -95,10 +95,24 @@ def _folder(path: Path, files: Iterable[Path], naming: Naming) -> Imu:
     if "gravity" in tables and "total" not in forces[0]:
         accel += _at(gyro[:, 0], open_samples(tables["gravity"], partial(_vectors, ours="a")))
         notes.append(f"gravity added from {tables['gravity'].name}")
+    system = _system(tables.get("metadata"))
+    if system == "ios":
+        accel = -accel
+        notes.append("an iPhone's, not standardised: the signs of its accelerations are changed")
+    elif "gravity" in notes[-1] and not system:
+        notes.append("read as of Android; of an iPhone, not standardised, the track is mirrored: add its Metadata.csv")
     try:
         return imu_of(np.column_stack([gyro[:, 0], accel, gyro[:, 1:]]), tuple(notes))
     except ValueError as error:
         raise EchostepError(f"{path}: {error}") from error
+
+
+def _system(metadata: Path | None) -> str:
+    """Whose signs a Metadata.csv of Sensor Logger states: ios, or another system; "" where it states none."""
+    lines = open_samples(metadata, lambda file: [*islice(lines_of(file, LIMITS), 2)]) if metadata else []
+    about = next(csv.DictReader(lines), {})
+    standard = str(about.get("standardisation")).casefold() == "true"
+    return "standard" if standard else str(about.get("platform") or "").casefold()
 
 
 def _vectors(file: TextIO, ours: str) -> Floats:
@@ -134,9 +148,8 @@ def _mat(path: Path) -> tuple[Floats, tuple[str, ...]]:
     there = {name: shape for name, shape, _ in _read_mat(lambda: whosmat(path))}
     names = [next((name for name in known if name in there), "") for known in (MAT_TIME, MAT_IMU)]
     if not all(names):
-        raise ValueError(
-            f"no {' or '.join(MAT_TIME)} with {' or '.join(MAT_IMU)} (n, 6); there are {', '.join(there)[:300]}"
-        )
+        wanted = f"no {' or '.join(MAT_TIME)} with {' or '.join(MAT_IMU)} (n, 6)"
+        raise ValueError(f"{wanted}; there are {', '.join(there)[:300]}")
     if any(max(there[name]) > (LIMITS.lines or 0) for name in names):
         raise ValueError(f"more than {LIMITS.lines} samples: cut the recording into parts")
     mat = _read_mat(lambda: loadmat(path, variable_names=names))

@@ -10,7 +10,8 @@ github.com/xioTechnologies/x-IMU3-CSV. phyphox: titles of the columns in public 
 github.com/tszheichoi/awesome-sensor-logger. MT Manager: text exports in a test of opensim-core's reader, and in [Voisard 2025]. Movella DOT: export
 bei_D4CA6EF17860_20210830_170505.csv of a recording, in github.com/Allwillcome/XsensDot2Mtw4OpenSense: its times step by 8333 at 120 Hz, its sensor
 at rest reads 9.65 and 0.2, which as rad/s would be a bias of 11 deg/s; the titles of the other modes: logger of the SDK for Android. SensorConnect
-(MSCL): data of github.com/mtahakoroglu/gait-driven-inertial-navigation-dataset. gaitmap: example data of github.com/mad-lab-fau/gaitmap.
+(MSCL): data of github.com/mtahakoroglu/gait-driven-inertial-navigation-dataset. gaitmap: example data of github.com/mad-lab-fau/gaitmap. SensorLog:
+titles in public scripts; an iPhone's accelerations have the opposite sign [Apple, CMAccelerometerData: at rest -1 g upwards], which mirrors a track.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from echostep.offline.imu_csv import COLUMNS
 # Quantity and factor to the SI unit of each unit; standard gravity [CGPM 1901].
 UNITS = {
     "s": ("time", 1.0), "ms": ("time", 1e-3), "us": ("time", 1e-6), "ns": ("time", 1e-9),
-    "m/s2": ("force", 1.0), "g": ("force", 9.80665), "mg": ("force", 9.80665e-3),
+    "m/s2": ("force", 1.0), "g": ("force", 9.80665), "mg": ("force", 9.80665e-3), "-g": ("force", -9.80665),
     "rad/s": ("rate", 1.0), "deg/s": ("rate", np.pi / 180.0),
     "rad": ("angle", 1.0), "deg": ("angle", np.pi / 180.0),
     "Pa": ("pressure", 1.0), "hPa": ("pressure", 100.0), "kPa": ("pressure", 1000.0),
@@ -61,6 +62,8 @@ PHYPHOX = _axes("a", "Acceleration {} (m/s^2)", "xyz") | _axes("g", "Gyroscope {
 XSENS = _axes("a", "Acc_{}") | _axes("g", "Gyr_{}")
 XSENS_MAG = _axes("m", "Mag_{}")
 GAITMAP = _axes("a", "left_sensor.acc_{}", "xyz") | _axes("g", "left_sensor.gyr_{}", "xyz")
+SENSORLOG = {"t_s": "accelerometerTimestamp_sinceReboot(s)"} | _axes("a", "accelerometerAcceleration{}(G)")
+SENSORLOG_GYROS = ("gyroRotation{}(rad/s)", "motionRotationRate{}(rad/s)")
 MSCL = _axes("a", "scaledAccel{}") | _axes("g", "scaledGyro{}")
 
 
@@ -83,6 +86,7 @@ LOGGERS = (
     Logger("Sensor Logger", {"t_s": "seconds_elapsed", "pressure_pa": "pressure"}, units={"pressure": "hPa"}),
     Logger("Movella DOT", {"t_s": DOT_CLOCK} | XSENS, XSENS_MAG, {"rate": "deg/s"}, DOT),
     Logger("MT Manager", {"t_s": COUNTER} | XSENS, XSENS_MAG),
+    *(Logger("SensorLog", SENSORLOG | _axes("g", gyro), units={"force": "-g"}) for gyro in SENSORLOG_GYROS),
     Logger("SensorConnect", {"t_s": "Time"} | MSCL, _axes("m", "scaledMag{}"), {"force": "g"}),
     Logger("gaitmap, its left sensor", {"t_s": "index"} | GAITMAP, units={"rate": "deg/s"}),
 )
@@ -122,11 +126,11 @@ def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
     columns, units = dict(naming.columns), dict(naming.units)
     notes: tuple[str, ...] = ()
     names = [_own(title) for title in theirs]
-    names = ["t_s" if name == "time" and "t_s" not in names else name for name in names]
     if not columns and "t_s" not in names:
         columns, more, notes = _recognised(theirs, above)
         units = more | units
     counts_hz, period = _counter(columns.get("t_s"), above)
+    names = ["t_s" if name == "time" and "t_s" not in names else name for name in names]
     names = _renamed(theirs, columns) if columns else names
     factors = _factors(names, theirs, units)
     advice = ("" if naming.columns else proposal(theirs)) or ADVICE
@@ -162,9 +166,7 @@ def _counter(name: str | None, above: list[str]) -> tuple[float | None, int]:
         return None, COUNTER_PERIOD
     rates = [float(found[1]) for line in above if (found := COUNTS_HZ.search(line))]
     if not rates or not rates[-1]:
-        raise ValueError(
-            f"{COUNTER} counts samples, and no line '// Update Rate: 100.0Hz' says how many there are a second"
-        )
+        raise ValueError(f"{COUNTER} counts samples, and no line '// Update Rate: 100.0Hz' says how many a second")
     return rates[-1], COUNTER_PERIOD
 
 
@@ -204,15 +206,18 @@ def _renamed(theirs: list[str], columns: Mapping[str, str]) -> list[str]:
 
 
 def _factors(names: list[str], theirs: list[str], units: Mapping[str, str]) -> dict[str, float]:
-    """Factors to SI by name: of the unit given for the quantity, else of the unit in the brackets of the file's name."""
+    """Factors to SI by name: of the unit given for the quantity, else in the brackets of the file's name; raises ValueError for an unknown one."""
     factors: dict[str, float] = {}
     quantities = {quantity_of(name) for name in names}
     if unused := [unit for quantity, unit in units.items() if quantity not in quantities]:
         raise ValueError(f"--units {unused[0]}: no column has such a unit; there are {', '.join(theirs)[:300]}")
     for name, title in zip(names, theirs, strict=True):
-        in_brackets = re.search(r"\(([^)]*)\)$", title)
-        unit = units.get(quantity_of(name)) or (in_brackets[1].replace("^", "") if in_brackets else "")
-        if unit in UNITS and UNITS[unit][0] == quantity_of(name):
+        quantity, stated = quantity_of(name), re.search(r"\(([^)]*)\)$", title)
+        if unit := units.get(quantity) or (quantity and stated and stated[1].strip()):
+            unit = unit if unit in UNITS else BY_SPELLING.get(unit.casefold(), unit)
+            if UNITS.get(unit, ("",))[0] != quantity:
+                known = [each for each, (measured, _) in UNITS.items() if measured == quantity]
+                raise ValueError(f"{title}: its unit is none of {', '.join(known)}: convert the column, or say --units")
             factors[name] = UNITS[unit][1]
     return factors
 
@@ -225,7 +230,8 @@ def quantity_of(name: str) -> str:
 
 SPELLINGS = {
     "s": "s sec seconds", "ms": "ms msec milliseconds", "us": "us µs μs microseconds", "ns": "ns nanoseconds",
-    "m/s2": "m/s2 m/s^2 m/s² m/s/s mps2 m_s2 ms2", "g": "g", "mg": "mg", "rad/s": "rad/s rad/sec rad_s rads", "deg/s": "deg/s deg/sec °/s dps deg_s",
+    "m/s2": "m/s2 m/s^2 m/s² m/s/s mps2 m_s2 ms2", "g": "g", "mg": "mg", "hPa": "hpa mbar",
+    "rad/s": "rad/s rad/sec rad_s rads", "deg/s": "deg/s deg/sec °/s dps deg_s",
 }  # fmt: skip
 BY_SPELLING = {spelling: unit for unit, spellings in SPELLINGS.items() for spelling in spellings.split()}
 SI = ("s", "m/s2", "rad/s")

@@ -55,6 +55,10 @@ def import_imu(imu: Imu, name: str, out: Path, about: Mapping[str, str], beside:
     rate_hz, begin_s = rate_of(imu.t_s), float(imu.t_s[0])
     messages, settings = _messages(beside)
     within = [each for each in messages if begin_s <= each[0] <= imu.t_s[-1]]
+    for kind, path in ((Ping, beside.ranges), (Pressure, beside.pressure), (Gyros, beside.legs)):
+        if path and not any(isinstance(message, kind) for _, message in within):
+            span = f"{begin_s:.3f} to {imu.t_s[-1]:.3f} s"
+            raise EchostepError(f"{path}: nothing in it from {span}, as {name}: t_s in seconds, of one clock?")
     text = imu_settings(rate_hz) + settings
     parse_settings(text, str(beside.settings or name))
     chunks = ImuChunks(rate_hz)
@@ -68,9 +72,7 @@ def import_imu(imu: Imu, name: str, out: Path, about: Mapping[str, str], beside:
     recorder.check_whole()
     kept = len(imu.t_s) - chunks.left_out
     outside = len(messages) - len(within)
-    more = (
-        f"{len(within)} messages of {sensors}, {outside} left out as before or after the foot's; " if messages else ""
-    )
+    more = f"{len(within)} messages of {sensors}, {outside} left out as before or after the foot's; " * bool(messages)
     told = f"{kept} samples at {rate_hz:.4g} Hz, {chunks.left_out} left out as within the same period; {more}"
     return f"{told}t_s of its track counts from {begin_s:.3f} s in the file"
 
@@ -104,7 +106,7 @@ def _messages(beside: Beside) -> tuple[list[tuple[float, Message]], str]:
         rows = _columns(beside.pressure, ("t_s", "pressure_pa"))
         if not PASCALS[0] < np.median(rows[:, 1]) < PASCALS[1]:
             raise EchostepError(
-                f"{beside.pressure}: pressure_pa is {rows[0, 1]:g}: pascals are expected, or a column pressure_pa (hPa)"
+                f"{beside.pressure}: pressure_pa {rows[0, 1]:g}: expected pascals, or pressure_pa (hPa)"
             )
         found += [
             (t, Pressure(0, round(4.0 * p), PRESSURE_TEMPERATURE_INVALID)) for t, p in rows.tolist() if 0.0 < p < 2e5
@@ -130,6 +132,9 @@ def _pings(path: Path) -> tuple[list[tuple[float, Message]], float]:
             f"{path}: direction_deg {', '.join(f'{each:g}' for each in np.unique(rows[:, 1])[:4])}: expected one ranger to the left (90) and one to "
             f"the right (-90), both as far ahead, at most {MOST_AHEAD_DEG:g} degrees"
         )
+    values = np.unique(rows[rows[:, 2] > 0.0, 2])
+    if (beyond := int((values > FARTHEST_M).sum())) > 1 and 2 * beyond > len(values):
+        raise EchostepError(f"{path}: range_m is {np.median(values):g}: metres up to {FARTHEST_M:.0f} are expected")
     pings: list[tuple[float, Message]] = []
     for t_s, direction, range_m in rows.tolist():
         heard = 0.0 < range_m < FARTHEST_M
@@ -151,6 +156,5 @@ def _read_columns(file: TextIO, names: tuple[str, ...], required: int) -> Floats
     columns = [column_of(head.names, name) for name in names]
     if -1 in columns:
         raise ValueError(f"expected the columns {','.join(names)}; there are {', '.join(head.names)[:300]}")
-    return head.in_si(
-        read_rows(lines, (head.names, head.separator), columns, required, LIMITS, head.line + 1).values, names
-    )
+    rows = read_rows(lines, (head.names, head.separator), columns, required, LIMITS, head.line + 1)
+    return head.in_si(rows.values, names)

@@ -138,9 +138,8 @@ def _empty_cells(table: Floats) -> tuple[str, ...]:
 def _about_walking_axis(name: str, t_s: Floats, rates: Floats) -> tuple[Floats, str]:
     """Rates (n,) about the axis of walking of a sensor with rates (n, 3), peaks repaired, and a note; NaN where a number is missing."""
     part, pitch_rate = name.split("_", maxsplit=1)[0], np.full(len(t_s), np.nan)
-    whole = np.flatnonzero(
-        np.isfinite(rates).all(axis=1) & np.isfinite(t_s) & (np.abs(rates).max(axis=1) < LARGEST_NUMBER)
-    )
+    finite = np.isfinite(rates).all(axis=1) & np.isfinite(t_s)
+    whole = np.flatnonzero(finite & (np.abs(rates).max(axis=1) < LARGEST_NUMBER))
     order = whole[np.argsort(t_s[whole], kind="stable")]
     if len(order) < FEWEST_ROWS:
         raise ValueError(f"{part}_x, {part}_y, {part}_z: too few rows with numbers to find the axis of walking")
@@ -207,7 +206,5 @@ def _notes(table: Floats) -> tuple[str, ...]:
         notes.append(f"{100 * missing:.0f} % of the samples are missing: the track is less certain")
     for name, *limits in zip(COLUMNS[1:], *find_clipping_limits(table[:, THIGH : SHANK + 1]), strict=True):
         if reached := [abs(limit) for limit in limits if math.isfinite(limit)]:
-            notes.append(
-                f"{name} is cut off at {min(reached):.3g} rad/s, the sensor's range is too small: peaks are reconstructed"
-            )
+            notes.append(f"{name} is cut off at {min(reached):.3g} rad/s, its range is too small: peaks restored")
     return tuple(notes)

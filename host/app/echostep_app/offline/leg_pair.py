@@ -65,9 +65,8 @@ def track_pair(
     distance = _summed((np.where(alone, seen * ratio[:, None], 0.5) * moves).sum(axis=0))
     differ = 0.0 if settings.calibrated else LEGS_DIFFER
     strides = with_turns(_joint_strides(t_s, distance, seen, legs, differ), t_s, heading)
-    loose = (
-        f"the sensors of {name} leg rest during a walk: are they worn?" for name in np.array(NAMES)[idle.any(axis=1)]
-    )
+    resting = np.array(NAMES)[idle.any(axis=1)]
+    loose = (f"the sensors of {name} leg rest during a walk: are they worn?" for name in resting)
     notes = (*notes, *loose, *heading_notes, *doubts(strides))
     counts = LegCounts(*(getattr(estimates[0][1], k) + getattr(estimates[1][1], k) for k in LegCounts.__slots__))
     return LegTrack(path_rows(t_s, distance, heading), strides, counts, source_of(trunk), float(angles[-1, 1]), notes)
@@ -95,9 +94,8 @@ def _idle(t_s: Floats, strides: tuple[Stride, ...], others: tuple[Stride, ...]) 
     begun = _summed(stands.astype(np.float64))
     whole = [s for s in others if s.length_m > 0.0 and Flag.EDGE not in s.flags]
     spans = [np.searchsorted(middle, [s.t_start_s, s.t_end_s]) for s in whole]
-    return _within(
-        middle, [s for s, (a, b) in zip(whole, spans, strict=True) if b > a and begun[b] - begun[a] == b - a]
-    )
+    moving = [s for s, (a, b) in zip(whole, spans, strict=True) if b > a and begun[b] - begun[a] == b - a]
+    return _within(middle, moving)
 
 
 def _within(times: Floats, strides: Sequence[Stride]) -> Bools:

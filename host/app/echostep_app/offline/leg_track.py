@@ -198,18 +198,14 @@ def checked_lengths(thigh_m: float | None, shank_m: float | None, scale: float =
     for name, length in (("--thigh", thigh_m), ("--shank", shank_m)):
         if not LENGTH_RANGE_M[0] <= length <= LENGTH_RANGE_M[1]:
             hint = ": in centimetres? give metres" if CENTIMETRES[0] < length < CENTIMETRES[1] else ""
-            raise EchostepError(
-                f"{name} {length:g}: no such leg, expected {LENGTH_RANGE_M[0]} to {LENGTH_RANGE_M[1]} m{hint}"
-            )
+            raise EchostepError(f"{name} {length:g}: expected {LENGTH_RANGE_M[0]} to {LENGTH_RANGE_M[1]} m{hint}")
     return LegLengths(thigh_m, shank_m, scale)
 
 
 def calibrated_scale(distance_m: float, walked_m: float) -> float:
     """Factor on all stride lengths: true length `walked_m` of a walk over its computed length; raises EchostepError when they do not fit."""
     if not WALKED_RANGE_M[0] <= walked_m <= WALKED_RANGE_M[1]:
-        raise EchostepError(
-            f"--walked {walked_m:g}: expected the length of the walk in metres, 3 to 1000, best 10 or more"
-        )
+        raise EchostepError(f"--walked {walked_m:g}: expected the walk's length in metres, 3 to 1000, best 10 or more")
     if distance_m < SCALE_RANGE[0] * walked_m or distance_m > SCALE_RANGE[1] * walked_m:
         raise EchostepError(
             f"--walked {walked_m:g}: these samples hold {distance_m:.2f} m: is it the same walk, and are the legs in metres?"

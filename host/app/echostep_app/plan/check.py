@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checks of a plan: gaps, overlaps, loose doors, open rooms, unreachable rooms, stairs and lifts without access.
+"""Checks of a plan: gaps, overlaps, loose doors, open rooms, unreachable rooms, stairs and lifts without access, other units.
 
 In: a `Plan`. Out: `PlanFinding`s, numbered from 1, level by level. Owns the tolerances.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -25,6 +26,7 @@ from echostep_app.plan.places.standing import StandingGround
 NEAR_M = 0.1  # a wall's end that is nearer than this to a wall was meant to touch it
 OVERLAP_M = 0.02  # shorter overlaps are not reported
 ELBOW_M2 = 1.0  # stairs with less free area beside them than this have no access
+WIDEST_M, MOST_RISE_M = 20.0, 100.0  # of a door; from a level to the next one
 MOST_LEAKS = 20  # searches for the opening of a room in one plan, because each takes a while
 NOT_ENCLOSED = "is not enclosed by walls, doors and gaps"
 PARALLEL = 0.02  # sine of the angle below which walls count as parallel
@@ -34,14 +36,10 @@ def check_plan(plan: Plan) -> list[PlanFinding]:
     """All findings of a plan, sorted by level and numbered from 1."""
     needs_faces = bool(plan.connectors) or any(level.rooms for level in plan.levels)
     passable = replace(plan, levels=tuple(with_gaps(level) for level in plan.levels)) if needs_faces else plan
-    faces = [
-        find_faces(level if needs_faces else Level(level.name, level.height_m, level.walls[:0]))
-        for level in passable.levels
-    ]
+    seen = passable.levels if needs_faces else [Level(level.name, 0.0, level.walls[:0]) for level in plan.levels]
+    faces = [find_faces(level) for level in seen]
     findings = [finding for i, level in enumerate(plan.levels) for finding in _level(level, i, faces[i])]
-    findings += unreachable_rooms(passable, faces)
-    findings += _connectors(passable, faces)
-    findings += _start(plan)
+    findings += [*unreachable_rooms(passable, faces), *_connectors(passable, faces), *_start(plan)]
     findings.sort(key=lambda finding: finding.level)
     not_enclosed = [k for k, finding in enumerate(findings) if finding.text.endswith(NOT_ENCLOSED)]
     for k in not_enclosed[:MOST_LEAKS]:
@@ -93,13 +91,8 @@ def _overlaps(solid: Floats, tree: shapely.STRtree, i: int) -> Iterator[PlanFind
         shared = float(_shared_m(a[None], b[None])[0])
         shorter = a if np.hypot(*(a[2:] - a[:2])) < np.hypot(*(b[2:] - b[:2])) else b
         x, y = (shorter[:2] + shorter[2:]) / 2
-        yield PlanFinding(
-            "overlap",
-            i,
-            (float(x), float(y)),
-            f"walls overlap along {shared:.2f} m",
-            _lines(solid, (int(one[k]), int(other[k]))),
-        )
+        lines = _lines(solid, (int(one[k]), int(other[k])))
+        yield PlanFinding("overlap", i, (float(x), float(y)), f"walls overlap along {shared:.2f} m", lines)
 
 
 def _doors(level: Level, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]:
@@ -114,6 +107,8 @@ def _doors(level: Level, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]
         if max(loose) > JAMB_M:
             words = "ends in no wall" if np.isinf(max(loose)) else f"ends {max(loose):.2f} m from any wall"
             yield PlanFinding("door", i, at, f"{name} {words}", lines)
+        if door.width_m > WIDEST_M:
+            yield PlanFinding("door", i, at, f"{name} is {door.width_m:.3g} m wide: is the plan in metres?", lines)
         inner = shapely.LineString((line.interpolate(0.2, normalized=True), line.interpolate(0.8, normalized=True)))
         if len(tree.query(inner, predicate="dwithin", distance=TOUCH_M)):
             yield PlanFinding("door", i, at, f"a wall runs through {name}: doors are gaps in the walls", lines)
@@ -159,24 +154,28 @@ def _connectors(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFinding]:
     for connector in plan.connectors:
         area = shapely.Polygon(connector.outline_m)
         middle = area.representative_point() if area.is_valid else shapely.Point(connector.outline_m.mean(axis=0))
-        at = (middle.x, middle.y)
+        at, name = (middle.x, middle.y), f"{connector.kind} {connector.name!r}"
         if not area.is_valid:
-            yield PlanFinding(
-                "way", connector.levels[0], at, f"{connector.kind} {connector.name!r}: its outline crosses itself"
-            )
+            yield PlanFinding("way", connector.levels[0], at, f"{name}: its outline crosses itself")
         for i in connector.levels:
             if faces[i].indices_of(np.array([at]))[0] == OUTSIDE:
-                yield PlanFinding("way", i, at, f"{connector.kind} {connector.name!r} {NOT_ENCLOSED}")
+                yield PlanFinding("way", i, at, f"{name} {NOT_ENCLOSED}")
             elif _sealed(shapely.make_valid(area), plan.levels[i], faces[i]):
-                yield PlanFinding(
-                    "way", i, at, f"{connector.kind} {connector.name!r} has no door and no way out to this level"
-                )
+                yield PlanFinding("way", i, at, f"{name} has no door and no way out to this level")
     joined = {i for connector in plan.connectors for i in connector.levels}
     if len(plan.levels) > 1:
         for i in sorted(set(range(len(plan.levels))) - joined):
-            ends = plan.levels[i].solid.reshape(-1, 2)
-            x, y = ends.mean(axis=0) if len(ends) else (0.0, 0.0)
-            yield PlanFinding("way", i, (float(x), float(y)), "no stairs, lift or ramp leads to this level")
+            yield PlanFinding("way", i, _middle(plan.levels[i]), "no stairs, lift or ramp leads to this level")
+    for i, (low, high) in enumerate(pairwise(plan.levels), start=1):
+        if (rise_m := abs(high.height_m - low.height_m)) > MOST_RISE_M:
+            text = f"levels {low.name} and {high.name} are {rise_m:.3g} m apart: are their heights in metres?"
+            yield PlanFinding("way", i, _middle(high), text)
+
+
+def _middle(level: Level) -> tuple[float, float]:
+    """The mean of the ends of its walls."""
+    x, y = level.solid.reshape(-1, 2).mean(axis=0) if len(level.solid) else (0.0, 0.0)
+    return float(x), float(y)
 
 
 def _sealed(area: BaseGeometry, level: Level, faces: Faces) -> bool:

@@ -41,9 +41,7 @@ class EarthTransform:
         except ValueError as error:
             raise ValueError(f"georeference.crs: {error}") from error
         if not (np.isfinite(lon) and np.isfinite(lat)):
-            raise ValueError(
-                f"georeference.origin: {stated[0]:g}, {stated[1]:g} is outside of {georeference.crs[:60]!r}"
-            )
+            raise ValueError(f"georeference.origin: {stated[0]:g}, {stated[1]:g} is outside {georeference.crs[:60]!r}")
         local = CRS.from_dict({"proj": "aeqd", "lon_0": lon, "lat_0": lat, "datum": "WGS84", "units": "m"})
         self._to_east_north = Transformer.from_crs(WGS84, local, always_xy=True)
         self._to_degrees = Transformer.from_crs(local, WGS84, always_xy=True)

@@ -11,7 +11,9 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TextIO, TypeVar
 
@@ -83,7 +85,8 @@ def open_samples(path: Path | str, read: Callable[[TextIO], Result]) -> Result:
     try:
         with Path(path).open("rb") as begin:
             first = begin.read(32)
-        if what := replaced(first):
+        binary = "binary, not a table: export it as CSV" if b"\0" in first and first[:2] not in UTF_16 else ""
+        if what := replaced(first) or binary:
             raise ValueError(what)
         encoding = "utf-16" if first[:2] in UTF_16 else "utf-8-sig"
         with Path(path).open(newline=None, encoding=encoding, errors="replace") as file:
@@ -94,10 +97,8 @@ def open_samples(path: Path | str, read: Callable[[TextIO], Result]) -> Result:
         raise EchostepError(f"{path}: {error}") from error
 
 
-def read_rows(
-    lines: Iterator[str], header: tuple[list[str], str], columns: Sequence[int], required: int, limits: CsvLimits,
-    first: int = 2,
-) -> CsvTable:  # fmt: skip
+def read_rows(lines: Iterator[str], header: tuple[list[str], str], columns: Sequence[int], required: int,
+              limits: CsvLimits, first: int = 2) -> CsvTable:  # fmt: skip
     """Rows of the lines after the header, from line `first` on; empty lines are skipped.
 
     `columns`: index of each wanted column, -1 if the file lacks it.
@@ -127,9 +128,8 @@ def _check_share(rows: int, bad: int) -> None:
     if rows < 2:
         raise ValueError("no samples")
     if bad > MOST_BAD * rows:
-        raise ValueError(
-            f"{100 * bad / rows:.0f} % of the first {rows} rows have no number in some column, or more cells than there are names"
-        )
+        share = f"{100 * bad / rows:.0f} % of the first {rows} rows"
+        raise ValueError(f"{share} have no number in some column, or more cells than there are names")
 
 
 def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, too_fast: str) -> str:
@@ -144,7 +144,11 @@ def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, to
 
 
 def number_of(text: str) -> float:
-    """The number in a cell; NaN if missing, or if no sensor and no clock gives such a number."""
+    """The number in a cell, or the seconds from 1970 to an ISO 8601 date and time (UTC without a zone); NaN if missing or impossible."""
+    if ":" in text:
+        with suppress(ValueError):
+            date = datetime.fromisoformat(text.strip(' "\n'))
+            return date.replace(tzinfo=date.tzinfo or UTC).timestamp()
     try:
         number = float(text)
     except ValueError:

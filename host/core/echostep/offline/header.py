@@ -54,7 +54,6 @@ def since_first(counter: Floats, period: int) -> Floats:
     """Counts since the first one, of a counter (n,) that wraps after `period`; NaN where there is no number."""
     counts = np.full(len(counter), np.nan)
     whole = np.isfinite(counter)
-    if whole.any():
-        unwrapped = np.unwrap(counter[whole], period=period)
-        counts[whole] = unwrapped - unwrapped[0]
+    unwrapped = np.unwrap(counter[whole], period=period)
+    counts[whole] = unwrapped - unwrapped[:1]
     return counts

@@ -31,6 +31,7 @@ FASTEST_FOOT_RAD_S = 40.0  # 2300 deg/s; common gyros end at 2000 deg/s
 FASTEST_QUANTILE = 0.999  # of the rates, compared with that limit: single spikes are left out
 RATE_RANGE_HZ = (45.0, 550.0)  # 50 to 500 Hz with a margin of 10 %
 REGULAR_SHARE = 0.01  # largest share of sorted times that follow each other within half a period
+LATEST = 10.0  # periods, after which two exchanged parts do not follow each other
 BACK_SHARE = 0.02  # largest share of rows whose time goes back
 REPEATED_SHARE = 0.6  # largest share of rows that repeat the time before
 MISSING_SHARE = 0.02  # share of missing samples that is reported
@@ -59,14 +60,15 @@ def whole_rows(table: Floats) -> tuple[Floats, tuple[str, ...]]:
 
 
 def sorted_by_time(table: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """The rows sorted by time, with a note, if that makes the times regular: shuffled rows. Raises ValueError for a clock that began anew."""
+    """The rows sorted by time, with a note, if that makes the times regular. Raises ValueError for a clock that began anew."""
     t_s = table[:, TIME]
     back = int((np.diff(t_s) < 0.0).sum())
     if back == 0:
         return table, ()
     order = np.argsort(t_s, kind="stable")
     ahead, steps = (each[each > 0.0] for each in (np.diff(t_s), np.diff(t_s[order])))
-    if len(steps) and back < BACK_SHARE * len(t_s) and np.median(steps) < 0.75 * np.median(ahead):
+    apart = back == 1 and len(steps) and t_s[0] - t_s[-1] > LATEST * np.median(steps)
+    if len(steps) and back < BACK_SHARE * len(t_s) and (apart or np.median(steps) < 0.75 * np.median(ahead)):
         raise ValueError("t_s begins anew within the file: are these several recordings? Cut it there")
     if len(steps) and float((steps < 0.5 * np.median(steps)).mean()) < REGULAR_SHARE:
         return table[order], (f"{back} rows were not in the order of t_s: sorted by it",)
@@ -83,9 +85,7 @@ def time_complaint(t_s: Floats, what: str) -> str:
     steps = np.diff(t_s)
     back = float((steps < 0).mean()) if len(steps) else 0.0
     if back > BACK_SHARE:
-        return (
-            f"t_s goes back in {100 * back:.0f} % of the rows, and sorting does not help: are several recordings mixed?"
-        )
+        return f"t_s goes back in {100 * back:.0f} % of the rows, even when sorted: are several recordings mixed?"
     forward = steps[steps > 0]
     if not len(forward):
         return "t_s does not advance"

@@ -33,9 +33,7 @@ class ImuChunks:
         """Chunks of samples: t_s (n,) s, rising; accel (n, 3) m/s2, gyro (n, 3) rad/s, body frame. Raises EchostepError for other shapes."""
         t_s, accel, gyro = (np.asarray(each, np.float64) for each in (t_s, accel, gyro))
         if t_s.ndim != 1 or accel.shape != (len(t_s), 3) or gyro.shape != (len(t_s), 3):
-            raise EchostepError(
-                f"samples: t_s {t_s.shape}, accel {accel.shape}, gyro {gyro.shape}; must be (n,), (n, 3), (n, 3)"
-            )
+            raise EchostepError(f"t_s {t_s.shape}, accel {accel.shape}, gyro {gyro.shape}; must be (n,) and (n, 3)")
         if not np.isfinite(t_s).all():
             raise EchostepError("samples: t_s is not a number in some of them: leave these out")
         if np.isnan(self._first_s) and len(t_s):

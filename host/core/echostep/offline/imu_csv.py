@@ -94,9 +94,8 @@ def write_foot_track(path: Path | str, track: Track) -> None:
             writer = csv.writer(file)
             writer.writerow(TRACK_COLUMNS)
             columns = (track.t_s, *track.position_m.T, track.heading_rad)
-            writer.writerows(
-                [*(f"{v:.6f}" for v in row), int(still)] for *row, still in zip(*columns, track.stance, strict=True)
-            )
+            rows = zip(*columns, track.stance, strict=True)
+            writer.writerows([*(f"{v:.6f}" for v in row), int(still)] for *row, still in rows)
     except OSError as error:
         raise EchostepError(f"{path}: cannot write the track: {error.strerror}") from error
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ezdxf.enums import TextEntityAlignment
 from ezdxf.filemanagement import new
 from ezdxf.math import Matrix44
 
@@ -226,6 +228,24 @@ def test_a_reference_that_is_not_in_the_file_is_named(tmp_path: Path) -> None:
     plan, report = imported(doc, tmp_path)
     assert len(plan.levels[0].walls) == 14
     assert "floor-1.dwg is an external reference" in report.doubts[0]
+
+
+@pytest.mark.parametrize("degrees", [0.0, 40.0, 90.0])
+def test_lines_beneath_each_other_are_one_name(tmp_path: Path, degrees: float) -> None:
+    """Number and name of a room in left or middle alignment; the bare area and smaller letters below are counted, other rooms stay apart."""
+    doc, space = sheet()
+    house(space)
+    left, middle = ("1.01", "Store", "12.50", "Tiles", "Hall"), ("1.02", "Lab", "9.90", "Wood", "Lobby")
+    for k, (y, height) in enumerate(((5.0, 0.2), (4.7, 0.2), (4.4, 0.2), (4.1, 0.1), (2.0, 0.2))):
+        space.add_text(left[k], height=height, dxfattribs={"layer": "Rooms", "insert": (1, y)})
+        text = space.add_text(middle[k], height=height, dxfattribs={"layer": "Rooms"})
+        text.set_placement((7, y), align=TextEntityAlignment.MIDDLE_CENTER)
+    space.add_mtext("Office\\~2", dxfattribs={"layer": "Rooms", "insert": (5, 7), "char_height": 0.2})
+    for entity in space:
+        entity.transform(Matrix44.z_rotate(math.radians(degrees)))
+    plan, report = imported(doc, tmp_path)
+    assert {room.name for room in plan.levels[0].rooms} == {"1.01 Store", "1.02 Lab", "Hall", "Lobby", "Office 2"}
+    assert report.left_out == {"TEXT on Rooms": 4}
 
 
 def test_outlines_of_rooms(tmp_path: Path) -> None:

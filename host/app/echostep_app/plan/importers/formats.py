@@ -56,26 +56,17 @@ def import_plan(
     hints = hints or Hints()
     if hints.doors_m is not None and not _is_imdf(path):
         raise EchostepError(f"{path}: --doors is for IMDF alone: draw doors with echostep plan edit")
-    drawn = {
-        "--units": hints.units,
-        "--scale": hints.scale_m,
-        "--window": hints.windows,
-        "--layer": hints.layers,
-        "--align": hints.align,
-    }
-    suffix = path.suffix.casefold()
-    given = [option for option, value in {**drawn, "--level": hints.level_names}.items() if value]
-    if given and suffix != ".dxf" and not (suffix in PICTURES and given == ["--scale"]):
-        raise EchostepError(
-            f"{path}: {' and '.join(given)} {'is' if len(given) == 1 else 'are'} for drawings (DXF) alone"
-        )
+    drawn: dict[str, Any] = {"--units": hints.units, "--scale": hints.scale_m, "--window": hints.windows}
+    drawn |= {"--layer": hints.layers, "--align": hints.align, "--level": hints.level_names}
+    suffix, given = path.suffix.casefold(), [option for option, value in drawn.items() if value]
+    unread = suffix in {*NEXT_STEPS} - {*PICTURES}
+    if given and not unread and suffix != ".dxf" and not (suffix in PICTURES and given == ["--scale"]):
+        raise EchostepError(f"{path}: {' and '.join(given)} {'are' if given[1:] else 'is'} for drawings (DXF) alone")
     report = ImportReport() if report is None else report
     plan = _imported(path, hints, above, report)
-    for low, high in pairwise(plan.levels):
-        if (apart_m := high.height_m - low.height_m) < HALF_STOREY_M:
-            report.doubt(
-                f"levels {low.name} and {high.name} are {apart_m:.2f} m apart: half storeys, or reference levels?"
-            )
+    for low, up in pairwise(plan.levels):
+        if (off_m := up.height_m - low.height_m) < HALF_STOREY_M:
+            report.doubt(f"levels {low.name} and {up.name} are {off_m:.2f} m apart: half storeys, or reference levels?")
     return replace(plan, digest=hashlib.sha256(plan_json(plan).encode()).hexdigest())
 
 
@@ -114,9 +105,7 @@ def _imported(path: Path, hints: Hints, above: Sequence[Path], report: ImportRep
     elif not path.exists():
         raise EchostepError(f"{path}: no such file")
     else:
-        raise EchostepError(
-            f"{path}: {NEXT_STEPS.get(suffix, f'no format of plans that echostep knows: give {FORMATS}')}"
-        )
+        raise EchostepError(f"{path}: {NEXT_STEPS.get(suffix, f'no format that echostep knows: give {FORMATS}')}")
     return plan
 
 

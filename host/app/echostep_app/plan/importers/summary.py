@@ -71,9 +71,7 @@ def _in_gap(door: Door, tree: shapely.STRtree, doors: Sequence[Door]) -> bool:
         others = [shapely.LineString((other.line[:2], other.line[2:])) for other in doors if other is not door]
         beside = shapely.union_all(others)
         at_wall = [one or beside.distance(end) < AT_WALL_M for one, end in zip(at_wall, ends, strict=True)]
-    through, *sides = (
-        len(tree.query(way, predicate="dwithin", distance=CLEAR_M)) > 0 for way in (inner, *_sides(door))
-    )
+    through, *sides = (len(tree.query(way, predicate="dwithin", distance=CLEAR_M)) for way in (inner, *_sides(door)))
     return all(at_wall) and not through and not all(sides)
 
 

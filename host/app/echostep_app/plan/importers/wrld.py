@@ -55,7 +55,7 @@ class BuildingFields(Struct):
     name: Text = ""
 
 
-def import_wrld(path: Path, storey_height_m: float, report: ImportReport) -> Plan:
+def import_wrld(path: Path, storey_m: float, report: ImportReport) -> Plan:
     """Import the building of a main.json; raises EchostepError that names the file and the feature."""
     try:
         building = checked(parse_json(read_text(path), str(path)), BuildingFields)
@@ -66,9 +66,7 @@ def import_wrld(path: Path, storey_height_m: float, report: ImportReport) -> Pla
     georeference = Georeference(longitude, latitude)
     earth = EarthTransform(georeference)
     drawn_levels = [
-        _level(
-            file, DrawnLevel(row.readable_name or row.name, round(int(row.z_order) * storey_height_m, 6)), earth, report
-        )
+        _level(file, DrawnLevel(row.readable_name or row.name, round(int(row.z_order) * storey_m, 6)), earth, report)
         for row, file in sorted(zip(building.levels, files, strict=True), key=lambda pair: pair[0].z_order)
     ]
     _open_levels(drawn_levels)

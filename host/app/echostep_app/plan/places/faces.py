@@ -67,9 +67,8 @@ def _ticks(doors: Floats) -> Floats:
     """Short lines across both ends of doors (n, 4) -> (2n, 4): a wall that continues a door in line may lie beside it because of rounding."""
     along = doors[:, 2:] - doors[:, :2]
     across = (along / np.hypot(*along.T)[:, None] * TOUCH_M)[:, ::-1] * (-1.0, 1.0)
-    return np.concatenate(
-        [np.concatenate((end - across, end + across), axis=1) for end in (doors[:, :2], doors[:, 2:])]
-    )
+    ends = (doors[:, :2], doors[:, 2:])
+    return np.concatenate([np.concatenate((end - across, end + across), axis=1) for end in ends])
 
 
 def connected_groups(plan: Plan, faces: Sequence[Faces]) -> dict[Face, Face]:

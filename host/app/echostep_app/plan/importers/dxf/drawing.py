@@ -112,9 +112,7 @@ def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Pla
     usual = [file.stem for file in files] if len(storeys) == len(files) else [f"level {i}" for i in range(len(storeys))]
     names = [*hints.level_names, *usual[len(hints.level_names) :]]
     if (order := in_order(names)) != names:
-        report.doubt(
-            f"by their names the storeys are {', '.join(order)[:200]} from the lowest: give them in this order"
-        )
+        report.doubt(f"by their names the storeys are {', '.join(order)[:99]} from the lowest: give them in this order")
     drawn_levels = [
         _drawn_level(storey, DrawnLevel(name, round(i * hints.storey_height_m, 6)), report)
         for i, (storey, name) in enumerate(zip(storeys, names, strict=False))
@@ -152,9 +150,7 @@ def _lay_over(storeys: list[_Storey], hints: Hints, report: ImportReport) -> Non
     first = storeys[0].sheet
     for storey, lines in zip(storeys, walls, strict=True):
         if not lines:
-            raise EchostepError(
-                f"{storey.sheet.file}: the layers of walls have no lines: give the right ones with --layer walls=NAME"
-            )
+            raise EchostepError(f"{storey.sheet.file}: the layers of walls have no lines: give --layer walls=NAME")
         if storey.window is not None:
             continue
         if len(boxes := storey_boxes(lines)) > 1:
@@ -303,9 +299,7 @@ def _tell_doors(placed: PlacedDoors, report: ImportReport) -> None:
         report.leave_out("mark on a layer of doors", placed.marks)
     if placed.cuts:
         one = len(placed.cuts) == 1
-        report.doubt(
-            f"{len(placed.cuts)} door{' lies' if one else 's lie'} where a wall is drawn through: the wall was cut there"
-        )
+        report.doubt(f"{len(placed.cuts)} door{' lies' if one else 's lie'} where a wall is drawn through: it was cut")
     if placed.strays:
         places = ", ".join(f"x {x:g} y {y:g}" for (x, y), _ in placed.strays[:SHOWN_STRAYS])
         one = len(placed.strays) == 1

@@ -57,9 +57,7 @@ def read_drawing(file: Path, report: ImportReport) -> Any:
             report.leave_out(f"{deleted[1][:40]} (damaged)")
         if removed := REMOVED.search(fix.message):
             report.leave_out(f"{removed[1][:40]} (object of another program)")
-            report.doubt(
-                f"{removed[1][:40]} and its like cannot be read: save as plain DXF (AutoCAD: -EXPORTTOAUTOCAD)"
-            )
+            report.doubt(f"{removed[1][:40]} and its like are not read: save as plain DXF (AutoCAD: -EXPORTTOAUTOCAD)")
     return drawing
 
 
@@ -142,9 +140,8 @@ def _is_invisible(entity: Any) -> bool:
 def parts(insert: Any, file: Path) -> list[Any]:
     """The entities of a block reference, one level deep; empty for a damaged one."""
     if insert.mcount > MOST_PARTS // 10:
-        raise EchostepError(
-            f"{file}: layer {insert.dxf.layer!r}: block {insert.dxf.name!r} is repeated {insert.mcount} times"
-        )
+        block = f"layer {insert.dxf.layer!r}: block {insert.dxf.name!r}"
+        raise EchostepError(f"{file}: {block} is repeated {insert.mcount} times")
     try:
         return [
             part

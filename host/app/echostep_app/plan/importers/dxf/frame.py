@@ -29,9 +29,8 @@ THINNEST_M = 0.03  # a wider polyline is drawn as thick as its wall, a narrower 
 THICKEST_M = 1.2  # a hatch that is nowhere wider fills a wall or a column, a wider one a floor; assumed
 ASKEW = 0.5  # sine of the angle between a multiline and its stored offsets below which these are wrong; at right corners it is 0.71
 PROXY_LINES = ("LINE", "ARC", "CIRCLE", "LWPOLYLINE", "POLYLINE")
-PICTURES = frozenset(
-    {"IMAGE", "WIPEOUT", "VIEWPORT", "OLE2FRAME", "XLINE", "RAY", "UNDERLAY", "INSERT"}
-)  # their outlines are not lines of the building
+# Their outlines are not lines of the building
+PICTURES = frozenset({"IMAGE", "WIPEOUT", "VIEWPORT", "OLE2FRAME", "XLINE", "RAY", "UNDERLAY", "INSERT"})
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,11 +6,14 @@ In: entities on the layers of rooms. Out: `Room`s. Owns the least area of an out
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+import shapely
 from shapely.geometry import Point, Polygon
 
 from echostep.fields import LIMIT_M
@@ -23,6 +26,7 @@ from echostep_app.plan.places.spaces import find_spaces
 
 LEAST_M2 = 1.0  # smaller closed lines are frames of texts, symbols, furniture; assumed
 SAME_HEIGHT = 0.8  # ratio of letters to the largest ones in a room, down to which they belong to its name; assumed
+INDENT, NEXT_LINE = 0.5, 2.5  # of a line from the one above it, in heights of letters; assumed
 MEASURE = re.compile(r"\W*\d[\d.,'x× ]*[.,]\d+\.?$")
 UNIT = r"(?:mm|cm|m|m2|m²|qm|sqm|sq ?ft|sf|['\"])"
 KINDS = r"(?:[AFHUP]|NGF|BGF|[LR]H|[OU]K\w*)"  # areas, perimeters and heights, in English and German
@@ -35,27 +39,33 @@ TEXTS = ("TEXT", "MTEXT", "ATTRIB")
 
 
 class Written(NamedTuple):
-    """A text as a room, the height of its letters (m), and what it is called where it is left out."""
+    """A text as a room, the height of its letters (m), their direction (rad), and what it is called where it is left out."""
 
     room: Room
     height_m: float
+    turn: float
     what: str
+
+    def read_at(self) -> tuple[float, float]:
+        """Its place along and across the direction of reading."""
+        x, y, c, s = *self.room.at_m, math.cos(self.turn), math.sin(self.turn)
+        return c * x + s * y, c * y - s * x
 
 
 def rooms_of(
-    entities: Sequence[tuple[Any, str]], frame: DrawingFrame, file: Path, report: ImportReport, texts: Sequence[Written]
+    entities: Sequence[tuple[Any, str]], frame: DrawingFrame, file: Path, report: ImportReport, texts: list[Written]
 ) -> list[Room]:
     """A room for each text, with the smallest outline around it, and for each outline without one, named by the `texts` of other layers in it."""
-    names: dict[tuple[str, tuple[float, float]], Room] = {}  # one of each that is drawn twice
+    names: dict[tuple[str, tuple[float, float]], Written] = {}  # one of each that is drawn twice
     outlines: list[Polygon] = []
     for entity, layer in entities:
-        named = _named(entity, frame)
+        named = written(entity, layer, frame)
         closed = [
             area for line in frame.lines(entity, file) if line.is_closed for area in areas([Polygon(line.coords)])
         ]
         large = [area for area in closed if area.area >= LEAST_M2]
         if named:
-            names[named.name, named.at_m] = named
+            names[named.room.name, named.room.at_m] = named
         outlines += large
         if not named and not large:
             report.leave_out(f"{entity.dxftype()} on {layer[:40]}")
@@ -64,16 +74,45 @@ def rooms_of(
     return _matched([*names.values()], outlines, texts, report)
 
 
-def _matched(names: list[Room], outlines: list[Polygon], texts: Sequence[Written], report: ImportReport) -> list[Room]:
+def _matched(names: list[Written], outlines: list[Polygon], texts: list[Written], report: ImportReport) -> list[Room]:
     """Each outline gets the texts inside it that no smaller outline has; an outline without a text is numbered."""
     left, rooms = list(names), []
     for outline in sorted(outlines, key=lambda area: area.area):
-        inside = [name for name in left if outline.intersects(Point(name.at_m))]
-        left = [name for name in left if name not in inside]
-        inside = inside or _lines_of([text for text in texts if outline.intersects(Point(text.room.at_m))], report)
+        own = [name for name in left if outline.intersects(Point(name.room.at_m))]
+        left = [name for name in left if name not in own]
+        inside = [name.room for name in own] or _lines_of(
+            [text for text in texts if outline.intersects(Point(text.room.at_m))], report
+        )
         rooms.append(room(" ".join(name.name for name in inside)[:80], outline))
     numbered = [one if one.name else Room(f"room {k}", one.at_m, one.outline_m) for k, one in enumerate(rooms, 1)]
-    return [*left, *numbered]
+    return [*_stamps(left, report), *numbered]
+
+
+def _stamps(texts: Sequence[Written], report: ImportReport) -> list[Room]:
+    """Texts that stand beneath each other, as lines of one room's name; of these, smaller letters and measures are none."""
+    texts = sorted(texts, key=lambda one: (-one.read_at()[1], one.read_at()[0]))
+    places = shapely.points(np.array([text.room.at_m for text in texts]).reshape(-1, 2))
+    tree, reach_m = shapely.STRtree(places), 2.0 * NEXT_LINE * max((text.height_m for text in texts), default=0.0)
+    stamps: dict[int, list[Written]] = {}  # by the number of each text
+    for k, (text, place) in enumerate(zip(texts, places, strict=True)):
+        near = (stamps[i] for i in tree.query(place, predicate="dwithin", distance=reach_m) if i < k)
+        above = (stamp for stamp in near if _follows(text, stamp[-1]))
+        stamps[k] = min(above, key=lambda stamp: stamp[-1].read_at()[1], default=[])
+        stamps[k].append(text)
+    rooms = []
+    for stamp in {id(stamp): stamp for stamp in stamps.values()}.values():
+        large = [text for text in stamp if text.height_m >= SAME_HEIGHT * max(one.height_m for one in stamp)]
+        lines = [text for text in large if text is large[0] or not MEASURE.match(text.room.name)]
+        rooms.append(Room(" ".join(line.room.name for line in lines)[:80], lines[0].room.at_m))
+        for text in stamp:
+            report.leave_out(text.what, text not in lines)
+    return rooms
+
+
+def _follows(text: Written, last: Written) -> bool:
+    """Whether a text is the next line below another one."""
+    (a, b), (c, d), height = text.read_at(), last.read_at(), max(text.height_m, last.height_m)
+    return abs(a - c) <= INDENT * height and 0.0 < d - b <= NEXT_LINE * height and abs(text.turn - last.turn) < 0.01
 
 
 def named_spaces(plan: Plan, level_index: int, texts: Sequence[Written], report: ImportReport) -> list[Room]:
@@ -104,17 +143,20 @@ def _lines_of(texts: Sequence[Written], report: ImportReport) -> list[Room]:
 def written(entity: Any, layer: str, frame: DrawingFrame) -> Written | None:
     """A text of any layer; None when the entity is no text."""
     named = _named(entity, frame)
-    height = entity.dxf.get("char_height" if entity.dxftype() == "MTEXT" else "height", 0.0) if named else 0.0
-    return Written(named, float(height) * frame.scale_m, f"{entity.dxftype()} on {layer[:40]}") if named else None
+    if named is None:
+        return None
+    height = entity.dxf.get("char_height" if entity.dxftype() == "MTEXT" else "height", 0.0)
+    turn = math.radians(entity.get_rotation() if entity.dxftype() == "MTEXT" else entity.dxf.get("rotation", 0.0))
+    return Written(named, float(height) * frame.scale_m, turn, f"{entity.dxftype()} on {layer[:40]}")
 
 
 def _named(entity: Any, frame: DrawingFrame) -> Room | None:
     """A text entity as a room; None when it is empty, a size, far away, or not a text."""
-    if entity.dxftype() not in TEXTS or (
-        entity.dxftype() == "ATTRIB" and (entity.is_invisible or SIZES.search(entity.dxf.tag))
-    ):
+    hidden = entity.dxftype() == "ATTRIB" and (entity.is_invisible or SIZES.search(entity.dxf.tag))
+    if hidden or entity.dxftype() not in TEXTS:
         return None
-    lines = [line for line in entity.plain_text().splitlines() if not SIZE.fullmatch(line)]
+    lines = [line for line in entity.plain_text().replace("\\~", " ").splitlines() if not SIZE.fullmatch(line)]
     words = " ".join(" ".join(lines).split())[:80]
-    x, y = frame.metres(entity.dxf.insert if entity.dxftype() == "MTEXT" else entity.ocs().to_wcs(entity.dxf.insert))
+    at = entity.dxf.insert
+    x, y = frame.metres(at if entity.dxftype() == "MTEXT" else entity.ocs().to_wcs(entity.get_placement()[1] or at))
     return Room(words, (round(x, 3), round(y, 3))) if words and max(abs(x), abs(y)) < LIMIT_M else None

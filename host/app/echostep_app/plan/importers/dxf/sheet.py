@@ -130,9 +130,7 @@ def _no_walls(
             f"{file}: the drawing only refers to {', '.join(references)[:200]} (external reference): bind it (XREF, Bind), or give that file"
         )
     if not everything and any(len(drawing.layouts.get(name)) > 1 for name in drawing.layout_names() if name != "Model"):
-        return EchostepError(
-            f"{file}: it is drawn on a layout (paper space) alone: copy it to the model space (CHSPACE)"
-        )
+        return EchostepError(f"{file}: it is on a layout (paper space) alone: copy it to the model space (CHSPACE)")
     names = [layer for layer, _ in Counter(layer for _, layer in everything).most_common(MOST_NAMES)]
     unit = likely_unit(lengths_of({"walls": [entity for entity, _ in everything], "doors": [], "rooms": []}, file))
     alike = _like_walls(everything, DrawingFrame(METRES[unit or stated_unit(drawing) or "m"]))

@@ -78,17 +78,15 @@ class Shapes:
             return None
         corners[:, :2] -= self.origin_m
         if not (np.abs(corners) <= LIMIT_M).all():
-            raise EchostepError(
-                f"{self._path}: {element.is_a()} #{element.id()}: further than {LIMIT_M / 1000:.0f} km from the origin"
-            )
+            where = f"{self._path}: {element.is_a()} #{element.id()}"
+            raise EchostepError(f"{where}: further than {LIMIT_M / 1000:.0f} km from the origin")
         return SolidBody(element, corners, faces)
 
     def _triangles(self, element: Any) -> tuple[Floats, Ints]:
         """Corners (n, 3) in the model's own coordinates, and triangles (m, 3); raises RuntimeError for a shape that cannot be made."""
         shape = self._geometry.create_shape(self._settings, element).geometry
-        return np.array(shape.verts, dtype=np.float64).reshape(-1, 3), np.array(shape.faces, dtype=np.int64).reshape(
-            -1, 3
-        )
+        faces = np.array(shape.faces, dtype=np.int64)
+        return np.array(shape.verts, dtype=np.float64).reshape(-1, 3), faces.reshape(-1, 3)
 
     def find_origin(self, elements: list[Any]) -> None:
         """The origin by some of the elements, where these lie in a national grid."""

@@ -36,6 +36,7 @@ WALLS = ("IfcWall", "IfcColumn", "IfcCurtainWall", "IfcPlate", "IfcMember")
 CONNECTOR_KINDS: dict[str, ConnectorKind] = {
     "IfcStair": "stairs", "IfcStairFlight": "stairs", "IfcRamp": "ramp", "IfcRampFlight": "ramp", "IfcTransportElement": "lift",
 }  # fmt: skip
+LIFTS = ("ELEVATOR", "None", "NOTDEFINED")
 SEEN = (*WALLS, *CONNECTOR_KINDS, "IfcWindow", "IfcSpace")
 
 
@@ -131,11 +132,7 @@ def _place(drawn_levels: list[DrawnLevel], body: SolidBody) -> str:
 
 def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorKind, name: str) -> str:
     """As `_place`, for stairs, a ramp or a lift: on all levels between its lowest and its highest corner."""
-    if kind == "lift" and str(getattr(body.element, "PredefinedType", "ELEVATOR")) not in (
-        "ELEVATOR",
-        "None",
-        "NOTDEFINED",
-    ):
+    if kind == "lift" and str(getattr(body.element, "PredefinedType", "ELEVATOR")) not in LIFTS:
         return "that is no lift"
     low, high = body.z_m
     passed = [i for i, drawn in enumerate(drawn_levels) if low - 0.5 <= drawn.height_m <= high + 0.5]

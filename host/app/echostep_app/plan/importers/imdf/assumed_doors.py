@@ -98,10 +98,8 @@ def _straight(boundary: LineString, other: Polygon) -> Iterator[Floats]:
 def _facing(piece: Floats, other: Polygon) -> Floats:
     """The part of a piece (4,) that lies between the ends of the other area, seen along the piece: not round its corner."""
     begin, step = piece[:2], piece[2:] - piece[:2]
-    near = other.exterior.intersection(
-        LineString(piece.reshape(2, 2)).buffer(THICKEST_M + ONE_LINE_M, cap_style="flat")
-    )
-    corners = shapely.get_coordinates(near)
+    band = LineString(piece.reshape(2, 2)).buffer(THICKEST_M + ONE_LINE_M, cap_style="flat")
+    corners = shapely.get_coordinates(other.exterior.intersection(band))
     if not len(corners) or not step.any():
         return np.concatenate((begin, begin))
     share = np.clip((corners - begin) @ step / (step @ step), 0.0, 1.0)

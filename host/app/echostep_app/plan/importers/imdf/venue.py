@@ -100,7 +100,7 @@ def import_imdf(path: Path, storey_height_m: float, doors_m: float | None, repor
     with Archive(path) as archive:
         if not archive.has(_file(archive, "level")):
             raise EchostepError(
-                f"{path}: no level.geojson in it: IMDF is a folder or zip file with level.geojson and unit.geojson"
+                f"{path}: no level.geojson in it: IMDF is a folder or zip of level.geojson, unit.geojson"
             )
         if not archive.has("manifest.json"):
             report.doubt("no manifest.json: read as IMDF by the names of its files")
@@ -125,9 +125,7 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
     earth = EarthTransform(georeference)
     levels = sorted(_features(archive, "level", earth), key=_ordinal)
     if not levels:
-        raise EchostepError(
-            f"{path}: {_file(archive, 'level')}: it has no levels: export the archive again with its levels"
-        )
+        raise EchostepError(f"{path}: {_file(archive, 'level')}: it has no levels: export the archive with its levels")
     drawn_levels = {
         level.key: DrawnLevel(level.name or f"level {_ordinal(level):g}", round(_ordinal(level) * storey_height_m, 6))
         for level in levels
@@ -149,11 +147,9 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
         report.leave_out("unit without an area", sum(not areas([unit.shape]) for unit in units[key]))
         if doors_m is not None:
             _assume_doors(drawn, units[key], openings[key], doors_m)
-    fixtures = _by_level(
-        _features(archive, "fixture", earth) + _features(archive, "kiosk", earth), drawn_levels, report
-    )
+    fixed = _by_level(_features(archive, "fixture", earth) + _features(archive, "kiosk", earth), drawn_levels, report)
     for key, drawn in drawn_levels.items():
-        for fixture in fixtures[key]:
+        for fixture in fixed[key]:
             if "kiosk" in fixture.where or fixture.category in SOLID_FIXTURES:
                 drawn.obstacles += areas([fixture.shape])
                 report.leave_out("fixture or kiosk without an area", not areas([fixture.shape]))
@@ -183,9 +179,7 @@ def _origin(archive: Archive) -> Georeference:
                     return Georeference(round(place[0], 5), round(place[1], 5))
     except ValueError as error:
         raise EchostepError(f"{archive.label(name)}: {error}") from error
-    raise EchostepError(
-        f"{archive.label(name)}: it has no levels with a place: export the archive again with its levels"
-    )
+    raise EchostepError(f"{archive.label(name)}: it has no levels with a place: export the archive with its levels")
 
 
 def _features(archive: Archive, kind: str, earth: EarthTransform) -> list[Feature]:
@@ -261,9 +255,7 @@ def _place_doors(drawn: DrawnLevel, openings: list[Feature], report: ImportRepor
         drawn.doors = [door for k, door in enumerate(drawn.doors) if k not in again]
         report.leave_out("opening that stands twice", len(again))
     if astray:
-        report.doubt(
-            f"{drawn.name}: {astray} of {len(drawn.doors)} openings lie in no wall: compare them with the building"
-        )
+        report.doubt(f"{drawn.name}: {astray} of {len(drawn.doors)} openings lie in no wall: compare with the building")
 
 
 def _again(doors: list[Door]) -> set[int]:

@@ -2,7 +2,7 @@
 """OpenStreetMap Simple Indoor Tagging (XML, JSON of Overpass, GeoJSON of overpass-turbo) -> `Plan`.
 
 In: an .osm, .xml, .json or .geojson file. Out: `Plan`. Owns nothing. Rooms have walls, corridors and areas have none, `indoor=wall` is a wall, a
-building's outline is a wall on each of its levels; a door is a node on a wall. Levels are `storey_height_m` apart, level 0 at 0 m.
+building's outline is a wall on each of its levels; a door is a node on a wall. Levels are `storey_m` apart, level 0 at 0 m.
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ class OsmSite:
         return (self.drawn_levels[level] for level in levels if level in self.drawn_levels)
 
 
-def import_osm(path: Path, storey_height_m: float, report: ImportReport) -> Plan:
+def import_osm(path: Path, storey_m: float, report: ImportReport) -> Plan:
     """Import the building in a file; raises EchostepError that names the file and the element."""
     elements = read_osm(path)
-    levels = sorted({level for tags in elements.indoor_tags() for level in levels_of(tags)})
+    levels = sorted(elements.levels(path))
     if not levels:
         raise EchostepError(f"{path}: {_why_empty(elements)}")
     if len(levels) > MOST_LEVELS:
@@ -64,9 +64,7 @@ def import_osm(path: Path, storey_height_m: float, report: ImportReport) -> Plan
     elements.project(EarthTransform(georeference).metres)
     if np.abs(np.array(list(elements.at_m.values()))).max() > LIMIT_M:
         raise EchostepError(f"{path}: nodes are further than {LIMIT_M / 1000:.0f} km apart: cut out one building")
-    site = OsmSite(
-        {level: DrawnLevel(f"level {level:g}", round(level * storey_height_m, 6)) for level in levels}, levels
-    )
+    site = OsmSite({level: DrawnLevel(f"level {level:g}", round(level * storey_m, 6)) for level in levels}, levels)
     _without_level(elements, report)
     _outlines(site, elements)
     _spaces(site, elements)
@@ -224,9 +222,7 @@ def _gap(
     near = walls[tree.query(Point(at_m), predicate="dwithin", distance=ON_M)]
     if not len(near):
         return None
-    x0, y0, x1, y1 = min(
-        (_directed(wall) for wall in near.tolist()), key=lambda w: (-round(math.dist(w[:2], w[2:]), 2), w)
-    )
+    x0, y0, x1, y1 = min(map(_directed, near.tolist()), key=lambda w: (-round(math.dist(w[:2], w[2:]), 2), w))
     side = LineString([(x0, y0), (x1, y1)])
     wide_m = min(wide_m, side.length)
     middle = min(max(side.project(Point(at_m)), wide_m / 2), side.length - wide_m / 2)
@@ -250,13 +246,8 @@ def _lifts(site: OsmSite, elements: Elements) -> None:
     for node, tags in elements.nodes():
         way = _way(tags)
         if way is not None:
-            _ways(
-                site,
-                way,
-                tags,
-                Point(elements.at_m[node]).buffer(LIFT_M / 2, cap_style="square"),
-                levels_of(tags, f"node {node}"),
-            )
+            square = Point(elements.at_m[node]).buffer(LIFT_M / 2, cap_style="square")
+            _ways(site, way, tags, square, levels_of(tags, f"node {node}"))
 
 
 def _way(tags: Tags) -> ConnectorKind | None:

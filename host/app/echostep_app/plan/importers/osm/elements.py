@@ -84,9 +84,10 @@ class Elements:
         """Nodes with tags."""
         return ((key, tags) for key, tags in self.node_tags.items() if tags)
 
-    def indoor_tags(self) -> Iterator[Tags]:
-        """Tags of all lines with an indoor tag."""
-        return (tags for _, _, tags in self.lines() if tags.get("indoor", "no") != "no")
+    def levels(self, file: Path) -> set[float]:
+        """The level numbers of all lines with an indoor tag."""
+        indoor = ((name, tags) for name, _, tags in self.lines() if tags.get("indoor", "no") != "no")
+        return {level for name, tags in indoor for level in levels_of(tags, f"{file}: {name}")}
 
     def through(self, node: int) -> int:
         """The node by which ways pass through a node's place: itself, or one that has a position alone."""
@@ -233,9 +234,8 @@ def _rounded(place: tuple[float, float]) -> tuple[float, float]:
 
 
 def _degrees(row: dict[str, Any], where: str) -> tuple[float, float]:
-    return number(row.get("lon"), f"{where}: lon", 180.0, "degrees"), number(
-        row.get("lat"), f"{where}: lat", 90.0, "degrees"
-    )
+    lon, lat = number(row.get("lon"), f"{where}: lon", 180.0, "degrees"), row.get("lat")
+    return lon, number(lat, f"{where}: lat", 90.0, "degrees")
 
 
 def _ref(value: Any, where: str) -> int:

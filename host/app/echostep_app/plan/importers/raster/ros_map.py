@@ -56,16 +56,14 @@ def import_ros_map(path: Path, report: ImportReport) -> Plan:
     if (far_x, far_y) != (0.0, 0.0):
         report.doubt(IN_GRID.format("the map", far_x, far_y))
     c, s = pixel_m * math.cos(yaw), pixel_m * math.sin(yaw)
-    drawn = DrawnLevel(
-        path.stem, 0.0, walls=[affine_transform(area, (c, -s, s, c, x - far_x, y - far_y)) for area in outlines]
-    )
+    walls = [affine_transform(area, (c, -s, s, c, x - far_x, y - far_y)) for area in outlines]
     report.units = f"{pixel_m:g} m a pixel (resolution)"
     if noise:
         report.leave_out("specks of less than 4 pixels", noise)
     report.doubt(
         "traced from what a robot saw: furniture and people are walls too, and doors that stood open are gaps; echostep plan edit corrects it"
     )
-    return plan_of(path.stem, [drawn], report)
+    return plan_of(path.stem, [DrawnLevel(path.stem, 0.0, walls=[*walls])], report)
 
 
 def _probability(path: Path, fields: dict[str, str], values: Floats) -> Floats:
