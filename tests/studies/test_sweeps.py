@@ -48,7 +48,7 @@ def test_sweeps_are_cut_where_the_place_changes(tmp_path: Path) -> None:
         ("x_m,y_m\n1,2\n1,2\n", WALLS, "a.csv: no column heading_deg"),
         (HEADER, WALLS, "a.csv: no samples"),
         ("", WALLS, "a.csv: no column x_m"),
-        ("\0\xff" * 50, WALLS, "a.csv: no column x_m"),
+        ("\0\xff" * 50, WALLS, "a.csv: binary, not a table"),
         (HEADER + "1,1,0,0,1\n1,1,0,5,1\n", "a,b,c,d\n0,0,1,0\n0,0,1\n", "walls.csv: a wall lacks a number"),
         (HEADER + "1,1,0,0,1\n1,1,0,5,1\n", "", "walls.csv"),
     ],

@@ -36,6 +36,7 @@ from echostep.localization.belief import (
 from echostep.localization.grid.search import Search
 from echostep.localization.limits import SURE
 from echostep.localization.particles.cloud import Cloud, cloud_about
+from echostep.localization.particles.start import wide
 from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose
@@ -240,7 +241,7 @@ def test_a_place_is_as_sure_as_the_plan_that_it_is_on(fits: float, status: Track
 @pytest.mark.parametrize(("start", "status"), [(Start(HERE), TrackStatus.UNCERTAIN), (Start(), TrackStatus.LOST)])
 def test_a_cloud_that_is_doubted_is_searched_for_and_not_claimed(start: Start, status: TrackStatus) -> None:
     doubted = filter_at(HERE)
-    doubted._way.begin = start.wide  # as long as all of the way from there is known; then anywhere
+    doubted._way.begin = wide(start)  # as long as all of the way from there is known; then anywhere
     doubted.belief = Belief(doubted.cloud, 0.2, PLAN_FITS)
     estimate = after_a_step(doubted)
     assert doubted.belief.search is not None

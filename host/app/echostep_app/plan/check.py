@@ -108,7 +108,8 @@ def _doors(level: Level, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]
             words = "ends in no wall" if np.isinf(max(loose)) else f"ends {max(loose):.2f} m from any wall"
             yield PlanFinding("door", i, at, f"{name} {words}", lines)
         if door.width_m > WIDEST_M:
-            yield PlanFinding("door", i, at, f"{name} is {door.width_m:.3g} m wide: is the plan in metres?", lines)
+            text = f"door {door.name or number} is {door.width_m:.3g} m wide: is the plan in metres?"
+            yield PlanFinding("door", i, at, text, lines)
         inner = shapely.LineString((line.interpolate(0.2, normalized=True), line.interpolate(0.8, normalized=True)))
         if len(tree.query(inner, predicate="dwithin", distance=TOUCH_M)):
             yield PlanFinding("door", i, at, f"a wall runs through {name}: doors are gaps in the walls", lines)
@@ -154,14 +155,16 @@ def _connectors(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFinding]:
     for connector in plan.connectors:
         area = shapely.Polygon(connector.outline_m)
         middle = area.representative_point() if area.is_valid else shapely.Point(connector.outline_m.mean(axis=0))
-        at, name = (middle.x, middle.y), f"{connector.kind} {connector.name!r}"
+        at = (middle.x, middle.y)
         if not area.is_valid:
-            yield PlanFinding("way", connector.levels[0], at, f"{name}: its outline crosses itself")
+            text = f"{connector.kind} {connector.name!r}: its outline crosses itself"
+            yield PlanFinding("way", connector.levels[0], at, text)
         for i in connector.levels:
             if faces[i].indices_of(np.array([at]))[0] == OUTSIDE:
-                yield PlanFinding("way", i, at, f"{name} {NOT_ENCLOSED}")
+                yield PlanFinding("way", i, at, f"{connector.kind} {connector.name!r} {NOT_ENCLOSED}")
             elif _sealed(shapely.make_valid(area), plan.levels[i], faces[i]):
-                yield PlanFinding("way", i, at, f"{name} has no door and no way out to this level")
+                text = f"{connector.kind} {connector.name!r} has no door and no way out to this level"
+                yield PlanFinding("way", i, at, text)
     joined = {i for connector in plan.connectors for i in connector.levels}
     if len(plan.levels) > 1:
         for i in sorted(set(range(len(plan.levels))) - joined):

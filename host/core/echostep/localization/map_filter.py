@@ -30,7 +30,7 @@ from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, 
 from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.localization.particles.kernels import systematic
-from echostep.localization.particles.start import ANY_LEVEL, STATED, Air, Start
+from echostep.localization.particles.start import ANY_LEVEL, STATED, Air, Start, wide
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
 from echostep.localization.window import RecentWay
 from echostep.path import MeasuredSegment, Odometer, PathSegment
@@ -67,7 +67,7 @@ class MapFilter:
         self._crossed = CrossedWalls()
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
-        self._way = RecentWay(start.wide, walk_heading_rad)  # since the last gap
+        self._way = RecentWay(wide(start), walk_heading_rad)  # since the last gap
         self._riding = RidingHeight(HEIGHT_SD_M)
         self._barometer_starts = 0  # before the last height by pressure
         if start.after_pause:

@@ -10,9 +10,10 @@ import pytest
 
 from echostep.localization import ANY_LEVEL, STATED, Building, EchoSettings, FilterSettings, Start, echo_model
 from echostep.localization.echoes.unplanned import RangeMemory
-from echostep.localization.grid.search_grid import SearchGrid
+from echostep.localization.grid.search_grid import MOST_STATES, SearchGrid
 from echostep.localization.grid.start import NEAR_SHARE, grid_of
 from echostep.localization.map_filter import NEAR_SD_M
+from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.start import WIDE_SHARE, draw_poses
 from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.plan import Pose
@@ -58,6 +59,17 @@ def test_a_wide_start_leaves_no_state_of_the_floor_without_weight() -> None:
     assert math.sqrt(weight @ (poses.x_m - along) ** 2) == pytest.approx(sd_m, rel=0.1)
     far = grid_in(Building(Walls(CORRIDOR)), Start(Pose(1e6, 0.0, 0.0), sd_m)).every()[1]
     assert np.ptp(far) == 0.0  # far from the floor: anywhere on it
+
+
+def test_in_a_large_building_too_a_wide_start_is_not_all_that_is_possible() -> None:
+    """It has more states than a search keeps; only one was left of them."""
+    walls = Walls(np.array([(0, 0, 40, 0), (40, 0, 40, 40), (40, 40, 0, 40), (0, 40, 0, 0)], float))
+    grid = grid_in(Building(walls), Start(Pose(10.0, 1.0, 1.2), 4.0, 0.6))
+    assert len(grid) > MOST_STATES
+    none = np.zeros(0)
+    no_pings = PingBatch(none, none, none, none, none.astype(np.int64), none, none, none, none, none)
+    grid.advance(Move(0.1, 0.0, 0.0, 0.0), no_pings, echo_model(EchoSettings()))
+    assert len(grid) > 0.9 * MOST_STATES
 
 
 def test_a_start_behind_a_wall_weighs_as_a_way_through_it() -> None:

@@ -79,6 +79,7 @@ class SearchGrid:
         if total > 0.0:  # otherwise all of it is far from the floor
             weight = density * (share / total) + (1.0 - share) / len(density)
             self._states = s._replace(weight=(weight / weight.max()).astype(np.float32))
+            self._note_least(1.0)
 
     def begin_about(self, x_m: Floats, y_m: Floats, turn_rad: Floats, share: float) -> None:
         """Begin again, with this share of the weight at these poses (n,), and the rest evenly."""

@@ -38,7 +38,7 @@ from echostep.localization.particles.start import Start, draw_poses
 from echostep.localization.settings import CloudSettings
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
-from echostep.walls.index import NO_WALLS, WallIndex
+from echostep.walls.index import NO_WALLS, WallIndex, crossings
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never that large
@@ -138,7 +138,7 @@ class Cloud(Particles):
             log_passed += passed
             if lowest < -0.5 * settings.wall_cost:
                 self._widen()
-            self.resample_if_needed()
+            self.resample_if_needed(index)
         return Evidence(log_evidence, log_passed)
 
     def change_levels(self, move: Move, change: HeightChange) -> float:
@@ -205,8 +205,8 @@ class Cloud(Particles):
         self.log_weight -= self.log_weight.max()
         self.resample_if_needed()
 
-    def resample_if_needed(self) -> None:
-        """Systematic resampling [Kitagawa 1996] when too few particles carry the weight.
+    def resample_if_needed(self, walls: WallIndex = NO_WALLS) -> None:
+        """Systematic resampling [Kitagawa 1996] when too few particles carry the weight; what roughens them leads through none of the walls.
 
         Until the cloud is gathered, the number of a mode's particles follows the square root of its weight, and they keep that weight: resampling
         alone would lose the lighter of two modes by chance.
@@ -225,7 +225,7 @@ class Cloud(Particles):
             self._resample(np.zeros(len(self.x_m)), self.log_weight, count)
         self.is_gathered = self.is_gathered or self.far_weight(self.x_m) < GATHERED_REST
         if self.is_scattered:
-            self._roughen(self._settings.rough_m, math.radians(self._settings.rough_deg))
+            self._roughen(self._settings.rough_m, math.radians(self._settings.rough_deg), walls)
 
     def _resample(self, log_wanted: Floats, log_weight: Floats, count: int) -> None:
         """Keep `count` particles with these log-probabilities (n,), each with its log-weight (n,)."""
@@ -262,11 +262,12 @@ class Cloud(Particles):
         self.x_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
         self.y_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
 
-    def _roughen(self, rough_m: float, rough_rad: float) -> None:
+    def _roughen(self, rough_m: float, rough_rad: float, walls: WallIndex = NO_WALLS) -> None:
         """Add noise to a scattered cloud, so that copies of one particle try places between the few that fit [Gordon et al. 1993]."""
         noise = self._rng.standard_normal((3, len(self.x_m)))
-        self.x_m += rough_m * noise[0]
-        self.y_m += rough_m * noise[1]
+        x_m, y_m = self.x_m + rough_m * noise[0], self.y_m + rough_m * noise[1]
+        stays = crossings(self.x_m, self.y_m, x_m, y_m, walls)
+        self.x_m, self.y_m = np.where(stays, self.x_m, x_m), np.where(stays, self.y_m, y_m)
         self.turn_rad += rough_rad * noise[2]
 
     def _wanted_size(self) -> int:

@@ -70,12 +70,6 @@ class Start:
         return self.pose is None and self.level == ANY_LEVEL and self.air is None
 
     @property
-    def wide(self) -> Start:
-        """The start if what is stated is wrong: near its pose, if any."""
-        sd_m, sd_rad = math.hypot(self.sd_m, WIDE_SD_M), math.hypot(self.heading_sd_rad, WIDE_SD_RAD)
-        return Start(near=self.pose, sd_m=sd_m, heading_sd_rad=sd_rad)
-
-    @property
     def lag_variance(self) -> float:
         """Variance (m2) of the offset of the height by pressure."""
         return UNKNOWN_LAG_M2 if self.air is None else self.air.sd_m**2
@@ -87,6 +81,12 @@ class Start:
         return f"Start({', '.join(words)})"
 
 
+def wide(start: Start) -> Start:
+    """A start if what is stated is wrong: near its pose, if any."""
+    sd_m, sd_rad = math.hypot(start.sd_m, WIDE_SD_M), math.hypot(start.heading_sd_rad, WIDE_SD_RAD)
+    return Start(near=start.pose, sd_m=sd_m, heading_sd_rad=sd_rad)
+
+
 def draw_poses(
     start: Start, count: int, floor: Floor, sheet: LevelSheet | None, rng: np.random.Generator, walls: WallIndex = NO_WALLS
 ) -> tuple[Floats, Floats, Floats, Floats]:  # fmt: skip
@@ -95,9 +95,9 @@ def draw_poses(
         x, y, heading = _on_floor(allowed_floor(floor, start, sheet), count, rng)
         return x, y, heading, np.zeros(count)
     is_wide = rng.random((2, count)) < (WIDE_SHARE if len(floor.x_m) else 0.0)  # without walls nothing would correct it
-    pose, wide, noise = start.pose, start.wide, rng.standard_normal((3, count))
-    sd_m = np.where(is_wide[0], wide.sd_m, start.sd_m)
-    sd_rad = np.where(is_wide[1], wide.heading_sd_rad, start.heading_sd_rad)
+    pose, wrong, noise = start.pose, wide(start), rng.standard_normal((3, count))
+    sd_m = np.where(is_wide[0], wrong.sd_m, start.sd_m)
+    sd_rad = np.where(is_wide[1], wrong.heading_sd_rad, start.heading_sd_rad)
     x, y = pose.x_m + sd_m * noise[0], pose.y_m + sd_m * noise[1]
     heading = pose.heading_rad + sd_rad * noise[2]
     if start.heading_sd_rad > TURN_AROUND_RAD:
