@@ -74,12 +74,14 @@ class SearchGrid:
 
     def begin_with(self, place: Floats, turn: Floats, share: float) -> None:
         """Begin with this share of the weight by densities over the places (n,) and over the rotations (SECTORS,), and the rest evenly."""
-        s, density = self._states, np.outer(turn, place).ravel()
-        total = float(density.sum())
-        if total > 0.0:  # otherwise all of it is far from the floor
-            weight = density * (share / total) + (1.0 - share) / len(density)
-            self._states = s._replace(weight=(weight / weight.max()).astype(np.float32))
-            self._note_least(1.0)
+        density = np.outer(turn, place).ravel()
+        if (total := float(density.sum())) > 0.0:  # otherwise all of it is far from the floor
+            self._weigh_anew(density * (share / total) + (1.0 - share) / len(density))
+
+    def _weigh_anew(self, weight: Floats) -> None:
+        """Replace the weights of all states by these; the greatest is 1 then."""
+        self._states = self._states._replace(weight=(weight / weight.max()).astype(np.float32))
+        self._note_least(1.0)
 
     def begin_about(self, x_m: Floats, y_m: Floats, turn_rad: Floats, share: float) -> None:
         """Begin again, with this share of the weight at these poses (n,), and the rest evenly."""
@@ -93,9 +95,8 @@ class SearchGrid:
         layer = np.floor((turn_rad - self._turned_rad) * SECTORS / (2.0 * math.pi)).astype(np.int64) % SECTORS
         state = (layer * size + place)[place >= 0]
         if len(state):
-            weight = np.bincount(state, minlength=len(s.weight)) * (share / len(state)) + (1.0 - share) / len(s.weight)
-            self._states = s._replace(weight=(weight / weight.max()).astype(np.float32))
-            self._note_least(1.0)
+            counts = np.bincount(state, minlength=len(s.weight)).astype(np.float64)
+            self._weigh_anew(counts * (share / len(state)) + (1.0 - share) / len(s.weight))
 
     def __len__(self) -> int:
         return len(self._states.cell)
@@ -215,8 +216,7 @@ class SearchGrid:
 
     def reweight(self, log_weight: Floats) -> None:
         """Replace the log-weights of all states."""
-        self._states = self._states._replace(weight=np.exp(log_weight - log_weight.max()).astype(np.float32))
-        self._note_least(1.0)
+        self._weigh_anew(np.exp(log_weight - log_weight.max()))
 
     def _poses(self, chosen: Ints) -> DrawnPoses:
         """The middles of states (n,)."""
