@@ -78,6 +78,17 @@ def test_the_mixture_is_a_probability(sources: list[Source]) -> None:
     assert 0.9 < inside + math.exp(log_p(0.0, sources)) < 1.1
 
 
+def test_what_roughens_a_scattered_cloud_leads_through_no_wall() -> None:
+    """All stand 5 cm before a wall: noise of 10 cm would carry a third of them through it."""
+    scattered = cloud_about(CloudSettings(size=20), Start(Pose(1.0, 1.0, 0.0)), 0.0, np.random.default_rng(1))
+    count = len(scattered.x_m)
+    scattered.x_m, scattered.y_m = np.full(count, 0.05), np.linspace(0.1, 1.9, count)
+    scattered.log_weight = np.where(np.arange(count) % 10, -50.0, 0.0)
+    scattered.resample_if_needed(BOX.near(scattered.x_m, scattered.y_m, 1.0))
+    assert scattered.is_scattered
+    assert scattered.x_m.max() > 0.1 > scattered.x_m.min() > 0.0
+
+
 def test_an_echo_where_the_wall_is_is_likeliest() -> None:
     wall = [(1.0, 0.0, 0.0)]
     assert all(log_p(z, wall) < log_p(1.0, wall) for z in (0.5, 0.8, 1.2, 3.0, 0.0))
