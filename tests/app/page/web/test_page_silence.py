@@ -163,6 +163,7 @@ def test_no_call_is_lost_by_a_clock_that_is_set_nor_in_one_of_two_tabs(browser: 
             wait_for(page, f"/sending for [1-9]\\d* s/.test({OUTBOX})")
         for each in (page, tab):
             wait_for(each, f"!{OUTBOX}.includes('sending') && !echostep.link.outbox.kept.length")
+        assert until(lambda: feeder.lines)
         tab.close()
         old = "{ kind: 'call', help: true, request: '1-2-3-4', at_ms: Date.now() - 3600e3 }"  # of another day
         page.evaluate(f"localStorage['request / 1-2-3-4'] = JSON.stringify({old})")
