@@ -33,6 +33,7 @@ from foot.foot_walks import MANNERS, course, samples
 from free_ports import free_port
 from players import pseudo_terminal
 from twin.line_foot import lines
+from waiting import until
 
 HEADER = "t_s,ax,ay,az,gx,gy,gz"
 
@@ -146,5 +147,6 @@ def test_what_is_no_foot_is_said(sent: bytes, said: str, monkeypatch: pytest.Mon
     monkeypatch.setattr(line_foot, "PATIENCE_S", 1.0)
     with terminal() as (port, send), closing(SerialPorts({LINES: port}, {LINES: 115200})) as ports:
         send(sent)
+        assert until(lambda: sum(len(chunk.data) for chunk in ports._queue._chunks) == len(sent))
         with pytest.raises(EchostepError, match=said):
             LineFoot(ports, f"lines:{port}")

@@ -40,7 +40,7 @@ def board_and_mtx() -> Iterator[tuple[str, str]]:
 def test_swapped_ports_are_named_as_swapped_and_their_bytes_are_kept(tmp_path: Path, command: str) -> None:
     more = ["--plan", PLAN, "--headless", "--out", tmp_path] if command == "live" else ["--out", tmp_path / "walk.mcap"]
     with board_and_mtx() as (board, mtx):
-        done = echostep(command, "--board", mtx, "--mtx", board, "--seconds", 30, *more)
+        done = echostep(command, "--board", mtx, "--mtx", board, "--seconds", PATIENCE_S, *more)
     assert done.returncode == 2
     assert "the ports are swapped" in done.stderr
     assert f"give --board {board} --mtx {mtx}" in done.stderr
@@ -133,7 +133,9 @@ def test_two_boards_are_found_told_apart_tracked_and_replayed(tmp_path: Path, mo
     with walking_twin(tmp_path, "--kit", "2026") as (board, foot):
         seen = [PortSeen(port, Role.BOARD, "", number) for port, number in ((foot, "17"), (board, "4"))]
         monkeypatch.setattr(port_search, "list_seen", lambda: seen)
-        swapped = echostep("record", "--board", foot, "--foot", board, "--out", tmp_path / "a.mcap", "--seconds", 30)
+        swapped = echostep(
+            "record", "--board", foot, "--foot", board, "--out", tmp_path / "a.mcap", "--seconds", PATIENCE_S
+        )
         interrupt_after(10, monkeypatch)
         live = echostep("live", "--plan", PLAN, "--headless", "--out", tmp_path / "live", "--seconds", PATIENCE_S)
         monkeypatch.setattr("echostep_app.commissioning.doctor.list_seen", lambda: seen)
@@ -157,7 +159,7 @@ def test_two_boards_are_found_told_apart_tracked_and_replayed(tmp_path: Path, mo
 @needs_twin
 def test_a_foot_board_alone_at_the_boards_port_is_named(tmp_path: Path) -> None:
     with walking_twin(tmp_path, "--kit", "2026") as (_, foot):
-        done = echostep("record", "--board", foot, "--out", tmp_path / "a.mcap", "--seconds", 30)
+        done = echostep("record", "--board", foot, "--out", tmp_path / "a.mcap", "--seconds", PATIENCE_S)
     assert f"{foot} is the foot board, not the sensor board: name its port with --foot {foot}" in done.stderr
 
 

@@ -123,7 +123,7 @@ def board_over_tcp() -> Iterator[str]:
 @pytest.mark.long
 def test_a_port_is_recorded_and_the_recording_handled(tmp_path: Path) -> None:
     with board_over_tcp() as url:
-        said = echostep("record", "--board", url, "--seconds", 1.5, "--out", tmp_path / "walk.mcap")
+        said = echostep("record", "--board", url, "--seconds", 5, "--out", tmp_path / "walk.mcap")
     size = CAPTURE.stat().st_size
     assert f"{size} bytes from the board" in said
     assert b"".join(c.data for c in open_recording(tmp_path / "walk.mcap").chunks()) == CAPTURE.read_bytes()

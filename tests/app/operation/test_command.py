@@ -44,12 +44,12 @@ def test_the_command_serves_what_a_tracker_reports(tmp_path: Path) -> None:
         found = re.search(r"(http://127\.0\.0\.1:\d+)/\S*", running.stderr.readline())
         assert found
         box = box_to(broker.url)
-        box.offer(report("anna", position=replace(POSITION, protection_m=0.4)))
         with opened_url(found[0]) as page:
             hello = json.loads(page.recv(PATIENCE_S))
             assert (hello["kind"], hello["plan"]["name"]) == ("hello", "Demo office")
 
             def rows() -> Any:
+                box.offer(report("anna", position=replace(POSITION, protection_m=0.4)))
                 header = header_of(page.recv(PATIENCE_S))  # type: ignore[arg-type]
                 page.send(json.dumps({"kind": "drawn", "seq": header["seq"]}))
                 return header["list"]

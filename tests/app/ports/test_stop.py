@@ -29,6 +29,8 @@ def test_what_has_arrived_comes_after_stop() -> None:
         while not received:
             received += getattr(next(chunks), "data", b"")
         os.write(ours, b", second")
+        opened: Any = ports._ports["board"]
+        assert until(lambda: opened.in_waiting or ports._queue._chunks)  # a pseudo terminal hands it over later
         ports.stop()
         os.write(ours, b", third")
         received += b"".join(chunk.data for chunk in chunks if chunk)

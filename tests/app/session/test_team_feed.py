@@ -41,7 +41,8 @@ def test_without_a_broker_it_is_said_what_is_missing(tmp_path: Path) -> None:
 def test_the_newest_place_of_the_wearer_is_heard_although_the_broker_dies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(outbox, "FRESH_S", PATIENCE_S)
+    for name in ("FRESH_S", "SETTLED_S"):
+        monkeypatch.setattr(outbox, name, PATIENCE_S)
     monkeypatch.setattr(feeds, "NEWS_S", 0.0)
     monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     said: list[str] = []

@@ -34,7 +34,8 @@ def arrival_ns(chunk: Chunk | None) -> int:
 @needs_broker
 def test_teammates_on_this_plan_can_be_met(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The wearer's own reports, those on another plan and those of another team are not among them."""
-    monkeypatch.setattr(outbox, "FRESH_S", PATIENCE_S)
+    for name in ("FRESH_S", "SETTLED_S"):
+        monkeypatch.setattr(outbox, name, PATIENCE_S)
     monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     with Broker(tmp_path) as broker:
         feed, subscription = a_feed(broker, load_plan(PLAN), "bo", RUN)

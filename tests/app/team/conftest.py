@@ -19,9 +19,9 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No report becomes too old to be sent, however long other programs have the cores."""
-    monkeypatch.setattr(outbox, "FRESH_S", PATIENCE_S)
-    monkeypatch.setattr(outbox, "CLOSING_S", PATIENCE_S)
+    """No report becomes too old to be sent, nor its position lost by its age, however long other programs have the cores."""
+    for name in ("FRESH_S", "SETTLED_S", "CLOSING_S"):
+        monkeypatch.setattr(outbox, name, PATIENCE_S)
 
 
 @pytest.fixture(scope="module")

@@ -8,12 +8,15 @@ for each. Messages are made and read by the protocol's own definitions, which th
 from __future__ import annotations
 
 import os
+import select
 import threading
 import tty
 from types import TracebackType
 from typing import Any, Self
 
 from meshtastic.protobuf.mesh_pb2 import FromRadio, MeshPacket, ToRadio
+
+from waiting import PATIENCE_S
 
 START = b"\x94\xc3"
 
@@ -46,6 +49,7 @@ class Air:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         for node in self.nodes:
             node.unplug()
+            os.close(node.slave)
 
 
 class MeshNodePlayer:
@@ -53,39 +57,39 @@ class MeshNodePlayer:
 
     def __init__(self, air: Air, number: int) -> None:
         self._air, self._number = air, number
-        self._master, slave = os.openpty()
-        tty.setraw(slave)
-        self.port = os.ttyname(slave)
-        self._slave: int | None = slave  # stays open, so that the terminal lives between two programs
-        self._writing = threading.Lock()
-        threading.Thread(target=self._read, daemon=True).start()
+        # The slave stays open: so the terminal lives between two programs, and no other test gets its number once it is unplugged
+        self._master, self.slave = os.openpty()
+        tty.setraw(self.slave)
+        self.port = os.ttyname(self.slave)
+        self._over, self._writing = threading.Event(), threading.Lock()
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
 
     def unplug(self) -> None:
         """End the terminal."""
-        if self._slave is not None:
-            os.close(self._slave)
-            self._slave = None
-            os.close(self._master)
+        self._over.set()
+        self._thread.join(PATIENCE_S)
 
     def tell(self, message: Any) -> None:
         data = message.SerializeToString()
         with self._writing:
-            if self._slave is not None:
+            if not self._over.is_set():
                 os.write(self._master, START + len(data).to_bytes(2, "big") + data)
 
     def _read(self) -> None:
+        """Closes the terminal at its end: a number that is closed under a read may be another file's when it is read next."""
         buffer = b""
-        while True:
-            try:
+        while not self._over.is_set():
+            if select.select([self._master], [], [], 0.05)[0]:
                 buffer += os.read(self._master, 4096)
-            except OSError:
-                return
             while (at := buffer.find(START)) >= 0 and len(buffer) >= at + 4:
                 end = at + 4 + int.from_bytes(buffer[at + 2 : at + 4], "big")
                 if len(buffer) < end:
                     break
                 self._heed(ToRadio.FromString(buffer[at + 4 : end]))
                 buffer = buffer[end:]
+        with self._writing:
+            os.close(self._master)
 
     def _heed(self, message: Any) -> None:
         if message.want_config_id:

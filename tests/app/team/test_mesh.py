@@ -237,9 +237,8 @@ def test_a_report_goes_from_node_to_node(air: Air) -> None:
     words: list[str] = []
     with closing(ListenerThread(listener, words.append)) as receiver:
         assert until(lambda: receiver.connected), words
-        box = Outbox(
-            MeshTransport(parse_endpoint(f"mesh://{mine.port}"), ("red", "kim"), words.append), "mesh", words.append
-        )
+        transport = MeshTransport(parse_endpoint(f"mesh://{mine.port}"), ("red", "kim"), words.append)
+        box = Outbox(transport, "mesh", words.append)
         box.offer(report("kim"))
         messages: list[Any] = []
 
@@ -262,17 +261,15 @@ def test_a_report_goes_from_node_to_node(air: Air) -> None:
 @pytest.mark.long
 def test_a_node_that_answers_late_is_connected_and_gets_the_report(air: Air, monkeypatch: pytest.MonkeyPatch) -> None:
     """It boots: its port is there, it answers only after the first attempt to connect has been given up."""
-    monkeypatch.setattr(mesh, "ANSWER_S", 1)
-    node, words = air.node(), list[str]()
-    heed, heard = node._heed, list[Any]()
-    monkeypatch.setattr(node, "_heed", heard.append)
-    box = Outbox(
-        MeshTransport(parse_endpoint(f"mesh://{node.port}"), ("red", "kim"), words.append), "mesh", words.append
-    )
-    box.offer(report("kim"))
-    assert until(lambda: any("no Meshtastic node answers" in line for line in words)), words
-    assert heard
-    monkeypatch.setattr(node, "_heed", heed)
+    node, words, heard = air.node(), list[str](), list[Any]()
+    transport = MeshTransport(parse_endpoint(f"mesh://{node.port}"), ("red", "kim"), words.append)
+    with monkeypatch.context() as booting:
+        booting.setattr(mesh, "ANSWER_S", 1)
+        booting.setattr(node, "_heed", heard.append)
+        box = Outbox(transport, "mesh", words.append)
+        box.offer(report("kim"))
+        assert until(lambda: any("no Meshtastic node answers" in line for line in words)), words
+        assert heard
 
     def arrived() -> bool:
         box.offer(report("kim"))

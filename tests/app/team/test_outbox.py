@@ -66,6 +66,7 @@ def test_every_report_goes_out_when_the_line_is_quick(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("patient")
 def test_a_slow_line_sends_the_newest_and_counts_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outbox, "FRESH_S", 0.05)
     line = Recorded()
@@ -146,6 +147,7 @@ def test_a_position_is_known_until_it_is_older_than_an_estimate_can_be() -> None
     assert (settled.status, settled.place.sd_m, settled.last_place) == ("tracking", PLACE.sd_m, None)
 
 
+@pytest.mark.usefixtures("patient")
 def test_a_heartbeat_repeats_the_last_report(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outbox, "HEARTBEAT_S", 0.05)
     line = Recorded()
@@ -204,13 +206,8 @@ def test_an_event_of_cursor_on_target() -> None:
     assert times[0] == times[1] is not None
     point = top.find("point")
     assert point is not None
-    assert point.attrib == {
-        "lat": "48.20000000",
-        "lon": "16.37000000",
-        "hae": "9999999.0",
-        "ce": "0.32",
-        "le": "9999999.0",
-    }
+    expected = {"lat": "48.20000000", "lon": "16.37000000", "hae": "9999999.0", "ce": "0.32", "le": "9999999.0"}
+    assert point.attrib == expected
     group = top.find("detail/__group")
     assert group is not None
     assert group.attrib == {"name": "Red", "role": "Team Member"}

@@ -29,7 +29,7 @@ from team.team_broker import Broker, Certificates, needs_broker
 from team.team_reports import report
 from waiting import PATIENCE_S, ends, until
 
-pytestmark = pytest.mark.usefixtures("quick")
+pytestmark = pytest.mark.usefixtures("quick", "patient")
 
 
 class Ear:
@@ -69,7 +69,6 @@ def listening(url: str) -> Iterator[Ear]:
 
 
 @needs_broker
-@pytest.mark.usefixtures("patient")
 def test_a_broker_that_dies_and_returns_loses_no_later_report(tmp_path: Path) -> None:
     words: list[str] = []
     with Broker(tmp_path) as broker, listening(broker.url) as feed:
@@ -131,7 +130,6 @@ def test_a_tracker_that_vanishes_leaves_its_last_will_and_its_last_place(tmp_pat
 
 
 @needs_broker
-@pytest.mark.usefixtures("patient")
 def test_a_team_of_twenty_is_followed(tmp_path: Path) -> None:
     with Broker(tmp_path) as broker, listening(broker.url) as feed:
         boxes = [box_to(broker.url, name=f"n{k:02d}", run=f"{k:08x}") for k in range(20)]

@@ -42,6 +42,7 @@ def test_record_sets_the_device_up_and_keeps_every_byte(
         measured.append(chunk.data)
         return device.output == PROJECT and len(MtxReader().feed_batch(b"".join(measured)).counter) > 20
 
+    monkeypatch.setattr("echostep_app.xsens.setup.TIMEOUT_S", 10.0)  # the device shares this process
     interrupt_when(has_measured, monkeypatch)
     with on_a_terminal(device) as mtx, mute_port() as board:
         done = echostep("record", "--board", board, "--mtx", mtx, "--out", tmp_path / "r.mcap", "--seconds", PATIENCE_S)

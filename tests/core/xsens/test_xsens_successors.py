@@ -62,7 +62,8 @@ def test_product_codes() -> None:
 
 
 @pytest.mark.long
-def test_the_doctor_configures_and_names_an_mti_on_a_port() -> None:
+def test_the_doctor_configures_and_names_an_mti_on_a_port(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("echostep_app.xsens.setup.TIMEOUT_S", 10.0)  # the device shares this process
     device = MtiDevice(MTI_630)
     with on_a_terminal(device) as mtx, python_board() as board:
         done = echostep("doctor", "--board", board, "--mtx", mtx, "--seconds", 4)

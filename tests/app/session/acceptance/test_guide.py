@@ -26,13 +26,15 @@ def taps_of(typed: str) -> tuple[list[Tap], list[str], Guide]:
     said: list[str] = []
     guide = Guide(corridor("20x2"), 1, io.StringIO(typed), said.append, {"source": "live"})
     taps: list[Tap] = []
+    end = "No more lines can be typed: what was tapped counts; Ctrl-C ends."
 
     def is_read() -> bool:
+        is_over = end in said  # then the taps are there
         for tap in map(parse_tap, guide.pop()):
             assert tap is not None
             assert 0 < tap.t_ns <= now_ns()
             taps.append(Tap(tap.point, tap.standing))
-        return "No more lines can be typed: what was tapped counts; Ctrl-C ends." in said
+        return is_over
 
     assert until(is_read)
     said.pop()

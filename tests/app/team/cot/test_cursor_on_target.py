@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -112,9 +113,9 @@ class Server:
                 self._listen(caller)
 
     def _listen(self, caller: socket.socket) -> None:
-        caller.settimeout(0.1)
         rest = b""
         caller.sendall(self._greeting)
+        caller.settimeout(0.1)
         while not self._ended.is_set():
             try:
                 got = caller.recv(65_536)
@@ -210,7 +211,8 @@ def test_a_demo_is_published_and_commanded(tmp_path: Path) -> None:
             assert "tracking goes on" in demo.stdout
             box.offer(report("bob", status="lost"))
             assert until(lambda: box.counts.sent == 2)
-            time.sleep(1.0)
+            (operation,) = tmp_path.glob("operation*.mcap")
+            assert until(lambda: b'"presence":"ended"' in operation.read_bytes())
         finally:
             commander.send_signal(2)
             out, err = commander.communicate(timeout=PATIENCE_S)
@@ -231,21 +233,15 @@ def _replays_alike(folder: Path) -> None:
     plan.write_text(
         json.dumps(json.loads(PLAN.read_text()) | {"georeference": {"origin": [16.37, 48.2], "rotation_deg": 20.0}})
     )
-    replay = [*ECHOSTEP, "replay", str(folder / "demo/walk.mcap"), "--headless", "--out"]
-    subprocess.run(
-        [*replay, str(folder / "quiet"), "--plan", str(PLAN)], capture_output=True, timeout=3.0 * PATIENCE_S, check=True
-    )
+    replay = partial(subprocess.run, capture_output=True, timeout=3.0 * PATIENCE_S, check=True)
+    command = [*ECHOSTEP, "replay", folder / "demo/walk.mcap", "--headless", "--out"]
+    replay([*command, folder / "quiet", "--plan", PLAN])
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
         ear.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
         ear.bind(("127.0.0.1", 0))
         ear.settimeout(PATIENCE_S)
         more = ["--publish", f"cot+udp://127.0.0.1:{ear.getsockname()[1]}", "--name", "anna"]
-        subprocess.run(
-            [*replay, str(folder / "loud"), "--plan", str(plan), *more],
-            capture_output=True,
-            timeout=3.0 * PATIENCE_S,
-            check=True,
-        )
+        replay([*command, folder / "loud", "--plan", plan, *more])
         top = ElementTree.fromstring(ear.recv(65_536))
     tracks = {name: (folder / name / "track.csv").read_bytes() for name in ("demo", "quiet", "loud")}
     assert tracks["demo"] == tracks["quiet"] == tracks["loud"]
@@ -281,8 +277,5 @@ def test_a_mistake_is_named_in_one_line(tmp_path: Path, arguments: list[object],
 
 
 def test_the_presence_is_a_report_of_its_own() -> None:
-    assert json.loads(encode(Presence(1, "0123abcd", "online"))) == {
-        "echostep_presence": 1,
-        "run": "0123abcd",
-        "presence": "online",
-    }
+    expected = {"echostep_presence": 1, "run": "0123abcd", "presence": "online"}
+    assert json.loads(encode(Presence(1, "0123abcd", "online"))) == expected

@@ -9,7 +9,9 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from hypothesis import given
@@ -199,7 +201,10 @@ def test_a_commander_sees_those_who_are_on_a_drawing(tmp_path: Path, monkeypatch
 def test_a_hostile_drawing_ends_the_command_in_a_sentence_and_leaves_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(wearer_plan, "WAIT_S", 1.0)
+    looked = Mock(wraps=checked_drawing)
+    monkeypatch.setattr(wearer_plan, "checked_drawing", looked)
+    over = SimpleNamespace(monotonic=lambda: wearer_plan.WAIT_S * looked.call_count)  # once one was looked at
+    monkeypatch.setattr(wearer_plan, "time", over)
     with Broker(tmp_path) as broker:
         keep(broker, drawing(walls=[[0, 0, "x", 0]]))
         arguments = ("--plan", "wearer:anna", "--publish", broker.url, "--name", "bo", "--team", "red", "--out", "out")
