@@ -16,6 +16,8 @@ from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers.formats import import_plan, open_plan
 from echostep_app.plan.importers.osm.elements import levels_of
 from echostep_app.plan.importers.report import ImportReport
+from plan.habits import osm_house
+from plan.habits.house import Move
 
 LON, LAT = 8.85, 53.11
 EAST, NORTH = 1 / 66_945.0, 1 / 111_300.0  # degrees a metre there
@@ -196,3 +198,18 @@ def test_rooms_without_a_level_are_told(tmp_path: Path) -> None:
     assert report.left_out["room without level"] == 1
     assert report.left_out["indoor=area without level"] == 1
     assert report.doubts[0].startswith("1 room has no level and was left out (way 60)")
+
+
+@pytest.mark.parametrize("kind", ["osm", "geojson"])
+@pytest.mark.parametrize(("tags", "level"), [({}, 0), ({"min_level": "1"}, 1), ({"max_level": "-1"}, -1)])
+def test_an_outlines_door_is_on_the_ground(tmp_path: Path, kind: str, tags: dict[str, str], level: int) -> None:
+    corners = [(0, 0), (9, 0), (9, 9), (-1, -1), (4, -1), (10, -1), (10, 10), (-1, 10)]
+    rows = [node(k, x, y, **({"entrance": "main"} if k == 5 else {})) for k, (x, y) in enumerate(corners, 1)]
+    rows += [way(20, [1, 2, 3, 1], indoor="room", level="-1-2"), way(21, [4, 5, 6, 7, 8, 4], building="yes", **tags)]
+    report = ImportReport()
+    plan = import_plan(osm_house.write(tmp_path, kind, rows, Move()), report=report)
+    assert [one.name for one in plan.levels if one.doors] == [f"level {level}"]
+    assert "on the ground (node" in report.doubts[0]
+    rows.append(way(22, [1, 5, 2, 1], indoor="room", level="2"))
+    doors = [one.doors for one in import_plan(osm_house.write(tmp_path, kind, rows, Move())).levels]
+    assert [len(on) for on in doors] == [0, 0, 0, 1]

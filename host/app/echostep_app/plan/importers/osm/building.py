@@ -34,18 +34,18 @@ OFF_M = 0.02  # of a straight wall's nodes from its line: twice OpenStreetMap's 
 ON_M = 0.1  # greatest distance of a door's node from its wall; assumed
 MOST_LEVELS = 200
 UNITS_M = {"": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "'": 0.3048, '"': 0.0254}
-WIDTH = re.compile(
-    r"""(\d+(?:[.,]\d+)?) ?(m|cm|mm|ft|'|"|)(?: ?(\d+)")?"""
-)  # as 0.9, 90 cm, 3'6" [OpenStreetMap wiki, Map features/Units]
+# As 0.9, 90 cm, 3'6" [OpenStreetMap wiki, Map features/Units]
+WIDTH = re.compile(r"""(\d+(?:[.,]\d+)?) ?(m|cm|mm|ft|'|"|)(?: ?(\d+)")?""")
 
 
 @dataclass(slots=True)
 class OsmSite:
-    """Levels by their OSM level numbers, these numbers in order, and the levels of the walls through each node."""
+    """Levels by their OSM level numbers, these in order, and the levels of the indoor elements and of the outlines through each node."""
 
     drawn_levels: dict[float, DrawnLevel]
     order: list[float]
     levels_at: dict[int, set[float]] = field(default_factory=dict)
+    outside: dict[int, list[float]] = field(default_factory=dict)
 
     def on(self, levels: list[float]) -> Iterator[DrawnLevel]:
         """The levels with these OSM numbers."""
@@ -138,6 +138,7 @@ def _outlines(site: OsmSite, elements: Elements) -> None:
                 if _within(level, tags.get("building:min_level") or tags.get("min_level"), tags.get("max_level"))
             ]
             _wall(site, elements, nodes, own, tags)
+            site.outside |= dict.fromkeys(nodes, own)
 
 
 def _within(level: float, least: str | None, most: str | None) -> bool:
@@ -155,6 +156,8 @@ def _spaces(site: OsmSite, elements: Elements) -> None:
         closed = nodes[0] == nodes[-1] and len(nodes) > 3
         area = Polygon(line) if closed and line is not None else None
         way = _way(tags)
+        for node in nodes if kind != "no" else ():
+            site.levels_at.setdefault(node, set()).update(levels)
         if kind in ("room", "wall"):
             _wall(site, elements, nodes, levels, tags)
         if kind in ("column", "pillar") and area is not None:
@@ -175,27 +178,26 @@ def _wall(site: OsmSite, elements: Elements, nodes: list[int], levels: list[floa
     if line is None:
         return
     glass = "glass" in (tags.get("material"), tags.get("wall"))
-    for level in levels:
-        if level in site.drawn_levels:
-            (site.drawn_levels[level].windows if glass else site.drawn_levels[level].walls).append(line)
-            for node in nodes:
-                site.levels_at.setdefault(node, set()).add(level)
+    for drawn in site.on(levels):
+        (drawn.windows if glass else drawn.walls).append(line)
 
 
 def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
-    """Add a door for each node with a door tag, on each of its levels where it lies on a wall; without a level, on those of the walls through it."""
+    """Add a door for each node with a door tag, on each of its levels where it lies on a wall."""
     walls = {
         level: merge_collinear(pieces_of([*drawn.walls, *drawn.windows]), OFF_M)
         for level, drawn in site.drawn_levels.items()
     }
     trees = {level: shapely.STRtree(shapely.linestrings(rows.reshape(-1, 2, 2))) for level, rows in walls.items()}
     lines: dict[float, set[tuple[float, ...]]] = {level: set() for level in walls}
-    lost, odd = [], []
+    lost, odd, ground = [], [], []
     for node, tags in elements.nodes():
         if not _is_door(tags):
             continue
         odd += [f"node {node}: width={tags['width'][:20]}"] if "width" in tags and not _metres(tags, 0.0) else []
-        own = levels_of(tags, f"node {node}") or sorted(site.levels_at.get(elements.through(node), site.order))
+        own, through = levels_of(tags, f"node {node}"), elements.through(node)
+        ground += [f"node {node}"] if not own and through in site.outside else []
+        own = own or _levels_at(site, through)
         wide_m, at_m = _metres(tags, DOOR_M), elements.at_m[node]
         gaps = {level: _gap(walls[level], trees[level], at_m, wide_m) for level in own if level in walls}
         lost += [] if any(gaps.values()) else [f"node {node}"]
@@ -204,6 +206,8 @@ def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
                 lines[level].add(gap)
                 name = (tags.get("name") or tags.get("ref") or "")[:80]
                 site.drawn_levels[level].doors.append(Door(gap, _state(tags), name))
+    if ground:
+        report.doubt(f"doors without level on outlines are on the ground ({', '.join(ground[:5])}): tag level=*")
     if odd:
         report.doubt(
             f"{len(odd)} doors were taken as {DOOR_M:g} m wide ({', '.join(odd[:3])}): write it in metres, as width=0.9, or with its unit"
@@ -213,6 +217,12 @@ def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
         report.doubt(
             f"doors on no wall were left out ({', '.join(lost[:5])}{', ...' * (len(lost) > 5)}): corridors and areas have no walls"
         )
+
+
+def _levels_at(site: OsmSite, node: int) -> list[float]:
+    """Levels of a door without a level: of the indoor elements through its node; on an outline only the lowest from 0 up."""
+    levels = sorted(site.levels_at.get(node) or site.outside.get(node) or site.order)
+    return [min(levels, key=lambda level: (level < 0, abs(level)))] if node in site.outside else levels
 
 
 def _gap(

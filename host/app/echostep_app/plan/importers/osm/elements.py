@@ -184,9 +184,8 @@ def _json_number(text: str | None) -> Any:
 def _add(elements: Elements, row: Any) -> None:
     """Check an element (as in Overpass JSON) and add it; relations other than multipolygons are counted."""
     row = typed(row, "elements", dict)
-    if (
-        row.get("action") == "delete" or row.get("visible") is False
-    ):  # in JOSM before the upload, or in an extract with history
+    # In JOSM before the upload, or in an extract with history
+    if row.get("action") == "delete" or row.get("visible") is False:
         return
     kind, key = row.get("type"), row.get("id")
     if isinstance(key, bool) or not isinstance(key, int):
