@@ -200,16 +200,20 @@ def test_rooms_without_a_level_are_told(tmp_path: Path) -> None:
     assert report.doubts[0].startswith("1 room has no level and was left out (way 60)")
 
 
+ROOFS = [({"building": kind}, None) for kind in ("roof", "carport", "canopy")]  # without walls, so without doors
+
+
 @pytest.mark.parametrize("kind", ["osm", "geojson"])
-@pytest.mark.parametrize(("tags", "level"), [({}, 0), ({"min_level": "1"}, 1), ({"max_level": "-1"}, -1)])
-def test_an_outlines_door_is_on_the_ground(tmp_path: Path, kind: str, tags: dict[str, str], level: int) -> None:
+@pytest.mark.parametrize(("tags", "level"), [({}, 0), ({"min_level": "1"}, 1), ({"max_level": "-1"}, -1), *ROOFS])
+def test_an_outlines_door_is_on_the_ground(tmp_path: Path, kind: str, tags: dict[str, str], level: int | None) -> None:
     corners = [(0, 0), (9, 0), (9, 9), (-1, -1), (4, -1), (10, -1), (10, 10), (-1, 10)]
     rows = [node(k, x, y, **({"entrance": "main"} if k == 5 else {})) for k, (x, y) in enumerate(corners, 1)]
-    rows += [way(20, [1, 2, 3, 1], indoor="room", level="-1-2"), way(21, [4, 5, 6, 7, 8, 4], building="yes", **tags)]
+    tags = {"building": "yes"} | tags
+    rows += [way(20, [1, 2, 3, 1], indoor="room", level="-1-2"), way(21, [4, 5, 6, 7, 8, 4], **tags)]
     report = ImportReport()
     plan = import_plan(osm_house.write(tmp_path, kind, rows, Move()), report=report)
-    assert [one.name for one in plan.levels if one.doors] == [f"level {level}"]
-    assert "on the ground (node" in report.doubts[0]
+    assert [one.name for one in plan.levels if one.doors] == [f"level {level}"] * (level is not None)
+    assert ("on the ground (node" in report.doubts[0]) == (level is not None)
     rows.append(way(22, [1, 5, 2, 1], indoor="room", level="2"))
     doors = [one.doors for one in import_plan(osm_house.write(tmp_path, kind, rows, Move())).levels]
     assert [len(on) for on in doors] == [0, 0, 0, 1]

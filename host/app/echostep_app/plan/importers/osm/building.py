@@ -33,6 +33,7 @@ DOOR_M, STAIRS_M, LIFT_M = 0.9, 1.5, 1.8  # widths where the map states none: us
 OFF_M = 0.02  # of a straight wall's nodes from its line: twice OpenStreetMap's resolution
 ON_M = 0.1  # greatest distance of a door's node from its wall; assumed
 MOST_LEVELS = 200
+WALL_LESS = ("no", "roof", "carport", "canopy")  # values of building=*: roofs on posts
 UNITS_M = {"": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "'": 0.3048, '"': 0.0254}
 # As 0.9, 90 cm, 3'6" [OpenStreetMap wiki, Map features/Units]
 WIDTH = re.compile(r"""(\d+(?:[.,]\d+)?) ?(m|cm|mm|ft|'|"|)(?: ?(\d+)")?""")
@@ -92,7 +93,7 @@ def _without_level(elements: Elements, report: ImportReport) -> None:
     for where, _, tags in elements.lines():
         indoor = tags.get("indoor", "no")
         kind = "room" if indoor == "room" else f"indoor={indoor[:20]}" if indoor != "no" else ""
-        if (kind or _way(tags)) and not levels_of(tags, where) and tags.get("building", "no") == "no":
+        if (kind or _way(tags)) and not levels_of(tags, where) and tags.get("building", "no") in WALL_LESS:
             lost.setdefault(kind or str(_way(tags)), []).append(where)
     for kind, names in lost.items():
         report.leave_out(f"{kind} without level", len(names))
@@ -107,7 +108,7 @@ def _other(elements: Elements, report: ImportReport) -> None:
     """Report elements with tags that plans do not have: shops, furniture, footpaths, groups."""
     walls = ("room", "wall", "column", "pillar", "area", "corridor", "level")
     for _, _, tags in elements.lines():
-        if tags and _way(tags) is None and tags.get("building", "no") == "no" and tags.get("indoor") not in walls:
+        if tags and _way(tags) is None and tags.get("building", "no") in WALL_LESS and tags.get("indoor") not in walls:
             report.leave_out("way that is no wall, room, corridor or stairs")
     for _, tags in elements.nodes():
         if _way(tags) is None and not _is_door(tags):
@@ -131,12 +132,9 @@ def _origin(elements: Elements, path: Path) -> Georeference:
 def _outlines(site: OsmSite, elements: Elements) -> None:
     """Add the outlines of buildings as walls, on each of their levels."""
     for where, nodes, tags in elements.lines():
-        if tags.get("building", "no") != "no":
-            own = levels_of(tags, where) or [
-                level
-                for level in site.order
-                if _within(level, tags.get("building:min_level") or tags.get("min_level"), tags.get("max_level"))
-            ]
+        if tags.get("building", "no") not in WALL_LESS:
+            least = tags.get("building:min_level") or tags.get("min_level")
+            own = levels_of(tags, where) or [k for k in site.order if _within(k, least, tags.get("max_level"))]
             _wall(site, elements, nodes, own, tags)
             site.outside |= dict.fromkeys(nodes, own)
 
@@ -214,9 +212,7 @@ def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
         )
     if lost:
         report.leave_out("door on no wall", len(lost))
-        report.doubt(
-            f"doors on no wall were left out ({', '.join(lost[:5])}{', ...' * (len(lost) > 5)}): corridors and areas have no walls"
-        )
+        report.doubt(f"doors on no wall were left out ({', '.join(lost[:5])}): corridors and areas have no walls")
 
 
 def _levels_at(site: OsmSite, node: int) -> list[float]:
