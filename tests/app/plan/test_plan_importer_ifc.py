@@ -230,6 +230,13 @@ def imported(model: Model, folder: Path) -> tuple[Plan, ImportReport]:
     return import_plan(folder / "a.ifc", report=report), report
 
 
+def walled() -> tuple[Model, Any]:
+    """A storey with a wall of 8 m."""
+    model = Model()
+    model.storey("Ground", 0.0)
+    return model, model.box("IfcWall", (0, 0, 0), (8, 0.2, 2.6))
+
+
 def without_shape(model: Model, kind: str, **about: Any) -> Any:
     """An element without a representation."""
     from ifcopenshell.api import root
@@ -274,9 +281,7 @@ def test_a_door_without_opening_has_its_placement(tmp_path: Path) -> None:
 
 
 def test_what_has_no_shape_is_counted_and_filled_openings_place_windows(tmp_path: Path) -> None:
-    model = Model()
-    model.storey("Ground", 0.0)
-    wall = model.box("IfcWall", (0, 0, 0), (8, 0.2, 2.6))
+    model, wall = walled()
     model.fill(model.cut(wall, (2, -0.1, 0.8), (1.5, 0.4, 1.2)), without_shape(model, "IfcWindow"))
     for kind in ("IfcDoor", "IfcWindow", "IfcWall"):
         without_shape(model, kind)
@@ -311,13 +316,11 @@ def test_reference_levels_are_no_storeys(tmp_path: Path) -> None:
 
 def test_names_of_storeys_and_rooms(tmp_path: Path) -> None:
     """Of a storey the name goes before the long name, of a room the other way round."""
-    model = Model()
-    storey = model.storey("Ground floor", 0.0)
-    storey.LongName = "ACID00000001"
-    model.box("IfcWall", (0, 0, 0), (8, 0.2, 2.6))
+    model, _ = walled()
+    model.file.by_type("IfcBuildingStorey")[0].LongName = "ACID00000001"
     model.box("IfcSpace", (1, 1, 0), (2, 2, 2.6), name="1.01").LongName = "Kitchen"
     plan, _ = imported(model, tmp_path)
-    assert plan.levels[0].name == "Ground floor"
+    assert plan.levels[0].name == "Ground"
     assert [room.name for room in plan.levels[0].rooms] == ["Kitchen"]
 
 
@@ -351,14 +354,9 @@ def concrete_kinds(kind: str) -> list[str]:
 @pytest.mark.slow
 def test_every_class_of_elements_is_used_or_counted(tmp_path: Path) -> None:
     """One element of each class of IFC4, all far above the storeys; those that are no bodies of a building, as openings, are not counted."""
-    model = Model()
-    ground = model.storey("Ground", 0.0)
-    model.contain(ground, model.box("IfcWall", (0, 0, 0), (8, 0.2, 2.6)))
-    silent = {
-        kind
-        for parent in ("IfcFeatureElement", "IfcPort", "IfcVirtualElement", "IfcElementComponent")
-        for kind in concrete_kinds(parent)
-    }
+    model, _ = walled()
+    parents = ("IfcFeatureElement", "IfcPort", "IfcVirtualElement", "IfcElementComponent")
+    silent = {kind for parent in parents for kind in concrete_kinds(parent)}
     kinds = sorted({*concrete_kinds("IfcElement"), "IfcSpace"} - silent)
     for kind in kinds:
         model.box(kind, (0, 0, 50.0), (2, 0.2, 2.0))
@@ -380,3 +378,12 @@ def test_what_lies_on_one_level_alone_is_counted(tmp_path: Path) -> None:
     plan, report = imported(model, tmp_path)
     assert [connector.kind for connector in plan.connectors] == ["lift"]
     assert report.left_out == {"stairs on one level only": 1, "IfcTransportElement that is no lift": 1}
+
+
+@pytest.mark.parametrize("parts", [(-33, 51, 30), (-33, -51, 30), (-33, 51, 30, 0), (-33, 50, 89, 1000000)])
+def test_an_angle_has_the_sign_of_its_first_part(tmp_path: Path, parts: tuple[int, ...]) -> None:
+    model, _ = walled()
+    model.site.RefLatitude, model.site.RefLongitude = parts, (0, -6, 36)
+    place = imported(model, tmp_path)[0].georeference
+    assert place is not None
+    assert (place.latitude_deg, place.longitude_deg) == pytest.approx((-33.858333, -0.11))

@@ -180,5 +180,6 @@ def _place_on_earth(model: Any, shapes: Shapes, report: ImportReport) -> Georefe
 
 
 def _degrees(parts: Any) -> float:
-    """Degrees from degrees, minutes, seconds and millionths of a second."""
-    return float(sum(part / unit for part, unit in zip(parts, (1, 60, 3600, 3600e6), strict=False)))
+    """Degrees from degrees, minutes, seconds and millionths of a second; all have the sign of the first that is not 0."""
+    size = sum(abs(part) / unit for part, unit in zip(parts, (1, 60, 3600, 3600e6), strict=False))
+    return math.copysign(size, next(filter(None, parts), 0))
