@@ -17,13 +17,15 @@ from echostep.plan import Plan
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.report import ImportReport
 
+Schema = Literal["IFC2X3", "IFC4", "IFC4X3"]
+Triple = tuple[float, float, float]
 ifcopenshell = pytest.importorskip("ifcopenshell", reason="ifcopenshell is not installed: pip install 'echostep[ifc]'")
 
 
 class Model:
     """A building in millimetres."""
 
-    def __init__(self, schema: Literal["IFC2X3", "IFC4", "IFC4X3"] = "IFC4") -> None:
+    def __init__(self, schema: Schema = "IFC4") -> None:
         from ifcopenshell.api import aggregate, context, owner, project, root, unit
 
         self.file: Any = project.create_file(version=schema)
@@ -50,14 +52,7 @@ class Model:
         self._put(storey, 0, 0, z_m, 0)
         return storey
 
-    def box(
-        self,
-        kind: str,
-        at: tuple[float, float, float],
-        size: tuple[float, float, float],
-        turn: float = 0.0,
-        name: str = "",
-    ) -> Any:
+    def box(self, kind: str, at: Triple, size: Triple, turn: float = 0.0, name: str = "") -> Any:
         """An element of length, thickness and height in metres; its corner is at `at`."""
         from ifcopenshell.api import geometry, root
 
@@ -69,7 +64,7 @@ class Model:
         self._put(element, *at, turn)
         return element
 
-    def cut(self, wall: Any, at: tuple[float, float, float], size: tuple[float, float, float]) -> Any:
+    def cut(self, wall: Any, at: Triple, size: Triple) -> Any:
         opening = self.box("IfcOpeningElement", at, size)
         self.add(wall, opening)
         return opening
@@ -132,11 +127,8 @@ def test_storeys_and_their_walls(house: Plan) -> None:
     assert np.hypot(*(upper[:, 2:] - upper[:, :2]).T).sum() == pytest.approx(2 * (6 + 4) + 2 * (5.4 + 3.4), abs=0.02)
     ground = house.levels[0].walls
     assert (upper.min(), upper.max()) == (0.0, 6.0)
-    inside_door = (
-        (ground[:, [1, 3]].max(axis=1) < 0.31)
-        & (ground[:, [0, 2]].min(axis=1) > 1.99)
-        & (ground[:, [0, 2]].max(axis=1) < 3.01)
-    )
+    x, y = ground[:, ::2], ground[:, 1::2]
+    inside_door = (y.max(axis=1) < 0.31) & (x.min(axis=1) > 1.99) & (x.max(axis=1) < 3.01)
     assert all(x0 == x1 for x0, _, x1, _ in ground[inside_door])  # only its jambs
 
 
@@ -161,9 +153,7 @@ def test_its_place_on_earth(house: Plan) -> None:
 PLACE, TURN = (489_000.0, 5_884_000.0), math.radians(30.0)  # in UTM zone 32: a degree of longitude west of its middle
 
 
-def mapped(
-    schema: Literal["IFC2X3", "IFC4"], name: str, unit_m: float = 1.0, at: tuple[float, float] = (0.0, 0.0)
-) -> Model:
+def mapped(schema: Schema, name: str, unit_m: float = 1.0, at: tuple[float, float] = (0.0, 0.0)) -> Model:
     """A wall at a place of the model, whose origin is `PLACE` on the map."""
     from ifcopenshell.api import georeference, pset
 
@@ -185,9 +175,7 @@ def mapped(
 @pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
 @pytest.mark.parametrize("unit_m", [1.0, 0.001])
 @pytest.mark.parametrize("at", [(0.0, 0.0), (30_000.0, 0.0)])
-def test_its_place_on_a_map(
-    tmp_path: Path, schema: Literal["IFC2X3", "IFC4"], unit_m: float, at: tuple[float, float]
-) -> None:
+def test_its_place_on_a_map(tmp_path: Path, schema: Schema, unit_m: float, at: tuple[float, float]) -> None:
     """Eastings in metres or in the model's millimetres, without a stated unit; grid north is not north."""
     plan, report = imported(mapped(schema, "EPSG:25832", unit_m, at), tmp_path)
     assert plan.georeference is not None
@@ -249,16 +237,14 @@ def without_shape(model: Model, kind: str, **about: Any) -> Any:
 
 @pytest.mark.parametrize("schema", ["IFC2X3", "IFC4", "IFC4X3"])
 @pytest.mark.parametrize("leaf", ["drawn open", "without a shape", "closed"])
-def test_a_door_lies_in_its_opening(tmp_path: Path, leaf: str, schema: Literal["IFC2X3", "IFC4", "IFC4X3"]) -> None:
+def test_a_door_lies_in_its_opening(tmp_path: Path, leaf: str, schema: Schema) -> None:
     """The wall x 4.0 to 4.2 has an opening y 3 to 5, which reaches out of the wall on one side."""
     model = Model(schema)
     model.storey("Ground", 0.0)
     wall = model.box("IfcWall", (4.2, 0, 0), (8, 0.2, 2.6), math.pi / 2)
     opening = model.cut(wall, (4.0, 3.0, 0), (0.5, 2.0, 2.1))
-    if leaf == "without a shape":
-        door = without_shape(model, "IfcDoor")
-    else:
-        door = model.box("IfcDoor", (4.05, 3.0, 0), (1.0, 0.05, 2.1) if leaf == "drawn open" else (0.05, 2.0, 2.1))
+    sizes: dict[str, Triple] = {"drawn open": (1.0, 0.05, 2.1), "closed": (0.05, 2.0, 2.1)}
+    door = model.box("IfcDoor", (4.05, 3.0, 0), sizes[leaf]) if leaf in sizes else without_shape(model, "IfcDoor")
     model.fill(opening, door)
     plan, report = imported(model, tmp_path)
     assert len(plan.levels[0].doors) == 1
@@ -300,10 +286,8 @@ def test_reference_levels_are_no_storeys(tmp_path: Path) -> None:
     """Levels without walls, doors and rooms close to another one; two half storeys with walls stay, and are told."""
     model = Model()
     walls = [model.box("IfcWall", (0, 0, z), (8, 0.2, 2.0)) for z in (0.0, 2.9, 4.2)]
-    named = {
-        name: model.storey(name, z)
-        for name, z in (("Slab 0", -0.36), ("Ground", 0.0), ("Slab 1", 2.6), ("First", 2.9), ("Half", 4.2))
-    }
+    heights = {"Slab 0": -0.36, "Ground": 0.0, "Slab 1": 2.6, "First": 2.9, "Half": 4.2}
+    named = {name: model.storey(name, z) for name, z in heights.items()}
     for name, wall in zip(("Ground", "First", "Half"), walls, strict=True):
         model.contain(named[name], wall)
     plan, report = imported(model, tmp_path)
@@ -331,12 +315,8 @@ def test_a_packed_model(tmp_path: Path) -> None:
     assert import_plan(tmp_path / "house.ifczip").digest == import_plan(house).digest
     with zipfile.ZipFile(tmp_path / "none.ifczip", "w") as packed:
         packed.writestr("readme.txt", "x")
-    for name, raw, named in (
-        ("none.ifczip", None, "no .ifc file in it"),
-        ("bad.ifczip", b"PK\x03\x04x", "not a zip file"),
-    ):
-        if raw is not None:
-            (tmp_path / name).write_bytes(raw)
+    (tmp_path / "bad.ifczip").write_bytes(b"PK\x03\x04x")
+    for name, named in (("none.ifczip", "no .ifc file in it"), ("bad.ifczip", "not a zip file")):
         with pytest.raises(EchostepError, match=named):
             import_plan(tmp_path / name)
 
@@ -387,3 +367,13 @@ def test_an_angle_has_the_sign_of_its_first_part(tmp_path: Path, parts: tuple[in
     place = imported(model, tmp_path)[0].georeference
     assert place is not None
     assert (place.latitude_deg, place.longitude_deg) == pytest.approx((-33.858333, -0.11))
+
+
+@pytest.mark.parametrize(
+    ("field", "value"), [("PredefinedType", "GFA"), ("PredefinedType", "EXTERNAL"), ("ObjectType", "GFA")]
+)
+def test_gross_areas_and_outdoor_spaces_are_no_rooms(tmp_path: Path, field: str, value: str) -> None:
+    model, _ = walled()
+    setattr(model.box("IfcSpace", (0, 0, 0), (8, 6, 2.6)), field, value)
+    plan, report = imported(model, tmp_path)
+    assert (plan.levels[0].rooms, report.left_out) == ((), {"IfcSpace that is no room": 1})

@@ -26,7 +26,7 @@ from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, 
 from echostep_app.plan.importers.ifc.bodies import Shapes, SolidBody
 from echostep_app.plan.importers.ifc.doors import placed_door
 from echostep_app.plan.importers.ifc.map_conversion import map_georeference
-from echostep_app.plan.importers.ifc.model import open_model, storeys_of
+from echostep_app.plan.importers.ifc.model import open_model, standing, storeys_of
 from echostep_app.plan.importers.report import ImportReport
 
 NO_STOREY = "at the height of no storey"
@@ -36,7 +36,6 @@ WALLS = ("IfcWall", "IfcColumn", "IfcCurtainWall", "IfcPlate", "IfcMember")
 CONNECTOR_KINDS: dict[str, ConnectorKind] = {
     "IfcStair": "stairs", "IfcStairFlight": "stairs", "IfcRamp": "ramp", "IfcRampFlight": "ramp", "IfcTransportElement": "lift",
 }  # fmt: skip
-LIFTS = ("ELEVATOR", "None", "NOTDEFINED")
 SEEN = (*WALLS, *CONNECTOR_KINDS, "IfcWindow", "IfcSpace")
 
 
@@ -47,9 +46,8 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
     drawn_levels = [DrawnLevel(storey.name, storey.height_m) for storey in storeys]
     shapes = Shapes(path)
     shapes.find_origin(model.by_type("IfcWall") or model.by_type("IfcElement"))
-    elements = [element for kind in SEEN for element in model.by_type(kind)]
     count = 0
-    for body in shapes.bodies(elements, report):
+    for body in shapes.bodies(standing(model, SEEN, report), report):
         count += 1
         if why := _place(drawn_levels, body):
             report.leave_out(f"{body.element.is_a()} {why}")
@@ -132,8 +130,6 @@ def _place(drawn_levels: list[DrawnLevel], body: SolidBody) -> str:
 
 def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorKind, name: str) -> str:
     """As `_place`, for stairs, a ramp or a lift: on all levels between its lowest and its highest corner."""
-    if kind == "lift" and str(getattr(body.element, "PredefinedType", "ELEVATOR")) not in LIFTS:
-        return "that is no lift"
     low, high = body.z_m
     passed = [i for i, drawn in enumerate(drawn_levels) if low - 0.5 <= drawn.height_m <= high + 0.5]
     for i in passed:
@@ -149,11 +145,8 @@ def _georeference(model: Any) -> Georeference | None:
     lat, lon = (_degrees(parts) for parts in (sites[0].RefLatitude, sites[0].RefLongitude))
     if not (abs(lat) <= 90.0 and abs(lon) <= 180.0) or (lat, lon) == (0.0, 0.0):
         return None
-    norths = [
-        c.TrueNorth.DirectionRatios
-        for c in model.by_type("IfcGeometricRepresentationContext", include_subtypes=False)
-        if c.TrueNorth
-    ]
+    contexts = model.by_type("IfcGeometricRepresentationContext", include_subtypes=False)
+    norths = [c.TrueNorth.DirectionRatios for c in contexts if c.TrueNorth]
     x, y = norths[0][:2] if norths else (0.0, 1.0)
     return Georeference(lon, lat, math.pi / 2 - math.atan2(y, x))
 
