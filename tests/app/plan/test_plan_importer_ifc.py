@@ -96,9 +96,8 @@ def write_house(folder: Path) -> Path:
     """6 m by 4 m, walls of 0.3 m, on two floors 3 m apart; a door in the south, a window in the north of the ground floor."""
     model = Model()
     model.site.RefLatitude, model.site.RefLongitude = (53, 6, 36), (8, 51, 0)
-    for i in range(2):
-        model.storey(f"Floor {i}", 3.0 * i)
-        z = 3.0 * i
+    for i, z in enumerate((0.0, 3.0)):
+        model.storey(f"Floor {i}", z)
         south = model.box("IfcWall", (0, 0, z), (6, 0.3, 2.8))
         north = model.box("IfcWall", (0, 3.7, z), (6, 0.3, 2.8))
         model.box("IfcWall", (0.3, 0.3, z), (3.4, 0.3, 2.8), math.pi / 2)
@@ -122,10 +121,9 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Plan:
 
 def test_storeys_and_their_walls(house: Plan) -> None:
     assert [(level.name, level.height_m) for level in house.levels] == [("Floor 0", 0.0), ("Floor 1", 3.0)]
-    upper = house.levels[1].walls
+    ground, upper = (level.walls for level in house.levels)
     assert len(upper) == 8
     assert np.hypot(*(upper[:, 2:] - upper[:, :2]).T).sum() == pytest.approx(2 * (6 + 4) + 2 * (5.4 + 3.4), abs=0.02)
-    ground = house.levels[0].walls
     assert (upper.min(), upper.max()) == (0.0, 6.0)
     x, y = ground[:, ::2], ground[:, 1::2]
     inside_door = (y.max(axis=1) < 0.31) & (x.min(axis=1) > 1.99) & (x.max(axis=1) < 3.01)
@@ -218,11 +216,11 @@ def imported(model: Model, folder: Path) -> tuple[Plan, ImportReport]:
     return import_plan(folder / "a.ifc", report=report), report
 
 
-def walled() -> tuple[Model, Any]:
-    """A storey with a wall of 8 m."""
+def walled(length_m: float = 8.0) -> tuple[Model, Any]:
+    """A storey with a wall."""
     model = Model()
     model.storey("Ground", 0.0)
-    return model, model.box("IfcWall", (0, 0, 0), (8, 0.2, 2.6))
+    return model, model.box("IfcWall", (0, 0, 0), (length_m, 0.2, 2.6))
 
 
 def without_shape(model: Model, kind: str, **about: Any) -> Any:
@@ -256,9 +254,7 @@ def test_a_door_lies_in_its_opening(tmp_path: Path, leaf: str, schema: Schema) -
 
 def test_a_door_without_opening_has_its_placement(tmp_path: Path) -> None:
     """A leaf drawn open, 0.9 m wide along the placement's x."""
-    model = Model()
-    model.storey("Ground", 0.0)
-    model.box("IfcWall", (0, 0, 0), (4, 0.2, 2.6))
+    model, _ = walled(4.0)
     model.box("IfcWall", (4.9, 0, 0), (4, 0.2, 2.6))
     door = model.box("IfcDoor", (4.0, 0.1, 0), (0.9, 0.9, 2.1))
     door.OverallWidth, door.OverallHeight = 900.0, 2100.0
@@ -285,11 +281,10 @@ def test_what_has_no_shape_is_counted_and_filled_openings_place_windows(tmp_path
 def test_reference_levels_are_no_storeys(tmp_path: Path) -> None:
     """Levels without walls, doors and rooms close to another one; two half storeys with walls stay, and are told."""
     model = Model()
-    walls = [model.box("IfcWall", (0, 0, z), (8, 0.2, 2.0)) for z in (0.0, 2.9, 4.2)]
     heights = {"Slab 0": -0.36, "Ground": 0.0, "Slab 1": 2.6, "First": 2.9, "Half": 4.2}
     named = {name: model.storey(name, z) for name, z in heights.items()}
-    for name, wall in zip(("Ground", "First", "Half"), walls, strict=True):
-        model.contain(named[name], wall)
+    for name in ("Ground", "First", "Half"):
+        model.contain(named[name], model.box("IfcWall", (0, 0, heights[name]), (8, 0.2, 2.0)))
     plan, report = imported(model, tmp_path)
     assert [level.name for level in plan.levels] == ["Ground", "First", "Half"]
     assert report.doubts == [
@@ -327,8 +322,8 @@ def concrete_kinds(kind: str) -> list[str]:
     def below(declaration: Any) -> list[Any]:
         return [declaration, *(inner for one in declaration.subtypes() for inner in below(one))]
 
-    declared = ifcopenshell.ifcopenshell_wrapper.schema_by_name("IFC4").declaration_by_name(kind)
-    return [one.name() for one in below(declared) if not one.is_abstract()]
+    schema = ifcopenshell.ifcopenshell_wrapper.schema_by_name("IFC4")
+    return [one.name() for one in below(schema.declaration_by_name(kind)) if not one.is_abstract()]
 
 
 @pytest.mark.slow
@@ -377,3 +372,20 @@ def test_gross_areas_and_outdoor_spaces_are_no_rooms(tmp_path: Path, field: str,
     setattr(model.box("IfcSpace", (0, 0, 0), (8, 6, 2.6)), field, value)
     plan, report = imported(model, tmp_path)
     assert (plan.levels[0].rooms, report.left_out) == ((), {"IfcSpace that is no room": 1})
+
+
+@pytest.mark.parametrize("on", ["IfcWall", "IfcDoor"])
+@pytest.mark.parametrize("status", ["DEMOLISH", "EXISTING", "TEMPORARY"])
+def test_what_is_demolished_is_left_out(tmp_path: Path, on: str, status: str) -> None:
+    from ifcopenshell.api import pset
+
+    model, _ = walled()
+    wall = model.box("IfcWall", (0, 4, 0), (8, 0.2, 2.6))
+    door = model.box("IfcDoor", (2, 4, 0), (1, 0.2, 2.1))
+    model.fill(model.cut(wall, (2, 3.9, 0), (1, 0.4, 2.1)), door)
+    about = pset.add_pset(model.file, product={"IfcWall": wall, "IfcDoor": door}[on], name=f"Pset_{on[3:]}Common")
+    pset.edit_pset(model.file, pset=about, properties={"Status": status})
+    plan, report = imported(model, tmp_path)
+    gone = {"IfcDoor", on} if status == "DEMOLISH" else set()
+    assert report.left_out == {f"{kind} to be demolished": 1 for kind in gone}
+    assert (len(plan.levels[0].walls), len(plan.levels[0].doors)) == (12 - 8 * ("IfcWall" in gone), 1 - bool(gone))

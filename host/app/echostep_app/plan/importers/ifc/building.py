@@ -67,7 +67,7 @@ def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: I
     """Add each door to the levels that it is open to at the height of the cut."""
     scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
     solid: dict[int, list[LineString]] = {}  # doors without an opening, by id of the level
-    for element in model.by_type("IfcDoor"):
+    for element in standing(model, ["IfcDoor"], report):
         door = placed_door(element, shapes, scale_m)
         if door is None:
             report.leave_out(f"{element.is_a()} without a shape, an opening or a width")
@@ -113,19 +113,15 @@ def _place(drawn_levels: list[DrawnLevel], body: SolidBody) -> str:
     name = str(getattr(body.element, "LongName", None) or getattr(body.element, "Name", None) or "")[:80]
     if kind in CONNECTOR_KINDS:
         return _place_way(drawn_levels, body, CONNECTOR_KINDS[kind], name)
-    placed = False
-    for drawn in drawn_levels:
-        z = drawn.height_m + CUT_M
-        if not low <= z <= high:
-            continue
-        placed = True
+    levels = [drawn for drawn in drawn_levels if low <= drawn.height_m + CUT_M <= high]
+    for drawn in levels:
         if kind in WALLS:
-            drawn.walls += body.cut(z)
+            drawn.walls += body.cut(drawn.height_m + CUT_M)
         elif kind == "IfcWindow":
             drawn.windows.append(body.above())
         else:
-            drawn.rooms += [room(name or "room", area) for area in body.cut(z)]
-    return "" if placed else NO_STOREY
+            drawn.rooms += [room(name or "room", area) for area in body.cut(drawn.height_m + CUT_M)]
+    return "" if levels else NO_STOREY
 
 
 def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorKind, name: str) -> str:

@@ -7,7 +7,9 @@ elements their kind keeps out of a plan.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -113,9 +115,18 @@ def standing(model: Any, kinds: Iterable[str], report: ImportReport) -> Iterator
 
 
 def why_out(element: Any) -> str:
-    """Why an element is no part of a plan, by its kind; empty when it is one."""
+    """Why an element is no part of a plan, by its kind and the status of itself, its wall and its whole; empty when it is one."""
     util: Any = import_module("ifcopenshell.util.element")
     kinds = {util.get_predefined_type(element), *(getattr(element, name, None) for name in KINDS)}
     if element.is_a("IfcSpace") and kinds & NO_ROOMS:
         return "that is no room"
-    return "that is no lift" if element.is_a("IfcTransportElement") and kinds & NO_LIFTS else ""
+    if element.is_a("IfcTransportElement") and kinds & NO_LIFTS:
+        return "that is no lift"
+    holes = [relation.RelatingOpeningElement for relation in getattr(element, "FillsVoids", ())]
+    wholes = [relation.RelatingBuildingElement for hole in holes for relation in hole.VoidsElements]
+    wholes += [relation.RelatingObject for relation in element.Decomposes]
+    with suppress(AttributeError, TypeError, RuntimeError):  # damaged sets
+        sets = [one for each in (element, *wholes) for one in util.get_psets(each, psets_only=True).items()]
+        states = [str(values.get("Status")) for name, values in sets if re.fullmatch("Pset_.*Common", name)]
+        return "to be demolished" if any("DEMOLISH" in state for state in states) else ""
+    return ""
