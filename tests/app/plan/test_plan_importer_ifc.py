@@ -17,13 +17,15 @@ from echostep.plan import Plan
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.report import ImportReport
 
+Schema = Literal["IFC2X3", "IFC4", "IFC4X3"]
+Triple = tuple[float, float, float]
 ifcopenshell = pytest.importorskip("ifcopenshell", reason="ifcopenshell is not installed: pip install 'echostep[ifc]'")
 
 
 class Model:
     """A building in millimetres."""
 
-    def __init__(self, schema: Literal["IFC2X3", "IFC4", "IFC4X3"] = "IFC4") -> None:
+    def __init__(self, schema: Schema = "IFC4") -> None:
         from ifcopenshell.api import aggregate, context, owner, project, root, unit
 
         self.file: Any = project.create_file(version=schema)
@@ -50,14 +52,7 @@ class Model:
         self._put(storey, 0, 0, z_m, 0)
         return storey
 
-    def box(
-        self,
-        kind: str,
-        at: tuple[float, float, float],
-        size: tuple[float, float, float],
-        turn: float = 0.0,
-        name: str = "",
-    ) -> Any:
+    def box(self, kind: str, at: Triple, size: Triple, turn: float = 0.0, name: str = "") -> Any:
         """An element of length, thickness and height in metres; its corner is at `at`."""
         from ifcopenshell.api import geometry, root
 
@@ -69,7 +64,7 @@ class Model:
         self._put(element, *at, turn)
         return element
 
-    def cut(self, wall: Any, at: tuple[float, float, float], size: tuple[float, float, float]) -> Any:
+    def cut(self, wall: Any, at: Triple, size: Triple) -> Any:
         opening = self.box("IfcOpeningElement", at, size)
         self.add(wall, opening)
         return opening
@@ -101,9 +96,8 @@ def write_house(folder: Path) -> Path:
     """6 m by 4 m, walls of 0.3 m, on two floors 3 m apart; a door in the south, a window in the north of the ground floor."""
     model = Model()
     model.site.RefLatitude, model.site.RefLongitude = (53, 6, 36), (8, 51, 0)
-    for i in range(2):
-        model.storey(f"Floor {i}", 3.0 * i)
-        z = 3.0 * i
+    for i, z in enumerate((0.0, 3.0)):
+        model.storey(f"Floor {i}", z)
         south = model.box("IfcWall", (0, 0, z), (6, 0.3, 2.8))
         north = model.box("IfcWall", (0, 3.7, z), (6, 0.3, 2.8))
         model.box("IfcWall", (0.3, 0.3, z), (3.4, 0.3, 2.8), math.pi / 2)
@@ -127,16 +121,12 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Plan:
 
 def test_storeys_and_their_walls(house: Plan) -> None:
     assert [(level.name, level.height_m) for level in house.levels] == [("Floor 0", 0.0), ("Floor 1", 3.0)]
-    upper = house.levels[1].walls
+    ground, upper = (level.walls for level in house.levels)
     assert len(upper) == 8
     assert np.hypot(*(upper[:, 2:] - upper[:, :2]).T).sum() == pytest.approx(2 * (6 + 4) + 2 * (5.4 + 3.4), abs=0.02)
-    ground = house.levels[0].walls
     assert (upper.min(), upper.max()) == (0.0, 6.0)
-    inside_door = (
-        (ground[:, [1, 3]].max(axis=1) < 0.31)
-        & (ground[:, [0, 2]].min(axis=1) > 1.99)
-        & (ground[:, [0, 2]].max(axis=1) < 3.01)
-    )
+    x, y = ground[:, ::2], ground[:, 1::2]
+    inside_door = (y.max(axis=1) < 0.31) & (x.min(axis=1) > 1.99) & (x.max(axis=1) < 3.01)
     assert all(x0 == x1 for x0, _, x1, _ in ground[inside_door])  # only its jambs
 
 
@@ -161,9 +151,7 @@ def test_its_place_on_earth(house: Plan) -> None:
 PLACE, TURN = (489_000.0, 5_884_000.0), math.radians(30.0)  # in UTM zone 32: a degree of longitude west of its middle
 
 
-def mapped(
-    schema: Literal["IFC2X3", "IFC4"], name: str, unit_m: float = 1.0, at: tuple[float, float] = (0.0, 0.0)
-) -> Model:
+def mapped(schema: Schema, name: str, unit_m: float = 1.0, at: tuple[float, float] = (0.0, 0.0)) -> Model:
     """A wall at a place of the model, whose origin is `PLACE` on the map."""
     from ifcopenshell.api import georeference, pset
 
@@ -185,9 +173,7 @@ def mapped(
 @pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
 @pytest.mark.parametrize("unit_m", [1.0, 0.001])
 @pytest.mark.parametrize("at", [(0.0, 0.0), (30_000.0, 0.0)])
-def test_its_place_on_a_map(
-    tmp_path: Path, schema: Literal["IFC2X3", "IFC4"], unit_m: float, at: tuple[float, float]
-) -> None:
+def test_its_place_on_a_map(tmp_path: Path, schema: Schema, unit_m: float, at: tuple[float, float]) -> None:
     """Eastings in metres or in the model's millimetres, without a stated unit; grid north is not north."""
     plan, report = imported(mapped(schema, "EPSG:25832", unit_m, at), tmp_path)
     assert plan.georeference is not None
@@ -230,6 +216,13 @@ def imported(model: Model, folder: Path) -> tuple[Plan, ImportReport]:
     return import_plan(folder / "a.ifc", report=report), report
 
 
+def walled(length_m: float = 8.0) -> tuple[Model, Any]:
+    """A storey with a wall."""
+    model = Model()
+    model.storey("Ground", 0.0)
+    return model, model.box("IfcWall", (0, 0, 0), (length_m, 0.2, 2.6))
+
+
 def without_shape(model: Model, kind: str, **about: Any) -> Any:
     """An element without a representation."""
     from ifcopenshell.api import root
@@ -242,16 +235,14 @@ def without_shape(model: Model, kind: str, **about: Any) -> Any:
 
 @pytest.mark.parametrize("schema", ["IFC2X3", "IFC4", "IFC4X3"])
 @pytest.mark.parametrize("leaf", ["drawn open", "without a shape", "closed"])
-def test_a_door_lies_in_its_opening(tmp_path: Path, leaf: str, schema: Literal["IFC2X3", "IFC4", "IFC4X3"]) -> None:
+def test_a_door_lies_in_its_opening(tmp_path: Path, leaf: str, schema: Schema) -> None:
     """The wall x 4.0 to 4.2 has an opening y 3 to 5, which reaches out of the wall on one side."""
     model = Model(schema)
     model.storey("Ground", 0.0)
     wall = model.box("IfcWall", (4.2, 0, 0), (8, 0.2, 2.6), math.pi / 2)
     opening = model.cut(wall, (4.0, 3.0, 0), (0.5, 2.0, 2.1))
-    if leaf == "without a shape":
-        door = without_shape(model, "IfcDoor")
-    else:
-        door = model.box("IfcDoor", (4.05, 3.0, 0), (1.0, 0.05, 2.1) if leaf == "drawn open" else (0.05, 2.0, 2.1))
+    sizes: dict[str, Triple] = {"drawn open": (1.0, 0.05, 2.1), "closed": (0.05, 2.0, 2.1)}
+    door = model.box("IfcDoor", (4.05, 3.0, 0), sizes[leaf]) if leaf in sizes else without_shape(model, "IfcDoor")
     model.fill(opening, door)
     plan, report = imported(model, tmp_path)
     assert len(plan.levels[0].doors) == 1
@@ -263,9 +254,7 @@ def test_a_door_lies_in_its_opening(tmp_path: Path, leaf: str, schema: Literal["
 
 def test_a_door_without_opening_has_its_placement(tmp_path: Path) -> None:
     """A leaf drawn open, 0.9 m wide along the placement's x."""
-    model = Model()
-    model.storey("Ground", 0.0)
-    model.box("IfcWall", (0, 0, 0), (4, 0.2, 2.6))
+    model, _ = walled(4.0)
     model.box("IfcWall", (4.9, 0, 0), (4, 0.2, 2.6))
     door = model.box("IfcDoor", (4.0, 0.1, 0), (0.9, 0.9, 2.1))
     door.OverallWidth, door.OverallHeight = 900.0, 2100.0
@@ -274,9 +263,7 @@ def test_a_door_without_opening_has_its_placement(tmp_path: Path) -> None:
 
 
 def test_what_has_no_shape_is_counted_and_filled_openings_place_windows(tmp_path: Path) -> None:
-    model = Model()
-    model.storey("Ground", 0.0)
-    wall = model.box("IfcWall", (0, 0, 0), (8, 0.2, 2.6))
+    model, wall = walled()
     model.fill(model.cut(wall, (2, -0.1, 0.8), (1.5, 0.4, 1.2)), without_shape(model, "IfcWindow"))
     for kind in ("IfcDoor", "IfcWindow", "IfcWall"):
         without_shape(model, kind)
@@ -294,13 +281,10 @@ def test_what_has_no_shape_is_counted_and_filled_openings_place_windows(tmp_path
 def test_reference_levels_are_no_storeys(tmp_path: Path) -> None:
     """Levels without walls, doors and rooms close to another one; two half storeys with walls stay, and are told."""
     model = Model()
-    walls = [model.box("IfcWall", (0, 0, z), (8, 0.2, 2.0)) for z in (0.0, 2.9, 4.2)]
-    named = {
-        name: model.storey(name, z)
-        for name, z in (("Slab 0", -0.36), ("Ground", 0.0), ("Slab 1", 2.6), ("First", 2.9), ("Half", 4.2))
-    }
-    for name, wall in zip(("Ground", "First", "Half"), walls, strict=True):
-        model.contain(named[name], wall)
+    heights = {"Slab 0": -0.36, "Ground": 0.0, "Slab 1": 2.6, "First": 2.9, "Half": 4.2}
+    named = {name: model.storey(name, z) for name, z in heights.items()}
+    for name in ("Ground", "First", "Half"):
+        model.contain(named[name], model.box("IfcWall", (0, 0, heights[name]), (8, 0.2, 2.0)))
     plan, report = imported(model, tmp_path)
     assert [level.name for level in plan.levels] == ["Ground", "First", "Half"]
     assert report.doubts == [
@@ -311,13 +295,11 @@ def test_reference_levels_are_no_storeys(tmp_path: Path) -> None:
 
 def test_names_of_storeys_and_rooms(tmp_path: Path) -> None:
     """Of a storey the name goes before the long name, of a room the other way round."""
-    model = Model()
-    storey = model.storey("Ground floor", 0.0)
-    storey.LongName = "ACID00000001"
-    model.box("IfcWall", (0, 0, 0), (8, 0.2, 2.6))
+    model, _ = walled()
+    model.file.by_type("IfcBuildingStorey")[0].LongName = "ACID00000001"
     model.box("IfcSpace", (1, 1, 0), (2, 2, 2.6), name="1.01").LongName = "Kitchen"
     plan, _ = imported(model, tmp_path)
-    assert plan.levels[0].name == "Ground floor"
+    assert plan.levels[0].name == "Ground"
     assert [room.name for room in plan.levels[0].rooms] == ["Kitchen"]
 
 
@@ -328,12 +310,8 @@ def test_a_packed_model(tmp_path: Path) -> None:
     assert import_plan(tmp_path / "house.ifczip").digest == import_plan(house).digest
     with zipfile.ZipFile(tmp_path / "none.ifczip", "w") as packed:
         packed.writestr("readme.txt", "x")
-    for name, raw, named in (
-        ("none.ifczip", None, "no .ifc file in it"),
-        ("bad.ifczip", b"PK\x03\x04x", "not a zip file"),
-    ):
-        if raw is not None:
-            (tmp_path / name).write_bytes(raw)
+    (tmp_path / "bad.ifczip").write_bytes(b"PK\x03\x04x")
+    for name, named in (("none.ifczip", "no .ifc file in it"), ("bad.ifczip", "not a zip file")):
         with pytest.raises(EchostepError, match=named):
             import_plan(tmp_path / name)
 
@@ -344,21 +322,16 @@ def concrete_kinds(kind: str) -> list[str]:
     def below(declaration: Any) -> list[Any]:
         return [declaration, *(inner for one in declaration.subtypes() for inner in below(one))]
 
-    declared = ifcopenshell.ifcopenshell_wrapper.schema_by_name("IFC4").declaration_by_name(kind)
-    return [one.name() for one in below(declared) if not one.is_abstract()]
+    schema = ifcopenshell.ifcopenshell_wrapper.schema_by_name("IFC4")
+    return [one.name() for one in below(schema.declaration_by_name(kind)) if not one.is_abstract()]
 
 
 @pytest.mark.slow
 def test_every_class_of_elements_is_used_or_counted(tmp_path: Path) -> None:
     """One element of each class of IFC4, all far above the storeys; those that are no bodies of a building, as openings, are not counted."""
-    model = Model()
-    ground = model.storey("Ground", 0.0)
-    model.contain(ground, model.box("IfcWall", (0, 0, 0), (8, 0.2, 2.6)))
-    silent = {
-        kind
-        for parent in ("IfcFeatureElement", "IfcPort", "IfcVirtualElement", "IfcElementComponent")
-        for kind in concrete_kinds(parent)
-    }
+    model, _ = walled()
+    parents = ("IfcFeatureElement", "IfcPort", "IfcVirtualElement", "IfcElementComponent")
+    silent = {kind for parent in parents for kind in concrete_kinds(parent)}
     kinds = sorted({*concrete_kinds("IfcElement"), "IfcSpace"} - silent)
     for kind in kinds:
         model.box(kind, (0, 0, 50.0), (2, 0.2, 2.0))
@@ -380,3 +353,39 @@ def test_what_lies_on_one_level_alone_is_counted(tmp_path: Path) -> None:
     plan, report = imported(model, tmp_path)
     assert [connector.kind for connector in plan.connectors] == ["lift"]
     assert report.left_out == {"stairs on one level only": 1, "IfcTransportElement that is no lift": 1}
+
+
+@pytest.mark.parametrize("parts", [(-33, 51, 30), (-33, -51, 30), (-33, 51, 30, 0), (-33, 50, 89, 1000000)])
+def test_an_angle_has_the_sign_of_its_first_part(tmp_path: Path, parts: tuple[int, ...]) -> None:
+    model, _ = walled()
+    model.site.RefLatitude, model.site.RefLongitude = parts, (0, -6, 36)
+    place = imported(model, tmp_path)[0].georeference
+    assert place is not None
+    assert (place.latitude_deg, place.longitude_deg) == pytest.approx((-33.858333, -0.11))
+
+
+@pytest.mark.parametrize(
+    ("field", "value"), [("PredefinedType", "GFA"), ("PredefinedType", "EXTERNAL"), ("ObjectType", "GFA")]
+)
+def test_gross_areas_and_outdoor_spaces_are_no_rooms(tmp_path: Path, field: str, value: str) -> None:
+    model, _ = walled()
+    setattr(model.box("IfcSpace", (0, 0, 0), (8, 6, 2.6)), field, value)
+    plan, report = imported(model, tmp_path)
+    assert (plan.levels[0].rooms, report.left_out) == ((), {"IfcSpace that is no room": 1})
+
+
+@pytest.mark.parametrize("on", ["IfcWall", "IfcDoor"])
+@pytest.mark.parametrize("status", ["DEMOLISH", "EXISTING", "TEMPORARY"])
+def test_what_is_demolished_is_left_out(tmp_path: Path, on: str, status: str) -> None:
+    from ifcopenshell.api import pset
+
+    model, _ = walled()
+    wall = model.box("IfcWall", (0, 4, 0), (8, 0.2, 2.6))
+    door = model.box("IfcDoor", (2, 4, 0), (1, 0.2, 2.1))
+    model.fill(model.cut(wall, (2, 3.9, 0), (1, 0.4, 2.1)), door)
+    about = pset.add_pset(model.file, product={"IfcWall": wall, "IfcDoor": door}[on], name=f"Pset_{on[3:]}Common")
+    pset.edit_pset(model.file, pset=about, properties={"Status": status})
+    plan, report = imported(model, tmp_path)
+    gone = {"IfcDoor", on} if status == "DEMOLISH" else set()
+    assert report.left_out == {f"{kind} to be demolished": 1 for kind in gone}
+    assert (len(plan.levels[0].walls), len(plan.levels[0].doors)) == (12 - 8 * ("IfcWall" in gone), 1 - bool(gone))

@@ -7,22 +7,16 @@ import random
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from ifcopenshell.api import aggregate, unit
 
 from plan.habits.house import ENTRANCE, HIGH, INNER, PARTITION, ROOMS, STAIRS, STOREYS, WIDE, Line, Move
-from plan.test_plan_importer_ifc import Model
+from plan.test_plan_importer_ifc import Model, Schema
 
 
 def model(
-    move: Move,
-    units: str = "",
-    z: float = 0.0,
-    thick: float = 0.2,
-    schema: Literal["IFC2X3", "IFC4"] = "IFC4",
-    *,
-    voids: bool = True,
+    move: Move, units: str = "", z: float = 0.0, thick: float = 0.2, schema: Schema = "IFC4", *, voids: bool = True
 ) -> Model:
     """The house in millimetres, or in feet or inches; its lowest floor at height z. Without `voids` its walls have no openings for doors."""
     made, h = Model(schema), thick / 2

@@ -6,7 +6,7 @@ In: a model. Out: `SolidBody`s. Owns nothing. Elements without a usable shape ar
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
@@ -96,7 +96,7 @@ class Shapes:
                 points += [corner[:2] for corner in self._triangles(element)[0][:1]]
         self.origin_m = grid_origin(np.array(points).reshape(-1, 2))
 
-    def bodies(self, elements: list[Any], report: ImportReport) -> Iterator[SolidBody]:
+    def bodies(self, elements: Iterable[Any], report: ImportReport) -> Iterator[SolidBody]:
         """Bodies of elements; without a shape, the bodies of their parts (elemented walls) or of the opening that they fill. Others are reported."""
         for element in elements:
             body = self.body(element)

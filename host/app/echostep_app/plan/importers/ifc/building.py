@@ -26,7 +26,7 @@ from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, 
 from echostep_app.plan.importers.ifc.bodies import Shapes, SolidBody
 from echostep_app.plan.importers.ifc.doors import placed_door
 from echostep_app.plan.importers.ifc.map_conversion import map_georeference
-from echostep_app.plan.importers.ifc.model import open_model, storeys_of
+from echostep_app.plan.importers.ifc.model import open_model, standing, storeys_of
 from echostep_app.plan.importers.report import ImportReport
 
 NO_STOREY = "at the height of no storey"
@@ -36,7 +36,6 @@ WALLS = ("IfcWall", "IfcColumn", "IfcCurtainWall", "IfcPlate", "IfcMember")
 CONNECTOR_KINDS: dict[str, ConnectorKind] = {
     "IfcStair": "stairs", "IfcStairFlight": "stairs", "IfcRamp": "ramp", "IfcRampFlight": "ramp", "IfcTransportElement": "lift",
 }  # fmt: skip
-LIFTS = ("ELEVATOR", "None", "NOTDEFINED")
 SEEN = (*WALLS, *CONNECTOR_KINDS, "IfcWindow", "IfcSpace")
 
 
@@ -47,9 +46,8 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
     drawn_levels = [DrawnLevel(storey.name, storey.height_m) for storey in storeys]
     shapes = Shapes(path)
     shapes.find_origin(model.by_type("IfcWall") or model.by_type("IfcElement"))
-    elements = [element for kind in SEEN for element in model.by_type(kind)]
     count = 0
-    for body in shapes.bodies(elements, report):
+    for body in shapes.bodies(standing(model, SEEN, report), report):
         count += 1
         if why := _place(drawn_levels, body):
             report.leave_out(f"{body.element.is_a()} {why}")
@@ -69,7 +67,7 @@ def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: I
     """Add each door to the levels that it is open to at the height of the cut."""
     scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
     solid: dict[int, list[LineString]] = {}  # doors without an opening, by id of the level
-    for element in model.by_type("IfcDoor"):
+    for element in standing(model, ["IfcDoor"], report):
         door = placed_door(element, shapes, scale_m)
         if door is None:
             report.leave_out(f"{element.is_a()} without a shape, an opening or a width")
@@ -115,25 +113,19 @@ def _place(drawn_levels: list[DrawnLevel], body: SolidBody) -> str:
     name = str(getattr(body.element, "LongName", None) or getattr(body.element, "Name", None) or "")[:80]
     if kind in CONNECTOR_KINDS:
         return _place_way(drawn_levels, body, CONNECTOR_KINDS[kind], name)
-    placed = False
-    for drawn in drawn_levels:
-        z = drawn.height_m + CUT_M
-        if not low <= z <= high:
-            continue
-        placed = True
+    levels = [drawn for drawn in drawn_levels if low <= drawn.height_m + CUT_M <= high]
+    for drawn in levels:
         if kind in WALLS:
-            drawn.walls += body.cut(z)
+            drawn.walls += body.cut(drawn.height_m + CUT_M)
         elif kind == "IfcWindow":
             drawn.windows.append(body.above())
         else:
-            drawn.rooms += [room(name or "room", area) for area in body.cut(z)]
-    return "" if placed else NO_STOREY
+            drawn.rooms += [room(name or "room", area) for area in body.cut(drawn.height_m + CUT_M)]
+    return "" if levels else NO_STOREY
 
 
 def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorKind, name: str) -> str:
     """As `_place`, for stairs, a ramp or a lift: on all levels between its lowest and its highest corner."""
-    if kind == "lift" and str(getattr(body.element, "PredefinedType", "ELEVATOR")) not in LIFTS:
-        return "that is no lift"
     low, high = body.z_m
     passed = [i for i, drawn in enumerate(drawn_levels) if low - 0.5 <= drawn.height_m <= high + 0.5]
     for i in passed:
@@ -149,11 +141,8 @@ def _georeference(model: Any) -> Georeference | None:
     lat, lon = (_degrees(parts) for parts in (sites[0].RefLatitude, sites[0].RefLongitude))
     if not (abs(lat) <= 90.0 and abs(lon) <= 180.0) or (lat, lon) == (0.0, 0.0):
         return None
-    norths = [
-        c.TrueNorth.DirectionRatios
-        for c in model.by_type("IfcGeometricRepresentationContext", include_subtypes=False)
-        if c.TrueNorth
-    ]
+    contexts = model.by_type("IfcGeometricRepresentationContext", include_subtypes=False)
+    norths = [c.TrueNorth.DirectionRatios for c in contexts if c.TrueNorth]
     x, y = norths[0][:2] if norths else (0.0, 1.0)
     return Georeference(lon, lat, math.pi / 2 - math.atan2(y, x))
 
@@ -180,5 +169,6 @@ def _place_on_earth(model: Any, shapes: Shapes, report: ImportReport) -> Georefe
 
 
 def _degrees(parts: Any) -> float:
-    """Degrees from degrees, minutes, seconds and millionths of a second."""
-    return float(sum(part / unit for part, unit in zip(parts, (1, 60, 3600, 3600e6), strict=False)))
+    """Degrees from degrees, minutes, seconds and millionths of a second; all have the sign of the first that is not 0."""
+    size = sum(abs(part) / unit for part, unit in zip(parts, (1, 60, 3600, 3600e6), strict=False))
+    return math.copysign(size, next(filter(None, parts), 0))

@@ -52,9 +52,8 @@ def map_georeference(
     c, s = math.cos(turn), math.sin(turn)
     places = []
     for unit_m in sorted({stated_m} if stated_m else {axis_m, scale_m}) if axis_m else ():
-        grid = (
-            scale * unit_m / scale_m if abs(scale * unit_m / scale_m - 1.0) < 0.01 else 1.0
-        )  # metres there for one here
+        stretch = scale * unit_m / scale_m
+        grid = stretch if abs(stretch - 1.0) < 0.01 else 1.0  # metres there for one here
         ends = [
             to_degrees(
                 (east * unit_m + grid * (c * x - s * origin_m[1])) / axis_m,

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: MIT
 """The file of a building model, and its storeys.
 
-In: an .ifc file, or one packed as .ifczip. Out: the model, names and heights of its storeys. Owns which storeys are reference levels.
+In: an .ifc file, or one packed as .ifczip. Out: the model, names and heights of its storeys. Owns which storeys are reference levels, and which
+elements their kind keeps out of a plan.
 """
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,6 +24,9 @@ from echostep_app.plan.importers.report import ImportReport
 # A storey without walls, doors and rooms nearer than this to another one is its reference level; assumed
 REFERENCE_M = 1.0
 CONTENTS = ("IfcWall", "IfcDoor", "IfcWindow", "IfcSpace", "IfcCurtainWall")
+KINDS = ("PredefinedType", "InteriorOrExteriorSpace", "OperationType")  # the latter two in IFC 2x3
+NO_ROOMS = {"GFA", "EXTERNAL"}  # gross floor area; outside of the house
+NO_LIFTS = {"ESCALATOR", "MOVINGWALKWAY", "CRANEWAY", "LIFTINGGEAR", "HAULINGGEAR", "USERDEFINED"}
 
 
 class Storey(NamedTuple):
@@ -96,3 +103,30 @@ def _contents(storey: Any) -> int:
     contained = [e for relation in storey.ContainsElements for e in relation.RelatedElements]
     spaces = [e for relation in storey.IsDecomposedBy for e in relation.RelatedObjects]
     return sum(any(element.is_a(kind) for kind in CONTENTS) for element in (*contained, *spaces))
+
+
+def standing(model: Any, kinds: Iterable[str], report: ImportReport) -> Iterator[Any]:
+    """The elements of these kinds without those that are no part of a plan, which are reported."""
+    for element in (element for kind in kinds for element in model.by_type(kind)):
+        if why := why_out(element):
+            report.leave_out(f"{element.is_a()} {why}")
+        else:
+            yield element
+
+
+def why_out(element: Any) -> str:
+    """Why an element is no part of a plan, by its kind and the status of itself, its wall and its whole; empty when it is one."""
+    util: Any = import_module("ifcopenshell.util.element")
+    kinds = {util.get_predefined_type(element), *(getattr(element, name, None) for name in KINDS)}
+    if element.is_a("IfcSpace") and kinds & NO_ROOMS:
+        return "that is no room"
+    if element.is_a("IfcTransportElement") and kinds & NO_LIFTS:
+        return "that is no lift"
+    holes = [relation.RelatingOpeningElement for relation in getattr(element, "FillsVoids", ())]
+    wholes = [relation.RelatingBuildingElement for hole in holes for relation in hole.VoidsElements]
+    wholes += [relation.RelatingObject for relation in element.Decomposes]
+    with suppress(AttributeError, TypeError, RuntimeError):  # damaged sets
+        sets = [one for each in (element, *wholes) for one in util.get_psets(each, psets_only=True).items()]
+        states = [str(values.get("Status")) for name, values in sets if re.fullmatch("Pset_.*Common", name)]
+        return "to be demolished" if any("DEMOLISH" in state for state in states) else ""
+    return ""
