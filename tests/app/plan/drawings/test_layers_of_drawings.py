@@ -211,7 +211,8 @@ def test_columns_alone_are_no_building(tmp_path: Path) -> None:
     [
         ("A-WALL-INTR", "walls"), ("TABIQUE", "walls"), ("Стены", "walls"), ("PARED_01", "walls"), ("A-WALL-PATT", None), ("Wand-Schraffur", None),
         ("PUERTA", "doors"), ("S-COLS", "columns"), ("A-GLAZ", "windows"), ("A-FLOR-STRS", "stairs"), ("SCALE-BAR", None), ("A-AREA-IDEN", "rooms"),
-        ("A-WALL-ABOV", None), ("A-WALL-OVHD", None), ("A-WALL-CNTR", None), ("A-WALL-HEAD", None),
+        ("A-WALL-ABOV", None), ("A-WALL-OVHD", None), ("A-WALL-CNTR", None), ("A-WALL-HEAD", None), ("A-WALL-LOW", "walls"),
+        ("Achsen-Wand", None), ("Wandtapete", None), ("Wallpaper", None), ("A-ROOM-WALLFINISH", None),
     ],
 )  # fmt: skip
 def test_names_of_layers(layer: str, kind: str | None) -> None:
