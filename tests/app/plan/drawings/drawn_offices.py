@@ -141,7 +141,6 @@ def drawn_twice(space: Any, box: Box, layer: Layer) -> None:
 
 
 def wide_polylines(space: Any, box: Box, layer: Layer) -> None:
-    """Open: the width of the last corner, where no piece begins, does not count."""
     a, b, thick = axis(box)
     corners_of, same = ([a, b], {"const_width": thick}) if a[0] == b[0] else ([(*a, thick, thick), (*b, 0, 0)], {})
     space.add_lwpolyline(corners_of, format="xyse", dxfattribs=layer | same)

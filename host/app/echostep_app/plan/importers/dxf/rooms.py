@@ -64,8 +64,8 @@ def rooms_of(
     outlines: list[Polygon] = []
     for entity, layer in entities:
         named = written(entity, layer, frame)
-        rings = [Polygon(line.coords) for line in frame.lines(entity, file) if line.is_closed]
-        large = [area for ring in rings for area in areas([ring]) if area.area >= LEAST_M2]
+        rings = (Polygon(line.coords) for line in frame.lines(entity, file) if line.is_closed)
+        large = [area for area in areas(rings) if area.area >= LEAST_M2]
         if named:
             names[named.room.name, named.room.at_m] = named
         outlines += large
@@ -85,15 +85,16 @@ def names_of_blocks(texts: Sequence[Written]) -> list[Written]:
 
 
 def _matched(names: list[Written], outlines: list[Polygon], texts: list[Written], report: ImportReport) -> list[Room]:
-    """Each outline gets the texts inside it that no smaller outline has; an outline without a text is numbered."""
-    left, rooms = list(names), []
-    for outline in sorted(outlines, key=lambda area: area.area):
+    """Each outline gets the texts inside it that no smaller outline has; one without a text is numbered, if it holds less than two others."""
+    left, rooms, seen = list(names), [], list[Point]()
+    for outline in sorted({area.normalize(): area for area in outlines}.values(), key=lambda area: area.area):
         own = [name for name in left if outline.intersects(Point(name.room.at_m))]
         left = [name for name in left if name not in own]
-        inside = [name.room for name in own] or _lines_of(
-            [text for text in texts if outline.intersects(Point(text.room.at_m))], report
-        )
-        rooms.append(room(" ".join(name.name for name in inside)[:80], outline))
+        others = [text for text in texts if outline.intersects(Point(text.room.at_m))]
+        inside = [name.room for name in own] or _lines_of(others, report)
+        if inside or shapely.covers(outline, seen).sum() < 2:
+            rooms.append(room(" ".join(name.name for name in inside)[:80], outline))
+        seen.append(outline.representative_point())
     numbered = [one if one.name else Room(f"room {k}", one.at_m, one.outline_m) for k, one in enumerate(rooms, 1)]
     return [*_stamps(left, report), *numbered]
 
