@@ -150,6 +150,11 @@ def test_room_numbers_of_blocks(tmp_path: Path) -> None:
     doc.blocks.new("TAG")
     space.add_blockref("TAG", (2, 2), {"layer": "A-ROOM"}).add_attrib("NUMBER", "2.14", (2, 2), {"layer": "A-ROOM"})
     assert [(room.name, room.at_m) for room in imported(doc, tmp_path).levels[0].rooms] == [("2.14", (2, 2))]
+    beside, layer = space.add_blockref("TAG", (6, 2), {"layer": "A-ROOM"}), {"layer": "A-ROOM", "height": 0.2}
+    texts = {"NUMBER": "101", "ROOM_NAME": "Office", "DEPT": "Sales", "FINISH": "Carpet", "OCC": "Ann"}
+    for k, (tag, text) in enumerate(texts.items()):
+        beside.add_attrib(tag, text, (6 + 0.5 * (k % 2), 2 - 0.6 * k), layer)
+    assert [room.name for room in imported(doc, tmp_path).levels[0].rooms] == ["2.14", "101 Office"]
 
 
 @pytest.mark.long

@@ -142,7 +142,8 @@ def drawn_twice(space: Any, box: Box, layer: Layer) -> None:
 
 def wide_polylines(space: Any, box: Box, layer: Layer) -> None:
     a, b, thick = axis(box)
-    space.add_lwpolyline([a, b], dxfattribs=layer | {"const_width": thick})
+    corners_of, same = ([a, b], {"const_width": thick}) if a[0] == b[0] else ([(*a, thick, thick), (*b, 0, 0)], {})
+    space.add_lwpolyline(corners_of, format="xyse", dxfattribs=layer | same)
 
 
 def multilines(space: Any, box: Box, layer: Layer) -> None:

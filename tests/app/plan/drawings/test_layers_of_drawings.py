@@ -211,7 +211,8 @@ def test_columns_alone_are_no_building(tmp_path: Path) -> None:
     [
         ("A-WALL-INTR", "walls"), ("TABIQUE", "walls"), ("Стены", "walls"), ("PARED_01", "walls"), ("A-WALL-PATT", None), ("Wand-Schraffur", None),
         ("PUERTA", "doors"), ("S-COLS", "columns"), ("A-GLAZ", "windows"), ("A-FLOR-STRS", "stairs"), ("SCALE-BAR", None), ("A-AREA-IDEN", "rooms"),
-        ("A-WALL-ABOV", None), ("A-WALL-OVHD", None), ("A-WALL-CNTR", None), ("A-WALL-HEAD", None),
+        ("A-WALL-ABOV", None), ("A-WALL-OVHD", None), ("A-WALL-CNTR", None), ("A-WALL-HEAD", None), ("A-WALL-LOW", "walls"),
+        ("Achsen-Wand", None), ("Wandtapete", None), ("Wallpaper", None), ("A-ROOM-WALLFINISH", None),
     ],
 )  # fmt: skip
 def test_names_of_layers(layer: str, kind: str | None) -> None:
@@ -250,10 +251,10 @@ def test_lines_beneath_each_other_are_one_name(tmp_path: Path, degrees: float) -
 
 
 def test_outlines_of_rooms(tmp_path: Path) -> None:
-    """An outline takes the texts inside it, each once, but no sizes; without a text it is numbered; small ones are symbols and counted."""
+    """An outline takes the texts inside it, once, but no sizes; without one it is numbered, if not repeated or gross; small ones are symbols."""
     doc, space = sheet()
     house(space)
-    for box in ((0.3, 0.3, 4, 7.7), (4.1, 0.3, 9.7, 7.7), (5, 5, 5.5, 5.5)):
+    for box in (*2 * ((0.3, 0.3, 4, 7.7), (4.1, 0.3, 9.7, 7.7)), (5, 5, 5.5, 5.5), (0, 0, 10, 8)):
         space.add_lwpolyline(corners(box), close=True, dxfattribs={"layer": "Rooms"})
     for text in ("%%uHall", "%%uHall", "23,40 m2", "H=2.70"):
         space.add_text(text, dxfattribs={"layer": "Rooms", "insert": (1, 1), "height": 0.3})

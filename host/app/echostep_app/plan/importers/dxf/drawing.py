@@ -27,7 +27,7 @@ from echostep_app.plan.importers.dxf.doors import PlacedDoors
 from echostep_app.plan.importers.dxf.entities import parts
 from echostep_app.plan.importers.dxf.frame import DrawingFrame
 from echostep_app.plan.importers.dxf.gaps import WallBands
-from echostep_app.plan.importers.dxf.rooms import Written, named_spaces, rooms_of, written
+from echostep_app.plan.importers.dxf.rooms import Written, named_spaces, names_of_blocks, rooms_of, written
 from echostep_app.plan.importers.dxf.sheet import Sheet, read_sheet
 from echostep_app.plan.importers.dxf.storeys import (
     Box,
@@ -89,7 +89,7 @@ class _Storey:
     def texts(self) -> list[Written]:
         """The texts on layers that mean nothing else."""
         found = (written(entity, layer, self.frame) for entity, layer in self.sheet.others)
-        return [text for text in found if text is not None and self.holds(Point(text.room.at_m))]
+        return names_of_blocks([text for text in found if text is not None and self.holds(Point(text.room.at_m))])
 
     def holds(self, shape: BaseGeometry) -> bool:
         """Whether a shape belongs to this level."""

@@ -79,7 +79,7 @@ class VisibleEntities:
         """Each entity with its layer; layer "0" inside a block means the block's layer. Blocks are expanded unless `whole(layer)`."""
         stack: list[tuple[Any, str, int, BaseGeometry | None]]
         stack = [(entity, "0", 0, None) for entity in reversed(list(self._space))]
-        count = 0
+        count = inserts = 0
         while stack:
             entity, outer, depth, shown = stack.pop()
             count += depth > 0
@@ -93,7 +93,10 @@ class VisibleEntities:
                 self._report.leave_out(f"{entity.dxftype()} on {layer[:40]} ({hidden})")
                 continue
             if is_block:
-                stack += [(attribute, layer, depth + 1, shown) for attribute in entity.attribs]
+                inserts += 1
+                for attribute in entity.attribs:
+                    attribute.dxf.owner = f"insert {inserts}"  # those of one block name one room; copies have no owner
+                    stack.append((attribute, layer, depth + 1, shown))
                 if self._is_reference(entity):
                     continue
                 shown = shown_of(entity, shown)

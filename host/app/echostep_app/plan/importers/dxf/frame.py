@@ -118,13 +118,14 @@ def _width(entity: Any) -> float:
     """The width of a polyline that is drawn with one width all along, in drawing units; 0 for others."""
     if entity.dxftype() == "LWPOLYLINE":
         same = entity.dxf.get("const_width", 0.0)
-        widths = [(same, same)] if same else [tuple(point) for point in entity.get_points("se")]
+        widths = [(same, same)] * 2 if same else [tuple(point) for point in entity.get_points("se")]
     elif entity.dxftype() == "POLYLINE" and entity.has_width:
         start, end = entity.dxf.default_start_width, entity.dxf.default_end_width
         widths = [(v.dxf.get("start_width", start), v.dxf.get("end_width", end)) for v in entity.vertices]
     else:
         return 0.0
-    known = {float(width) for pair in widths for width in pair}
+    pieces = widths if entity.is_closed else widths[:-1]  # none begins at the last corner of an open one
+    known = {float(width) for pair in pieces for width in pair}
     return known.pop() if len(known) == 1 else 0.0
 
 

@@ -42,7 +42,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
 BESIDE = (
     "*patt*", "*hatch*", "*schraff*", "*-dim*", "*bemass*", "*bemaß*", "*anno*", "*text*", "*demol*", "*-demo*", "*abbruch*", "*insul*", "*daemm*",
     "*dämm*", "*furn*", "*möbel*", "*moebel*", "*muebl*", "*mobil*", "*sanit*", "*plumb*", "*clng*", "*ceil*", "*elec*", "*hvac*", "*equip*",
-    "*tile*", "*-iden*", "*-tag*", "*-symb*", "*-abov*", "*-ovhd*", "*-cntr*", "*-head*",
+    "*tile*", "*-iden*", "*-tag*", "*-symb*", "*-abov*", "*-ovhd*", "*-cntr*", "*-head*", "*achse*", "*tapete*", "*paper*", "*finish*",
 )  # fmt: skip
 # Kinds whose layers come with layers of hatching or measures
 DRAWN = ("walls", "columns", "windows", "doors", "stairs", "lifts")

@@ -34,17 +34,21 @@ KINDS = r"(?:[AFHUP]|NGF|BGF|[LR]H|[OU]K\w*)"  # areas, perimeters and heights, 
 SIZE = re.compile(
     rf"\W*(?:{KINDS} ?[=:] ?[+±-]?\d[\d.,]*(?: ?{UNIT})?|\d[\d.,'x× ]*{UNIT}|(?<=[+±])\d[\d.,]*)\W*", re.IGNORECASE
 )
-SIZES = re.compile("AREA|FLAE|FLÄ|SUPERF|SURF|HEIGHT|HOEHE|HÖHE", re.IGNORECASE)  # in the tag of an attribute
+# In the tag of an attribute: what is no name, what is one, and what is a part of one
+SIZES = re.compile("AREA|FLAE|FLÄ|SURF|SUPERF|HEIGHT|HOEHE|HÖHE|PERI|UMF|DEP|FINIS|BELAG|BODEN", re.IGNORECASE)
+NAME, PART = (re.compile("NAME|NOM|DESC|BEZ|NUTZ" + number, re.IGNORECASE) for number in ("", "|NUM|NR|^NO|NO$"))
 TEXTS = ("TEXT", "MTEXT", "ATTRIB")
 
 
 class Written(NamedTuple):
-    """A text as a room, the height of its letters (m), their direction (rad), and what it is called where it is left out."""
+    """A text as a room, height (m) and direction (rad) of its letters, what it is called where it is left out, an attribute's block and tag."""
 
     room: Room
     height_m: float
     turn: float
     what: str
+    block: str = ""
+    tag: str = ""
 
     def read_at(self) -> tuple[float, float]:
         """Its place along and across the direction of reading."""
@@ -60,10 +64,8 @@ def rooms_of(
     outlines: list[Polygon] = []
     for entity, layer in entities:
         named = written(entity, layer, frame)
-        closed = [
-            area for line in frame.lines(entity, file) if line.is_closed for area in areas([Polygon(line.coords)])
-        ]
-        large = [area for area in closed if area.area >= LEAST_M2]
+        rings = (Polygon(line.coords) for line in frame.lines(entity, file) if line.is_closed)
+        large = [area for area in areas(rings) if area.area >= LEAST_M2]
         if named:
             names[named.room.name, named.room.at_m] = named
         outlines += large
@@ -71,37 +73,49 @@ def rooms_of(
             report.leave_out(f"{entity.dxftype()} on {layer[:40]}")
         else:
             report.use("rooms", layer)
-    return _matched([*names.values()], outlines, texts, report)
+    chosen = names_of_blocks([*names.values()])
+    report.leave_out("ATTRIB beside a room's name", len(names) - len(chosen))
+    return _matched(chosen, outlines, texts, report)
+
+
+def names_of_blocks(texts: Sequence[Written]) -> list[Written]:
+    """Texts without the attributes of a block beside those that its tags call name and number."""
+    named = {text.block for text in texts if NAME.search(text.tag)}
+    return [text for text in texts if text.block not in named or PART.search(text.tag)]
 
 
 def _matched(names: list[Written], outlines: list[Polygon], texts: list[Written], report: ImportReport) -> list[Room]:
-    """Each outline gets the texts inside it that no smaller outline has; an outline without a text is numbered."""
-    left, rooms = list(names), []
-    for outline in sorted(outlines, key=lambda area: area.area):
+    """Each outline gets the texts inside it that no smaller outline has; one without a text is numbered, if it holds less than two others."""
+    left, rooms, seen = list(names), [], list[Point]()
+    for outline in sorted({area.normalize(): area for area in outlines}.values(), key=lambda area: area.area):
         own = [name for name in left if outline.intersects(Point(name.room.at_m))]
         left = [name for name in left if name not in own]
-        inside = [name.room for name in own] or _lines_of(
-            [text for text in texts if outline.intersects(Point(text.room.at_m))], report
-        )
-        rooms.append(room(" ".join(name.name for name in inside)[:80], outline))
+        others = [text for text in texts if outline.intersects(Point(text.room.at_m))]
+        inside = [name.room for name in own] or _lines_of(others, report)
+        if inside or shapely.covers(outline, seen).sum() < 2:
+            rooms.append(room(" ".join(name.name for name in inside)[:80], outline))
+        seen.append(outline.representative_point())
     numbered = [one if one.name else Room(f"room {k}", one.at_m, one.outline_m) for k, one in enumerate(rooms, 1)]
     return [*_stamps(left, report), *numbered]
 
 
 def _stamps(texts: Sequence[Written], report: ImportReport) -> list[Room]:
-    """Texts that stand beneath each other, as lines of one room's name; of these, smaller letters and measures are none."""
+    """Texts that stand beneath each other, or in one block, as lines of one room's name; of these, smaller letters and measures are none."""
     texts = sorted(texts, key=lambda one: (-one.read_at()[1], one.read_at()[0]))
     places = shapely.points(np.array([text.room.at_m for text in texts]).reshape(-1, 2))
     tree, reach_m = shapely.STRtree(places), 2.0 * NEXT_LINE * max((text.height_m for text in texts), default=0.0)
     stamps: dict[int, list[Written]] = {}  # by the number of each text
+    blocks: dict[str, list[Written]] = {}
     for k, (text, place) in enumerate(zip(texts, places, strict=True)):
         near = (stamps[i] for i in tree.query(place, predicate="dwithin", distance=reach_m) if i < k)
         above = (stamp for stamp in near if _follows(text, stamp[-1]))
-        stamps[k] = min(above, key=lambda stamp: stamp[-1].read_at()[1], default=[])
+        below = min(above, key=lambda stamp: stamp[-1].read_at()[1], default=[])
+        stamps[k] = blocks.setdefault(text.block, below) if text.block else below
         stamps[k].append(text)
     rooms = []
     for stamp in {id(stamp): stamp for stamp in stamps.values()}.values():
-        large = [text for text in stamp if text.height_m >= SAME_HEIGHT * max(one.height_m for one in stamp)]
+        least_m = SAME_HEIGHT * max(one.height_m for one in stamp)
+        large = [text for text in stamp if text.height_m >= least_m or PART.search(text.tag)]
         lines = [text for text in large if text is large[0] or not MEASURE.match(text.room.name)]
         rooms.append(Room(" ".join(line.room.name for line in lines)[:80], lines[0].room.at_m))
         for text in stamp:
@@ -147,7 +161,8 @@ def written(entity: Any, layer: str, frame: DrawingFrame) -> Written | None:
         return None
     height = entity.dxf.get("char_height" if entity.dxftype() == "MTEXT" else "height", 0.0)
     turn = math.radians(entity.get_rotation() if entity.dxftype() == "MTEXT" else entity.dxf.get("rotation", 0.0))
-    return Written(named, float(height) * frame.scale_m, turn, f"{entity.dxftype()} on {layer[:40]}")
+    block, tag = (entity.dxf.owner, entity.dxf.tag) if entity.dxftype() == "ATTRIB" else ("", "")
+    return Written(named, float(height) * frame.scale_m, turn, f"{entity.dxftype()} on {layer[:40]}", block, tag)
 
 
 def _named(entity: Any, frame: DrawingFrame) -> Room | None:
