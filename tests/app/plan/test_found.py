@@ -125,7 +125,7 @@ def found() -> Path:
 
 
 @pytest.mark.parametrize(("name", "doors"), [
-    ("stacked/stacked.osm", [2, 1, 1]), ("stacked/stacked.geojson", [2, 1, 1]), ("geom/out_geom.osm", [2, 2, 2]), ("josm-deleted/josm.osm", [0]),
+    ("stacked/stacked.osm", [2, 1, 1]), ("stacked/stacked.geojson", [2, 1, 1]), ("geom/out_geom.osm", [2, 1, 1]), ("josm-deleted/josm.osm", [0]),
 ])  # fmt: skip
 def test_doors_found(found: Path, name: str, doors: list[int]) -> None:
     assert [len(level.doors) for level in imported(found / name)[0].levels] == doors

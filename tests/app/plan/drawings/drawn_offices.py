@@ -142,8 +142,9 @@ def drawn_twice(space: Any, box: Box, layer: Layer) -> None:
 
 def wide_polylines(space: Any, box: Box, layer: Layer) -> None:
     a, b, thick = axis(box)
-    corners_of, same = ([a, b], {"const_width": thick}) if a[0] == b[0] else ([(*a, thick, thick), (*b, 0, 0)], {})
-    space.add_lwpolyline(corners_of, format="xyse", dxfattribs=layer | same)
+    even = a[0] == b[0]
+    ends: list[Any] = [a, b] if even else [(*a, thick, thick), (*b, 0, 0)]
+    space.add_lwpolyline(ends, format="xyse", dxfattribs=layer | ({"const_width": thick} if even else {}))
 
 
 def multilines(space: Any, box: Box, layer: Layer) -> None:
