@@ -14,6 +14,7 @@ from urllib.parse import unquote
 import pytest
 
 from board_runs import ROOT
+from page.browser import opened_page
 from waiting import PATIENCE_S
 
 pytestmark = [pytest.mark.process, pytest.mark.long]
@@ -103,7 +104,7 @@ def test_a_dead_link_fails(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("width", [360, 1280])
 def test_the_search_finds_without_a_server_or_a_network(site: Path, browser: Any, width: int) -> None:
-    page = browser.new_page(viewport={"width": width, "height": 800})
+    page = opened_page(browser, viewport={"width": width, "height": 800})
     requests: list[str] = []
     page.on("request", lambda request: requests.append(request.url))
     page.goto((site / "search.html").as_uri() + "?q=resampling")

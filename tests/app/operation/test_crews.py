@@ -20,8 +20,8 @@ from echostep_app.team.messages.marks import MarkBoard
 from echostep_app.team.messages.report import BadReportError
 from operation.teams import TOWER, ServedTeam, Team, place, whole_team
 from operation.test_table_page import LOOKS, shot, table
-from page.browser import loaded_page, overflow, violations, wait_for
-from page.web.test_page_sizes import SIZES, TABLE_READY, UNREACHED
+from page.browser import TABLE_READY, loaded_page, overflow, violations, wait_for
+from page.web.test_page_sizes import SIZES, UNREACHED
 
 CREW = Crew(1, "0123abcd", "Attack 1", ("Anna", "Bo"), 30.0, "Ann", 1.8e9)
 BUTTON = "document.querySelector('#crews-button').textContent"
@@ -189,7 +189,7 @@ def test_a_commander_with_crews(browser: Any, monkeypatch: pytest.MonkeyPatch, t
                 f"[...document.querySelectorAll('#crew-list li')].find((e) => e.innerText.includes('{name}')).dataset.state === 'inside'",
             )
             page.click("#crews form[method=dialog] button")
-        assert page.inner_text("#list li:has-text('Anna') .note") == "crew Attack 1 inside"
+        page.locator("#list li:has-text('Anna') .note:text-is('crew Attack 1 inside')").wait_for()
         pass_time(4.5)
         wait_for(page, f"{BUTTON} === 'Crews 2 !' && {DUE} === 'Attack 2: check due'")
         page.focus("#map")

@@ -11,14 +11,14 @@ import pytest
 
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.teams import TOWER, ServedTeam, Team, place, whole_team
-from page.browser import opened_page, spot, violations, wait_for
+from page.browser import TABLE_READY, loaded_page, spot, violations, wait_for
 from waiting import until
 
 SIZES = ((1280, 800), (360, 740), (740, 360), (320, 256), (1920, 1080))
-READY = "echostep.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
 LISTENS = """
     window.rung = 0; window.shaken = 0;
-    const create = AudioContext.prototype.createOscillator;
+    const { createOscillator: create, resume } = AudioContext.prototype;
+    AudioContext.prototype.resume = function () { return resume.call(this).then(() => { window.sounds = true; }); };
     AudioContext.prototype.createOscillator = function () { window.rung++; return create.call(this); };
     navigator.vibrate = () => { window.shaken++; return true; };"""
 VIEW = "[echostep.scene.level, echostep.view.x, echostep.view.y, echostep.view.scale, echostep.view.turn]"
@@ -35,13 +35,13 @@ def calm_team() -> Team:
 
 
 def opened_table(browser: Any, url: str, size: tuple[int, int]) -> Any:
-    page = opened_page(browser, viewport={"width": size[0], "height": size[1]})
-    page.wrong = []
-    page.on("pageerror", lambda error: page.wrong.append(str(error)))
-    page.add_init_script(LISTENS)
-    page.goto(url)
-    wait_for(page, READY)
-    return page
+    return loaded_page(browser, url, {"viewport": {"width": size[0], "height": size[1]}}, TABLE_READY, LISTENS)
+
+
+def lets_sound(page: Any) -> None:
+    """The first tap; the device takes its time."""
+    page.click("#north")
+    wait_for(page, "window.sounds")
 
 
 def header_colour(page: Any) -> str:
@@ -57,7 +57,7 @@ def test_a_mayday_is_heard_and_seen_and_leads_to_its_place_and_back(
     with ServedTeam(team) as served, opened_table(browser, served.page.url, size) as page:
         calm, title = header_colour(page), page.title()
         assert page.inner_text("#words") == "● connected"
-        page.click("#north")  # the first tap lets the page sound
+        lets_sound(page)
         page.evaluate("echostep.view.zoom(6)")
         before = page.evaluate(VIEW)
         team.hear("Gil", place(TOWER, X_M + 9.0, Y_M, 2), alarm=FALL)
@@ -89,7 +89,7 @@ def test_a_mayday_is_heard_and_seen_and_leads_to_its_place_and_back(
 def test_a_page_in_the_background_sounds_too(browser: Any) -> None:
     team = calm_team()
     with ServedTeam(team) as served, opened_table(browser, served.page.url, SIZES[0]) as page:
-        page.click("#north")
+        lets_sound(page)
         page.evaluate("""() => {
             Object.defineProperty(document, 'hidden', { get: () => true });
             window.requestAnimationFrame = () => 0;

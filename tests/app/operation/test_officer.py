@@ -15,8 +15,8 @@ from echostep_app.team.messages.orders import EVERYBODY, Receipt, receipt_messag
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.crowd import walking
 from operation.teams import STOREYS, TOWER, ServedTeam, Team
-from operation.test_table_page import READY, WIDE, WORDS
-from page.browser import HELD_MS, loaded_page, overflow, spot, violations, wait_for
+from operation.test_table_page import WIDE, WORDS
+from page.browser import FRAMED, HELD_MS, TABLE_READY, loaded_page, overflow, spot, violations, wait_for
 from page.outage import Wire
 from page.web.test_page_silence import OUTBOX, STATUS
 from page.web.test_page_sizes import SIZES, UNREACHED
@@ -52,7 +52,7 @@ def test_a_list_of_twenty_is_sorted_and_looked_through(browser: Any) -> None:
     """Calls for help stay on top; a place has coordinates, and a distance to a second one."""
     team = crowd(20)
     team.hear("wearer 13", walking(13, 0.0, 1), alarm=ReportedAlarm("mayday", "fall", 1, 14.0))
-    with ServedTeam(team) as served, loaded_page(browser, served.page.url, WIDE, READY) as page:
+    with ServedTeam(team) as served, loaded_page(browser, served.page.url, WIDE, TABLE_READY) as page:
         page.select_option("#sort", "floor")
         floors = f"{WORDS}.map((text) => text.match(/(Ground|1st|2nd) floor/)?.[1])"
         shown(page, floors, ["1st", *["2nd"] * 6, *["1st"] * 6, *["Ground"] * 7])
@@ -66,7 +66,7 @@ def test_a_list_of_twenty_is_sorted_and_looked_through(browser: Any) -> None:
         assert page.evaluate(NAMES) == ["wearer 13", "wearer 07"]
         page.fill("#find", "")
         wait_for(page, f"{NAMES}.length === 20")
-        page.evaluate("echostep.view.zoom(0.5)")
+        page.evaluate(f"(echostep.view.zoom(0.5), {FRAMED})")
         x_m, y_m = TOWER.levels[0].rooms[0].at_m
         page.mouse.click(*spot(page, x_m + 2.0, y_m))
         wait_for(
@@ -85,7 +85,7 @@ def test_all_storeys_feet_and_the_log(browser: Any, tmp_path: Path) -> None:
     team = crowd(6)
     team.unix_s = time.time()
     place_words = "document.querySelector('#list .said').textContent"
-    with ServedTeam(team) as served, loaded_page(browser, served.page.url, WIDE, READY) as page:
+    with ServedTeam(team) as served, loaded_page(browser, served.page.url, WIDE, TABLE_READY) as page:
         served.page.feed.send = lambda *message: team.put_bytes(*message) or True  # type: ignore[func-returns-value]
         page.focus("#map")
         page.keyboard.press("v")
@@ -185,7 +185,7 @@ def officer(browser: Any, wearers: int, minutes: float, look: Callable[[Any, str
     part_s, caller = 60.0 * minutes / 6.0, wearers - 1
     name = f"wearer {caller:02d}"
     with ServedTeam(crowd(wearers)) as served, Wire(served.page.url) as wire:
-        page = loaded_page(browser, wire.url, WIDE, READY)
+        page = loaded_page(browser, wire.url, WIDE, TABLE_READY)
         visit = Visit(served, page, wearers)
         visit.pass_time(part_s)
         visit.until(f"{STATUS} === 'connected' && echostep.scene.rows.length === {wearers}")

@@ -33,7 +33,7 @@ from echostep_app.team.messages.report import BadReportError
 from operation.teams import Team, whole_team
 from operation.test_marks_and_alarms import Commander
 from operation.test_sent import SPEAKS
-from page.browser import HELD_MS, READY, Walk, opened_page, overflow, wait_for
+from page.browser import HELD_MS, READY, Walk, loaded_page, overflow, wait_for
 from page.web.test_page_sizes import UNREACHED
 from team.network import box_to
 from team.team_broker import Broker, needs_broker
@@ -137,12 +137,9 @@ def test_everybody_is_ordered_out_and_says_so(browser: Any, tmp_path: Path, monk
         box = box_to(broker.url, name="bo")
         box.offer(report("bo"))
         assert until(lambda: len(ben.look().rows) == 1)
-        wearer, table = (opened_page(browser, viewport={"width": 360, "height": 740}) for _ in range(2))
-        wearer.add_init_script(SPEAKS)
-        wearer.goto(walk.page.url)
-        wait_for(wearer, READY)
-        table.goto(ben.page.url)
-        wait_for(table, "document.querySelectorAll('#list li').length === 1")
+        how = {"viewport": {"width": 360, "height": 740}}
+        wearer = loaded_page(browser, walk.page.url, how, READY, SPEAKS)
+        table = loaded_page(browser, ben.page.url, how, "document.querySelectorAll('#list li').length === 1")
         table.fill("#me", "Ben")
         table.click("#out")
         wait_for(table, "document.querySelector('#hint').textContent === 'Hold Everybody out for a second.'")

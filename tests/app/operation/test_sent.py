@@ -17,7 +17,7 @@ from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.team.endpoint import parse_outlet
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.test_marks_and_alarms import Commander
-from page.browser import READY, Walk, opened_page, wait_for
+from page.browser import READY, Walk, loaded_page, wait_for
 from team.network import box_to
 from team.team_broker import Broker, needs_broker
 from team.team_reports import PLAN, POSITION, report
@@ -42,14 +42,11 @@ def test_who_is_sent_gets_the_way(browser: Any, tmp_path: Path, monkeypatch: pyt
         boxes[0].offer(report("anna", position=lying, alarm=ReportedAlarm("mayday", "fall", 1, 31.0)))
         boxes[1].offer(report("bo"))
         assert until(lambda: len(ben.look().rows) == 2)
-        rescuer = opened_page(browser, viewport={"width": 360, "height": 740})
-        rescuer.add_init_script(SPEAKS)
-        rescuer.goto(walk.page.url)
-        wait_for(rescuer, READY)
+        how = {"viewport": {"width": 360, "height": 740}}
+        rescuer = loaded_page(browser, walk.page.url, how, READY, SPEAKS)
         assert rescuer.is_hidden("#errand")
-        table = opened_page(browser, viewport={"width": 1280, "height": 800})
-        table.goto(ben.page.url)
-        wait_for(table, "document.querySelectorAll('#list li').length === 2")
+        how = {"viewport": {"width": 1280, "height": 800}}
+        table = loaded_page(browser, ben.page.url, how, "document.querySelectorAll('#list li').length === 2")
         table.click("#list li:first-child button")
         wait_for(table, "document.querySelectorAll('#rescuers li').length === 1")
         table.click("#rescuers button")
@@ -78,7 +75,8 @@ def test_who_is_sent_gets_the_way(browser: Any, tmp_path: Path, monkeypatch: pyt
         rescuer.click("#end-guidance")
         wait_for(rescuer, "document.querySelector('#errand').hidden && !echostep.last.guidance")
         sink.take(portion_of([]), [])
-        wait_for(rescuer, "document.querySelector('#errand').hidden")  # it does not return by itself
+        assert walk.page.mailbox.goal is None  # it does not return by itself
+        wait_for(rescuer, "document.querySelector('#errand').hidden")
         for box in boxes:
             box.close()
         subscription.close()

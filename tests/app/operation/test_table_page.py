@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from operation.teams import TOWER, ServedTeam, place, whole_team
-from page.browser import PHONE, kept, loaded_page, overflow, spot, violations, wait_for
+from page.browser import PHONE, TABLE_READY, kept, loaded_page, overflow, spot, violations, wait_for
 
 WIDE = {"viewport": {"width": 1280, "height": 720}}
 LOOKS: dict[str, dict[str, Any]] = {
@@ -18,13 +18,12 @@ LOOKS: dict[str, dict[str, Any]] = {
     "phone": {**PHONE, "color_scheme": "dark"},
     "contrast": {**PHONE, "contrast": "more"},
 }
-READY = "echostep.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
 WORDS = "[...document.querySelectorAll('#list li')].map((e) => e.innerText.replaceAll('\\n', ' '))"
 
 
 def table(browser: Any, url: str, look: str) -> Any:
     """A page that shows a plan and a list."""
-    return loaded_page(browser, url, LOOKS[look], READY)
+    return loaded_page(browser, url, LOOKS[look], TABLE_READY)
 
 
 def shot(page: Any, name: str, tmp_path: Path) -> None:

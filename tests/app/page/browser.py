@@ -43,6 +43,8 @@ SETTLED = """(() => {
     return Math.abs(view.width - map.clientWidth) < 1 && Math.abs(view.height - map.clientHeight) < 1;
 })()"""  # the view has the size of the map
 READY = f"window.echostep?.last?.told && document.querySelector('#walls path') && {SETTLED}"  # an estimate and a floor are drawn
+TABLE_READY = "window.echostep?.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"  # a commander's
+FRAMED = "new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))"  # after two frames
 SPOT = f"""([x_m, y_m]) => {{
     const {{ left, top }} = document.querySelector('#map').getBoundingClientRect(), [x, y] = echostep.view.toScreen(x_m, y_m);
     return {SETTLED} && [left + x, top + y];
@@ -151,9 +153,10 @@ def looking(browser: Any, url: str, look: str) -> Any:
     return loaded_page(browser, url, LOOKS[look], READY)
 
 
-def loaded_page(browser: Any, url: str, how: dict[str, Any], ready: str) -> Any:
-    """A page of its own context at a URL, once it is ready; faults and errors on its console are in `wrong`."""
+def loaded_page(browser: Any, url: str, how: dict[str, Any], ready: str, script: str = "") -> Any:
+    """A page of its own context at a URL, once it is ready; faults and errors on its console are in `wrong`. `script` runs before its own."""
     page = opened_page(browser, **how)
+    page.add_init_script(script)
     page.wrong = []
     page.on("pageerror", lambda error: page.wrong.append(str(error)))
     page.on("console", lambda said: page.wrong.append(said.text) if said.type == "error" else None)

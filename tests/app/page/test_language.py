@@ -26,7 +26,7 @@ from echostep_app.plan.writer import save_plan
 from echostep_app.team.messages.crews import Crew
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.teams import BASE, NAMES, TOWER, ServedTeam, place, whole_team
-from page.browser import READY, loaded_page, overflow, violations, wait_for
+from page.browser import READY, TABLE_READY, loaded_page, overflow, violations, wait_for
 from page.edit.drawing import answer, answered, click, status
 from page.edit.test_editor_questions import doubtful_house
 from page.frames import scene, served
@@ -35,9 +35,6 @@ from page.web.test_page_sizes import RATES, UNREACHED, moments
 from plan.imported_plans import seven_floors
 from waiting import until
 
-TABLE_READY = (
-    "window.echostep?.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
-)
 EDITOR_READY = "Boolean(window.echostep)"
 LOCALES = {"en": "en-GB", "de": "de-DE"}
 OTHERS = [name for name in LOCALES if name != "en"]

@@ -73,8 +73,8 @@ def test_a_tap_and_a_drag_check_in(browser: Any, tmp_path: Path) -> None:
         page.mouse.down()
         page.mouse.move(x_px, y_px - 50.0, steps=4)
         page.mouse.up()
-        assert not walk.checked_in  # it is said what it would do; only then it is done
         wait_for(page, f"{SHEET}.includes('In South corridor.') && {SHEET}.includes('You face the arrow.')")
+        assert not walk.checked_in  # it is said what it would do; only then it is done
         picture(page, "check-in", tmp_path)
         page.click("#sheet-here")
         assert until(lambda: len(walk.checked_in) == 1)

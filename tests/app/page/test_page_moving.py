@@ -23,7 +23,7 @@ from echostep_app.page.elements.scene import TruePath
 from echostep_app.page.live import LivePage
 from echostep_app.simulation.devices.board import PythonBoard
 from echostep_app.simulation.scenario import demo_scenario
-from page.browser import LOCAL, PICTURES, PLAN, READY, loaded_page, wait_for
+from page.browser import FRAMED, LOCAL, PICTURES, PLAN, READY, loaded_page, wait_for
 
 NAME = "page.webp"
 TITLE = "A simulated walk"
@@ -62,7 +62,7 @@ def recorded(page: Any) -> list[Image.Image]:
     for t_s in np.arange(begin_s + 1.0, end_s, STEP_S):
         page.locator("#time").fill(f"{t_s:.1f}")
         wait_for(page, f"Math.abs(echostep.scene.frame.play.t_s - {t_s:.1f}) < 0.1")
-        page.evaluate("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
+        page.evaluate(FRAMED)
         frames.append(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
     return frames
 

@@ -14,11 +14,10 @@ from echostep.plan import Georeference, Plan
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.plan.places.bearing import heading_words, north_rad
 from operation.teams import ServedTeam, Team, place
-from page.browser import READY, loaded_page, wait_for
+from page.browser import FRAMED, READY, TABLE_READY, loaded_page, wait_for
 from page.frames import PLAN, scene, served, told
 
 DESK = {"viewport": {"width": 1280, "height": 800}}
-TABLE_READY = "echostep.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
 POINTS = """(heading) => {
     const { m21, m22 } = new DOMMatrix(getComputedStyle(document.querySelector('#needle')).transform);
     const [x, y] = echostep.view.toScreen(0, 0), [u, v] = echostep.view.toScreen(Math.cos(heading), Math.sin(heading));
@@ -53,7 +52,7 @@ def check(page: Any, plan: Plan, shot: Path) -> None:
         page.focus("#map")
         page.keyboard.press("[")
         wait_for(page, f"({POINTS})({north}).every((angle) => Math.abs(angle) > 10)")
-        page.evaluate("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
+        page.evaluate(FRAMED)
         needle, heading = angles()
         assert math.remainder(needle - heading, 360.0) == pytest.approx(0.0, abs=0.1)
         act()

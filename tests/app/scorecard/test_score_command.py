@@ -14,7 +14,7 @@ import pytest
 
 from board_runs import ROOT
 from command_line import echostep
-from page.browser import violations
+from page.browser import opened_page, violations
 
 PLAN = ROOT / "host/core/echostep/plans/demo.json"
 
@@ -96,7 +96,7 @@ def test_the_page_in_a_browser(browser: Any, folder: Path, tmp_path: Path, width
     html = tmp_path / "score.html"
     done = echostep("score", folder / "ours.csv", "--truth", folder / "truth.csv", "--html", html)
     assert (done.returncode, done.stdout.splitlines()[-1]) == (0, f"page: {html}")
-    page = browser.new_page(viewport={"width": width, "height": 900})
+    page = opened_page(browser, viewport={"width": width, "height": 900})
     try:
         page.goto(html.as_uri())
         drawn = page.evaluate("[...document.images].map((i) => i.complete && i.naturalWidth > 100)")

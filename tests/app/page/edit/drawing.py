@@ -12,22 +12,16 @@ from typing import Any
 from board_runs import ROOT
 from echostep.plan import load_plan
 from echostep_app.page.editor import EditServer
-from page.browser import spot, wait_for
-from waiting import PATIENCE_S, until
+from page.browser import loaded_page, spot, wait_for
+from waiting import until
 
 PHONES = {"upright": (360, 740), "sideways": (740, 360)}
 PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
 
 
 def opened(browser: Any, server: EditServer, **context: Any) -> Any:
-    page = browser.new_context(**({"viewport": {"width": 1200, "height": 760}} | context)).new_page()
-    page.set_default_timeout(1e3 * PATIENCE_S)
-    page.wrong = []
-    page.on("pageerror", lambda error: page.wrong.append(str(error)))
-    page.on("console", lambda said: page.wrong.append(said.text) if said.type == "error" else None)
-    page.goto(server.url)
-    assert until(lambda: page.evaluate("Boolean(window.echostep)")), page.wrong
-    return page
+    how = {"viewport": {"width": 1200, "height": 760}} | context
+    return loaded_page(browser, server.url, how, "Boolean(window.echostep)")
 
 
 def on_phone(browser: Any, server: EditServer, held: str) -> Any:

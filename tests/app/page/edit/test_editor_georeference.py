@@ -71,7 +71,7 @@ def test_two_corners_give_the_georeference(browser: Any, bare: EditServer, tmp_p
     click(page, *CORNERS[1])
     answer(page, pasted(1.01)[1])
     mentions(page, "Georeference: y points 342.8° from north; 26.83 m here are 27.10 m on Earth, 1.0 % longer")
-    assert page.text_content("#north-text") == "north; y points 342.8°"
+    wait_for(page, "document.querySelector('#north-text').textContent === 'north; y points 342.8°'")  # it is drawn
     turned = page.get_attribute(
         "#north-arrow", "transform"
     )  # clockwise on the page, as x points counter-clockwise from east
@@ -103,11 +103,8 @@ def test_distances_that_disagree_are_refused(browser: Any, bare: EditServer, fac
         click(page, *corner)
         answer(page, text)
     mentions(page, "No georeference: the two points are 26.83 m apart on the plan and " + words)
-    assert page.evaluate("[echostep.sheet.past.length, echostep.tools.points.length, echostep.tools.known.length]") == [
-        0,
-        0,
-        0,
-    ]
+    kept = "[echostep.sheet.past.length, echostep.tools.points.length, echostep.tools.known.length]"
+    assert page.evaluate(kept) == [0, 0, 0]
     assert [text for text in page.wrong if "422" not in text] == []
 
 
@@ -142,6 +139,7 @@ def test_fingers_on_a_phone_held_either_way(browser: Any, bare: EditServer, held
         page.locator("#ask[open]").wait_for()
         page.fill("#answer", "x")
         page.tap("#yes")
+        wait_for(page, "document.querySelector('#ask-wrong').textContent")
         found = violations(page)
         page.screenshot(path=tmp_path / f"asked-{held}.png")
         assert found == []

@@ -87,6 +87,7 @@ def test_digits_on_the_sheet_go_to_the_length(browser: Any, drawn: EditServer) -
     page.keyboard.press("w")
     page.keyboard.press("Enter")
     page.keyboard.press("ArrowUp")  # the draft gives the direction
+    wait_for(page, "!document.querySelector('#length').disabled")
     page.keyboard.type("3.21")
     page.keyboard.press("Enter")
     says(page, "Wall 3.21 m, 90.0°, as typed")

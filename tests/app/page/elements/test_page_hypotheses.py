@@ -22,14 +22,13 @@ from echostep_app.page.live import LivePage
 from echostep_app.plan.routing import Route, Stretch
 from page.browser import READY, Walk, loaded_page, looking, picture, wait_for
 from page.frames import LOCAL, PLAN, scene, served, told
-from page.test_page_browser import ink_near
+from page.test_page_browser import STILL, ink_near
 
 PLACES = (LikelyPlace(0.62, 5.0, 7.5, 0, 0.4, 0.0), LikelyPlace(0.31, 5.0, 2.0, 0, 0.4, 0.0))
 SEARCHED_S = 6.0  # of the demo's walk: along one of two corridors that are alike
 DRAWN = "document.querySelector('#places').textContent"
 WAY = Route((Stretch(0, np.array([[2.0, 7.5], [9.5, 7.5]])),))
 SIZES = ((1280, 800), (360, 740))
-STILL = "!document.getAnimations().length"
 INK = """(places) => {
     const canvas = document.querySelector('#canvas'), style = getComputedStyle(document.documentElement);
     const { data, width } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);

@@ -16,16 +16,13 @@ from typing import Any
 import pytest
 
 from command_line import PROGRAM
-from page.browser import HELD_MS, READY, loaded_page, overflow, wait_for
+from page.browser import HELD_MS, READY, TABLE_READY, loaded_page, overflow, wait_for
 from page.web.test_page_silence import OUTBOX, STATUS, WITHIN_S
 from page.web.test_page_sizes import SIZES, UNREACHED
 from team.team_broker import Broker, needs_broker
 from team.team_reports import PLAN
 from waiting import PATIENCE_S
 
-TABLE_READY = (
-    "window.echostep?.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
-)
 ROW = "document.querySelector('#list li .said').textContent"
 WAITING = "Requests that wait for the broker: 1"
 LOST = "no broker: the last known state"
@@ -73,9 +70,9 @@ def outage(wearer: Any, table: Any, broker: Broker) -> None:
 @pytest.mark.parametrize("size", SIZES)  # each with a walk of its own: at its end the page of a demo becomes its replay
 def test_a_dead_broker_is_told(browser: Any, size: tuple[int, int], tmp_path: Path) -> None:
     with Broker(tmp_path) as broker:
-        walk = f"demo --speed 1 --port 0 --publish {broker.url} --name anna --out {tmp_path / 'demo'}".split()
+        walk = f"demo --speed 0.5 --port 0 --publish {broker.url} --name anna --out {tmp_path / 'demo'}".split()
         follow = ("command", broker.url, "--plan", PLAN, "--port", 0, "--out", tmp_path / "operation.mcap")
-        with program(*walk, "--page", "--no-open") as wearer_url, program(*follow) as table_url:
+        with program(*follow) as table_url, program(*walk, "--page", "--no-open") as wearer_url:
             how = {"viewport": dict(zip(("width", "height"), size, strict=True))}
             wearer = loaded_page(browser, wearer_url, how, READY)
             table = loaded_page(browser, table_url, how, TABLE_READY)

@@ -19,10 +19,11 @@ from echostep_app.plan.routing import RoutePlace
 from echostep_app.team.messages.crews import Crew
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.teams import TOWER, ServedTeam, Team, place
-from page.browser import READY, loaded_page, wait_for
+from page.browser import READY, TABLE_READY, loaded_page, wait_for
 from page.frames import PLAN, scene, served, told
-from page.web.test_page_sizes import RATES, RUNNING, TABLE_READY, moments
+from page.web.test_page_sizes import RATES, RUNNING, moments
 from plan.imported_plans import seven_floors
+from waiting import until
 
 SIZES = ((360, 740), (740, 360), (320, 256))
 ABOVE = """([x, y]) => {
@@ -64,7 +65,7 @@ def test_the_wearer_is_seen_under_every_message(browser: Any, size: tuple[int, i
             mailbox.publish(replace(bad, t_s=t_s + 0.5, estimate=estimate, streams=RATES, gait=RUNNING))
             wait_for(page, f"echostep.last.t_s === {t_s + 0.5}")
             page.screenshot(path=tmp_path / f"{size[0]}-{x_m:.0f}.png")
-            assert page.evaluate(ABOVE, [x_m, 7.5]) == []
+            assert until(lambda x_m=x_m: page.evaluate(ABOVE, [x_m, 7.5]) == []), page.evaluate(ABOVE, [x_m, 7.5])  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -132,7 +133,7 @@ def test_names_give_way_to_signs(browser: Any) -> None:
     spots = [TOWER.levels[0].rooms[0].at_m]
     team.hear("Anna", place(TOWER, *spots[0], 0))
     with ServedTeam(team) as table, opened(browser, table.page.url, (360, 740), TABLE_READY) as page:
-        assert not covered(page, spots)
+        assert until(lambda: not covered(page, spots)), covered(page, spots)
         left, right = page.evaluate(NAME_AT_EDGE)
         assert 0 < left < right < 180  # on the other side of the sign, where the map's edge would cut it
 

@@ -18,12 +18,14 @@ from echostep_app.page.elements.scene import TruePath
 from echostep_app.page.live import LivePage
 from echostep_app.session.options import OutputOptions
 from echostep_app.session.session import Session
-from page.browser import LOCAL, PLAN, SETTLED, opened_page, wait_for
+from page.browser import LOCAL, PLAN, SETTLED, loaded_page, opened_page, wait_for
+from page.frames import scene, served
 from walks import walk_chunks
 
 ENDED = "ended: mean error 0.06 m, at most 0.16 m. ▶ plays it again"
 FITS = "echostep.view.shows([1, 1, 25, 13])"
 STATUS = "document.getElementById('words').dataset.status"
+SAYS = "document.getElementById('status-text').textContent"
 SIZES = {"desk": {"width": 1280, "height": 720}, "phone": {"width": 360, "height": 640}}
 
 
@@ -43,7 +45,7 @@ def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any, tmp
         assert "4 x real time" in page.inner_text("#title")
         assert page.is_hidden("#replay")
         live.mailbox.end("mean error 0.06 m, at most 0.16 m")
-        wait_for(page, f"document.getElementById('status-text').textContent === '{ENDED}'")
+        wait_for(page, f"{SAYS} === '{ENDED}'")
         wait_for(page, f"!document.getElementById('replay').hidden && {SETTLED} && {FITS}")  # beside the time bar
         page.screenshot(path=tmp_path / f"ended-{size}.png")
         assert page.get_attribute("#words", "data-status") == "ended"
@@ -95,14 +97,24 @@ def test_an_error_that_ends_the_run_is_on_the_page_in_the_words_of_the_terminal(
         cli.main()
     said = capsys.readouterr().err.removeprefix("echostep: ").strip()
     (page,) = pages
-    wait_for(
-        page, f"{STATUS} === 'ended' && document.getElementById('status-text').textContent === 'ended by an error'"
-    )
+    wait_for(page, f"{STATUS} === 'ended' && {SAYS} === 'ended by an error'")
     assert page.inner_text("#fault") == said
     page.evaluate("echostep.link.wait = 50")
     wait_for(page, "echostep.link.failures > 4")  # the server is away; that it does not answer is no other error
     page.screenshot(path=tmp_path / f"failed-{size}.png")
     assert page.inner_text("#fault") == said
+
+
+def test_a_frame_before_the_connection_ends_hides_no_error(browser: Any) -> None:
+    with served() as (server, mailbox):
+        mailbox.publish(scene())
+        page = loaded_page(browser, server.url, {}, "window.echostep?.last")
+        page.evaluate("echostep.link.onFailed('No space left on device', true)")
+        mailbox.publish(scene(2.0))
+        wait_for(page, "echostep.last.t_s === 2")
+        page.evaluate("(echostep.link.wait = 1e9, echostep.link.socket.close())")
+        wait_for(page, "!echostep.link.isOpen")
+        assert page.evaluate(SAYS) == "ended by an error"
 
 
 def rgb(colour: str) -> str:

@@ -13,12 +13,11 @@ import pytest
 from echostep.plan import Plan
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.teams import ServedTeam, Team, place
-from page.browser import HELD_MS, READY, loaded_page, overflow, violations, wait_for
+from page.browser import HELD_MS, READY, TABLE_READY, loaded_page, overflow, violations, wait_for
 from page.web.test_page_visit import PLACES, Place, Visit
 from waiting import until
 
 SIZES = ((1280, 800), (360, 740), (740, 360), (320, 256), (1920, 1080))
-TABLE_READY = "echostep.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
 Look = Callable[[str], None]
 
 
@@ -60,7 +59,7 @@ def test_a_newcomer_looks_around(browser: Any, name: str, tmp_path: Path) -> Non
             look("0-arrives")
             before = visit.estimates[-1]
             for page in pages:
-                assert page.inner_text("#status-text").startswith("tracking, ")
+                wait_for(page, "document.querySelector('#status-text').textContent.startsWith('tracking, ')")
                 assert spot.said[0].split(",")[0].rstrip(".").lower() in page.inner_text("#place").lower()
                 legend(page)
                 page.click("#closer")
@@ -178,7 +177,7 @@ def test_a_commander_answers_a_mayday(browser: Any, name: str, tmp_path: Path) -
 
         with windows(browser, served.page.url, TABLE_READY, tmp_path) as (pages, look):
             for page in pages:
-                assert page.inner_text("#status-text") == "connected"
+                wait_for(page, "document.querySelector('#status-text').textContent === 'connected'")
                 legend(page)
                 page.fill("#me", "Ben")
             team.hear("Kim", place(spot.plan, *spot.way[1], last), alarm=ReportedAlarm("mayday", "fall", 1, 14.0))

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from websockets.sync.client import ClientConnection
 
 from echostep.ports.people.check_in import Call
 from echostep_app.page.mailbox import Mailbox, popped
-from page.browser import HELD_MS, loaded_page, overflow, wait_for
+from page.browser import HELD_MS, TABLE_READY, loaded_page, overflow, wait_for
 from page.frames import BEAT, PLAN, opened_url, scene, served
 from page.outage import Feeder, Wire, outage
 from page.web.test_page_sizes import SIZES, UNREACHED
@@ -22,13 +21,15 @@ from waiting import PATIENCE_S, until
 
 READY = {
     "wearer": "window.echostep?.last?.told && echostep.scene.frame.guidance && document.querySelector('#walls path')",
-    "commander": "window.echostep?.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length",
+    "commander": TABLE_READY,
 }
 FRESH = {"wearer": "tracking, 0.2 m", "commander": "connected"}
 STATUS = "document.querySelector('#status-text').textContent"
 SLEPT_S = 3600
-SLEEPS = f"(() => {{ const now = Date.now; Date.now = () => now() + {1000 * SLEPT_S}; }})()"  # the clock of a browser's computer that slept
-WITHIN_S = 5.0  # of which the tick of the page and the answer of the browser have their share
+TOLD = """new MutationObserver(() => { window.age_s ??= echostep.link.pulse.age_s; })
+    .observe(document.body, { attributeFilter: ['data-silent'] })"""  # keeps how old what is shown was when the page said so
+SLEEPS = f"(() => {{ const now = Date.now; Date.now = () => now() + {1000 * SLEPT_S}; window.age_s = undefined; }})()"  # a computer slept
+WITHIN_S = 5.0  # of which the tick of the page has its share
 DATED = """(id) => getComputedStyle(document.querySelector(id), '::before').content"""
 BEATS = "echostep.link.pulse.heard"
 BACKGROUND = """(() => { const { pulse } = echostep.link, tick = pulse.tick; let last = 0;
@@ -74,21 +75,30 @@ def ask(page: Any, role: str) -> None:
     wait_for(page, f"{OUTBOX}.startsWith('Acknowledge: sending for ')")
 
 
-CARRIED_OUT: dict[str, Callable[[str], bool]] = {
-    "wearer": lambda line: line == "Call(help=True)",
-    "commander": lambda line: "/ack/" in line,
-}
+CARRIED_OUT = {"wearer": "Call(help=True)", "commander": "/ack/"}  # what the feeder prints of it
+LATER = {"wearer": "'call', { help: false }", "commander": "'log', { text: 'seen', by: 'Ben' }"}  # another request
+LATER_OUT = {"wearer": "Call(help=False)", "commander": "/log/"}
+
+
+def printed(feeder: Feeder, words: str) -> int:
+    """How many requests with these words have been carried out."""
+    return sum(words in line for line in feeder.lines)
 
 
 def check(browser: Any, role: str, kind: str, size: tuple[int, int], tmp_path: Path, *, reloads: bool = True) -> None:
     with Feeder(role) as feeder, Wire(feeder.url) as wire:
         page = loaded_page(browser, wire.url, {"viewport": {"width": size[0], "height": size[1]}}, READY[role])
-        wait_for(page, f"{STATUS} === '{FRESH[role]}'")
-        assert page.is_hidden("#silence")
+        wait_for(page, f"{STATUS} === '{FRESH[role]}' && document.querySelector('#silence').hidden")
+        page.evaluate(TOLD)
+        before_s = 0.0
         with outage(kind, feeder, wire):
-            page.evaluate(SLEEPS if kind == "asleep" else "0")
+            if kind == "asleep":
+                wait_for(page, "echostep.link.pulse.since_s > 1.5")  # no beat is on its way
+                before_s = SLEPT_S + page.evaluate("echostep.link.pulse.age_s")
+                page.evaluate(SLEEPS)
+                wait_for(page, f"{STATUS}.includes(' for {SLEPT_S // 60} min')")
             said = shown(page, role)
-            late_s = page.evaluate("echostep.link.pulse.age_s") - SLEPT_S * (kind == "asleep")
+            late_s = page.evaluate("age_s") - before_s
             assert (f"for {SLEPT_S // 60} min" in said) == (kind == "asleep")
             dated(page, role)
             ask(page, role)
@@ -96,13 +106,14 @@ def check(browser: Any, role: str, kind: str, size: tuple[int, int], tmp_path: P
             assert overflow(page) == (0, 0)
             assert page.evaluate(UNREACHED) == []
         wait_for(page, f"{STATUS} === '{FRESH[role]}' && !document.body.dataset.silent")
-        wait_for(page, f"!{OUTBOX}.includes('sending')")
-        assert not page.evaluate("echostep.link.outbox.kept.length")
-        assert until(lambda: any(map(CARRIED_OUT[role], feeder.lines)))
+        wait_for(page, f"!{OUTBOX}.includes('sending') && !echostep.link.outbox.kept.length")
+        assert until(lambda: printed(feeder, CARRIED_OUT[role]))
         if reloads:  # what was answered does not come again
             page.reload()
             wait_for(page, f"{READY[role]} && echostep.link.isOpen")
-        assert sum(map(CARRIED_OUT[role], feeder.lines)) == 1
+        page.evaluate(f"echostep.link.send({LATER[role]})")
+        assert until(lambda: printed(feeder, LATER_OUT[role]))
+        assert printed(feeder, CARRIED_OUT[role]) == 1
         assert not [wrong for wrong in page.wrong if "WebSocket" not in wrong and "net::" not in wrong]
     assert late_s < WITHIN_S
 
@@ -138,6 +149,7 @@ def test_a_call_survives_a_reload_and_the_end_of_the_program(browser: Any) -> No
                     "([key, text]) => { localStorage[`request ${location.pathname} ${key}`] = text; }",
                     [len(damaged), damaged],
                 )
+            page.evaluate("echostep.link.wait = 1e9")  # the page that is left does not come back
             wire.cut()
             wire.lead_to(other.url)
             wire.mend()
@@ -175,8 +187,7 @@ def test_no_call_is_lost_by_a_clock_that_is_set_nor_in_one_of_two_tabs(browser: 
 def test_a_run_that_hangs_behind_its_server_is_told_and_what_has_nothing_to_say_is_not_silent(browser: Any) -> None:
     with served(Mailbox(PLAN, "echostep live", replay=False)) as (server, mailbox):
         page = loaded_page(browser, server.url, {}, "window.echostep?.link.isOpen")
-        wait_for(page, f"{BEATS} > 3")  # no estimate yet
-        assert page.is_hidden("#silence")
+        wait_for(page, f"{BEATS} > 3 && document.querySelector('#silence').hidden")  # no estimate yet
         page.evaluate(BACKGROUND)
         mailbox.publish(scene())
         mailbox.exchange.note_alive()
@@ -195,11 +206,8 @@ def test_a_beat_comes_at_once_and_a_request_is_carried_out_once() -> None:
         call = {"kind": "call", "help": True, "request": "12-34-56-78"}
         for _ in range(2):
             page.send(json.dumps(call))
-            assert json.loads(page.recv(timeout=PATIENCE_S)) == {
-                "kind": "answered",
-                "request": "12-34-56-78",
-                "reason": "",
-            }
+            answer = {"kind": "answered", "request": "12-34-56-78", "reason": ""}
+            assert json.loads(page.recv(timeout=PATIENCE_S)) == answer
         with opened_url(server.url) as again:  # after a new connection
             again.recv(timeout=PATIENCE_S)
             again.send(json.dumps(call))
@@ -207,35 +215,43 @@ def test_a_beat_comes_at_once_and_a_request_is_carried_out_once() -> None:
         assert list(popped(mailbox.check_ins)) == [Call(help=True)]
         page.send(json.dumps(call | {"help": "please", "request": "12-34-56-79"}))
         assert "another version" in json.loads(page.recv(timeout=PATIENCE_S))["reason"]
-        late = {
-            "kind": "check_in",
-            "x_m": 2,
-            "y_m": 7.5,
-            "sd_m": 0.5,
-            "request": "12-34-56-81",
-            "until_s": time.monotonic() - 0.1,
-        }
-        page.send(json.dumps(late))
+        here = {"kind": "check_in", "x_m": 2, "y_m": 7.5, "sd_m": 0.5}
+        page.send(json.dumps(here | {"request": "12-34-56-81", "until_s": time.monotonic() - 0.1}))
         assert json.loads(page.recv(timeout=PATIENCE_S))["reason"].startswith("It came too late")
-        page.send(json.dumps(late | {"request": "12-34-56-82", "until_s": time.monotonic() + PATIENCE_S}))
+        page.send(json.dumps(here | {"request": "12-34-56-82", "until_s": time.monotonic() + PATIENCE_S}))
         assert not json.loads(page.recv(timeout=PATIENCE_S))["reason"]
         assert len(list(popped(mailbox.check_ins))) == 1
-        page.send(json.dumps(late | {"request": "12-34-56-82"}))  # again, later: it was carried out
+        late = {"request": "12-34-56-82", "until_s": time.monotonic() - 0.1}
+        page.send(json.dumps(here | late))  # again, later: it was carried out
         assert not json.loads(page.recv(timeout=PATIENCE_S))["reason"]
-        page.send(json.dumps({"kind": "check_in", "x_m": 2, "y_m": 8.5, "sd_m": 0.5, "request": "12-34-56-80"}))
+        page.send(json.dumps(here | {"y_m": 8.5, "request": "12-34-56-80"}))
         assert "inside a wall" in json.loads(page.recv(timeout=PATIENCE_S))["reason"]
 
 
-@pytest.mark.parametrize("held", [True, False])
-def test_help_is_held_and_a_brush_is_none(browser: Any, *, held: bool) -> None:
+HELD = """() => {
+    const help = document.querySelector('#help'), begun = performance.now();
+    const point = (kind) => help.dispatchEvent(new PointerEvent(kind, { pointerId: 1 }));
+    help.setPointerCapture = () => {};
+    point('pointerdown');
+    while (performance.now() < begun + 1100);
+    point('pointerup');
+}"""  # while the page is too busy for its timer
+
+
+@pytest.mark.parametrize("how", ["key", "busy", "brush"])
+def test_help_is_held_and_a_brush_is_none(browser: Any, how: str) -> None:
     with served() as (server, mailbox):
         mailbox.publish(scene())
         page = loaded_page(browser, server.url, {}, "window.echostep?.last?.told")
-        if held:
-            page.focus("#help")
-            page.keyboard.press("Enter")  # no glove presses a key
-            wait_for(page, f"{OUTBOX} === 'Help!: sent'")
-        else:
+        if how == "brush":
             page.click("#help")
             wait_for(page, "document.querySelector('#hint').textContent === 'Hold Help! for a second.'")
-        assert list(popped(mailbox.check_ins)) == [Call(help=True)] * held
+        elif how == "busy":
+            page.evaluate(HELD)
+        else:
+            page.press("#help", "Enter")  # no glove presses a key
+        if how != "brush":
+            wait_for(page, f"{OUTBOX} === 'Help!: sent'")
+        page.evaluate("echostep.link.send('call', { help: false })")  # after which nothing of before can come
+        wait_for(page, f"{OUTBOX}.includes('I am all right: sent')")
+        assert list(popped(mailbox.check_ins)) == [Call(help=True)] * (how != "brush") + [Call(help=False)]

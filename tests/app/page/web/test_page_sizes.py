@@ -16,13 +16,12 @@ from echostep_app.page.elements.stream_rates import StreamRates
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.teams import TOWER, ServedTeam, place, whole_team
-from page.browser import READY, loaded_page, overflow, violations, wait_for
+from page.browser import READY, TABLE_READY, loaded_page, overflow, violations, wait_for
 from page.frames import scene, served, told
 from plan.imported_plans import seven_floors
 
 SIZES = ((1280, 800), (360, 740), (740, 360), (320, 256), (1920, 1080), (1100, 640))
 LOW = ((740, 360), (320, 256))  # a phone held sideways, and 1280 x 1024 at 400 %
-TABLE_READY = "echostep.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
 BOX = "JSON.stringify(document.querySelector('#map').getBoundingClientRect())"
 HEADER = "document.querySelector('header').getBoundingClientRect().height"
 SHARE = "document.querySelector('#map').getBoundingClientRect().height / innerHeight"

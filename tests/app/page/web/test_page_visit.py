@@ -21,7 +21,7 @@ from echostep.tracker import Tracker
 from echostep_app.page.live import LivePage
 from echostep_app.simulation.devices.board import PythonBoard
 from echostep_app.simulation.scenario import Scenario
-from page.browser import LOCAL, PHONE, PLAN, READY, opened_page, spot, wait_for
+from page.browser import LOCAL, PHONE, PLAN, READY, loaded_page, spot, wait_for
 from plan.imported_plans import seven_floors
 from waiting import until
 
@@ -93,12 +93,8 @@ def pages(browser: Any, url: str) -> Iterator[dict[str, Any]]:
     with ExitStack() as opened:
         found = {}
         for size, how in SIZES.items():
-            page = found[size] = opened_page(browser, **how)
-            opened.callback(page.context.close)
-            page.wrong = []
-            page.on("pageerror", lambda error, page=page: page.wrong.append(str(error)))
-            page.goto(url)
-            wait_for(page, READY)
+            found[size] = loaded_page(browser, url, how, READY)
+            opened.callback(found[size].context.close)
         yield found
         for page in found.values():
             assert not page.wrong

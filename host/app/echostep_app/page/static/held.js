@@ -5,18 +5,18 @@ const HELD_MS = 1000;
 
 // `act()` once it was held; `brushed()` when it was let go before.
 export function onHeld(button, act, brushed) {
-  let timer = null;
+  let timer = null, begun = 0;
   const end = () => {
     clearTimeout(timer);
     timer = null;
     button.classList.remove('held');
   };
-  button.onpointerdown = ({ pointerId }) => {
+  button.onpointerdown = ({ pointerId, timeStamp }) => {
     button.setPointerCapture(pointerId);
     button.classList.add('held');
-    timer = setTimeout(() => { end(); act(); }, HELD_MS);
+    [begun, timer] = [timeStamp, setTimeout(() => { end(); act(); }, HELD_MS)];
   };
-  button.onpointerup = () => { if (timer !== null) brushed(); end(); };
+  button.onpointerup = ({ timeStamp }) => { if (timer !== null) (timeStamp - begun < HELD_MS ? brushed : act)(); end(); };  // a busy page's timer is late
   button.onpointercancel = end;
   button.oncontextmenu = (e) => e.preventDefault();
   button.onclick = ({ detail }) => { if (!detail) act(); };

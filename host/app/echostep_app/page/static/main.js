@@ -73,7 +73,7 @@ async function hello(message) {
     view.resize($('map').clientWidth, $('map').clientHeight);
     fitted = false;
   }
-  isLive = !message.replay && !message.takes_files;
+  [isLive, broken] = [!message.replay && !message.takes_files, false];
   $('here').hidden = $('sheet-here').hidden = $('help').hidden = !isLive;
   drops.show(message.takes_files, !message.replay);
   if (!isLive) panel.team([]);
@@ -146,7 +146,6 @@ function refused(reason) {
 // What is left of the last frame while no other one comes: no way to go, no claim.
 function connection() {
   const { pulse, isOpen } = link;
-  if (isOpen) broken = false;
   dirty ||= pulse.isSilent || scene.isOld;
   scene.isOld = pulse.isSilent;
   if (pulse.isSilent && scene.frame?.guidance && pulse.isLive()) {
