@@ -19,6 +19,7 @@ from hypothesis import settings
 
 import layers
 from echostep_app.interruption import ENDS, end_by_signals
+from waiting import PATIENCE_S
 
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
@@ -48,6 +49,13 @@ def _signals_as_they_were() -> Iterator[None]:
     end_by_signals()  # no signal has come
     for number, handler in handlers:
         signal.signal(number, handler)
+
+
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No report becomes too old to be sent, nor its position lost by its age, however long other programs have the cores."""
+    for name in ("FRESH_S", "SETTLED_S", "CLOSING_S"):
+        monkeypatch.setattr(f"echostep_app.team.outbox.{name}", PATIENCE_S)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -20,13 +20,12 @@ from echostep_app.session.session import Session
 from echostep_app.session.team import feeds
 from echostep_app.session.team.feeds import TeamFeed
 from echostep_app.session.team.subscription import TeamSubscription
-from echostep_app.team import outbox
 from echostep_app.team.endpoint import parse_endpoint, parse_outlet
 from echostep_app.team.inbox import MESSAGES_PER_TOPIC
 from team.network import box_to
 from team.team_broker import Broker, needs_broker
 from team.team_reports import PLAN, POSITION, report
-from waiting import PATIENCE_S, until
+from waiting import until
 
 
 def test_without_a_broker_it_is_said_what_is_missing(tmp_path: Path) -> None:
@@ -38,11 +37,10 @@ def test_without_a_broker_it_is_said_what_is_missing(tmp_path: Path) -> None:
 
 
 @needs_broker
+@pytest.mark.usefixtures("patient")
 def test_the_newest_place_of_the_wearer_is_heard_although_the_broker_dies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("FRESH_S", "SETTLED_S"):
-        monkeypatch.setattr(outbox, name, PATIENCE_S)
     monkeypatch.setattr(feeds, "NEWS_S", 0.0)
     monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     said: list[str] = []

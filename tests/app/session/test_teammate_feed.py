@@ -16,13 +16,12 @@ from echostep_app.session.chunk_streams import MessageSource, with_messages
 from echostep_app.session.team import teammate_feed
 from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.session.team.teammate_feed import TeammateFeed
-from echostep_app.team import outbox
 from echostep_app.team.endpoint import parse_endpoint, parse_outlet
 from echostep_app.team.mqtt.publisher import Listener
 from team.network import box_to
 from team.team_broker import Broker, needs_broker
 from team.team_reports import PLAN, POSITION, report
-from waiting import PATIENCE_S, until
+from waiting import until
 
 RUN = "0000beac"
 
@@ -32,10 +31,9 @@ def arrival_ns(chunk: Chunk | None) -> int:
 
 
 @needs_broker
+@pytest.mark.usefixtures("patient")
 def test_teammates_on_this_plan_can_be_met(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The wearer's own reports, those on another plan and those of another team are not among them."""
-    for name in ("FRESH_S", "SETTLED_S"):
-        monkeypatch.setattr(outbox, name, PATIENCE_S)
     monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     with Broker(tmp_path) as broker:
         feed, subscription = a_feed(broker, load_plan(PLAN), "bo", RUN)
