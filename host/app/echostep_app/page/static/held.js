@@ -14,7 +14,8 @@ export function onHeld(button, act, brushed) {
   button.onpointerdown = ({ pointerId, timeStamp }) => {
     button.setPointerCapture(pointerId);
     button.classList.add('held');
-    [begun, timer] = [timeStamp, setTimeout(() => { end(); act(); }, HELD_MS)];
+    begun = timeStamp;
+    timer = setTimeout(() => { end(); act(); }, HELD_MS);
   };
   button.onpointerup = ({ timeStamp }) => { if (timer !== null) (timeStamp - begun < HELD_MS ? brushed : act)(); end(); };  // a busy page's timer is late
   button.onpointercancel = end;

@@ -73,7 +73,8 @@ async function hello(message) {
     view.resize($('map').clientWidth, $('map').clientHeight);
     fitted = false;
   }
-  [isLive, broken] = [!message.replay && !message.takes_files, false];
+  isLive = !message.replay && !message.takes_files;
+  broken = false;
   $('here').hidden = $('sheet-here').hidden = $('help').hidden = !isLive;
   drops.show(message.takes_files, !message.replay);
   if (!isLive) panel.team([]);

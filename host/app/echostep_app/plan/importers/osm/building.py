@@ -93,7 +93,7 @@ def _without_level(elements: Elements, report: ImportReport) -> None:
     for where, _, tags in elements.lines():
         indoor = tags.get("indoor", "no")
         kind = "room" if indoor == "room" else f"indoor={indoor[:20]}" if indoor != "no" else ""
-        if (kind or _way(tags)) and not levels_of(tags, where) and tags.get("building", "no") in WALL_LESS:
+        if (kind or _way(tags)) and not levels_of(tags, where) and not _is_outline(tags):
             lost.setdefault(kind or str(_way(tags)), []).append(where)
     for kind, names in lost.items():
         report.leave_out(f"{kind} without level", len(names))
@@ -108,7 +108,7 @@ def _other(elements: Elements, report: ImportReport) -> None:
     """Report elements with tags that plans do not have: shops, furniture, footpaths, groups."""
     walls = ("room", "wall", "column", "pillar", "area", "corridor", "level")
     for _, _, tags in elements.lines():
-        if tags and _way(tags) is None and tags.get("building", "no") in WALL_LESS and tags.get("indoor") not in walls:
+        if tags and _way(tags) is None and not _is_outline(tags) and tags.get("indoor") not in walls:
             report.leave_out("way that is no wall, room, corridor or stairs")
     for _, tags in elements.nodes():
         if _way(tags) is None and not _is_door(tags):
@@ -132,11 +132,16 @@ def _origin(elements: Elements, path: Path) -> Georeference:
 def _outlines(site: OsmSite, elements: Elements) -> None:
     """Add the outlines of buildings as walls, on each of their levels."""
     for where, nodes, tags in elements.lines():
-        if tags.get("building", "no") not in WALL_LESS:
+        if _is_outline(tags):
             least = tags.get("building:min_level") or tags.get("min_level")
             own = levels_of(tags, where) or [k for k in site.order if _within(k, least, tags.get("max_level"))]
             _wall(site, elements, nodes, own, tags)
             site.outside |= dict.fromkeys(nodes, own)
+
+
+def _is_outline(tags: Tags) -> bool:
+    """Whether a way is a building's outline, which has walls."""
+    return tags.get("building", "no") not in WALL_LESS
 
 
 def _within(level: float, least: str | None, most: str | None) -> bool:
