@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader, encode
 from echostep.board.reports import BoardReports
+from echostep.board.subscription import SUBSCRIBE
 from echostep_app.board.faults.health import board_findings
-from echostep_app.board.subscription import SUBSCRIBE
-from echostep_app.simulation.devices.board import BoardProcess
-from echostep_app.simulation.stimulus import NO_SYNC, ROW
+from echostep_simulation.devices.board import BoardProcess
+from echostep_simulation.stimulus import NO_SYNC, ROW
 
 ROOT = Path(__file__).resolve().parent.parent
 TWIN = ROOT / "tools/twin/build/echostep-twin"

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from board_runs import quiet_rows, tool
-from echostep_app.simulation.devices.board import PythonBoard
+from echostep_simulation.devices.board import PythonBoard
 from twin.run import PtyBoard
 from waiting import PATIENCE_S
 

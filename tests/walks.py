@@ -16,8 +16,8 @@ from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk
 from echostep_app.scorecard.card import Scorecard, score
 from echostep_app.scorecard.track_columns import ScoredPath, track_of
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import Scenario, demo_scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import Scenario, demo_scenario
 
 DEMO = ROOT / "host/core/echostep/plans/demo.json"
 

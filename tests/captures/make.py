@@ -22,8 +22,8 @@ from echostep.plan import load_plan  # noqa: E402
 from echostep.ports.chunks import BOARD, Chunk  # noqa: E402
 from echostep.recording import as_json, read_capture  # noqa: E402
 from echostep_app.recording.recorder import Recorder  # noqa: E402
-from echostep_app.simulation.devices.board import BoardProcess  # noqa: E402
-from echostep_app.simulation.scenario import demo_scenario  # noqa: E402
+from echostep_simulation.devices.board import BoardProcess  # noqa: E402
+from echostep_simulation.scenario import demo_scenario  # noqa: E402
 
 SECONDS = 4.0
 NAMES = ("board.bin", "mtx.bin", "walk.mcap")

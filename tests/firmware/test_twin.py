@@ -10,7 +10,7 @@ from pathlib import Path
 
 from board_runs import ROOT, TWIN, Bench, kinds, needs_twin, pings
 from echostep.board import messages as m
-from echostep_app.simulation.devices.board import BoardProcess
+from echostep_simulation.devices.board import BoardProcess
 
 pytestmark = needs_twin
 

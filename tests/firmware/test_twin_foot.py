@@ -9,9 +9,9 @@ import pytest
 from board_runs import Bench, kinds, needs_twin
 from echostep.board import messages as m
 from echostep.board.reports import BoardReports
+from echostep.board.subscription import SUBSCRIBE
 from echostep_app.board.faults.health import board_findings
-from echostep_app.board.subscription import SUBSCRIBE
-from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC
+from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC
 
 pytestmark = needs_twin
 

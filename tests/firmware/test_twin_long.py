@@ -12,8 +12,8 @@ import pytest
 from board_runs import TWIN, Bench, kinds, needs_twin, pings
 from echostep.board import messages as m
 from echostep.timing.timeline import TICKS_PER_S
-from echostep_app.simulation.devices.board import BoardProcess
-from echostep_app.simulation.stimulus import NO_SYNC, ROW
+from echostep_simulation.devices.board import BoardProcess
+from echostep_simulation.stimulus import NO_SYNC, ROW
 from twin.late_clock import HALF_WRAP, TIMER_WRAP, WRAP, late_firmware
 
 pytestmark = needs_twin

@@ -20,7 +20,7 @@ from board_runs import ELF, TWIN, Bench, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader
 from echostep.errors import EchostepError
-from echostep_app.simulation.devices.board import BoardProcess
+from echostep_simulation.devices.board import BoardProcess
 from waiting import PATIENCE_S
 
 pytestmark = needs_twin

@@ -11,9 +11,9 @@ import pytest
 from board_runs import Bench, needs_twin, pings
 from echostep.board import messages as m
 from echostep.board.reports import BoardReports
+from echostep.board.subscription import SUBSCRIBE_ELECTRICAL
 from echostep_app.board.faults.electrical import electrical_findings
-from echostep_app.board.subscription import SUBSCRIBE_ELECTRICAL
-from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC
+from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC
 
 pytestmark = needs_twin
 BARE = ("bmp390", "imu_thigh", "imu_calf", "imu_belt", "pulse_left", "pulse_right", "lis3mdl")

@@ -10,7 +10,7 @@ import pytest
 
 from board_runs import ELF, ROOT, TWIN, Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
-from echostep_app.simulation.devices.board import BoardProcess
+from echostep_simulation.devices.board import BoardProcess
 
 pytestmark = needs_twin
 

@@ -64,13 +64,13 @@ FILE_NAMES = {path.name for folder in ("host", "tools", "tests", "protocol") for
 
 SOURCE = "\n".join(
     path.read_text()
-    for folder in ("host/core", "host/app", "host/studies", "protocol", "firmware")
+    for folder in ("host/core", "host/simulation", "host/app", "host/studies", "protocol", "firmware")
     for path in sorted((ROOT / folder).rglob("*"))
     if path.suffix in {".py", ".toml", ".c", ".h", ".js"}
 )
 
 
-RINGS = (ROOT / "host/core/echostep", ROOT / "host/app/echostep_app")
+RINGS = (ROOT / "host/core/echostep", ROOT / "host/simulation", ROOT / "host/app/echostep_app")
 
 
 def name_of(page: Path) -> str:

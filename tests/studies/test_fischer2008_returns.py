@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from command_line import echostep
-from echostep_app.simulation.world.beacon_ground import OUTLIER_M, disturbance, ground, is_in_reach, measure
+from echostep_simulation.world.beacon_ground import OUTLIER_M, disturbance, ground, is_in_reach, measure
 from echostep_studies.fischer2008.paper_fusion import FUSION, fuse
 from echostep_studies.fischer2008.simulator import OURS, PAPER, PDR, guided_return
 from echostep_studies.fischer2008.study import NOMINAL, UNCERTAIN, Case, cases, one_batch, one_return, wilson95

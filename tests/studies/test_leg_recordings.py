@@ -13,7 +13,7 @@ import pytest
 from echostep.errors import EchostepError
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import Flag, StrideSettings
-from echostep_app.simulation.people.walker import Person, walk
+from echostep_simulation.people.walker import Person, walk
 from echostep_studies.bench.recordings.legs import SETS, LegRecording, moves_of
 from echostep_studies.frame.recordings import DATA, read_sets
 from echostep_studies.legs.recordings import (

@@ -18,7 +18,7 @@ from echostep.plan import Level, load_plan
 from echostep_app.mapping.graph.graph import Closure
 from echostep_app.mapping.graph.nodes import Nodes
 from echostep_app.plan.check import check_plan
-from echostep_app.simulation.scenario import DEMO_WAYPOINTS
+from echostep_simulation.scenario import DEMO_WAYPOINTS
 from echostep_studies.bench.filtering import Claim
 from echostep_studies.bench.sites import Site, plan_of
 from echostep_studies.bench.walks import SimulatedWalk

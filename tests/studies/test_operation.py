@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from echostep_app.simulation.people.walker import Manner, Person, walk
+from echostep_simulation.people.walker import Manner, Person, walk
 from echostep_studies.frame.study import StudyRequest, run_study
 from echostep_studies.operation import study
 from echostep_studies.operation.walks import CHANGE_S, MANNERS, operation, waypoints

@@ -16,7 +16,7 @@ from echostep.arrays import Floats
 from echostep.board.gateway import Gateway
 from echostep.localization import Estimate, TrackStatus
 from echostep.plan import load_plan
-from echostep_app.simulation.scenario import START_NS
+from echostep_simulation.scenario import START_NS
 from echostep_studies.frame.study import StudyRequest, run_study
 from echostep_studies.team import study, tracking, walks
 from echostep_studies.team.beacons import MOST_EACH, dropped_on, with_dropped_beacons

@@ -14,10 +14,10 @@ from typer.testing import CliRunner
 from echostep.arrays import Floats
 from echostep.foot.steps import FootCounts, Track
 from echostep_app.cli import app
-from echostep_app.simulation.devices.mtx import MtxModel, measure
-from echostep_app.simulation.devices.onboard_filter import OnBoardFilter
-from echostep_app.simulation.people.walker import Walk
-from echostep_app.simulation.world.magnetic_field import EARTH_T, MagneticDipole, MagneticField, dipole
+from echostep_simulation.devices.mtx import MtxModel, measure
+from echostep_simulation.devices.onboard_filter import OnBoardFilter
+from echostep_simulation.people.walker import Walk
+from echostep_simulation.world.magnetic_field import EARTH_T, MagneticDipole, MagneticField, dipole
 from echostep_studies.papers import fischer2008
 from echostep_studies.simulation.fischer_trails import TRAILS, Trail, measure_trail, walk_trail
 from echostep_studies.trails.study import METHODS, RATES_HZ, JudgedTrack, TrailRun, judge, summaries, track

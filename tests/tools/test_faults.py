@@ -18,8 +18,8 @@ from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, MTX
 from echostep.recording import open_recording
 from echostep.xsens import MtxReader
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.stimulus import NO_SYNC
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.stimulus import NO_SYNC
 from places import PLAN
 from reliability import faults, soak
 from reliability.fault_outcomes import NORMAL_S, FaultOutcome, judge_streams, table

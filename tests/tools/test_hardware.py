@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from board_runs import ROOT, needs_twin
 from command_line import echostep
 from docs.pages import hardware
-from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC
+from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC
 from hardware.drawing import lanes
 from hardware.nets import HIGH_MIN_V, PULL_UP_OHM, idle_v, problems
 from hardware.wiring import Device, WiredBoard, boards, pins

@@ -18,6 +18,7 @@ LIMITS = """
 "lines of a function" = 2
 [parts]
 "host/core" = 4
+"host/simulation" = 0
 "host/app" = 0
 "host/studies" = 0
 "tools" = 0
@@ -60,6 +61,26 @@ def test_what_outgrows_one_is_named(
     (tree / path).write_text(text)
     assert sizes.main() == 1
     assert words in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("committed", [False, True])
+def test_a_limit_that_rose_is_named_whatever_has_been_committed_since(
+    tree: Path, capsys: pytest.CaptureFixture[str], committed: bool
+) -> None:
+    def commit() -> None:
+        subprocess.run(["git", "add", "."], cwd=tree, check=True)
+        who = ["-c", "user.name=a", "-c", "user.email=a@b"]
+        subprocess.run(["git", *who, "commit", "--quiet", "--message", "x"], cwd=tree, check=True)
+
+    commit()
+    assert sizes.main() == 0
+    (tree / "limits").write_text(LIMITS.replace('"tools" = 0', '"tools" = 1'))
+    if committed:
+        commit()
+        (tree / "a.md").write_text("one")
+        commit()
+    assert sizes.main() == 1
+    assert capsys.readouterr().out.endswith("tools: its limit rose from 0 to 1: limits only fall\n")
 
 
 def test_generated_messages_do_not_count(tree: Path) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from board_runs import needs_twin, tool
-from echostep_app.simulation.stimulus import ROW
+from echostep_simulation.stimulus import ROW
 from waiting import PATIENCE_S, until
 
 run = importlib.import_module("twin.run")

@@ -19,8 +19,8 @@ from echostep.plan import load_plan
 from echostep.ports.chunks import MTX, Chunk
 from echostep.tracker import Tracker
 from echostep_app.session.chunk_streams import portions_of
-from echostep_app.simulation.devices.board import Board, BoardProcess
-from echostep_app.simulation.scenario import START_NS, Scenario, demo_scenario
+from echostep_simulation.devices.board import Board, BoardProcess
+from echostep_simulation.scenario import START_NS, Scenario, demo_scenario
 from places import OUT, PLAN, ROOT, TWIN
 from reliability.campaign import CampaignJournal, options
 from reliability.fault_outcomes import NORMAL_S, FaultOutcome, columns, heard, judge_estimates, judge_streams, table

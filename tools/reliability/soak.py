@@ -40,7 +40,7 @@ from echostep_app.session.metadata import clock_metadata, run_metadata, start_re
 from echostep_app.session.options import OutputOptions
 from echostep_app.session.runs.live import _recorded_chunks
 from echostep_app.session.session import Session
-from echostep_app.simulation.devices.board import BoardProcess
+from echostep_simulation.devices.board import BoardProcess
 from places import OUT, PLAN, TWIN
 from reliability.campaign import Figure, none, options, report
 from reliability.fault_outcomes import SURE_M, FaultOutcome, columns, judge_estimates

@@ -19,10 +19,10 @@ import numpy as np
 from echostep.plan import Plan
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata
-from echostep_app.simulation.devices.board import Board
-from echostep_app.simulation.devices.mtx import MtxModel
-from echostep_app.simulation.people.walker import Person, Waypoint
-from echostep_app.simulation.scenario import BLOCK_MS, START_NS, USB_LATENCY_NS, Scenario
+from echostep_simulation.devices.board import Board
+from echostep_simulation.devices.mtx import MtxModel
+from echostep_simulation.people.walker import Person, Waypoint
+from echostep_simulation.scenario import BLOCK_MS, START_NS, USB_LATENCY_NS, Scenario
 
 MODEL = MtxModel(drift_ppm=50.0)
 SAMPLES, SPAN_MS = 2000, 20_001  # samples of MODEL's crystal that take a whole number of milliseconds

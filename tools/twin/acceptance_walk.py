@@ -17,8 +17,8 @@ import numpy as np
 from echostep.plan import Plan
 from echostep_app.session.acceptance.protocol import Point, Visit
 from echostep_app.session.acceptance.survey import corridor
-from echostep_app.simulation.people.walker import Person, Walk, Waypoint
-from echostep_app.simulation.scenario import Scenario
+from echostep_simulation.people.walker import Person, Walk, Waypoint
+from echostep_simulation.scenario import Scenario
 from twin.run import PtyBoard, PtyMtx, announce, playing, until_interrupted, wait_for_opening
 
 STOP_S = 1.5  # on a point that is visited standing; assumed

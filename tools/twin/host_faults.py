@@ -42,7 +42,7 @@ main()
 DATAGRAMS = """
 import socket, sys, time
 from echostep.board.frames import encode
-from echostep_app.simulation.devices.beacon_gateway import message
+from echostep_simulation.devices.beacon_gateway import message
 flood, k = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), 0
 while True:
     for _ in range(50):

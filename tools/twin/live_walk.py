@@ -26,8 +26,8 @@ from echostep.board.frames import BoardReader
 from echostep.plan import load_plan
 from echostep.recording import open_recording
 from echostep_app.ports.arrival_clock import now_ns
-from echostep_app.simulation.scenario import demo_scenario
-from echostep_app.simulation.stimulus import BoardSensors
+from echostep_simulation.scenario import demo_scenario
+from echostep_simulation.stimulus import BoardSensors
 from places import PLAN
 from reliability.fault_outcomes import NORMAL_S, FaultOutcome, heard, judge_estimates, judge_streams
 from twin.run import PtyBoard, PtyMtx, playing, wait_for_opening

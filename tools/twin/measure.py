@@ -20,10 +20,10 @@ from rich.progress import track
 from echostep.arrays import Floats
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader, encode
-from echostep_app.board.subscription import SUBSCRIBE as USUAL
-from echostep_app.simulation.devices.board import BoardProcess
-from echostep_app.simulation.kits import Kit
-from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
+from echostep.board.subscription import SUBSCRIBE as USUAL
+from echostep_simulation.devices.board import BoardProcess
+from echostep_simulation.kits import Kit
+from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 from places import TWIN
 from reliability.campaign import Figure, options, report
 

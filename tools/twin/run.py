@@ -31,12 +31,12 @@ from echostep.plan import load_plan
 from echostep.xsens import MtxReader
 from echostep.xsens.reader import warm_up
 from echostep_app.commands.actions.beacon_player import simulate_gateway
-from echostep_app.simulation.devices.beacon_gateway import SPACING_M
-from echostep_app.simulation.devices.board import Sent
-from echostep_app.simulation.devices.foot_board import FootBoardPort
-from echostep_app.simulation.kits import Kit
-from echostep_app.simulation.scenario import DEMO_WAYPOINTS, Scenario, demo_scenario
-from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
+from echostep_simulation.devices.beacon_gateway import SPACING_M
+from echostep_simulation.devices.board import Sent
+from echostep_simulation.devices.foot_board import FootBoardPort
+from echostep_simulation.kits import Kit
+from echostep_simulation.scenario import DEMO_WAYPOINTS, Scenario, demo_scenario
+from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 from echostep_studies.simulation.devices.mtx_setup import MtxDevice
 from echostep_studies.simulation.devices.rehearsal import Act, LyingParts, Rehearsal
 from places import OUT, PLAN, TWIN

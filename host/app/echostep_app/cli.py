@@ -15,9 +15,8 @@ from typing import Annotated
 
 import typer
 
-from echostep.errors import EchostepError, IncompleteError, words_of
+from echostep.errors import EchostepError, IncompleteError, former_use, words_of
 from echostep.file_mode import share_files
-from echostep.former import former_use
 from echostep_app.commands import acceptance, beacons, commander, files, hardware, plan, recordings, runs
 from echostep_app.commands.studies import add_studies
 from echostep_app.extras import EXTRAS, lacks
@@ -81,10 +80,9 @@ def main() -> None:
 
 def _status() -> int:
     """The exit status of the command, which is run."""
-    if words := former_use(sys.argv[1:]):
-        complain(f"echostep: {words}")
-        return 2
     try:
+        if words := former_use(sys.argv[1:]):
+            raise EchostepError(words)
         app()
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else int(end.code is not None)

@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: MIT
 """The errors that end a command with one line for the user.
 
-In: nothing. Out: `EchostepError`, `IncompleteError`; any error in words. Owns nothing.
+In: nothing. Out: `EchostepError`, `IncompleteError`; any error in words; one sentence about a use of what has left. Owns the table of what serves
+instead.
 """
+
+from __future__ import annotations
+
+from collections.abc import Sequence
 
 PACKED = {  # by the first bytes [file(1)]
     b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ": "xz", b"PK\x03\x04": "zip", b"(\xb5/\xfd": "zstd", b"7z\xbc\xaf": "7z",
@@ -30,3 +35,30 @@ def replaced(begin: bytes) -> str:
         return "a pointer of Git LFS in place of the file: git lfs pull brings it"
     packed = next((name for magic, name in PACKED.items() if begin.startswith(magic)), "")
     return f"packed by {packed}: unpack it first" if packed else ""
+
+
+# A command (`acceptance`), its option (`map --plan`), a setting (`[ranger] learn`), the begin of an address in any command (`mesh://`)
+INSTEAD: dict[str, str] = {}
+
+
+def has_left(use: str) -> str:
+    """The sentence about a use of the table."""
+    return f"{use} has left: {INSTEAD[use]}" if use in INSTEAD else ""
+
+
+def former_use(words: Sequence[str]) -> str:
+    """The sentence about the first former use in the words of a command line, without the program's name; empty where there is none."""
+    given = [word for word in words if word != "--share"]
+    return next((has_left(use) for use in INSTEAD if _is_used(use, given)), "")
+
+
+def _is_used(use: str, words: list[str]) -> bool:
+    *command, last = use.split()
+    if words[: len(command)] != command:
+        return False
+    rest = words[len(command) :]
+    if last.startswith("-"):
+        return any(word.partition("=")[0] == last for word in rest)
+    if last.endswith((":", "/")):
+        return any(word.startswith(last) or f"={last}" in word for word in rest)
+    return rest[:1] == [last]

@@ -21,7 +21,7 @@ from echostep_app.ports import serial_ports, udp
 from echostep_app.ports.datagram_key import Opener, read_key, seal
 from echostep_app.ports.serial_ports import ChunkQueue
 from echostep_app.ports.udp import UdpPort
-from echostep_app.simulation.devices.beacon_gateway import message
+from echostep_simulation.devices.beacon_gateway import message
 from free_ports import free_port
 from waiting import until
 

@@ -19,13 +19,13 @@ from echostep.plan import Door, Plan, Room, load_plan
 from echostep.ports.chunks import portion_of
 from echostep.recording import open_recording
 from echostep.tracker import Tracker
+from echostep_app.guidance.tours import room_tour
 from echostep_app.page.elements.scene import TruePath
 from echostep_app.page.live import LivePage
 from echostep_app.scorecard.track_columns import load_path
 from echostep_app.session.runs import demo
 from echostep_app.session.session import open_browser
-from echostep_app.simulation.people.tours import room_tour
-from echostep_app.simulation.scenario import DEMO_WAYPOINTS, start_of
+from echostep_simulation.scenario import DEMO_WAYPOINTS, start_of
 from echostep_studies.simulation.tower import tower
 from page.browser import LOCAL
 from page.frames import header, opened_url

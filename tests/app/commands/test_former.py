@@ -6,7 +6,7 @@ from __future__ import annotations
 import pytest
 
 from command_line import echostep
-from echostep.former import INSTEAD, former_use, has_left
+from echostep.errors import INSTEAD, former_use, has_left
 
 TYPED = [use for use in INSTEAD if not use.startswith("[")]
 

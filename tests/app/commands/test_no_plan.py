@@ -18,8 +18,8 @@ from echostep.localization.height.levels import HeightChange
 from echostep.plan import NO_PLAN
 from echostep_app.page.elements.scene import status_text
 from echostep_app.session.metadata import run_metadata, start_recording
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import Scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import Scenario
 from page.frames import PLAN, told
 
 

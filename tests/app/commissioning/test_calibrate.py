@@ -29,9 +29,9 @@ from echostep_app.commissioning.calibrate import STILL_S, TURN_S, WALK_S, Ports,
 from echostep_app.commissioning.calibrate import calibrate as calibrate_parts
 from echostep_app.commissioning.fitting import doubt, fit_compass, fit_gyros, fit_legs, fit_mounting, still_bias
 from echostep_app.commissioning.probe import ProbeResult, _Probe
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.devices.board_sensors import Adis16100Model
-from echostep_app.simulation.people.walker import Person, walk
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.devices.board_sensors import Adis16100Model
+from echostep_simulation.people.walker import Person, walk
 from echostep_studies.simulation.devices.rehearsal import Act, Rehearsal
 from players import pseudo_terminal, python_board, some_noise
 

@@ -43,7 +43,7 @@ def files(walk: Path) -> list[Path]:
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The demo walk, recorded by rangers that measure too much (simulated)."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("echostep_app.simulation.stimulus.ranger_bias_m", lambda *_: np.array([0.06, 0.02]))
+        patch.setattr("echostep_simulation.stimulus.ranger_bias_m", lambda *_: np.array([0.06, 0.02]))
         return recorded(tmp_path_factory.mktemp("walk"), LEARN)
 
 

@@ -27,15 +27,15 @@ from echostep.board import messages as m
 from echostep.board.calibration import ICM20649_M_S2, ImuSettings
 from echostep.board.foot_board import FootBoardReader
 from echostep.board.frames import encode
+from echostep.board.subscription import SUBSCRIBE
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import Settings, parse_settings
-from echostep_app.board.subscription import SUBSCRIBE
 from echostep_app.commissioning import calibrate
 from echostep_app.commissioning.imu_errors import POSES, RestPose, check_unlike, fit_errors, pose_of
 from echostep_app.commissioning.poses import TRIES, measure_poses
 from echostep_app.commissioning.probe import ProbeResult, _Probe
-from echostep_app.simulation.devices.board import BoardProcess
+from echostep_simulation.devices.board import BoardProcess
 from echostep_studies.simulation.devices.rehearsal import LyingParts
 from waiting import PATIENCE_S
 

@@ -32,10 +32,10 @@ from echostep_app.commissioning.rangers.report import RangerReport, report
 from echostep_app.printing.console import console_for_people
 from echostep_app.session.metadata import run_metadata, start_recording
 from echostep_app.session.options import TrackingOptions
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import demo_scenario
-from echostep_app.simulation.world.acoustics import PULSE_RANGER, SRF02, Acoustics
-from echostep_app.simulation.world.echoes import Echoes, echoes
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import demo_scenario
+from echostep_simulation.world.acoustics import PULSE_RANGER, SRF02, Acoustics
+from echostep_simulation.world.echoes import Echoes, echoes
 from players import walking_twin
 from waiting import PATIENCE_S
 from walks import DEMO
@@ -218,7 +218,7 @@ def calibrated(walk: Path) -> str:
 @pytest.mark.long
 def test_biases_come_out_of_a_recorded_walk_into_the_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The tracker has used the same pings: between two walls only half of what both rangers have in common would be left otherwise."""
-    monkeypatch.setattr("echostep_app.simulation.stimulus.ranger_bias_m", lambda *_: np.array([0.06, 0.02]))
+    monkeypatch.setattr("echostep_simulation.stimulus.ranger_bias_m", lambda *_: np.array([0.06, 0.02]))
     settings = parse_settings(calibrated(recorded(tmp_path)), "here")
     assert settings.ranger.left_bias_m == pytest.approx(0.06, abs=0.025)
     assert settings.ranger.right_bias_m == pytest.approx(0.02, abs=0.025)
@@ -230,7 +230,7 @@ def test_swapped_rangers_of_a_recorded_walk_are_named(tmp_path: Path, monkeypatc
         found = echoes(*given)
         return Echoes(found.own_us[:, ::-1].copy(), found.cross_us[:, ::-1].copy())
 
-    monkeypatch.setattr("echostep_app.simulation.stimulus.echoes", swapped)
+    monkeypatch.setattr("echostep_simulation.stimulus.echoes", swapped)
     with pytest.raises(EchostepError, match="rangers are swapped"):
         calibrated(recorded(tmp_path))
     assert not (tmp_path / "rangers.toml").exists()

@@ -23,8 +23,8 @@ from echostep_app.guidance.guided_rescue import GuidedRescue
 from echostep_app.guidance.guided_run import guidance_of
 from echostep_app.plan.routing import Route
 from echostep_app.ports.teammate import Teammate, parse_teammate
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import Scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import Scenario
 from echostep_studies.simulation.tower import tower
 
 TOWER = tower(3)

@@ -20,8 +20,8 @@ from echostep_app.mapping.mapper import map_walk
 from echostep_app.mapping.plan import plan_of
 from echostep_app.plan.writer import plan_json
 from echostep_app.session.metadata import run_metadata, start_recording
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import demo_scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import demo_scenario
 from echostep_studies.bench.tours import clearance_m
 
 pytestmark = pytest.mark.slow

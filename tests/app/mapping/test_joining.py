@@ -22,9 +22,9 @@ from echostep_app.mapping.mapper import Mapped, solve_walk
 from echostep_app.mapping.placing import Place, find_place
 from echostep_app.plan.writer import save_plan
 from echostep_app.session.metadata import run_metadata, start_recording
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.people.walker import Person
-from echostep_app.simulation.scenario import Scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.people.walker import Person
+from echostep_simulation.scenario import Scenario
 from echostep_studies.bench.sites import plan_of
 from echostep_studies.bench.tours import clearance_m
 from echostep_studies.bench.walks import CORNER_M, SimulatedWalk, simulate

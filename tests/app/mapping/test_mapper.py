@@ -23,8 +23,8 @@ from echostep_app.mapping.walls.drawing import Drawing, draw
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.places.gaps import door_gaps
 from echostep_app.session.metadata import run_metadata, start_recording
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import DEMO_WAYPOINTS, demo_scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import DEMO_WAYPOINTS, demo_scenario
 from echostep_studies.bench.sites import Site
 from echostep_studies.bench.tours import clearance_m
 from echostep_studies.bench.walks import SimulatedWalk, simulate

@@ -19,8 +19,8 @@ from command_line import echostep
 from echostep.errors import EchostepError
 from echostep_app import cli
 from echostep_app.offline.foot_files import load_foot
-from echostep_app.simulation.devices.mtx import specific_force_and_rate
-from echostep_app.simulation.people.walker import Person, walk
+from echostep_simulation.devices.mtx import specific_force_and_rate
+from echostep_simulation.people.walker import Person, walk
 from echostep_studies.frame.recordings import DATA
 from needs_data import needs_data
 

@@ -19,7 +19,7 @@ from echostep_app.offline.leg_csv import LegSamples
 from echostep_app.offline.leg_gyros import walking_axis
 from echostep_app.offline.leg_side import HALF_PELVIS_M, about_trunk, distance_sd_m, leg_left_m
 from echostep_app.offline.leg_track import doubts, track_default
-from echostep_app.simulation.people.walker import Person, Walk, Waypoint, walk
+from echostep_simulation.people.walker import Person, Walk, Waypoint, walk
 from foot.foot_walks import any_rotation
 
 CORNER: list[Waypoint] = [(0.0, 0.0), (6.0, 0.0), (6.0, 6.0)]

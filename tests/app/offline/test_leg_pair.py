@@ -16,7 +16,7 @@ from echostep_app.offline.leg_csv import LegSamples, load_pair
 from echostep_app.offline.leg_pair import LEGS_DIFFER, track_pair
 from echostep_app.offline.leg_side import distance_sd_m
 from echostep_app.offline.leg_track import track_default
-from echostep_app.simulation.people.walker import Person, walk
+from echostep_simulation.people.walker import Person, walk
 
 LONGER = 1.06  # by which the second leg swings farther
 KEYS = ("thigh_rad_s", "shank_rad_s")

@@ -24,9 +24,9 @@ from echostep_app.guidance.guided_run import GuidedRun
 from echostep_app.page.live import LivePage
 from echostep_app.page.server import Address
 from echostep_app.plan.routing import RoutePlace
-from echostep_app.simulation.devices.beacon_gateway import with_beacons
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import START_NS, demo_scenario
+from echostep_simulation.devices.beacon_gateway import with_beacons
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import START_NS, demo_scenario
 from waiting import PATIENCE_S, until
 
 PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")

@@ -6,8 +6,8 @@ from __future__ import annotations
 import pytest
 
 from echostep.ports.chunks import Chunk
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import Scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import Scenario
 from page.frames import PLAN
 
 

@@ -27,8 +27,8 @@ from websockets.exceptions import InvalidMessage
 from board_runs import ROOT
 from echostep.plan import load_plan
 from echostep_app.commands.actions.beacon_player import simulate_gateway
-from echostep_app.simulation.devices.board import PythonBoard, Sent
-from echostep_app.simulation.scenario import Scenario
+from echostep_simulation.devices.board import PythonBoard, Sent
+from echostep_simulation.scenario import Scenario
 from free_ports import free_port
 from page.frames import header, opened_url
 from players import pseudo_terminal

@@ -20,7 +20,7 @@ from echostep.ports.people.check_in import PERSON, Call, CheckIn, Undo, parse_pe
 from echostep.tracker import Tracker
 from echostep_app.page import requests
 from echostep_app.page.live import LivePage
-from echostep_app.simulation.scenario import START_NS, Scenario
+from echostep_simulation.scenario import START_NS, Scenario
 from page.frames import LOCAL, PLAN, next_frame, opened_url
 from waiting import PATIENCE_S
 

@@ -21,8 +21,8 @@ from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
 from echostep_app.page.elements.scene import TruePath
 from echostep_app.page.live import LivePage
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import demo_scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import demo_scenario
 from page.browser import FRAMED, LOCAL, PICTURES, PLAN, READY, loaded_page, wait_for
 
 NAME = "page.webp"

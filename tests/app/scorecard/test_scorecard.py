@@ -23,8 +23,8 @@ from echostep_app.scorecard.csv_columns import read_csv
 from echostep_app.scorecard.definitions import METRICS
 from echostep_app.scorecard.track_columns import load_path
 from echostep_app.scorecard.truth import card_of, load_truth
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import demo_scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import demo_scenario
 from echostep_studies.simulation.tower import LENGTH_M, LIFT_AT, STOREY_M, tower
 from walks import walk_chunks
 

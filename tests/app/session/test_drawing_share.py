@@ -21,13 +21,13 @@ from echostep_app.session.metadata import run_metadata, start_recording
 from echostep_app.session.options import OutputOptions
 from echostep_app.session.session import Session
 from echostep_app.session.team import teammate_feed
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import demo_scenario
 from echostep_app.team.endpoint import parse_endpoint, parse_outlet
 from echostep_app.team.inbox import ListenerThread
 from echostep_app.team.messages.shared_drawings import MOST_BYTES, checked_drawing, drawing_topic
 from echostep_app.team.mqtt.publisher import Listener
 from echostep_app.team.wearer_plan import plan_file
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import demo_scenario
 from page.browser import PLAN, demo_walk
 from team.team_broker import Broker, needs_broker
 from walks import card_of, truth_of

@@ -24,7 +24,7 @@ from echostep_app.page.live import LivePage
 from echostep_app.session import results
 from echostep_app.session.runs import demo
 from echostep_app.session.session import Session
-from echostep_app.simulation.scenario import DEMO_WAYPOINTS
+from echostep_simulation.scenario import DEMO_WAYPOINTS
 from page.frames import told
 from waiting import PATIENCE_S
 

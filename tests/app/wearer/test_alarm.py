@@ -14,11 +14,11 @@ from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import PERSON, Call, CheckIn
 from echostep.tracker import Tracker
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import Scenario
 from echostep_app.wearer.alarm import ASK_S, MAYDAY_S, OVER_S, WearerAlarm, watch_of
 from echostep_app.wearer.stillness import Window
 from echostep_app.wearer.wearer_signs import StepTaken
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import Scenario
 
 PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 END_STILL_S = 60.0

@@ -12,10 +12,10 @@ from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.ports.people.check_in import PERSON, CheckIn
 from echostep.tracker import Tracker
 from echostep_app.page.live import LivePage
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import START_NS, Scenario
 from echostep_app.team.outbox import stamped, steadied
 from echostep_app.wearer.steady_status import HOLD_S, SteadyStatus
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import START_NS, Scenario
 from page.frames import LOCAL, PLAN
 from team.team_reports import POSITION, report
 

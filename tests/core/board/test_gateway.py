@@ -20,7 +20,7 @@ from echostep.ports.chunks import BOARD, GATEWAY, Chunk, portion_of
 from echostep_app.output.terminal import gateway_words
 from echostep_app.ports.serial_ports import SerialPorts
 from echostep_app.ports.udp import UdpPort
-from echostep_app.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, heard_at, lay_beacons, message
+from echostep_simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, heard_at, lay_beacons, message
 from free_ports import free_port
 
 GOOD = message(7, 3.25, 0.5, 10.0)

@@ -18,8 +18,8 @@ from echostep.plan import Plan, load_plan
 from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import Scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import Scenario
 from echostep_studies.bench.recordings.feet import SETS
 from echostep_studies.frame.recordings import DATA, read_sets
 from foot import foot_walks as fw

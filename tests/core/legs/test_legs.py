@@ -19,8 +19,8 @@ from echostep_app.cli import app
 from echostep_app.offline.leg_csv import LegSamples, load_legs
 from echostep_app.offline.leg_side import distance_sd_m
 from echostep_app.offline.leg_track import describe_legs, track_default
-from echostep_app.simulation.people.leg_angles import LegDimensions
-from echostep_app.simulation.people.walker import Person, Waypoint, walk
+from echostep_simulation.people.leg_angles import LegDimensions
+from echostep_simulation.people.walker import Person, Waypoint, walk
 from echostep_studies.papers.profiles import track_lee2010
 from echostep_studies.simulation.joint_gait import FAST, NATURAL, SLOW, WalkingPace, draw_person, simulate_gait
 

@@ -18,7 +18,7 @@ from echostep.plan import Pose, load_plan
 from echostep.ports.chunks import BOARD, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import lay_out_levels
-from echostep_app.simulation.devices.board import PythonBoard
+from echostep_simulation.devices.board import PythonBoard
 from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tower
 from walks import DEMO
 

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from board_runs import ELF, ROOT, TWIN, needs_twin
 from echostep.board.frames import encode
+from echostep.board.subscription import SUBSCRIBE
 from echostep.localization import Estimate
 from echostep.odometry import FrontEnd
 from echostep.plan import load_plan
@@ -22,12 +23,11 @@ from echostep.ports.chunks import FOOT, Chunk, portion_of
 from echostep.settings import Settings
 from echostep.tracker import Tracker
 from echostep_app.board.faults.health import all_findings
-from echostep_app.board.subscription import SUBSCRIBE
-from echostep_app.simulation.devices.board import BoardProcess
-from echostep_app.simulation.devices.foot_board import HEAD_START_MS
-from echostep_app.simulation.kits import Kit
-from echostep_app.simulation.scenario import DEMO_WAYPOINTS, START_NS, Scenario
 from echostep_app.wearer.alarm import watch_of
+from echostep_simulation.devices.board import BoardProcess
+from echostep_simulation.devices.foot_board import HEAD_START_MS
+from echostep_simulation.kits import Kit
+from echostep_simulation.scenario import DEMO_WAYPOINTS, START_NS, Scenario
 
 pytestmark = needs_twin
 

@@ -20,11 +20,11 @@ from echostep.path import PathSegment
 from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.tracker import Tracker
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.people.leg_angles import LegDimensions
-from echostep_app.simulation.people.walker import Person, walk
-from echostep_app.simulation.scenario import DEMO_WAYPOINTS, Scenario
-from echostep_app.simulation.stimulus import BoardSensors
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.people.leg_angles import LegDimensions
+from echostep_simulation.people.walker import Person, walk
+from echostep_simulation.scenario import DEMO_WAYPOINTS, Scenario
+from echostep_simulation.stimulus import BoardSensors
 
 pytestmark = pytest.mark.slow
 

@@ -28,10 +28,10 @@ from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.timing.timeline import MtxTiming
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.devices.mtx import MtxModel
-from echostep_app.simulation.scenario import DEMO_WAYPOINTS, Scenario
 from echostep_app.wearer.alarm import AlarmWatch
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.devices.mtx import MtxModel
+from echostep_simulation.scenario import DEMO_WAYPOINTS, Scenario
 
 Told = list[tuple[object, ...]]
 CORRECTED = 25_000  # chunks

@@ -24,8 +24,8 @@ from echostep.settings import parse_settings
 from echostep.timing.timeline import MtxTiming
 from echostep.walls.echo_sources import Walls
 from echostep_app.mapping.graph.nodes import nodes_of
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import Scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import Scenario
 
 AHEAD_DEG, HEADING_RAD = 20.0, 0.7
 # A ranger that looks ahead looks less far from the heading, on either side.

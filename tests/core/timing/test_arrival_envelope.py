@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from echostep.timing import arrival_envelope as line
 from echostep.timing.arrival_envelope import lower_hull, most_probable_slope
 from echostep.timing.device_clock import new_clock
-from echostep_app.simulation.devices.serial_delivery import deliver
+from echostep_simulation.devices.serial_delivery import deliver
 from naive.clocks import ArrivalClock as NaiveClock
 
 

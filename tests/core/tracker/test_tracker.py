@@ -17,8 +17,8 @@ from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.xsens import FrameReader, encode_frame
 from echostep_app.scorecard.track_columns import ScoredPath
-from echostep_app.simulation.devices.board import BoardProcess, PythonBoard
-from echostep_app.simulation.scenario import Scenario, demo_scenario
+from echostep_simulation.devices.board import BoardProcess, PythonBoard
+from echostep_simulation.scenario import Scenario, demo_scenario
 from walks import card_of, truth_of
 
 PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")

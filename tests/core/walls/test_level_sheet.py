@@ -34,9 +34,9 @@ from echostep.walls.level_sheet import (
     nearest_level,
 )
 from echostep_app.plan.importers.formats import open_plan
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.people.walker import Person, Waypoint, walk
-from echostep_app.simulation.scenario import Scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.people.walker import Person, Waypoint, walk
+from echostep_simulation.scenario import Scenario
 from echostep_studies.floors.storeys import judge, through
 from echostep_studies.frame.recordings import DATA
 from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tour, tower

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep_app.cli import app
-from echostep_app.simulation.devices.board_sensors import Scp1000Model
+from echostep_simulation.devices.board_sensors import Scp1000Model
 from echostep_studies.barometer.altitude import Pressures, heights_above_start, noise_of
 from echostep_studies.barometer.floor_filter import checked_heights, smooth_floors
 from echostep_studies.barometer.floor_record import find_storeys, stays

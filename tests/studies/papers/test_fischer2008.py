@@ -19,7 +19,7 @@ from echostep.errors import EchostepError
 from echostep.foot import steps as foot
 from echostep_app.cli import app
 from echostep_app.commands.actions.offline import foot as run_foot
-from echostep_app.simulation.devices import onboard_filter as onboard
+from echostep_simulation.devices import onboard_filter as onboard
 from echostep_studies.frame.recordings import DATA
 from echostep_studies.papers import fischer2008
 from echostep_studies.papers.fischer2008 import Fischer2008
@@ -316,7 +316,7 @@ def test_a_real_walk_with_its_sensor_s_own_matrix_comes_out_short_as_in_the_pape
     """The GX5's own filter is another maker's black box: it falls short of the surveyed way, too, and so does our model of the MTx's."""
     from scipy.io import loadmat
 
-    from echostep_app.simulation.people.attitude import rotations
+    from echostep_simulation.people.attitude import rotations
 
     table = np.genfromtxt(DATA / "gx5_gcp" / f"SensorConnectData_{name}.csv", delimiter=",", skip_header=1)
     survey = loadmat(DATA / "gx5_gcp" / f"SensorConnectData_{name}_LLIO.mat")

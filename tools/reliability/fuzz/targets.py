@@ -30,10 +30,10 @@ from echostep_app.ports.datagram_key import Opener, seal
 from echostep_app.ports.tap import Tap, parse_tap
 from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.recovery import Recovery
-from echostep_app.simulation.devices.beacon_gateway import message
 from echostep_app.team.messages.report import decode
 from echostep_app.team.messages.report import encode as report_bytes
 from echostep_app.team.messages.shared_drawings import checked_drawing
+from echostep_simulation.devices.beacon_gateway import message
 from echostep_studies.barometer.pressure_csv import load_pressures
 from plan.imported_plans import write_seven_floors
 from team.team_reports import report

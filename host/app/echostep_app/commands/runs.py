@@ -26,7 +26,7 @@ from echostep_app.commands.options import (
     page_address,
 )
 from echostep_app.printing.lines import say
-from echostep_app.simulation.kits import Kit
+from echostep_simulation.kits import Kit
 
 if TYPE_CHECKING:
     from echostep_app.team.endpoint import Outlet

@@ -13,9 +13,9 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan import Plan
+from echostep_app.guidance.tours import tour as tour_of
 from echostep_app.plan.routing import RoutePlace, Routes
-from echostep_app.simulation.people.tours import tour as tour_of
-from echostep_app.simulation.people.walker import Waypoint
+from echostep_simulation.people.walker import Waypoint
 
 LEG_M = (5.0, 45.0)  # from place to place
 OTHER_LEVEL = 0.3  # share of the places that are on another level

@@ -18,11 +18,11 @@ from echostep.plan import Plan, Pose
 from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.settings import Settings
 from echostep.tracker import Tracker
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.devices.board_sensors import WornGyro
-from echostep_app.simulation.devices.mtx import MtxModel
-from echostep_app.simulation.people.walker import Person
-from echostep_app.simulation.scenario import START_NS, Scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.devices.board_sensors import WornGyro
+from echostep_simulation.devices.mtx import MtxModel
+from echostep_simulation.people.walker import Person
+from echostep_simulation.scenario import START_NS, Scenario
 from echostep_studies.bench.sites import Site
 
 CORNER_M = 0.3  # corners are cut by so much, so that the way stays clear of door jambs

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep_app.simulation.world.acoustics import PIPE_RADIUS_M, SRF02, rod_db
-from echostep_app.simulation.world.echoes import echoes
+from echostep_simulation.world.acoustics import PIPE_RADIUS_M, SRF02, rod_db
+from echostep_simulation.world.echoes import echoes
 
 TRIES = 200  # pings at each place
 WIDTH_M = 2.4  # of the corridor of Figure 5

@@ -20,7 +20,7 @@ from msgspec import UNSET, UnsetType
 from echostep.localization import EchoSettings, echo_model
 from echostep.walls.echo_sources import Walls
 from echostep_app.output.table import Table
-from echostep_app.simulation.world.acoustics import SRF02, directivity_db
+from echostep_simulation.world.acoustics import SRF02, directivity_db
 from echostep_studies.echoes.effects import Effect, pipe_range_m, simulated_effects
 from echostep_studies.echoes.likelihood import SettingRow, fitted, log_p
 from echostep_studies.echoes.sweep_rows import ShareRow, SweepRow, share_rows, sweep_rows

@@ -16,8 +16,8 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.offline.csv_table import CsvLimits, CsvTable, column_of, header_of, lines_of, open_samples, read_rows
-from echostep_app.simulation.world.acoustics import Acoustics
-from echostep_app.simulation.world.echoes import echoes
+from echostep_simulation.world.acoustics import Acoustics
+from echostep_simulation.world.echoes import echoes
 
 COLUMNS = ("x_m", "y_m", "heading_deg", "bearing_deg", "range_m")
 WALLS = "walls.csv"

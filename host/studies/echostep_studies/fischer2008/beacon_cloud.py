@@ -26,7 +26,7 @@ from echostep.localization.particle_arrays import Move, ParticleArrays
 from echostep.localization.particles.kernels import systematic
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex
-from echostep_app.simulation.world.beacon_ground import BeaconGround, is_in_reach, measure
+from echostep_simulation.world.beacon_ground import BeaconGround, is_in_reach, measure
 from echostep_studies.fischer2008.walker import GuidedWalker
 
 CLOUD = CloudSettings()

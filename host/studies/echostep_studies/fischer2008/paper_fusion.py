@@ -13,7 +13,7 @@ import numpy as np
 
 from echostep.arrays import Floats, record_dtype
 from echostep.jit import kernel, part
-from echostep_app.simulation.world.beacon_ground import BeaconGround, is_in_reach, measure
+from echostep_simulation.world.beacon_ground import BeaconGround, is_in_reach, measure
 from echostep_studies.fischer2008.walker import GuidedWalker
 
 THRESHOLD_M = 1.0  # "on the scale of a meter or more" [Fischer 2008, 4.1.1]

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from echostep_app.output.table import Table
-from echostep_app.simulation.world.beacon_ground import GroundSettings, ground
+from echostep_simulation.world.beacon_ground import GroundSettings, ground
 from echostep_studies.fischer2008.simulator import OURS, PAPER, PDR, Knowledge, guided_return
 from echostep_studies.fischer2008.walker import EXACT, Obedience
 from echostep_studies.frame.pictures import BLUE, ORANGE, axes_of, save

@@ -13,7 +13,7 @@ import numpy as np
 
 from echostep.arrays import Bools, record_dtype
 from echostep.jit import part
-from echostep_app.simulation.world.beacon_ground import BeaconGround, disturbance
+from echostep_simulation.world.beacon_ground import BeaconGround, disturbance
 
 TICK_S = 0.01  # between inertial events [Fischer 2008, 4.2]
 SPEED_M_S = 1.0  # a slow walk

@@ -23,14 +23,14 @@ from echostep.localization import ANY_LEVEL, Estimate, TrackStatus
 from echostep.plan import Connector, Plan, Pose
 from echostep.ports.chunks import MTX, portion_of
 from echostep.tracker import Tracker
+from echostep_app.guidance.tours import tour as tour_of
 from echostep_app.output.table import Table
 from echostep_app.plan.importers.formats import open_plan
 from echostep_app.plan.routing import RoutePlace, Routes
 from echostep_app.scorecard.error_statistics import error_statistics
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.people.tours import tour as tour_of
-from echostep_app.simulation.people.walker import Person, Waypoint
-from echostep_app.simulation.scenario import Scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.people.walker import Person, Waypoint
+from echostep_simulation.scenario import Scenario
 from echostep_studies.frame.report import LOST_END_M, Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.tower import tour, tower

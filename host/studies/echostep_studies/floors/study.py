@@ -19,7 +19,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints, spans
 from echostep_app.output.table import Table
-from echostep_app.simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
+from echostep_simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
 from echostep_studies.barometer.altitude import Pressures
 from echostep_studies.barometer.floor_filter import Floors, smooth_floors
 from echostep_studies.frame.report import Row, rows_by_name

@@ -18,7 +18,7 @@ from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import Flag, Stride, StrideSettings
 from echostep.legs.strides import StrideEstimator
 from echostep_app.offline.leg_side import distance_sd_m
-from echostep_app.simulation.people.leg_angles import LegDimensions, stair_angles
+from echostep_simulation.people.leg_angles import LegDimensions, stair_angles
 
 CYCLES, RATE_HZ, STAND_S, EASE_S = 15, 100.0, 2.0, 0.8
 AMPLITUDE_SD, TIME_SD = 0.08, 0.05  # of a person against the curves

@@ -17,9 +17,9 @@ from echostep.foot.ins import GRAVITY_M_S2, Noise
 from echostep.foot.steps import walk_track
 from echostep.odometry import ICM20649_NOISE
 from echostep_app.commissioning.imu_errors import fit_errors, pose_of
-from echostep_app.simulation.devices.foot_board import MODEL
-from echostep_app.simulation.devices.mtx import MtxModel, means, measure, specific_force_and_rate
-from echostep_app.simulation.people.walker import RATE_HZ, Person, Walk, walk
+from echostep_simulation.devices.foot_board import MODEL
+from echostep_simulation.devices.mtx import MtxModel, means, measure, specific_force_and_rate
+from echostep_simulation.people.walker import RATE_HZ, Person, Walk, walk
 from echostep_studies.simulation.sites import otb
 
 PACES = {"walking": Person(), "hurried": Person(stride_m=1.9, stride_s=0.8)}  # 1.2 and 2.4 m/s; assumed

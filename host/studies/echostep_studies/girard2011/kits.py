@@ -15,8 +15,8 @@ from echostep.board.messages import Part, Schedule
 from echostep.localization import EchoSettings
 from echostep.localization.echoes.rangers import ECHO_OF
 from echostep_app.output.table import Table
-from echostep_app.simulation.devices.srf02 import HALF_US
-from echostep_app.simulation.world.acoustics import MAXSONAR, PULSE_RANGER, SRF02, Acoustics
+from echostep_simulation.devices.srf02 import HALF_US
+from echostep_simulation.world.acoustics import MAXSONAR, PULSE_RANGER, SRF02, Acoustics
 from echostep_studies.frame.report import Row, as_dicts, rows_by_name, summary
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.girard2011 import kit_feet

@@ -20,7 +20,7 @@ from echostep.ports.chunks import Chunk, portion_of
 from echostep.settings import Settings
 from echostep.tracker import Tracker
 from echostep_app.offline.leg_track import track_default
-from echostep_app.simulation.people.walker import walk
+from echostep_simulation.people.walker import walk
 from echostep_studies.lee2010.walks import STOREY_M, STOREYS, MeasuredWalk, chunks_of, measure, person_of, storeys
 from echostep_studies.papers import lee2010
 

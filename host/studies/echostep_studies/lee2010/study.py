@@ -19,7 +19,7 @@ from msgspec import UNSET, UnsetType
 
 from echostep.arrays import Floats
 from echostep_app.output.table import Table
-from echostep_app.simulation.people.walker import Walk
+from echostep_simulation.people.walker import Walk
 from echostep_studies.frame.report import Row, as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.lee2010.methods import METHODS, MethodTrack, floors_of, with_plan

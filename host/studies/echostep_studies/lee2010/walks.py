@@ -23,11 +23,11 @@ from echostep.plan import Level, Plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.timing.timeline import PLAIN, Arrivals, MtxTiming, Timeline
 from echostep_app.offline.leg_csv import LegSamples
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.people.leg_angles import LegDimensions
-from echostep_app.simulation.people.walker import Person, Walk, Waypoint, walk
-from echostep_app.simulation.stimulus import BoardSensors
-from echostep_app.simulation.world.magnetic_field import MagneticField
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.people.leg_angles import LegDimensions
+from echostep_simulation.people.walker import Person, Walk, Waypoint, walk
+from echostep_simulation.stimulus import BoardSensors
+from echostep_simulation.world.magnetic_field import MagneticField
 
 LAP: tuple[Waypoint, ...] = ((0.0, 0.0), (40.0, 0.0), (40.0, 30.0), (0.0, 30.0), (0.0, 0.0))  # [Lee 2010, Figure 6]
 CORRIDOR_M, STOREY_M, STOREYS = 80.0, 3.5, 5  # [Lee 2010, Figure 7]; the storey's height is not printed

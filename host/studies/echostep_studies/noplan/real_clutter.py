@@ -17,8 +17,8 @@ import numpy as np
 from echostep.angles import wrap
 from echostep.arrays import Floats
 from echostep.path import MeasuredSegment
-from echostep_app.simulation.world.acoustics import SRF02
-from echostep_app.simulation.world.echoes import ranger_bias_m
+from echostep_simulation.world.acoustics import SRF02
+from echostep_simulation.world.echoes import ranger_bias_m
 from echostep_studies.bench.laser.building import HALF_CONE_RAD, building_of, nearest_return, walk_from
 from echostep_studies.bench.laser.carmen_log import CarmenLog, logs_in, name_of
 from echostep_studies.bench.walks import SimulatedWalk

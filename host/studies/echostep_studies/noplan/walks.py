@@ -14,8 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from echostep.legs.trunk_path import rotated_segment
-from echostep_app.simulation.devices.board_sensors import WornGyro
-from echostep_app.simulation.devices.mtx import MtxModel
+from echostep_simulation.devices.board_sensors import WornGyro
+from echostep_simulation.devices.mtx import MtxModel
 from echostep_studies.bench.echo_changes import with_people
 from echostep_studies.bench.sites import Site
 from echostep_studies.bench.walks import SimulatedWalk, simulate

@@ -23,9 +23,9 @@ from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.plan.routing import RoutePlace
 from echostep_app.session.last_place import start_after
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.people.walker import Manner, Person, Waypoint
-from echostep_app.simulation.scenario import START_NS, Scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.people.walker import Manner, Person, Waypoint
+from echostep_simulation.scenario import START_NS, Scenario
 from echostep_studies.bench.sites import LOBBY
 from echostep_studies.bench.tours import random_tour
 from echostep_studies.simulation.tower import STOREY_M, tower

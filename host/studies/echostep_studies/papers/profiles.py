@@ -17,7 +17,7 @@ from echostep.offline.imu_csv import Imu
 from echostep_app.offline.leg_csv import LegSamples
 from echostep_app.offline.leg_track import LegTrack, belt_sign, source_of
 from echostep_app.printing.console import console
-from echostep_app.simulation.devices.onboard_filter import orientations
+from echostep_simulation.devices.onboard_filter import orientations
 from echostep_studies.papers import fischer2008, lee2010
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep_app.simulation.people.attitude import rotations, turns
+from echostep_simulation.people.attitude import rotations, turns
 
 RATE_HZ = 1000
 G0_M_S2 = 9.80665  # standard gravity

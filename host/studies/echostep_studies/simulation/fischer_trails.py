@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep_app.simulation.devices.mtx import MtxModel, MtxSamples, measure
-from echostep_app.simulation.devices.onboard_filter import OnBoardFilter
-from echostep_app.simulation.people.walker import Person, Walk, Waypoint, walk
-from echostep_app.simulation.world.magnetic_field import MagneticDipole, MagneticField
+from echostep_simulation.devices.mtx import MtxModel, MtxSamples, measure
+from echostep_simulation.devices.onboard_filter import OnBoardFilter
+from echostep_simulation.people.walker import Person, Walk, Waypoint, walk
+from echostep_simulation.world.magnetic_field import MagneticDipole, MagneticField
 
 BUILDING = 2008  # seed of the field that the steel of every building makes; the people differ from run to run, the buildings do not
 LANE_M = 0.5  # from the middle of a corridor

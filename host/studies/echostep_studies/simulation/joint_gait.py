@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep_app.simulation.people.leg_angles import HALF_PELVIS_M, KNEE_DEG, THIGH_DEG, LegDimensions, series
+from echostep_simulation.people.leg_angles import HALF_PELVIS_M, KNEE_DEG, THIGH_DEG, LegDimensions, series
 
 RATE_HZ = 500
 ANKLE_DEG = (1, -3, -1, 3, 6, 8, 10, 11, 12, 13, 9, -2, -14, -16, -7, -2, 1, 2, 2, 2)  # dorsiflexion

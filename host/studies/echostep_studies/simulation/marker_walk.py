@@ -17,9 +17,9 @@ import numpy as np
 from echostep.angles import wrap
 from echostep.arrays import Bools, Floats, Ints
 from echostep.board.messages import Schedule
-from echostep_app.simulation.devices.srf02 import FIRST_US, HALF_US, JITTER_US, LAST_US
-from echostep_app.simulation.world.acoustics import SRF02, Acoustics
-from echostep_app.simulation.world.echoes import echoes, ranger_bias_m
+from echostep_simulation.devices.srf02 import FIRST_US, HALF_US, JITTER_US, LAST_US
+from echostep_simulation.world.acoustics import SRF02, Acoustics
+from echostep_simulation.world.echoes import echoes, ranger_bias_m
 
 STEP_M = 1.25  # [Girard 2011, 3.3]
 STEP_S = 1.0  # one user step per second [Girard 2011, 3.3]

@@ -11,7 +11,7 @@ import hashlib
 import numpy as np
 
 from echostep.plan import Connector, Level, Plan, Pose, Room
-from echostep_app.simulation.people.walker import Waypoint
+from echostep_simulation.people.walker import Waypoint
 
 STOREY_M = 3.5
 LENGTH_M = 30.0

@@ -18,8 +18,8 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.board.frames import encode
 from echostep.ports.chunks import GATEWAY, Chunk
-from echostep_app.simulation.devices.beacon_gateway import ASIDE_M, PERIOD_S, SPACING_M, BeaconWorld, heard_at, message
-from echostep_app.simulation.scenario import START_NS
+from echostep_simulation.devices.beacon_gateway import ASIDE_M, PERIOD_S, SPACING_M, BeaconWorld, heard_at, message
+from echostep_simulation.scenario import START_NS
 from echostep_studies.bench.walks import T, X, Y, Z, way_m
 from echostep_studies.team.walks import LEVEL_M, TeamWalks
 

@@ -19,9 +19,9 @@ from echostep.arrays import Bools, Floats, spans
 from echostep.plan import Plan, Pose
 from echostep.ports.chunks import Chunk
 from echostep_app.plan.routing import RoutePlace
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.people.walker import Person, Waypoint
-from echostep_app.simulation.scenario import Scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.people.walker import Person, Waypoint
+from echostep_simulation.scenario import Scenario
 from echostep_studies.bench.tours import random_tour
 from echostep_studies.bench.walks import T, X, Y, Z
 

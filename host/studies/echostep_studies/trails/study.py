@@ -17,8 +17,8 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.foot.steps import Track, walk_track
 from echostep_app.output.table import Table
-from echostep_app.simulation.devices.mtx import MtxSamples
-from echostep_app.simulation.people.walker import RATE_HZ, Walk
+from echostep_simulation.devices.mtx import MtxSamples
+from echostep_simulation.people.walker import RATE_HZ, Walk
 from echostep_studies.frame.report import Row, as_dict, rows_by_name, summary
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.papers import fischer2008

@@ -22,7 +22,7 @@ from echostep_app.mapping.picture import draw_picture
 from echostep_app.mapping.plan import Walked, plan_of
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.writer import plan_json
-from echostep_app.simulation.people.walker import Waypoint
+from echostep_simulation.people.walker import Waypoint
 from echostep_studies.bench.sites import Site
 from echostep_studies.bench.tours import clearance_m
 from echostep_studies.bench.walks import SimulatedWalk, simulate

@@ -25,9 +25,9 @@ from echostep_app.page.elements.marks import BeaconMark
 from echostep_app.page.elements.scene import PageScene
 from echostep_app.page.live import LivePage
 from echostep_app.plan.routing import Route, RoutePlace, Stretch
-from echostep_app.simulation.devices.beacon_gateway import with_beacons
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import Scenario
+from echostep_simulation.devices.beacon_gateway import with_beacons
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import Scenario
 from page.frames import LOCAL, PLAN, next_frame, opened, opened_url, scene, served
 from waiting import PATIENCE_S
 

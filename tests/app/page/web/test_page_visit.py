@@ -19,8 +19,8 @@ from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import PERSON
 from echostep.tracker import Tracker
 from echostep_app.page.live import LivePage
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import Scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import Scenario
 from page.browser import LOCAL, PHONE, PLAN, READY, loaded_page, spot, wait_for
 from plan.imported_plans import seven_floors
 from waiting import until

@@ -17,8 +17,8 @@ from echostep_app.recording.recorder import Recorder
 from echostep_app.session.acceptance.protocol import Protocol
 from echostep_app.session.acceptance.survey import corridor
 from echostep_app.session.metadata import run_metadata
-from echostep_app.simulation.devices.board import BoardProcess, PythonBoard
-from echostep_app.simulation.scenario import START_NS, Scenario
+from echostep_simulation.devices.board import BoardProcess, PythonBoard
+from echostep_simulation.scenario import START_NS, Scenario
 from twin.acceptance_walk import WEARER, times_s, waypoints
 
 CORRIDOR, ROUNDS = "8x2", 2

@@ -25,10 +25,10 @@ from echostep.ports.chunks import GATEWAY, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.guided_run import GuidedRun, destination
 from echostep_app.plan.routing import RoutePlace
-from echostep_app.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.people.walker import Waypoint
-from echostep_app.simulation.scenario import START_NS, Scenario
+from echostep_simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.people.walker import Waypoint
+from echostep_simulation.scenario import START_NS, Scenario
 
 SEED = 5
 

@@ -28,9 +28,9 @@ from echostep.ports.people.team_beacons import MOST_SHARED, TEAM_BEACONS, Shared
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import lay_out_levels
 from echostep_app.page.elements.marks import beacon_marks
-from echostep_app.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import START_NS, Scenario
+from echostep_simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import START_NS, Scenario
 
 PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 LAID_OUT = lay_out_levels(PLAN)

@@ -17,8 +17,8 @@ from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk, portion_of
 from echostep.settings import Settings
 from echostep.tracker import Tracker
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.scenario import DEMO_WAYPOINTS, Scenario
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import DEMO_WAYPOINTS, Scenario
 
 PULSE = ECHO_OF[m.Part.PULSE]
 PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")

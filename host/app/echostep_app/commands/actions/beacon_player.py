@@ -23,7 +23,7 @@ from echostep_app.ports.port_faults import PORT_FAULTS
 from echostep_app.ports.udp import key_of
 from echostep_app.printing.console import console
 from echostep_app.scorecard.track_columns import load_path
-from echostep_app.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
+from echostep_simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
 
 BAUD = 115200
 DEFAULT_PORT = 9000  # UDP

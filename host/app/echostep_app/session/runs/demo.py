@@ -20,6 +20,7 @@ from echostep.plan import Plan
 from echostep.ports.chunks import Chunk, Portion
 from echostep.tracker import Tracker
 from echostep.walk.recorded import SIMULATED
+from echostep_app.guidance.tours import room_tour
 from echostep_app.interruption import until_asked
 from echostep_app.kernel_parts import Part
 from echostep_app.plan.importers.limited import open_limited
@@ -32,20 +33,19 @@ from echostep_app.session.metadata import run_metadata, start_recording
 from echostep_app.session.options import OutputOptions
 from echostep_app.session.results import output_folder
 from echostep_app.session.session import Session
-from echostep_app.simulation.devices.beacon_gateway import with_beacons
-from echostep_app.simulation.devices.board import Board, BoardProcess, PythonBoard
-from echostep_app.simulation.kits import Kit
-from echostep_app.simulation.people.tours import room_tour
-from echostep_app.simulation.people.walker import Person, Waypoint
-from echostep_app.simulation.scenario import DEMO_WAYPOINTS, Scenario, start_of
-from echostep_app.simulation.stimulus import TEMPERATURE_C
+from echostep_simulation.devices.beacon_gateway import with_beacons
+from echostep_simulation.devices.board import Board, BoardProcess, PythonBoard
+from echostep_simulation.kits import Kit
+from echostep_simulation.people.walker import Person, Waypoint
+from echostep_simulation.scenario import DEMO_WAYPOINTS, Scenario, start_of
+from echostep_simulation.stimulus import TEMPERATURE_C
 
 WATCHED_SPEED = 4.0  # times real time, on a terminal: a walk of 90 s is seen in 22 s
 # Chunks that are tracked together in a run that is watched: 20 ms of the walk: no step is shown later
 WATCHED_PORTION = 16
 UNSEEN_PORTION = 1000  # chunks that are tracked together when nothing shows the run: fewer calls
 FOOT_BOARD = 2  # seed of its simulator: another board than the belt's
-SIMULATION = Part("echostep_app.simulation.kernels:simulation", 85)
+SIMULATION = Part("echostep_simulation.kernels:simulation", 85)
 _DEMO_PLAN = files("echostep") / "plans" / "demo.json"
 TOUR_CORNER_M = 0.3  # how far corners are cut on a tour: doors of any plan are passed without touching them
 

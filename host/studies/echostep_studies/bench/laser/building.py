@@ -22,8 +22,8 @@ from echostep.errors import EchostepError
 from echostep.jit import kernel
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Plan, Pose
-from echostep_app.simulation.world.acoustics import SRF02, Acoustics, wall_db
-from echostep_app.simulation.world.echoes import ranger_bias_m
+from echostep_simulation.world.acoustics import SRF02, Acoustics, wall_db
+from echostep_simulation.world.echoes import ranger_bias_m
 from echostep_studies.bench.laser.carmen_log import CarmenLog, read_log
 from echostep_studies.bench.laser.odometry import Odometry, odometry_of
 from echostep_studies.bench.laser.wall_lines import straight_pieces, wall_segments

@@ -22,9 +22,9 @@ from echostep.plan import Plan
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep.settings import parse_settings
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
-from echostep_app.simulation.devices.board import PythonBoard
-from echostep_app.simulation.people.walker import RATE_HZ, Walk
-from echostep_app.simulation.stimulus import BoardSensors
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.people.walker import RATE_HZ, Walk
+from echostep_simulation.stimulus import BoardSensors
 from echostep_studies.bench.recordings.feet import FootRecording, hallway
 from echostep_studies.bench.sites import plan_of
 from echostep_studies.bench.walks import SimulatedWalk, walk_of

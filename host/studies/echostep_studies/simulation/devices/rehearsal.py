@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from echostep.arrays import Floats
 from echostep.plan import Plan
-from echostep_app.simulation.devices.board import Board
-from echostep_app.simulation.people.walker import Person
-from echostep_app.simulation.scenario import Scenario
-from echostep_app.simulation.stimulus import EXTENDED_ROW, NO_SYNC
+from echostep_simulation.devices.board import Board
+from echostep_simulation.people.walker import Person
+from echostep_simulation.scenario import Scenario
+from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC
 
 WALK = ((2.0, 7.5), (12.0, 7.5))  # 10 m along the demo's corridor
 TURN_DEG_S, TURN_BEGIN_MS, TURN_END_MS = 22.0, 1000, 18_500  # 385 degrees within the 20 s of the measurement
