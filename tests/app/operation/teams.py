@@ -14,7 +14,6 @@ from echostep.plan import Plan
 from echostep_app.operation.operation import Operation, TableScene
 from echostep_app.operation.page import TablePage
 from echostep_app.operation.recorded.record import OperationRecorder
-from echostep_app.operation.recorded.tape import Tape
 from echostep_app.page.server import Address
 from echostep_app.plan.places.whereabouts import Whereabouts
 from echostep_app.printing.lines import moment
@@ -98,12 +97,11 @@ class Team:
 
 
 class Recording:
-    """A team whose operation is recorded, with a keyframe every few messages."""
+    """A team whose operation is recorded."""
 
-    def __init__(self, folder: Path, team: Team, keyframe_messages: int = 20) -> None:
+    def __init__(self, folder: Path, team: Team) -> None:
         recorder = OperationRecorder(folder / "operation.mcap", team.operation, "mqtt://broker:1883")
-        self.file, self.tape = recorder.file, recorder.tape
-        self.tape._messages = keyframe_messages
+        self.file = recorder.file
         team.on_believed = lambda believed: recorder.add(believed, team.now_s, team.unix_s, connected=True)
 
     def on_disk(self) -> bool:
@@ -154,9 +152,9 @@ def whole_team(team: Team | None = None) -> Team:
 class ServedTeam:
     """The page of a team; `show` publishes its present scene."""
 
-    def __init__(self, team: Team, tape: Tape | None = None) -> None:
+    def __init__(self, team: Team) -> None:
         self.team = team
-        self.page = TablePage(team.operation, "Simulated operation", Address(port=0), tape)
+        self.page = TablePage(team.operation, "Simulated operation", Address(port=0))
 
     def show(self, **how: Any) -> None:
         self.page.feed.publish(self.team.scene(**how))

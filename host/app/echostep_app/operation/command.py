@@ -102,7 +102,7 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
         recording = recorder.file
         opened.callback(print_notices, recording.notices, console)
         opened.callback(recording.close)
-        page = views.open_page(opened, operation, "echostep command", recorder.tape, console)
+        page = views.open_page(opened, operation, "echostep command", console)
         console.print(f"Recording: {recording.path}", highlight=False)
         receiver = _receiver(endpoint, checked, operation.plan, inbox, lambda text: console.print(text, markup=False))
         opened.callback(receiver.close)

@@ -14,7 +14,7 @@ from typing import Self
 from starlette.websockets import WebSocket
 
 from echostep_app.operation.operation import Operation
-from echostep_app.operation.recorded.tape import Tape
+from echostep_app.operation.recorded.tape import OperationTape
 from echostep_app.operation.session import TableFeed, TableSession
 from echostep_app.page.server import STATIC, Address, PageSite, SocketServer
 from echostep_app.page.shared import PageCounts
@@ -26,7 +26,7 @@ TABLE = Path(__file__).parent / "static"
 class TablePage:
     """Serves the scenes that are published until it is closed; raises EchostepError when it cannot listen at the address."""
 
-    def __init__(self, operation: Operation, title: str, address: Address, tape: Tape | None = None) -> None:
+    def __init__(self, operation: Operation, title: str, address: Address, tape: OperationTape | None = None) -> None:
         self.feed = feed = TableFeed(operation, title, tape)
         faults, counts = Faults(), PageCounts()
         self.notices: deque[str] = faults.notices  # faults of the server that are not printed yet

@@ -13,7 +13,7 @@ from msgspec import Meta
 
 from echostep.fields import Metres
 from echostep.ports.people.payloads import Level, decoded
-from echostep_app.page.requests import MOST_REQUEST, FrameDrawn, Seek, SetPlaying, SetSpeed
+from echostep_app.page.requests import MOST_REQUEST, FrameDrawn, PlayerRequest
 from echostep_app.team.messages.crews import AirMinutes, Does, Members
 from echostep_app.team.messages.marks import MarkKind
 from echostep_app.team.messages.orders import OUT, NoteText
@@ -93,13 +93,8 @@ class WriteNote(msgspec.Struct, frozen=True, tag_field="kind", tag="log"):
     by: Person
 
 
-class Now(msgspec.Struct, frozen=True, tag_field="kind", tag="now"):
-    """Show the present."""
-
-
-TimeRequest = Seek | SetPlaying | SetSpeed | Now
 Action = SetMark | Unmark | Acknowledge | Send | SetCrew | CrewDoes | SetOrder | WriteNote
-TableRequest = FrameDrawn | Choose | TimeRequest | Action
+TableRequest = FrameDrawn | Choose | PlayerRequest | Action
 _REQUESTS = msgspec.json.Decoder(TableRequest)
 
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The guarded socket of one page: the common part of the sessions of all pages.
 
-In: a WebSocket. Out: texts, frames and a beat each second to the page; its requests, one by one, to the session. Owns the budget of requests and
-the handling of faults.
+In: a WebSocket. Out: texts, frames and a beat each second to the page; its requests, one by one, to the session. Owns the budget of requests, the
+handling of faults, and the pace: at most 30 frames a second, at most two not yet drawn. A page in the background draws nothing, so nothing is sent to
+it; when it is visible again it gets the newest moment.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from abc import ABC, abstractmethod
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from echostep_app.page import protocol, requests
+from echostep_app.page.player import Player
+from echostep_app.page.protocol import FRAME_S
 from echostep_app.page.shared import PageCounts
 from echostep_app.page.web.exchange import Exchange
 from echostep_app.page.web.faults import Faults
@@ -37,6 +40,10 @@ class GuardedSocket(ABC):
         self._faults = faults
         self._counts = counts
         self._news = asyncio.Event()
+        self._player: Player | None = None  # of a recorded run
+        self._frame_due = True  # the page needs a frame, even of the same moment
+        self._seq = 0  # number of the newest frame
+        self._undrawn: dict[int, int | None] = {}  # number of a sent frame: arrival (ns) of the bytes that are new in it
 
     @abstractmethod
     async def _greet(self) -> None:
@@ -47,8 +54,33 @@ class GuardedSocket(ABC):
         """Handle one request, None if it was not a text; the reason of a refusal, else empty."""
 
     @abstractmethod
+    async def _next_frame(self) -> bytes | None:
+        """The frame of what this page has not been sent yet; None while nothing is new."""
+
+    async def _tell_run(self) -> None:
+        """Tell how the run stands, also a page in the background."""
+
     async def _send(self) -> None:
-        """Send what is new, until cancelled."""
+        """Send a frame when there is something new, not before `FRAME_S` after the last one; until cancelled."""
+        due_s = 0.0
+        while True:
+            playing = self._player is not None and self._player.playing
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._news.wait(), FRAME_S if playing else None)
+            if (early_s := due_s - time.monotonic()) > 0.0:
+                await asyncio.sleep(early_s)
+            self._news.clear()
+            await self._tell_run()
+            if len(self._undrawn) < MOST_UNDRAWN and (frame := await self._next_frame()) is not None:
+                due_s = max(due_s, time.monotonic() - FRAME_S) + FRAME_S
+                await self.tell(frame)
+
+    def _numbered(self, arrived_ns: int | None = None) -> int:
+        """The number of a new frame, which counts as sent."""
+        self._frame_due = False
+        self._seq += 1
+        self._undrawn[self._seq] = arrived_ns
+        return self._seq
 
     def wake(self) -> None:
         """Look for something new to send."""

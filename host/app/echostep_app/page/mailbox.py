@@ -58,21 +58,27 @@ class SceneHistory:
     def __len__(self) -> int:
         return len(self._t_s)
 
-    def __getitem__(self, index: int) -> PageScene:
-        return self._scenes[index]
-
     def add(self, scene: PageScene) -> None:
         """Append a scene; one that is earlier than the last scene gets the last scene's time."""
         self._scenes.append(scene)
         self._t_s.append(max(scene.t_s, self._t_s[-1]) if self._t_s else scene.t_s)
 
-    def index_at(self, t_s: float) -> int:
+    def _index_at(self, t_s: float) -> int:
         """Index of the last scene at or before `t_s`; 0 when all scenes are later."""
         return max(bisect_right(self._t_s, t_s) - 1, 0)
 
-    def t_s(self, index: int) -> float:
-        """Time of a scene."""
-        return self._t_s[index]
+    @property
+    def span_s(self) -> tuple[float, float] | None:
+        """Times of the first and the last scene; None before the first."""
+        return (self._t_s[0], self._t_s[-1]) if self._t_s else None
+
+    def at(self, t_s: float) -> PageScene:
+        """The scene that is shown at `t_s`."""
+        return self._scenes[self._index_at(t_s)]
+
+    def stepped(self, t_s: float, by: int) -> float:
+        """Time of the scene `by` scenes after the one that is shown at `t_s`, or of the first or last one."""
+        return self._t_s[min(max(self._index_at(t_s) + by, 0), len(self) - 1)]
 
 
 class Mailbox:

@@ -32,7 +32,7 @@ from echostep_app.page.elements.stream_rates import StreamRates
 from echostep_app.page.elements.taps import Considered, ShownPoints
 from echostep_app.page.elements.undo_offer import UndoOffer
 from echostep_app.page.over_time import COLUMNS, Event, OverTime
-from echostep_app.page.replay_cursor import PlayState
+from echostep_app.page.player import PlayState
 from echostep_app.plan.pictures.symbols import level_lines, way_names
 from echostep_app.plan.places.bearing import KNOWN_HEADING_RAD, north_rad
 from echostep_app.plan.places.globe import Globe, globe_of

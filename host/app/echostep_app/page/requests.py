@@ -106,14 +106,13 @@ class Seek(msgspec.Struct, frozen=True, tag_field="kind", tag="seek"):
 
 
 class StepBy(msgspec.Struct, frozen=True, tag_field="kind", tag="skip"):
-    """Move the replay by a number of estimates; negative: back."""
+    """Move the replay by a number of estimates, of an operation by tens of seconds; negative: back."""
 
     by: Integer
 
 
-_OwnRequest = (
-    Undo | Call | Consider | Met | Understood | AtPoint | NoTap | GoTo | EndGuidance | FrameDrawn | SetPlaying | SetSpeed | Seek | StepBy
-)  # fmt: skip
+PlayerRequest = SetPlaying | SetSpeed | Seek | StepBy
+_OwnRequest = Undo | Call | Consider | Met | Understood | AtPoint | NoTap | GoTo | EndGuidance | FrameDrawn | PlayerRequest
 Request = CheckIn | _OwnRequest
 _KEPT = msgspec.json.Decoder(Kept)
 _REQUESTS = msgspec.json.Decoder(Entered | _OwnRequest)

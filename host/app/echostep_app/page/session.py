@@ -1,18 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""The session of one page: sends scenes at most 30 times a second, with at most two frames not yet drawn; takes requests.
+"""The session of one wearer's page: sends scenes, takes requests.
 
-In: a WebSocket, the mailbox. Out: frames. Owns what this page has been sent and its position in a replay. A page in the background
-draws nothing, so nothing is sent to it; when it is visible again it gets the newest scene and the rest of the trail.
+In: a WebSocket, the mailbox. Out: frames. Owns what this page has been sent and its position in a replay.
 """
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import time
 from collections import deque
 
-from starlette.websockets import WebSocket
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from echostep.errors import EchostepError
 from echostep.localization import Estimate
@@ -23,10 +21,9 @@ from echostep_app.page.elements.guidance import Destination, ShownGuidance
 from echostep_app.page.elements.marks import ShownMark, ShownOrder
 from echostep_app.page.elements.scene import PageScene, ParticleSample, is_placed
 from echostep_app.page.elements.taps import NO_TAP, PointPress, ShownPoints
-from echostep_app.page.guarded_socket import MOST_UNDRAWN, UNKNOWN, GuardedSocket
+from echostep_app.page.guarded_socket import UNKNOWN, GuardedSocket
 from echostep_app.page.mailbox import Mailbox
-from echostep_app.page.protocol import FRAME_S
-from echostep_app.page.replay_cursor import ReplayCursor
+from echostep_app.page.player import Player
 from echostep_app.page.shared import Shared
 from echostep_app.plan.places.bearing import heading_words
 from echostep_app.ports.arrival_clock import now_ns
@@ -44,13 +41,9 @@ class PageSession(GuardedSocket):
         super().__init__(socket, mailbox.exchange, shared.faults, shared.counts)
         self._mailbox = mailbox
         self._shared = shared
-        self._cursor = ReplayCursor(mailbox.history) if mailbox.replay else None
+        self._player = Player(mailbox.history) if mailbox.replay else None
         self._destination: Destination | None = None
         self._searches: set[asyncio.Task[None]] = set()
-        self._undrawn: dict[
-            int, int | None
-        ] = {}  # number of a sent frame: `arrived_ns` of the estimate that is new in it
-        self._seq = 0
         self._last: PageScene | None = None
         self._particles: ParticleSample | None = None
         self._marks: tuple[ShownMark, ...] | None = None  # that the page has
@@ -60,11 +53,10 @@ class PageSession(GuardedSocket):
         self._points: ShownPoints | None = None  # that the page has
         self._trail_count = 0  # points of the trail that the page has
         self._told_end = False
-        self._frame_due = True  # the page needs a frame, even of the same scene
 
     async def _greet(self) -> None:
         mailbox, shared = self._mailbox, self._shared
-        replay = self._cursor is not None
+        replay = self._player is not None
         hello = protocol.hello(
             mailbox.plan, mailbox.title, mailbox.exchange.run, replay=replay, takes_files=shared.takes_files
         )
@@ -72,7 +64,7 @@ class PageSession(GuardedSocket):
 
     async def _begin_replay(self) -> None:
         """The live run is over: from now on the page plays its scenes, beginning with the last one, paused."""
-        self._cursor = ReplayCursor(self._mailbox.history, at_end=True)
+        self._player = Player(self._mailbox.history, at_end=True)
         self._trail_count, self._particles, self._drawing, self._frame_due = 0, None, None, True
         await self._greet()
 
@@ -105,8 +97,8 @@ class PageSession(GuardedSocket):
                 self._mailbox.set_goal(request.goal)
             case requests.EndGuidance():
                 self._mailbox.set_goal(None)
-            case _ if self._cursor is not None:
-                self._cursor.handle(request)
+            case requests.SetPlaying() | requests.SetSpeed() | requests.Seek() | requests.StepBy() if self._player:
+                self._player.handle(request)
                 self._frame_due = True
             case _:
                 self._counts.refused += 1
@@ -135,38 +127,37 @@ class PageSession(GuardedSocket):
         typed = request.name if isinstance(request, requests.AtPoint) else NO_TAP
         return "" if self._mailbox.add_press(PointPress(now_ns(), number, typed)) else TOO_BUSY
 
-    async def _send(self) -> None:
-        """Send a frame when there is something new, not before `FRAME_S` after the last one."""
-        due_s = 0.0
-        while True:
-            playing = self._cursor is not None and self._cursor.playing
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._news.wait(), FRAME_S if playing else None)
-            if (early_s := due_s - time.monotonic()) > 0.0:
-                await asyncio.sleep(early_s)
-            self._news.clear()
-            if self._mailbox.failure:
-                await self.tell(protocol.encode(protocol.Failed(self._mailbox.failure, ended=True)))
-                return
-            if self._cursor is None and self._mailbox.replay:
-                await self._begin_replay()
-            if self._mailbox.summary is not None and not self._told_end:
-                self._told_end = self._frame_due = True
-            if len(self._undrawn) >= MOST_UNDRAWN:
-                continue
-            self._follow_goal()
-            self._frame_due = self._frame_due or self._marks is not self._mailbox.marks
-            self._frame_due = self._frame_due or self._orders is not self._mailbox.orders
-            self._frame_due = self._frame_due or self._team is not self._mailbox.team
-            self._frame_due = self._frame_due or self._points is not self._mailbox.points
-            scene = self._cursor.scene(time.monotonic()) if self._cursor else self._mailbox.latest
-            if scene is None:
-                continue
-            self._frame_due = self._frame_due or self._mailbox.drawing_at(scene.t_s) is not self._drawing
-            if scene is self._last and not self._frame_due and not playing:
-                continue
-            due_s = max(due_s, time.monotonic() - FRAME_S) + FRAME_S
-            await self.tell(self._frame(scene))
+    async def _tell_run(self) -> None:
+        mailbox = self._mailbox
+        if mailbox.failure:
+            await self.tell(protocol.encode(protocol.Failed(mailbox.failure, ended=True)))
+            raise WebSocketDisconnect
+        if self._player is None and mailbox.replay:
+            await self._begin_replay()
+        if mailbox.summary is not None and not self._told_end:
+            self._told_end = self._frame_due = True
+
+    async def _next_frame(self) -> bytes | None:
+        self._follow_goal()
+        scene = self._scene()
+        if scene is None or not (self._frame_due or self._is_new(scene)):
+            return None
+        return self._frame(scene)
+
+    def _scene(self) -> PageScene | None:
+        """What this page shows; None while there is nothing."""
+        if self._player is None:
+            return self._mailbox.latest
+        t_s = self._player.move(time.monotonic())
+        return None if t_s is None else self._mailbox.history.at(t_s)
+
+    def _is_new(self, scene: PageScene) -> bool:
+        """Whether the page lacks something of what it would be sent with a scene."""
+        mailbox = self._mailbox
+        had = (self._last, self._marks, self._orders, self._team, self._points, self._drawing)
+        now = (scene, mailbox.marks, mailbox.orders, mailbox.team, mailbox.points, mailbox.drawing_at(scene.t_s))
+        playing = self._player is not None and self._player.playing
+        return playing or any(new is not old for new, old in zip(now, had, strict=True))
 
     def _follow_goal(self) -> None:
         """Guide to the run's goal, which any page may have changed."""
@@ -176,14 +167,11 @@ class PageSession(GuardedSocket):
 
     def _frame(self, scene: PageScene) -> bytes:
         """A frame with what this page has not been sent yet; from then on it counts as sent."""
-        self._frame_due = False
-        self._seq += 1
-        new_estimate = self._cursor is None and (self._last is None or scene.estimate is not self._last.estimate)
-        self._undrawn[self._seq] = scene.arrived_ns if new_estimate else None
+        new_estimate = self._player is None and (self._last is None or scene.estimate is not self._last.estimate)
         begin = min(self._trail_count, scene.trail_count)  # a replay may go back
         drawing, points = self._mailbox.drawing_at(scene.t_s), self._mailbox.points
         parts = protocol.FrameParts(
-            seq=self._seq,
+            seq=self._numbered(scene.arrived_ns if new_estimate else None),
             where=self._shared.taps.where(scene.estimate) if scene.estimate else "",
             heading=self._heading(scene.estimate) if scene.estimate else "",
             placed=scene.estimate is not None and is_placed(scene.estimate, self._mailbox.plan),
@@ -195,12 +183,12 @@ class PageSession(GuardedSocket):
             goal=self._mailbox.goal,
             errand=self._mailbox.errand,
             orders=self._mailbox.orders,
-            play=self._cursor.state() if self._cursor else None,
+            play=self._player.state() if self._player else None,
             marks=self._mailbox.marks if self._marks is not self._mailbox.marks else None,
             drawing=(drawing or NO_DRAWING) if drawing is not self._drawing else None,
             team=self._mailbox.team if self._team is not self._mailbox.team else None,
             points=points if points is not self._points else None,
-            ended=self._mailbox.summary if self._cursor is None or self._cursor.at_end else None,
+            ended=self._mailbox.summary if self._player is None or self._player.at_end else None,
         )
         self._marks, self._team, self._drawing, self._points = self._mailbox.marks, self._mailbox.team, drawing, points
         self._orders = self._mailbox.orders

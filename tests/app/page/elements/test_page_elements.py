@@ -26,37 +26,37 @@ from echostep_app.page.elements.taps import Taps
 from echostep_app.page.elements.undo_offer import UndoClock, UndoOffer
 from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import SceneHistory
-from echostep_app.page.replay_cursor import ReplayCursor
+from echostep_app.page.player import Player
 from echostep_app.plan.routing import RoutePlace
 from page.frames import LOCAL, PLAN, scene, told
 from plan.imported_plans import seven_floors
 
 
-def test_a_cursor_plays_stops_seeks_and_steps() -> None:
+def test_a_player_plays_stops_seeks_and_steps() -> None:
     history = SceneHistory()
-    cursor = ReplayCursor(history)
-    assert cursor.scene(100.0) is None
+    player = Player(history)
+    assert player.move(100.0) is None
     for t_s in (10.0, 11.0, 12.0, 13.0):
         history.add(scene(t_s))
 
     def at(now_s: float) -> float:
-        shown = cursor.scene(now_s)
-        assert shown is not None
-        return shown.t_s
+        t_s = player.move(now_s)
+        assert t_s is not None
+        return history.at(t_s).t_s
 
     assert at(100.0) == 10.0
-    assert at(101.5) == 11.0
-    cursor.handle(requests.SetSpeed(4.0))
-    assert at(101.9) == 13.0
+    assert at(101.5) == 11.0  # a page that was in the background goes on from where it was
+    player.handle(requests.SetSpeed(4.0))
+    assert at(102.0) == 13.0
     assert at(500.0) == 13.0
-    cursor.handle(requests.StepBy(-2))
-    assert (at(501.0), cursor.playing) == (11.0, False)
+    player.handle(requests.StepBy(-2))
+    assert (at(501.0), player.playing) == (11.0, False)
     assert at(502.0) == 11.0
-    cursor.handle(requests.Seek(12.4))
+    player.handle(requests.Seek(12.4))
     assert at(503.0) == 12.0
-    cursor.handle(requests.Seek(1e9))
+    player.handle(requests.Seek(1e9))
     assert at(504.0) == 13.0
-    cursor.handle(requests.SetPlaying(True))  # at the end: from the beginning
+    player.handle(requests.SetPlaying(True))  # at the end: from the beginning
     assert at(504.0) == 10.0
 
 

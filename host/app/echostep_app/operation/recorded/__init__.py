@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An operation on file: what is recorded of it, its past on the page, and its replay.
+"""An operation on file: what is recorded of it, and its replay.
 
-In: messages with their times of arrival. Out: a tape, frames of the past. Owns the file that it writes.
+In: messages with their times of arrival; a file. Out: the file; the operation at any time. Owns the file that it writes.
 """

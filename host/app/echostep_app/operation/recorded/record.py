@@ -25,7 +25,6 @@ from msgspec import Meta
 
 from echostep.ports.chunks import Chunk
 from echostep_app.operation.operation import Operation
-from echostep_app.operation.recorded.tape import Keyframe, Tape
 from echostep_app.output.foxglove import log_line
 from echostep_app.recording.splitting import numbered_recorder
 from echostep_app.team.inbox import ReceivedMessage
@@ -78,7 +77,7 @@ def decode_record(data: bytes) -> Heard | Condition | None:
 
 
 class OperationRecorder:
-    """Writes an operation to a new file, numbered after `wanted`, and its keyframes to `tape`. Never waits for the disk.
+    """Writes an operation to a new file, numbered after `wanted`. Never waits for the disk.
 
     `file`: the recorder of the file. Raises EchostepError when it cannot be created.
     """
@@ -94,7 +93,6 @@ class OperationRecorder:
             "started_ns": str(time.monotonic_ns()),
         }
         self.file = numbered_recorder(wanted, fields)
-        self.tape = Tape(self.file.path, grows=True)
         self._operation = operation
         self._condition: Condition | None = None
         self._counted_s = -math.inf
@@ -117,8 +115,6 @@ class OperationRecorder:
         self._faults = max(self._faults, len(faults))
         roster = self._operation.roster
         self._add_condition(now_s, Condition(unix_s, connected, roster.received, dict(roster.rejected)))
-        offset, operation = self.file.offset, self._operation
-        self.tape.note(now_s, len(believed), lambda: Keyframe(now_s, unix_s, offset, connected, operation.copy()))
 
     def _add_condition(self, now_s: float, new: Condition) -> None:
         """Record the state of the connection and the counts, when the state has changed, or counts of rejected messages after `COUNTS_S`."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import math
 import sys
-import time
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,11 +20,10 @@ from rich.console import Console
 from echostep.errors import EchostepError
 from echostep.plan import Plan
 from echostep.recording import open_recording
+from echostep_app.interruption import sleep
 from echostep_app.operation.operation import Operation
-from echostep_app.operation.recorded.player import Player, load
 from echostep_app.operation.recorded.record import KIND
-from echostep_app.operation.recorded.tape import Tape
-from echostep_app.page.protocol import FRAME_S
+from echostep_app.operation.recorded.tape import OperationTape, Reader
 from echostep_app.team.commander import as_tree, table
 
 if TYPE_CHECKING:
@@ -41,7 +39,7 @@ class Views:
     as_json: bool = False
 
     def open_page(
-        self, opened: ExitStack, operation: Operation, title: str, tape: Tape, console: Console
+        self, opened: ExitStack, operation: Operation, title: str, console: Console, tape: OperationTape | None = None
     ) -> TablePage | None:
         """The page, served until `opened` is closed, and its address printed; None where there is none."""
         if self.page is None:
@@ -68,44 +66,28 @@ def replay(path: Path, plan: Plan, seconds: float | None, views: Views, console:
         console.print(
             f"{path}: it was recorded on another plan: wearers are listed, not shown on this one", markup=False
         )
-    operation, tape = Operation(plan), Tape(path, grows=False)
+    tape = OperationTape(path, Operation(plan))
     with ExitStack() as opened:
-        page = views.open_page(opened, operation, "echostep command, recorded", tape, console)
+        page = views.open_page(opened, tape.operation, "echostep command, recorded", console, tape)
         with suppress(KeyboardInterrupt):
-            player = _read(tape, operation, page)
-            if player is None:
+            reader = None
+            for reader in tape.read():
+                pass
+            if reader is None:
                 raise EchostepError(f"{path}: nothing of the operation can be read")
-            _say(player, console)
+            _say(reader, console)
             if page:
-                _serve(player, page, math.inf if seconds is None else seconds)
+                sleep(math.inf if seconds is None else seconds)
+    end_s = (tape.span_s or (0.0, 0.0))[1]
     if not views.as_json:
-        lines = table(operation.roster, plan, tape.end_s, connected=True, columns=console.width)
-        console.print(lines)
-    views.finish(operation, tape.end_s)
+        console.print(table(tape.operation.roster, plan, end_s, connected=True, columns=console.width))
+    views.finish(tape.operation, end_s)
 
 
-def _read(tape: Tape, operation: Operation, page: TablePage | None) -> Player | None:
-    """Read the whole file; the page is shown what is read at most 30 times a second. Returns the player at the end."""
-    shown_s, player = -math.inf, None
-    for player in load(tape, operation):
-        if page and time.monotonic() - shown_s >= FRAME_S:
-            shown_s = time.monotonic()
-            page.feed.publish(player.scene())
-    return player
-
-
-def _serve(player: Player, page: TablePage, seconds: float) -> None:
-    """Wake the pages 30 times a second: each plays on by itself."""
-    end_s, scene = time.monotonic() + seconds, player.scene()
-    while time.monotonic() < end_s:
-        page.feed.publish(scene)
-        time.sleep(FRAME_S)
-
-
-def _say(player: Player, console: Console) -> None:
+def _say(reader: Reader, console: Console) -> None:
     """What is wrong with the file."""
-    file = player.file
+    file = reader.file
     if file.own_damage.truncated:
         console.print(f"{file.path}: it was not closed: it is shown up to its last whole record", markup=False)
-    if file.own_damage.altered or file.own_damage.places or file.own_damage.unreadable_chunks or player.unknown:
+    if file.own_damage.altered or file.own_damage.places or file.own_damage.unreadable_chunks or reader.unknown:
         console.print(f"{file.path}: damaged; echostep info {file.path} says where", markup=False)

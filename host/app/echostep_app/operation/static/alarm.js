@@ -3,7 +3,7 @@
 // one tap leads back to what was seen before.
 
 import { Bell } from '../static/bell.js';
-import { say } from './text.js';
+import { say } from '../static/text.js';
 
 const BLINK_MS = 1000;  // assumed; slower than the 3 flashes a second of WCAG 2.3.1
 const $ = (id) => document.getElementById(id);
@@ -17,19 +17,14 @@ export class Alarm {
     $('mayday-back').onclick = () => this.back();
   }
 
-  // Rows of the list, the place of each wearer, and the time bar: while the past is shown a mayday of now sounds, but the map stays.
-  update(rows, places, time, isPast) {
-    const open = rows.filter(({ open_alarm }) => open_alarm), count = isPast ? time?.open_alarms ?? 0 : open.length;
-    if (isPast) {
-      if (count > this.count) this.bell.ring();
-    } else {
-      const first = this.open_ids === null, come = open.filter(({ id }) => !first && !this.open_ids.has(id));
-      this.open_ids = new Set(open.map(({ id }) => id));
-      if (come.length) this.arrive(come[0], places.get(come[0].id));
-      if (this.shown !== null && !this.open_ids.has(this.shown)) this.hide();
-    }
-    [this.count, this.first] = [count, isPast ? undefined : open[0]?.id];
-    this.named = isPast || !open.length ? '' : ` ${open[0].name}`;
+  // Rows of the list, the place of each wearer.
+  update(rows, places) {
+    const open = rows.filter(({ open_alarm }) => open_alarm), first = this.open_ids === null, come = open.filter(({ id }) => !first && !this.open_ids.has(id));
+    this.open_ids = new Set(open.map(({ id }) => id));
+    if (come.length) this.arrive(come[0], places.get(come[0].id));
+    if (this.shown !== null && !this.open_ids.has(this.shown)) this.hide();
+    [this.count, this.first] = [open.length, open[0]?.id];
+    this.named = open.length ? ` ${open[0].name}` : '';
     this.mark();
   }
 

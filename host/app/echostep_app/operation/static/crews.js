@@ -2,7 +2,7 @@
 // Crews and their accountability check (PAR): who is inside, since when, when it last answered, how much of the planned air is left. What is due is said.
 
 import { localise, minutes, tr } from '../static/language.js';
-import { put, say } from './text.js';
+import { put, say } from '../static/text.js';
 
 const CHECK_SHARE = 1 / 3;  // of the planned air until a check is due: the crew is reminded of its pressures after one and after two thirds [FwDV 7, 7.4]
 const ORDER = ['over', 'due', 'inside', 'ready', 'out'];
@@ -45,8 +45,8 @@ export class Crews {
     if (isSent) $('crew-name').value = $('crew-members').value = '';
   }
 
-  // `unix_s`: of the frame, which is not the clock's while the past is shown.
-  show(crews, unix_s, isPast) {
+  // `unix_s`: of the frame, which is not the clock's in a recorded operation.
+  show(crews, unix_s, isRecorded) {
     if (crews) this.crews = crews;
     const shown = this.crews.map((crew) => ({ ...crew, ...stateOf(crew, unix_s) })).sort((a, b) => ORDER.indexOf(a.state) - ORDER.indexOf(b.state));
     const known = new Set(shown.map(({ id }) => id));
@@ -59,15 +59,15 @@ export class Crews {
       const inside = ['over', 'due', 'inside'].includes(crew.state);
       [...item.lastChild.children].forEach((button) => { button.hidden = (button.dataset.does === 'enter') === inside; });
     });
-    this.sum(shown, isPast);
+    this.sum(shown, isRecorded);
   }
 
-  sum(shown, isPast) {
+  sum(shown, isRecorded) {
     const urgent = shown.filter(({ state }) => ['over', 'due'].includes(state)), inside = shown.filter(({ state }) => !['ready', 'out'].includes(state)).length;
     say($('crew-sum'), shown.length ? `${inside} inside${urgent.length ? `, ${urgent.length} to be asked now` : ''}` : 'No crew yet.');
     put($('crews-button'), `${tr('Crews')}${inside ? ` ${inside}` : ''}${urgent.length ? ' !' : ''}`);
     $('crews-button').classList.toggle('urgent', urgent.length > 0);
-    const text = isPast ? '' : urgent.slice(0, 3).map(({ name, state }) => `${name}: ${state === 'over' ? 'planned air is over' : 'check due'}`).join('. ');
+    const text = isRecorded ? '' : urgent.slice(0, 3).map(({ name, state }) => `${name}: ${state === 'over' ? 'planned air is over' : 'check due'}`).join('. ');
     say($('crew-due'), text);
     if ($('crew-due').hidden !== !text) $('crew-due').hidden = !text;
   }

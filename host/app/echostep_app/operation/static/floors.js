@@ -2,7 +2,7 @@
 // Floors of the plan: for each a button with the number of wearers on it, and a sign when one of them needs help; on a phone more than three are a list. The last one shows all storeys.
 
 import { tr } from '../static/language.js';
-import { put } from './text.js';
+import { put } from '../static/text.js';
 
 const MOST_BUTTONS = 3;
 const URGENT = ['mayday', 'asked', 'lost', 'stale'];

@@ -2,7 +2,7 @@
 // The list of wearers and the details of one, in words; and the text for screen readers when a wearer needs help.
 
 import { tr } from '../static/language.js';
-import { clock, put, said, say } from './text.js';
+import { clock, put, said, say } from '../static/text.js';
 
 export const SIGNS = { mayday: '▲', asked: '△', lost: '✕', stale: '◌', uncertain: '◐', waiting: '○', tracking: '●', ended: '■' };
 const URGENT = ['mayday', 'asked', 'lost', 'stale'];
@@ -16,7 +16,7 @@ export class List {
   constructor(onChoose, onSend) {
     Object.assign(this, { onChoose, onSend, items: new Map(), rows: [], states: new Map(), chosen: null });
     $('close').onclick = () => this.choose(null);
-    $('find').oninput = $('sort').onchange = () => this.show(this.rows, this.isPast);
+    $('find').oninput = $('sort').onchange = () => this.show(this.rows, this.isRecorded);
   }
 
   // In the chosen order, those that hold what is looked for; calls for help first.
@@ -26,9 +26,9 @@ export class List {
     return found.sort((a, b) => isCall(b) - isCall(a) || ORDERS[$('sort').value](a, b));
   }
 
-  // Rows in order of urgency; elements stay, so that focus and scrolling stay. What happened in the past is not announced.
-  show(rows, isPast) {
-    Object.assign(this, { rows, isPast });
+  // Rows in order of urgency; elements stay, so that focus and scrolling stay. What a recording holds is not announced.
+  show(rows, isRecorded) {
+    Object.assign(this, { rows, isRecorded });
     const shown = this.sorted(rows), known = new Set(shown.map(({ id }) => id)), focused = document.activeElement, teams = new Set(rows.map(({ team }) => team)).size;
     $('finding').hidden = rows.length <= MANY && !$('find').value;
     for (const [id, item] of this.items) if (!known.has(id)) { item.li.remove(); this.items.delete(id); }
@@ -43,13 +43,13 @@ export class List {
       say(item.note, row.notes.join('; '));
     });
     if (focused?.isConnected && document.activeElement !== focused) focused.focus({ preventScroll: true });
-    this.announce(rows, isPast);
+    this.announce(rows, isRecorded);
     if (this.chosen !== null && !rows.some(({ id }) => id === this.chosen)) this.choose(null);
   }
 
   again() {
     this.shownDetails = this.shownDistress = null;
-    this.show(this.rows, this.isPast);
+    this.show(this.rows, this.isRecorded);
   }
 
   make(id) {
@@ -121,9 +121,9 @@ export class List {
   }
 
   // A wearer who has become lost or silent is said once, others are not.
-  announce(rows, isPast) {
+  announce(rows, isRecorded) {
     const said = rows.filter(({ id, state }) => URGENT.includes(state) && this.states.get(id) !== state).map(({ name, words }) => `${name}: ${words}`);
-    if (isPast) return;
+    if (isRecorded) return;
     this.states = new Map(rows.map(({ id, state }) => [id, state]));
     if (said.length) say($('live'), said.slice(0, 3).join('. '));
   }

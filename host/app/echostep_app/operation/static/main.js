@@ -21,8 +21,8 @@ import { Painter } from './paint.js';
 import { Orders } from './orders.js';
 import { Sheet } from './sheet.js';
 import { Storeys } from './storeys.js';
-import { put, say } from './text.js';
-import { TimeBar } from './timebar.js';
+import { put, say } from '../static/text.js';
+import { TimeBar } from '../static/timebar.js';
 import { Trails } from './trails.js';
 import { parseFrame, placesOf } from './wire.js';
 
@@ -34,9 +34,9 @@ const scene = { places: new Map(), rows: [], marks: [], level: 0, chosen: null, 
 const storeys = new Storeys(), floors = new Floors((level) => (level === null ? stack() : visit(level)));
 const list = new List(choose, (id) => sheet.signed((by) => link.send('send', { id, to: scene.chosen, by })));
 const alarm = new Alarm(view, { show: goTo, open: (id) => list.choose(id), level: () => wantedLevel, showLevel: visit, floor: (level) => plan.levels[level].name });
-let plan = null, wantedLevel = 0, fitted = false, isAsked = false, globe = null, drawnStamp = -1, undrawn = [], found = false;
+let plan = null, wantedLevel = 0, fitted = false, isAsked = false, globe = null, drawnStamp = -1, undrawn = [], found = false, isRecorded = false;
 
-const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onAge: connection, onUnsent: () => {}, isLive: () => scene.frame?.time?.live !== false && !timeBar.isPast, parse: parseFrame });
+const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onAge: connection, onUnsent: () => {}, isLive: () => !isRecorded, parse: parseFrame });
 const sheet = new Sheet((kind, fields) => link.send(kind, fields), hint, { words: (x, y) => globe?.words(x, y), measure: measured });
 const showLegend = startLegend($('legend-button'), COMMAND, COMMAND_KEYS, inOtherUnit), crews = new Crews((act) => sheet.signed(act), (kind, fields) => link.send(kind, fields));
 const orders = new Orders((act) => sheet.signed(act), (kind, fields) => link.send(kind, fields), () => scene.chosen, hint);
@@ -53,7 +53,8 @@ async function hello(message) {
   found = fitted = false;
   fault('');
   trails.clear();
-  timeBar.again();
+  isRecorded = message.replay;
+  timeBar.show(message.replay);
   $('title').textContent = `${message.title}: ${plan.name}`;
   alarm.entitle(message.title);
   floors.plan(plan.levels);
@@ -105,8 +106,7 @@ function connection() {
   const { pulse, isOpen } = link, isOld = pulse.isSilent && pulse.isLive();
   if (scene.frame && scene.isOld !== isOld) {
     scene.isOld = isOld;
-    list.show(isOld ? scene.rows.map(then) : scene.rows, timeBar.isPast);
-    timeBar.show(scene.frame.time, scene.frame.unix_s, isOld);
+    list.show(isOld ? scene.rows.map(then) : scene.rows, isRecorded);
   }
   ask();
   if (!pulse.isSilent && isOpen) return scene.frame && status(scene.frame);
@@ -122,19 +122,19 @@ function frame(received) {
   scene.places = placesOf(received.places);
   if (!received.trail_from) trails.clear();
   trails.add(received.trail, received.unix_s);
-  timeBar.show(received.time, received.unix_s);
+  timeBar.frame(received.play, false, received.unix_s);
   if (received.list) {
     scene.rows = received.list;
-    list.show(received.list, timeBar.isPast);
+    list.show(received.list, isRecorded);
     floors.show(storeys.on ? null : scene.level, scene.rows);
     findFirst();
   }
-  if (received.list) alarm.update(received.list, scene.places, received.time, timeBar.isPast);
+  if (received.list && !isRecorded) alarm.update(received.list, scene.places);
   if (received.marks) scene.marks = received.marks;
   orders.show(received.order, received.unix_s);
   orders.log(received.log);
   link.outbox.wait(received.waiting);
-  crews.show(received.crews, received.unix_s, timeBar.isPast);
+  crews.show(received.crews, received.unix_s, isRecorded);
   list.details(received.details, received.distress);
   scene.frame = received;
   if (!link.pulse.isSilent) status(received);
@@ -147,7 +147,7 @@ function status({ summary, refused, connected, fault }) {
   put($('mark'), connected ? '●' : '✕');
   if ($('words').dataset.status !== (connected ? 'tracking' : 'broken')) $('words').dataset.status = connected ? 'tracking' : 'broken';
   say($('status-text'), connected ? 'connected' : 'no broker: the last known state');
-  say($('summary'), (timeBar.isPast ? 'the past: ' : '') + summary);
+  say($('summary'), (isRecorded ? 'recorded: ' : '') + summary);
   const why = [fault, refused && `rejected: ${refused}`].filter(Boolean).join('; ');
   say($('refused'), why);
   if ($('refused').hidden !== !why) $('refused').hidden = !why;

@@ -3,7 +3,7 @@
 
 import { onHeld } from '../static/held.js';
 import { minutes } from '../static/language.js';
-import { clock, say } from './text.js';
+import { clock, say } from '../static/text.js';
 
 const MOST_NAMES = 6;
 const $ = (id) => document.getElementById(id);

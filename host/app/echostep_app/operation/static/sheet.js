@@ -3,7 +3,7 @@
 
 import { recall, remember } from '../static/storage.js';
 import { markWords } from '../static/marks.js';
-import { said } from './text.js';
+import { said } from '../static/text.js';
 
 const KINDS = ['cleared', 'hazard', 'meeting'];
 const $ = (id) => document.getElementById(id);

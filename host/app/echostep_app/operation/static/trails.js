@@ -21,7 +21,7 @@ export class Trails {
     this.level = null;  // all is painted anew, at once
   }
 
-  // `now_s`: time of the frame, which is not that of the clock while the past is shown
+  // `now_s`: time of the frame, which is not the clock's in a recorded operation
   add(rows, now_s) {
     this.now_s = now_s;
     const grown = new Map();  // by wearer, the number of points that were there already

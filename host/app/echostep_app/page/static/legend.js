@@ -46,7 +46,7 @@ export const LIVE = [
   ]],
   ['Marks', MARKS],
 ];
-const MOVES = { 'arrow keys': 'move the map', '+ −': 'zoom', '[ ]': 'rotate', N: 'north up', W: 'the whole floor', Space: 'hold or play the past', 'L ?': 'this', Escape: 'cancel, close' };
+const MOVES = { 'arrow keys': 'move the map', '+ −': 'zoom', '[ ]': 'rotate', N: 'north up', W: 'the whole floor', Space: 'play or pause a recording', 'L ?': 'this', Escape: 'cancel, close' };
 export const LIVE_KEYS = { ...MOVES, F: 'follow', H: 'I am here: a cross', G: 'go to: a cross', D: 'measure a distance', Enter: 'take the cross', ', .': 'turn the heading', C: 'charts', T: 'more' };
 export const COMMAND_KEYS = { ...MOVES, M: 'mark the middle', P: 'crews', V: 'all storeys' };
 export const COMMAND = [

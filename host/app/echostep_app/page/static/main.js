@@ -11,7 +11,6 @@ import { Panel } from './live/panel.js';
 import { PlanView } from './plan.js';
 import { Points } from './live/points.js';
 import { Orders } from './live/orders.js';
-import { Replay } from './live/replay.js';
 import { Speech } from './live/speech.js';
 import { Taps } from './live/taps.js';
 import { Charts } from './tools/charts.js';
@@ -24,6 +23,7 @@ import { titled } from './tools/titles.js';
 import { Tools } from './tools/tools.js';
 import { inUnits, showScale } from './tools/units.js';
 import { startTheme } from './theme.js';
+import { TimeBar } from './timebar.js';
 import { View } from './view.js';
 import { localise, missing, tr } from './language.js';
 
@@ -48,7 +48,7 @@ const link = new Link({
 const speech = new Speech($('speech'), $('sentence'), $('invitation'), $('unspoken'));
 const orders = new Orders((kind, fields) => link.send(kind, fields), (text) => speech.unsent(text));
 const showLegend = startLegend($('legend-button'), LIVE, LIVE_KEYS, redraw);
-const replay = new Replay((kind, fields) => link.send(kind, fields));
+const timeBar = new TimeBar((kind, fields) => link.send(kind, fields));
 const points = new Points((kind, fields) => link.send(kind, fields));
 const drops = new Drops(hint), charts = new Charts($('charts'), () => painter.colour, seek);
 const tools = new Tools({ view, scene, planView, layers: scene.layers, charts, hint, enter, seek, changed: redraw, plan: () => plan, globe: () => globe, takesFiles: () => drops.takes });
@@ -68,7 +68,7 @@ async function hello(message) {
   invited = false;
   panel.hello(message);
   const begins = message.replay && $('replay').hidden;
-  replay.show(message.replay);
+  timeBar.show(message.replay);
   if (begins) {  // the time bar takes room: the floor is fitted into what is left
     view.resize($('map').clientWidth, $('map').clientHeight);
     fitted = false;
@@ -97,7 +97,7 @@ function goToLink() {
   linked = null;
 }
 
-function seek(t_s) { link.send('seek', { t_s }); }
+function seek(t_s) { timeBar.seek(t_s); }
 
 function redraw() {
   dirty = true;
@@ -110,7 +110,7 @@ function startAnew() {
   fitted = arrived = false;
   taps.drop();
   scene.measure.clear();
-  replay.forget();
+  timeBar.forget();
 }
 
 async function showLevel(level) {
@@ -221,7 +221,7 @@ function draw() {
     connection();  // the frame may be older than the end of the connection
     taps.undoable(scene.frame.undo);
     panel.floors(scene.level, estimate);
-    replay.frame(scene.frame.play, scene.frame.ended);
+    timeBar.frame(scene.frame.play, scene.frame.ended);
     charts.frame(scene.frame.play);
     if (moment !== null && scene.frame.play?.end_s >= moment) { link.send('play', { playing: false }); seek(moment); moment = null; }
     if (!estimate && !invited && scene.frame.words.startsWith('tap')) { invited = true; enter('here'); }
