@@ -71,7 +71,7 @@ def test_a_page_goes_back_and_on_and_cannot_act(tmp_path: Path) -> None:
         assert all(numbers[row["name"]] == row["id"] for row in past["list"])
         ask(page, kind="choose", id=numbers["Kim"])
         assert frames_until(lambda header: header["details"])["details"]["history"]
-        ask(page, kind="skip", by=1)
+        ask(page, kind="step", steps=1)
         frames_until(lambda header: header["play"]["t_s"] == pytest.approx(begin_s + 30.0))
         ask(page, kind="acknowledge", id=numbers["Finn"], by="Ann")
         while not isinstance(answer := page.recv(PATIENCE_S), str):

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: MIT
 """The commander's page: an operation served to browsers.
 
-In: an operation, an address. Out: the page. Owns the server. Server, guards and style are those of the live page (`echostep_app.page`).
+In: an operation, an address. Out: the page, in the role of a commander. Owns the server.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -16,11 +15,9 @@ from starlette.websockets import WebSocket
 from echostep_app.operation.operation import Operation
 from echostep_app.operation.recorded.tape import OperationTape
 from echostep_app.operation.session import TableFeed, TableSession
-from echostep_app.page.server import STATIC, Address, PageSite, SocketServer
+from echostep_app.page.server import Address, PageSite, SocketServer
 from echostep_app.page.shared import PageCounts
 from echostep_app.page.web.faults import Faults
-
-TABLE = Path(__file__).parent / "static"
 
 
 class TablePage:
@@ -34,8 +31,7 @@ class TablePage:
         def session(socket: WebSocket) -> TableSession:
             return TableSession(socket, feed, faults, counts)
 
-        folders = {"static": STATIC, "table": TABLE}
-        site = PageSite("echostep table", operation.plan, TABLE / "index.html", folders, session, faults, counts)
+        site = PageSite("commander", operation.plan, session, faults, counts)
         self.server = SocketServer(site, address)
 
     @property

@@ -29,7 +29,7 @@ from echostep_app.page.elements.marks import ShownMark
 from echostep_app.page.guarded_socket import UNKNOWN, GuardedSocket
 from echostep_app.page.player import Player, PlayState
 from echostep_app.page.protocol import encode, hello, packed
-from echostep_app.page.requests import FrameDrawn, Seek, SetPlaying, SetSpeed, StepBy
+from echostep_app.page.requests import FrameDrawn, Seek, SetPlaying, SetSpeed, Step
 from echostep_app.page.shared import PageCounts
 from echostep_app.page.web.exchange import Exchange
 from echostep_app.page.web.faults import Faults
@@ -125,7 +125,7 @@ class TableSession(GuardedSocket):
                 self._undrawn.pop(seq, None)
             case requests.Choose(number):
                 self._chosen, self._frame_due = number, True
-            case Seek() | SetPlaying() | SetSpeed() | StepBy():
+            case Seek() | SetPlaying() | SetSpeed() | Step():
                 if self._player is not None:
                     self._player.handle(request)
                     self._frame_due = True

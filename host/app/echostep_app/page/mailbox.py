@@ -76,9 +76,9 @@ class SceneHistory:
         """The scene that is shown at `t_s`."""
         return self._scenes[self._index_at(t_s)]
 
-    def stepped(self, t_s: float, by: int) -> float:
-        """Time of the scene `by` scenes after the one that is shown at `t_s`, or of the first or last one."""
-        return self._t_s[min(max(self._index_at(t_s) + by, 0), len(self) - 1)]
+    def stepped(self, t_s: float, steps: int) -> float:
+        """Time of the scene `steps` scenes after the one that is shown at `t_s`, or of the first or last one."""
+        return self._t_s[min(max(self._index_at(t_s) + steps, 0), len(self) - 1)]
 
 
 class Mailbox:

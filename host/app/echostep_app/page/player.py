@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from echostep_app.page.requests import PlayerRequest, Seek, SetPlaying, SetSpeed, StepBy
+from echostep_app.page.requests import PlayerRequest, Seek, SetPlaying, SetSpeed, Step
 
 MOST_S = 1.0  # by which the position moves at once, at normal speed: a page that was in the background goes on from where it was
 
@@ -22,8 +22,8 @@ class Tape(Protocol):
     def span_s(self) -> tuple[float, float] | None:
         """The first and the last time by now; None while there is nothing."""
 
-    def stepped(self, t_s: float, by: int) -> float:
-        """The time `by` steps after the moment that is shown at `t_s`; it may be outside the span."""
+    def stepped(self, t_s: float, steps: int) -> float:
+        """The time `steps` steps after the moment that is shown at `t_s`; it may be outside the span."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +60,9 @@ class Player:
                 self.times = times
             case Seek(t_s):
                 self._seek(t_s)
-            case StepBy(by) if (span_s := self._tape.span_s) is not None:
+            case Step(steps) if (span_s := self._tape.span_s) is not None:
                 self.playing = False
-                self._seek(self._tape.stepped(span_s[0] if self.position_s is None else self.position_s, by))
+                self._seek(self._tape.stepped(span_s[0] if self.position_s is None else self.position_s, steps))
 
     @property
     def at_end(self) -> bool:

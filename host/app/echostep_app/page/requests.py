@@ -105,13 +105,13 @@ class Seek(msgspec.Struct, frozen=True, tag_field="kind", tag="seek"):
     t_s: Annotated[float, Meta(ge=-1e9, le=1e9)]
 
 
-class StepBy(msgspec.Struct, frozen=True, tag_field="kind", tag="skip"):
+class Step(msgspec.Struct, frozen=True, tag_field="kind", tag="step"):
     """Move the replay by a number of estimates, of an operation by tens of seconds; negative: back."""
 
-    by: Integer
+    steps: Integer
 
 
-PlayerRequest = SetPlaying | SetSpeed | Seek | StepBy
+PlayerRequest = SetPlaying | SetSpeed | Seek | Step
 _OwnRequest = Undo | Call | Consider | Met | Understood | AtPoint | NoTap | GoTo | EndGuidance | FrameDrawn | PlayerRequest
 Request = CheckIn | _OwnRequest
 _KEPT = msgspec.json.Decoder(Kept)

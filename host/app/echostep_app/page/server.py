@@ -11,11 +11,11 @@ import contextlib
 import secrets
 import socket
 import threading
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Generic, Protocol, Self, TypeVar
+from typing import Generic, Literal, Protocol, Self, TypeVar
 
 import uvicorn
 from starlette.applications import Starlette
@@ -42,7 +42,7 @@ from echostep_app.page.web.uploads import Uploads
 
 STATIC = Path(__file__).parent / "static"
 LOCAL = "127.0.0.1"
-HTML = '<html lang="en"'  # of a page; static/language.js reads which language was chosen
+HTML = '<html lang="en"'  # of a page; static/language.js reads which language was chosen, static/main.js the role
 PORT = 8420
 MOST_PAGES = 32  # open at the same time; further ones are refused
 TRY_AGAIN_LATER = 1013  # WebSocket close code [IANA]
@@ -77,12 +77,10 @@ S = TypeVar("S", bound=SocketSession)
 
 @dataclass(frozen=True, slots=True)
 class PageSite(Generic[S]):
-    """The content of a server: the page `index`, files of `folders` by the first part of their path, lines of `plan`, a session for each socket."""
+    """The content of a server: the page of a role, lines of `plan`, a session for each socket."""
 
-    name: str
+    role: Literal["wearer", "commander"]
     plan: Plan
-    index: Path
-    folders: Mapping[str, Path]
     session: Callable[[WebSocket], S]
     faults: Faults
     counts: PageCounts
@@ -109,7 +107,7 @@ class SocketServer(Generic[S]):
             ws_max_size=MOST_REQUEST, ws_per_message_deflate=False, timeout_graceful_shutdown=1,
         )  # fmt: skip
         self._server = GatedServer(settings, self.connections)
-        self._thread = threading.Thread(target=self._serve, name=site.name, daemon=True)
+        self._thread = threading.Thread(target=self._serve, name=f"echostep page: {site.role}", daemon=True)
         self._logged = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
@@ -164,7 +162,7 @@ class SocketServer(Generic[S]):
             Route("/lines/{level:int}", self._lines),
             WebSocketRoute("/socket", self._socket),
             *self._own_routes(),
-            *(Mount(f"/{name}", StaticFiles(directory=folder)) for name, folder in self._site.folders.items()),
+            Mount("/static", StaticFiles(directory=STATIC)),
         ]
         return Starlette(
             routes=[Mount(f"/{token}", routes=routes)] if token else routes,
@@ -187,7 +185,7 @@ class SocketServer(Generic[S]):
         self._loop = None
 
     async def _index(self, _: Request) -> Response:
-        return await page_in(self._site.index, self._lang)
+        return await page_in(STATIC / "index.html", self._lang, self._site.role)
 
     async def _lines(self, request: Request) -> Response:
         level = request.path_params["level"]
@@ -224,9 +222,7 @@ class PageServer(SocketServer[PageSession]):
         def session(socket: WebSocket) -> PageSession:
             return PageSession(socket, self._mailbox, self.shared)
 
-        folders = {"static": STATIC}
-        index = STATIC / "index.html"
-        site = PageSite("echostep page", mailbox.plan, index, folders, session, shared.faults, shared.counts)
+        site = PageSite("wearer", mailbox.plan, session, shared.faults, shared.counts)
         super().__init__(site, address)
 
     def _own_routes(self) -> list[Route]:
@@ -265,10 +261,11 @@ class PageServer(SocketServer[PageSession]):
         super().__exit__(kind, error, at)
 
 
-async def page_in(path: Path, lang: str | None) -> Response:
-    """A page in a language; None: in each browser's language."""
+async def page_in(path: Path, lang: str | None, role: str = "") -> Response:
+    """A page in a language, None: in each browser's language; with the parts of a role."""
     page = await asyncio.to_thread(path.read_text, "utf-8")
-    return HTMLResponse(page.replace(HTML, f'{HTML} data-lang="{lang}"', 1) if lang else page)
+    attributes = f' data-lang="{lang}"' * bool(lang) + f' class="{role}"' * bool(role)
+    return HTMLResponse(page.replace(HTML, HTML + attributes, 1))
 
 
 def open_listener(address: Address) -> socket.socket:

@@ -97,7 +97,7 @@ class PageSession(GuardedSocket):
                 self._mailbox.set_goal(request.goal)
             case requests.EndGuidance():
                 self._mailbox.set_goal(None)
-            case requests.SetPlaying() | requests.SetSpeed() | requests.Seek() | requests.StepBy() if self._player:
+            case requests.SetPlaying() | requests.SetSpeed() | requests.Seek() | requests.Step() if self._player:
                 self._player.handle(request)
                 self._frame_due = True
             case _:

@@ -49,7 +49,7 @@ def test_a_player_plays_stops_seeks_and_steps() -> None:
     player.handle(requests.SetSpeed(4.0))
     assert at(102.0) == 13.0
     assert at(500.0) == 13.0
-    player.handle(requests.StepBy(-2))
+    player.handle(requests.Step(-2))
     assert (at(501.0), player.playing) == (11.0, False)
     assert at(502.0) == 11.0
     player.handle(requests.Seek(12.4))

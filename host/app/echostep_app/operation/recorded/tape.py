@@ -26,7 +26,7 @@ STEP_S = 0.25  # of an operation that is played: a state changes at most so much
 MOST_STEPS = 1000  # for one gap without messages, so that a damaged time does not keep the reader busy
 MESSAGES, SPAN_S = 5000, 300.0  # between two keyframes at most, at first: 0.1 to 0.7 s of work
 MOST_KEYFRAMES = 256  # a keyframe of 200 wearers takes about 1 MB
-SKIPPED_S = 10.0  # by one step of the player
+PLAYER_STEP_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,9 +139,9 @@ class OperationTape:
         """The first and the last moment by now; None while there is none."""
         return (self._keyframes[0].t_s, self._end_s) if self._keyframes else None
 
-    def stepped(self, t_s: float, by: int) -> float:
-        """The time `by` times 10 s after `t_s`."""
-        return t_s + by * SKIPPED_S
+    def stepped(self, t_s: float, steps: int) -> float:
+        """The time `steps` times 10 s after `t_s`."""
+        return t_s + steps * PLAYER_STEP_S
 
     def before(self, t_s: float) -> Keyframe:
         """The last keyframe at or before a time, else the first one, of a tape that has one."""

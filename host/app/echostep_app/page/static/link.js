@@ -9,7 +9,7 @@ const REVIVE_MS = 10000;  // a socket that gives no beat for so long is given up
 
 export class Link {
   // `onAge()`: of the pulse; `isLive()`: what is shown is the present; `onUnsent(text)`: of the outbox; `parse`: bytes of a frame -> frame.
-  constructor({ onHello, onFrame, onRefused, onFailed, onConsidered, onAge, onUnsent, isLive, parse = parseFrame }) {
+  constructor({ onHello, onFrame, onRefused, onFailed, onConsidered, onAge, onUnsent, isLive, parse }) {
     Object.assign(this, { onHello, onFrame, onRefused, onFailed, onConsidered, onAge, parse, wait: 250, failures: 0, isOpen: false });
     this.pulse = new Pulse(() => { this.revive(); onAge(); }, isLive);
     this.outbox = new Outbox((request) => this.transmit(request), onUnsent, () => this.pulse.now_s);
@@ -71,26 +71,4 @@ export class Link {
   transmit(request) {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(request));
   }
-}
-
-// A frame's header with the new points of the trail and the columns of the cloud; the layout is in page/protocol.py.
-export function parseFrame(buffer) {
-  const length = new DataView(buffer).getUint32(0, true);
-  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
-  let offset = 4 + length;
-  header.trail.points = new Float32Array(buffer, offset, 3 * header.trail.count);
-  offset += 12 * header.trail.count;
-  if (header.drawing) {
-    const { walls, points, trail_count } = header.drawing;
-    header.drawing = { trail_count, walls: new Float32Array(buffer, offset, 5 * walls), path: new Float32Array(buffer, offset + 20 * walls, 2 * points) };
-    offset += 20 * walls + 8 * points;
-  }
-  if (header.cloud) {
-    const n = header.cloud.count;
-    header.cloud.x = new Uint16Array(buffer, offset, n);
-    header.cloud.y = new Uint16Array(buffer, offset + 2 * n, n);
-    header.cloud.weight = new Uint8Array(buffer, offset + 4 * n, n);
-    header.cloud.level = new Uint8Array(buffer, offset + 5 * n, n);
-  }
-  return header;
 }

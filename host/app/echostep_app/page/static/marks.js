@@ -7,21 +7,19 @@ const LOOKS = {
   meeting: { letter: 'M', colour: 'here', words: 'meeting point', shape: null },
 };
 
-export function paintMarks(pen, view, marks, level, colour) {
+export function paintMarks(painter, view, marks, level) {
+  const { pen, colour } = painter;
   for (const { mark, x_m, y_m, level: on } of marks) {
     const look = LOOKS[mark];
     if (on !== level || !look) continue;
     const [sx, sy] = view.toScreen(x_m, y_m);
-    pen.beginPath();
-    if (look.shape) for (const [x, y] of look.shape) pen.lineTo(sx + x, sy + y);
-    else pen.arc(sx, sy, 11, 0, 2 * Math.PI);
+    if (look.shape) painter.path(look.shape.map(([x, y]) => [sx + x, sy + y]));
+    else painter.ring([sx, sy], 11);
     pen.closePath();
-    [pen.fillStyle, pen.strokeStyle, pen.lineWidth] = [colour.halo, colour[look.colour], 2.5];
+    pen.fillStyle = colour.halo;
     pen.fill();
-    pen.stroke();
-    [pen.font, pen.textAlign, pen.textBaseline, pen.fillStyle] = ['700 14px system-ui, sans-serif', 'center', 'middle', colour[look.colour]];
-    pen.fillText(look.letter, sx, sy + 1);
-    [pen.textAlign, pen.textBaseline] = ['left', 'alphabetic'];
+    painter.stroke(colour[look.colour], 2.5);
+    painter.text(look.letter, sx, sy + 1, colour[look.colour], { size: 14, align: 'center', base: 'middle', weight: 700, halo: 0 });
   }
 }
 

@@ -12,16 +12,16 @@ export class TimeBar {
   constructor(send) {
     Object.assign(this, { send, holding: false, playing: true, asked: null, last: null });
     $('play').onclick = () => send('play', { playing: !this.playing });
-    $('back').onclick = () => this.skip(-1);
-    $('on').onclick = () => this.skip(1);
+    $('back').onclick = () => this.step(-1);
+    $('on').onclick = () => this.step(1);
     $('times').onchange = () => send('speed', { times: Number($('times').value) });
     $('time').oninput = () => { this.holding = true; this.seek(Number($('time').value)); };
     $('time').onchange = () => { this.holding = false; };
   }
 
-  skip(by) {
+  step(steps) {
     this.asked = null;
-    this.send('skip', { by });
+    this.send('step', { steps });
   }
 
   seek(t_s) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Orders to the wearers: everybody out, by a button that is held, and who has understood; a note in words to the chosen wearer, or to the log.
 
-import { onHeld } from '../static/held.js';
-import { minutes } from '../static/language.js';
-import { clock, say } from '../static/text.js';
+import { onHeld } from '../held.js';
+import { minutes } from '../language.js';
+import { clock, say } from '../text.js';
 
 const MOST_NAMES = 6;
 const $ = (id) => document.getElementById(id);

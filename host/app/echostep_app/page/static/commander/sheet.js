@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // What a commander can do at a place of the map: set a mark, or remove the one that is there; and the commander's name, with which marks and acknowledgements are signed.
 
-import { recall, remember } from '../static/storage.js';
-import { markWords } from '../static/marks.js';
-import { said } from '../static/text.js';
+import { recall, remember } from '../storage.js';
+import { markWords } from '../marks.js';
+import { said } from '../text.js';
 
 const KINDS = ['cleared', 'hazard', 'meeting'];
 const $ = (id) => document.getElementById(id);

@@ -1,43 +1,26 @@
 // SPDX-License-Identifier: MIT
-// Paints the moving things on a canvas: particles, trail, beacons, echo lines, position with its ellipse, heading, route, a pose that is being entered.
+// The layers of a wearer's map: particles, trail, beacons, echo lines, position with its ellipse, heading, route, a pose that is being entered.
 
-import { paintDrawing } from './drawing.js';
-import { paintMarks } from '../marks.js';
 import { tr } from '../language.js';
+import { paintMarks } from '../marks.js';
+import { Painter } from '../paint.js';
+import { paintDrawing } from './drawing.js';
 
 const GRADES = 4;  // shades of the particles' weight
 const PARTICLE_PX = 2.5;
 const WIDEST_M = 30;  // protection radius that is still drawn
 const SD_95 = 2.45;  // half axis of a 95 % circle, in standard deviations per axis
 
-export class Painter {
-  constructor(canvas) {
-    this.canvas = canvas;
-    this.pen = canvas.getContext('2d');
-    this.recolour();
-  }
-
-  recolour() {
-    const style = getComputedStyle(document.documentElement);
-    this.colour = Object.fromEntries(
-      ['cloud', 'trail', 'here', 'halo', 'left', 'right', 'expected', 'goal', 'beacon', 'bad', 'ink', 'good', 'wall', 'faint', 'line'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
-  }
-
+export class WearerPainter extends Painter {
   // `scene.layers` says what is drawn.
   paint(view, scene) {
     const shows = (layer) => scene.layers.shows(layer);
-    const sharp = window.devicePixelRatio || 1, { canvas, pen } = this;
-    const width = Math.round(view.width * sharp), height = Math.round(view.height * sharp);
-    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
-    pen.setTransform(sharp, 0, 0, sharp, 0, 0);
-    pen.clearRect(0, 0, view.width, view.height);
-    pen.lineJoin = pen.lineCap = 'round';
-    if (scene.drawing) paintDrawing(pen, view, scene.drawing, this.colour);
+    this.begin(view);
+    if (scene.drawing) paintDrawing(this.pen, view, scene.drawing, this.colour);
     if (scene.cloud && shows('cloud')) this.particles(view, scene.cloud, scene.level);
     if (shows('trail')) this.trail(view, scene.trail, scene.level, scene.drawing?.trail_count ?? 0);
-    if (shows('marks')) paintMarks(pen, view, scene.marks, scene.level, this.colour);
-    const { told: estimate } = scene.frame ?? {};
-    const { guidance, goal } = scene.frame ?? {}, path = guidance && estimate?.placed && estimate.level === scene.level ? guidance.path : [];
+    if (shows('marks')) paintMarks(this, view, scene.marks, scene.level);
+    const { told: estimate, guidance, goal } = scene.frame ?? {}, path = guidance && estimate?.placed && estimate.level === scene.level ? guidance.path : [];
     if (path.length > 1) this.line(path.map(([x, y]) => view.toScreen(x, y)), this.colour.goal, 3, [8, 7]);
     if (goal?.level === scene.level) this.flag(view, [goal.x_m, goal.y_m]);
     else if (path.length && !guidance.own) this.flag(view, path.at(-1));
@@ -54,21 +37,15 @@ export class Painter {
     const truth = scene.frame?.truth;
     if (truth && truth.level === scene.level) this.truth(view, truth);
     if (scene.tapped) this.pose(view, scene.tapped);
-    scene.measure.paint(pen, view, scene.level, this.colour);
+    scene.measure.paint(this, view, scene.level);
   }
 
   // The true position of a simulation: a diamond with its name.
   truth(view, { x_m, y_m }) {
-    const [sx, sy] = view.toScreen(x_m, y_m), { pen } = this;
-    this.line([[sx, sy - 9], [sx + 9, sy], [sx, sy + 9], [sx - 9, sy], [sx, sy - 9]], this.colour.halo, 5);
-    this.line([[sx, sy - 9], [sx + 9, sy], [sx, sy + 9], [sx - 9, sy], [sx, sy - 9]], this.colour.good, 2.5);
-    pen.font = '600 12px system-ui, sans-serif';
-    pen.textAlign = 'left';
-    pen.lineWidth = 3;
-    pen.strokeStyle = this.colour.halo;
-    pen.fillStyle = this.colour.good;
-    pen.strokeText(tr('truth'), sx + 12, sy - 8);
-    pen.fillText(tr('truth'), sx + 12, sy - 8);
+    const [sx, sy] = view.toScreen(x_m, y_m), diamond = [[sx, sy - 9], [sx + 9, sy], [sx, sy + 9], [sx - 9, sy], [sx, sy - 9]];
+    this.line(diamond, this.colour.halo, 5);
+    this.line(diamond, this.colour.good, 2.5);
+    this.text(tr('truth'), sx + 12, sy - 8, this.colour.good);
   }
 
   particles(view, { count, x0_m, y0_m, step_m, x, y, weight, level }, shownLevel) {
@@ -87,17 +64,6 @@ export class Painter {
     pen.globalAlpha = 1;
   }
 
-  line(points, colour, width, dash = []) {
-    const { pen } = this;
-    pen.beginPath();
-    points.forEach(([sx, sy], k) => (k ? pen.lineTo(sx, sy) : pen.moveTo(sx, sy)));
-    pen.setLineDash(dash);
-    pen.strokeStyle = colour;
-    pen.lineWidth = width;
-    pen.stroke();
-    pen.setLineDash([]);
-  }
-
   // From the point `first` on: the path before it is in the drawing. A point with NaN coordinates breaks the line: there was a check-in.
   trail(view, { points, count }, shownLevel, first) {
     const [a, b, c, d, e, f] = view.matrix(), { pen } = this;
@@ -108,50 +74,34 @@ export class Painter {
       if (visible) pen[drawing ? 'lineTo' : 'moveTo'](a * x + c * y + e, b * x + d * y + f);
       drawing = visible;
     }
-    pen.strokeStyle = this.colour.trail;
-    pen.lineWidth = 2;
-    pen.stroke();
+    this.stroke(this.colour.trail, 2);
   }
 
   // Measured range: a line with a bar across its end. Range expected from the plan: a dotted line with a ring at its end.
   echoLine(view, { ranger, x_m, y_m, axis_rad, measured_m, expected_m }) {
-    const { pen } = this, pixelAt = (range_m) => view.toScreen(x_m + range_m * Math.cos(axis_rad), y_m + range_m * Math.sin(axis_rad));
+    const pixelAt = (range_m) => view.toScreen(x_m + range_m * Math.cos(axis_rad), y_m + range_m * Math.sin(axis_rad));
     const colour = ranger ? this.colour.right : this.colour.left, from = pixelAt(0);
     if (expected_m !== null) {
       const end = pixelAt(expected_m);
       this.line([from, end], this.colour.expected, 1.5, [2, 5]);
-      pen.beginPath();
-      pen.arc(...end, 6, 0, 2 * Math.PI);
-      pen.strokeStyle = this.colour.expected;
-      pen.lineWidth = 1.5;
-      pen.stroke();
+      this.circle(end, 6, this.colour.expected, 1.5);
     }
-    if (measured_m !== null) {
-      const end = pixelAt(measured_m), ux = end[0] - from[0], uy = end[1] - from[1];
-      const length = Math.hypot(ux, uy) || 1, bx = (-uy / length) * 7, by = (ux / length) * 7;
-      this.line([from, end], colour, 2.5);
-      this.line([[end[0] - bx, end[1] - by], [end[0] + bx, end[1] + by]], colour, 3.5);
-    } else {
-      this.line([from, pixelAt(0.6)], colour, 2.5, [1, 6]);
-    }
+    if (measured_m === null) return this.line([from, pixelAt(0.6)], colour, 2.5, [1, 6]);
+    const end = pixelAt(measured_m), ux = end[0] - from[0], uy = end[1] - from[1];
+    const length = Math.hypot(ux, uy) || 1, bx = (-uy / length) * 7, by = (ux / length) * 7;
+    this.line([from, end], colour, 2.5);
+    this.line([[end[0] - bx, end[1] - by], [end[0] + bx, end[1] + by]], colour, 3.5);
   }
 
   // Beacons that are heard are drawn on top; a number that would cover another is left out.
   beacons(view, shown) {
-    const { pen } = this, taken = [], order = [...shown].sort((a, b) => a.heard - b.heard);
+    const taken = [], order = [...shown].sort((a, b) => a.heard - b.heard);
     for (const beacon of order) this.beacon(view, beacon);
-    pen.font = '600 12px system-ui, sans-serif';
-    pen.textAlign = 'center';
-    pen.lineWidth = 3;
-    pen.strokeStyle = this.colour.halo;
     for (const { number, x_m, y_m, state, by } of order.reverse()) {
       const [sx, sy] = view.toScreen(x_m, y_m);
       if (taken.some(([tx, ty]) => Math.abs(tx - sx) < 18 && Math.abs(ty - sy) < 14)) continue;
       taken.push([sx, sy]);
-      pen.fillStyle = state === 'well' ? this.colour.beacon : this.colour.bad;
-      const name = by ? `${number} ${by}` : number;
-      pen.strokeText(name, sx, sy + 18);
-      pen.fillText(name, sx, sy + 18);
+      this.text(by ? `${number} ${by}` : number, sx, sy + 18, state === 'well' ? this.colour.beacon : this.colour.bad, { align: 'center' });
     }
   }
 
@@ -159,39 +109,22 @@ export class Painter {
   // tail) or silent (crossed out).
   beacon(view, { x_m, y_m, radius95_m, state, heard, by }) {
     const { pen } = this, tip = by ? -1 : 1, [sx, sy] = view.toScreen(x_m, y_m), colour = state === 'well' ? this.colour.beacon : this.colour.bad;
-    pen.strokeStyle = pen.fillStyle = colour;
-    pen.lineWidth = 1.5;
     if (radius95_m * view.scale > 9) {  // a smaller circle is covered by the triangle
-      pen.beginPath();
-      pen.arc(sx, sy, radius95_m * view.scale, 0, 2 * Math.PI);
-      pen.globalAlpha = 0.12;
-      pen.fill();
-      pen.globalAlpha = 1;
-      pen.setLineDash([2, 4]);
-      pen.stroke();
-      pen.setLineDash([]);
+      this.ring([sx, sy], radius95_m * view.scale);
+      this.tint(colour, 1.5, [2, 4], 0.12);
     }
-    pen.beginPath();
-    pen.moveTo(sx, sy - 7 * tip);
-    pen.lineTo(sx + 6.5, sy + 4 * tip);
-    pen.lineTo(sx - 6.5, sy + 4 * tip);
+    this.path([[sx, sy - 7 * tip], [sx + 6.5, sy + 4 * tip], [sx - 6.5, sy + 4 * tip]]);
     pen.closePath();
-    pen.lineWidth = 4;
-    pen.strokeStyle = this.colour.halo;
-    pen.stroke();
-    pen.lineWidth = 2;
-    pen.strokeStyle = colour;
+    this.stroke(this.colour.halo, 4);
+    pen.fillStyle = colour;
     if (state === 'well') pen.fill();
-    pen.stroke();
+    this.stroke(colour, 2);
     if (state === 'silent') this.line([[sx - 8, sy + 8], [sx + 8, sy - 9]], colour, 2);
     if (state === 'moved') this.line([[sx - 20, sy + 5], [sx - 11, sy + 5]], colour, 2, [2, 4]);
-    if (heard) {
-      for (const side of [0, Math.PI]) {
-        pen.beginPath();
-        pen.arc(sx, sy - 1, 12, side - 0.6, side + 0.6);
-        pen.lineWidth = 2;
-        pen.stroke();
-      }
+    for (const side of heard ? [0, Math.PI] : []) {
+      pen.beginPath();
+      pen.arc(sx, sy - 1, 12, side - 0.6, side + 0.6);
+      this.stroke(colour, 2);
     }
   }
 
@@ -199,52 +132,21 @@ export class Painter {
     const { pen } = this, [sx, sy] = view.toScreen(x_m, y_m);
     pen.beginPath();
     pen.ellipse(sx, sy, Math.max(major_m * view.scale, 1), Math.max(minor_m * view.scale, 1), -(angle_rad + view.turn), 0, 2 * Math.PI);
-    this.disc(this.colour.here, 2);
-  }
-
-  // What was begun, in a light tone with an edge.
-  disc(colour, width) {
-    const { pen } = this;
-    Object.assign(pen, { fillStyle: colour, strokeStyle: colour, lineWidth: width, globalAlpha: 0.15 });
-    pen.fill();
-    pen.globalAlpha = 1;
-    pen.stroke();
+    this.tint(this.colour.here, 2);
   }
 
   // The circle beyond which the error is with a probability of 1 in 1,000.
   protection(view, { x_m, y_m, protection_m }) {
-    if (protection_m === null || protection_m > WIDEST_M) return;
-    const { pen } = this;
-    pen.beginPath();
-    pen.arc(...view.toScreen(x_m, y_m), protection_m * view.scale, 0, 2 * Math.PI);
-    pen.setLineDash([6, 6]);
-    pen.strokeStyle = this.colour.here;
-    pen.lineWidth = 1.5;
-    pen.stroke();
-    pen.setLineDash([]);
+    if (protection_m !== null && protection_m <= WIDEST_M) this.circle(view.toScreen(x_m, y_m), protection_m * view.scale, this.colour.here, 1.5, [6, 6]);
   }
 
   // A place that fits: a ring with its number, and its probability.
   hypothesis(view, { number, x_m, y_m, probability }) {
-    const [sx, sy] = view.toScreen(x_m, y_m), { pen } = this, text = `${Math.round(100 * probability)} %`;
-    pen.beginPath();
-    pen.arc(sx, sy, 11, 0, 2 * Math.PI);
-    pen.lineWidth = 5;
-    pen.strokeStyle = this.colour.halo;
-    pen.stroke();
-    pen.lineWidth = 2.5;
-    pen.strokeStyle = this.colour.here;
-    pen.stroke();
-    pen.font = '600 13px system-ui, sans-serif';
-    pen.textAlign = 'left';
-    pen.lineWidth = 3;
-    pen.strokeStyle = this.colour.halo;
-    pen.fillStyle = this.colour.ink;
-    pen.strokeText(text, sx + 15, sy + 5);
-    pen.fillText(text, sx + 15, sy + 5);
-    pen.textAlign = 'center';
-    pen.strokeText(number, sx, sy + 5);
-    pen.fillText(number, sx, sy + 5);
+    const [sx, sy] = view.toScreen(x_m, y_m);
+    this.circle([sx, sy], 11, this.colour.halo, 5);
+    this.circle([sx, sy], 11, this.colour.here, 2.5);
+    this.text(`${Math.round(100 * probability)} %`, sx + 15, sy + 5, this.colour.ink, { size: 13 });
+    this.text(number, sx, sy + 5, this.colour.ink, { size: 13, align: 'center' });
   }
 
   // An arrow along the heading; a circle when the heading is not known.
@@ -253,14 +155,10 @@ export class Painter {
     pen.save();
     pen.translate(...view.toScreen(x_m, y_m));
     pen.rotate(-(heading_rad + view.turn));
-    pen.beginPath();
-    if (heading_known) { pen.moveTo(13, 0); pen.lineTo(-9, 8); pen.lineTo(-4, 0); pen.lineTo(-9, -8); pen.closePath(); }
-    else pen.arc(0, 0, 8, 0, 2 * Math.PI);
-    pen.lineWidth = 4;
-    pen.strokeStyle = this.colour.halo;
-    pen.stroke();
-    pen.fillStyle = this.colour.here;
-    pen.fill();
+    if (heading_known) this.path([[13, 0], [-9, 8], [-4, 0], [-9, -8]]);
+    else this.ring([0, 0], 8);
+    pen.closePath();
+    this.sign(this.colour.here, 0, true);
     pen.restore();
   }
 
@@ -276,12 +174,11 @@ export class Painter {
 
   // The ghost of a position that is being entered: in the circle that would hold it; a broken arrow is a heading that would stay.
   pose(view, { x_m, y_m, heading_rad, kept_rad = null, sd_m = 0 }) {
-    const [sx, sy] = view.toScreen(x_m, y_m), { pen } = this;
-    pen.beginPath();
-    pen.arc(sx, sy, Math.max(SD_95 * sd_m * view.scale, 9), 0, 2 * Math.PI);
-    this.disc(this.colour.goal, 3);
+    const at = view.toScreen(x_m, y_m);
+    this.ring(at, Math.max(SD_95 * sd_m * view.scale, 9));
+    this.tint(this.colour.goal, 3);
     if (heading_rad === null && kept_rad === null) return;
-    this.heading([sx, sy], heading_rad ?? kept_rad, view, heading_rad === null ? [3, 7] : []);
+    this.heading(at, heading_rad ?? kept_rad, view, heading_rad === null ? [3, 7] : []);
   }
 
   heading([sx, sy], heading_rad, view, dash) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // All storeys over each other, the lowest one below, seen obliquely, with the wearers on each. A tap chooses a wearer, or leads to a storey.
 
-import { boxOf, linesOf } from '../static/plan.js';
-import { View } from '../static/view.js';
+import { boxOf, linesOf } from '../plan.js';
+import { View } from '../view.js';
 
 const FLAT = 0.4;  // of a storey's depth is seen
 const MARGIN_PX = 24, GAP_PX = 20, FONT = '600 12px system-ui, sans-serif';

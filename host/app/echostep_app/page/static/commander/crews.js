@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Crews and their accountability check (PAR): who is inside, since when, when it last answered, how much of the planned air is left. What is due is said.
 
-import { localise, minutes, tr } from '../static/language.js';
-import { put, say } from '../static/text.js';
+import { localise, minutes, tr } from '../language.js';
+import { put, say } from '../text.js';
 
 const CHECK_SHARE = 1 / 3;  // of the planned air until a check is due: the crew is reminded of its pressures after one and after two thirds [FwDV 7, 7.4]
 const ORDER = ['over', 'due', 'inside', 'ready', 'out'];

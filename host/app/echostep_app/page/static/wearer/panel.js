@@ -1,23 +1,20 @@
 // SPDX-License-Identifier: MIT
-// Text around the map: status, position, stream rates, beacons, guidance, floors, scale bar; and the text for screen readers.
+// Text around the map: status, position, stream rates, beacons, guidance; and the text for screen readers.
 
 import { drawnText } from './drawing.js';
 import { marksText } from '../marks.js';
-import { inUnits } from '../tools/units.js';
 import { tr } from '../language.js';
+import { said, say, tell } from '../text.js';
 
-const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕', ended: '■' };
 const SPOKEN_MS = 8000;  // shortest time between two positions for a screen reader
 const FASTEST_RAD_S = Math.PI;  // of the guidance arrow's turn
-const MOST_BUTTONS = 3;  // floors as buttons on a phone; more of them are a list
 const LEAST_RAD = 0.01;  // the arrow ignores smaller changes
-const LONG = 26, VERY_LONG = 60;  // letters of a status that is written smaller
 const $ = (id) => document.getElementById(id);
-const put = (id, metric) => { const text = tr(inUnits(metric)); if ($(id).textContent !== text) $(id).textContent = text; };  // unchanged text causes no new layout
 
 export class Panel {
-  constructor(onFloor) {
-    this.onFloor = onFloor;
+  // `status(name, words)`: shows it
+  constructor({ status }) {
+    this.status = status;
     this.spoken = { at: -Infinity, status: '', text: '' };
     this.turn = 0;  // angle of the arrow in radians, not wrapped, so that the transition takes the short way
   }
@@ -25,42 +22,22 @@ export class Panel {
   hello({ title, plan }) {
     this.plan = plan;
     this.shownGoal = null;
-    this.fault('');
-    $('title').textContent = `${title.replace(/\((.*)\)$/, (_, how) => `(${how.split(', ').map(tr).join(', ')})`)}: ${plan.name}`;
     document.title = title;
     $('goal').replaceChildren(new Option(tr('Go to…'), ''), new Option(tr('a place on the map'), 'map'),
       ...plan.levels.flatMap(({ rooms, name }, level) => rooms.map((room, k) => new Option(plan.levels.length > 1 ? `${room.name} (${name})` : room.name, `${level} ${k}`))));
-    $('floors').hidden = plan.levels.length < 2;
-    $('floors').classList.toggle('many', plan.levels.length > MOST_BUTTONS);
-    $('floor').replaceChildren(...plan.levels.map(({ name }, level) => new Option(name, level)).reverse());
-    $('floor').onchange = () => this.onFloor(Number($('floor').value));
-    $('floors').replaceChildren(...plan.levels.map((level, k) => {
-      const button = document.createElement('button'), share = document.createElement('span');
-      button.type = 'button';
-      button.textContent = level.name;
-      share.className = 'share';
-      button.append(share);
-      button.onclick = () => this.onFloor(k);  // with the index of the level
-      return button;
-    }));
   }
 
   frame({ told: estimate, words: said, gait, streams, guidance, goal, beams, beacons, play, ended, alarm, errand }) {
     const status = ended ? 'ended' : estimate?.status ?? 'waiting', words = ended ? `ended: ${ended}${play ? '. ▶ plays it again' : ''}` : said;
     this.status(status, words);
-    put('place', estimate ? positionText(estimate, this.plan.levels) : '');
-    put('places', estimate?.places ?? '');
-    $('places').hidden = !estimate?.places;
-    put('gait', gait);
-    $('gait').hidden = !gait;
-    put('echoes', estimate ? echoText(beams, estimate.placed) : '');
-    put('health', streams ? rateText(streams) : 'no bytes yet');
-    put('wrong', streams?.wrong ?? '');
-    $('wrong').hidden = !streams?.wrong;
-    put('beacons', beaconText(beacons));
-    $('beacons').hidden = !beacons.length;
-    put('errand', errand);
-    $('errand').hidden = !errand;
+    say($('place'), estimate ? positionText(estimate, this.plan.levels) : '');
+    say($('echoes'), estimate ? echoText(beams, estimate.placed) : '');
+    say($('health'), streams ? rateText(streams) : 'no bytes yet');
+    tell($('places'), estimate?.places ?? '');
+    tell($('gait'), gait);
+    tell($('wrong'), streams?.wrong ?? '');
+    tell($('beacons'), beaconText(beacons));
+    tell($('errand'), errand);
     this.alarm(alarm);
     this.guidance(guidance);
     this.goal(goal);
@@ -68,15 +45,9 @@ export class Panel {
   }
 
   // The marks that commanders have set; a screen reader says them when they change.
-  marks(marks) {
-    put('marks', marksText(marks, this.plan.levels));
-    $('marks').hidden = !marks.length;
-  }
+  marks(marks) { tell($('marks'), marksText(marks, this.plan.levels)); }
 
-  drawing(drawing) {
-    put('drawn', drawnText(drawing));
-    $('drawn').hidden = !drawing;
-  }
+  drawing(drawing) { tell($('drawn'), drawnText(drawing)); }
 
   // The teammates who can be met: a list that is there only when there are any.
   team(names) {
@@ -89,7 +60,7 @@ export class Panel {
     if (!alarm) return;
     $('alarm').dataset.kind = alarm.kind;
     $('fine').hidden = alarm.kind === 'over';
-    put('alarm-text', alarm.text);
+    say($('alarm-text'), alarm.text);
   }
 
   // The arrow is relative to the heading: up is straight ahead.
@@ -105,8 +76,8 @@ export class Panel {
       $('arrow').style.transition = `transform ${0.2 + Math.abs(by) / FASTEST_RAD_S}s ease-out`;
       $('arrow').style.transform = `rotate(${this.turn}rad)`;
     }
-    put('cue', text);
-    put('left', left_m === null ? '' : `${left_m < 0.95 ? left_m.toFixed(1) : left_m.toFixed(0)} m to go`);
+    say($('cue'), text);
+    say($('left'), left_m === null ? '' : `${left_m < 0.95 ? left_m.toFixed(1) : left_m.toFixed(0)} m to go`);
     $('end-guidance').hidden = !own;
   }
 
@@ -123,40 +94,12 @@ export class Panel {
     return room < 0 ? 'map' : `${level} ${room}`;
   }
 
-  // A fault of the server or of this page, in words; empty: none.
-  fault(text) {
-    put('fault', text);
-    $('fault').hidden = !text;
-  }
-
-  status(status, words) {
-    const { length } = tr(words);
-    Object.assign($('words').dataset, { status, long: length > VERY_LONG ? 'very' : String(length > LONG) });
-    $('mark').textContent = MARKS[status];
-    put('status-text', words);
-  }
-
-  // One button per level of the plan, with the level's share of the particles; the same as a list.
-  floors(shownLevel, estimate) {
-    $('floor').value = shownLevel;
-    for (const option of $('floor').options) {
-      const share = Math.round(100 * (estimate?.levels?.[option.value] ?? 0)), text = `${this.plan.levels[option.value].name}${share ? ` ${share} %` : ''}`;
-      if (option.text !== text) option.text = text;
-    }
-    [...$('floors').children].forEach((button, level) => {
-      const share = estimate?.levels?.[level] ?? 0;
-      button.setAttribute('aria-pressed', String(level === shownLevel));
-      button.setAttribute('aria-label', `${button.firstChild.textContent}, ${tr(`${Math.round(100 * share)} % likely`)}`);
-      button.lastChild.style.width = `${100 * share}%`;
-    });
-  }
-
   // Text for screen readers: at once when the status has changed, else not more often than every SPOKEN_MS.
   announce(status, text) {
     const now = performance.now(), { spoken } = this;
     if (text === spoken.text || (status === spoken.status && now - spoken.at < SPOKEN_MS)) return;
     this.spoken = { at: now, status, text };
-    $('live').textContent = tr(inUnits(text));
+    $('live').textContent = said(text);
   }
 }
 

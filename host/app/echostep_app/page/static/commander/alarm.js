@@ -2,8 +2,8 @@
 // A mayday that arrives: it sounds and vibrates, the title blinks and the header is red until it is acknowledged; its floor and place come into view, and
 // one tap leads back to what was seen before.
 
-import { Bell } from '../static/bell.js';
-import { say } from '../static/text.js';
+import { Bell } from '../bell.js';
+import { say } from '../text.js';
 
 const BLINK_MS = 1000;  // assumed; slower than the 3 flashes a second of WCAG 2.3.1
 const $ = (id) => document.getElementById(id);
@@ -12,7 +12,6 @@ export class Alarm {
   // `view` of the map; `show(place)`: its floor and place come into view; `open(id)`: the details; `level()`, `showLevel(level)`: of the map; `floor(level)`: its name
   constructor(view, { show, open, level, showLevel, floor }) {
     Object.assign(this, { view, show, open, level, showLevel, floor, bell: new Bell($('invitation')), title: document.title, open_ids: null, count: 0, shown: null, before: null, blink: null, isTurned: false, isLeft: false, named: '' });
-    this.bell.invite(true, 'This page cannot sound before it is tapped: tap here');
     $('mayday-open').onclick = () => this.open(this.shown);
     $('mayday-back').onclick = () => this.back();
   }
@@ -77,8 +76,9 @@ export class Alarm {
     document.title = this.isTurned ? `▲ MAYDAY${this.named}` : this.title;
   }
 
-  entitle(title) {
+  begin(title, isLive) {
     this.title = title;
+    this.bell.invite(isLive, 'This page cannot sound before it is tapped: tap here');
     if (!this.isTurned) document.title = title;
   }
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The list of wearers and the details of one, in words; and the text for screen readers when a wearer needs help.
 
-import { tr } from '../static/language.js';
-import { clock, put, said, say } from '../static/text.js';
+import { tr } from '../language.js';
+import { clock, put, said, say } from '../text.js';
 
 export const SIGNS = { mayday: '▲', asked: '△', lost: '✕', stale: '◌', uncertain: '◐', waiting: '○', tracking: '●', ended: '■' };
 const URGENT = ['mayday', 'asked', 'lost', 'stale'];
