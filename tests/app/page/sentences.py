@@ -15,7 +15,7 @@ from pathlib import Path
 from board_runs import ROOT
 
 HOST = ROOT / "host/app/echostep_app"
-FOLDERS = ("page/static", "page/static/live", "page/static/tools", "operation/static")
+FOLDERS = ("page/static", "page/static/wearer", "page/static/commander", "page/static/tools")
 ELSEWHERE = ("export.js", "theme.js", "language.js")  # GeoJSON, queries of styles, names of languages
 # Functions and classes whose texts a page shows; None: all of the module.
 MODULES: dict[str, tuple[str, ...] | None] = {

@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: MIT
 """The tape: a recorded operation with its state at some moments, from which any other moment is reached.
 
-In: an operation's file. Out: the state at a time: the recorded messages go through the code that shows them live. Owns the kept states; their number is
-bounded: when there are too many, every second one is forgotten.
+In: an operation's file. Out: the state at a time: the recorded messages go through the code that shows them live. Owns the kept states, one a minute.
 """
 
 from __future__ import annotations
 
 import math
-import threading
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator
@@ -24,8 +22,7 @@ from echostep_app.team.inbox import ReceivedMessage
 # Assumed, all of them.
 STEP_S = 0.25  # of an operation that is played: a state changes at most so much later than it did
 MOST_STEPS = 1000  # for one gap without messages, so that a damaged time does not keep the reader busy
-MESSAGES, SPAN_S = 5000, 300.0  # between two keyframes at most, at first: 0.1 to 0.7 s of work
-MOST_KEYFRAMES = 256  # a keyframe of 200 wearers takes about 1 MB
+KEYFRAME_S = 60.0  # between two keyframes at least; one of 20 wearers takes about 0.1 MB
 PLAYER_STEP_S = 10.0
 
 
@@ -57,11 +54,11 @@ class Reader:
         while self.t_s < to_s:
             self.step(to_s)
 
-    def step(self, to_s: float = math.inf) -> int | None:
-        """Take the messages of the next `STEP_S` at most, not beyond `to_s`; returns how many; None at the end of the file."""
+    def step(self, to_s: float = math.inf) -> bool:
+        """Take the messages of the next `STEP_S` at most, not beyond `to_s`; False at the end of the file."""
         following = self.following()
         if following is None and math.isinf(to_s):
-            return None
+            return False
         ahead_s = min(following[0] if following else to_s, to_s) - self.t_s
         end_s = min(to_s, self.t_s + max(STEP_S, ahead_s / MOST_STEPS))
         unix_s, messages = self.unix_s + end_s - self.t_s, list[ReceivedMessage]()
@@ -77,7 +74,7 @@ class Reader:
                 self.operation.set_counts(record.received, record.rejected)
         self.operation.receive(messages, {}, end_s, unix_s)
         self.t_s, self.unix_s = end_s, unix_s
-        return len(messages)
+        return True
 
     def following(self) -> tuple[float, Heard | Condition] | None:
         """The next record and its time; None at the end of the file."""
@@ -110,8 +107,7 @@ class OperationTape:
         """`operation`: without a message; after `read` it is at the end of the file."""
         self.path, self.operation = path, operation
         self._end_s = -math.inf
-        self._keyframes: list[Keyframe] = []
-        self._lock = threading.Lock()
+        self._keyframes: list[Keyframe] = []  # only appended to
 
     def read(self) -> Iterator[Reader]:
         """Gives the reader, which goes on, after each step; nothing if no record can be read."""
@@ -121,17 +117,10 @@ class OperationTape:
         reader.t_s, reader.unix_s = first[0], first[1].unix_s
         self._keyframes.append(Keyframe(reader.t_s, reader.unix_s, 0, connected=True, operation=self.operation.copy()))
         self._end_s = reader.t_s
-        count, messages, span_s = 0, MESSAGES, SPAN_S
-        while (taken := reader.step()) is not None:
-            count, self._end_s = count + taken, reader.t_s
-            is_due = count >= messages or reader.t_s - self._keyframes[-1].t_s >= span_s
-            if is_due and (keyframe := reader.keyframe()) is not None:
-                count = 0
-                with self._lock:
-                    self._keyframes.append(keyframe)
-                    if len(self._keyframes) > MOST_KEYFRAMES:
-                        del self._keyframes[1::2]
-                        messages, span_s = 2 * messages, 2.0 * span_s
+        while reader.step():
+            self._end_s = reader.t_s
+            if reader.t_s - self._keyframes[-1].t_s >= KEYFRAME_S and (keyframe := reader.keyframe()) is not None:
+                self._keyframes.append(keyframe)
             yield reader
 
     @property
@@ -145,9 +134,8 @@ class OperationTape:
 
     def before(self, t_s: float) -> Keyframe:
         """The last keyframe at or before a time, else the first one, of a tape that has one."""
-        with self._lock:
-            k = bisect_right(self._keyframes, t_s, key=lambda keyframe: keyframe.t_s)
-            return self._keyframes[max(k - 1, 0)]
+        k = bisect_right(self._keyframes, t_s, key=lambda keyframe: keyframe.t_s)
+        return self._keyframes[max(k - 1, 0)]
 
 
 class TapeHead:

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The legend: what each sign on the map means, the keys, the choice of language and unit; a dialog that a button or the keys L and ? open, on the wearer's and the commander's page.
 
-import { localise, startLanguage, tr } from './language.js';
+import { dialogOf } from './dialog.js';
+import { startLanguage } from './language.js';
 import { chooseUnit, chosenUnit } from './tools/units.js';
 
 const line = (d, colour = 'wall', width = 1.5, more = '') => `<path d="${d}" fill="none" stroke="var(--${colour})" stroke-width="${width}" ${more}/>`;
@@ -62,15 +63,11 @@ export const COMMAND = [
 
 // A dialog with these groups of [picture, words] and the keys; `onUnit()`: another one is chosen. Returns what opens it, at the keys or at its beginning.
 export function startLegend(button, groups, keys, onUnit) {
-  const dialog = document.createElement('dialog');
-  dialog.id = 'legend';
-  dialog.setAttribute('aria-label', tr('Legend'));
   const rows = (entries) => entries.map(([picture, words]) => `<li><svg viewBox="-16 -12 32 24" aria-hidden="true">${picture}</svg><span>${words}</span></li>`).join('');
   const names = Object.entries(keys).map(([key, words]) => `<li><kbd>${key}</kbd><span>${words}</span></li>`).join('');
-  dialog.innerHTML = `<form method="dialog"><h2>Legend</h2><label for="language" class="unseen">Language</label><select id="language"></select><label for="unit" class="unseen">Lengths in</label><select id="unit"><option>m</option><option>ft</option></select><button aria-label="Close">✕</button></form><div tabindex="0" role="group" aria-label="Signs">${groups.map(([title, entries]) => `<h3>${title}</h3><ul>${rows(entries)}</ul>`).join('')}<h3 id="keys-title">Keys on the map</h3><ul>${names}</ul></div>`;
-  dialog.onclick = ({ target }) => { if (target === dialog) dialog.close(); };  // beside it
-  localise(dialog);
-  document.body.append(dialog);
+  const signs = groups.map(([title, entries]) => `<h3>${title}</h3><ul>${rows(entries)}</ul>`).join('');
+  const choices = '<label for="language" class="unseen">Language</label><select id="language"></select><label for="unit" class="unseen">Lengths in</label><select id="unit"><option>m</option><option>ft</option></select>';
+  const dialog = dialogOf('legend', 'Legend', `<div tabindex="0" role="group" aria-label="Signs">${signs}<h3 id="keys-title">Keys on the map</h3><ul>${names}</ul></div>`, choices);
   startLanguage(document.getElementById('language'));
   const unit = document.getElementById('unit');
   unit.value = chosenUnit();

@@ -3,6 +3,7 @@
 // *Level*: index into the plan's levels; *floor*: its name on the page.
 
 import { stayAwake } from './awake.js';
+import { Commander } from './commander/role.js';
 import { Floors } from './floors.js';
 import { Gestures } from './gestures.js';
 import { localise, missing, tr } from './language.js';
@@ -17,30 +18,30 @@ import { Measure } from './tools/measure.js';
 import { titled } from './tools/titles.js';
 import { showScale } from './tools/units.js';
 import { View } from './view.js';
+import { Wearer } from './wearer/role.js';
 
 const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕', broken: '✕', ended: '■' };
 const LONG = 26, VERY_LONG = 60;  // letters of a status that is written smaller
 const HINT_MS = 6000;
 const $ = (id) => document.getElementById(id);
-const role = document.documentElement.className;
+const ROLES = { wearer: Wearer, commander: Commander }, role = document.documentElement.className;
 for (const part of document.querySelectorAll('[data-for]')) if (part.dataset.for !== role) part.remove();
 localise(document.body);
 
-const { Role } = await import(`./${role}/role.js`);
 const view = new View(), planView = new PlanView($('walls'), $('rooms'));
 const scene = { frame: null, marks: [], level: 0, isOld: false, measure: new Measure() };
 const page = {
   view, planView, scene, plan: null, title: '', globe: null, isReplay: false, isLive: true, isFitted: false, wantedLevel: 0,
-  send: (kind, fields) => link.send(kind, fields), seek: (t_s) => timeBar.seek(t_s), ask, fault, hint, lines, measured, redraw, showFloors, showLevel, status,
+  send: (kind, fields) => link.send(kind, fields), seek: (t_s) => timeBar.seek(t_s), ask, fault, hint, lines, measured, showFloors, showLevel, status,
 };
 let isAsked = false, drawnStamp = -1, undrawn = [], hintEnds = 0, isAwake = false;
 
 const timeBar = new TimeBar(page.send);
-const parts = new Role(page);
+const parts = new ROLES[role](page);
 const floors = new Floors((level) => parts.floorChosen(level), parts.hasAllFloors);
 const link = page.link = new Link({
-  onHello: hello, onFrame: frame, onRefused: (reason) => parts.refused(reason), onFailed: (reason, ended) => parts.failed(reason, ended),
-  onConsidered: (answer) => parts.considered(answer), onAge: aged, onUnsent: (text) => parts.unsent(text), isLive: () => page.isLive && scene.frame?.ended == null, parse: parts.parse,
+  onHello: hello, onFrame: frame, onRefused: (reason) => { parts.refused?.(); hint(reason); }, onFailed: (reason, ended) => { parts.failed?.(ended); fault(reason); },
+  onConsidered: (answer) => parts.considered(answer), onAge: aged, onUnsent: (text) => parts.unsent?.(text), isLive: () => page.isLive && scene.frame?.ended == null, parse: parts.parse,
 });
 const showLegend = startLegend($('legend-button'), parts.legend, parts.keyNames, () => parts.inOtherUnit());
 const painted = new MessageChannel();
@@ -129,8 +130,6 @@ function ask() {
   isAsked = true;
 }
 
-function redraw() { view.changed(); }
-
 function draw() {
   try { parts.follow(); } finally { isAsked = false; }  // what moves the view here is drawn at once
   if (drawnStamp !== view.stamp) {
@@ -189,7 +188,7 @@ window.addEventListener('error', ({ message }) => fault(`This page has a fault: 
 window.addEventListener('unhandledrejection', ({ reason }) => fault(`This page has a fault: ${reason?.message ?? reason}. Reload it.`));
 view.onChanged = ask;
 view.layOver(...['messages', 'floors', 'floor'].map($));
-startTheme($('theme'), () => { parts.recolour(); redraw(); });
+startTheme($('theme'), () => { parts.painter.recolour(); parts.recoloured?.(); view.changed(); });
 view.resize($('map').clientWidth, $('map').clientHeight);
 new ResizeObserver(([{ contentRect }]) => view.resize(contentRect.width, contentRect.height)).observe($('map'));
 titled({ 'legend-button': 'L, ?', north: 'N', whole: 'W', closer: '+', farther: '−', ...parts.titles });

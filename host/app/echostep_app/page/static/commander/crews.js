@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Crews and their accountability check (PAR): who is inside, since when, when it last answered, how much of the planned air is left. What is due is said.
 
-import { localise, minutes, tr } from '../language.js';
+import { dialogOf } from '../dialog.js';
+import { minutes, tr } from '../language.js';
 import { put, say } from '../text.js';
 
 const CHECK_SHARE = 1 / 3;  // of the planned air until a check is due: the crew is reminded of its pressures after one and after two thirds [FwDV 7, 7.4]
@@ -9,8 +10,7 @@ const ORDER = ['over', 'due', 'inside', 'ready', 'out'];
 const SIGNS = { over: '▲', due: '△', inside: '●', ready: '○', out: '■' };
 const DOES = { enter: 'Enters', check: 'Answered', leave: 'Is out' };
 const $ = (id) => document.getElementById(id);
-const HTML = `<form method="dialog"><h2>Crews</h2><button aria-label="Close">✕</button></form>
-<div tabindex="0" role="group" aria-label="Crews inside, and accountability check">
+const HTML = `<div tabindex="0" role="group" aria-label="Crews inside, and accountability check">
   <p id="crew-sum"></p>
   <ul id="crew-list"></ul>
   <form id="crew-new"><h3>New crew</h3>
@@ -23,13 +23,7 @@ const HTML = `<form method="dialog"><h2>Crews</h2><button aria-label="Close">✕
 export class Crews {
   // `signed(act)`: calls `act` with the commander's name; `send(kind, fields)`: a request to the server
   constructor(signed, send) {
-    Object.assign(this, { signed, send, crews: [], items: new Map(), dialog: document.createElement('dialog'), said: '' });
-    this.dialog.id = 'crews';
-    this.dialog.setAttribute('aria-label', tr('Crews'));
-    this.dialog.innerHTML = HTML;
-    localise(this.dialog);
-    this.dialog.onclick = ({ target }) => { if (target === this.dialog) this.dialog.close(); };  // beside it
-    document.body.append(this.dialog);
+    Object.assign(this, { signed, send, crews: [], items: new Map(), dialog: dialogOf('crews', 'Crews', HTML), said: '' });
     $('crews-button').onclick = () => this.dialog.showModal();
     $('crew-new').onsubmit = (e) => { e.preventDefault(); this.add(); };
   }

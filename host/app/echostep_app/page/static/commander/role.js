@@ -17,7 +17,7 @@ const TAP_PX = 28;  // a wearer within this distance of a tap is chosen
 const URGENT = ['mayday', 'asked', 'lost', 'stale'], CALLS = ['mayday', 'asked'];
 const $ = (id) => document.getElementById(id);
 
-export class Role {
+export class Commander {
   // `page`: of main.js
   constructor(page) {
     const { send, hint, scene, view } = page;
@@ -54,11 +54,6 @@ export class Role {
     this.stacked();
   }
 
-  refused(reason) { this.page.hint(reason); }
-  failed(reason) { this.page.fault(reason); }
-  considered() {}
-  unsent() {}
-  recolour() { this.painter.recolour(); }
   fitWhole() { this.page.view.fit(this.page.planView.box); }
 
   async floorChosen(level) {
@@ -138,7 +133,7 @@ export class Role {
   inOtherUnit() {
     this.list.again();
     this.page.send('choose', { id: this.page.scene.chosen });
-    this.page.redraw();
+    this.page.view.changed();
   }
 
   follow() { this.alarm.keep(this.page.scene.places); }

@@ -6,12 +6,12 @@ import { geojson, save } from './export.js';
 import { linkOf } from './hash.js';
 import { Heard } from './heard.js';
 import { LAYERS } from './layers.js';
-import { localise, minutes, tr } from '../language.js';
+import { dialogOf } from '../dialog.js';
+import { minutes, tr } from '../language.js';
 
 const $ = (id) => document.getElementById(id);
 const BUTTONS = { measure: 'Measure', charts: 'Charts', link: 'Copy a link', geojson: 'GeoJSON', files: 'Open files…' };
-const HTML = `<form method="dialog"><h2>More</h2><button aria-label="Close">✕</button></form>
-<div tabindex="0" role="group" aria-label="Tools">
+const HTML = `<div tabindex="0" role="group" aria-label="Tools">
   <p class="row">${Object.entries(BUTTONS).map(([name, text]) => `<button id="tool-${name}" type="button">${text}</button>`).join('')}
     <label for="theme" class="unseen">Colours</label><select id="theme"><option value="auto">auto</option><option value="bright">bright</option><option value="dark">dark</option><option value="contrast">high contrast</option></select></p>
   <h3 id="layers-title">Layers</h3>
@@ -23,19 +23,12 @@ const HTML = `<form method="dialog"><h2>More</h2><button aria-label="Close">✕<
 export class Tools {
   // `page`: view, scene, planView, layers, charts, plan(), globe(), hint(text, ms), enter(mode), changed(), seek(t_s)
   constructor(page) {
-    this.page = page;
-    const dialog = this.dialog = document.createElement('dialog');
-    dialog.id = 'tools';
-    dialog.setAttribute('aria-label', tr('More'));
-    dialog.innerHTML = HTML;
-    localise(dialog);
-    dialog.onclick = ({ target }) => { if (target === dialog) dialog.close(); };  // beside it
-    document.body.append(dialog);
+    Object.assign(this, { page, dialog: dialogOf('tools', 'More', HTML) });
     new Heard($('messages'), $('heard'));
     this.wire();
     this.wireLayers();
     this.setCharts(recall('charts') === 'on');
-    Object.assign(page.charts, { onEvents: (events) => this.events(events), isWanted: () => dialog.open });
+    Object.assign(page.charts, { onEvents: (events) => this.events(events), isWanted: () => this.dialog.open });
   }
 
   wire() {

@@ -21,7 +21,7 @@ const HINTS = { here: 'Stand still. Tap where you are, drag in the direction you
 const TITLES = { follow: 'F', here: 'H', goal: 'G', 'tools-button': 'T', 'tool-measure': 'D', 'tool-charts': 'C' };
 const $ = (id) => document.getElementById(id);
 
-export class Role {
+export class Wearer {
   // `page`: of main.js. Modes: null, 'here' (a tap gives the wearer's position, a drag the heading too), 'go' (a tap gives the destination), 'measure'.
   constructor(page) {
     const { send, hint, seek, view, planView, scene } = page;
@@ -40,7 +40,7 @@ export class Role {
     this.points = new Points(send);
     this.drops = new Drops(hint);
     this.charts = new Charts($('charts'), () => this.painter.colour, seek);
-    this.tools = new Tools({ view, scene, planView, layers: scene.layers, charts: this.charts, hint, seek, enter: (mode) => this.enter(mode), changed: page.redraw, plan: () => page.plan, globe: () => page.globe, takesFiles: () => this.drops.takes });
+    this.tools = new Tools({ view, scene, planView, layers: scene.layers, charts: this.charts, hint, seek, enter: (mode) => this.enter(mode), changed: () => view.changed(), plan: () => page.plan, globe: () => page.globe, takesFiles: () => this.drops.takes });
     this.shown = { charts: this.charts };
     this.wire();
   }
@@ -117,28 +117,15 @@ export class Role {
     if (view.scale === this.fittedScale && !this.linked) view.approach(estimate.x_m, estimate.y_m, planView.box);
   }
 
-  refused(reason) {
-    this.points.ready();
-    this.page.hint(reason);
-  }
-
-  // `ended`: the reason is the error that ended the run.
-  failed(reason, ended) {
-    this.broken = Boolean(ended);
-    this.page.fault(reason);
-  }
-
+  refused() { this.points.ready(); }
+  failed(ended) { this.broken = Boolean(ended); }  // by the error that ended the run
   considered(answer) { this.taps.considered(answer); }
   unsent(text) { this.speech.unsent(text); }
-
-  recolour() {
-    this.painter.recolour();
-    this.charts.paint();
-  }
+  recoloured() { this.charts.paint(); }
 
   inOtherUnit() {
     if (this.page.scene.frame) this.panel.frame(this.page.scene.frame);
-    this.page.redraw();
+    this.page.view.changed();
   }
 
   // Without news there is no way to go, and no claim.
@@ -229,7 +216,7 @@ export class Role {
     $('goal').value = next === 'go' ? 'map' : scene.frame?.goal ? this.panel.optionOf(scene.frame.goal) : '';
     page.hint(HINTS[next] ?? '', 0);
     if (next === 'measure') scene.measure.clear();
-    page.redraw();
+    page.view.changed();
   }
 
   // What the cross is on.
