@@ -59,7 +59,7 @@ def bench_report(
         FiredBy | None, typer.Option(help="How the rangers fire meanwhile; without it, as they do now.")
     ] = None,
 ) -> None:
-    """Collect what a new board tells of itself into one text file, to be sent in with measurements (firmware/bench.md)."""
+    """Collect a new board's reports in one text file, to be sent in with measurements (firmware/bench.md)."""
     from echostep.board.messages import Schedule
     from echostep_app.commissioning import bench_report as bench
 

@@ -2,7 +2,7 @@
 """Tap: the wearer is at a surveyed point now, as a chunk of the port `POINT`.
 
 In: the number of a point. Out: the bytes of a chunk; a `Tap` from such bytes, which may be damaged or hostile. Owns nothing.
-The bytes are recorded like those of any port. They never reach the tracker: a track is judged by them.
+The bytes are recorded as for any port. They never reach the tracker: a track is judged by them.
 """
 
 from __future__ import annotations

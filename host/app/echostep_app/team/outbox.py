@@ -234,7 +234,7 @@ def steadied(report: Report, age_s: float, steady: SteadyStatus) -> Report:
 
 
 def without_place(report: Report, last: Position | None) -> Report:
-    """The report of a lost wearer: without position and place on Earth, with the last position that was known."""
+    """The report of a lost wearer: without position and place on Earth, with the last known position."""
     return replace(report, position=None, place=None, last_place=last)
 
 

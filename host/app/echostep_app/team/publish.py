@@ -114,7 +114,7 @@ class Publishing:
         return "; ".join(f"{box.name}: {box.fault}" for box in self._outboxes if box.fault)
 
     def receipt(self, number: int) -> str:
-        """What is known of the delivery of the mayday with this number, in a sentence."""
+        """State of delivery of the mayday with this number, in a sentence."""
         kinds = [
             delivery for box in self._outboxes if box.delivered
             for alarm, delivery in (box.delivered,) if (alarm.kind, alarm.number) == ("mayday", number)

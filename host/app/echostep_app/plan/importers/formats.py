@@ -51,7 +51,7 @@ def import_plan(
 ) -> Plan:
     """Import a file of another program; drawings have one file per level, `above` are the files of the higher levels. Fills the report.
 
-    Raises EchostepError that names the file and the position in it.
+    Raises EchostepError with the file's name and the position.
     """
     hints = hints or Hints()
     if hints.doors_m is not None and not _is_imdf(path):
@@ -71,7 +71,7 @@ def import_plan(
 
 
 def open_plan(path: Path | str) -> Plan:
-    """Read plan.json, or import another format without hints. Raises EchostepError that names the file and the position in it."""
+    """Read plan.json, or import another format without hints. Raises EchostepError with the file's name and the position."""
     path = Path(path)
     return import_plan(path) if is_foreign(path) else load_plan(path)
 

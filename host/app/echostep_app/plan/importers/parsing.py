@@ -63,7 +63,7 @@ def number(value: Any, where: str, limit: float, unit: str) -> float:
 
 
 def finite(text: str, where: str) -> float:
-    """The finite number that a text stands for; raises EchostepError."""
+    """A text as a finite number; raises EchostepError."""
     try:
         value = float(text)
     except ValueError as error:

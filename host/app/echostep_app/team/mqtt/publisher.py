@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""MQTT: sends reports to a broker, and receives the reports of a team from it.
+"""MQTT: sends reports to a broker, and receives a team's reports.
 
 In: reports; or an endpoint to subscribe at. Out: messages on `echostep/<team>/<wearer>/estimate` (retained, QoS 1: a commander that
 connects late gets the last report) and `.../presence` (retained, with a last will); or the messages of the broker. Owns one connection,
