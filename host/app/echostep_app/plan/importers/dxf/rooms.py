@@ -59,7 +59,7 @@ class Written(NamedTuple):
 def rooms_of(
     entities: Sequence[tuple[Any, str]], frame: DrawingFrame, file: Path, report: ImportReport, texts: list[Written]
 ) -> list[Room]:
-    """A room for each text, with the smallest outline around the text, and for each outline without one, named by enclosed `texts` of other layers."""
+    """A room for each text, with the smallest outline around it, and for each outline without one, named by enclosed `texts` of other layers."""
     names: dict[tuple[str, tuple[float, float]], Written] = {}  # one of each that is drawn twice
     outlines: list[Polygon] = []
     for entity, layer in entities:
