@@ -14,7 +14,7 @@ from echostep.errors import EchostepError
 from reliability.fuzz import host as fuzz_host
 from reliability.fuzz.targets import TARGETS
 
-SLOW = {"dxf": 2, "ifc": 3, "osm": 3, "wrld": 5, "wrld-floor": 2}  # inputs, where one takes tens of milliseconds
+SLOW = {"dxf": 2, "ifc": 3, "osm": 3, "imdf": 5}  # inputs, where one takes tens of milliseconds
 
 
 @pytest.fixture(autouse=True)

@@ -35,12 +35,12 @@ from echostep_app.team.messages.report import encode as report_bytes
 from echostep_app.team.messages.shared_drawings import checked_drawing
 from echostep_simulation.devices.beacon_gateway import message
 from echostep_studies.barometer.pressure_csv import load_pressures
-from plan.imported_plans import write_seven_floors
+from plan import test_plan_importer_imdf as imdf
 from team.team_reports import report
 from walks import DEMO, walk_chunks
 
 KEY = bytes(range(32))
-FLOOR = "floor1.geojson"  # of the seven
+UNITS = "unit.geojson"  # of a venue
 PLAN = """{"echostep_plan":1,"name":"p","levels":[{"name":"g","height_m":0,"walls":[[0,0,4,0],[4,0,4,4],[4,4,0,4],[0,4,0,0]],
 "rooms":[{"name":"r","at":[1,1],"outline":[[0,0],[2,0],[2,2]]}],"doors":[{"line":[1,0,2,0]}],"obstacles":[[[1,1],[2,1],[2,2]]]}],
 "start":{"x":0.5,"y":0.5,"heading_deg":0},"georeference":{"origin":[8,53]},"uncertainty_m":0.1}"""
@@ -130,12 +130,12 @@ def write_model(folder: Path) -> Path:
     return write_house(folder)
 
 
-def import_floor(data: bytes) -> object:
-    """Import the seven floors with these bytes as one of them."""
+def import_units(data: bytes) -> object:
+    """Import a venue with these bytes as its units."""
     with TemporaryDirectory() as folder:
-        main = write_seven_floors(Path(folder))
-        main.with_name(FLOOR).write_bytes(data)
-        return import_plan(main)
+        venue = imdf.folder(Path(folder), imdf.files())
+        (venue / UNITS).write_bytes(data)
+        return import_plan(venue)
 
 
 def csv(header: str, *columns: float, rate_hz: float = 100.0) -> Callable[[], bytes]:
@@ -168,8 +168,7 @@ TARGETS: dict[str, Target] = {
     "mcap": Target(recording, file("a.mcap", read_recording)),
     "dxf": Target(written(write_drawing), file("a.dxf", import_plan)),
     "osm": Target(OSM.encode, file("a.osm", import_plan)),
-    "wrld": Target(written(write_seven_floors), file("main.json", import_plan)),
-    "wrld-floor": Target(written(lambda folder: write_seven_floors(folder).with_name(FLOOR)), import_floor),
+    "imdf": Target(written(lambda folder: imdf.folder(folder, imdf.files()) / UNITS), import_units),
     "ifc": Target(written(write_model), file("a.ifc", import_plan)),
     "legs": Target(csv("t_s,thigh_rad_s,shank_rad_s", 0.0, 0.1), file("a.csv", load_legs)),
     "imu": Target(csv("t_s,ax,ay,az,gx,gy,gz", 0.0, 0.0, 9.8, 0.0, 0.0, 0.0), file("a.csv", load_foot)),
