@@ -30,6 +30,7 @@ from echostep_app.scorecard.error_statistics import error_statistics
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import Person, Waypoint
 from echostep_simulation.scenario import Scenario
+from echostep_studies.bench.sites import WESTPORT
 from echostep_studies.frame.report import LOST_END_M, Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.tower import tour, tower
