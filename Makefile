@@ -148,7 +148,7 @@ soak: $(READY) ## eight simulated hours of the firmware through the live pipelin
 kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording; on from where it stopped
 	$(TOOL) reliability.kill_recorder
 
-hardware: $(READY) ## checks the nets of the wiring; the printed boxes: STL, checked to be closed, and their pictures; not built yet
+hardware: $(READY) ## checks the nets of wiring and schematics; the printed boxes: STL, checked to be closed; not built yet
 	@tools/apt.sh openscad || true
 	$(TOOL) hardware.nets
 	$(TOOL) hardware.boxes
