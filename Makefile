@@ -148,9 +148,15 @@ soak: $(READY) ## eight simulated hours of the firmware through the live pipelin
 kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording; on from where it stopped
 	$(TOOL) reliability.kill_recorder
 
-hardware: $(READY) ## checks the nets of wiring and schematics; the printed boxes: STL, checked to be closed; not built yet
+hardware: $(READY) ## checks the nets of wiring and schematics, KiCad's rules too where it is installed; the printed boxes: STL, checked to be closed; not built yet
 	@tools/apt.sh openscad || true
 	$(TOOL) hardware.nets
+	@mkdir -p out/hardware
+	@if command -v kicad-cli >/dev/null; then \
+		for sheet in papers 2026 foot; do \
+			kicad-cli sch erc --severity-error --exit-code-violations -o out/hardware/$$sheet.rpt firmware/hardware/schematic/$$sheet.kicad_sch || exit 1; \
+		done; \
+	else echo "kicad-cli (KiCad 8 or newer) is not installed: its rules check is skipped"; fi
 	$(TOOL) hardware.boxes
 
 flash: ## build the firmware and write it to a board: make flash PORT=/dev/ttyACM0
