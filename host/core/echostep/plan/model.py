@@ -216,7 +216,7 @@ def load_plan(path: Path | str) -> Plan:
     try:
         return parse_plan(raw)
     except NotJsonError as error:
-        formats = "DXF, IMDF, OSM, IFC, GeoJSON or WRLD"
+        formats = "DXF, IMDF, OSM, IFC or GeoJSON"
         remedy = f"of another format ({formats}), echostep plan import makes one"
         raise EchostepError(f"{path}: {error}; {remedy}") from error
     except ValueError as error:

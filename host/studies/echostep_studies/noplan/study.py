@@ -28,7 +28,7 @@ from echostep_studies.bench.filtering import Claim, track
 from echostep_studies.bench.judgement import TRACKING, TruePlaces, judge, true_levels
 from echostep_studies.bench.recordings import hallways
 from echostep_studies.bench.recordings.foot_metrics import rmse
-from echostep_studies.bench.sites import Site
+from echostep_studies.bench.sites import WESTPORT, Site
 from echostep_studies.bench.walks import SimulatedWalk
 from echostep_studies.frame.report import Row, as_dict
 from echostep_studies.frame.study import Study, StudyRequest
@@ -199,8 +199,8 @@ def second_row(
 
 def noplan_study(data: Path | None, pattern: str, request: StudyRequest) -> Study[RunRow, Row]:
     """The study of the rows whose names match a pattern; `data`: folder of the public recordings."""
-    if data is not None and not (data / "maps" / "westport-house").is_dir():
-        raise EchostepError(f"{data / 'maps' / 'westport-house'}: not there: without --data its rows are left out")
+    if data is not None and not (data / WESTPORT).is_file():
+        raise EchostepError(f"{data / WESTPORT}: not there: without --data its rows are left out")
     every = names_of(data)
     names = tuple(name for name in every if fnmatch(name, pattern))
     if not names:
