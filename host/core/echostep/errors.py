@@ -38,7 +38,9 @@ def replaced(begin: bytes) -> str:
 
 
 # A command (`acceptance`), its option (`map --plan`), a setting (`[ranger] learn`), the begin of an address in any command (`mesh://`)
-INSTEAD: dict[str, str] = {}
+INSTEAD: dict[str, str] = {
+    "mesh://": "reports go by IP to the team's broker (mqtt://HOST); what a Meshtastic radio's own uplink brings there: docs/teams.md, Off grid",
+}
 
 
 def has_left(use: str) -> str:

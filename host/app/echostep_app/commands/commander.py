@@ -23,7 +23,7 @@ def command(
         str,
         typer.Argument(
             metavar="URL",
-            help="mqtt://HOST[:PORT], mqtts://HOST[:PORT]?ca=FILE, mesh:///dev/PORT, or a recorded operation (.mcap)",
+            help="mqtt://HOST[:PORT], mqtts://HOST[:PORT]?ca=FILE, or a recorded operation (.mcap)",
         ),
     ],
     plan: TeamPlan,

@@ -205,7 +205,7 @@ Publish = Annotated[
     typer.Option(
         "--publish",
         metavar="URL",
-        help="Send estimates to a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls:// mesh://; may be given several times.",
+        help="Send estimates to a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls://; may be given several times.",
     ),
 ]
 Name = Annotated[str, typer.Option("--name", help="The wearer's name, for --publish.")]

@@ -68,7 +68,7 @@ class Inbox:
 
 
 class Subscription(Protocol):
-    """Where messages come from: a broker, or a radio."""
+    """Where messages come from: a broker."""
 
     def open(self) -> str:
         """Connect; returns what is refused of it, in words, empty if nothing; raises OSError."""
