@@ -15,7 +15,6 @@ from echostep.errors import EchostepError
 from echostep.plan import load_plan
 from echostep_app.commissioning.calibrate import write_sections
 from echostep_app.page.editor import PlanFile
-from echostep_app.team.wearer_plan import _kept
 from echostep_studies.frame.runs import Journal
 from reliability import left_behind
 from reliability.campaign import CampaignJournal
@@ -79,17 +78,6 @@ def test_a_damaged_journal_of_a_study_loses_only_what_is_damaged(tmp_path: Path,
     assert not journal.runs
     journal.add(1, [Row(7)])
     assert Journal(path, (Row,)).runs == {1: [Row(7)]}
-
-
-@pytest.mark.parametrize("left", [b"", b"{}", None], ids=str)
-def test_a_teammates_drawing_that_a_power_failure_damaged_is_put_aside(tmp_path: Path, left: bytes | None) -> None:
-    path = _kept(b"drawing", "anna", tmp_path)
-    assert _kept(b"drawing", "anna", tmp_path) == path
-    path.unlink()
-    path.mkdir() if left is None else path.write_bytes(left)
-    assert _kept(b"drawing", "anna", tmp_path).read_bytes() == b"drawing"
-    aside = path.with_name(f"{path.name}.damaged")
-    assert aside.is_dir() if left is None else aside.read_bytes() == left
 
 
 def test_settings_that_cannot_be_written_whole_leave_those_before(

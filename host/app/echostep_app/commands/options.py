@@ -90,21 +90,11 @@ Shank = Annotated[
     float | None, typer.Option("--shank", metavar="M", help="Knee to ankle or to the floor, metres; likewise.")
 ]
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
-TeamPlan = Annotated[
-    Path,
-    typer.Option(
-        "--plan",
-        metavar="FILE|wearer:NAME",
-        help="The building's plan (JSON, metres), or wearer:NAME: what that wearer has drawn by now.",
-    ),
-]
 OptionalPlan = Annotated[
     Path | None,
     typer.Option(
         "--plan",
-        metavar="FILE|wearer:NAME",
-        help="The building's plan (JSON, metres), or wearer:NAME: what that wearer of the team has drawn by now (live only). "
-        "Without it the map begins where the walk begins, and nothing is drawn on it.",
+        help="The building's plan (JSON, metres). Without it the map begins where the walk begins, and nothing is drawn on it.",
     ),
 ]
 Start = Annotated[
