@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What is said of the delivery of reports is what the receiver said: a broker that refuses them, one that has them, a receiver without a
-point for some."""
+point for some.
+"""
 
 from __future__ import annotations
 
