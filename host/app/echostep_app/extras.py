@@ -24,7 +24,6 @@ EXTRAS = dict.fromkeys((*PAGE, "segno"), "page") | {
     "pandas": "pandas",
     "ifcopenshell": "ifc",
     "foxglove": "foxglove",
-    "meshtastic": "mesh",
 }
 
 

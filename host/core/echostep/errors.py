@@ -8,6 +8,7 @@ instead.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 PACKED = {  # by the first bytes [file(1)]
     b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ": "xz", b"PK\x03\x04": "zip", b"(\xb5/\xfd": "zstd", b"7z\xbc\xaf": "7z",
@@ -37,8 +38,13 @@ def replaced(begin: bytes) -> str:
     return f"packed by {packed}: unpack it first" if packed else ""
 
 
-# A command (`acceptance`), its option (`map --plan`), a setting (`[ranger] learn`), the begin of an address in any command (`mesh://`)
-INSTEAD: dict[str, str] = {}
+# A command (`acceptance`), its option (`map --plan`), a setting (`[ranger] learn`), the begin of an address in any command (`mesh://`),
+# an option with such a value (`--plan wearer:`)
+INSTEAD: dict[str, str] = {
+    "map --plan": "a walk is drawn by itself; echostep plan edit mends a plan",
+    "--plan wearer:": "echostep map WALK.mcap -o plan.json draws that wearer's recording, and --plan plan.json takes it",
+    "mesh://": "reports go by IP to the team's broker (mqtt://HOST); what a Meshtastic radio's own uplink brings there: docs/teams.md, Off grid",
+}
 
 
 def has_left(use: str) -> str:
@@ -54,6 +60,9 @@ def former_use(words: Sequence[str]) -> str:
 
 def _is_used(use: str, words: list[str]) -> bool:
     *command, last = use.split()
+    if command and command[0].startswith("-"):
+        given = [*pairwise(words), *(word.partition("=")[::2] for word in words)]
+        return any(option == command[0] and value.startswith(last) for option, value in given)
     if words[: len(command)] != command:
         return False
     rest = words[len(command) :]

@@ -20,10 +20,25 @@ def test_a_former_use_ends_with_the_sentence_that_names_its_substitute(use: str)
 
 
 def test_a_command_line_of_today_is_no_former_use(monkeypatch: pytest.MonkeyPatch) -> None:
-    rows = {"former": "now", "live --old": "new", "plan make --size": "none", "far://": "near://"}
+    rows = {"former": "now", "live --old": "new", "plan make --size": "none", "far://": "near://", "--on who:": "file"}
     for use, instead in rows.items():
         monkeypatch.setitem(INSTEAD, use, instead)
-    for today in ("live former", "live --name former", "replay --old", "plan make", "live --publish farther", ""):
+    for today in (
+        "live former",
+        "live --name former",
+        "replay --old",
+        "plan make",
+        "live --publish farther",
+        "live --to who:x --on",
+        "",
+    ):
         assert not former_use(today.split())
-    for before in ("former x", "--share former", "live --old=3", "plan make a --size 2", "live --publish=far://x"):
+    for before in (
+        "former x",
+        "--share former",
+        "live --old=3",
+        "plan make a --size 2",
+        "live --publish=far://x",
+        "live --on who:x",
+    ):
         assert former_use(before.split())

@@ -37,7 +37,6 @@ from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.recovery import Recovery
 from echostep_app.team.messages.report import decode
 from echostep_app.team.messages.report import encode as report_bytes
-from echostep_app.team.messages.shared_drawings import checked_drawing
 from echostep_app.xsens.requests import project_requests
 from echostep_app.xsens.setup import MtxSetup
 from echostep_simulation.devices.beacon_gateway import message
@@ -203,7 +202,6 @@ TARGETS: dict[str, Target] = {
     "person": Target(lambda: b'{"x_m":1.0,"y_m":2.0,"level":0,"sd_m":0.5}', parse_person),
     "websocket": Target(lambda: b'{"kind":"go_to","x_m":1.0,"y_m":2.0,"level":0}', text(parse_request)),
     "mqtt": Target(lambda: report_bytes(report()), decode),
-    "drawing": Target(PLAN.encode, checked_drawing),
     "settings": Target(lambda: b"[cloud]\nsize = 300\n[mtx]\nrate_hz = 100\n", text(lambda t: parse_settings(t, "x"))),
     "plan": Target(PLAN.encode, parse_plan),
     "mcap": Target(recording, file("a.mcap", read_recording)),

@@ -34,21 +34,15 @@ Truth = Annotated[
 
 @app.command("map")
 def map_command(
-    recordings: Annotated[
-        list[Path], typer.Argument(metavar="WALK...", help="Recorded walks (.mcap) through one building.")
-    ],
+    recording: Annotated[Path, typer.Argument(metavar="WALK", help="A recorded walk (.mcap) through a building.")],
     out: Annotated[Path, typer.Option("-o", "--out", metavar="PLAN", help="The plan to write (JSON).")],
-    plan: Annotated[
-        Path | None,
-        typer.Option("--plan", metavar="PARTIAL", help="A partial or old plan, which the walks complete and correct."),
-    ] = None,
     picture: Annotated[Path | None, picture_option("Draw plan and path there")] = None,
 ) -> None:
-    """Draw the plan of a building from recorded walks."""
-    require("a drawing of walks", "scipy")
+    """Draw the plan of a building from a recorded walk."""
+    require("a drawing of a walk", "scipy")
     from echostep_app.commands.actions import mapping
 
-    mapping.map_recordings(recordings, plan, out, picture)
+    mapping.map_recording(recording, out, picture)
 
 
 @app.command("import")

@@ -89,11 +89,11 @@ class Tracking:
     settings: SettingsFile = None
     guide: GuideTo = None
 
-    def options(self, plan: Path | None, seed: int | None) -> TrackingOptions:
-        """These options with the file of the plan and the seed."""
+    def options(self, seed: int | None) -> TrackingOptions:
+        """These options with the seed."""
         from echostep_app.session.options import TrackingOptions
 
-        return TrackingOptions(plan, self.start, self.start_sd, self.settings, seed, self.guide)
+        return TrackingOptions(self.plan, self.start, self.start_sd, self.settings, seed, self.guide)
 
 
 @dataclass(frozen=True, slots=True)

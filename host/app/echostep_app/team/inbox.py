@@ -68,7 +68,7 @@ class Inbox:
 
 
 class Subscription(Protocol):
-    """Where messages come from: a broker, or a radio."""
+    """Where messages come from: a broker."""
 
     def open(self) -> str:
         """Connect; returns the refused part in words, empty if there is none; raises OSError."""

@@ -66,7 +66,7 @@ class OutboxCounts:
 
     offered: int = 0
     sent: int = 0  # without heartbeats
-    left_out: int = 0  # by the transport: no time in the air, no point for a map, nobody listens
+    left_out: int = 0  # by the transport: no point for a map, nobody listens
     heartbeats: int = 0
     overtaken: int = 0
     breaks: int = 0

@@ -57,7 +57,6 @@ from echostep_app.xsens.startup import MtxStart
 
 if TYPE_CHECKING:
     from echostep_app.page.mailbox import Mailbox
-    from echostep_app.team.endpoint import Outlet
 
 BAUD = dict.fromkeys((BOARD, MTX, FOOT, GATEWAY, LINES), 115200)
 
@@ -82,7 +81,7 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions, g
     plan = plan_of(tracking)
     if port_of(ports.foot) is None:
         return _live(plan, tracking, ports, output, guide)
-    with closing(_open_ports(ports, output.outlet)) as opened:
+    with closing(_open_ports(ports)) as opened:
         return _live(plan, tracking, ports, output, guide, opened)
 
 
@@ -108,7 +107,7 @@ def _live(
     session.prepare(SEARCH)  # a search may begin with the first steps
     folder = output_folder(output.folder)
     tracker.watchers.append(PlaceKeeper(folder, tracker, number).note)
-    with closing(early or _open_ports(ports, output.outlet)) as opened:
+    with closing(early or _open_ports(ports)) as opened:
         _identify(opened)
         metadata = run_metadata(plan, tracker.start, seed, "live", settings_toml) | clock_metadata()
         session.arrivals.urls = opened.urls
@@ -183,16 +182,15 @@ def _identify(ports: SerialPorts) -> None:
             ports.send(name, encode(Identify(), 0))
 
 
-def _open_ports(options: PortOptions, outlet: Outlet | None = None) -> SerialPorts:
-    """The ports of a run; raises EchostepError when two uses of the run have the same one, the radio of `outlet` included."""
+def _open_ports(options: PortOptions) -> SerialPorts:
+    """The ports of a run; raises EchostepError when two uses of the run have the same one."""
     if options.mtx is not None and options.foot is not None:
         raise EchostepError("--mtx and --foot: only one of them is on the foot: give that one")
     lines = port_of(options.foot)
     foot = options.foot if lines is None else None
     urls = {BOARD: options.board, MTX: options.mtx, FOOT: foot, GATEWAY: options.beacons, LINES: lines}
     given = {name: url for name, url in urls.items() if url is not None}
-    radios = [endpoint.host for endpoint in outlet.endpoints if endpoint.scheme == "mesh"] if outlet else []
-    check_different(given | {f"--publish mesh://{port} ({k})": port for k, port in enumerate(radios, 1)})
+    check_different(given)
     return SerialPorts(given, BAUD)
 
 
