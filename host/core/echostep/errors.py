@@ -37,8 +37,14 @@ def replaced(begin: bytes) -> str:
     return f"packed by {packed}: unpack it first" if packed else ""
 
 
+LEARNT_BIAS = "the range bias that both rangers have in common is learnt while tracking"
 # A command (`acceptance`), its option (`map --plan`), a setting (`[ranger] learn`), the begin of an address in any command (`mesh://`)
-INSTEAD: dict[str, str] = {}
+INSTEAD = {
+    "calibrate rangers": LEARNT_BIAS,
+    "calibrate --plan": LEARNT_BIAS,
+    "calibrate --mtx": LEARNT_BIAS,
+    "[ranger] learn": LEARNT_BIAS,
+}
 
 
 def has_left(use: str) -> str:

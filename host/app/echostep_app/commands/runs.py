@@ -90,12 +90,7 @@ def live(
     outputs = output.options(out)
     plan = _plan_file(tracking.plan, outputs.outlet, out)
     options = tracking.options(plan, seed)
-    recording = live_run.live(options, ports.options(), outputs)
-    if options.settings_path is not None:
-        from echostep_app.commands.actions.rangers import learn_rangers
-        from echostep_app.printing.console import console
-
-        learn_rangers(recording, options, console)
+    live_run.live(options, ports.options(), outputs)
 
 
 @app.command()
