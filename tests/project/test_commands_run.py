@@ -25,7 +25,6 @@ LEFT_OUT = {  # beginnings of commands, and why they are not run here
     "live": "ports",
     "doctor": "a board",
     "bench-report": "a board",
-    "acceptance": "a board, half an hour",
     "calibrate": "a board, or the walks of a wearer (tests/app/commissioning)",
     "demo --guide": "a browser",
     r"demo$": "a browser",

@@ -40,7 +40,6 @@ STARTED_BY = {
     "reliability.kill_recorder": HERE,
     "reliability.left_behind": "tools/test_left_behind.py",
     "reliability.soak": "tools/test_faults.py",
-    "twin.acceptance_walk": "app/session/acceptance/test_acceptance_command.py",
     "twin.measure": HERE,
     "twin.run": "app/commands/test_live.py",
 }

@@ -40,6 +40,8 @@ def replaced(begin: bytes) -> str:
 LEARNT_BIAS = "the range bias that both rangers have in common is learnt while tracking"
 # A command (`acceptance`), its option (`map --plan`), a setting (`[ranger] learn`), the begin of an address in any command (`mesh://`)
 INSTEAD = {
+    "acceptance": "live records a walk with the places that are tapped on its page, and score WALK.mcap --taps compares it with them",
+    "score --html": "score prints the numbers, and evo draws the track that export writes as .tum",
     "calibrate rangers": LEARNT_BIAS,
     "calibrate --plan": LEARNT_BIAS,
     "calibrate --mtx": LEARNT_BIAS,
