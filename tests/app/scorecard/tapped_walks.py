@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -42,8 +41,7 @@ def said(t_s: float, message: bytes) -> Chunk:
     return Chunk(PERSON, START_NS + round(1e9 * t_s), message)
 
 
-@cache
-def walked(plan: Plan, xs_m: tuple[float, ...], y_m: float) -> tuple[tuple[Chunk, ...], tuple[Stand, ...]]:
+def walked(plan: Plan, xs_m: Sequence[float], y_m: float) -> tuple[tuple[Chunk, ...], tuple[Stand, ...]]:
     """The chunks of both ports, and where the wearer stood, along these places and back."""
     there_and_back = [*xs_m, *xs_m[-2::-1]]
     scenario = Scenario(plan, [(x_m, y_m, STAND_S) for x_m in there_and_back], 3, PythonBoard(3))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -33,13 +34,18 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@cache
+def corridor_walk() -> tuple[tuple[Chunk, ...], tuple[Stand, ...]]:
+    return walked(CORRIDOR, XS_M, Y_M)
+
+
 def chunks() -> tuple[Chunk, ...]:
-    return walked(CORRIDOR, XS_M, Y_M)[0]
+    return corridor_walk()[0]
 
 
 def stands() -> tuple[Stand, ...]:
     """Where the simulated wearer stood, after the start."""
-    return walked(CORRIDOR, XS_M, Y_M)[1][1:]
+    return corridor_walk()[1][1:]
 
 
 def scored(folder: Path, plan: Path, taps: list[Chunk], start: Pose | None = START) -> dict[str, Any]:
@@ -63,7 +69,9 @@ def errors_m(folder: Path, plan: Path) -> Floats:
 def test_the_figures_are_those_of_the_simulated_truth(tmp_path: Path, plan: Path) -> None:
     card, expected = scored(tmp_path, plan, [stand.tap() for stand in stands()]), errors_m(tmp_path, plan)
     assert card["points"] == len(stands()) == 4
-    assert card["horizontal"]["mean_m"] == pytest.approx(expected.mean(), abs=0.02)  # the board's clock begins with its first sample
+    assert card["horizontal"]["mean_m"] == pytest.approx(
+        expected.mean(), abs=0.02
+    )  # the board's clock begins with its first sample
     assert card["horizontal"]["max_m"] == pytest.approx(expected.max(), abs=0.02)
     assert card["horizontal"]["mean_m"] < 0.2
     assert card["floor_probability"] == card["availability"] == 1.0
@@ -76,8 +84,8 @@ def test_no_tap_moves_the_track_that_it_judges(tmp_path: Path, plan: Path) -> No
     assert card["horizontal"]["ending_m"] == pytest.approx(0.5, abs=0.2)
 
 
-def test_a_walk_that_waits_for_a_tap_begins_there_and_the_tap_is_no_truth(tmp_path: Path, plan: Path) -> None:
-    begin = walked(CORRIDOR, XS_M, Y_M)[1][0]._replace(t_s=1.0)
+def test_a_walk_that_waits_for_a_tap_begins_there_and_the_tap_is_no_truth(tmp_path: Path) -> None:
+    begin = corridor_walk()[1][0]._replace(t_s=1.0)
     save_plan(replace(CORRIDOR, start=None), tmp_path / "open.json")
     taps = [begin.tap(heading_rad=0.0), *(stand.tap() for stand in stands())]
     card = scored(tmp_path, tmp_path / "open.json", taps, None)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Tracks of recordings as files for other programs.
 
-In: a recording and a plan. Out: CSV, Parquet, GeoPackage, KML, GPX, a TUM trajectory, or a recording with newly derived messages, chosen by the suffix of the file
-name. Owns nothing.
+In: a recording and a plan. Out: CSV, Parquet, GeoPackage, KML, GPX, a TUM trajectory, or a recording with newly derived messages, chosen by the
+suffix of the file name. Owns nothing.
 """
 
 from __future__ import annotations

@@ -56,9 +56,11 @@ class Taps:
     def take(self, portion: Portion) -> Iterator[Estimate]:
         """The estimates of a tracker that gets no tap but its start."""
         for piece in portion.cut_after(PERSON):
-            person = piece.of(PERSON)
-            withheld = len(person.row) > 0 and self._withholds(person.received)
-            yield from self._tracker.take(piece.rows(0, len(piece.port) - withheld))
+            message, end = piece.of(PERSON), len(piece.port)
+            before = end - len(message.row)
+            yield from self._tracker.take(piece.rows(0, before))
+            if before < end and not self._withholds(message.received):
+                yield from self._tracker.take(piece.rows(before, end))
 
     def _withholds(self, received: bytes) -> bool:
         """Whether a message is a tap that the tracker does not wait for, or takes such a tap back."""
@@ -84,7 +86,9 @@ def tapped_walk(path: Path, plan: Plan, start: Start | Pose | None) -> TappedWal
     timed = [tap for tap in taps.kept.values() if math.isfinite(tap.t_s)]
     truth = _truth(path, timed, plan)
     sd_m = float(np.median([tap.check_in.sd_m for tap in timed]))
-    words = f"{path}: {len(timed)} taps, each with a standard deviation of {sd_m:.2f} m; the track was made without them"
+    words = (
+        f"{path}: {len(timed)} taps, each with a standard deviation of {sd_m:.2f} m; the track was made without them"
+    )
     return TappedWalk(track_of(estimates, str(path)), truth, words, [f"{path}: {line}" for line in recording.damage()])
 
 
@@ -101,7 +105,9 @@ def _truth(path: Path, taps: list[TimedTap], plan: Plan) -> ScoredPath:
             )
     t_s = np.array([tap.t_s for tap in taps])
     if len(taps) > 1 and float(np.median(np.diff(t_s))) <= PATH_S:
-        raise EchostepError(f"{path}: most taps came within {PATH_S:g} s of the one before: no walk from point to point")
+        raise EchostepError(
+            f"{path}: most taps came within {PATH_S:g} s of the one before: no walk from point to point"
+        )
     at = [tap.check_in for tap in taps]
     return ScoredPath(
         path, t_s, np.array([(tap.x_m, tap.y_m) for tap in at]), np.zeros(len(at), bool), {},

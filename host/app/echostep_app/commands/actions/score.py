@@ -31,6 +31,7 @@ from echostep_app.scorecard.truth import is_recording, load_truth
 from echostep_app.session.metadata import start_given
 from echostep_app.session.options import TrackingOptions
 
+
 class Compared(NamedTuple):
     """The name of the truth, each track with its true path, and sentences about what was read."""
 
