@@ -200,7 +200,6 @@ WALK = CAPTURES / "walk.mcap"
     ("matplotlib", ("plan", "show", DEMO, "-o", "x.png")),
     ("matplotlib", ("plan", "check", DEMO, "--picture", "x.png")),
     ("matplotlib", ("plan", "overlay", DEMO, "-o", "x.kmz")),
-    ("matplotlib", ("score", "x.csv", "--truth", "x.csv", "--html", "x.html")),
     ("matplotlib", ("foot", "x.csv", "--picture", "x.pdf")),
     ("matplotlib", ("legs", "x.csv", "--thigh", "0.4", "--shank", "0.4", "--picture", "x.pdf")),
 ])  # fmt: skip

@@ -38,7 +38,6 @@ STARTED_BY = {
     "reliability.fuzz.host": HERE,
     "reliability.kill_recorder": HERE,
     "reliability.soak": "tools/test_faults.py",
-    "twin.acceptance_walk": "app/session/acceptance/test_acceptance_command.py",
     "twin.measure": HERE,
     "twin.run": "app/commands/test_live.py",
 }

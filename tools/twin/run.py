@@ -177,11 +177,6 @@ def advance(board: PtyBoard, mtx: PtyMtx, rows: NDArray[Any]) -> None:
 
 def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> bool:
     """Play one walk in real time; returns whether it was played to its end: it is left when the program closes the board's port."""
-    return all(board.is_open for _ in playing(scenario, board, mtx))
-
-
-def playing(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> Iterator[float]:
-    """Play one walk in real time; gives the time of the walk (s) after each block."""
     frames = iter(zip(scenario.mtx.arrival_s.tolist(), scenario.mtx.frames, strict=True))
     waiting = next(frames, None)
     for begin_ms in during(scenario):
@@ -190,14 +185,16 @@ def playing(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> Iterator[float]
         while waiting is not None and waiting[0] <= now_s:
             mtx.measure(waiting[1])
             waiting = next(frames, None)
-        yield now_s
+        if not board.is_open:
+            return False
+    return True
 
 
-def announce(command: str, hint: str = "", **ports: str) -> None:
-    """Print the ports, and what to start, and then to do, in another terminal."""
+def announce(command: str, **ports: str) -> None:
+    """Print the ports, and what to start in another terminal."""
     for name, port in ports.items():
         print(f"{name:5} {port}")
-    print(f"\nIn another terminal:\n  .venv/bin/echostep {command}\n\n{hint}Ctrl-C ends.", flush=True)
+    print(f"\nIn another terminal:\n  .venv/bin/echostep {command}\n\nCtrl-C ends.", flush=True)
 
 
 def walk_with_mtx(options: argparse.Namespace) -> None:

@@ -32,7 +32,6 @@ from echostep_app.offline.leg_csv import load_legs
 from echostep_app.page.requests import parse_request
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.ports.datagram_key import Opener, seal
-from echostep_app.ports.tap import Tap, parse_tap
 from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.recovery import Recovery
 from echostep_app.team.messages.report import decode
@@ -198,7 +197,6 @@ TARGETS: dict[str, Target] = {
     "setup": Target(lambda: bytes_of(MTX), lambda data: MtxSetup(project_requests(100.0), 100.0).advance(data, 0.0)),
     "gateway": Target(lambda: encode(message(7, 3.0, 0.5, 10.0), 0) * 3, lambda data: Gateway().read(data, 10.0)),
     "datagram": Target(lambda: seal(KEY, b"frames", 1), Opener(KEY).open),
-    "tap": Target(Tap(1, standing=True, t_ns=1).encode, parse_tap),
     "person": Target(lambda: b'{"x_m":1.0,"y_m":2.0,"level":0,"sd_m":0.5}', parse_person),
     "websocket": Target(lambda: b'{"kind":"go_to","x_m":1.0,"y_m":2.0,"level":0}', text(parse_request)),
     "mqtt": Target(lambda: report_bytes(report()), decode),

@@ -19,7 +19,6 @@ from echostep_app.commands.options import (
     Start,
     Thigh,
     Units,
-    needs,
     picture_option,
 )
 from echostep_app.extras import require
@@ -156,15 +155,13 @@ def score(
         ),
     ] = None,
     plan: Annotated[
-        Path | None, typer.Option("--plan", help="The building's plan, for floors by height, zones and the picture.")
+        Path | None, typer.Option("--plan", help="The building's plan, for floors by height, zones, and taps.")
     ] = None,
     start: Start = None,
-    html: Annotated[
-        Path | None,
-        typer.Option(
-            "--html", metavar="FILE", callback=needs("matplotlib"), help="Write a page with the table and the pictures."
-        ),
-    ] = None,
+    taps: Annotated[
+        bool,
+        typer.Option("--taps", help="The places tapped on the page of a recorded run are the truth; needs --plan."),
+    ] = False,
     setup: Annotated[
         float | None, typer.Option("--setup", metavar="S", help="Set-up time of the system, to be listed.", min=0.0)
     ] = None,
@@ -174,7 +171,7 @@ def score(
     from echostep_app.commands.actions import score as scoring
     from echostep_app.session.options import TrackingOptions
 
-    scoring.score(tracks, truth, TrackingOptions(plan, start), html, setup, as_json=as_json)
+    scoring.score(tracks, truth, TrackingOptions(plan, start), setup, taps=taps, as_json=as_json)
 
 
 @app.command()

@@ -85,13 +85,7 @@ def live(
     from echostep_app.session.runs import live as live_run
 
     outputs = output.options(out)
-    options = tracking.options(seed)
-    recording = live_run.live(options, ports.options(), outputs)
-    if options.settings_path is not None:
-        from echostep_app.commands.actions.rangers import learn_rangers
-        from echostep_app.printing.console import console
-
-        learn_rangers(recording, options, console)
+    live_run.live(tracking.options(seed), ports.options(), outputs)
 
 
 @app.command()

@@ -22,14 +22,12 @@ from echostep_app.page.elements.drawn_walls import NO_DRAWING, ShownDrawing
 from echostep_app.page.elements.guidance import Destination, ShownGuidance
 from echostep_app.page.elements.marks import ShownMark, ShownOrder
 from echostep_app.page.elements.scene import PageScene, ParticleSample, is_placed
-from echostep_app.page.elements.taps import NO_TAP, PointPress, ShownPoints
 from echostep_app.page.guarded_socket import MOST_UNDRAWN, UNKNOWN, GuardedSocket
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.protocol import FRAME_S
 from echostep_app.page.replay_cursor import ReplayCursor
 from echostep_app.page.shared import Shared
 from echostep_app.plan.places.bearing import heading_words
-from echostep_app.ports.arrival_clock import now_ns
 
 TOO_BUSY = "Not accepted: this is a replay, or the tracker is too busy."
 
@@ -57,7 +55,6 @@ class PageSession(GuardedSocket):
         self._orders: tuple[ShownOrder, ...] = ()
         self._drawing: ShownDrawing | None = None  # that the page has
         self._team: tuple[str, ...] | None = None  # that the page has
-        self._points: ShownPoints | None = None  # that the page has
         self._trail_count = 0  # points of the trail that the page has
         self._told_end = False
         self._frame_due = True  # the page needs a frame, even of the same scene
@@ -98,9 +95,8 @@ class PageSession(GuardedSocket):
                 refusal = "It is too late to undo this." if is_late else self._take(request)
             case Call():
                 refusal = self._take(request)
-            case requests.Met() | requests.Understood() | requests.AtPoint() | requests.NoTap():
-                for_team = requests.Met | requests.Understood
-                refusal = self._tell_team(request) if isinstance(request, for_team) else self._press(request)
+            case requests.Met() | requests.Understood():
+                refusal = self._tell_team(request)
             case requests.GoTo() if request.level < levels:
                 self._mailbox.set_goal(request.goal)
             case requests.EndGuidance():
@@ -125,16 +121,6 @@ class PageSession(GuardedSocket):
             return f"{request.name} is not heard."
         return "" if self._mailbox.add(self._mailbox.met, request.name) else TOO_BUSY
 
-    def _press(self, request: requests.AtPoint | requests.NoTap) -> str:
-        """Queue a tap at a surveyed point for the guide of the walk; the reason of a refusal, else empty."""
-        points, number = self._mailbox.points, request.number
-        if points is None:
-            return "Not accepted: no points are measured in this run."
-        if points.number != number:
-            return "Not accepted: the walk is at another point by now."
-        typed = request.name if isinstance(request, requests.AtPoint) else NO_TAP
-        return "" if self._mailbox.add_press(PointPress(now_ns(), number, typed)) else TOO_BUSY
-
     async def _send(self) -> None:
         """Send a frame when there is something new, not before `FRAME_S` after the last one."""
         due_s = 0.0
@@ -158,7 +144,6 @@ class PageSession(GuardedSocket):
             self._frame_due = self._frame_due or self._marks is not self._mailbox.marks
             self._frame_due = self._frame_due or self._orders is not self._mailbox.orders
             self._frame_due = self._frame_due or self._team is not self._mailbox.team
-            self._frame_due = self._frame_due or self._points is not self._mailbox.points
             scene = self._cursor.scene(time.monotonic()) if self._cursor else self._mailbox.latest
             if scene is None:
                 continue
@@ -181,7 +166,7 @@ class PageSession(GuardedSocket):
         new_estimate = self._cursor is None and (self._last is None or scene.estimate is not self._last.estimate)
         self._undrawn[self._seq] = scene.arrived_ns if new_estimate else None
         begin = min(self._trail_count, scene.trail_count)  # a replay may go back
-        drawing, points = self._mailbox.drawing_at(scene.t_s), self._mailbox.points
+        drawing = self._mailbox.drawing_at(scene.t_s)
         parts = protocol.FrameParts(
             seq=self._seq,
             where=self._shared.taps.where(scene.estimate) if scene.estimate else "",
@@ -199,10 +184,9 @@ class PageSession(GuardedSocket):
             marks=self._mailbox.marks if self._marks is not self._mailbox.marks else None,
             drawing=(drawing or NO_DRAWING) if drawing is not self._drawing else None,
             team=self._mailbox.team if self._team is not self._mailbox.team else None,
-            points=points if points is not self._points else None,
             ended=self._mailbox.summary if self._cursor is None or self._cursor.at_end else None,
         )
-        self._marks, self._team, self._drawing, self._points = self._mailbox.marks, self._mailbox.team, drawing, points
+        self._marks, self._team, self._drawing = self._mailbox.marks, self._mailbox.team, drawing
         self._orders = self._mailbox.orders
         self._last, self._trail_count, self._particles = scene, scene.trail_count, scene.particles
         return protocol.frame(scene, parts)

@@ -9,7 +9,6 @@ import { Link } from './link.js';
 import { Painter } from './live/paint.js';
 import { Panel } from './live/panel.js';
 import { PlanView } from './plan.js';
-import { Points } from './live/points.js';
 import { Orders } from './live/orders.js';
 import { Replay } from './live/replay.js';
 import { Speech } from './live/speech.js';
@@ -42,14 +41,13 @@ const taps = new Taps(view, {
   keptHeading: () => (scene.frame?.told?.heading_known ? scene.frame.told.heading_rad : null),
 });
 const link = new Link({
-  onHello: hello, onFrame: frame, onRefused: refused, onFailed: failed, onConsidered: (answer) => taps.considered(answer), onAge: connection, onUnsent: (text) => speech.unsent(text),
+  onHello: hello, onFrame: frame, onRefused: (reason) => hint(reason, 6000), onFailed: failed, onConsidered: (answer) => taps.considered(answer), onAge: connection, onUnsent: (text) => speech.unsent(text),
   isLive: () => isLive && scene.frame?.ended == null,
 });
 const speech = new Speech($('speech'), $('sentence'), $('invitation'), $('unspoken'));
 const orders = new Orders((kind, fields) => link.send(kind, fields), (text) => speech.unsent(text));
 const showLegend = startLegend($('legend-button'), LIVE, LIVE_KEYS, redraw);
 const replay = new Replay((kind, fields) => link.send(kind, fields));
-const points = new Points((kind, fields) => link.send(kind, fields));
 const drops = new Drops(hint), charts = new Charts($('charts'), () => painter.colour, seek);
 const tools = new Tools({ view, scene, planView, layers: scene.layers, charts, hint, enter, seek, changed: redraw, plan: () => plan, globe: () => globe, takesFiles: () => drops.takes });
 const painted = new MessageChannel();
@@ -64,7 +62,6 @@ async function hello(message) {
   view.north = plan.north_rad;
   scene.trail.count = 0;
   scene.drawing = null;
-  points.show(null);
   invited = false;
   panel.hello(message);
   const begins = message.replay && $('replay').hidden;
@@ -139,11 +136,6 @@ function arrive(estimate) {
   if (view.scale === fittedScale && !linked) view.approach(estimate.x_m, estimate.y_m, planView.box);
 }
 
-function refused(reason) {
-  points.ready();
-  hint(reason, 6000);
-}
-
 // What is left of the last frame while no other one comes: no way to go, no claim.
 function connection() {
   const { pulse, isOpen } = link;
@@ -171,7 +163,6 @@ function frame(received) {
   if (received.cloud) scene.cloud = received.cloud;
   if (received.drawing) panel.drawing(scene.drawing = received.drawing.path.length ? received.drawing : null);
   if (received.team) panel.team(received.team);
-  if (received.points) points.show(received.points);
   if (received.met && received.met.number !== metNumber) {
     metNumber = received.met.number;
     hint(received.met.text, 8000);
