@@ -38,21 +38,19 @@ def replaced(begin: bytes) -> str:
     return f"packed by {packed}: unpack it first" if packed else ""
 
 
+LEARNT_BIAS = "the range bias that both rangers have in common is learnt while tracking"
 # A command (`acceptance`), its option (`map --plan`), a setting (`[ranger] learn`), the begin of an address in any command (`mesh://`),
 # an option with such a value (`--plan wearer:`)
 INSTEAD: dict[str, str] = {
+    "acceptance": "live records a walk with the places that are tapped on its page, and score WALK.mcap --taps compares it with them",
+    "calibrate --mtx": LEARNT_BIAS,
+    "calibrate --plan": LEARNT_BIAS,
+    "calibrate rangers": LEARNT_BIAS,
+    "[ranger] learn": LEARNT_BIAS,
     "map --plan": "a walk is drawn by itself; echostep plan edit mends a plan",
     "--plan wearer:": "echostep map WALK.mcap -o plan.json draws that wearer's recording, and --plan plan.json takes it",
     "mesh://": "reports go by IP to the team's broker (mqtt://HOST); what a Meshtastic radio's own uplink brings there: docs/teams.md, Off grid",
-LEARNT_BIAS = "the range bias that both rangers have in common is learnt while tracking"
-# A command (`acceptance`), its option (`map --plan`), a setting (`[ranger] learn`), the begin of an address in any command (`mesh://`)
-INSTEAD = {
-    "acceptance": "live records a walk with the places that are tapped on its page, and score WALK.mcap --taps compares it with them",
     "score --html": "score prints the numbers, and evo draws the track that export writes as .tum",
-    "calibrate rangers": LEARNT_BIAS,
-    "calibrate --plan": LEARNT_BIAS,
-    "calibrate --mtx": LEARNT_BIAS,
-    "[ranger] learn": LEARNT_BIAS,
 }
 
 
