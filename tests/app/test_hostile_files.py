@@ -49,7 +49,7 @@ def test_settings_that_a_power_failure_left_are_named(tmp_path: Path, left: byte
 @pytest.mark.parametrize("left", [b"", b"\0" * 40, b"\xff\0"])
 def test_a_truth_that_a_power_failure_left_is_named(tmp_path: Path, left: bytes) -> None:
     (tmp_path / "truth.csv").write_bytes(left)
-    with pytest.raises(EchostepError, match=r"truth\.csv: .*truth") as caught:
+    with pytest.raises(EchostepError, match=r"truth\.csv") as caught:
         load_truth(tmp_path / "truth.csv", None)
     assert "\n" not in str(caught.value)
 

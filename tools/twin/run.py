@@ -177,6 +177,11 @@ def advance(board: PtyBoard, mtx: PtyMtx, rows: NDArray[Any]) -> None:
 
 def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> bool:
     """Play one walk in real time; returns whether it was played to its end: it is left when the program closes the board's port."""
+    return all(board.is_open for _ in playing(scenario, board, mtx))
+
+
+def playing(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> Iterator[float]:
+    """Play one walk in real time; gives the time of the walk (s) after each block."""
     frames = iter(zip(scenario.mtx.arrival_s.tolist(), scenario.mtx.frames, strict=True))
     waiting = next(frames, None)
     for begin_ms in during(scenario):
@@ -185,9 +190,7 @@ def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> bool:
         while waiting is not None and waiting[0] <= now_s:
             mtx.measure(waiting[1])
             waiting = next(frames, None)
-        if not board.is_open:
-            return False
-    return True
+        yield now_s
 
 
 def announce(command: str, **ports: str) -> None:

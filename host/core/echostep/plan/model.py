@@ -84,8 +84,8 @@ class Question:
 class Level:
     """One level: `walls` (n, 4) and `windows` (k, 4) are x0, y0, x1, y1 in map metres; doors are gaps in them; obstacles are outlines (m, 2).
 
-    `doubtful` (d, 4): walls of an older plan that echoes passed, or of a drawing that are not known well enough; they block nothing. `place_sd`
-    (k, 3): x, y of a drawn wall, and the standard deviation per axis of its place in the building.
+    `doubtful` (d, 4): walls of a drawing that are not known well enough; they block nothing. `place_sd` (k, 3): x, y of a drawn wall, and the
+    standard deviation per axis of its place in the building.
     """
 
     name: str
