@@ -37,11 +37,11 @@ firmware: ## build the firmware (firmware/build/echostep.elf and .hex) and put i
 	$(MAKE) -C firmware
 	cp firmware/build/echostep.hex firmware/build/echostep.hex.sha256 $(dir $(SHIPPED))
 
-twin: $(READY) ## play board and MTx on two pseudo terminals until Ctrl-C; STILL=1: a wearer who does what calibrate asks; KIT=2026: two boards; CORRIDOR=20x2: acceptance
+twin: $(READY) ## play board and MTx on two pseudo terminals until Ctrl-C; STILL=1: a wearer who does what calibrate asks; KIT=2026: two boards
 	@tools/apt.sh $(APT_PACKAGES)
 	$(MAKE) -C firmware
 	$(MAKE) -C tools/twin
-	$(if $(CORRIDOR),$(TOOL) twin.acceptance_walk $(CORRIDOR),$(TOOL) twin.run $(if $(STILL),--still) $(if $(KIT),--kit $(KIT)))
+	$(TOOL) twin.run $(if $(STILL),--still) $(if $(KIT),--kit $(KIT))
 
 demo: $(DEMO_READY) ## track a simulated walk through the real firmware in the simulator; KIT=2026: with the parts of 2026 (default: papers)
 	@if tools/apt.sh $(APT_PACKAGES); then \
@@ -145,18 +145,18 @@ soak: $(READY) ## eight simulated hours of the firmware through the live pipelin
 	$(MAKE) --quiet -C tools/twin
 	$(TOOL) reliability.soak $(if $(HOURS),--hours $(HOURS)) $(if $(WRAP),--wrap $(WRAP))
 
-calls: $(READY) ## each call of the operating system fails in turn, in each command that runs: output, files, ports, sockets; on from where it stopped
-	$(TOOL) reliability.calls.campaign
-
 kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording; on from where it stopped
 	$(TOOL) reliability.kill_recorder
 
-left-behind: $(READY) ## damage each file that an earlier run left, and start the command that reads it; on from where it stopped
-	$(TOOL) reliability.left_behind
-
-hardware: $(READY) ## checks the nets of the wiring; the printed boxes: STL, checked to be closed, and their pictures; not built yet
+hardware: $(READY) ## checks the nets of wiring and schematics, KiCad's rules too where it is installed; the printed boxes: STL, checked to be closed; not built yet
 	@tools/apt.sh openscad || true
 	$(TOOL) hardware.nets
+	@mkdir -p out/hardware
+	@if command -v kicad-cli >/dev/null; then \
+		for sheet in papers 2026 foot; do \
+			kicad-cli sch erc --severity-error --exit-code-violations -o out/hardware/$$sheet.rpt firmware/hardware/schematic/$$sheet.kicad_sch || exit 1; \
+		done; \
+	else echo "kicad-cli (KiCad 8 or newer) is not installed: its rules check is skipped"; fi
 	$(TOOL) hardware.boxes
 
 flash: ## build the firmware and write it to a board: make flash PORT=/dev/ttyACM0
@@ -168,4 +168,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: elsewhere help setup firmware twin demo real quick test long board suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak calls kill left-behind hardware docs site licences lock audit flash clean
+.PHONY: elsewhere help setup firmware twin demo real quick test long board suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak kill hardware docs site licences lock audit flash clean

@@ -10,9 +10,9 @@ import pytest
 from echostep_studies.frame.recordings import DATA
 
 
-def needs_data(folder: str = "") -> pytest.MarkDecorator:
-    """Skip unless this folder of the recordings is there."""
-    return pytest.mark.skipif(not (DATA / folder).is_dir(), reason=_absent(folder))
+def needs_data(name: str = "") -> pytest.MarkDecorator:
+    """Skip unless this file or folder of the recordings is there."""
+    return pytest.mark.skipif(not (DATA / name).exists(), reason=_absent(name))
 
 
 def data_or_skip(folder: str) -> Path:
@@ -22,5 +22,5 @@ def data_or_skip(folder: str) -> Path:
     return DATA / folder
 
 
-def _absent(folder: str) -> str:
-    return f"skipped: no recordings in {DATA / folder} (../shared/data or $ECHOSTEP_DATA): host/studies/README.md says where they come from"
+def _absent(name: str) -> str:
+    return f"skipped: no recordings in {DATA / name} (../shared/data or $ECHOSTEP_DATA): host/studies/README.md says where they come from"

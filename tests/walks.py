@@ -40,4 +40,4 @@ def truth_of(scenario: Scenario) -> ScoredPath:
 
 def card_of(estimates: Sequence[Estimate], truth: ScoredPath) -> Scorecard:
     """Their scores."""
-    return score(track_of(estimates), truth).card
+    return score(track_of(estimates), truth)

@@ -13,13 +13,14 @@ import pytest
 from echostep.errors import EchostepError
 from echostep.plan import load_plan, parse_plan
 from echostep.recording import open_parts
-from echostep.settings import parse_settings
+from echostep.settings import parse_settings, read_settings
 from echostep.walk.recorded import recorded_start
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.leg_csv import load_legs
 from echostep_app.plan.writer import save_plan
 from echostep_app.recording.recorder import Recorder
 from echostep_app.scorecard.track_columns import load_path
+from echostep_app.scorecard.truth import load_truth
 from echostep_app.session.options import TrackingOptions
 from echostep_app.session.runs.replay import tracker_of
 from walks import DEMO, walk_chunks
@@ -35,6 +36,22 @@ def test_settings_nested_too_deeply_are_one_error(tmp_path: Path) -> None:
             recorder.write(chunk)
     with pytest.raises(EchostepError, match=r"a\.mcap: its values are nested too deeply"):
         tracker_of(open_parts([tmp_path / "a.mcap"]), load_plan(DEMO), TrackingOptions(DEMO))
+
+
+@pytest.mark.parametrize(("left", "why"), [(b"", "an empty file"), (b"\xff\0", "not UTF-8"), (None, "Is a directory")])
+def test_settings_that_a_power_failure_left_are_named(tmp_path: Path, left: bytes | None, why: str) -> None:
+    path = tmp_path / "s.toml"
+    path.mkdir() if left is None else path.write_bytes(left)
+    with pytest.raises(EchostepError, match=rf"s\.toml: .*{why}"):
+        read_settings(path)
+
+
+@pytest.mark.parametrize("left", [b"", b"\0" * 40, b"\xff\0"])
+def test_a_truth_that_a_power_failure_left_is_named(tmp_path: Path, left: bytes) -> None:
+    (tmp_path / "truth.csv").write_bytes(left)
+    with pytest.raises(EchostepError, match=r"truth\.csv") as caught:
+        load_truth(tmp_path / "truth.csv", None)
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("fields", [{"start": "anywhere", "start_room": "[" * 5000}, {"start_x_y_rad": "[" * 5000}])

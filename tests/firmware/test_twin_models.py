@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
-import select
 import shutil
 import subprocess
 import time
@@ -21,6 +21,7 @@ from echostep.board import messages as m
 from echostep.board.frames import BoardReader
 from echostep.errors import EchostepError
 from echostep_simulation.devices.board import BoardProcess
+from twin.run import PtyBoard
 from waiting import PATIENCE_S
 
 pytestmark = needs_twin
@@ -168,39 +169,12 @@ def test_nothing_is_read_through_a_stuck_line() -> None:
         assert {p.outcome for p in found} == {m.Outcome.BUS_ERROR}
 
 
-class PtyTwin:
+class PtyTwin(PtyBoard):
     """The twin with a pseudo terminal, whose time passes by `run`."""
 
-    def __init__(self) -> None:
-        pipe = subprocess.PIPE
-        self.child = subprocess.Popen([str(TWIN), "--pty", "--elf", str(ELF)], stdin=pipe, stdout=pipe, stderr=pipe)
-        self.port = self.next_port()
-
-    def next_port(self) -> str:
-        """The name that the twin prints when the board is plugged in."""
-        assert self.child.stderr is not None
-        ready, _, _ = select.select([self.child.stderr], [], [], PATIENCE_S)
-        assert ready
-        found = re.fullmatch(r"board port: (\S+)\n", self.child.stderr.readline().decode())
-        assert found
-        return found[1]
-
-    def write(self, kind: bytes, body: bytes) -> None:
-        """One record of the bench protocol."""
-        assert self.child.stdin is not None
-        self.child.stdin.write(kind + len(body).to_bytes(4, "little") + body)
-        self.child.stdin.flush()
-
     def run(self, milliseconds: int) -> None:
-        """Let time pass, up to its acknowledgement."""
-        self.write(b"R", quiet_rows(milliseconds).tobytes())
-        assert self.child.stdout is not None
-        while True:
-            head = self.child.stdout.read(5)
-            assert len(head) == 5, "the twin ended"
-            self.child.stdout.read(int.from_bytes(head[1:], "little"))
-            if head[:1] == b"A":
-                return
+        """Let time pass."""
+        self.advance(quiet_rows(milliseconds))
 
     def listen(self, port: serial.Serial) -> list[m.Message]:
         """What a program gets that reads while time passes."""
@@ -225,10 +199,8 @@ def write_for_long(port: serial.Serial) -> None:
 
 @pytest.fixture
 def pty_twin() -> Iterator[PtyTwin]:
-    twin = PtyTwin()
-    yield twin
-    twin.child.kill()
-    twin.child.communicate(timeout=PATIENCE_S)
+    with contextlib.closing(PtyTwin()) as twin:
+        yield twin
 
 
 def test_a_program_opens_closes_and_opens_the_pty(pty_twin: PtyTwin) -> None:
@@ -245,11 +217,11 @@ def test_an_unplugged_pty_goes_away_and_comes_back(pty_twin: PtyTwin) -> None:
     pty_twin.run(300)
     with serial.Serial(pty_twin.port, timeout=0) as port:
         pty_twin.listen(port)
-        pty_twin.write(b"F", b"usb=unplug")
+        pty_twin.fault("usb=unplug")
         pty_twin.run(50)
         with pytest.raises((serial.SerialException, OSError)):
             write_for_long(port)
-    pty_twin.write(b"F", b"usb=plug")
+    pty_twin.fault("usb=plug")
     pty_twin.run(300)
-    with serial.Serial(pty_twin.next_port(), timeout=0) as port:
+    with serial.Serial(pty_twin.port, timeout=0) as port:
         assert sum(isinstance(x, m.Ping) for x in pty_twin.listen(port)) >= 28

@@ -15,8 +15,10 @@ from ezdxf.filemanagement import new
 from board_runs import ROOT
 from command_line import echostep
 from echostep.offline.imu_csv import Imu
+from echostep.plan import load_plan
 from foot.foot_walks import MANNERS, course, samples
 from offline.imu_files import write
+from scorecard.tapped_walks import tapped as record_tapped
 
 
 @cache
@@ -36,6 +38,11 @@ def walk(path: Path) -> None:
 def captured(path: Path) -> None:
     """The first seconds of one."""
     shutil.copyfile(ROOT / "tests/captures/walk.mcap", path)
+
+
+def tapped(path: Path, corridor: Path) -> None:
+    """A walk along the corridor of this plan, whose wearer taps the places."""
+    record_tapped(path, load_plan(corridor))
 
 
 def plan(path: Path) -> None:

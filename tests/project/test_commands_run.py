@@ -18,14 +18,25 @@ import pytest
 
 from board_runs import ROOT
 from command_line import echostep
-from project.brought_files import captured, demo_folder, drawing, foot, foreign, legs, plan, pressure, true_path, walk
+from project.brought_files import (
+    captured,
+    demo_folder,
+    drawing,
+    foot,
+    foreign,
+    legs,
+    plan,
+    pressure,
+    tapped,
+    true_path,
+    walk,
+)
 from project.test_docs import NOTEBOOK, PAGES, blocks, name_of
 
 LEFT_OUT = {  # beginnings of commands, and why they are not run here
     "live": "ports",
     "doctor": "a board",
     "bench-report": "a board",
-    "acceptance": "a board, half an hour",
     "calibrate": "a board, or the walks of a wearer (tests/app/commissioning)",
     "demo --guide": "a browser",
     r"demo$": "a browser",
@@ -71,8 +82,11 @@ def bring(folder: Path, line: str, words: list[str]) -> None:
     if words[0] == "live":
         out = folder / (words[words.index("--out") + 1] if "--out" in words else "out/live")
         out.mkdir(parents=True, exist_ok=True)
-        for name in ("walk.mcap", "walk-0001-20261122T091500Z.mcap"):
-            captured(out / name)
+        if out.name == "corridor":
+            tapped(out / "walk.mcap", folder / "plan.json")
+        else:
+            for name in ("walk.mcap", "walk-0001-20261122T091500Z.mcap"):
+                captured(out / name)
     if words[0] == "demo" and "--out" in words:  # run once for all pages
         shutil.copytree(demo_folder(), folder / words[words.index("--out") + 1])
     outputs = {words[k + 1] for k, word in enumerate(words[:-1]) if word in ("-o", "--out", "--picture")}

@@ -34,7 +34,6 @@ PROJECTS = {ring: tomllib.loads((ROOT / f"host/{ring}/pyproject.toml").read_text
 REQUIRED = {ring: project["dependencies"] for ring, project in PROJECTS.items()}
 OPTIONAL = PROJECTS["app"]["optional-dependencies"]
 FOR_DEVELOPERS = {"dev", "bench", "cluster"}
-BROUGHT = {"pubsub"}  # by meshtastic
 OWNERS = packages_distributions()
 CAPTURES = ROOT / "tests/captures"
 
@@ -69,9 +68,9 @@ def test_the_table_is_that_of_pyproject() -> None:
     assert not imports([*REQUIRED["core"], *REQUIRED["app"]]) & set(EXTRAS)
 
 
-def test_all_is_every_extra_but_the_gpl_and_the_studies() -> None:
+def test_all_is_every_extra_but_the_studies() -> None:
     (everything,) = map(Requirement, OPTIONAL["all"])
-    assert everything.extras == set(OPTIONAL) - FOR_DEVELOPERS - {"all", "mesh"}
+    assert everything.extras == set(OPTIONAL) - FOR_DEVELOPERS - {"all"}
 
 
 def test_each_extra_of_the_app_is_one_of_the_core_under_its_name() -> None:
@@ -95,7 +94,7 @@ def test_every_import_is_required_or_has_an_extra() -> None:
         found = {
             package: path for folder in RINGS[ring] for path in folder.rglob("*.py") for package in third_party(path)
         }
-        assert {name: path for name, path in found.items() if name not in required | set(EXTRAS) | BROUGHT} == {}
+        assert {name: path for name, path in found.items() if name not in required | set(EXTRAS)} == {}
         assert imports(REQUIRED[ring]) <= set(found) | {"echostep"}, "required, but nothing imports it"
 
 
@@ -192,7 +191,6 @@ WALK = CAPTURES / "walk.mcap"
     ("starlette", ("plan", "edit", DEMO)),
     ("paho", ("live", "--board", "x", "--no-page", "--publish", "mqtt://h", "--name", "a")),
     ("paho", ("command", "mqtts://h", *PLAN, "--no-page")),
-    ("meshtastic", ("command", "mesh:///dev/x", *PLAN, "--no-page")),
     ("pyproj", ("live", "--board", "x", "--no-page", "--publish", "cot+udp://h", "--name", "a")),
     ("pyproj", ("export", WALK, *PLAN, "-o", "x.kml")),
     ("pyarrow", ("export", WALK, *PLAN, "-o", "x.parquet")),
@@ -202,7 +200,6 @@ WALK = CAPTURES / "walk.mcap"
     ("matplotlib", ("plan", "show", DEMO, "-o", "x.png")),
     ("matplotlib", ("plan", "check", DEMO, "--picture", "x.png")),
     ("matplotlib", ("plan", "overlay", DEMO, "-o", "x.kmz")),
-    ("matplotlib", ("score", "x.csv", "--truth", "x.csv", "--html", "x.html")),
     ("matplotlib", ("foot", "x.csv", "--picture", "x.pdf")),
     ("matplotlib", ("legs", "x.csv", "--thigh", "0.4", "--shank", "0.4", "--picture", "x.pdf")),
 ])  # fmt: skip

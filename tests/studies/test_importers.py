@@ -12,7 +12,8 @@ from command_line import echostep
 from echostep.errors import EchostepError
 from echostep_studies.importers.study import buildings_in, importers_study
 from plan.drawings.drawn_houses import Gap, loose, outlines, write_house
-from plan.imported_plans import write_seven_floors
+from plan.test_plan_importer_imdf import files
+from plan.test_plan_importer_imdf import folder as write_venue
 
 
 @pytest.fixture
@@ -25,13 +26,13 @@ def folder(tmp_path: Path) -> Path:
     (drawings / "notes.txt").write_text("x")
     wrong = (drawings / "house.dxf").read_text().replace("$INSUNITS\n 70\n6\n", "$INSUNITS\n 70\n4\n")
     (drawings / "wrong.dxf").write_text(wrong)
-    write_seven_floors(tmp_path / "seven")
+    write_venue(tmp_path / "venue", files(levels=3))
     return tmp_path
 
 
 def test_buildings_are_files_and_folders(folder: Path) -> None:
     names = [str(path.relative_to(folder)) for path in buildings_in(folder)]
-    assert names == ["drawings/house.dxf", "drawings/plan.dwg", "drawings/wrong.dxf", "seven"]
+    assert names == ["drawings/house.dxf", "drawings/plan.dwg", "drawings/wrong.dxf", "venue"]
 
 
 @pytest.mark.process
@@ -50,8 +51,8 @@ def test_the_command(folder: Path) -> None:
     assert rows["drawings/wrong.dxf"]["outcome"] == "refused"
     assert "is it in metres? give --units m" in rows["drawings/wrong.dxf"]["says"]
     assert "save it as DXF" in rows["drawings/plan.dwg"]["says"]
-    seven = rows["seven"]
-    assert (seven["levels"], seven["rooms"], seven["enclosed"]) == (7, 35, 1.0)
+    venue = rows["venue"]
+    assert (venue["levels"], venue["rooms"], venue["enclosed"]) == (3, 3, 1.0)
     assert "2 refused" in done.stdout
     assert "in a gap of a wall" in done.stdout
 

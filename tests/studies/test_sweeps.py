@@ -83,6 +83,6 @@ def test_simulated_shares_go_with_the_angle_like_the_real_ones(monkeypatch: pyte
 def test_a_sweep_tells_its_place() -> None:
     table, model = grid_table(ROOM), echo_model(LIMITS_KNOWN)
     sweep = simulated_sweeps(1).sweeps[0]
-    assert place(sweep, table, 0.0, 0.0, model).known
+    assert place(sweep, table, model).known
     deaf = Sweep(sweep.x_m, sweep.y_m, sweep.heading_rad, sweep.bearing_rad, np.full(len(sweep.range_m), math.nan))
-    assert not place(deaf, table, 0.0, 0.0, model).all
+    assert not place(deaf, table, model).all

@@ -14,7 +14,8 @@ from echostep.errors import EchostepError
 from reliability.fuzz import host as fuzz_host
 from reliability.fuzz.targets import TARGETS
 
-SLOW = {"dxf": 2, "ifc": 3, "osm": 3, "wrld": 5, "wrld-floor": 2}  # inputs, where one takes tens of milliseconds
+# Inputs, where one takes tens of milliseconds, or some microseconds
+COUNTS = {"dxf": 2, "ifc": 3, "osm": 3, "imdf": 5, "mtdata": 1000, "mtdata2": 1000, "packets": 1000}
 
 
 @pytest.fixture(autouse=True)
@@ -27,9 +28,10 @@ def limited() -> Iterator[None]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(TARGETS))
 def test_mutated_inputs_are_no_fault(name: str) -> None:
-    count, data, text = fuzz_host.run_shard(name, 0, 60.0, SLOW.get(name, 20))
+    most = COUNTS.get(name, 20)
+    count, data, text = fuzz_host.run_shard(name, 0, 60.0, most)
     assert text == "", data.hex()
-    assert count == SLOW.get(name, 20)
+    assert count == most
 
 
 def test_inputs_that_once_were_faults_are_none() -> None:

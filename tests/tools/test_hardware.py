@@ -15,7 +15,6 @@ from board_runs import ROOT, needs_twin
 from command_line import echostep
 from docs.pages import hardware
 from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC
-from hardware.drawing import lanes
 from hardware.nets import HIGH_MIN_V, PULL_UP_OHM, idle_v, problems
 from hardware.wiring import Device, WiredBoard, boards, pins
 from players import twin_board
@@ -147,11 +146,6 @@ def test_each_role_has_a_part_with_an_order_number(kit: str) -> None:
     boards_of = {"papers": ["papers"], "2026": ["2026", "foot"]}[kit]
     processors = [row["count"][kit] for row in rows if row["role"].startswith("processor board")]
     assert sum(processors) == len(boards_of)
-
-
-def test_wires_of_one_lane_do_not_touch() -> None:
-    ends = {"a": [0.0, 100.0], "b": [50.0, 200.0], "c": [110.0, 300.0], "d": [130.0, 180.0]}
-    assert lanes(ends) == {"a": 0, "b": 1, "c": 2, "d": 0}
 
 
 @pytest.mark.parametrize("name", ["papers", "2026", "foot"])

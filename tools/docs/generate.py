@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The pages that are made from the code and from tables, written or compared (`make docs`, `make check`).
 
-In: the installed package, firmware/hardware. Out: host/docs/*.md, report.schema.json, tables of firmware/README.md, wiring
-drawings, schematics.
+In: the installed package, firmware/hardware. Out: host/docs/*.md, report.schema.json, tables of firmware/README.md.
 `--check` writes nothing and exits 1 when one is stale. Owns nothing.
 """
 
@@ -27,7 +26,7 @@ def pages() -> dict[Path, str]:
         "python": python,
     }
     texts = {DOCS / f"{name}.md": module.page() for name, module in made.items()} | {teams.SCHEMA: schema()}
-    return texts | {hardware.README: hardware.page()} | hardware.drawings() | hardware.schematics()
+    return texts | {hardware.README: hardware.page()}
 
 
 def main() -> int:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Documents for building the boards, made from two tables: parts.toml and wiring.toml in firmware/hardware.
+"""Checks of the documents for building the boards in firmware/hardware.
 
-In: these tables. Out: nets that are checked, wiring drawings, KiCad schematics, tables for the README; boxes checked and drawn. Owns nothing.
+In: parts.toml, wiring.toml, schematics, boxes. Out: problems in words. Owns nothing.
 """
 
 from places import ROOT

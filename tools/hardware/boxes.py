@@ -1,77 +1,89 @@
 # SPDX-License-Identifier: MIT
-"""The printed boxes (`make hardware`): each part from its OpenSCAD source to STL, checked to be a closed surface, and drawn for the README.
+"""The printed boxes (`make hardware`): each part rendered from its OpenSCAD source to STL, and checked to be a closed surface.
 
-In: firmware/hardware/boxes/*.scad; the program openscad. Out: NAME-PART.stl and NAME.png beside the source; what was found on
-standard output, exit status 1 when a surface is not closed. Each file states the sources that it was made from. Owns nothing.
+In: firmware/hardware/boxes/*.scad; the program openscad. Out: NAME-PART.stl beside the source; sizes on standard output, exit status 1 when a
+surface is not closed. Owns nothing.
 """
 
 from __future__ import annotations
 
 import argparse
-import hashlib
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
-from PIL.PngImagePlugin import PngInfo
+from numpy.typing import NDArray
 
-from hardware import HARDWARE, solids
-from hardware.solids import Triangles, faults, picture, read_stl, volume, write_stl
-from places import OUT
+from hardware import HARDWARE
 
 BOXES = HARDWARE / "boxes"
 NAMES = ("belt_box", "ranger_holder", "imu_clip", "ankle_box")
 PARTS = ("box", "lid")
-STL = OUT / "hardware"
-HEADER = "echostep, made from "  # of a binary STL file; `solid` would mark one as text
-WIDTH = 420  # of a part's picture, pixels
+Triangles = NDArray[np.float64]
 
 
-def sources(name: str) -> str:
-    """A fingerprint of all that a picture is made from."""
-    files = (BOXES / "common.scad", BOXES / f"{name}.scad", Path(solids.__file__))
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
-
-
-def compiled(name: str, part: str, out: Path) -> Triangles:
-    """A part by OpenSCAD, by way of a text file in `out`."""
-    out.mkdir(parents=True, exist_ok=True)
-    path = out / f"{name}-{part}.stl"
-    command = ["openscad", "-q", "-D", f'part="{part}"', "-o", str(path), str(BOXES / f"{name}.scad")]
+def render(name: str, part: str, folder: Path) -> Triangles:
+    """Render a part to NAME-PART.stl in a folder by OpenSCAD, and read it."""
+    path = folder / f"{name}-{part}.stl"
+    command = [
+        "openscad",
+        "-q",
+        "--export-format",
+        "binstl",
+        "-D",
+        f'part="{part}"',
+        "-o",
+        path,
+        BOXES / f"{name}.scad",
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode or done.stderr:
         raise SystemExit(f"{name}, {part}: {done.stderr}")
     return read_stl(path)
 
 
-def draw(name: str, parts: list[Triangles]) -> None:
-    """The parts of a box side by side, as the picture beside its source."""
-    drawn = [picture(triangles, WIDTH) for triangles in parts]
-    height = max(len(one) for one in drawn)
-    padded = [np.pad(one, ((0, height - len(one)), (0, 0), (0, 0)), constant_values=255) for one in drawn]
-    made_from = PngInfo()
-    made_from.add_text("Source", sources(name))
-    Image.fromarray(np.concatenate(padded, axis=1)).quantize(64).save(
-        BOXES / f"{name}.png", pnginfo=made_from, optimize=True
+def read_stl(path: Path) -> Triangles:
+    """Corners (n, 3, 3) of the triangles of a binary STL file, mm: 80 bytes, a count, and 50 bytes a facet [3D Systems, 1989]."""
+    facets = np.frombuffer(path.read_bytes()[84:], np.uint8).reshape(-1, 50)
+    return facets[:, 12:48].copy().view("<f4").reshape(-1, 3, 3).astype(float)
+
+
+def is_closed(triangles: Triangles) -> bool:
+    """Whether the surface encloses a volume: each edge is passed once in each direction."""
+    _, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    edges = Counter(
+        (int(a), int(b)) for face in corners.reshape(-1, 3) for a, b in zip(face, np.roll(face, -1), strict=True)
     )
+    whole = all(count == 1 and a != b and (b, a) in edges for (a, b), count in edges.items())
+    return whole and volume(triangles) > 0.0
+
+
+def volume(triangles: Triangles) -> float:
+    """Enclosed volume, mm3, by the divergence theorem."""
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def size(triangles: Triangles) -> NDArray[np.float64]:
+    """Lengths (3,) of the box around a part, mm."""
+    lengths: NDArray[np.float64] = np.ptp(triangles.reshape(-1, 3), axis=0)
+    return lengths
 
 
 def main() -> int:
-    """Make, check and draw all boxes."""
+    """Render and check all boxes."""
     argparse.ArgumentParser(description=__doc__.partition("\n")[0]).parse_args()
     sound = True
     for name in NAMES:
-        parts = [compiled(name, part, STL) for part in PARTS]
-        for part, triangles in zip(PARTS, parts, strict=True):
-            write_stl(BOXES / f"{name}-{part}.stl", triangles, f"{HEADER}{sources(name)}")
-            size = np.ptp(triangles.reshape(-1, 3), axis=0)
-            found = faults(triangles)
-            sound &= not found
-            print(f"{name} {part}: {size[0]:.1f} x {size[1]:.1f} x {size[2]:.1f} mm, {volume(triangles) / 1000:.1f} cm3, "
-                  f"{'; '.join(found) or 'closed'}")  # fmt: skip
-        draw(name, parts)
+        for part in PARTS:
+            triangles = render(name, part, BOXES)
+            x, y, z = size(triangles)
+            closed = is_closed(triangles)
+            sound &= closed
+            words = "closed" if closed else "not closed"
+            print(f"{name} {part}: {x:.1f} x {y:.1f} x {z:.1f} mm, {volume(triangles) / 1000:.1f} cm3, {words}")
     return 0 if sound else 1
 
 

@@ -13,6 +13,7 @@ import math
 import sys
 from collections.abc import Iterator
 
+from hardware import schematic
 from hardware.wiring import POWER, Device, WiredBoard, boards
 
 DRIVERS = ("out", "tri")
@@ -117,6 +118,7 @@ def _level(device: Device, kind: str) -> float:
 def main() -> int:
     argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0]).parse_args()
     found = [text for board in boards() for text in problems(board)]
+    found += [text for board in boards() for text in schematic.problems(board, schematic.file_of(board).read_text())]
     print(
         "\n".join(found)
         or f"wiring: {sum(len(_nets(board)) for board in boards())} nets, each with one driver at a time"

@@ -47,16 +47,11 @@ class Device:
     name: str
     symbol: Symbol
     note: str
-    side: str
     pins: dict[str, str]
 
     def wires(self) -> dict[str, str]:
         """Nets of the pins that are neither supply nor ground."""
         return {pin: net for pin, net in self.pins.items() if net not in POWER}
-
-    def tied(self) -> dict[str, str]:
-        """Nets of the pins that are tied to supply or ground."""
-        return {pin: net for pin, net in self.pins.items() if net in POWER}
 
 
 @dataclass(frozen=True, slots=True)

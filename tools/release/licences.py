@@ -71,7 +71,7 @@ def main() -> int:
     """Print the table; the dependencies of `pip install echostep` first."""
     parser = argparse.ArgumentParser(description="licences of all dependencies, as a Markdown table")
     parser.parse_args()
-    runtime, optional, everything = needed("echostep-app"), needed("echostep-app", ("all", "mesh")), for_developers()
+    runtime, optional, everything = needed("echostep-app"), needed("echostep-app", ("all",)), for_developers()
     print("| package | version | licence | needed |\n|---|---|---|---|")
     for name, package in sorted(everything.items(), key=lambda item: (item[0] not in runtime, item[0])):
         use = "to run" if name in runtime else "by an extra" if name in optional else "to develop, or by the studies"

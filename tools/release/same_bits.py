@@ -2,9 +2,8 @@
 """Digests of everything that a refactoring must not change, to be compared between two checkouts.
 
 In: the recordings' folder ($ECHOSTEP_DATA or ../shared/data), the twin when it is built. Out: one line `name sha256` per result on stdout:
-estimates of the demo (seeds 1-3, real firmware in the twin) and of `make real`, decodes of the captures, the foot's track of each public
-recording, and
-the rows of the first runs of every study. Owns nothing. Digests depend on the machine's floating point: compare runs of one machine only.
+estimates of the demo (seeds 1-3, real firmware in the twin) and of `make real`, decodes of the captures, and the rows of the first runs of
+every study. Owns nothing. Digests depend on the machine's floating point: compare runs of one machine only.
 """
 
 from __future__ import annotations
@@ -74,25 +73,6 @@ def captures() -> Iterator[tuple[str, str]]:
         yield f"decode/{path.name}", sha256(echostep("decode", path))
 
 
-FOOT = """
-import hashlib, sys
-from pathlib import Path
-from echostep.foot.steps import walk_track
-from echostep_studies.bench.recordings.feet import SETS
-from echostep_studies.frame.recordings import read_sets
-for r in read_sets(Path(sys.argv[1]), SETS)[0]:
-    track = walk_track(r.t_s, r.accel, r.gyro, mag=r.mag)
-    print(r.group, r.name, hashlib.sha256(track.position_m.tobytes()).hexdigest(), sep="\\t")
-"""
-
-
-def foot() -> Iterator[tuple[str, str]]:
-    """Positions of the foot on each public recording."""
-    for line in run(sys.executable, "-c", FOOT, DATA).splitlines():
-        group, name, digest = line.split("\t")
-        yield f"foot/{group}/{name.replace(' ', '_')}", digest
-
-
 def studies(out: Path, runs: int, chosen: list[str] | None) -> Iterator[tuple[str, str]]:
     """Rows of the first runs of every study, or of the chosen ones, without measured times."""
     for study in chosen or STUDIES:
@@ -116,7 +96,7 @@ def studies(out: Path, runs: int, chosen: list[str] | None) -> Iterator[tuple[st
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--runs", type=int, default=5, help="runs of each study")
-    parser.add_argument("--only", choices=("demo", "real", "captures", "foot", "studies"), action="append")
+    parser.add_argument("--only", choices=("demo", "real", "captures", "studies"), action="append")
     parser.add_argument("--study", choices=STUDIES, action="append", help="only this study")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
@@ -125,7 +105,6 @@ def main() -> int:
             "captures": captures(),
             "demo": demo(out),
             "real": real(out),
-            "foot": foot(),
             "studies": studies(out, options.runs, options.study),
         }
         for name, rows in parts.items():

@@ -8,7 +8,7 @@ too. Faults that the file has already are not run again. Owns the list of the tw
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -131,12 +131,10 @@ def walk_s(t_arrival_ns: int) -> float:
     return (t_arrival_ns - START_NS) * 1e-9
 
 
-def run(fault: TwinFault, board: Board | None = None, always: Iterable[str] = ()) -> FaultOutcome:
-    """One walk with this fault, as fast as it can be computed; with the real firmware unless another board is given. `always`: more switches."""
+def run(fault: TwinFault, board: Board | None = None) -> FaultOutcome:
+    """One walk with this fault, as fast as it can be computed; with the real firmware unless another board is given."""
     plan = load_plan(PLAN)
     board = board or BoardProcess([*TWIN, "--seed", str(SEED)])
-    for switch in always:
-        board.fault(switch)
     scenario = demo_scenario(plan, SEED, board)
     tracker, reader = Tracker(plan, scenario.start, seed=SEED), BoardReader()
     times_s: dict[str, list[float]] = {name: [] for name in NORMAL_S}
@@ -154,10 +152,10 @@ def run(fault: TwinFault, board: Board | None = None, always: Iterable[str] = ()
     return outcome
 
 
-def matrix(folder: Path, always: Iterable[str] = ()) -> Mapping[str, Callable[[], FaultOutcome]]:
-    """Each fault by name, and the function that runs it; live runs keep their files in `folder`. With switches `always` those of the board alone."""
-    simulated = {fault.name: partial(run, fault, always=always) for fault in FAULTS}
-    return simulated | {fault.title: partial(run_live, fault, folder) for fault in HOST_FAULTS if not always}
+def matrix(folder: Path) -> Mapping[str, Callable[[], FaultOutcome]]:
+    """Each fault by name, and the function that runs it; live runs keep their files in `folder`."""
+    simulated = {fault.name: partial(run, fault) for fault in FAULTS}
+    return simulated | {fault.title: partial(run_live, fault, folder) for fault in HOST_FAULTS}
 
 
 def run_live(fault: HostFault, folder: Path) -> FaultOutcome:
@@ -175,10 +173,9 @@ def main() -> int:
     asked = options(
         __doc__,
         out=(OUT / "faults.jsonl", "outcomes so far; they are not run again"),
-        always=("", "switches of the board in every walk, as kit=2026 or srf_cycle=70000; no faults of the host then"),
         page=(False, "write the table into host/docs/faults.md"),
     )
-    runs = matrix(asked.out.with_suffix(""), asked.always.split())
+    runs = matrix(asked.out.with_suffix(""))
     rows = CampaignJournal(asked.out).play("faults", runs, lambda row: table([FaultOutcome(**row)]).splitlines()[-1])
     done = [FaultOutcome(**row) for row in rows]
     if asked.page:

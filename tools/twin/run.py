@@ -13,30 +13,29 @@ import argparse
 import contextlib
 import itertools
 import os
-import re
 import signal
-import subprocess
 import sys
 import threading
 import time
 import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from echostep.errors import EchostepError
 from echostep.plan import load_plan
 from echostep.xsens import MtxReader
 from echostep.xsens.reader import warm_up
 from echostep_app.commands.actions.beacon_player import simulate_gateway
 from echostep_simulation.devices.beacon_gateway import SPACING_M
-from echostep_simulation.devices.board import Sent
+from echostep_simulation.devices.board import BoardProcess, Sent
 from echostep_simulation.devices.foot_board import FootBoardPort
 from echostep_simulation.kits import Kit
 from echostep_simulation.scenario import DEMO_WAYPOINTS, Scenario, demo_scenario
-from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
+from echostep_simulation.stimulus import NO_SYNC, ROW
 from echostep_studies.simulation.devices.mtx_setup import MtxDevice
 from echostep_studies.simulation.devices.rehearsal import Act, LyingParts, Rehearsal
 from places import OUT, PLAN, TWIN
@@ -48,63 +47,35 @@ LATE_S = 0.5  # a delay behind real time that is reported
 CALIBRATION = "out/twin/calibration.toml"
 
 
-class PtyBoard:
+class PtyBoard(BoardProcess):
     """The twin with its port on a pseudo terminal: rows in, the firmware's bytes to the program that has the port open."""
 
     def __init__(self, seed: int = 1) -> None:
         """`seed`: which of all boards it is."""
-        pipe = subprocess.PIPE
-        self._child = subprocess.Popen([*TWIN, "--pty", "--seed", str(seed)], stdin=pipe, stdout=pipe, stderr=pipe)
-        assert self._child.stdin
-        assert self._child.stdout
-        assert self._child.stderr
-        self._in: IO[bytes] = self._child.stdin
-        self._out: IO[bytes] = self._child.stdout
-        self._log: IO[bytes] = self._child.stderr
-        self.port = self._told_port()
-        self.is_open = False
+        super().__init__([*TWIN, "--pty", "--seed", str(seed)])
+        self.port, self.is_open = "", False
         self.t_s = 0.0  # board time
-
-    def _told_port(self) -> str:
-        """The name of the pseudo terminal, which the twin prints when it makes one."""
-        if match := re.match(rb"board port: (\S+)", self._log.readline()):
-            return match[1].decode()
-        raise SystemExit("the twin made no port")
+        self.advance(np.zeros(0, ROW))
 
     def advance(self, rows: NDArray[Any]) -> Sent:
         """Run the firmware for one millisecond per row. The list is empty: the bytes go to the terminal."""
-        body = rows.tobytes()
-        kind = b"E" if rows.dtype == EXTENDED_ROW else b"R"
-        self._in.write(kind + len(body).to_bytes(4, "little") + body)
-        self._in.flush()
-        while True:
-            head = self._out.read(5)
-            if len(head) < 5:
-                raise SystemExit("the twin ended")
-            record = self._out.read(int.from_bytes(head[1:], "little"))
-            if head[:1] == b"T" and record[8:].startswith(b"port "):
-                self.is_open = record[8:] == b"port opened"
-            if head[:1] == b"A":
-                self.t_s = int.from_bytes(record, "little") * 1e-9
-                return []
+        super().advance(rows)
+        self.t_s = round(self.t_s + 1e-3 * len(rows), 3)
+        for _, text in self.trace:
+            if text.startswith("board port "):
+                self.port = text.removeprefix("board port ")
+            elif text.startswith("port "):
+                self.is_open = text == "port opened"
+        self.trace.clear()
+        return []
 
     def send(self, sent: bytes) -> None:
         """Does nothing: the host writes to the port itself."""
 
     def fault(self, text: str) -> None:
         """Set a fault switch, `name=value`; after `usb=plug` the port has another name."""
-        self._in.write(b"F" + len(text).to_bytes(4, "little") + text.encode())
-        self._in.flush()
-        if text == "usb=plug":
-            self.port = self._told_port()
-
-    def close(self) -> None:
-        """Stop the twin."""
-        self._child.kill()
-        self._child.wait()
-        for pipe in (self._in, self._out, self._log):
-            with contextlib.suppress(OSError):
-                pipe.close()
+        super().fault(text)
+        self.advance(np.zeros(0, ROW))
 
 
 class Gateway:
@@ -222,11 +193,11 @@ def playing(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> Iterator[float]
         yield now_s
 
 
-def announce(command: str, hint: str = "", **ports: str) -> None:
-    """Print the ports, and what to start, and then to do, in another terminal."""
+def announce(command: str, **ports: str) -> None:
+    """Print the ports, and what to start in another terminal."""
     for name, port in ports.items():
         print(f"{name:5} {port}")
-    print(f"\nIn another terminal:\n  .venv/bin/echostep {command}\n\n{hint}Ctrl-C ends.", flush=True)
+    print(f"\nIn another terminal:\n  .venv/bin/echostep {command}\n\nCtrl-C ends.", flush=True)
 
 
 def walk_with_mtx(options: argparse.Namespace) -> None:
@@ -318,8 +289,11 @@ def until_interrupted(work: Callable[[], None]) -> int:
     """Work until its end, Ctrl-C or SIGTERM."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
-    with contextlib.suppress(KeyboardInterrupt):
-        work()
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            work()
+    except EchostepError as error:
+        raise SystemExit(str(error)) from error
     return 0
 
 

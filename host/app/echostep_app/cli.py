@@ -17,7 +17,7 @@ import typer
 
 from echostep.errors import EchostepError, IncompleteError, former_use, words_of
 from echostep.file_mode import share_files
-from echostep_app.commands import acceptance, beacons, commander, files, hardware, plan, recordings, runs
+from echostep_app.commands import beacons, commander, files, hardware, plan, recordings, runs
 from echostep_app.commands.studies import add_studies
 from echostep_app.extras import EXTRAS, lacks
 from echostep_app.interruption import end_by_signals, is_asked
@@ -34,7 +34,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     help="Indoor pedestrian tracking.",
 )
-for nameless in (runs, files, commander, hardware, acceptance, recordings):
+for nameless in (runs, files, commander, hardware, recordings):
     app.add_typer(nameless.app)
 add_studies(app)
 for name, group in {"beacons": beacons, "plan": plan}.items():

@@ -24,12 +24,11 @@ EXTRAS = dict.fromkeys((*PAGE, "segno"), "page") | {
     "pandas": "pandas",
     "ifcopenshell": "ifc",
     "foxglove": "foxglove",
-    "meshtastic": "mesh",
 }
 
 
 def lacks(what: str, *packages: str) -> str:
-    """What is missing for it, and which command installs it; empty when nothing is."""
+    """The missing package, and the command that installs it; empty when nothing is."""
     for package in packages:
         if find_spec(package) is None:
             return f"{what} needs {package}, which is not installed: pip install 'echostep[{EXTRAS[package]}]'"

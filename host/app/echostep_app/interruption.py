@@ -39,7 +39,7 @@ def end_by_signals() -> None:
 
 @contextmanager
 def holding_signals() -> Iterator[None]:
-    """Hold the first signal back: `is_asked` tells of it."""
+    """Hold the first signal back: `is_asked` is then true."""
     _holding.set()
     try:
         yield

@@ -2,7 +2,7 @@
 """The kernels of a run, compiled before its first bytes come: once on a computer, in as many processes as there are cores.
 
 In: parts, each a function that calls its kernels once (`echostep.tracker.kernels`). Out: kernels in the cache (`kernel_cache`), from which every
-process loads them. Owns the processes, and a mark beside the kernels of each part that is compiled.
+process loads them. Owns the processes, and a mark in the folder of the kernels for each compiled part.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ LATER = (SEARCH, BEACONS)  # what a walk from a known start may come to need
 
 
 def compile_parts(parts: Sequence[Part], show: Show = lambda _share: None) -> None:
-    """Compile those of the parts that are not compiled yet, in a process for each core. What fails is left to the run: it compiles what it misses."""
+    """Compile the parts that are not in the cache, in a process for each core. A part that fails is compiled by the run when it is first called."""
     shares = _shared_out([part for part in parts if not part.is_compiled], os.cpu_count() or 1)
     count, total = itertools.count(1), sum(part.kernels for share in shares for part in share)
     children: list[subprocess.Popen[bytes]] = []

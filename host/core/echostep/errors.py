@@ -8,6 +8,7 @@ instead.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 PACKED = {  # by the first bytes [file(1)]
     b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ": "xz", b"PK\x03\x04": "zip", b"(\xb5/\xfd": "zstd", b"7z\xbc\xaf": "7z",
@@ -37,8 +38,20 @@ def replaced(begin: bytes) -> str:
     return f"packed by {packed}: unpack it first" if packed else ""
 
 
-# A command (`acceptance`), its option (`map --plan`), a setting (`[ranger] learn`), the begin of an address in any command (`mesh://`)
-INSTEAD: dict[str, str] = {}
+LEARNT_BIAS = "the range bias that both rangers have in common is learnt while tracking"
+# A command (`acceptance`), its option (`map --plan`), a setting (`[ranger] learn`), the begin of an address in any command (`mesh://`),
+# an option with such a value (`--plan wearer:`)
+INSTEAD: dict[str, str] = {
+    "acceptance": "live records a walk with the places that are tapped on its page, and score WALK.mcap --taps compares it with them",
+    "calibrate --mtx": LEARNT_BIAS,
+    "calibrate --plan": LEARNT_BIAS,
+    "calibrate rangers": LEARNT_BIAS,
+    "[ranger] learn": LEARNT_BIAS,
+    "map --plan": "a walk is drawn by itself; echostep plan edit mends a plan",
+    "--plan wearer:": "echostep map WALK.mcap -o plan.json draws that wearer's recording, and --plan plan.json takes it",
+    "mesh://": "reports go by IP to the team's broker (mqtt://HOST); what a Meshtastic radio's own uplink brings there: docs/teams.md, Off grid",
+    "score --html": "score prints the numbers, and evo draws the track that export writes as .tum",
+}
 
 
 def has_left(use: str) -> str:
@@ -54,6 +67,9 @@ def former_use(words: Sequence[str]) -> str:
 
 def _is_used(use: str, words: list[str]) -> bool:
     *command, last = use.split()
+    if command and command[0].startswith("-"):
+        given = [*pairwise(words), *(word.partition("=")[::2] for word in words)]
+        return any(option == command[0] and value.startswith(last) for option, value in given)
     if words[: len(command)] != command:
         return False
     rest = words[len(command) :]

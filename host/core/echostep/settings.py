@@ -15,7 +15,7 @@ from typing import Any
 
 from echostep.aiding import BeaconSettings
 from echostep.board.calibration import GyroSettings, Imus, ImuSettings, RangerSettings
-from echostep.errors import EchostepError
+from echostep.errors import EchostepError, has_left
 from echostep.fields import checked, short
 from echostep.foot.steps import FootSettings
 from echostep.foot.trunk_path import GaitSettings
@@ -106,30 +106,36 @@ def read_settings(path: Path | str) -> str:
     raise EchostepError(f"{path}: an empty file, as a power failure leaves one: calibrate again, or give no settings")
 
 
-def parse_settings(text: str, origin: str) -> Settings:
-    """Settings from TOML text; raises EchostepError that names the origin, the section and the field."""
+def parse_settings(text: str, origin: str, *, recorded: bool = False) -> Settings:
+    """Settings from TOML text; raises EchostepError that names the origin, the section and the field.
+
+    `recorded`: the text is a recording's, which may carry settings that have left.
+    """
     try:
-        return _settings_of(tomllib.loads(text))
+        return _settings_of(tomllib.loads(text), recorded=recorded)
     except ValueError as error:
         raise EchostepError(f"{origin}: {error}") from error
     except RecursionError as error:
         raise EchostepError(f"{origin}: its values are nested too deeply: settings are sections of numbers") from error
 
 
-def _settings_of(tree: dict[str, Any]) -> Settings:
+def _settings_of(tree: dict[str, Any], *, recorded: bool) -> Settings:
     """Settings from a parsed TOML tree; raises ValueError that names the section and the field."""
     defaults = {f.name: getattr(Settings(), f.name) for f in dataclasses.fields(Settings)}
     if unknown := tree.keys() - defaults.keys():
         raise ValueError(f"[{min(unknown)}] is no section; there are {', '.join(defaults)}")
-    return Settings(**{name: _section(name, rows, defaults[name]) for name, rows in tree.items()})
+    return Settings(**{name: _section(name, rows, defaults[name], recorded=recorded) for name, rows in tree.items()})
 
 
-def _section(name: str, rows: Any, default: Any) -> Any:
+def _section(name: str, rows: Any, default: Any, *, recorded: bool) -> Any:
     """A copy of the section's defaults with the fields of `rows`; raises ValueError that names the field."""
     if not isinstance(rows, dict):
         raise ValueError(f"{name}: expected a section, [{name}]")
     known = dataclasses.asdict(default)
-    rows = {RENAMED.get((name, key), key): value for key, value in rows.items()}
+    former = {key: words for key in rows if (words := has_left(f"[{name}] {key}"))}
+    if former and not recorded:
+        raise ValueError(next(iter(former.values())))
+    rows = {RENAMED.get((name, key), key): value for key, value in rows.items() if key not in former}
     for key, value in rows.items():
         if key not in known:
             raise ValueError(f"[{name}] {key}: unknown; there are {', '.join(known)}")

@@ -263,7 +263,7 @@ STUDIES = (
         REAL,
         "Drawings, models and maps of a folder, imported without options: time, sizes, counts, doors in gaps, enclosed rooms.",
         "minutes",
-        (_data("Folder of DXF, IFC, IMDF, OpenStreetMap, ROS or WRLD files, searched with its folders.", Parameter.empty), JSON),
+        (_data("Folder of DXF, IFC, IMDF, OpenStreetMap or ROS files, searched with its folders.", Parameter.empty), JSON),
         lambda _request, given: _of("importers.study").importers_study(given["data"]),
     ),
     StudyCommand(

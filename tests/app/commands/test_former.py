@@ -1,13 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""What has left is answered with one sentence that names what serves instead."""
+"""A use of what has left ends with one sentence that names what serves instead; a recording replays without it."""
 
 from __future__ import annotations
+
+import re
+from pathlib import Path
 
 import pytest
 
 from command_line import echostep
-from echostep.errors import INSTEAD, former_use, has_left
+from echostep.errors import INSTEAD, EchostepError, former_use, has_left
+from echostep.plan import load_plan
+from echostep.recording import open_parts
+from echostep.settings import Settings, parse_settings
+from echostep.walk.recorded import tracker_of
+from echostep_app.recording.recorder import Recorder
+from walks import DEMO, walk_chunks
 
+SETTINGS = [use for use in INSTEAD if use.startswith("[")]
 TYPED = [use for use in INSTEAD if not use.startswith("[")]
 
 
@@ -19,11 +29,40 @@ def test_a_former_use_ends_with_the_sentence_that_names_its_substitute(use: str)
     assert done.stderr == f"echostep: {has_left(use)}\n"
 
 
+@pytest.mark.parametrize("use", SETTINGS)
+def test_a_former_setting_is_refused_in_a_file_and_passed_over_in_a_recording(use: str, tmp_path: Path) -> None:
+    section, name = use.split()
+    text = f"{section}\n{name} = 1\n\n[cloud]\nsize = 300\n"
+    with pytest.raises(EchostepError, match=re.escape(f"me.toml: {has_left(use)}")):
+        parse_settings(text, "me.toml")
+    with Recorder(tmp_path / "walk.mcap", {"settings_toml": text}) as recorder:
+        for chunk in walk_chunks(1.0):
+            recorder.write(chunk)
+    settings = tracker_of(open_parts([tmp_path / "walk.mcap"]), load_plan(DEMO)).settings
+    assert settings.cloud.size == 300
+    assert settings.ranger == Settings().ranger
+
+
 def test_a_command_line_of_today_is_no_former_use(monkeypatch: pytest.MonkeyPatch) -> None:
-    rows = {"former": "now", "live --old": "new", "plan make --size": "none", "far://": "near://"}
+    rows = {"former": "now", "live --old": "new", "plan make --size": "none", "far://": "near://", "--on who:": "file"}
     for use, instead in rows.items():
         monkeypatch.setitem(INSTEAD, use, instead)
-    for today in ("live former", "live --name former", "replay --old", "plan make", "live --publish farther", ""):
+    for today in (
+        "live former",
+        "live --name former",
+        "replay --old",
+        "plan make",
+        "live --publish farther",
+        "live --to who:x --on",
+        "",
+    ):
         assert not former_use(today.split())
-    for before in ("former x", "--share former", "live --old=3", "plan make a --size 2", "live --publish=far://x"):
+    for before in (
+        "former x",
+        "--share former",
+        "live --old=3",
+        "plan make a --size 2",
+        "live --publish=far://x",
+        "live --on who:x",
+    ):
         assert former_use(before.split())

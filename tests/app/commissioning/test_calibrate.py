@@ -10,6 +10,7 @@ import subprocess
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ from echostep.legs.kinematics import LegLengths
 from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import Settings, parse_settings
-from echostep_app.commissioning.calibrate import STILL_S, TURN_S, WALK_S, Ports, Wearer
+from echostep_app.commissioning.calibrate import STILL_S, TURN_S, WALK_S, Ports, Wearer, write_sections
 from echostep_app.commissioning.calibrate import calibrate as calibrate_parts
 from echostep_app.commissioning.fitting import doubt, fit_compass, fit_gyros, fit_legs, fit_mounting, still_bias
 from echostep_app.commissioning.probe import ProbeResult, _Probe
@@ -85,6 +86,18 @@ def test_biases_go_into_a_file_that_the_tracker_reads(tmp_path: Path) -> None:
     for name, counts in USUAL.items():
         assert getattr(settings.gyro, f"{name}_bias_rad_s") == pytest.approx(counts * COUNT_RAD_S, abs=0.0015)
     assert re.search(r"thigh \+2\.[12]\d degrees/s \(noise 0\.[56]\d\)", done.stdout), done.stdout
+
+
+def test_settings_that_cannot_be_written_whole_leave_those_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "s.toml"
+    write_sections(out, {"gyro": {"thigh_bias_rad_s": 0.01}})
+    before = out.read_text()
+    monkeypatch.setattr("os.fsync", mock.Mock(side_effect=OSError(28, "No space left on device")))
+    with pytest.raises(EchostepError, match=r"s\.toml: cannot write the settings: No space left"):
+        write_sections(out, {"gyro": {"thigh_bias_rad_s": 0.02}})
+    assert [path.read_text() for path in tmp_path.iterdir()] == [before]
 
 
 @pytest.mark.parametrize("reversed_", [False, True])

@@ -13,7 +13,6 @@ import shapely
 from echostep.arrays import Floats
 from echostep.plan import Connector, Level, Plan, load_plan
 from echostep_app.guidance.tours import room_tour, tour
-from echostep_app.plan.importers.formats import open_plan
 from echostep_app.plan.routing import RoutePlace
 from echostep_simulation.people.walker import RATE_HZ, Person, Waypoint, walk
 from echostep_studies.bench import sites
@@ -28,7 +27,7 @@ from needs_data import needs_data
 PERSON = Person(corner_m=0.3)  # as in the studies
 STOREY_M, INNER_M, OUTER_M = 3.5, 2.0, 3.2  # of a quarter of a winding stair about the origin
 TOUR_M = 300.0
-WESTPORT = DATA / "maps" / "westport-house"
+WESTPORT = DATA / sites.WESTPORT
 
 
 def walked(way: Sequence[Waypoint], seed: int) -> Floats:
@@ -101,8 +100,8 @@ TOURS: dict[str, Callable[[int], tuple[Plan, Sequence[Waypoint]]]] = {
 }
 WESTPORT_TOURS = {
     "house": (lambda seed: site_of(sites.westport_house(seed, DATA)), (401, 605, 606, 801, 802)),
-    "through": (lambda seed: (plan := open_plan(WESTPORT), through(plan, seed)), (1, 2)),
-    "rooms": (lambda _: (plan := open_plan(WESTPORT), room_tour(plan)), (1,)),
+    "through": (lambda seed: (plan := load_plan(WESTPORT), through(plan, seed)), (1, 2)),
+    "rooms": (lambda _: (plan := load_plan(WESTPORT), room_tour(plan)), (1,)),
     "drawn storey": (lambda seed: site_of(drawn_sites.westport(seed, TOUR_M, DATA)), (501,)),
     "drawn storeys": (lambda seed: site_of(drawn_sites.storeys(seed, TOUR_M, DATA)), (501,)),
 }  # 605, 606, 801, 802 and both of `through` use the winding stair, or the one with a corner
@@ -119,7 +118,7 @@ def test_no_tour_meets_a_wall(name: str) -> None:
 
 @pytest.mark.long
 @pytest.mark.study
-@needs_data("maps/westport-house")
+@needs_data("maps/westport-house.json")
 @pytest.mark.parametrize(
     ("make", "seed"), [pytest.param(make, s, id=f"{name} {s}") for name, (make, seeds) in WESTPORT_TOURS.items() for s in seeds]
 )  # fmt: skip

@@ -65,9 +65,7 @@ def test_a_recorded_operation_is_shown_as_it_was(tmp_path: Path, *, rewritten: b
 
 
 @pytest.mark.parametrize("being_written", [False, True])
-def test_any_moment_is_shown_as_it_was(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, being_written: bool
-) -> None:
+def test_any_moment_is_shown_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, being_written: bool) -> None:
     monkeypatch.setattr(tape, "KEYFRAME_S", 5.0)
     monkeypatch.setattr("echostep.recording.message_runs.PORTION_BYTES", 1 << 12)  # it is read in many portions
     team = Team()

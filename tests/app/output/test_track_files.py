@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pyogrio
 import pytest
+from evo.tools import file_interface
 from pyarrow import parquet
 
 from command_line import echostep
@@ -114,6 +115,15 @@ def test_a_gpx_track_is_cut_where_the_track_is_lost(folder: Path, estimates: lis
         assert len(root.findall(".//{*}time")) == (15 if moments else 0)
     FORMATS[".gpx"](tmp_path / "lost.gpx", TrackOnPlan(some[10:15], plan, []))
     assert ET.parse(tmp_path / "lost.gpx").getroot().findall(".//{*}trkseg") == []
+
+
+def test_evo_reads_a_track(folder: Path, estimates: list[Estimate]) -> None:
+    read = file_interface.read_tum_trajectory_file(export(folder, "track.tum"))
+    expected = [(e.x_m, e.y_m, e.z_m) for e in estimates]
+    assert np.abs(read.positions_xyz - expected).max() < 1e-6
+    assert np.abs(read.timestamps - [e.t_s for e in estimates]).max() < 1e-6
+    turned = read.get_orientations_euler()[:, 2] - [e.heading_rad for e in estimates]
+    assert np.abs(np.sin(0.5 * turned)).max() < 1e-5
 
 
 def test_a_recording_with_new_derived_messages_keeps_the_bytes(folder: Path) -> None:

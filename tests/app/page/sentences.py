@@ -40,7 +40,6 @@ MODULES: dict[str, tuple[str, ...] | None] = {
     "page/web/exchange.py": ("Exchange",),
     "plan/places/standing.py": ("_reason", "StandingGround"),
     "plan/places/whereabouts.py": None,
-    "session/acceptance/guide.py": ("_request", "_manner"),
     "session/results.py": ("summary_words",),
     "wearer/steady_status.py": None,
     "session/runs/dropped.py": ("DroppedFiles", "WAITING", "PREPARING", "_track"),

@@ -32,7 +32,7 @@ json_like = st.recursive(
 
 
 fields = st.sampled_from(
-    ["x_m", "y_m", "sd_m", "heading_rad", "level", "seq", "playing", "times", "t_s", "by", "undo", "number", "name"]
+    ["x_m", "y_m", "sd_m", "heading_rad", "level", "seq", "playing", "times", "t_s", "by", "undo", "name"]
 )
 kinds = st.sampled_from(
     [
@@ -47,8 +47,6 @@ kinds = st.sampled_from(
         "seek",
         "step",
         "met",
-        "at_point",
-        "no_tap",
         "?",
     ]
 )
@@ -71,8 +69,7 @@ def test_no_text_breaks_the_parser(text: str) -> None:
         '"kind":"seek","t_s":1e308', '"kind":"seek","t_s":NaN', '"kind":"seek","t_s":1e999', '"kind":"seek","t_s":true', '"kind":"speed","times":0',
         '"kind":"speed","times":32.1', '"kind":"step","steps":1.5', '"kind":"step","steps":9007199254740992', '"kind":"play","playing":1',
         '"kind":"met","name":""', '"kind":"go_to","x_m":1,"y_m":100000.1', '"kind":"go_to","x_m":1,"y_m":1,"level":1000',
-        '"kind":"at_point","number":-1', '"kind":"at_point","number":1,"name":"' + 33 * "x" + '"', '"kind":"no_tap"', '"kind":"no_tap","number":true',
-        '"kind":"drawn"', '"kind":"undo","undo":0', '"seq":1',
+        '"kind":"met","name":"' + 33 * "x" + '"', '"kind":"drawn"', '"kind":"undo","undo":0', '"seq":1',
     ],
 )  # fmt: skip
 def test_a_request_beyond_its_limits_is_none(text: str) -> None:
@@ -83,7 +80,6 @@ def test_a_request_beyond_its_limits_is_none(text: str) -> None:
     ("text", "request_"),
     [
         ('"kind":"go_to","x_m":1,"y_m":2', requests.GoTo(1.0, 2.0, 0)), ('"kind":"step","steps":-3', requests.Step(-3)),
-        ('"kind":"at_point","number":3', requests.AtPoint(3)), ('"kind":"at_point","number":0,"name":"B"', requests.AtPoint(0, "B")),
         ('"kind":"check_in","x_m":1,"y_m":2,"sd_m":0,"heading_rad":4', CheckIn(1.0, 2.0, 4.0 - 2.0 * math.pi, 0.05, 0)),
     ],
 )  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan import NO_PLAN, Pose
+from echostep.plan import NO_PLAN
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.page import protocol
@@ -27,7 +27,6 @@ from echostep_app.page.elements.drawn_walls import (
 )
 from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import Mailbox
-from echostep_app.page.shared import SharedDrawing
 from page.browser import DESK, LOCAL, PHONE, demo_walk, loaded_page, overflow, picture, wait_for
 from page.frames import told
 from waiting import until
@@ -149,14 +148,6 @@ def test_a_drawing_that_cannot_go_on_is_said_once_and_nothing_waits_for_it() -> 
     process.add(step(1.0, STRETCH_M), told(), 1)
     process.close()
     assert said == ["the walls are no longer drawn: EOFError"]
-
-
-def test_the_newest_plan_is_taken_once_and_none_that_is_too_long() -> None:
-    shared = SharedDrawing(Pose(0.0, 0.0, 0.0), "test", most_bytes=4)
-    assert shared.take() is None
-    for plan in (b"old", b"new", b"", b"too long"):
-        shared.put(plan)
-    assert (shared.take(), shared.take(), shared.too_long) == (b"new", None, 1)
 
 
 def test_the_drawing_meets_the_wearer() -> None:

@@ -18,7 +18,7 @@ from page.frames import scene, served, told
 from plan import test_plan_importer_dxf as dxf
 from plan import test_plan_importer_imdf as imdf
 from plan import test_plan_importer_osm as osm
-from plan.imported_plans import seven_floors, write_seven_floors
+from plan.imported_plans import seven_floors
 
 
 def from_dxf(folder: Path) -> Plan:
@@ -46,7 +46,6 @@ FORMATS: dict[str, Callable[[Path], Plan]] = {
     "IMDF": lambda folder: import_plan(imdf.folder(folder / "mall", imdf.files())),
     "OSM": lambda folder: osm.imported(folder, osm.HOUSE, "house.osm"),
     "IFC": from_ifc,
-    "GeoJSON": lambda folder: import_plan(write_seven_floors(folder / "office")),
     "edited": lambda _: seven_floors(),
 }
 

@@ -20,9 +20,6 @@ from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
 from plan import test_plan_importer_imdf as imdf
 from plan import test_plan_importer_osm as osm
-from plan import test_plan_importer_wrld as wrld
-from plan.test_plan_importer_nodelink import SMALL
-from plan.test_plan_importer_nodelink import write as write_nodelink
 
 
 def counted(path: Path, **hints: Any) -> tuple[Plan, dict[str, int]]:
@@ -95,40 +92,6 @@ def test_kinds_of_openstreetmap(tmp_path: Path) -> None:
         "way that is no wall, room, corridor or stairs": 2, "room without level": 1, "relation that is no multipolygon": 1,
     }  # fmt: skip
     assert sizes(plan) == {"doors": 3, "windows": 1, "rooms": 4, "obstacles": 0, "connectors": 2}
-
-
-def test_kinds_of_wrld(tmp_path: Path) -> None:
-    """Each type that westport-house has, and one that nobody knows."""
-
-    def square(k: int) -> list[list[list[float]]]:
-        x, y, d = -3.0 + 1e-4 * k, 56.0, 5e-5
-        return [[[x, y], [x + d, y], [x + d, y + d], [x, y + d], [x, y]]]
-
-    taken = ("wall", "window", "door", "inaccessible_space", "floor_opening", "room", "bathroom", "hallway")
-    alone = ("stairs", "elevator", "escalator", "ramp")
-    left = ("building_outline", "landscaping", "table", "no_geometry", "pathway")
-    features = [wrld.feature(kind, square(k)) for k, kind in enumerate((*taken, *alone, *left))]
-    line = {
-        "type": "Feature",
-        "properties": {"type": "wall"},
-        "geometry": {"type": "LineString", "coordinates": [[-3, 56], [-3, 56.0001]]},
-    }
-    plan, left_out = counted(wrld.write(tmp_path, [*features, line]))
-    assert left_out == dict.fromkeys(left, 1) | {
-        "wall": 1, "stairs on one level only": 2, "lift on one level only": 1, "ramp on one level only": 1,
-    }  # fmt: skip
-    assert sizes(plan) == {"doors": 1, "windows": 4, "rooms": 3, "obstacles": 0, "connectors": 0}
-    assert len(plan.levels[0].walls) == 3 * 4  # wall, inaccessible space, opening in the floor
-
-
-def test_kinds_of_nodes_and_links(tmp_path: Path) -> None:
-    links = SMALL["link.txt"] + "10,0,4,4\n"
-    zones = SMALL["polygon.txt"] + "6,0,3,1,2,3\n"
-    arrows = SMALL["arrow.txt"] + "1,1,0,0\n"
-    plan, left_out = counted(write_nodelink(tmp_path, link=links, polygon=zones, arrow=arrows))
-    assert left_out == {"link without length": 1, "zone of type 0": 1, "arrow in no zone of stairs": 1}
-    assert sum(len(level.walls) for level in plan.levels) == 2  # links 7 and 9 are one wall
-    assert len(plan.connectors) == 1
 
 
 @pytest.mark.parametrize("name", ["map.yaml", "map.png"])

@@ -16,7 +16,7 @@ from echostep.errors import EchostepError
 from echostep.plan import Plan, load_plan
 from echostep_app.cli import app
 from echostep_app.plan.importers.dxf import entities as dxf_entities
-from echostep_app.plan.importers.formats import import_plan, open_plan
+from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 
 
@@ -166,7 +166,7 @@ def test_commands(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0
     assert "ground, 0 m: 9 x 0 m, 2 walls (8 m)" in done.output
-    assert load_plan(tmp_path / "plan.json").digest == open_plan(tmp_path / "ground.dxf").digest
+    assert load_plan(tmp_path / "plan.json").digest == import_plan(tmp_path / "ground.dxf").digest
     again = CliRunner().invoke(app, [*command, "--layer", "walls=A-DOOR", "--layer", "walls=A-W*", "--units", "mm"])
     assert again.exit_code == 0
     for wrong, named in (

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from echostep.errors import EchostepError
-from echostep_app.plan.importers.formats import NEXT_STEPS, import_plan, open_plan
+from echostep_app.plan.importers.formats import NEXT_STEPS, import_plan, is_foreign
 from echostep_app.plan.importers.report import ImportReport
 
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
@@ -36,7 +36,6 @@ def test_a_room(tmp_path: Path) -> None:
     assert len(plan.levels[0].walls) == 12  # both faces, cut by the gap
     assert report.left_out == {"specks of less than 4 pixels": 1}
     assert report.units == "0.05 m a pixel (resolution)"
-    assert open_plan(tmp_path / "map.yaml").digest == plan.digest
 
 
 def test_a_slanting_wall_is_no_stair(tmp_path: Path) -> None:
@@ -73,6 +72,6 @@ def test_wrong_maps(tmp_path: Path, text: str, named: str) -> None:
 def test_formats_that_are_not_read_name_the_next_step(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"plan{suffix.upper()}"
     path.write_bytes(b"x")
-    for opened in (import_plan, open_plan):
-        with pytest.raises(EchostepError, match=r"--picture|save|export"):
-            opened(path)
+    assert is_foreign(path)
+    with pytest.raises(EchostepError, match=r"--picture|save|export"):
+        import_plan(path)

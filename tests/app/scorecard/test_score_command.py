@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""`echostep score`: the table, JSON, the page in Chromium, and faults in one line."""
+"""`echostep score`: the table, JSON, and faults in one line."""
 
 from __future__ import annotations
 
-import base64
 import json
 import re
 from pathlib import Path
@@ -14,7 +13,6 @@ import pytest
 
 from board_runs import ROOT
 from command_line import echostep
-from page.browser import opened_page, violations
 
 PLAN = ROOT / "host/core/echostep/plans/demo.json"
 
@@ -74,45 +72,3 @@ def test_a_fault_is_one_line_and_status_2(folder: Path, tmp_path: Path) -> None:
     assert done.stderr == f"echostep: {tmp_path}/bad.csv:2: column y: 'three' is not a number\n"
     missing = echostep("score", tmp_path / "none.csv", "--truth", folder / "truth.csv")
     assert missing.stderr == f"echostep: {tmp_path}/none.csv: cannot read it: No such file or directory\n"
-
-
-@pytest.mark.slow
-def test_the_page_needs_nothing_else_and_escapes_names(folder: Path, tmp_path: Path) -> None:
-    html = tmp_path / "new/score.html"
-    tracks = [folder / "ours.csv", folder / "<b>[red]theirs.csv"]
-    assert echostep("score", *tracks, "--truth", folder / "truth.csv", "--plan", PLAN, "--html", html).returncode == 0
-    text = html.read_text()
-    assert "<b>[red]" not in text
-    assert not re.findall(r"(?:src|href)=\"(?!data:)", text)
-    pictures = [base64.b64decode(data) for data in re.findall(r"data:image/svg\+xml;base64,([^\"]+)", text)]
-    assert len(pictures) == 4  # one distribution, two plans, one Stanford diagram
-    assert all(picture.startswith(b"<?xml") for picture in pictures)
-    assert text.count('alt=""') == 0
-
-
-@pytest.mark.parametrize("width", [390, 1200])
-def test_the_page_in_a_browser(browser: Any, folder: Path, tmp_path: Path, width: int) -> None:
-    """Every picture is drawn, nothing sticks out on a phone, axe finds nothing."""
-    html = tmp_path / "score.html"
-    done = echostep("score", folder / "ours.csv", "--truth", folder / "truth.csv", "--html", html)
-    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, f"page: {html}")
-    page = opened_page(browser, viewport={"width": width, "height": 900})
-    try:
-        page.goto(html.as_uri())
-        drawn = page.evaluate("[...document.images].map((i) => i.complete && i.naturalWidth > 100)")
-        wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
-        found = violations(page)
-    finally:
-        page.close()
-    assert drawn == [True] * 3
-    assert wide == 0
-    assert found == []
-
-
-@pytest.mark.process
-def test_the_same_files_give_the_same_page(folder: Path, tmp_path: Path) -> None:
-    pages = []
-    for name in ("a.html", "b.html"):
-        echostep("score", folder / "ours.csv", "--truth", folder / "truth.csv", "--html", tmp_path / name)
-        pages.append((tmp_path / name).read_text())
-    assert pages[0] == pages[1]

@@ -39,7 +39,7 @@ def written(path: Path, text: str) -> Path:
 def scored(folder: Path, track: str, truth: str) -> Scorecard:
     """The card of a track, as text of both files; without a plan."""
     track_path, truth_path = written(folder / "track.csv", track), written(folder / "truth.csv", truth)
-    return score(load_path(track_path, None), load_path(truth_path, None)).card
+    return score(load_path(track_path, None), load_path(truth_path, None))
 
 
 # A wearer stands at the origin for 4 s; the errors are (3, 4), (0, 0), (-1, 0), (0, 2): 5, 0, 1 and 2 m.
@@ -140,7 +140,7 @@ def test_a_plan_tells_floors_by_height_and_zones(tmp_path: Path) -> None:
         tmp_path / "truth.csv", f"t,x,y,z\n0,10,1.5,0\n1,10,1.5,0\n2,10,1.5,{STOREY_M}\n3,31,1.5,{STOREY_M}\n"
     )
     track = written(tmp_path / "a.csv", f"t,x,y,level\n0,12,1.5,0\n1,10,5,0\n2,10,1.5,0\n3,{LENGTH_M + 0.5},1.5,1\n")
-    card = score(load_path(track, plan), load_path(truth, plan), plan).card
+    card = score(load_path(track, plan), load_path(truth, plan), plan)
     assert card.floor_probability == pytest.approx(0.75)
     assert card.zone_probability == pytest.approx(0.5)
 
@@ -174,7 +174,7 @@ def test_the_same_figures_as_a_replay_prints(tmp_path: Path) -> None:
     scenario.write_truth(tmp_path / "truth.csv")
     estimates = Tracker(DEMO, scenario.start, seed=3).take(portion_of(walk_chunks()))
     write_track(tmp_path / "track.csv", estimates)
-    card = score(load_path(tmp_path / "track.csv", DEMO), load_path(tmp_path / "truth.csv", DEMO), DEMO).card
+    card = score(load_path(tmp_path / "track.csv", DEMO), load_path(tmp_path / "truth.csv", DEMO), DEMO)
     printed = card_of(estimates, load_truth(tmp_path / "truth.csv", DEMO))
     assert printed is not None
     assert (printed.horizontal, printed.ellipse95_holds) == (card.horizontal, card.ellipse95_holds)
@@ -193,7 +193,7 @@ def test_evo_finds_the_same_trajectory_errors(tmp_path: Path) -> None:
     tables = {"truth.csv": np.column_stack([t_s, true]), "track.csv": np.column_stack([t_s[rows], found])}
     for name, table in tables.items():
         np.savetxt(tmp_path / name, table, delimiter=",", header="t,x,y,z", comments="")
-    card = score(load_path(tmp_path / "track.csv", None), load_path(tmp_path / "truth.csv", None)).card
+    card = score(load_path(tmp_path / "track.csv", None), load_path(tmp_path / "truth.csv", None))
     for ours, third in ((card.spherical, 1.0), (card.horizontal, 0.0)):
         plane = (1.0, 1.0, third)
         ape = APE(PoseRelation.translation_part)

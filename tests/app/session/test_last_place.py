@@ -14,11 +14,13 @@ import pytest
 
 from echostep.errors import EchostepError
 from echostep.localization import Air, ClimbSettings, Estimate, Start, TrackStatus
+from echostep.settings import Settings
 from echostep.tracker import Tracker
 from echostep.tracker.last_place import LastPlace, last_place
 from echostep.walk.recorded import recorded_start
 from echostep_app.session.last_place import FILE, KEPT_S, Kept, PlaceKeeper, read_kept, start_last
 from echostep_app.session.metadata import parse_start, run_metadata
+from echostep_app.session.runs.live import _last_start
 from echostep_studies.simulation.tower import tower
 
 PLAN = tower(3)
@@ -52,6 +54,16 @@ def test_it_is_kept_while_the_tracker_is_sure_and_not_at_every_estimate(tmp_path
         (tmp_path / FILE).unlink(missing_ok=True)
         keeps.note(None, replace(SURE, t_s=t_s))
         assert (tmp_path / FILE).exists() == written
+
+
+@pytest.mark.parametrize("left", [b"", b"\0" * 40, b'{"utc": "2026-11', None], ids=str)
+def test_a_damaged_place_is_put_aside_and_the_building_is_searched(
+    tmp_path: Path, left: bytes | None, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / FILE
+    path.mkdir() if left is None else path.write_bytes(left)
+    assert _last_start(tmp_path, PLAN, BOARD, Settings()) == Start()
+    assert f"kept as {FILE}.damaged; the whole building is searched" in capfd.readouterr().err
 
 
 def test_a_disk_that_refuses_stops_nothing(tmp_path: Path) -> None:

@@ -15,7 +15,6 @@ from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep_app.session.options import PortOptions
 from echostep_app.session.runs.live import _open_ports
 from echostep_app.session.runs.port_roles import SURE_BYTES, with_right_names
-from echostep_app.team.endpoint import Outlet, parse_endpoint
 
 CAPTURES = ROOT / "tests/captures"
 BYTES = {name: (CAPTURES / f"{name}.bin").read_bytes()[: 2 * SURE_BYTES] for name in (BOARD, MTX)}
@@ -105,20 +104,15 @@ def test_bytes_of_no_known_device_wait_two_seconds_and_are_recorded_as_they_are(
 
 
 @pytest.mark.parametrize(
-    ("options", "publish", "named"),
+    ("options", "named"),
     [
-        ({"mtx": "/dev/null"}, [], "for board and mtx"),
-        ({"beacons": "/dev/null"}, [], "for board and gateway"),
-        ({"foot": "/dev/null"}, [], "for board and foot"),
-        ({}, ["mesh:///dev/null"], "for board and --publish mesh:///dev/null (1)"),
-        ({"mtx": "/dev/zero"}, ["mesh:///dev/zero"], "for mtx and --publish mesh:///dev/zero (1)"),
-        ({}, ["mesh:///dev/zero", "mesh:///dev/../dev/zero"], "for --publish mesh:///dev/zero (1) and --publish"),
+        ({"mtx": "/dev/null"}, "for board and mtx"),
+        ({"beacons": "/dev/null"}, "for board and gateway"),
+        ({"foot": "/dev/null"}, "for board and foot"),
     ],
 )
-def test_two_uses_of_one_port_are_refused_at_once(options: dict[str, str], publish: list[str], named: str) -> None:
-    outlet = Outlet(tuple(map(parse_endpoint, publish)), "anna", "red")
+def test_two_uses_of_one_port_are_refused_at_once(options: dict[str, str], named: str) -> None:
     with pytest.raises(EchostepError, match=f"is given twice, {re.escape(named)}"):
         _open_ports(
-            PortOptions("/dev/null", options.get("mtx"), options.get("beacons"), None, None, options.get("foot")),
-            outlet,
+            PortOptions("/dev/null", options.get("mtx"), options.get("beacons"), None, None, options.get("foot"))
         )

@@ -59,7 +59,7 @@ def test_a_picture_that_cannot_be_written_is_one_error_after_the_summary(
 
 def test_a_table_that_cannot_be_written_is_an_error_of_a_run_without_estimates_too(tmp_path: Path) -> None:
     (tmp_path / "track.csv").mkdir()
-    with pytest.raises(EchostepError, match="cannot write the track: Is a directory"):
+    with pytest.raises(EchostepError, match=r"track\.csv: cannot write the track: Is a directory"):
         results.write_results(tmp_path, TRACKER, None, results.Result("walk", []))
 
 

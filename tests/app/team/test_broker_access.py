@@ -133,14 +133,14 @@ def test_a_topic_that_may_not_be_read_costs_itself_alone(tmp_path: Path) -> None
             assert until(lambda: receiver.fault.startswith(refused))
             assert receiver.connected
             for payload in (b"1", b"2"):
-                receiver.send("echostep/red/bo/drawing/plan", payload)
+                receiver.send("echostep/red/bo/beacons", payload)
             assert until(lambda: not receiver.waiting)
             receiver.send("echostep/marks/a", b"{}")
             assert until(lambda: heard == ["echostep/marks/a"])
             assert until(lambda: receiver.fault.startswith(refused))
         assert [line.split(":")[0] for line in words] == [
             refused,
-            "the broker does not accept what is sent on echostep/red/bo/drawing/plan (Not authorized)",
+            "the broker does not accept what is sent on echostep/red/bo/beacons (Not authorized)",
         ]
 
 

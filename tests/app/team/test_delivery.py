@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What is said of the delivery of reports is what the receiver said: a broker that refuses them, one that has them, a radio that leaves some out."""
+"""What is said of the delivery of reports is what the receiver said: a broker that refuses them, one that has them, a receiver without a
+point for some.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ import pytest
 
 from echostep.plan import load_plan
 from echostep.tracker import Tracker
+from echostep_app.team import inbox
 from echostep_app.team.endpoint import Outlet, parse_endpoint
+from echostep_app.team.inbox import MOST_TRIES, ListenerThread
 from echostep_app.team.messages.report import ReportedAlarm
 from echostep_app.team.mqtt.broker import UnwantedError
 from echostep_app.team.mqtt.publisher import Listener, MqttTransport
@@ -105,7 +109,7 @@ def test_a_mayday_that_cannot_go_out_is_told_first() -> None:
 
 
 def test_a_transport_that_leaves_reports_out_sends_none() -> None:
-    class Radio:
+    class Leaving:
         def open(self) -> None: ...
 
         def send(self, _: object) -> Delivery:
@@ -113,8 +117,47 @@ def test_a_transport_that_leaves_reports_out_sends_none() -> None:
 
         def close(self, *, ended: bool) -> None: ...
 
-    box = Outbox(Radio(), "radio", print)
+    box = Outbox(Leaving(), "leaving", print)
     box.offer(report(alarm=MAYDAY))
     assert until(lambda: box.counts.left_out)
     assert "0 of 1 reports sent, 0 overtaken by newer ones, 0 unsent, 1 left out" in box.close()
     assert box.delivered is None
+
+
+class Refusing:
+    """A broker at whose connection one message breaks; the others are taken."""
+
+    def __init__(self, poison: bytes) -> None:
+        self.opened = 0
+        self.taken: list[bytes] = []
+        self._poison = poison
+
+    def open(self) -> str:
+        self.opened += 1
+        return ""
+
+    def run_once(self, timeout_s: float) -> None:
+        """Nothing comes."""
+
+    def publish(self, topic: str, payload: bytes) -> None:
+        if payload == self._poison:
+            raise ConnectionError(f"{topic} breaks it")
+        self.taken.append(payload)
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+def test_a_message_that_breaks_the_connection_every_time_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those behind it come through."""
+    monkeypatch.setattr(inbox, "RETRY_PAUSES_S", (0.0,))
+    broker, said = Refusing(b"too large"), list[str]()
+    receiver = ListenerThread(broker, said.append)
+    assert not receiver.waiting
+    receiver.send("beacons", b"too large")
+    receiver.send("mark", b"small")
+    assert until(lambda: broker.taken == [b"small"])
+    assert until(lambda: not receiver.waiting)
+    receiver.close()
+    assert broker.opened == MOST_TRIES + 1
+    assert "a message of 9 bytes on beacons is given up: the broker does not take it" in said

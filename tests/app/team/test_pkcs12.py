@@ -41,6 +41,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "locked.pem").write_bytes(locked + issued.cert_chain_pems[0].bytes())
     (folder / "secret").write_bytes(b"secret\n")
     (folder / "wrong").write_text("another")
+    (folder / "half.pem").write_text("-----BEGIN CERTIFICATE-----\nMIIB\n")
     return folder
 
 
@@ -77,6 +78,7 @@ def test_a_server_that_wants_a_certificate_accepts_it(folder: Path, query: str) 
         ("cert={0}/locked.pem&password={0}/wrong", "or has another password"),
         ("cert={0}/client.pem&password={0}/none", "password=.*none: there is no such file"),
         ("ca={0}/none.pem", "ca=.*none.pem: there is no such file"),
+        ("ca={0}/half.pem", r"ca=.*half\.pem: "),
         ("cert={0}/ca.pem", "lacks its certificate or its key"),
     ],
 )

@@ -161,6 +161,15 @@ def test_ranges_of_pings() -> None:
     assert np.isnan(found[1:]).all()
 
 
+def test_a_setting_of_a_bias_is_taken_off_each_ranger_s_own_ranges() -> None:
+    """2000 and 20 us are 0.343 and 0.003 m; what is shorter than a centimetre stays."""
+    flights = [(0, 2000), (1, 2000), (0, 20), (0, 100)]
+    pings = np.array([(0, ranger, Outcome.ECHO, flight_us) for ranger, flight_us in flights], ROWS[0x02])
+    biased = RangerSettings(left_bias_m=0.05, right_bias_m=-0.02)
+    usual, own = ranges(pings, RangerSettings()), ranges(pings, biased)
+    assert own - usual == pytest.approx([-0.05, 0.02, 0.0, 0.01 - usual[3]])
+
+
 class NaiveWaiting:
     """Slow, obviously right: a heap, and one message after the other."""
 

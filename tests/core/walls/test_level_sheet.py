@@ -20,7 +20,7 @@ from echostep.localization import ANY_LEVEL, ClimbSettings, CloudSettings, Estim
 from echostep.localization.height.levels import HeightArrays, HeightChange, change_levels, level_change_model
 from echostep.localization.particle_arrays import Move, ParticleArrays
 from echostep.localization.particles.cloud import Cloud, cloud_about
-from echostep.plan import Connector, Level, Plan, Pose
+from echostep.plan import Connector, Level, Plan, Pose, load_plan
 from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import (
@@ -33,7 +33,6 @@ from echostep.walls.level_sheet import (
     level_sheet_of,
     nearest_level,
 )
-from echostep_app.plan.importers.formats import open_plan
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import Person, Waypoint, walk
 from echostep_simulation.scenario import Scenario
@@ -293,10 +292,10 @@ def test_kinds_have_the_kernels_numbers() -> None:
 
 
 @pytest.mark.long
-@needs_data("maps/westport-house")
+@needs_data("maps/westport-house.json")
 def test_all_seven_floors_of_a_real_plan_are_walked() -> None:
     """By stairs and lift; the walk is simulated."""
-    plan = open_plan(DATA / "maps" / "westport-house")
+    plan = load_plan(DATA / "maps" / "westport-house.json")
     assert len(plan.levels) == 7
     way = through(plan, 3)
     scenario, estimates = tracked(plan, way, 3)

@@ -89,6 +89,21 @@ def test_rows_come_back_from_the_journal_as_they_were(tmp_path: Path) -> None:
     assert [list(row) for row in as_dicts(rows)] == [["name", "value"], ["name", "value", "counts"], ["name", "value"]]
 
 
+@pytest.mark.parametrize(
+    "left", [b"", b"\0" * 40, b"\xff\x00[[[", b"[1]\n3\nnull\n", b'{"seed": 1, "rows": [["Cou', None], ids=str
+)
+def test_a_damaged_journal_loses_only_what_is_damaged(tmp_path: Path, left: bytes | None) -> None:
+    path = tmp_path / "s.journal.jsonl"
+    if left is None:
+        path.mkdir()
+    else:
+        path.write_bytes(left + b'\n{"seed": 3, "rows": [["Counted", {"name": "a", "value": "no number"}]]}\n')
+    journal = Journal(path, KINDS)
+    assert not journal.runs
+    journal.add(1, named("b", 1))
+    assert Journal(path, KINDS).runs == {1: named("b", 1)}
+
+
 def named(name: str, _seed: int) -> list[Counted]:
     return [Counted(name=name, value=0.0)]
 

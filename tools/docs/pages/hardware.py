@@ -1,20 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""firmware/README.md: its tables of parts, reasons and wires, from firmware/hardware; and the drawings and schematics from the same tables.
+"""firmware/README.md: its tables of parts, reasons and wires, from firmware/hardware.
 
-In: parts.toml, wiring.toml. Out: the page with its marked tables regenerated; SVG of each board's wiring, KiCad schematics. Owns nothing.
+In: parts.toml, wiring.toml. Out: the page with its marked tables regenerated. Owns nothing.
 """
 
 from __future__ import annotations
 
 import tomllib
-from pathlib import Path
 from typing import Any
 
 from docs.pages import END
 from hardware import HARDWARE
-from hardware.drawing import drawing
-from hardware.kicad import schematic
-from hardware.wearing import wearing
 from hardware.wiring import POWER, WiredBoard, boards
 
 README = HARDWARE.parent / "README.md"
@@ -36,17 +32,6 @@ def page() -> str:
             raise SystemExit(f"{README}: has no mark {begin.strip()}")
         text = before + begin + table + END + rest.partition(END)[2]
     return text
-
-
-def drawings() -> dict[Path, str]:
-    """The drawings by their paths: wiring of each board, where everything is worn."""
-    made = {f"wiring-{board.name}": drawing(board) for board in boards()} | {"wearing": wearing()}
-    return {HARDWARE / "drawings" / f"{name}.svg": text for name, text in made.items()}
-
-
-def schematics() -> dict[Path, str]:
-    """The schematic of each board by its path."""
-    return {HARDWARE / "schematic" / f"{board.name}.kicad_sch": schematic(board) for board in boards()}
 
 
 def parts() -> list[Row]:

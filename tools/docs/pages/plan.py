@@ -10,7 +10,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from docs.pages import DOCS, HOST, between_marks
+from docs.pages import DOCS, HOST, between_marks, kind
 
 SCHEMA = HOST / "core/echostep/plans/plan.schema.json"
 FIELDS = "| field | type | needed | meaning |\n|---|---|---|---|\n"
@@ -35,7 +35,7 @@ def fields(schema: dict[str, Any], node: dict[str, Any], path: str) -> Iterator[
         whole = resolved(schema, field)
         yield (
             full,
-            kind(schema, field),
+            kind(field),
             name in node.get("required", []),
             field.get("description") or whole.get("description", ""),
         )
@@ -47,19 +47,3 @@ def fields(schema: dict[str, Any], node: dict[str, Any], path: str) -> Iterator[
 def resolved(schema: dict[str, Any], node: dict[str, Any]) -> dict[str, Any]:
     """The definition that a reference means."""
     return schema["$defs"][node["$ref"].rsplit("/", 1)[1]] if "$ref" in node else node
-
-
-def kind(schema: dict[str, Any], node: dict[str, Any]) -> str:
-    """The type in words."""
-    if "$ref" in node:
-        return str(node["$ref"].rsplit("/", 1)[1])
-    if "enum" in node:
-        return ", ".join(node["enum"])
-    if "const" in node:
-        return str(node["const"])
-    if "oneOf" in node:
-        return " or ".join(kind(schema, one) for one in node["oneOf"] if one.get("type") != "null")
-    json_type = node["type"] if isinstance(node["type"], str) else next(one for one in node["type"] if one != "null")
-    if json_type == "array" and isinstance(node.get("items"), dict):
-        return f"list of {kind(schema, node['items'])}"
-    return {"object": "object", "array": "list"}.get(json_type, json_type)

@@ -6,7 +6,6 @@ In: `echostep.__all__`, and `__all__` of the packages in it. Out: the page. Owns
 
 from __future__ import annotations
 
-import importlib
 import inspect
 from collections.abc import Iterator
 from enum import Enum
@@ -105,11 +104,3 @@ def _annotation(value: Any) -> str:
     if isinstance(value, ForwardRef):
         return value.__forward_arg__
     return value if isinstance(value, str) else inspect.formatannotation(value)
-
-
-def public_names() -> list[str]:
-    """Every public name with its package."""
-    names = [f"echostep.{name}" for name in echostep.__all__]
-    for package in ("echostep.plan", "echostep.foot", "echostep.xsens"):
-        names += [f"{package}.{name}" for name in importlib.import_module(package).__all__]
-    return names

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from docs.pages import DOCS, HOST, between_marks
+from docs.pages import DOCS, HOST, between_marks, kind
 from echostep_app.team.messages.report import schema
 
 SCHEMA = HOST / "app/echostep_app/team/report.schema.json"
@@ -26,19 +26,6 @@ def tables(tree: dict[str, Any]) -> str:
         ]
         made.append("\n")
     return "".join(made)
-
-
-def kind(row: dict[str, Any]) -> str:
-    """The type of a field in words."""
-    if "$ref" in row:
-        return str(row["$ref"]).rpartition("/")[2]
-    if "anyOf" in row:
-        return " or ".join(kind(part) for part in row["anyOf"])
-    if "enum" in row:
-        return ", ".join(f"`{value}`" for value in row["enum"])
-    if row.get("type") == "array":
-        return f"list of {kind(row['items'])}"
-    return str(row.get("type", ""))
 
 
 def limits(row: dict[str, Any]) -> str:

@@ -3,7 +3,7 @@
 
 In: the targets of `targets.py`, tests/hostile_inputs.jsonl (inputs that once were faults), the log in out/fuzz. Out: the log with one more line;
 executions so far by target. Exit status 1 when a target raises what it may not, takes longer than `LONGEST_S` or more than `MOST_MEMORY`; the
-input is then added to tests/hostile_inputs.jsonl. With the target `mtx`, frames are mutated whose checksums stay right, too. Owns both files.
+input is then added to tests/hostile_inputs.jsonl. Owns both files.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from types import FrameType
 from echostep.errors import EchostepError
 from places import OUT, ROOT
 from reliability.campaign import CampaignJournal, Figure, none, options, report
-from reliability.fuzz import mtx
 from reliability.fuzz.targets import ALLOWED, TARGETS
 
 KEPT = ROOT / "tests/hostile_inputs.jsonl"
@@ -31,7 +30,6 @@ LOG = OUT / "fuzz/host.jsonl"
 LONGEST_S = 10.0  # of one input, on a busy machine
 MOST_MEMORY = 2_000_000  # kB, of the whole process
 SHARD_S = 1.0  # of one target, then the next has its turn
-MTX_FRAMES = 60_000  # of a run
 SPECIAL = (b"\0", b"\xff", b"\x80", *b'- 1e308 nan inf 99999999999999999999 [ { " ,'.split(), b"\n")
 
 
@@ -132,8 +130,6 @@ def main() -> int:
         if text:
             failures.append((name, text))
             inputs.add({"target": name, "hex": data.hex()})
-    if "mtx" in asked.targets:
-        done["mtx, frames"] = mtx.fuzz(MTX_FRAMES, shard)["frames"]
     journal.add({"shard": shard, "executions": done})
     for name, text in failures:
         print(f"{name}: {text}")

@@ -13,6 +13,8 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
+
 from echostep.board.frames import encode
 from echostep.board.gateway import Gateway
 from echostep.plan import load_plan, parse_plan
@@ -21,26 +23,32 @@ from echostep.ports.people.check_in import parse_person
 from echostep.recording import open_recording
 from echostep.settings import parse_settings
 from echostep.tracker import Tracker
+from echostep.xsens import MTDATA, MTDATA2, PROJECT, MtSample, MtxLimits, MtxReader, encode_frame
+from echostep.xsens.frames import MAX_LENGTH
 from echostep.xsens.message import MessageReader
+from echostep.xsens.packets import read_packets
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.leg_csv import load_legs
 from echostep_app.page.requests import parse_request
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.ports.datagram_key import Opener, seal
-from echostep_app.ports.tap import Tap, parse_tap
 from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.recovery import Recovery
 from echostep_app.team.messages.report import decode
 from echostep_app.team.messages.report import encode as report_bytes
-from echostep_app.team.messages.shared_drawings import checked_drawing
+from echostep_app.xsens.requests import project_requests
+from echostep_app.xsens.setup import MtxSetup
 from echostep_simulation.devices.beacon_gateway import message
 from echostep_studies.barometer.pressure_csv import load_pressures
-from plan.imported_plans import write_seven_floors
+from echostep_studies.simulation.devices.mtx_setup import pack
+from plan import test_plan_importer_imdf as imdf
 from team.team_reports import report
 from walks import DEMO, walk_chunks
 
 KEY = bytes(range(32))
-FLOOR = "floor1.geojson"  # of the seven
+UNITS = "unit.geojson"  # of a venue
+SAMPLE = MtSample(0, (0.5, -0.25, 9.75), (0.125, 0.0, -1.5), (0.5, 0.0, -0.875), (0.5, 0.5, -0.5, 0.5))
+MTDATA_BYTES = pack(SAMPLE, PROJECT)  # an MTData message is as long as that, or is none
 PLAN = """{"echostep_plan":1,"name":"p","levels":[{"name":"g","height_m":0,"walls":[[0,0,4,0],[4,0,4,4],[4,4,0,4],[0,4,0,0]],
 "rooms":[{"name":"r","at":[1,1],"outline":[[0,0],[2,0],[2,2]]}],"doors":[{"line":[1,0,2,0]}],"obstacles":[[[1,1],[2,1],[2,2]]]}],
 "start":{"x":0.5,"y":0.5,"heading_deg":0},"georeference":{"origin":[8,53]},"uncertainty_m":0.1}"""
@@ -72,6 +80,31 @@ def port(name: str) -> Callable[[bytes], object]:
 def bytes_of(name: str) -> bytes:
     """The first bytes of a port in the demo."""
     return b"".join(chunk.data for chunk in walk_chunks(15.0) if chunk.port == name)[:400]
+
+
+def packets() -> bytes:
+    """The payload of an MTData2 message: counter; quaternion, accel and gyro in float32, fixed point 12.20 and float64."""
+    payload = b"\x10\x20\x02\0\0"
+    for identifier, values, form, scale in (
+        (0x2010, SAMPLE.quaternion, ">f4", 1),
+        (0x4021, SAMPLE.accel, ">i4", 1 << 20),
+        (0x8023, SAMPLE.gyro, ">f8", 1),
+    ):
+        content = (np.array(values) * scale).astype(form).tobytes()
+        payload += identifier.to_bytes(2, "big") + bytes([len(content)]) + content
+    return payload
+
+
+def measure(identifier: int, payload: bytes) -> None:
+    """Have an MTx's reader take a message whose checksum is right: only samples within the limits may pass."""
+    limits, batch = MtxLimits(), MtxReader().feed_batch(encode_frame(identifier, payload))
+    quaternion = batch.quaternion[~np.isnan(batch.quaternion).all(axis=1)]
+    mag = batch.mag[~np.isnan(batch.mag).all(axis=1)]
+    assert np.all(np.abs(batch.accel) <= limits.accel_m_s2), "accel"
+    assert np.all(np.abs(batch.gyro) <= limits.gyro_rad_s), "gyro"
+    assert np.all(np.abs(mag) <= limits.mag), "mag"
+    assert np.all(np.abs(np.linalg.norm(quaternion, axis=1) - 1.0) <= limits.quaternion_error + 1e-12), "quaternion"
+    assert np.all((batch.counter >= 0) & (batch.counter < 1 << 16)), "counter"
 
 
 def file(name: str, read: Callable[[Path], object]) -> Callable[[bytes], object]:
@@ -130,12 +163,12 @@ def write_model(folder: Path) -> Path:
     return write_house(folder)
 
 
-def import_floor(data: bytes) -> object:
-    """Import the seven floors with these bytes as one of them."""
+def import_units(data: bytes) -> object:
+    """Import a venue with these bytes as its units."""
     with TemporaryDirectory() as folder:
-        main = write_seven_floors(Path(folder))
-        main.with_name(FLOOR).write_bytes(data)
-        return import_plan(main)
+        venue = imdf.folder(Path(folder), imdf.files())
+        (venue / UNITS).write_bytes(data)
+        return import_plan(venue)
 
 
 def csv(header: str, *columns: float, rate_hz: float = 100.0) -> Callable[[], bytes]:
@@ -156,23 +189,30 @@ TARGETS: dict[str, Target] = {
     "board": Target(lambda: bytes_of(BOARD), port(BOARD)),
     "mtx": Target(lambda: bytes_of(MTX), port(MTX)),
     "xbus": Target(lambda: bytes_of(MTX), lambda data: MessageReader().feed(data, ended=True)),
+    "mtdata": Target(
+        lambda: MTDATA_BYTES, lambda data: measure(MTDATA, data[: len(MTDATA_BYTES)].ljust(len(MTDATA_BYTES), b"\0"))
+    ),
+    "mtdata2": Target(packets, lambda data: measure(MTDATA2, data[:MAX_LENGTH])),
+    "packets": Target(packets, read_packets),
+    "setup": Target(lambda: bytes_of(MTX), lambda data: MtxSetup(project_requests(100.0), 100.0).advance(data, 0.0)),
     "gateway": Target(lambda: encode(message(7, 3.0, 0.5, 10.0), 0) * 3, lambda data: Gateway().read(data, 10.0)),
     "datagram": Target(lambda: seal(KEY, b"frames", 1), Opener(KEY).open),
-    "tap": Target(Tap(1, standing=True, t_ns=1).encode, parse_tap),
     "person": Target(lambda: b'{"x_m":1.0,"y_m":2.0,"level":0,"sd_m":0.5}', parse_person),
     "websocket": Target(lambda: b'{"kind":"go_to","x_m":1.0,"y_m":2.0,"level":0}', text(parse_request)),
     "mqtt": Target(lambda: report_bytes(report()), decode),
-    "drawing": Target(PLAN.encode, checked_drawing),
     "settings": Target(lambda: b"[cloud]\nsize = 300\n[mtx]\nrate_hz = 100\n", text(lambda t: parse_settings(t, "x"))),
     "plan": Target(PLAN.encode, parse_plan),
     "mcap": Target(recording, file("a.mcap", read_recording)),
     "dxf": Target(written(write_drawing), file("a.dxf", import_plan)),
     "osm": Target(OSM.encode, file("a.osm", import_plan)),
-    "wrld": Target(written(write_seven_floors), file("main.json", import_plan)),
-    "wrld-floor": Target(written(lambda folder: write_seven_floors(folder).with_name(FLOOR)), import_floor),
+    "imdf": Target(written(lambda folder: imdf.folder(folder, imdf.files()) / UNITS), import_units),
     "ifc": Target(written(write_model), file("a.ifc", import_plan)),
     "legs": Target(csv("t_s,thigh_rad_s,shank_rad_s", 0.0, 0.1), file("a.csv", load_legs)),
     "imu": Target(csv("t_s,ax,ay,az,gx,gy,gz", 0.0, 0.0, 9.8, 0.0, 0.0, 0.0), file("a.csv", load_foot)),
     "pressure": Target(csv("t_s,pressure_pa", 101_325.0, rate_hz=10.0), file("a.csv", load_pressures)),
 }
-ALLOWED = {"plan": (ValueError,), "mqtt": (ValueError,)}  # besides EchostepError: their callers turn it into words
+ALLOWED = {
+    "plan": (ValueError,),
+    "mqtt": (ValueError,),
+    "packets": (ValueError,),
+}  # besides EchostepError: their callers turn it into words

@@ -3,7 +3,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <termios.h>
@@ -42,7 +41,7 @@ void pty_open(void)
 	if (master < 0 || grantpt(master) || unlockpt(master))
 		fail("cannot make a pseudo terminal: %s", strerror(errno));
 	make_raw(ptsname(master));
-	fprintf(stderr, "board port: %s\n", ptsname(master));
+	bench_trace("board port %s", ptsname(master));
 }
 
 void pty_close(void)

@@ -36,7 +36,7 @@ def simulate(
     pace: Annotated[float, typer.Option("--pace", help="Speed, as a multiple of real time.", min=0.01)] = 1.0,
     seed: Seed = 1,
 ) -> None:
-    """Simulate beacons along a walk, and send what they measure as their gateway does, in real time."""
+    """Simulate beacons along a walk, and send their measurements as their gateway does, in real time."""
     from echostep_app.commands.actions.beacon_player import simulate_gateway
 
     simulate_gateway(plan, truth, to, spacing, pace, seed)

@@ -11,8 +11,7 @@ from typing import Annotated
 
 import typer
 
-from echostep_app.commands.options import LOCAL, Host, Lang, Port, Seconds, TeamPlan, page_address
-from echostep_app.printing.lines import complain
+from echostep_app.commands.options import LOCAL, Host, Lang, Plan, Port, Seconds, page_address
 
 app = typer.Typer()
 
@@ -23,10 +22,10 @@ def command(
         str,
         typer.Argument(
             metavar="URL",
-            help="mqtt://HOST[:PORT], mqtts://HOST[:PORT]?ca=FILE, mesh:///dev/PORT, or a recorded operation (.mcap)",
+            help="mqtt://HOST[:PORT], mqtts://HOST[:PORT]?ca=FILE, or a recorded operation (.mcap)",
         ),
     ],
-    plan: TeamPlan,
+    plan: Plan,
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="FILE", help="The recording to write; each run gets a new number.")
     ] = Path("out/command/operation.mcap"),
@@ -50,18 +49,4 @@ def command(
     from echostep_app.operation.recorded.replay import Views
 
     views = Views(page_address(page, host, port, lang), as_json=as_json)
-    commander.command(_plan_file(plan, broker, team, out.parent), broker, team, seconds, views, out)
-
-
-def _plan_file(plan: Path, url: str, team: str | None, folder: Path) -> Path:
-    """The file of `--plan`; that of wearer:NAME comes from the broker at `url`, of any team unless one is given."""
-    from echostep_app.team.endpoint import BROKERS, parse_endpoint
-    from echostep_app.team.messages.report import checked_name
-    from echostep_app.team.wearer_plan import drawing_wearer, plan_file
-
-    if drawing_wearer(plan) is None:
-        return plan
-    broker = parse_endpoint(url) if url.startswith(tuple(f"{scheme}://" for scheme in BROKERS)) else None
-    path = plan_file(plan, broker, checked_name("--team", team) if team else "+", folder, complain)
-    assert path is not None
-    return path
+    commander.command(plan, broker, team, seconds, views, out)

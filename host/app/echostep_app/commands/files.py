@@ -19,7 +19,6 @@ from echostep_app.commands.options import (
     Start,
     Thigh,
     Units,
-    needs,
     picture_option,
 )
 from echostep_app.extras import require
@@ -34,21 +33,15 @@ Truth = Annotated[
 
 @app.command("map")
 def map_command(
-    recordings: Annotated[
-        list[Path], typer.Argument(metavar="WALK...", help="Recorded walks (.mcap) through one building.")
-    ],
+    recording: Annotated[Path, typer.Argument(metavar="WALK", help="A recorded walk (.mcap) through a building.")],
     out: Annotated[Path, typer.Option("-o", "--out", metavar="PLAN", help="The plan to write (JSON).")],
-    plan: Annotated[
-        Path | None,
-        typer.Option("--plan", metavar="PARTIAL", help="A partial or old plan, which the walks complete and correct."),
-    ] = None,
     picture: Annotated[Path | None, picture_option("Draw plan and path there")] = None,
 ) -> None:
-    """Draw the plan of a building from recorded walks."""
-    require("a drawing of walks", "scipy")
+    """Draw the plan of a building from a recorded walk."""
+    require("a drawing of a walk", "scipy")
     from echostep_app.commands.actions import mapping
 
-    mapping.map_recordings(recordings, plan, out, picture)
+    mapping.map_recording(recording, out, picture)
 
 
 @app.command("import")
@@ -162,15 +155,13 @@ def score(
         ),
     ] = None,
     plan: Annotated[
-        Path | None, typer.Option("--plan", help="The building's plan, for floors by height, zones and the picture.")
+        Path | None, typer.Option("--plan", help="The building's plan, for floors by height, zones, and taps.")
     ] = None,
     start: Start = None,
-    html: Annotated[
-        Path | None,
-        typer.Option(
-            "--html", metavar="FILE", callback=needs("matplotlib"), help="Write a page with the table and the pictures."
-        ),
-    ] = None,
+    taps: Annotated[
+        bool,
+        typer.Option("--taps", help="The places tapped on the page of a recorded run are the truth; needs --plan."),
+    ] = False,
     setup: Annotated[
         float | None, typer.Option("--setup", metavar="S", help="Set-up time of the system, to be listed.", min=0.0)
     ] = None,
@@ -180,7 +171,7 @@ def score(
     from echostep_app.commands.actions import score as scoring
     from echostep_app.session.options import TrackingOptions
 
-    scoring.score(tracks, truth, TrackingOptions(plan, start), html, setup, as_json=as_json)
+    scoring.score(tracks, truth, TrackingOptions(plan, start), setup, taps=taps, as_json=as_json)
 
 
 @app.command()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Groups of options that several commands share: what a run tracks, which ports it reads, where its results go.
+"""Groups of options that several commands share: tracking, ports, output.
 
 In: options as the command line parsed them. Out: dataclasses that make from them what the runs take. Owns the groups; a command takes a group as one
 parameter, and `with_groups` gives it the options.
@@ -81,7 +81,7 @@ def _options_of(group: Any) -> list[Parameter]:
 
 @dataclass(frozen=True, slots=True)
 class Tracking:
-    """What a run tracks: plan, start, settings, and where the wearer is guided to."""
+    """Tracking of a run: plan, start, settings, destination of the guidance."""
 
     plan: OptionalPlan = None
     start: Start = None
@@ -89,11 +89,11 @@ class Tracking:
     settings: SettingsFile = None
     guide: GuideTo = None
 
-    def options(self, plan: Path | None, seed: int | None) -> TrackingOptions:
-        """These options with the file of the plan and the seed."""
+    def options(self, seed: int | None) -> TrackingOptions:
+        """These options with the seed."""
         from echostep_app.session.options import TrackingOptions
 
-        return TrackingOptions(plan, self.start, self.start_sd, self.settings, seed, self.guide)
+        return TrackingOptions(self.plan, self.start, self.start_sd, self.settings, seed, self.guide)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,15 +6,12 @@ In: the command's arguments and options. Out: findings, a flashed board, setting
 
 from __future__ import annotations
 
-from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from echostep.errors import EchostepError
-from echostep_app.commands.groups import Ports
 from echostep_app.commands.options import Shank, Thigh
 from echostep_app.printing.lines import say
 
@@ -59,7 +56,7 @@ def bench_report(
         FiredBy | None, typer.Option(help="How the rangers fire meanwhile; without it, as they do now.")
     ] = None,
 ) -> None:
-    """Collect what a new board tells of itself into one text file, to be sent in with measurements (firmware/bench.md)."""
+    """Collect a new board's reports in one text file, to be sent in with measurements (firmware/bench.md)."""
     from echostep.board.messages import Schedule
     from echostep_app.commissioning import bench_report as bench
 
@@ -88,8 +85,7 @@ def calibrate(
     parts: Annotated[
         list[str] | None,
         typer.Argument(
-            help="gyros, mounting, compass, legs; without any, these four. accelerometers: of the parts on six sides. "
-            "rangers: from a walk of a minute on --plan, or rangers RECORDING: from a recorded one."
+            help="gyros, mounting, compass, legs; without any, these four. accelerometers: of the parts on six sides."
         ),
     ] = None,
     board: Annotated[
@@ -100,7 +96,7 @@ def calibrate(
         typer.Option(
             "--foot",
             metavar="PORT",
-            help="Port of a foot board, for accelerometers and rangers; without it, it is searched for.",
+            help="Port of a foot board, for accelerometers; without it, it is searched for.",
         ),
     ] = None,
     out: Annotated[
@@ -111,35 +107,10 @@ def calibrate(
     walked: Annotated[
         float, typer.Option("--walked", metavar="M", help="Length of the walk that calibrates the legs, metres.")
     ] = 10.0,
-    plan: Annotated[
-        Path | None, typer.Option("--plan", metavar="PLAN", help="Plan of the walk that calibrates the rangers.")
-    ] = None,
-    mtx: Annotated[
-        str | None,
-        typer.Option("--mtx", metavar="PORT", help="Port of an MTx, for rangers; without it, it is searched for."),
-    ] = None,
 ) -> None:
-    """Calibrate gyros, mounting, compass and legs, the accelerometers, or the rangers. Writes the results as settings."""
-    if parts and parts[0] == "rangers":
-        _calibrate_rangers([Path(p) for p in parts[1:]], Ports(board, mtx, foot), plan, out)
-        return
+    """Calibrate gyros, mounting, compass and legs, or the accelerometers. Writes the results as settings."""
     from echostep_app.commissioning import calibrate as calibration
     from echostep_app.printing.console import console_for_people
 
     wearer = calibration.Wearer(thigh, shank, walked)
     calibration.calibrate(calibration.Ports(board, foot), parts or [], wearer, out, console_for_people(highlight=False))
-
-
-def _calibrate_rangers(recordings: list[Path], ports: Ports, plan: Path | None, out: Path) -> None:
-    """From recordings, or from a walk now, which is tracked with the settings that earlier calibrations wrote."""
-    from echostep_app.commands.actions import rangers
-    from echostep_app.printing.console import console_for_people
-    from echostep_app.session.options import TrackingOptions
-
-    if plan is None:
-        raise EchostepError(rangers.PLAN_NEEDED)
-    console, settings = console_for_people(highlight=False), None
-    if not recordings:
-        settings = out if out.exists() else None
-        recordings = [rangers.walk_now(replace(ports, seconds=rangers.GUIDED_S).options(), out.parent, console)]
-    rangers.calibrate_rangers(recordings, TrackingOptions(plan, settings_path=settings), out, console)

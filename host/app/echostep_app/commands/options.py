@@ -90,21 +90,11 @@ Shank = Annotated[
     float | None, typer.Option("--shank", metavar="M", help="Knee to ankle or to the floor, metres; likewise.")
 ]
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
-TeamPlan = Annotated[
-    Path,
-    typer.Option(
-        "--plan",
-        metavar="FILE|wearer:NAME",
-        help="The building's plan (JSON, metres), or wearer:NAME: what that wearer has drawn by now.",
-    ),
-]
 OptionalPlan = Annotated[
     Path | None,
     typer.Option(
         "--plan",
-        metavar="FILE|wearer:NAME",
-        help="The building's plan (JSON, metres), or wearer:NAME: what that wearer of the team has drawn by now (live only). "
-        "Without it the map begins where the walk begins, and nothing is drawn on it.",
+        help="The building's plan (JSON, metres). Without it the map begins where the walk begins, and nothing is drawn on it.",
     ),
 ]
 Start = Annotated[
@@ -205,7 +195,7 @@ Publish = Annotated[
     typer.Option(
         "--publish",
         metavar="URL",
-        help="Send estimates to a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls:// mesh://; may be given several times.",
+        help="Send estimates to a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls://; may be given several times.",
     ),
 ]
 Name = Annotated[str, typer.Option("--name", help="The wearer's name, for --publish.")]

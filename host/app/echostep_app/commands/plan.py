@@ -93,7 +93,7 @@ def import_(
     doors: Doors = None,
     picture: Annotated[bool, typer.Option("--picture/--no-picture", help="Draw the plan as PNG, beside it.")] = True,
 ) -> None:
-    """Make a plan of a building that is drawn in another format, and show what came in and what was left out."""
+    """Convert a building in another format to a plan, and show the imported and the omitted parts."""
     from echostep_app.commands.options import layers_of, scale_of, unit_of, windows_of
     from echostep_app.plan.importers.hints import Hints
     from echostep_app.plan.importers.limited import import_reported
@@ -158,7 +158,7 @@ def check(
     file: PlanFile,
     picture: Annotated[Path | None, picture_option("Draw what is wrong")] = None,
 ) -> None:
-    """Tell what is wrong with a plan: exit status 0 when nothing is, 1 when something is."""
+    """List the faults of a plan: exit status 0 without any, 1 otherwise."""
     from echostep_app.plan.check import check_plan
     from echostep_app.plan.importers.limited import open_limited
     from echostep_app.plan.pictures.drawing import draw_plan

@@ -24,7 +24,7 @@ Out = Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="The recor
 
 @app.command()
 def info(file: Recording) -> None:
-    """Show what a recording holds, and whether it is whole; of another file, what it is and which command reads it."""
+    """Show the contents of a recording, and whether it is whole; of another file, its kind and the command that reads it."""
     from echostep.errors import EchostepError
     from echostep_app.commands.actions.foreign import foreign
     from echostep_app.recording.repair import contents
@@ -75,7 +75,7 @@ def export(
 
 @app.command()
 def repair(file: Recording, out: Out) -> None:
-    """Write what is readable of a damaged recording to a new one."""
+    """Write the readable part of a damaged recording to a new one."""
     from echostep_app.recording.repair import edit
 
     say(*edit.repair(file, out))

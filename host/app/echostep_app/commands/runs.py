@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from echostep.errors import EchostepError
 from echostep_app.commands.groups import Output, Ports, Tracking, with_groups
 from echostep_app.commands.options import (
     LOCAL,
@@ -25,11 +24,10 @@ from echostep_app.commands.options import (
     Seed,
     page_address,
 )
-from echostep_app.printing.lines import say
 from echostep_simulation.kits import Kit
 
 if TYPE_CHECKING:
-    from echostep_app.team.endpoint import Outlet
+    pass
 
 app = typer.Typer()
 
@@ -46,8 +44,8 @@ def demo(
         Path | None,
         typer.Option(
             "--plan",
-            metavar="FILE|wearer:NAME",
-            help="Walk through the rooms of this plan instead of the demo's, or of what that wearer of the team has drawn by now.",
+            metavar="FILE",
+            help="Walk through the rooms of this plan instead of the demo's.",
         ),
     ] = None,
     speed: Annotated[
@@ -71,7 +69,6 @@ def demo(
     from echostep_app.session.runs import demo as demo_run
 
     outputs = output.options(out, browser=browser)
-    plan = _plan_file(plan, outputs.outlet, out)
     demo_run.demo(demo_run.DemoOptions(seed, board_command, guide, plan, speed, kit, celsius), outputs)
 
 
@@ -88,14 +85,7 @@ def live(
     from echostep_app.session.runs import live as live_run
 
     outputs = output.options(out)
-    plan = _plan_file(tracking.plan, outputs.outlet, out)
-    options = tracking.options(plan, seed)
-    recording = live_run.live(options, ports.options(), outputs)
-    if options.settings_path is not None:
-        from echostep_app.commands.actions.rangers import learn_rangers
-        from echostep_app.printing.console import console
-
-        learn_rangers(recording, options, console)
+    live_run.live(tracking.options(seed), ports.options(), outputs)
 
 
 @app.command()
@@ -131,7 +121,7 @@ def replay(
     from echostep_app.session.runs import replay as replay_run
 
     outputs = output.options(out, stays_on_terminal=True)
-    replay_run.replay(recording, tracking.options(_recorded_plan(tracking.plan), seed), truth, outputs)
+    replay_run.replay(recording, tracking.options(seed), truth, outputs)
 
 
 @app.command()
@@ -147,25 +137,3 @@ def page(
 
     assert address
     serve_drops(address, browser=browser)
-
-
-def _plan_file(plan: Path | None, outlet: Outlet | None, folder: Path) -> Path | None:
-    """The file of `--plan`; that of wearer:NAME comes from the broker that the run publishes to, into the folder of its results."""
-    if plan is None:
-        return None
-    from echostep_app.team.wearer_plan import plan_file
-
-    return plan_file(plan, outlet.broker if outlet else None, outlet.team if outlet else "", folder, say)
-
-
-def _recorded_plan(plan: Path | None) -> Path | None:
-    """The file of a replay's `--plan`."""
-    if plan is None:
-        return None
-    from echostep_app.team.wearer_plan import drawing_wearer
-
-    if name := drawing_wearer(plan):
-        raise EchostepError(
-            f"--plan {plan}: a replay needs the drawing that the run was tracked on: the file drawing-{name}-... beside the recording"
-        )
-    return plan

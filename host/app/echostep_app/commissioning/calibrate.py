@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import sys
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from itertools import groupby
 from pathlib import Path
@@ -188,9 +188,9 @@ def read_sections(out: Path) -> Sections:
     return tomllib.loads(text)
 
 
-def _text(sections: Sections, notes: Sequence[str] = ()) -> str:
-    """The sections as TOML; `notes`: comments before them."""
-    lines = ["# Settings of echostep, with the results of echostep calibrate.", *(f"# {note}" for note in notes)]
+def _text(sections: Sections) -> str:
+    """The sections as TOML."""
+    lines = ["# Settings of echostep, with the results of echostep calibrate."]
     for name, values in sections.items():
         lines += ["", f"[{name}]"]
         lines += [
@@ -199,9 +199,9 @@ def _text(sections: Sections, notes: Sequence[str] = ()) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_sections(out: Path, sections: Sections, notes: Sequence[str] = ()) -> None:
+def write_sections(out: Path, sections: Sections) -> None:
     """Write a settings file; raises EchostepError for values that no settings can have, and for a file that cannot be written."""
-    text = _text(sections, notes)
+    text = _text(sections)
     parse_settings(text, str(out))
     with as_error(f"{out}: cannot write the settings"):
         out.parent.mkdir(parents=True, exist_ok=True)

@@ -23,7 +23,7 @@ from echostep_app.plan.routing import Route, RoutePlace, Stretch
 
 
 class CueKind(StrEnum):
-    """What a cue is about, in order of urgency."""
+    """Kinds of cues, in order of urgency."""
 
     STOP = "stop"  # position, heading or route is not known
     RETURN = "return"  # to the last known place
@@ -216,7 +216,7 @@ class Guide:
         return self._stretch == len(self.route.stretches) - 1
 
     def _choose_off_route(self, e: Estimate, off_m: float) -> Choice:
-        """What to do off the route: a new route with a planner, else the direction back to it."""
+        """The cue off the route: a new route with a planner, else the direction back to the route."""
         if self._planner is not None:
             end = self.route.stretches[-1]
             goal = RoutePlace(float(end.line_m[-1, 0]), float(end.line_m[-1, 1]), end.level)

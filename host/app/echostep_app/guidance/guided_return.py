@@ -3,7 +3,7 @@
 
 In: estimates of a tracker, when it publishes them. Out: a `Cue` for each. Owns the way that was walked, and the guide of a return.
 
-On the way in the length of the way back is shown, and nothing is spoken. The return begins when the wearer has come back by TURN_M, and ends at the
+Inbound, the length of the way back is shown, and nothing is spoken. The return begins when the wearer has come back by TURN_M, and ends at the
 start, or when the way back has grown by TURN_M again. Both are spoken.
 """
 
@@ -52,7 +52,7 @@ class GuidedReturn(CueList):
         return self._guide.route if self._guide else _route(self._way.line_m())
 
     def way(self, start: RoutePlace, _end: RoutePlace) -> Route:
-        """The way back from a position beside the way."""
+        """The way back from a position off the way."""
         begin, line = np.array([[start.x_m, start.y_m]]), self._way.line_m()
         return Route((Stretch(0, np.concatenate([begin, line])),))
 
@@ -120,7 +120,7 @@ class GuidedReturn(CueList):
 def _on_track(e: Estimate) -> Estimate:
     """An estimate relative to the track: the drift since the start moves the way back as well, so it is not an error here.
 
-    The covariance is kept up to the distance that a track may be beside itself.
+    The covariance is kept up to the distance at which two passages of one way may lie apart.
     """
     shrink = min(BESIDE_M / e.ellipse95.major_m, 1.0) ** 2 if e.ellipse95.major_m > 0.0 else 1.0
     xx, xy, yy = (shrink * value for value in (e.xx_m2, e.xy_m2, e.yy_m2))

@@ -2,7 +2,7 @@
 """Waypoints along a way through a building, stairs and lifts included.
 
 In: a plan and places, one after the other. Out: waypoints for `walker`. Owns nothing. The ways between are the shortest that a person can walk.
-Stairs are walked as two flights and a landing a storey, along the longer side of their outline, and round the walls that stand in the way of a
+Stairs are walked as two flights and a landing a storey, along the longer side of their outline, and round the walls that cross a
 straight flight: curved stairs, or a corner in the stairwell. A lift is ridden in its middle.
 """
 
@@ -117,7 +117,7 @@ def _between(plan: Plan, connector: Connector, level: int, to: int, entered_m: F
 
 
 def _flights(outline_m: Floats, entered_m: Floats) -> tuple[Floats, Floats, Floats]:
-    """Ends of the middle line of a stairwell, the end nearer to the entry first, and how far its flights are beside it."""
+    """Ends of the middle line of a stairwell, the end nearer to the entry first, and the offset of its flights from that line."""
     box = np.array(Polygon(outline_m).minimum_rotated_rectangle.exterior.coords)[:4]
     one, other = box[1] - box[0], box[3] - box[0]
     along, across = (one, other) if np.hypot(*one) >= np.hypot(*other) else (other, one)

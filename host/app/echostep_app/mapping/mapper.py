@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""A walk drawn: path and echoes -> fragments -> local walls -> loop closures -> the corrected path and its walls. Several walks become one drawing.
+"""A walk drawn: path and echoes -> fragments -> local walls -> loop closures -> the corrected path and its walls.
 
-In: measured segments of walks. Out: `Mapped`. Owns the order of the stages.
+In: measured segments. Out: `Mapped`. Owns the order of the stages.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,7 +33,7 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """The solved `graph` of all walks, its `pings`, the drawing of each level, whether the (first) walk shows two directions, closures undone."""
+    """The solved `graph`, its `pings`, the drawing of each level, whether the walls have two directions, closures undone."""
 
     graph: Graph
     pings: Pings
@@ -55,16 +55,6 @@ class Mapped:
 
 def map_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _share: None) -> Mapped:
     """Draw one walk; `progress` is called with the share that is done."""
-    return drawn(solve_walk(segments, progress))
-
-
-def drawn(solved: Mapped) -> Mapped:
-    """The solved walk with its walls."""
-    return replace(solved, drawings=draw(solved.graph, solved.pings))
-
-
-def solve_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _share: None) -> Mapped:
-    """The corrected path of one walk; nothing is drawn yet."""
     segments = with_smoothed_headings(segments)
     nodes, pings = nodes_of(segments)
     nodes, pings = without_bias(nodes, pings, find_bias(nodes, pings))
@@ -74,21 +64,16 @@ def solve_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda 
     for _ in range(LOCAL_ROUNDS):
         find_walls(graph)
     undone = close_loops(graph, progress)
-    undone += settle(graph)
-    return Mapped(graph, pings, (), directions, tuple(undone))
+    for _ in range(GLOBAL_ROUNDS):
+        find_walls(graph)
+    undone += _undo(graph)
+    return Mapped(graph, pings, draw(graph, pings), directions, tuple(undone))
 
 
 def find_pieces(nodes: Nodes, pings: Pings) -> tuple[Fragments, Directions]:
     """The pieces of walls that the pings show, and the directions that they have."""
     fragments, directions = find_relief(nodes, find_fragments(nodes, pings))
     return with_spots(nodes, pings, fragments, directions), directions
-
-
-def settle(graph: Graph) -> list[Closure]:
-    """Find walls and path again by turns, now that the loops are closed. Returns the closures that this undoes."""
-    for _ in range(GLOBAL_ROUNDS):
-        find_walls(graph)
-    return _undo(graph)
 
 
 def new_graph(nodes: Nodes, fragments: Fragments, directions: Directions) -> Graph:
@@ -127,19 +112,16 @@ def _anchored(graph: Graph) -> Bools:
     return anchored
 
 
-def close_loops(graph: Graph, progress: Progress, first: int = 0, before_m: float = math.inf) -> list[Closure]:
+def close_loops(graph: Graph, progress: Progress, first: int = 0) -> list[Closure]:
     """Match stretch after stretch from node `first` on with older ones; a closure bends the path before the next stretch is matched, without one
-    the next begins in the middle of the last.
-
-    `before_m`: only with the path before this length: of earlier walks. Returns closures that are undone.
+    the next begins in the middle of the last. Returns closures that are undone.
     """
     way_m, begin, undone = graph.nodes.way_m, first, []
     while begin < len(way_m) - 1:
         progress(float((way_m[begin] - way_m[first]) / max(way_m[-1] - way_m[first], 1e-9)))
         end = int(np.searchsorted(way_m, way_m[begin] + STRETCH_M))
         end = min(max(end, begin + 1), len(way_m) - 1)
-        until_m = min(way_m[begin], before_m) - APART_M
-        if (closure := find_closure(graph, begin, end, until_m)) is not None:
+        if (closure := find_closure(graph, begin, end, way_m[begin] - APART_M)) is not None:
             moved = graph.pose[closure.new] - graph.pose[closure.old] - closure.between
             graph.closures.append(closure)
             graph.solve(ROUNDS if np.hypot(*moved[:2]) > FAR_M else 1)

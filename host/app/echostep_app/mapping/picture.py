@@ -20,7 +20,7 @@ from echostep_app.printing.picture_files import check_picture, save_picture
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-WALKERS = ("#0072b2", "#009e73", "#cc79a7", "#56b4e9")
+PATH = "#0072b2"
 TRUE = "#e69f00"
 WIDE_IN, HIGHEST = 12.0, 1.4  # width in inches; greatest ratio of height to width
 TRUNK_M = 0.5  # width of the floor that a person walks on
@@ -53,9 +53,8 @@ def _draw_level(axes: Axes, level: Level, walked_m: Sequence[Floats], built: Lev
     low, high = axes.get_xlim()
     points_m = 72.0 * WIDE_IN / (high - low)
     for k, path_m in enumerate(walked_m):
-        colour = WALKERS[k % len(WALKERS)]
-        axes.plot(*path_m.T, color=colour, alpha=0.12, linewidth=TRUNK_M * points_m, solid_capstyle="round")
-        axes.plot(*path_m.T, color=colour, linewidth=0.7, label=f"path {k + 1}" if len(walked_m) > 1 else "path")
+        axes.plot(*path_m.T, color=PATH, alpha=0.12, linewidth=TRUNK_M * points_m, solid_capstyle="round")
+        axes.plot(*path_m.T, color=PATH, linewidth=0.7, label="" if k else "path")
     if built is not None:
         axes.add_collection(LineCollection(_lines(built.walls), colors=TRUE, linewidths=3.0, label="true walls"))
         for outline in built.obstacles:

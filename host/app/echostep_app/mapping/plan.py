@@ -31,12 +31,12 @@ COURSE_SD_RAD = math.radians(1.3)  # of that course: 32 simulated starts
 SQUARE_RAD = math.radians(6.0)
 
 
-Walked = tuple[tuple[Floats, ...], ...]  # of each level: the path (n, 2) of each walk, or its pieces there
+Walked = tuple[tuple[Floats, ...], ...]  # of each level: the path (n, 2), or its pieces there
 Moved = Callable[[Floats], Floats]  # points (n, 2) of the walk's own frame -> in the plan
 
 
 def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, Walked]:
-    """The plan with the first pose of the first walk at `start`, and the paths walked on each level."""
+    """The plan with the first pose of the walk at `start`, and the paths walked on each level."""
     first = mapped.graph.pose[0]
     turn, is_square = _turn(mapped, start.heading_rad)
     c, s = math.cos(turn), math.sin(turn)

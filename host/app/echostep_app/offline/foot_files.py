@@ -3,7 +3,7 @@
 
 In: a path. Out: `Imu`, or an EchostepError that names the file and what it lacks, or that it glided. Owns nothing.
 
-MAT: the names of github.com/utiasSTARS/pyshoe and of the recordings that are published with it. MVNX: sensorFreeAcceleration is without gravity and
+MAT: the names of github.com/utiasSTARS/pyshoe and of its published recordings. MVNX: sensorFreeAcceleration is without gravity and
 in the global frame, as sensorOrientation gives it [MVN User Manual, MVNX]. Folders: UNITS.md, and CROSSPLATFORM.md for the signs of iOS, of
 github.com/tszheichoi/awesome-sensor-logger; the sessions in github.com/xioTechnologies/x-IMU3-CSV; exports of phyphox.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A foot IMU's file as a recording that the tracker replays, with files of other sensors beside it.
+"""A foot IMU's file, and files of other sensors, as a recording that the tracker replays.
 
 In: `Imu`; files of rangers, a barometer, leg gyros on the same clock. Out: an MCAP recording of MTData2 messages that hold the samples as 32-bit
 floats, and of a board's messages. Owns nothing.
@@ -40,7 +40,7 @@ PASCALS = (20_000.0, 120_000.0)  # of air where people are; assumed
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """Files beside the foot's, None without: `ranges` t_s, direction_deg (left positive), range_m; `pressure` t_s, pressure_pa; `legs` as of the
+    """Files of other sensors, None without: `ranges` t_s, direction_deg (left positive), range_m; `pressure` t_s, pressure_pa; `legs` as of the
     command; `settings` (TOML) of the rangers, for instance.
     """
 
@@ -51,7 +51,7 @@ class Beside:
 
 
 def import_imu(imu: Imu, name: str, out: Path, about: Mapping[str, str], beside: Beside = Beside()) -> str:
-    """Record the samples of the file `name` in the new file `out`, `about` beside them; returns what was recorded, in words. Raises EchostepError."""
+    """Record the samples of the file `name` in the new file `out`, with the metadata `about`; returns the counts in words. Raises EchostepError."""
     rate_hz, begin_s = rate_of(imu.t_s), float(imu.t_s[0])
     messages, settings = _messages(beside)
     within = [each for each in messages if begin_s <= each[0] <= imu.t_s[-1]]

@@ -3,7 +3,7 @@
 
 In: columns `t_s,thigh_rad_s,shank_rad_s[,belt_rad_s,compass_rad]`, 50 to 500 Hz, either sign; in place of a pitch rate the rates about three axes
 in rad/s, as `thigh_x,thigh_y,thigh_z`. The other leg: the same columns with `other_` before them, or a file of its own whose times are of the same
-clock. Out: `LegSamples` with notes on repairs, or an EchostepError that says what is wrong. Owns nothing.
+clock. Out: `LegSamples` with notes on repairs, or an EchostepError that names the fault. Owns nothing.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def _has_other(file: TextIO, naming: Naming) -> bool:
 
 
 def load_legs(path: Path | str, prefix: str = "", naming: Naming = OWN) -> LegSamples:
-    """Samples of the leg whose columns have this prefix; raises EchostepError that names the file and what is wrong with which column."""
+    """Samples of the leg whose columns have this prefix; raises EchostepError that names the file, the column and the fault."""
     table, mended = open_samples(path, partial(_mended_table, prefix=prefix, naming=naming))
     later = np.concatenate([[True], table[1:, TIME] > np.maximum.accumulate(table[:-1, TIME])])
     t_s, thigh, shank, belt, compass = table[later].T

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Gyros on a leg: peaks that were clipped, reconstructed; the axis of walking in the frame of three axes that are strapped on anyhow.
+"""Gyros on a leg: peaks that were clipped, reconstructed; the axis of walking in the frame of three axes at any mounting.
 
 In: angular rates of one sensor of a leg that walks. Out: `Mounting`: a unit vector, how well it is defined. Owns the frequencies.
 

@@ -73,7 +73,7 @@ def track_pair(
 
 
 def _with_belt(leg: LegSamples, trunk: LegSamples) -> LegSamples:
-    """The leg with the rate of the belt worn with the other one, if it has none of its own."""
+    """The leg with the belt rate of the other one, if it has no belt rate."""
     if not np.isnan(leg.belt).all() or np.isnan(trunk.belt).all():
         return leg
     inside = (leg.t_s >= trunk.t_s[0]) & (leg.t_s <= trunk.t_s[-1])

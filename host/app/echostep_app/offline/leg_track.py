@@ -252,7 +252,7 @@ def describe_legs(track: LegTrack) -> str:
 
 
 def describe_strides(track: LegTrack) -> list[str]:
-    """A line for each stride: when, length with its own standard deviation, speed, what it is; of a long walk the first MOST_LISTED."""
+    """A line for each stride: time, length with its standard deviation, speed, kind; of a long walk the first MOST_LISTED."""
     steps = [s for s in track.strides if Flag.STANDING not in s.flags]
     lines = []
     for number, stride in enumerate(steps[:MOST_LISTED], start=1):

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console, Group
 from rich.live import Live
 
-from echostep.plan import Plan, load_plan
+from echostep.plan import load_plan
 from echostep_app.operation.operation import Operation
 from echostep_app.operation.recorded.record import OperationRecorder
 from echostep_app.operation.recorded.replay import Views, replay
@@ -27,8 +27,8 @@ from echostep_app.page.protocol import FRAME_S
 from echostep_app.printing.console import console_for_people, print_notices
 from echostep_app.printing.people import FaultNews, outlast_output, output_faults
 from echostep_app.team.commander import table
-from echostep_app.team.endpoint import Endpoint, parse_endpoint
-from echostep_app.team.inbox import Inbox, ListenerThread, Subscription
+from echostep_app.team.endpoint import BROKERS, Endpoint, parse_endpoint
+from echostep_app.team.inbox import Inbox, ListenerThread
 from echostep_app.team.messages.marks import ALL
 from echostep_app.team.messages.report import checked_name
 
@@ -94,7 +94,7 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
     if "://" not in url:
         replay(Path(url), load_plan(plan_path), seconds, views, console)
         return
-    endpoint = parse_endpoint(url, ("mqtt", "mqtts", "mesh"))
+    endpoint = parse_endpoint(url, BROKERS)
     operation, inbox = Operation(load_plan(plan_path)), Inbox()
     checked = checked_name("--team", team) if team else None
     with ExitStack() as opened:
@@ -104,12 +104,11 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
         opened.callback(recording.close)
         page = views.open_page(opened, operation, "echostep command", console)
         console.print(f"Recording: {recording.path}", highlight=False)
-        receiver = _receiver(endpoint, checked, operation.plan, inbox, lambda text: console.print(text, markup=False))
+        receiver = _receiver(endpoint, checked, inbox, lambda text: console.print(text, markup=False))
         opened.callback(receiver.close)
-        if page and endpoint.scheme != "mesh":  # marks need a broker
+        if page:
             page.feed.send = receiver.send
-        restorer = Restorer() if endpoint.scheme != "mesh" else None
-        run = _Run(operation, inbox, receiver, recorder, restorer)
+        run = _Run(operation, inbox, receiver, recorder, Restorer())
         with suppress(KeyboardInterrupt):
             _follow(run, page, console, math.inf if seconds is None else seconds, views)
         run.look(time.monotonic())
@@ -123,35 +122,27 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """An operation with its source and its recording. `restorer` None: the source keeps nothing."""
+    """An operation with its source and its recording."""
 
     operation: Operation
     inbox: Inbox
     receiver: ListenerThread
     recorder: OperationRecorder
-    restorer: Restorer | None
+    restorer: Restorer
 
     def look(self, now_s: float) -> None:
         """Empty the inbox, record its messages, and send the broker those shared messages again that it has lost."""
         unix_s, connected = time.time(), self.receiver.connected
         believed = self.operation.receive(*self.inbox.take_all(), now_s, unix_s)
-        if self.restorer:
-            restore(self.restorer, self.operation, self.receiver, believed, now_s)
+        restore(self.restorer, self.operation, self.receiver, believed, now_s)
         self.recorder.add(believed, now_s, unix_s, connected=connected, faults=output_faults())
 
 
-def _receiver(
-    endpoint: Endpoint, team: str | None, plan: Plan, inbox: Inbox, print_line: Callable[[str], None]
-) -> ListenerThread:
-    """A subscription to the reports of a team, or of all teams: at a broker, or over a Meshtastic node."""
-    if endpoint.scheme == "mesh":
-        from echostep_app.team.mesh.mesh import MeshListener
+def _receiver(endpoint: Endpoint, team: str | None, inbox: Inbox, print_line: Callable[[str], None]) -> ListenerThread:
+    """A subscription to the reports of a team, or of all teams, at a broker."""
+    from echostep_app.team.mqtt.publisher import Listener
 
-        listener: Subscription = MeshListener(endpoint, team, plan, inbox.put)
-    else:
-        from echostep_app.team.mqtt.publisher import Listener
-
-        listener = Listener(endpoint, [f"echostep/{team or '+'}/+/+", ALL], inbox.put)
+    listener = Listener(endpoint, [f"echostep/{team or '+'}/+/+", ALL], inbox.put)
     return ListenerThread(listener, lambda text: print_line(f"{endpoint}: {text}"))
 
 

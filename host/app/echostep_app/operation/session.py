@@ -135,6 +135,9 @@ class TableSession(GuardedSocket):
                 return self._feed.act(request)
         return ""
 
+    async def _tell_run(self) -> None:
+        """Nothing: each frame says it."""
+
     async def _next_frame(self) -> bytes | None:
         operation, scene = self._feed.operation, self._feed.latest
         if self._player is not None:

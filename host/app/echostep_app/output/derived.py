@@ -105,7 +105,7 @@ class Derived:
     """Derives the messages of each portion; `take` is called after `Tracker.take` of the same portion."""
 
     def __init__(self, tracker: Tracker, log_offset_ns: int = 0) -> None:
-        """`log_offset_ns`: times of the messages minus those of the arrivals."""
+        """`log_offset_ns`: times of the messages minus times of their arrival."""
         self._tracker, self._log_offset_ns = tracker, log_offset_ns
         tracker.arrival_ns(0.0)  # compiles its kernel before the run starts
         self._earth = earth_of(tracker.plan)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Messages that viewers of recordings (Foxglove, PlotJuggler) show without a plug-in.
 
-In: positions, headings, a plan. Out: `DerivedMessage`s for a `Recorder`: JSON with JSON Schemas, those of Foxglove where one fits
+In: positions, headings, a plan. Out: `DerivedMessage`s for a `Recorder`: JSON with JSON Schemas, Foxglove's where one fits
 [Foxglove, message schemas], else flat objects of numbers, which can be plotted. Owns nothing. The schemas contain only the fields that are filled.
 """
 
@@ -151,7 +151,7 @@ def location(
 
 
 def log_line(t_ns: int, text: str) -> DerivedMessage:
-    """A line on what is wrong with the run's output."""
+    """A line on the faults of the run's output."""
     body = {"timestamp": time_of(t_ns), "level": WARNING, "message": text, "name": "echostep", "file": "", "line": 0}
     return DerivedMessage(LOG, t_ns, body)
 

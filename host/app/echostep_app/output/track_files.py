@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: MIT
 """Tracks of recordings as files for other programs.
 
-In: a recording and a plan. Out: CSV, Parquet, GeoPackage, KML, GPX, or a recording with newly derived messages, chosen by the suffix of the file
-name. Owns nothing.
+In: a recording and a plan. Out: CSV, Parquet, GeoPackage, KML, GPX, a TUM trajectory, or a recording with newly derived messages, chosen by the
+suffix of the file name. Owns nothing.
 """
 
 from __future__ import annotations
 
 import csv
+import math
 import sqlite3
 from collections.abc import Callable, Iterator
 from pathlib import Path
+
+import numpy as np
 
 from echostep.errors import EchostepError
 from echostep.file_mode import claim
@@ -111,6 +114,15 @@ def _write_parquet(out: Path, track: TrackOnPlan) -> None:
     parquet.write_table(table.replace_schema_metadata({"plan": track.plan.name, "plan_sha256": track.plan.digest}), out)
 
 
+def _write_tum(out: Path, track: TrackOnPlan) -> None:
+    """Rows of time (s), place (m) and heading as a quaternion x, y, z, w: a trajectory that evo reads."""
+    rows = [
+        (e.t_s, e.x_m, e.y_m, e.z_m, 0.0, 0.0, math.sin(0.5 * e.heading_rad), math.cos(0.5 * e.heading_rad))
+        for e in track.estimates
+    ]
+    np.savetxt(out, rows, fmt="%.6f")
+
+
 Write = Callable[[Path, TrackOnPlan], None]
 FORMATS: dict[str, Write] = {
     ".csv": _write_csv,
@@ -118,6 +130,7 @@ FORMATS: dict[str, Write] = {
     ".gpkg": write_geopackage,
     ".kml": write_kml,
     ".gpx": write_gpx,
+    ".tum": _write_tum,
     ".mcap": lambda *_: None,
 }
 NEEDS_GEOREFERENCE = (".gpkg", ".kml", ".gpx")

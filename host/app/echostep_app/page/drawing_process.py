@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Draws the walls of a walk without a plan while it goes on, in a process of its own: the tracker never waits for it.
 
-In: measured segments and estimates, in the tracker's thread. Out: `ShownDrawing`s, and plans for others on request, in a thread that waits for
-the process. Owns both. A live run's process rests after each drawing as long as it has computed: half a core at most. A replay's draws at the same
-places of the walk, however fast it is computed; each stretch is longer by a share of the way, so that an hour is drawn 150 times.
+In: measured segments and estimates, in the tracker's thread. Out: `ShownDrawing`s, in a thread that waits for the process. Owns both. A live run's
+process rests after each drawing as long as it has computed: half a core at most. A replay's draws at the same places of the walk, however fast it
+is computed; each stretch is longer by a share of the way, so that an hour is drawn 150 times.
 """
 
 from __future__ import annotations
@@ -17,19 +17,12 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import IO, TYPE_CHECKING, NamedTuple
+from typing import IO
 
 from echostep.localization import Estimate
 from echostep.path import MeasuredSegment
-from echostep.plan import Pose
 from echostep_app.extras import lacks
 from echostep_app.page.elements.drawn_walls import ShownDrawing, WalkDrawing, shown_drawing, walk_drawing
-from echostep_app.page.shared import SharedDrawing
-from echostep_app.plan.places.refusals import refusals
-from echostep_app.plan.writer import plan_json
-
-if TYPE_CHECKING:
-    from echostep_app.mapping.mapper import Mapped
 
 STRETCH_M = 8.0  # of path, from which a new drawing is made: a few seconds
 LONGER = 0.02  # share of the way so far by which the stretches of a replay are longer
@@ -45,26 +38,12 @@ Stretch = tuple[
 ]  # with the estimate at its end, and how many points the trail has then
 
 
-class Asked(NamedTuple):
-    """A request to the process: draw these segments too; `plan`: pose at which a plan of the drawing begins, and its name; None for no plan."""
-
-    segments: list[MeasuredSegment]
-    plan: tuple[Pose, str] | None
-
-
 class DrawingProcess:
     """Call `add` with each segment; `show` is called with each drawing, in another thread. The process begins with the first stretch."""
 
-    def __init__(
-        self,
-        show: Callable[[ShownDrawing], None],
-        fail: Callable[[str], object],
-        *,
-        live: bool,
-        shared: SharedDrawing | None = None,
-    ) -> None:
-        """`fail` is called with the words for an early end; `live`: rest between two drawings; `shared` gets the plan of each drawing."""
-        self._show, self._fail, self._live, self._shared = show, fail, live, shared
+    def __init__(self, show: Callable[[ShownDrawing], None], fail: Callable[[str], object], *, live: bool) -> None:
+        """`fail` is called with the words for an early end; `live`: rest between two drawings."""
+        self._show, self._fail, self._live = show, fail, live
         self._stretches = Stretches(LONGER if not live else 0.0)
         self._changed = threading.Condition()
         self._ends = threading.Event()
@@ -125,14 +104,12 @@ class DrawingProcess:
 
     def _drawn(self, segments: list[MeasuredSegment]) -> tuple[WalkDrawing, float]:
         """The drawing with these segments, and the seconds of the processor that it took."""
-        child, shared = self._child, self._shared
+        child = self._child
         assert child is not None
         assert child.stdin is not None
         assert child.stdout is not None
-        _send(child.stdin, Asked(segments, (shared.start, shared.name) if shared else None))
-        drawing, plan, used_s = pickle.load(child.stdout)
-        if shared:
-            shared.put(plan)
+        _send(child.stdin, segments)
+        drawing, used_s = pickle.load(child.stdout)
         return drawing, used_s
 
 
@@ -180,7 +157,7 @@ def _send(to: IO[bytes], what: object) -> None:
 
 
 def main() -> None:
-    """The process: a drawing, its plan if asked for, and the seconds that both took, for each stretch."""
+    """The process: a drawing, and the seconds of the processor that it took, for each stretch."""
     from echostep_app.mapping.growing import GrowingMap
 
     with suppress(AttributeError, OSError):
@@ -188,18 +165,9 @@ def main() -> None:
     growing = GrowingMap()
     while True:
         try:
-            asked: Asked = pickle.load(sys.stdin.buffer)
+            segments: list[MeasuredSegment] = pickle.load(sys.stdin.buffer)
         except EOFError:
             return
         began_s = time.process_time()
-        mapped = growing.grow(asked.segments)
-        plan = _plan_bytes(mapped, *asked.plan) if asked.plan else b""
-        _send(sys.stdout.buffer, (walk_drawing(mapped), plan, time.process_time() - began_s))
-
-
-def _plan_bytes(mapped: Mapped, start: Pose, name: str) -> bytes:
-    """plan.json of a drawing whose walk begins at `start`, also of one that is refused: its reader is told so; empty before a wall is drawn."""
-    from echostep_app.mapping.plan import plan_of
-
-    plan, _ = plan_of(mapped, start, name)
-    return plan_json(plan).encode() if plan.is_drawn or refusals(plan) else b""
+        mapped = growing.grow(segments)
+        _send(sys.stdout.buffer, (walk_drawing(mapped), time.process_time() - began_s))

@@ -43,7 +43,9 @@ class GuardedSocket(ABC):
         self._player: Player | None = None  # of a recorded run
         self._frame_due = True  # the page needs a frame, even of the same moment
         self._seq = 0  # number of the newest frame
-        self._undrawn: dict[int, int | None] = {}  # number of a sent frame: arrival (ns) of the bytes that are new in it
+        self._undrawn: dict[
+            int, int | None
+        ] = {}  # number of a sent frame: arrival (ns) of the bytes that are new in it
 
     @abstractmethod
     async def _greet(self) -> None:
@@ -57,6 +59,7 @@ class GuardedSocket(ABC):
     async def _next_frame(self) -> bytes | None:
         """The frame of what this page has not been sent yet; None while nothing is new."""
 
+    @abstractmethod
     async def _tell_run(self) -> None:
         """Tell how the run stands, also a page in the background."""
 

@@ -32,7 +32,6 @@ from echostep_app.page.elements.stream_rates import StreamRateMeter
 from echostep_app.page.elements.undo_offer import UndoClock, echoes_fit
 from echostep_app.page.mailbox import Mailbox, popped
 from echostep_app.page.server import Address, PageServer
-from echostep_app.page.shared import SharedDrawing
 from echostep_app.plan.routing import RoutePlace
 from echostep_app.ports.arrival_clock import now_ns
 from echostep_app.wearer.alarm import watch_of
@@ -65,17 +64,15 @@ class LivePage:
         *,
         replay: bool = False,
         keeps: bool = False,
-        shared: SharedDrawing | None = None,
     ) -> None:
         """`guided` must have been made before: then it watches the tracker first, and its cue exists when the page gets an estimate.
 
         `address`: an address, or a server that shows this page while it is entered, and goes on after it.
-        `keeps`: keep the scenes of a live run, so that it can be played again after `end`. `shared` gets the plan that a walk without one draws.
+        `keeps`: keep the scenes of a live run, so that it can be played again after `end`.
         """
         self._tracker, self._watched = tracker, watch_of(tracker)
         self._guided = guided
         self._replay = replay
-        self._shared = shared
         self.mailbox = Mailbox(tracker.plan, title, replay=replay, keeps=keeps)
         self.truth: TruePath | None = None  # shown beside the estimates
         self.receipt_of: Callable[[int], str] | None = None  # delivery of a mayday; None: the run's reports go nowhere
@@ -119,7 +116,7 @@ class LivePage:
             self.server.show(self.mailbox)
         if not self._tracker.plan.is_drawn:
             fail = self.server.shared.faults.note_text
-            self._drawing = DrawingProcess(self.mailbox.add_drawing, fail, live=not self._replay, shared=self._shared)
+            self._drawing = DrawingProcess(self.mailbox.add_drawing, fail, live=not self._replay)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:

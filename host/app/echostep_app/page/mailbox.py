@@ -19,7 +19,6 @@ from echostep.ports.people.check_in import Call, CheckIn, Undo
 from echostep_app.page.elements.drawn_walls import ShownDrawing
 from echostep_app.page.elements.marks import ShownMark, ShownOrder
 from echostep_app.page.elements.scene import PageScene
-from echostep_app.page.elements.taps import PointPress, ShownPoints
 from echostep_app.page.over_time import OverTime
 from echostep_app.page.web.exchange import Exchange
 from echostep_app.plan.places.bearing import north_rad
@@ -103,9 +102,6 @@ class Mailbox:
             ShownDrawing, ...
         ] = ()  # in order of `t_s`; a live run has the newest only; replaced, never changed
         self.team: tuple[str, ...] = ()  # names of the teammates who can be met; replaced, never changed
-        self.points: ShownPoints | None = None  # of an acceptance walk; replaced, never changed
-        # Takes taps at points at once, in the server's thread
-        self.on_press: Callable[[PointPress], bool] | None = None
         self.on_publish: Callable[[], None] | None = None
         self.exchange = Exchange()
         self.check_ins: queue.Queue[CheckIn | Undo | Call] = queue.Queue(MOST_CHECK_INS)
@@ -154,11 +150,6 @@ class Mailbox:
         self.team = names
         self._announce()
 
-    def set_points(self, points: ShownPoints) -> None:
-        """Show which surveyed point comes next and call `on_publish`."""
-        self.points = points
-        self._announce()
-
     def keep(self, scene: PageScene) -> None:
         """Add the scene of an estimate to the run over time, and to the history that is played after `end`, if the run keeps one."""
         self.over_time.add(scene)
@@ -176,10 +167,6 @@ class Mailbox:
         """An error ends the run."""
         self.failure = words
         self._announce()
-
-    def add_press(self, press: PointPress) -> bool:
-        """Hand on a tap at a surveyed point; False when it is refused: in a replay, or by the guide of the walk."""
-        return not self.replay and self.on_press is not None and self.on_press(press)
 
     def add(self, waiting: queue.Queue[T], item: T) -> bool:
         """Queue what a page has said; False when it is refused: in a replay, or with a full queue."""

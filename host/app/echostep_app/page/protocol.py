@@ -29,7 +29,7 @@ from echostep_app.page.elements.likely_places import numbered
 from echostep_app.page.elements.marks import BeaconMark, ShownMark, ShownMeeting, ShownOrder
 from echostep_app.page.elements.scene import PageScene, ParticleSample, TruePosition
 from echostep_app.page.elements.stream_rates import StreamRates
-from echostep_app.page.elements.taps import Considered, ShownPoints
+from echostep_app.page.elements.taps import Considered
 from echostep_app.page.elements.undo_offer import UndoOffer
 from echostep_app.page.over_time import COLUMNS, Event, OverTime
 from echostep_app.page.player import PlayState
@@ -197,8 +197,7 @@ class FrameHeader:
     """One moment. `seq`: the page returns it when the frame is drawn. `goal`: the destination that was chosen on a page of this run.
 
     `errand`: who sent the wearer there, in words; empty when the wearer chose it. `orders`: those that are not understood yet. `team`: names of the
-    teammates for meetings, when they have changed; `met`: result of the newest meeting. `points`: what an acceptance walk asks for, when that has
-    changed. `gait`: that the wearer runs.
+    teammates for meetings, when they have changed; `met`: result of the newest meeting. `gait`: that the wearer runs.
     """
 
     seq: int
@@ -222,7 +221,6 @@ class FrameHeader:
     alarm: ShownAlarm | None
     marks: tuple[ShownMark, ...] | None
     team: tuple[str, ...] | None
-    points: ShownPoints | None
     met: ShownMeeting | None
     ended: str | None
     kind: Literal["frame"] = "frame"
@@ -309,7 +307,6 @@ class FrameParts:
     marks: tuple[ShownMark, ...] | None = None
     drawing: ShownDrawing | None = None
     team: tuple[str, ...] | None = None
-    points: ShownPoints | None = None
     ended: str | None = None
 
 
@@ -339,7 +336,6 @@ def frame(scene: PageScene, parts: FrameParts) -> bytes:
         alarm=scene.alarm,
         marks=parts.marks,
         team=parts.team,
-        points=parts.points,
         met=scene.met,
         ended=parts.ended,
     )

@@ -21,7 +21,6 @@ MOST_NAME = 32  # characters of a wearer's name, as in reports
 FASTEST = 32.0  # times as fast as it was recorded
 Identity = Annotated[str, Meta(min_length=8, max_length=64)]
 Integer = Annotated[int, Meta(gt=-(1 << 53), lt=1 << 53)]  # that JavaScript represents exactly
-Count = Annotated[int, Meta(ge=0, lt=1 << 31)]
 
 
 class Kept(msgspec.Struct, frozen=True):
@@ -49,19 +48,6 @@ class Understood(msgspec.Struct, frozen=True, tag_field="kind", tag="understood"
     """The wearer has understood a commander's order."""
 
     id: Annotated[str, Meta(min_length=1, max_length=64)]
-
-
-class AtPoint(msgspec.Struct, frozen=True, tag_field="kind", tag="at_point"):
-    """In an acceptance walk, while the page shows visit `number`: the wearer is at the point that it names, or at another one by its name."""
-
-    number: Count
-    name: Annotated[str, Meta(max_length=MOST_NAME)] = ""
-
-
-class NoTap(msgspec.Struct, frozen=True, tag_field="kind", tag="no_tap"):
-    """The newest tap at a surveyed point was a mistake."""
-
-    number: Count
 
 
 class GoTo(msgspec.Struct, frozen=True, tag_field="kind", tag="go_to"):
@@ -112,7 +98,7 @@ class Step(msgspec.Struct, frozen=True, tag_field="kind", tag="step"):
 
 
 PlayerRequest = SetPlaying | SetSpeed | Seek | Step
-_OwnRequest = Undo | Call | Consider | Met | Understood | AtPoint | NoTap | GoTo | EndGuidance | FrameDrawn | PlayerRequest
+_OwnRequest = Undo | Call | Consider | Met | Understood | GoTo | EndGuidance | FrameDrawn | PlayerRequest
 Request = CheckIn | _OwnRequest
 _KEPT = msgspec.json.Decoder(Kept)
 _REQUESTS = msgspec.json.Decoder(Entered | _OwnRequest)

@@ -20,13 +20,11 @@ from echostep_app.page.elements.drawn_walls import NO_DRAWING, ShownDrawing
 from echostep_app.page.elements.guidance import Destination, ShownGuidance
 from echostep_app.page.elements.marks import ShownMark, ShownOrder
 from echostep_app.page.elements.scene import PageScene, ParticleSample, is_placed
-from echostep_app.page.elements.taps import NO_TAP, PointPress, ShownPoints
 from echostep_app.page.guarded_socket import UNKNOWN, GuardedSocket
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.player import Player
 from echostep_app.page.shared import Shared
 from echostep_app.plan.places.bearing import heading_words
-from echostep_app.ports.arrival_clock import now_ns
 
 TOO_BUSY = "Not accepted: this is a replay, or the tracker is too busy."
 
@@ -50,7 +48,6 @@ class PageSession(GuardedSocket):
         self._orders: tuple[ShownOrder, ...] = ()
         self._drawing: ShownDrawing | None = None  # that the page has
         self._team: tuple[str, ...] | None = None  # that the page has
-        self._points: ShownPoints | None = None  # that the page has
         self._trail_count = 0  # points of the trail that the page has
         self._told_end = False
 
@@ -90,9 +87,8 @@ class PageSession(GuardedSocket):
                 refusal = "It is too late to undo this." if is_late else self._take(request)
             case Call():
                 refusal = self._take(request)
-            case requests.Met() | requests.Understood() | requests.AtPoint() | requests.NoTap():
-                for_team = requests.Met | requests.Understood
-                refusal = self._tell_team(request) if isinstance(request, for_team) else self._press(request)
+            case requests.Met() | requests.Understood():
+                refusal = self._tell_team(request)
             case requests.GoTo() if request.level < levels:
                 self._mailbox.set_goal(request.goal)
             case requests.EndGuidance():
@@ -116,16 +112,6 @@ class PageSession(GuardedSocket):
         if request.name not in self._mailbox.team:
             return f"{request.name} is not heard."
         return "" if self._mailbox.add(self._mailbox.met, request.name) else TOO_BUSY
-
-    def _press(self, request: requests.AtPoint | requests.NoTap) -> str:
-        """Queue a tap at a surveyed point for the guide of the walk; the reason of a refusal, else empty."""
-        points, number = self._mailbox.points, request.number
-        if points is None:
-            return "Not accepted: no points are measured in this run."
-        if points.number != number:
-            return "Not accepted: the walk is at another point by now."
-        typed = request.name if isinstance(request, requests.AtPoint) else NO_TAP
-        return "" if self._mailbox.add_press(PointPress(now_ns(), number, typed)) else TOO_BUSY
 
     async def _tell_run(self) -> None:
         mailbox = self._mailbox
@@ -154,8 +140,8 @@ class PageSession(GuardedSocket):
     def _is_new(self, scene: PageScene) -> bool:
         """Whether the page lacks something of what it would be sent with a scene."""
         mailbox = self._mailbox
-        had = (self._last, self._marks, self._orders, self._team, self._points, self._drawing)
-        now = (scene, mailbox.marks, mailbox.orders, mailbox.team, mailbox.points, mailbox.drawing_at(scene.t_s))
+        had = (self._last, self._marks, self._orders, self._team, self._drawing)
+        now = (scene, mailbox.marks, mailbox.orders, mailbox.team, mailbox.drawing_at(scene.t_s))
         playing = self._player is not None and self._player.playing
         return playing or any(new is not old for new, old in zip(now, had, strict=True))
 
@@ -169,7 +155,7 @@ class PageSession(GuardedSocket):
         """A frame with what this page has not been sent yet; from then on it counts as sent."""
         new_estimate = self._player is None and (self._last is None or scene.estimate is not self._last.estimate)
         begin = min(self._trail_count, scene.trail_count)  # a replay may go back
-        drawing, points = self._mailbox.drawing_at(scene.t_s), self._mailbox.points
+        drawing = self._mailbox.drawing_at(scene.t_s)
         parts = protocol.FrameParts(
             seq=self._numbered(scene.arrived_ns if new_estimate else None),
             where=self._shared.taps.where(scene.estimate) if scene.estimate else "",
@@ -187,10 +173,9 @@ class PageSession(GuardedSocket):
             marks=self._mailbox.marks if self._marks is not self._mailbox.marks else None,
             drawing=(drawing or NO_DRAWING) if drawing is not self._drawing else None,
             team=self._mailbox.team if self._team is not self._mailbox.team else None,
-            points=points if points is not self._points else None,
             ended=self._mailbox.summary if self._player is None or self._player.at_end else None,
         )
-        self._marks, self._team, self._drawing, self._points = self._mailbox.marks, self._mailbox.team, drawing, points
+        self._marks, self._team, self._drawing = self._mailbox.marks, self._mailbox.team, drawing
         self._orders = self._mailbox.orders
         self._last, self._trail_count, self._particles = scene, scene.trail_count, scene.particles
         return protocol.frame(scene, parts)

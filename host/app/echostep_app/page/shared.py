@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""State that all pages of a run share beside the mailbox, and the plan of a drawing for the team.
+"""State that all pages of a run share beside the mailbox.
 
-In: a plan; plan.json of a drawing, each replaces the one before. Out: `Shared`; the newest drawing, once. Owns the counts over pages,
-and the drawing: neither the thread that draws nor the run that publishes it waits.
+In: a plan. Out: `Shared`. Owns the counts over pages.
 """
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass, field, replace
 
-from echostep.plan import Plan, Pose
+from echostep.plan import Plan
 from echostep_app.page.elements.guidance import RouteFinder
 from echostep_app.page.elements.taps import Taps
 from echostep_app.page.web.faults import Faults
@@ -43,28 +41,3 @@ class Shared:
     def on(self, plan: Plan) -> Shared:
         """For the same pages, which show a run on another plan from now on."""
         return replace(self, route_finder=RouteFinder(plan), taps=Taps(plan))
-
-
-class SharedDrawing:
-    """`start`: pose at which the walk begins in the plan; `name`: its name; `most_bytes`: a longer plan is not kept, and counted in `too_long`."""
-
-    def __init__(self, start: Pose, name: str, most_bytes: int) -> None:
-        self.start, self.name = start, name
-        self.too_long = 0
-        self._most_bytes = most_bytes
-        self._lock = threading.Lock()
-        self._newest: bytes | None = None
-
-    def put(self, plan: bytes) -> None:
-        """A newer plan; empty: nothing is drawn yet."""
-        with self._lock:
-            if len(plan) > self._most_bytes:
-                self.too_long += 1
-            elif plan:
-                self._newest = plan
-
-    def take(self) -> bytes | None:
-        """The newest plan, if it was not taken yet."""
-        with self._lock:
-            newest, self._newest = self._newest, None
-            return newest

@@ -58,7 +58,7 @@ def _level(level: Level, i: int, faces: Faces) -> Iterator[PlanFinding]:
 
 
 def _gaps(solid: Floats, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]:
-    """Ends of walls that touch no wall, but are within `NEAR_M` of one that does not run parallel beside them."""
+    """Ends of walls that touch no wall, but are within `NEAR_M` of one that is not parallel to theirs."""
     ends = solid.reshape(-1, 2)
     if not len(ends):
         return
@@ -182,7 +182,7 @@ def _middle(level: Level) -> tuple[float, float]:
 
 
 def _sealed(area: BaseGeometry, level: Level, faces: Faces) -> bool:
-    """Whether stairs or a lift fill an enclosed space that has no door and no free area beside them."""
+    """Whether stairs or a lift fill an enclosed space that has no door and no other free area."""
     held = faces_under(area, faces)
     if OUTSIDE in held or held[1:]:
         return False

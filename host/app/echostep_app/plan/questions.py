@@ -55,7 +55,7 @@ def _once(questions: list[Question]) -> tuple[Question, ...]:
 
 
 def _together(group: list[Question]) -> list[Question]:
-    """One question for all alike: the answer is for each of them. That of a room is a short line which begins at its place."""
+    """One question for all alike: the answer counts for each. A room's is a short line which begins at its place."""
     return [
         replace(
             group[0],

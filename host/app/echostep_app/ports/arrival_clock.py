@@ -32,7 +32,7 @@ def now_s() -> float:
 
 
 class SleepWatch:
-    """Notices that the computer slept: the arrival clock has gone on, the clock that stands still meanwhile has not."""
+    """Detects that the computer slept: the arrival clock has advanced by more than the clock that stops in sleep."""
 
     def __init__(self, arrival_ns: Callable[[], int] = now_ns, awake_ns: Callable[[], int] = time.monotonic_ns) -> None:
         self._arrival_ns, self._awake_ns = arrival_ns, awake_ns

@@ -179,7 +179,7 @@ class SerialPorts:
         self._read_rest(name)
 
     def _read_rest(self, name: str) -> None:
-        """Put what the operating system has received before `stop` into the queue."""
+        """Put the bytes that the operating system received before `stop` into the queue."""
         with suppress(TypeError, EOFError, *PORT_FAULTS):
             port = self._ports[name]
             if (waiting := port.in_waiting) and (received := port.read(waiting)):

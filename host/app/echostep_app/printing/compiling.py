@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is shown while kernels are compiled: once on a computer, at the first start, for a minute or two.
+"""Progress of compiling the kernels: once on a computer, at the first start, for a minute or two.
 
 In: each kernel that no cache has (`jit`). Out: one line on standard error, on a terminal; or a count for the progress that is shown already. Owns
 what is called then.
@@ -19,7 +19,7 @@ COMPILING = "echostep: kernels are compiled, once on this computer: it takes a m
 
 
 def tell_of_compiling() -> None:
-    """From now on the first kernel that is compiled is told of."""
+    """Print a line when the first kernel is compiled from now on."""
     numbers = itertools.count()
     on_compiling[:] = [lambda: _tell(next(numbers))]
 

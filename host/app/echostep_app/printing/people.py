@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Standard output and standard error of a command, from its first line to its exit status.
 
-In: `to_people` around a command; whether what it prints is its result, or a view of a run. Out: the faults of both streams, an exit status. Owns
+In: `to_people` around a command; whether its output is its result, or a view of a run. Out: the faults of both streams, an exit status. Owns
 `sys.stdout` and `sys.stderr` meanwhile.
 
-A run (`live`, `record`, `replay`, `demo`, `command`, `export`) calls `outlast_output`: no stream ends, delays or fails it; the fault is told on the
+A run (`live`, `record`, `replay`, `demo`, `command`, `export`) calls `outlast_output`: no stream ends, delays or fails it; a fault is told on the
 other stream, on the page and in the recording. Any other command whose output is lost ends with status 2, as a compiler does on a full disk; a reader
 that had enough (`| head`) is no fault.
 """
@@ -90,7 +90,7 @@ def is_unread() -> bool:
 
 
 def lost_result() -> str:
-    """Why what a command printed is lost, where that is its result; empty where it is not, or nobody wants it."""
+    """Why the output of a command is lost, where that is its result; empty where it is not lost, or its reader has gone."""
     if not _open or _outlasting:
         return ""
     _open[0].flush()
@@ -98,7 +98,7 @@ def lost_result() -> str:
 
 
 def _fill_closed_files() -> None:
-    """Open what is closed of the files 0, 1, 2 on nothing: else the next file that is opened, as a recording, would be standard output."""
+    """Open each closed one of the files 0, 1, 2 on the null device: else the next file that is opened, as a recording, would be standard output."""
     for number in range(3):
         try:
             os.fstat(number)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Progress on the terminal, wherever a command takes longer than a moment.
 
-In: what is done; how far it is. Out: a line that is redrawn on a terminal and vanishes at the end, or one plain line elsewhere. Owns nothing.
+In: the name of the work; how far it is. Out: a line that is redrawn on a terminal and vanishes at the end, or one plain line elsewhere. Owns nothing.
 `listening_bar` owns the thread that moves it.
 """
 
@@ -26,7 +26,7 @@ Item = TypeVar("Item")
 
 @contextmanager
 def progress_line(text: str) -> Iterator[Callable[[float], None]]:
-    """Show what is being done while the block runs, and how many kernels it has compiled; the block is given a function that shows a share."""
+    """Show the name of the work while the block runs, and the number of compiled kernels; the block is given a function that shows a share."""
     if not console.is_terminal:
         timer = Timer(SHOWN_AFTER_S, console.print, [f"{text} ..."])
         timer.daemon = True

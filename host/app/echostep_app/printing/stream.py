@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """A text stream to people that never raises: what cannot be written is dropped, and the reason is kept.
 
-In: texts; standard output or standard error. Out: their bytes. Owns what is not written yet and, once no write may wait, a thread.
+In: texts; standard output or standard error. Out: their bytes. Owns the unwritten text and, once no write may wait, a thread.
 
-A terminal may be closed, the reader of a pipe may go, a disk may be full, a terminal may be stopped by Ctrl-S. A command whose result is what it
-prints waits for its reader, and its exit status tells of a loss. A run does not wait: after `outlast` a thread writes, and what is more than
+A terminal may be closed, the reader of a pipe may go, a disk may be full, a terminal may be stopped by Ctrl-S. A command whose result is its
+output waits for its reader, and its exit status reports a loss. A run does not wait: after `outlast` a thread writes, and text more than
 `QUEUE_BYTES` behind is dropped.
 """
 
@@ -58,7 +58,7 @@ class PeopleStream(io.TextIOBase):
 
     @property
     def is_gone(self) -> bool:
-        """Whether nobody reads: for a command that would print on for long."""
+        """Whether the reader has gone: for a command with much output."""
         return self.fault.endswith(GONE)
 
     def fileno(self) -> int:
@@ -68,7 +68,7 @@ class PeopleStream(io.TextIOBase):
         return self._stream.fileno()
 
     def isatty(self) -> bool:
-        """Whether it is a terminal that takes what is written."""
+        """Whether the stream is a terminal that accepts text."""
         return self._on_terminal and not self.fault
 
     def writable(self) -> bool:
@@ -93,7 +93,7 @@ class PeopleStream(io.TextIOBase):
         return len(text)
 
     def flush(self) -> None:
-        """Write what is buffered; of a stream that must not delay, the thread does."""
+        """Write the buffered text; of a stream that must not delay, the thread does."""
         if self._thread is None and not self.fault and self._file is not None:
             with self._changed:
                 data = bytes(self._buffer)

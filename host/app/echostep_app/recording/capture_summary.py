@@ -16,7 +16,7 @@ from echostep.xsens.reader import MtxCounts
 
 
 def summary(decoder: Decoder) -> list[str]:
-    """A line on each board's frames, lines on the MT's frames, on the format of legacy data, and on the tracker's use of them."""
+    """A line on each board's frames, lines on the MT's frames, on the format of legacy data, and on how many of them the tracker uses."""
     lines = [*_board_lines("Board", decoder.board), *_board_lines("Foot board", decoder.foot)]
     if decoder.mt.names:
         lines += [_frames_line(decoder.mt), *_format_lines(decoder.mt), *_gap_lines(decoder.mt), _tracker_line(decoder)]
@@ -36,7 +36,7 @@ def _joined(parts: list[str]) -> str:
 
 
 def _reasons(*counts: tuple[int, str]) -> str:
-    """Those of the counts that are not zero, as "3 of a wrong length"."""
+    """The counts above zero, as "3 of a wrong length"."""
     return _joined([f"{count} {reason}" for count, reason in counts if count])
 
 

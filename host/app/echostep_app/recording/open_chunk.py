@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The stream of an MCAP writer of chunks, whose records are in the file before their chunk is closed.
 
-In: records as they come, and what the writer writes. Out: the bytes of the file. Owns the offset of the open chunk.
+In: records as they come, and the bytes that the writer makes of them. Out: the bytes of the file. Owns the offset of the open chunk.
 
     open     private record PRIVATE of CHUNK_HEAD bytes | records ...
     closed   head of the chunk, as long                 | the same records ... | their index
@@ -26,7 +26,7 @@ _MESSAGE_HEAD = struct.Struct("<BQHIQQ")
 
 
 class OpenChunk:
-    """What the writer uses of a file: `write`, `tell` and `flush`. It closes a chunk by one `write` of the whole record."""
+    """The methods of a file that the writer calls: `write`, `tell` and `flush`. It closes a chunk by one `write` of the whole record."""
 
     def __init__(self, file: BackgroundWriter) -> None:
         self._file = file

@@ -72,7 +72,7 @@ class Recorder:
     """Writes chunks to a new file; raises EchostepError when the file cannot be created, or exists."""
 
     def __init__(self, path: Path | str, metadata: Mapping[str, str]) -> None:
-        """`metadata`: what a replay needs and a reader may want to know (start, seed, plan, note), as text."""
+        """`metadata`: start, seed, plan and note, as text, for replays and readers."""
         self._begin(BackgroundWriter(path), metadata)
         self._waited_ns: int | None = None  # arrival time of the chunk of the last wait
         self.lost_chunks = 0  # not recorded: more than `RAW_LIMIT` bytes waited for the disk

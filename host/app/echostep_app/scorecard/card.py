@@ -59,17 +59,7 @@ class Scorecard:
     protection_holds: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class Scored:
-    """A scorecard, and what it was computed from: the points, and the radius stated at each, (n,), `radius_name`."""
-
-    card: Scorecard
-    matched: Matched
-    radius_m: Floats | None
-    radius_name: str
-
-
-def score(track: ScoredPath, truth: ScoredPath, plan: Plan | None = None, setup_s: float | None = None) -> Scored:
+def score(track: ScoredPath, truth: ScoredPath, plan: Plan | None = None, setup_s: float | None = None) -> Scorecard:
     """Compare a track with the truth; raises EchostepError where they have no moment in common."""
     at = match(track, truth)
     error = at.xy_m - at.true_xy_m
@@ -82,7 +72,7 @@ def score(track: ScoredPath, truth: ScoredPath, plan: Plan | None = None, setup_
     latency = None if track.latency_s is None else track.latency_s[at.row]
     radius, protection = (None if r is None else r[at.row] for r in (track.radius95_m, track.protection_m))
     covered, available = _coverage(track, truth)
-    card = Scorecard(
+    return Scorecard(
         track=str(track.path), points=len(horizontal), span_s=float(at.t_s[-1] - at.t_s[0]),
         horizontal=error_statistics(horizontal), vertical=_statistics(vertical), spherical=_statistics(spherical),
         bias_m=float(np.hypot(*error.mean(0))), covariance_m2=(xx, xy, yy),
@@ -97,9 +87,6 @@ def score(track: ScoredPath, truth: ScoredPath, plan: Plan | None = None, setup_
         ellipse95_holds=_ellipse_holds(track, at, error), radius95_holds=_holds(radius, horizontal),
         protection_holds=_holds(protection, horizontal),
     )  # fmt: skip
-    if protection is not None:
-        return Scored(card, at, protection, "protection radius")
-    return Scored(card, at, radius, "95 % radius")
 
 
 def _floors_off(at: Matched) -> Floats | None:

@@ -102,6 +102,6 @@ def _text(rows: dict[str, Floats], every: int) -> str:
 def card_of(estimates: Sequence[Estimate], truth: ScoredPath) -> Scorecard | None:
     """The scores of estimates, as `echostep score` gives them; None where they have no moment in common with the truth."""
     try:
-        return score(track_of(estimates), truth).card if estimates else None
+        return score(track_of(estimates), truth) if estimates else None
     except EchostepError:
         return None

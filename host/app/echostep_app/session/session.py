@@ -54,7 +54,6 @@ from echostep_app.session.sinks import (
 
 if TYPE_CHECKING:
     from echostep_app.page.live import LivePage
-    from echostep_app.page.shared import SharedDrawing
     from echostep_app.session.team.subscription import TeamSubscription
     from echostep_app.team.endpoint import Endpoint, Outlet
     from echostep_app.team.publish import Publishing, Source
@@ -96,7 +95,6 @@ class Session:
         self.message_sources: list[MessageSource] = []  # what people and team send during the run
         self._publishing: Publishing | None = None
         self._truth: ScoredPath | None = None
-        self._drawing: SharedDrawing | None = None  # of a walk without a plan, for the team
         self._sinks: list[Sink] = []
         self._writers: list[Callable[[list[DerivedMessage]], None]] = []  # of what is derived from estimates
         self._opened = ExitStack()
@@ -106,7 +104,6 @@ class Session:
         for sentence in refusals(self.tracker.plan):
             _print_line(sentence)
         with ExitStack() as opened:  # closes what is open already when a later part cannot be opened
-            self._open_drawing(opened)
             self._open_page(opened)
             self._open_publishing(opened)
             self._open_team(opened)
@@ -118,21 +115,6 @@ class Session:
         if self.page and error is not None and not isinstance(error, KeyboardInterrupt):
             self.page.fail(words_of(error))
         self._opened.__exit__(kind, error, at)
-
-    def _open_drawing(self, opened: ExitStack) -> None:
-        """A live walk without a plan is drawn for the team, by the page or, without one, unseen."""
-        if self.recorded is not None or self.tracker.plan.is_drawn or self._broker is None:
-            return
-        from echostep_app.session.team.feeds import UnseenDrawing, shared_drawing
-
-        assert self.output.outlet
-        name = self.output.outlet.name
-        self._drawing = shared_drawing(self.tracker, name)
-        _print_line(
-            f"Once the walk has drawn walls, they are offered to {self._broker}: teammates take them by --plan wearer:{name}"
-        )
-        if self.output.page is None:
-            opened.callback(UnseenDrawing(self.tracker, self._drawing, _print_line).close)
 
     @property
     def _broker(self) -> Endpoint | None:
@@ -153,7 +135,6 @@ class Session:
             self.guided,
             replay=self.recorded is not None,
             keeps=self.source == "simulated",
-            shared=self._drawing,
         )
         print_page(console, page.server.urls)
         page.fault_sources.append(FaultNews().words)
@@ -230,7 +211,7 @@ class Session:
             feed = TeamFeed(subscription, outlet.team, self.guided.name, plan, _print_line)
             self.message_sources.append((TEAM, feed.pop))
         teammates = TeammateFeed(subscription, outlet, run, plan)
-        self._sinks.append(teammate_sink(teammates, self.tracker, page, self._drawing))
+        self._sinks.append(teammate_sink(teammates, self.tracker, page))
         self.message_sources.append((TEAM_BEACONS, teammates.beacons))
         if page is None:
             return

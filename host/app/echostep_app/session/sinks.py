@@ -24,7 +24,6 @@ from echostep_app.recording.recorder import DerivedMessage
 
 if TYPE_CHECKING:
     from echostep_app.page.live import LivePage
-    from echostep_app.page.shared import SharedDrawing
     from echostep_app.session.team.feeds import MarkFeed
     from echostep_app.session.team.teammate_feed import TeammateFeed
 
@@ -58,25 +57,17 @@ def page_sink(page: LivePage) -> Sink:
     return Sink(take, page.note_arrival, page.mailbox.end)
 
 
-def teammate_sink(
-    teammates: TeammateFeed, tracker: Tracker, page: LivePage | None, drawing: SharedDrawing | None
-) -> Sink:
-    """Exchange with teammates: this wearer's beacons and drawing for them when they are due, their names for the page when they change."""
+def teammate_sink(teammates: TeammateFeed, tracker: Tracker, page: LivePage | None) -> Sink:
+    """Exchange with teammates: this wearer's beacons for them when they are due, their names for the page when they change."""
 
     def take(_: Portion, estimates: list[Estimate]) -> None:
         names = teammates.news()
         if estimates:
             teammates.share(tracker.own_beacons)
-        if drawing:
-            teammates.share_drawing(drawing)
         if page and names is not None:
             page.mailbox.set_team(names)
 
-    def end(_: str) -> None:
-        if drawing and drawing.too_long:
-            console.print("The drawing became too large for the team: what was drawn later was not sent")
-
-    return Sink(take, end=end)
+    return Sink(take)
 
 
 def mark_sink(marks: MarkFeed, page: LivePage) -> Sink:

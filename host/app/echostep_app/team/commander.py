@@ -86,7 +86,7 @@ def table(
 
 
 def _widths(rows: Sequence[Mapping[str, str]], columns: int) -> dict[str, int]:
-    """Width of each column that fits into `columns` characters; the note takes what is left."""
+    """Width of each column that fits into `columns` characters; the note takes the rest."""
     widths = {name: max([len(name), *(cell_len(row[name]) for row in rows)]) for name in COLUMNS}
     widths |= {name: min(widths[name], MAX_COLUMN_WIDTH) for name in WORDS} | {"note": LEAST_NOTE}
 

@@ -59,14 +59,14 @@ def event(report: Report) -> bytes | None:
 
 
 def events(report: Report) -> list[bytes]:
-    """The event of a report, unless it has no position on Earth, and that of its emergency, if any."""
+    """The event of a report with a position on Earth, and the event of its emergency, if any."""
     return [made for made in (event(report), emergency(report)) if made is not None]
 
 
 def emergency(report: Report) -> bytes | None:
     """A mayday as TAK's emergency, or its end; None without a mayday. It goes out without a position on Earth too: its point is then unknown.
 
-    The form is that of ATAK: uid of the wearer and "-9-1-1", a link to the wearer, `emergency` in the detail.
+    The form is ATAK's: uid of the wearer and "-9-1-1", a link to the wearer, `emergency` in the detail.
     """
     alarm, place = report.alarm, report.place
     if alarm is None or alarm.kind == "asking":

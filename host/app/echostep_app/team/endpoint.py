@@ -14,15 +14,11 @@ from echostep.errors import EchostepError
 from echostep_app.extras import require
 from echostep_app.team.messages.report import checked_name
 
-PORTS = {"mqtt": 1883, "mqtts": 8883, "cot+udp": 6969, "cot+tcp": 8087, "cot+tls": 8089, "mesh": 0}
+PORTS = {"mqtt": 1883, "mqtts": 8883, "cot+udp": 6969, "cot+tcp": 8087, "cot+tls": 8089}
 FILES = ("ca", "cert", "key", "password")
 NAME = "name"  # that the server's certificate has, where it is not the host's
 BROKERS = ("mqtt", "mqtts")  # schemes of brokers, which keep messages
-PACKAGES = dict.fromkeys(PORTS, "pyproj") | {
-    "mqtt": "paho",
-    "mqtts": "paho",
-    "mesh": "meshtastic",
-}  # that a scheme needs
+PACKAGES = dict.fromkeys(PORTS, "pyproj") | dict.fromkeys(BROKERS, "paho")  # that a scheme needs
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,15 +32,12 @@ class Endpoint:
     password: str | None
     files: dict[str, str]
     certificate_name: str = ""
-    wearers: int = 0  # that share the channel of a mesh; 0: not given
 
     @property
     def secure(self) -> bool:
         return self.scheme in ("mqtts", "cot+tls")
 
     def __str__(self) -> str:
-        if self.scheme == "mesh":
-            return f"mesh://{self.host}"
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{self.scheme}://{host}:{self.port}"
 
@@ -60,8 +53,6 @@ def parse_endpoint(url: str, schemes: tuple[str, ...] = tuple(PORTS)) -> Endpoin
         raise EchostepError(f"{shown}: not an address: {error}") from error
     if parts.scheme in schemes:
         require(shown, PACKAGES[parts.scheme])
-    if parts.scheme == "mesh" and "mesh" in schemes:
-        return _mesh(shown, parts.netloc + parts.path, asked)
     if parts.scheme not in schemes:
         raise EchostepError(f"{shown}: expected one of {', '.join(f'{s}://' for s in schemes)}")
     if not host or port == 0 or parts.path not in ("", "/") or parts.fragment:
@@ -86,14 +77,6 @@ def parse_endpoint(url: str, schemes: tuple[str, ...] = tuple(PORTS)) -> Endpoin
     if endpoint.user is not None and "mqtt" not in parts.scheme:
         raise EchostepError(f"{shown}: user and password are for mqtt:// and mqtts://")
     return endpoint
-
-
-def _mesh(shown: str, port: str, asked: dict[str, list[str]]) -> Endpoint:
-    """A Meshtastic node on a serial port, as mesh:///dev/ttyUSB0?wearers=5."""
-    wearers = asked.pop("wearers", ["0"])[-1]
-    if not port.startswith("/") or asked or not (wearers.isascii() and wearers.isdigit() and int(wearers) <= 1000):
-        raise EchostepError(f"{shown}: expected mesh:///dev/PORT[?wearers=N]")
-    return Endpoint("mesh", port, 0, None, None, {}, wearers=int(wearers))
 
 
 def _is_resolvable(host: str) -> bool:

@@ -68,10 +68,10 @@ class Inbox:
 
 
 class Subscription(Protocol):
-    """Where messages come from: a broker, or a radio."""
+    """Where messages come from: a broker."""
 
     def open(self) -> str:
-        """Connect; returns what is refused of it, in words, empty if nothing; raises OSError."""
+        """Connect; returns the refused part in words, empty if there is none; raises OSError."""
 
     def run_once(self, timeout_s: float) -> None:
         """Wait for one message and pass it on; raises OSError when the connection is broken."""

@@ -66,7 +66,7 @@ class OutboxCounts:
 
     offered: int = 0
     sent: int = 0  # without heartbeats
-    left_out: int = 0  # by the transport: no time in the air, no point for a map, nobody listens
+    left_out: int = 0  # by the transport: no point for a map, nobody listens
     heartbeats: int = 0
     overtaken: int = 0
     breaks: int = 0
@@ -234,7 +234,7 @@ def steadied(report: Report, age_s: float, steady: SteadyStatus) -> Report:
 
 
 def without_place(report: Report, last: Position | None) -> Report:
-    """The report of a lost wearer: without position and place on Earth, with the last position that was known."""
+    """The report of a lost wearer: without position and place on Earth, with the last known position."""
     return replace(report, position=None, place=None, last_place=last)
 
 

@@ -29,7 +29,7 @@ from echostep_app.plan.places.bearing import KNOWN_HEADING_RAD
 from echostep_app.plan.places.whereabouts import Whereabouts
 from echostep_app.printing.lines import moment
 from echostep_app.team.cot import StreamTransport, UdpTransport
-from echostep_app.team.endpoint import Endpoint, Outlet
+from echostep_app.team.endpoint import BROKERS, Endpoint, Outlet
 from echostep_app.team.georeference import GroundPlane
 from echostep_app.team.messages.report import (
     WITHOUT_PLAN,
@@ -72,7 +72,7 @@ class Publishing:
         self._empty = empty_report(tracker.plan, outlet.name, outlet.team, run, source)
         self._ground = GroundPlane(tracker.plan) if tracker.plan.georeference else None
         self._whereabouts = Whereabouts(tracker.plan)
-        transports = [(_transport(e, tracker.plan, outlet, run, print_line), str(e)) for e in outlet.endpoints]
+        transports = [(_transport(e, tracker.plan, outlet, run), str(e)) for e in outlet.endpoints]
         self._outboxes = [Outbox(transport, name, print_line) for transport, name in transports]
         self._last = self._empty
         self._known: Position | None = None  # the last position that was a place
@@ -114,7 +114,7 @@ class Publishing:
         return "; ".join(f"{box.name}: {box.fault}" for box in self._outboxes if box.fault)
 
     def receipt(self, number: int) -> str:
-        """What is known of the delivery of the mayday with this number, in a sentence."""
+        """State of delivery of the mayday with this number, in a sentence."""
         kinds = [
             delivery for box in self._outboxes if box.delivered
             for alarm, delivery in (box.delivered,) if (alarm.kind, alarm.number) == ("mayday", number)
@@ -276,14 +276,8 @@ def battery_percent() -> int | None:
     return None
 
 
-def _transport(
-    endpoint: Endpoint, plan: Plan, outlet: Outlet, run: str, print_line: Callable[[str], None]
-) -> Transport:
-    if endpoint.scheme == "mesh":
-        from echostep_app.team.mesh.mesh import MeshTransport
-
-        return MeshTransport(endpoint, (outlet.team, outlet.name), print_line)
-    if endpoint.scheme in ("mqtt", "mqtts"):
+def _transport(endpoint: Endpoint, plan: Plan, outlet: Outlet, run: str) -> Transport:
+    if endpoint.scheme in BROKERS:
         from echostep_app.team.mqtt.publisher import MqttTransport
 
         return MqttTransport(endpoint, outlet.team, outlet.name, run)

@@ -100,7 +100,7 @@ def _identify(context: ssl.SSLContext, endpoint: Endpoint, content: bytes, passw
 
 
 def _pkcs12(endpoint: Endpoint, name: str, content: bytes, password: bytes | None) -> PKCS12KeyAndCertificates:
-    """What a file of PKCS #12 holds; raises EchostepError when it cannot be opened."""
+    """Contents of a PKCS #12 file; raises EchostepError when it cannot be opened."""
     if lacking := lacks("PKCS #12", "cryptography"):
         file = Path(endpoint.files[name]).name
         pem = f"{file.rpartition('.')[0] or file}.pem"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Falls: an impact just after an upright posture, then lying with little motion.
 
-In: tenths of a second of the belt (with the thigh's force beside them) and of the foot, and strides, in order of their messages. Out: `Fall`s; the
-trunk's tilt. Owns the standing directions and what was last upright.
+In: tenths of a second of the belt (with the thigh's force) and of the foot, and strides, in order of their messages. Out: `Fall`s; the
+trunk's tilt. Owns the standing directions and the last upright part.
 
 The phases are from [Kangas et al. 2008, Gait & Posture 28, 285-291] at the waist: impact of at least 2 g, then posture, lying when the vertical
 force is at most half of gravity, a tilt of 60 degrees; their dip below 0.6 g before the impact is not required, since slow falls lack it. To exclude
@@ -135,7 +135,7 @@ class Falls:
         self._sole.add_stride(calm, [x.rate for x in foot if x.turning < MOST_RAD_S])
 
     def add_belt(self, tenth: Tenth) -> Fall | None:
-        """A tenth of the belt's accelerometer and gyro; beside it the thigh's force."""
+        """A tenth of the belt's accelerometer and gyro; with the thigh's force."""
         self._belt_tenths.append(tenth)
         thigh_rad = self._thigh.tilt_rad(tenth.beside)
         return self._belt.add(tenth, self._trunk, may_lie=not thigh_rad < THIGH_RAD)

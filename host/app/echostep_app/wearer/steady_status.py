@@ -3,7 +3,7 @@
 
 In: statuses with the estimates' own times, so that a live run and its replay say the same. Out: the worst of the last HOLD_S. Owns those.
 The one rule for page, speech, terminal and reports; files, and whatever computes on, have each estimate's own status.
-`running_note`: a few words beside the status while the foot rests too briefly for a walk.
+`running_note`: a few words after the status while the foot rests too briefly for a walk.
 """
 
 from __future__ import annotations

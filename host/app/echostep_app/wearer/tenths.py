@@ -21,7 +21,7 @@ class Tenth(NamedTuple):
     """A tenth of a second that ends at `end_s`, in the sensor's axes. NaN where a sensor is missing.
 
     `force` (3,): mean specific force, m/s2; `peak`: its largest size; `unrest`: rms of its deviation from the mean. `rate` (3,): mean angular rate,
-    rad/s; `turning`: its rms. `beside` (3,): mean specific force of the sensor beside it.
+    rad/s; `turning`: its rms. `beside` (3,): mean specific force of the second sensor.
     """
 
     end_s: float
@@ -43,7 +43,7 @@ class Tenths:
     def cut(self, t_s: Floats, force: Floats, rate: Floats, beside: Floats | None = None) -> list[tuple[int, Tenth]]:
         """Tenths that samples complete, each with the index of the sample that does; samples of an earlier tenth are skipped.
 
-        `t_s` (n,), `force` and `rate` (n, 3), `beside` (n, 3): of another sensor, read at the same instants.
+        `t_s` (n,), `force` and `rate` (n, 3), `beside` (n, 3): of a second sensor, read at the same instants.
         """
         index = np.floor(t_s / TENTH_S).astype(np.int64)
         in_order = np.flatnonzero(index >= np.maximum.accumulate(np.r_[self._index, index])[:-1])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
 """Setting up an Xsens MT: requests, answers, and the products that can be set up.
 
-In: an open port. Out: a device that sends what the tracker needs, or an EchostepError. Owns nothing.
+In: an open port. Out: a device that sends the tracker's quantities, or an EchostepError. Owns nothing.
 """

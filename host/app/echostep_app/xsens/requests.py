@@ -48,7 +48,7 @@ class Request:
     rates: tuple[tuple[int, int], ...] = ()
 
     def fault(self, answer: bytes) -> str | None:
-        """What is wrong with this answer, as text; "" when it is right, None when it answers another request of the same name."""
+        """The fault of this answer, as text; "" when it is right, None when it answers another request of the same name."""
         if self.rates:
             return _rate_fault(dict(self.rates), answer)
         if self.answer is None or self.answer == answer:

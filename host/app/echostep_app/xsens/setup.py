@@ -11,7 +11,7 @@ In: bytes from the MT's port, and a clock in seconds. Out: bytes to send, and th
 A WakeUp starts again at any time, and so does a measurement in SILENT. A device that never answered is asked for GoToConfig again until it does.
 
 An acknowledgement carries the identifier of its request plus one; an error message carries a code instead [Manual 5.3.1 and 5.3.2].
-Which MT a device is, is known by its product code; the MTx's successors are the MTi 1 and 600 series.
+The product code tells the kind of MT; the MTx's successors are the MTi 1 and 600 series.
 """
 
 from __future__ import annotations

@@ -41,8 +41,7 @@ LEAST_RANGE_M = 0.01  # least range after the bias is subtracted: 0 would mean n
 @dataclass(frozen=True, slots=True)
 class RangerSettings:
     """`speed_of_sound_m_s`; 0: by the temperature that the board measures. `delay_s` from the time stamp of the trigger to the ultrasonic burst;
-    `ahead_deg`: how far both rangers look ahead of abeam, as worn on the belt; `left_bias_m`, `right_bias_m`: how much too far each measures
-    (`echostep calibrate rangers`). `learn`: after each live walk on a plan, suggest settings for its rangers.
+    `ahead_deg`: how far both rangers look ahead of abeam, as worn on the belt; `left_bias_m`, `right_bias_m`: how much too far each measures.
     """
 
     speed_of_sound_m_s: float = 0.0
@@ -50,7 +49,6 @@ class RangerSettings:
     ahead_deg: float = 0.0
     left_bias_m: float = 0.0
     right_bias_m: float = 0.0
-    learn: bool = False
 
     def __post_init__(self) -> None:
         """Raise ValueError for rangers that do not look sideways, or with values that no ranger has."""

@@ -37,7 +37,7 @@ from echostep.odometry.heading_fusion import HeadingFusion
 from echostep.odometry.synchronizer import BAROMETER, MEASUREMENT, Synchronizer
 from echostep.odometry.wearer import WearerWatch
 from echostep.path import Dropout, MeasuredSegment, PathSegment
-from echostep.ports.chunks import BOARD, FOOT, GATEWAY, LINES, MTX, POINT, TEAM, Portion
+from echostep.ports.chunks import BOARD, FOOT, GATEWAY, LINES, MTX, TEAM, Portion
 from echostep.ports.people.check_in import PERSON
 from echostep.ports.people.meeting import MEETING
 from echostep.ports.people.team_beacons import TEAM_BEACONS
@@ -163,7 +163,7 @@ class FrontEnd:
 
     def _count_unknown_ports(self, portion: Portion) -> None:
         for k, port in enumerate(portion.ports):
-            if port not in (BOARD, MTX, FOOT, GATEWAY, PERSON, TEAM, MEETING, TEAM_BEACONS, POINT, LINES):
+            if port not in (BOARD, MTX, FOOT, GATEWAY, PERSON, TEAM, MEETING, TEAM_BEACONS, LINES):
                 self._unknown_ports += int((portion.port == k).sum())
 
     def _count_bad_times(self, board: Arrivals, times: Times) -> None:

@@ -84,8 +84,8 @@ class Question:
 class Level:
     """One level: `walls` (n, 4) and `windows` (k, 4) are x0, y0, x1, y1 in map metres; doors are gaps in them; obstacles are outlines (m, 2).
 
-    `doubtful` (d, 4): walls of an older plan that echoes passed, or of a drawing that are not known well enough; they block nothing. `place_sd`
-    (k, 3): x, y of a drawn wall, and the standard deviation per axis of its place in the building.
+    `doubtful` (d, 4): walls of a drawing that are not known well enough; they block nothing. `place_sd` (k, 3): x, y of a drawn wall, and the
+    standard deviation per axis of its place in the building.
     """
 
     name: str
@@ -216,7 +216,7 @@ def load_plan(path: Path | str) -> Plan:
     try:
         return parse_plan(raw)
     except NotJsonError as error:
-        formats = "DXF, IMDF, OSM, IFC, GeoJSON or WRLD"
+        formats = "DXF, IMDF, OSM, IFC or GeoJSON"
         remedy = f"of another format ({formats}), echostep plan import makes one"
         raise EchostepError(f"{path}: {error}; {remedy}") from error
     except ValueError as error:

@@ -20,7 +20,6 @@ BOARD = "board"
 MTX = "mtx"
 FOOT = "foot"  # a second board, at the ankle, in place of an MTx
 GATEWAY = "gateway"
-POINT = "point"  # taps at surveyed points: they never reach the tracker, a track is judged by them
 LINES = "lines"  # text of any foot IMU, recorded; its samples are chunks of MTX [echostep_app.session.runs.live_lines]
 TEAM = "team"  # places of teammates, for a rescuer's guidance
 

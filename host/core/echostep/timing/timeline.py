@@ -11,7 +11,6 @@ A device that restarts gets a new epoch, set by arrival times.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -114,15 +113,6 @@ class Timeline:
     def stray_edges(self) -> int:
         """Edges on the board's SyncOut input that did not come from the MTx."""
         return int(self._edges["all_strays"])
-
-    @property
-    def foot_against_board(self) -> float:
-        """How much faster the clock of the foot's sensor runs than the board's, s/s: by SyncOut edges, else by arrivals; NaN without a board."""
-        if self.synchronised:
-            return float(self._edges["nominal_s"] / self._edges["period_s"]) - 1.0
-        if not (self._board["started"] and self._mtx["started"]):
-            return math.nan
-        return float(self._board["drift"] - self._mtx["drift"])
 
     def arrival_ns(self, t_s: float) -> int:
         """Arrival time, on the host's clock, of undelayed bytes about `t_s`; 0 before any message."""

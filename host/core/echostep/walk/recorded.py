@@ -65,7 +65,7 @@ def tracker_of(
     metadata, path = recording.metadata, recording.path
     if not isinstance(settings, Settings):
         text = metadata.get("settings_toml", "") if settings is None else read_settings(settings)
-        settings = parse_settings(text, str(path if settings is None else settings))
+        settings = parse_settings(text, str(path if settings is None else settings), recorded=settings is None)
     start = start or recorded_start(metadata, path)
     seed = recorded_seed(metadata, path) if seed is None else seed
     return Tracker(plan, start, settings, seed, waits=metadata.get("start") == CHECK_IN_START)

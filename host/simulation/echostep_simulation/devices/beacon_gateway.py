@@ -99,7 +99,7 @@ def with_beacons(scenario: Scenario, plan: Plan, seed: int) -> Iterator[Chunk]:
 
 
 def _hidden(walls: Floats, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether a wall stands between two places."""
+    """Whether a wall lies between two places."""
     if not len(walls):
         return False
     dx, dy = bx - ax, by - ay

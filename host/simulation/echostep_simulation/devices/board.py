@@ -39,7 +39,7 @@ class Board(Protocol):
     """Interface of a simulated board."""
 
     def advance(self, rows: NDArray[Any]) -> Sent:
-        """Let n milliseconds pass; bytes that left the board meanwhile."""
+        """Let n milliseconds pass; bytes that left the board in that time."""
 
     def send(self, sent: bytes) -> None:
         """Bytes from the host."""

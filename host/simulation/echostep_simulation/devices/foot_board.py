@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A foot board: the ICM-20649 on the foot, its inputs as rows for a board of its own; it is not built yet.
+"""A foot board: the ICM-20649 on the foot, its inputs as rows for a separate board; it is not built yet.
 
 In: a walk, a seeded generator, a board. Out: extended rows whose first place is the foot, in counts of the ICM-20649; the chunks of the board's port.
 Owns the part's constant errors, and the board.
@@ -74,7 +74,7 @@ class FootBoardSensors:
 
 
 class FootBoardPort:
-    """The port of a foot board during a walk, beside the belt's; both are driven block by block."""
+    """The port of a foot board during a walk, besides the belt's; both are driven block by block."""
 
     def __init__(self, walk: Walk, rng: np.random.Generator, board: Board) -> None:
         self.sensors = FootBoardSensors(walk, rng)
@@ -97,5 +97,5 @@ class FootBoardPort:
 
 
 def foot_rng(seed: int) -> np.random.Generator:
-    """A generator of its own, so that the belt's sensors do not change with the board on the foot."""
+    """A separate generator, so that the belt's samples do not depend on the foot board."""
     return np.random.default_rng([seed, 7])

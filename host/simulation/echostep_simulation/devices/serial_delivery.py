@@ -2,7 +2,7 @@
 """From a serial line to the host: when bytes arrive, and in which portions.
 
 In: frames and when the device begins to send each. Out: portions as the driver of an FTDI adapter hands them over. Owns nothing.
-The adapter sends what it has when 62 bytes have come or when its latency timer runs out, whichever is first [FTDI AN232B-04].
+The adapter sends its buffer when 62 bytes have come or when its latency timer runs out, whichever is first [FTDI AN232B-04].
 """
 
 from __future__ import annotations

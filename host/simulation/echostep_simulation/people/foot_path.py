@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The right foot between two footprints: flat and still, rolling over its ball, swinging, landing on its heel.
 
-In: when and where it stands. Out: the path and the attitude of the sensor on its instep. Owns nothing.
+In: times and places of the stances. Out: the path and the attitude of the sensor on its instep. Owns nothing.
 A stride runs from the middle of one stance to the middle of the next. Timing of heel off, toe off and heel strike as in [Perry 1992].
 """
 

@@ -82,7 +82,7 @@ def leg_angles(ankle_m: Floats, hip_m: Floats, leg: LegDimensions) -> tuple[Floa
 
 
 def hip_path(phase: Floats, effort: Floats, stride_m: float, leg: LegDimensions) -> tuple[Floats, Floats]:
-    """How far one hip is ahead of the trunk's even way and below where it stands (m), (n,) each.
+    """Offset of one hip ahead of the trunk's even motion and below its height at rest (m), (n,) each.
 
     Trunk: fastest and lowest while both feet carry [Perry 1992]. A vault over stiff legs would drop it by stride^2 / 32 legs; knees and ankles
     take a third.

@@ -88,7 +88,7 @@ class Walk:
 
 
 def walk(waypoints: Sequence[Waypoint], person: Person, rng: np.random.Generator) -> Walk:
-    """Stand, walk along the waypoints, stand again."""
+    """Rest, walk along the waypoints, rest again."""
     schedule = _Schedule(person, rng)
     for points, pause_s, height_m in _legs(waypoints):
         if len(points) > 1:
@@ -115,7 +115,7 @@ def round_corners(points: Floats, radius_m: float) -> Floats:
 
 
 def _legs(waypoints: Sequence[Waypoint]) -> list[tuple[Floats, float, float]]:
-    """Pieces (n, 3) of the way that are walked without a stop, the pause after each, and the height after the lift ride that follows."""
+    """Pieces (n, 3) of the path without a stop, the pause after each, and the height after the lift ride that follows."""
     points = [np.array([w[0], w[1], w[3] if len(w) == 4 else 0.0]) for w in waypoints]
     legs, begin = [], 0
     for k in range(1, len(points)):
@@ -294,7 +294,7 @@ class _Schedule:
         self._height.append(np.full(n, height_m))
 
     def _landings(self, trunk: Floats, heading: Floats, height: Floats) -> Strides:
-        """Where the foot stands at each time; while standing it stays where it landed."""
+        """Position of the resting foot at each time; while standing it stays where it landed."""
         t = np.array(self._t)
         at = np.minimum((t * RATE_HZ).astype(int), len(heading) - 1)
         landed = np.maximum.accumulate(np.where(np.concatenate([[True], self._moves]), np.arange(len(t)), 0))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Sound level of an echo, in dB against a wall straight ahead at one metre, and whether an SRF02 detects it.
 
-In: the geometry of one echo. Out: its level. Owns the one table of acoustic constants, `Acoustics`; the tracker's likelihood shares nothing with it.
+In: the geometry of one echo. Out: its level. Owns the one table of acoustic constants, `Acoustics`; the likelihood shares none of it.
 
 The rangers' transducer is taken as a piston: it sends and hears with the same directivity, so that an echo has it twice. Added to
-this are the spreading of the wave, the absorption by the air and the losses at reflectors; an echo above the noisy threshold is heard. The
+this are the spreading of the wave, the absorption by the air and the losses at reflectors; an echo above the noisy threshold is detected. The
 range therefore shrinks toward the rim of the cone, and is shorter for a small reflector than for a wall [Girard 2011, 2.6.2, 2.6.3].
 """
 
@@ -22,7 +22,7 @@ PIPE_RADIUS_M = 0.0275  # the 55 mm pipe of [Girard 2011, Figure 2a]
 
 
 class Acoustics(NamedTuple):
-    """Constants that decide whether an echo is heard; levels in dB against a wall on the axis at 1 m."""
+    """Constants of the detection of an echo; levels in dB against a wall on the axis at 1 m."""
 
     speed_m_s: float = 343.2  # of sound, dry air at 20 degC
     size: float = 4.797  # wave number x piston radius: -6 dB at 27.5 degrees each way, the 55 degree cone [Robot Electronics, sonar FAQ]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The world of a guided return [Fischer 2008, 4]: a trail on open ground, beacons dropped along it, magnetic sources beside it.
+"""The world of a guided return [Fischer 2008, 4]: a trail on open ground, beacons dropped along it, magnetic sources nearby.
 
 In: settings and a random generator. Out: a `BeaconGround` of plain arrays, and kernels for what happens on it: how a source turns the measured
-heading, which beacon hears the boot, and what it measures. Owns nothing. The paper does not print its trail: each seed draws another one.
+heading, which beacon receives the boot, and its measurement. Owns nothing. The paper does not print its trail: each seed draws another one.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def _sources(settings: GroundSettings, trail: Floats, rng: np.random.Generator) 
 
 @kernel
 def disturbance(sources: Floats, inside: Bools, x: float, y: float, heading: float) -> float:
-    """What the sources add to the measured heading (rad) on a step to (x, y) [Fischer 2008, 4.1.2].
+    """Error of the measured heading (rad) by the sources on a step to (x, y) [Fischer 2008, 4.1.2].
 
     Entering a source's radius turns the heading by its amplitude, once; the sign is the side on which the source is passed. The turn stays: the
     sensor's own filter remembers earlier fields. `inside` (s,): whether the last step was within each radius; updated.

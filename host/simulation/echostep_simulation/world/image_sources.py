@@ -34,7 +34,7 @@ def mirror(px: float, py: float, wall: Floats) -> tuple[float, float]:
 
 @part
 def crossing(px: float, py: float, qx: float, qy: float, wall: Floats) -> float:
-    """The share of the way p-q at which it meets a wall; -1 when it does not."""
+    """The share of the path p-q at which a wall is met; -1 when it does not."""
     rx, ry, sx, sy = qx - px, qy - py, wall[2] - wall[0], wall[3] - wall[1]
     det = rx * sy - ry * sx
     if abs(det) < 1e-12:
@@ -75,7 +75,7 @@ def is_before(px: float, py: float, x: float, y: float, wall: Floats) -> bool:
 
 @part
 def blocked(px: float, py: float, qx: float, qy: float, walls: Floats, but: int, but_too: int) -> bool:
-    """Whether a wall other than the two numbered stands between p and q; walls that only touch p or q do not."""
+    """Whether a wall other than the two numbered lies between p and q; walls that only touch p or q do not."""
     way = math.hypot(qx - px, qy - py)
     for w in range(len(walls)):
         if w not in (but, but_too):

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Echoes that are too long: sound that a wall turned away, and that a rough place sends back along the way it came.
 
-In: a ranger's place and axis, walls, a chance. Out: half the length of the way; 0 for none. Owns nothing.
+In: a ranger's place and axis, walls, a chance. Out: half the length of the sound's path; 0 for none. Owns nothing.
 
 The axis of the beam is followed from wall to wall as a mirror reflects it. Objects at a wall (a frame, a joint, a board) scatter sound to all
-sides, so that any angle is heard; the echo then has the length of the whole way, longer than to the wall's nearest point.
+sides, so that an echo returns at any angle; the echo then has the length of the whole way, longer than to the wall's nearest point.
 """
 
 from __future__ import annotations

@@ -19,6 +19,7 @@ from echostep_studies.anywhere.trials import NEEDS_DATA, PEERED, TRIALS, Trial, 
 from echostep_studies.bench.columns import ClaimsRow, JudgedRow, run_row, summaries, tables
 from echostep_studies.bench.filtering import FilterRun, track
 from echostep_studies.bench.judgement import SEARCH_M, JudgedRun, TruePlaces, judge, true_levels
+from echostep_studies.bench.sites import WESTPORT
 from echostep_studies.bench.stanford import draw_stanford
 from echostep_studies.bench.walks import T, X, Y, Z
 from echostep_studies.frame.report import Row
@@ -53,8 +54,8 @@ def anywhere_study(data: Path | None, rows: str = "*") -> Study[ClaimsRow, Row]:
 
     The peer's rows are run where the pattern names it: they cost three times what all others do.
     """
-    if data is not None and not (data / "maps" / "westport-house").is_dir():
-        raise EchostepError(f"{data / 'maps' / 'westport-house'}: not there: without --data its row is left out")
+    if data is not None and not (data / WESTPORT).is_file():
+        raise EchostepError(f"{data / WESTPORT}: not there: without --data its row is left out")
     every = [name for trial in TRIALS if data or trial not in NEEDS_DATA for name in _methods(trial)]
     names = tuple(name for name in every if fnmatch(name, rows) and name.endswith(PEER) == rows.endswith(PEER))
     if not names:

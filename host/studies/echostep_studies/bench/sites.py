@@ -16,13 +16,13 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.plan import Level, Plan, Pose, load_plan
-from echostep_app.plan.importers.formats import open_plan
 from echostep_app.plan.routing import RoutePlace
 from echostep_simulation.people.walker import Waypoint
 from echostep_studies.bench.tours import random_tour
 from echostep_studies.simulation.sites import hall as hall_site
 from echostep_studies.simulation.tower import CORRIDOR_Y, LENGTH_M, LIFT_AT, STOREY_M, tower
 
+WESTPORT = Path("maps") / "westport-house.json"  # in the folder of the public recordings
 OFFICE_PLAN = Path(str(files("echostep"))) / "plans" / "demo.json"
 STOREYS = 3
 # Of its rooms along the corridor: number, width, and y of their walls
@@ -71,7 +71,7 @@ def by_lift(seed: int) -> Site:
 
 def westport_house(seed: int, data: Path) -> Site:
     """A tour of westport-house, a real plan of seven floors; `data`: folder of the public recordings."""
-    plan = open_plan(data / "maps" / "westport-house")
+    plan = load_plan(data / WESTPORT)
     stairs = next(c for c in plan.connectors if c.kind == "stairs" and len(c.levels) == len(plan.levels))
     x, y = stairs.outline_m.mean(axis=0).tolist()
     rng = np.random.default_rng([seed, 74])

@@ -8,14 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echostep_app.output.score_plots import stanford_axes
+from echostep.arrays import Floats
 from echostep_studies.bench.columns import ClaimsRow, JudgedRow
-from echostep_studies.frame.pictures import ORANGE, axes_of, save
+from echostep_studies.frame.pictures import BLACK, BLUE, ORANGE, RED, axes_of, save
 from echostep_studies.frame.report import rows_by_name
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+RANGE_M = (0.01, 100.0)  # of both axes
 ACROSS = 4  # diagrams side by side
 INCHES = 3.2
 
@@ -35,10 +40,20 @@ def draw_stanford(folder: Path, rows: Sequence[ClaimsRow]) -> None:
             np.concatenate([getattr(run, key) for run in groups[k]]) for key in ("error_m", "protection_m")
         )
         beyond = error > radius
-        stanford_axes(ax, error, radius)
+        _draw_claims(ax, error, radius)
         ax.axvline(1.0, color=ORANGE, lw=0.8)
         ax.set_title(f"{groups[k][0].name}: {100.0 * beyond.mean():.2f} % beyond", fontsize=8)
         ax.set_xlabel("error (m)", fontsize=7)
         ax.set_ylabel("protection radius (m)", fontsize=7)
         ax.tick_params(labelsize=6)
     save(figure, folder / "stanford.png")
+
+
+def _draw_claims(axes: Axes, error_m: Floats, radius_m: Floats) -> None:
+    """Errors (n,) against stated radii (n,): above the diagonal the radius holds."""
+    beyond = error_m > radius_m
+    for which, colour, mark in ((~beyond, BLUE, "."), (beyond, RED, "x")):
+        x, y = error_m[which].clip(*RANGE_M), radius_m[which].clip(*RANGE_M)
+        axes.plot(x, y, mark, ms=2.0, alpha=0.4, color=colour, zorder=2)
+    axes.plot(RANGE_M, RANGE_M, color=BLACK, lw=1.0)
+    axes.set(xscale="log", yscale="log", xlim=RANGE_M, ylim=RANGE_M)

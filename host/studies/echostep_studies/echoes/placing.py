@@ -15,7 +15,7 @@ from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
 from echostep.localization import EchoModel
 from echostep.walls.echo_sources import Walls
-from echostep_app.commissioning.rangers.known_pings import KnownPings, known_pings, log_densities
+from echostep_studies.echoes.known_pings import KnownPings, known_pings, log_densities
 from echostep_studies.echoes.sweeps import Sweep
 
 GRID_M, HEADINGS = 0.04, 120  # 4 cm, 3 degrees: those of the figures that this is compared with
@@ -59,7 +59,7 @@ def grid_table(walls: Floats) -> GridTable:
     return GridTable(x, y, sources)
 
 
-def place(sweep: Sweep, table: GridTable, bias_m: float, missed: float, model: EchoModel) -> Placing:
+def place(sweep: Sweep, table: GridTable, model: EchoModel) -> Placing:
     """The errors of the likeliest places."""
     step = 2.0 * math.pi / HEADINGS
     offset = np.rint(sweep.bearing_rad / step).astype(np.int64)
@@ -68,7 +68,7 @@ def place(sweep: Sweep, table: GridTable, bias_m: float, missed: float, model: E
     ranges_m, which_range = np.unique(
         np.round(np.nan_to_num(sweep.range_m), 2), return_inverse=True
     )  # their errors are more
-    of_range = np.array([_by_axis(z, table, bias_m, missed, model) for z in ranges_m.tolist()])
+    of_range = np.array([_by_axis(z, table, model) for z in ranges_m.tolist()])
     near = np.abs([wrap(h * step - sweep.heading_rad) for h in range(HEADINGS)]) <= KNOWN_RAD
     totals = [_total(of_range, which_range, offset, which) for which in (every, few)]
     return Placing(
@@ -78,10 +78,10 @@ def place(sweep: Sweep, table: GridTable, bias_m: float, missed: float, model: E
     )
 
 
-def _by_axis(range_m: float, table: GridTable, bias_m: float, missed: float, model: EchoModel) -> Floats:
+def _by_axis(range_m: float, table: GridTable, model: EchoModel) -> Floats:
     """Log-density (places, HEADINGS) of one range along every axis."""
     pings = table.sources._replace(range_m=np.full(len(table.sources.listed), range_m))
-    return log_densities(pings, bias_m, missed, model).reshape(-1, HEADINGS)
+    return log_densities(pings, model).reshape(-1, HEADINGS)
 
 
 def _total(of_range: Floats, which_range: Ints, offset: Ints, which: Ints) -> Floats:

@@ -16,14 +16,12 @@ from echostep.angles import wrap
 from echostep.arrays import Floats
 from echostep.localization import EchoSettings, echo_model
 from echostep.walls.echo_sources import Walls
-from echostep_app.commissioning.rangers.fit import BIAS, FITTED, MISSED, fit_ranger, score
-from echostep_app.commissioning.rangers.known_pings import KnownPings, known_pings
+from echostep_studies.echoes.known_pings import KnownPings, known_pings, log_densities
 from echostep_studies.echoes.placing import grid_table, place
 from echostep_studies.echoes.sweeps import Sweep, SweepSet
 
 RIGHT_M = 0.1  # of a range from the nearest wall's
 NEAR_M, WIDE_DEG = 1.5, 60.0  # walls of the table by angle
-FIT_NAMES = (*FITTED, "soft_db", "edge_db", "corner_db")
 # Right, none and too long in % of the real sweeps [reference: 92 sweeps of eight student groups], by degrees off the nearest wall's normal
 REAL_SHARES = {
     (0, 5): (87, 3, 5), (20, 25): (86, 2, 11), (30, 35): (86, 3, 9), (35, 40): (74, 8, 14), (40, 45): (60, 12, 22), (45, 50): (38, 19, 32),
@@ -86,25 +84,16 @@ def _nearest_walls(walls: Floats, sweep: Sweep) -> tuple[Floats, Floats]:
 
 
 def sweep_rows(data: SweepSet) -> Iterator[SweepRow]:
-    """By the density as it is, with the real ranger's limits, and with all settings fitted to the other half of the sweeps."""
-    base = {BIAS: 0.0, MISSED: 0.0}
-    yield _row("settings of an SRF02", data, [(EchoSettings(), base)] * 2)
-    yield _row("limits known", data, [(LIMITS_KNOWN, base)] * 2)
-    halves = [_known(SweepSet(data.walls, data.sweeps[k::2], data.real)) for k in (1, 0)]
-    fits = [fit_ranger(half, LIMITS_KNOWN, FIT_NAMES) for half in halves]
-    yield _row("fitted to the other half", data, [(fit.settings(LIMITS_KNOWN), fit.values) for fit in fits])
+    """By the density as it is, and with the real ranger's limits."""
+    yield _row("settings of an SRF02", data, EchoSettings())
+    yield _row("limits known", data, LIMITS_KNOWN)
 
 
-def _row(name: str, data: SweepSet, models: list[tuple[EchoSettings, dict[str, float]]]) -> SweepRow:
-    """`models`: settings, bias and missed share for the even and for the odd sweeps."""
-    table, scores, hits = grid_table(data.walls), [], []
-    for k, sweep in enumerate(data.sweeps):
-        settings, values = models[k % 2]
-        own = _known(SweepSet(data.walls, (sweep,), data.real))
-        scores.append(score(own, {name: values[name] for name in (BIAS, MISSED) if values[name]}, settings))
-        hits.append(place(sweep, table, values[BIAS], values[MISSED], echo_model(settings)))
+def _row(name: str, data: SweepSet, settings: EchoSettings) -> SweepRow:
+    table, model = grid_table(data.walls), echo_model(settings)
+    hits = [place(sweep, table, model) for sweep in data.sweeps]
     every, few, known = (100.0 * np.mean(np.array(hits, float), axis=0)).tolist()
-    log_p: Floats = np.concatenate(scores)
+    log_p = log_densities(_known(data), model)
     return SweepRow(
         name=name,
         pings=len(log_p),

@@ -54,11 +54,10 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True)
 class SweepSet:
-    """Sweeps among the same walls (n, 4). `real`: whether they were measured."""
+    """Sweeps among the same walls (n, 4)."""
 
     walls: Floats
     sweeps: tuple[Sweep, ...]
-    real: bool
 
 
 def read_sweeps(folder: Path) -> SweepSet:
@@ -74,7 +73,7 @@ def read_sweeps(folder: Path) -> SweepSet:
     sweeps = [sweep for path in paths for sweep in _sweeps_of(path)]
     if not sweeps:
         raise EchostepError(f"{folder}: no sweep: its CSV files have the columns {', '.join(COLUMNS)}")
-    return SweepSet(walls, tuple(sweeps), real=True)
+    return SweepSet(walls, tuple(sweeps))
 
 
 def _sweeps_of(path: Path) -> list[Sweep]:
@@ -114,4 +113,4 @@ def simulated_sweeps(seed: int) -> SweepSet:
         us = echoes(np.tile([x, y], (PINGS, 1)), look, ROOM, bias_m, rng, ROOM_RANGER).own_us[:, 0].astype(float)
         range_m = np.where(us > 0.0, us * (0.5e-6 * ROOM_RANGER.speed_m_s), np.nan)
         sweeps.append(Sweep(x, y, heading, bearing, range_m))
-    return SweepSet(ROOM, tuple(sweeps), real=False)
+    return SweepSet(ROOM, tuple(sweeps))

@@ -20,23 +20,23 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization import ANY_LEVEL, Estimate, TrackStatus
-from echostep.plan import Connector, Plan, Pose
+from echostep.plan import Connector, Plan, Pose, load_plan
 from echostep.ports.chunks import MTX, portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.tours import tour as tour_of
 from echostep_app.output.table import Table
-from echostep_app.plan.importers.formats import open_plan
 from echostep_app.plan.routing import RoutePlace, Routes
 from echostep_app.scorecard.error_statistics import error_statistics
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import Person, Waypoint
 from echostep_simulation.scenario import Scenario
+from echostep_studies.bench.sites import WESTPORT
 from echostep_studies.frame.report import LOST_END_M, Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.tower import tour, tower
 
 STOREYS = 5
-WESTPORT = "storeys/westport"  # name of the row of the real plan
+REAL = "storeys/westport"  # name of the row of the real plan
 TIE_M = 0.5
 PORTION = 1000
 AWAY_M = (8.0, 30.0)  # of a place to visit from the stairs, as one walks
@@ -83,8 +83,8 @@ def one_run(real: Path | None, seed: int) -> list[StoreysRun]:
     """Every scene with the person of this seed."""
     rows = [_row(f"storeys/tower{name}", scene, tower(STOREYS), tour(STOREYS), seed) for name, scene in SCENES.items()]
     if real is not None:
-        plan = open_plan(real)
-        rows.append(_row(WESTPORT, BuildingScene(), plan, through(plan, seed), seed))
+        plan = load_plan(real)
+        rows.append(_row(REAL, BuildingScene(), plan, through(plan, seed), seed))
     return rows
 
 
@@ -170,15 +170,15 @@ def _summary(rows: Sequence[StoreysRun]) -> Row:
 
 def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     shown = [{k: 100.0 * v if k.endswith("right") or k == "coverage95" else v for k, v in row.items()} for row in rows]
-    real = any(row["name"] == WESTPORT for row in rows)
+    real = any(row["name"] == REAL for row in rows)
     notes = () if real else ("Without --data westport-house is left out.",)
     return [Table(f"All floors of a building, {request.runs} simulated walks", shown, COLUMNS, notes)]
 
 
 def storeys_study(data: Path | None) -> Study[StoreysRun, Row]:
     """The study; `data`: folder of the public recordings, which holds the plan of westport-house."""
-    westport = None if data is None else data / "maps" / "westport-house"
-    if westport is not None and not westport.is_dir():
+    westport = None if data is None else data / WESTPORT
+    if westport is not None and not westport.is_file():
         raise EchostepError(f"{westport}: not there: the tower alone can do without --data")
     return Study(
         "storeys",

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-BLACK, ORANGE, BLUE, GREEN, RED = "#000000", "#e69f00", "#0072b2", "#009e73", "#d55e00"
+BLACK, ORANGE, BLUE, RED = "#000000", "#e69f00", "#0072b2", "#d55e00"
 
 
 def draw_clouds(

@@ -29,7 +29,7 @@ from echostep_studies.frame.report import as_dict
 from echostep_studies.frame.study import Study, StudyRequest
 
 # A folder with one of them is one building
-WHOLE = ("level.geojson", "level.json", "manifest.json", "main.json", "core.txt")
+WHOLE = ("level.geojson", "level.json", "manifest.json")
 COLUMNS = {
     "file": "file", "outcome": "outcome", "seconds": "s", "levels": "levels", "size": "m", "walls": "walls", "doors": "doors", "in_gaps": "in gaps",
     "rooms": "rooms", "enclosed": "enclosed", "left_out": "left out", "says": "first note or refusal",
@@ -62,7 +62,7 @@ def importers_study(folder: Path) -> Study[ImportRow, ImportRow]:
     files = list(buildings_in(folder))
     if not files:
         raise EchostepError(
-            f"{folder}: no drawings, models or maps in it: give a folder of DXF, IFC, IMDF, OpenStreetMap, ROS or WRLD files"
+            f"{folder}: no drawings, models or maps in it: give a folder of DXF, IFC, IMDF, OpenStreetMap or ROS files"
         )
     return Study(
         "importers",

@@ -15,16 +15,11 @@ from msgspec import UNSET, UnsetType
 from echostep_app.output.table import Table
 from echostep_studies.frame.report import LOST_END_M, Row, as_dicts, rows_by_name
 from echostep_studies.frame.study import StudyRequest
-from echostep_studies.noplan.joined import PairRun, joined_summary
 
 COLUMNS = {
     "name": "row", "rmse_m": "RMSE m", "worst_rmse_m": "worst", "shape_m": "shape m", "foot_rmse_m": "foot alone",
     "footslam_rmse_m": "FootSLAM", "wall_median_m": "walls m", "wall95_m": "95 %", "drawn_pc": "drawn %", "absent_pc": "not there %",
     "closures": "closures", "wrong": "wrong", "map_s": "s",
-}  # fmt: skip
-JOINED_COLUMNS = {
-    "name": "row", "joined": "joined", "misplaced": "misplaced", "runs": "runs", "joined_rmse_m": "RMSE m", "worst_rmse_m": "worst",
-    "drawn_pc": "drawn %", "closures": "closures", "wrong": "wrong",
 }  # fmt: skip
 SECOND_COLUMNS = {
     "name": "row", "mean_m": "mean m", "worst_m": "worst mean m", "lost": "lost", "runs": "runs", "tracking_pc": "says tracking %",
@@ -77,7 +72,7 @@ class SecondRun:
     refused: int
 
 
-RunRow = DrawnRun | SecondRun | PairRun
+RunRow = DrawnRun | SecondRun
 
 
 def summaries(rows: list[RunRow]) -> list[Row]:
@@ -87,8 +82,6 @@ def summaries(rows: list[RunRow]) -> list[Row]:
 
 def _summary(group: Sequence[RunRow]) -> Row:
     """All rows of a name, which are of one kind."""
-    if pairs := [row for row in group if isinstance(row, PairRun)]:
-        return joined_summary(pairs)
     if second := [row for row in group if isinstance(row, SecondRun)]:
         return _second_summary(second)
     return _drawn_summary([row for row in group if isinstance(row, DrawnRun)])
@@ -124,11 +117,9 @@ def tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     """A table for each kind of row."""
     first = as_dicts(row for row in rows if "rmse_m" in row)
     second = as_dicts(row for row in rows if "tracking_pc" in row)
-    pairs = as_dicts(row for row in rows if "joined" in row)
     title = f"Drawn without a plan: {request.runs} simulated walks a row"
     every = [
         Table(title, first, COLUMNS),
         Table("Another person, tracked on the drawing", second, SECOND_COLUMNS),
-        Table("Two walks of unknown start, of one building and of two", pairs, JOINED_COLUMNS),
     ]
     return [table for table in every if table.rows]

@@ -15,10 +15,9 @@ import shapely
 
 from echostep.arrays import Floats
 from echostep.plan import Level, Plan, load_plan
-from echostep_app.plan.importers.formats import open_plan
 from echostep_app.plan.places.gaps import door_gaps
 from echostep_app.plan.routing import RoutePlace
-from echostep_studies.bench.sites import OFFICE_DOOR, OFFICE_PLAN, Site, level_alone, plan_of
+from echostep_studies.bench.sites import OFFICE_DOOR, OFFICE_PLAN, WESTPORT, Site, level_alone, plan_of
 from echostep_studies.bench.tours import random_tour
 
 # The loop: corridors 2 m wide about a block of 30 x 14 m, with rooms of 5 x 5 m or so on the outside.
@@ -47,14 +46,14 @@ def corridors(seed: int, length_m: float) -> Site:
 def westport(seed: int, length_m: float, data: Path) -> Site:
     """One storey of westport-house, furnished."""
     rng = np.random.default_rng([seed, 83])
-    plan = level_alone(open_plan(data / "maps" / "westport-house"), WESTPORT_LEVEL)
+    plan = level_alone(load_plan(data / WESTPORT), WESTPORT_LEVEL)
     return _toured(furnished(plan, 8, rng), _westport_begin(plan), length_m, rng)
 
 
 def storeys(seed: int, length_m: float, data: Path) -> Site:
     """The lowest STOREYS of westport-house with their stairs, furnished."""
     rng = np.random.default_rng([seed, 87])
-    whole = open_plan(data / "maps" / "westport-house")
+    whole = load_plan(data / WESTPORT)
     joined = (
         replace(c, levels=tuple(k for k in c.levels if k < STOREYS)) for c in whole.connectors if c.kind == "stairs"
     )

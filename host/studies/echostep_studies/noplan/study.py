@@ -28,21 +28,13 @@ from echostep_studies.bench.filtering import Claim, track
 from echostep_studies.bench.judgement import TRACKING, TruePlaces, judge, true_levels
 from echostep_studies.bench.recordings import hallways
 from echostep_studies.bench.recordings.foot_metrics import rmse
-from echostep_studies.bench.sites import Site
+from echostep_studies.bench.sites import WESTPORT, Site
 from echostep_studies.bench.walks import SimulatedWalk
 from echostep_studies.frame.report import Row, as_dict
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.noplan import real_clutter, sites
 from echostep_studies.noplan.columns import DrawnRun, RunRow, SecondRun, summaries, tables
 from echostep_studies.noplan.footslam import footslam
-from echostep_studies.noplan.joined import (
-    JoinedRun,
-    PairRun,
-    again,
-    joined_row,
-    strangers_row,
-    walked_pair,
-)
 from echostep_studies.noplan.judgement import (
     closure_columns,
     heights_m,
@@ -60,17 +52,12 @@ SECOND_M = 150.0  # way of the second person
 MINUTES = (10, 60)
 SITES = ("office", "corridors", "westport", "storeys")
 REAL = ("westport", "storeys")  # of the public recordings
-JOINED_MIN = 5  # of each of two walks
-STRANGERS = {"office": "corridors", "corridors": "westport", "westport": "office"}  # another building
 
 
 def names_of(data: Path | None) -> list[str]:
     """Names of the rows; without the recordings there is no westport-house."""
     known = [site for site in SITES if data or site not in REAL]
-    pairs = [f"{kind}/{site}" for kind in ("joined", "strangers") for site in STRANGERS if site in known]
-    if not data:
-        pairs.remove("strangers/corridors")
-    return [f"{site}/{minutes}min" for minutes in MINUTES for site in known] + pairs + _real_names(data)
+    return [f"{site}/{minutes}min" for minutes in MINUTES for site in known] + _real_names(data)
 
 
 def _real_names(data: Path | None) -> list[str]:
@@ -87,9 +74,7 @@ def one_run(names: tuple[str, ...], data: Path | None, pictures: Path, first: in
     for name in names:
         kind, minutes = name.split("/")
         picture = pictures / f"{name.replace('/', '-')}.png" if seed == first else None
-        if kind in ("joined", "strangers"):
-            rows.append(_pair_row(name, seed, data))
-        elif kind in ("feet", "clutter"):
+        if kind in ("feet", "clutter"):
             assert data is not None
             rows.append(_real_row(name, seed, data, picture))
         else:
@@ -106,16 +91,6 @@ def _real_row(name: str, seed: int, data: Path, picture: Path | None) -> DrawnRu
     hallway = hallways.read_hallway(hallways.names_in(data)[recording])
     walk = hallways.walked_hallway(hallway, seed)
     return drawn_row(name, walk, seed, picture, hallways.START_S + hallway.print_t_s)[0]
-
-
-def _pair_row(name: str, seed: int, data: Path | None) -> PairRun:
-    """Two walks of JOINED_MIN through one building, or through two."""
-    pairing, kind = name.split("/")
-    length_m = 60.0 * SPEED_M_S * JOINED_MIN
-    site = _site(kind, seed, length_m, data)
-    if pairing == "joined":
-        return joined_row(name, walked_pair(site, again(site, length_m, seed), seed), seed)
-    return strangers_row(name, walked_pair(site, _site(STRANGERS[kind], seed, length_m, data), seed), seed)
 
 
 def _site(kind: str, seed: int, length_m: float, data: Path | None) -> Site:
@@ -199,11 +174,12 @@ def second_row(
 
 def noplan_study(data: Path | None, pattern: str, request: StudyRequest) -> Study[RunRow, Row]:
     """The study of the rows whose names match a pattern; `data`: folder of the public recordings."""
-    if data is not None and not (data / "maps" / "westport-house").is_dir():
-        raise EchostepError(f"{data / 'maps' / 'westport-house'}: not there: without --data its rows are left out")
+    if data is not None and not (data / WESTPORT).is_file():
+        raise EchostepError(f"{data / WESTPORT}: not there: without --data its rows are left out")
     every = names_of(data)
     names = tuple(name for name in every if fnmatch(name, pattern))
     if not names:
         raise EchostepError(f"--rows {pattern}: no row is named so; there are: {', '.join(every)}")
-    kinds = (DrawnRun, SecondRun, PairRun, JoinedRun)
-    return Study("noplan", kinds, partial(one_run, names, data, request.out, request.seed), summaries, tables)
+    return Study(
+        "noplan", (DrawnRun, SecondRun), partial(one_run, names, data, request.out, request.seed), summaries, tables
+    )

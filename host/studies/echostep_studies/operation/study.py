@@ -24,7 +24,7 @@ from echostep.arrays import Bools, Floats
 from echostep.localization import Estimate, TrackStatus
 from echostep.plan import Plan
 from echostep_app.output.table import Table
-from echostep_app.scorecard.card import FLOOR_PENALTY_M, score
+from echostep_app.scorecard.card import FLOOR_PENALTY_M, match, score
 from echostep_app.scorecard.error_statistics import error_statistics, quantile
 from echostep_app.scorecard.track_columns import ScoredPath, track_of
 from echostep_studies.bench.judgement import true_levels
@@ -82,8 +82,8 @@ def one_run(half_m: float, seed: int) -> list[PartRun]:
 def _rows(walk: OperationWalk, after: Sequence[Estimate], seed: int, parts: Parts) -> list[PartRun]:
     """Rows of the parts of one operation, with the estimates of one of the trackers after the change of the battery."""
     estimates = [*walk.before, *after]
-    scored = score(track_of(estimates), truth_of(walk.truth, walk.plan), walk.plan)
-    at = scored.matched
+    track, truth = track_of(estimates), truth_of(walk.truth, walk.plan)
+    card, at = score(track, truth, walk.plan), match(track, truth)
     assert at.level is not None
     assert at.true_level is not None
     assert at.height_m is not None
@@ -101,7 +101,7 @@ def _rows(walk: OperationWalk, after: Sequence[Estimate], seed: int, parts: Part
         )  # fmt: skip
         if name in (ALL, RESUMED):
             row = WholeRun(
-                **as_dict(row), zone=scored.card.zone_probability, available=scored.card.availability,
+                **as_dict(row), zone=card.zone_probability, available=card.availability,
                 search_s=tracking_s[0] - walk.restart_s if tracking_s else None,
             )  # fmt: skip
         rows.append(row)

@@ -5,18 +5,16 @@ In: seeds. Out: rows `office/tap`, `tower/radio`, ... Owns the conditions. Simul
 
 All wearers but the first have their true starts; the first has a wrong one (`door`: all begin side by side, as teams go in; `tap`, `radio`: all begin
 apart; `beacons`: the same, each drops beacons, hears those of all and shares its own) or none (`unknown`, apart), or knows its own too and reports
-false places (`liar`: that wearer is left out of all columns). `drawing`: the first one walks without a plan, from a known start, then the others
-from theirs: `alone` without a plan, `together` on its drawing; the first one is left out. `ratio`: mean error of all wearers and runs together over
-that alone. `worst`: the greatest such ratio of one wearer in one run, the first one left out; `by_chance`: the same of the trackers alone with other
-random numbers, over those alone: how much of `worst` means nothing. An error on a wrong floor is at least a storey.
-On a drawing: one wearer walks without a plan, then the others of the team on its drawing, which is complete when they set out.
+false places (`liar`: that wearer is left out of all columns). `ratio`: mean error of all wearers and runs together over that alone. `worst`:
+the greatest such ratio of one wearer in one run, the first one left out; `by_chance`: the same of the trackers alone with other random numbers, over
+those alone: how much of `worst` means nothing. An error on a wrong floor is at least a storey.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fnmatch import fnmatch
 from functools import partial
 
@@ -25,17 +23,9 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization import Estimate, Start, TrackStatus
-from echostep.path import MeasuredSegment
-from echostep.plan import NO_PLAN, Plan, Pose, load_plan
-from echostep.ports.chunks import portion_of
-from echostep.tracker import Tracker
-from echostep_app.mapping.growing import GrowingMap
-from echostep_app.mapping.plan import plan_of
+from echostep.plan import Plan, Pose, load_plan
 from echostep_app.output.table import Table
-from echostep_app.page.drawing_process import Stretches
 from echostep_app.plan.routing import RoutePlace
-from echostep_app.plan.writer import plan_json
-from echostep_app.team.messages.shared_drawings import checked_drawing
 from echostep_studies.bench import judgement, sites
 from echostep_studies.bench.judgement import FALSE_TRACKING_M, TruePlaces, true_levels
 from echostep_studies.bench.tours import random_tour
@@ -44,41 +34,8 @@ from echostep_studies.frame.report import Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.tower import tower
 from echostep_studies.team.beacons import with_dropped_beacons
-from echostep_studies.team.tracking import LIAR, PORTION, How, track_team
+from echostep_studies.team.tracking import LIAR, How, track_team
 from echostep_studies.team.walks import WEARERS, TeamWalks, team_walks
-
-
-def drawing_by(walks: TeamWalks, who: int) -> Plan:
-    """The drawing of wearer `who` at the end of its walk, as a teammate receives it."""
-    tracker, stretches, growing = Tracker(NO_PLAN, walks.starts[who]), Stretches(0.0), GrowingMap()
-    mapped = None
-
-    def note(measured: MeasuredSegment | None, estimate: Estimate) -> None:
-        nonlocal mapped
-        if measured is not None:
-            stretches.add(measured, estimate, 0)
-        if stretches.ready:
-            mapped = growing.grow(stretches.pop()[0])
-
-    tracker.watchers.append(note)
-    _track(tracker, walks, who)
-    assert mapped is not None
-    drawn, _ = plan_of(mapped, walks.starts[who], f"drawn by wearer {who}")
-    return checked_drawing(plan_json(drawn).encode())
-
-
-def track_on(plan: Plan, walks: TeamWalks, who: int, seed: int) -> list[Estimate]:
-    """Estimates of a wearer from its true start, on a plan of one storey."""
-    true = walks.starts[who]
-    return _track(Tracker(plan, Pose(true.x_m, true.y_m, true.heading_rad), seed=seed), walks, who)
-
-
-def _track(tracker: Tracker, walks: TeamWalks, who: int) -> list[Estimate]:
-    """Estimates of a tracker that takes all bytes of a wearer."""
-    chunks = walks.chunks[who]
-    parts = (portion_of(list(chunks[begin : begin + PORTION])) for begin in range(0, len(chunks), PORTION))
-    return [estimate for part in parts for estimate in tracker.take(part)]
-
 
 ASKED_RATIO, ASKED_WORST = 0.6, 1.05  # what a team asks for
 LENGTH_M = 100.0  # least length of each way
@@ -111,8 +68,7 @@ def _tower() -> Building:
 
 
 BUILDINGS: dict[str, Callable[[], Building]] = {"office": _office, "tower": _tower}
-DRAWING = "office/drawing"  # of one storey: a drawing's storeys are not those of the plan
-ROWS = (*(f"{building}/{how}" for building in BUILDINGS for how in HOWS), DRAWING)
+ROWS = tuple(f"{building}/{how}" for building in BUILDINGS for how in HOWS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,7 +91,7 @@ def one_run(names: tuple[str, ...], length_m: float, seed: int) -> list[WearerRu
     """The rows of these names for the teams of one seed."""
     rows: list[WearerRun] = []
     for building, make in BUILDINGS.items():
-        hows = [name.split("/")[1] for name in names if name.startswith(f"{building}/") and name != DRAWING]
+        hows = [name.split("/")[1] for name in names if name.startswith(f"{building}/")]
         if not hows:
             continue
         plan, begin = make()
@@ -152,17 +108,6 @@ def one_run(names: tuple[str, ...], length_m: float, seed: int) -> list[WearerRu
             together = track_team(walks, begins, HOWS[how], seed)
             rows += [_row(f"{building}/{how}", walks, k, [alone[kind][0][k], together[k], alone[kind][1][k]], seed)
                      for k in range(WEARERS) if not (how == "liar" and k == LIAR)]  # fmt: skip
-    return rows + (_drawing_rows(length_m, seed) if DRAWING in names else [])
-
-
-def _drawing_rows(length_m: float, seed: int) -> list[WearerRun]:
-    """The row DRAWING of the team of one seed."""
-    walks = team_walks(*_office(), length_m, seed, at_door=True)
-    drawn, rows = drawing_by(walks, FIRST), []
-    for who in range(FIRST + 1, WEARERS):
-        alone, again = (track_on(NO_PLAN, walks, who, seed + more) for more in (0, OTHER_DRAWS))
-        runs = [alone, track_on(drawn, walks, who, seed), again]
-        rows.append(replace(_row(DRAWING, walks, who, runs, seed), meetings=0))
     return rows
 
 

@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.errors import EchostepError
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Plan, parse_plan
 from echostep_app.mapping.graph.levels import BETWEEN, find_levels
 from echostep_app.mapping.graph.nodes import nodes_of
-from echostep_app.mapping.joining import join_walks
 from echostep_app.mapping.mapper import Mapped, map_walk
 from echostep_app.mapping.picture import draw_picture
 from echostep_app.mapping.plan import Walked, plan_of
@@ -114,11 +112,6 @@ def test_walls_of_the_stairwell_hold_the_path_over_the_stairs(mapped: Mapped) ->
         heard = wall[(place[node] == flight) & (wall >= 0)]
         assert len(heard) > 5
         assert not np.isin(heard, wall[place[node] != flight]).any()
-
-
-def test_a_walk_over_stairs_is_not_joined_with_others(mapped: Mapped) -> None:
-    with pytest.raises(EchostepError, match="first: leads over 2 floors"):
-        join_walks([("first", mapped), ("second", mapped)])
 
 
 def stepped(rises: Floats, *, foot: bool = True) -> list[MeasuredSegment]:

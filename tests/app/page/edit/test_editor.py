@@ -156,6 +156,14 @@ def test_a_save_that_fails_leaves_the_file_whole(served: EditServer, monkeypatch
     assert [path.name for path in served.file.path.parent.iterdir()] == ["plan.json"]
 
 
+def test_a_folder_in_the_place_of_the_former_file_is_named(served: EditServer) -> None:
+    before = served.file.path.read_bytes()
+    served.file.path.with_name("plan.json.bak").mkdir()
+    status, raw, _ = asked(served, "plan", b'{"echostep_plan": 1, "levels": [{"walls": []}]}')
+    assert (status, b"plan.json.bak: cannot write the plan: Is a directory" in raw) == (500, True)
+    assert served.file.path.read_bytes() == before
+
+
 def test_pictures_and_plans_that_are_none(tmp_path: Path) -> None:
     (tmp_path / "text.png").write_text("no picture")
     (tmp_path / "text.json").write_text("[]")

@@ -139,7 +139,8 @@ def test_names_give_way_to_signs(browser: Any) -> None:
 
 
 NAME_AT_EDGE = """async () => {
-    const { TeamPainter } = await import(new URL('static/commander/wearers.js', document.baseURI)), painter = new TeamPainter(document.createElement('canvas')), at = [];
+    const { TeamPainter } = await import(new URL('static/commander/wearers.js', document.baseURI));
+    const painter = new TeamPainter(document.createElement('canvas')), at = [];
     painter.sprite = (_name, x, _y, [half]) => at.push(x - half, x + half);
     painter.names({ width: 200 }, [{ id: 1, name: 'Anna', state: 'mayday', at: [180, 50] }], null);
     return at;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The house as IMDF, WRLD, nodes and links, a map of ROS, a picture, and plan.json."""
+"""The house as IMDF, a map of ROS, a picture, and plan.json."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw
 
-from plan.habits.house import HIGH, LAT, LON, ROOMS, STAIRS, STOREYS, WIDE, Line, Move, axes, boxes, corners, doors_on
+from plan.habits.house import HIGH, ROOMS, STAIRS, STOREYS, WIDE, Line, Move, axes, boxes, corners, doors_on
 
 Rows = dict[str, list[dict[str, Any]]]
 
@@ -48,39 +48,6 @@ def imdf(folder: Path, move: Move, change: Callable[[Rows], Any] = id, **more: A
         collection(folder / f"{kind}.geojson", move.ordered(features), **more)
     (folder / "manifest.json").write_text('{"version": "1.0.0"}')
     return folder
-
-
-def wrld(folder: Path, move: Move) -> Path:
-    levels = []
-    for k in STOREYS:
-        rows = [area(move, box, type="wall") for box in boxes(k)]
-        rows += [
-            area(move, (a - 0.1 * (a == c), b - 0.1 * (b == d), c + 0.1 * (a == c), d + 0.1 * (b == d)), type="door")
-            for a, b, c, d in doors_on(k)
-        ]
-        rows += [area(move, box, type="room", name=name) for name, box in ROOMS.items()]
-        collection(folder / f"f{k}.geojson", move.ordered([*rows, area(move, STAIRS, type="stairs")]))
-        levels.append({"readable_name": f"Floor {k}", "z_order": k, "filename": f"f{k}.geojson"})
-    main = {"name": "House", "location": {"coordinates": [LON, LAT]}, "levels": move.ordered(levels)}
-    (folder / "main.json").write_text(json.dumps(main))
-    return folder / "main.json"
-
-
-def nodelink(folder: Path, move: Move, pixel: float = 0.01) -> Path:
-    nodes: dict[tuple[int, float, float], int] = {}
-
-    def node(k: int, x: float, y: float) -> int:
-        return nodes.setdefault((k, *move(x, y)), len(nodes))
-
-    def table(name: str, rows: list[str]) -> None:
-        (folder / f"{name}.txt").write_text("\n".join(["id,type,a,b", *move.ordered(rows)]))
-
-    table("link", [f"0,0,{node(k, *line[:2])},{node(k, *line[2:])}" for k in STOREYS for line in axes(k)])
-    table("polygon", [f"0,1,4,{','.join(str(node(k, *p)) for p in corners(STAIRS))}" for k in STOREYS])
-    table("arrow", [f"0,{int(k < 2)},{node(k, 9.5, 6)},{node(k, 10.5, 6)}" for k in STOREYS])
-    table("node", [f"{key},{k},{x / pixel},{-y / pixel}" for (k, x, y), key in nodes.items()])
-    (folder / "core.txt").write_text(f"floor,3\nheight,3.0\nscale,{pixel}\n")
-    return folder / "core.txt"
 
 
 def own(folder: Path, move: Move) -> Path:

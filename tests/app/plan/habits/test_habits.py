@@ -19,7 +19,8 @@ from PIL import Image
 from pyproj import Transformer
 
 from echostep.errors import EchostepError
-from echostep_app.plan.importers.formats import import_plan, open_plan
+from echostep.plan import load_plan
+from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.importers.summary import summary
@@ -230,9 +231,7 @@ IMDF = [
     *cells("imdf", "thick walls", beside(0.08), beside(0.19)),
     *cells("imdf", "thick walls", beside(0.4), asks="openings lie in no wall"),
     *cells("imdf", "copied storeys", altered(lambda files: [f["properties"].update(ordinal=0) for f in files["level"]]), asks="m apart"),
-    *moved("wrld", other.wrld, Right(thick=0.2, earth=True)),
     *moved("own", other.own, Right()),
-    *moved("nodelink", other.nodelink, Right(names=False), (*MOVES, *FAR)),
 ]  # fmt: skip
 
 
@@ -340,7 +339,7 @@ def outcome(cell: Cell, folder: Path) -> str:
     report, path = ImportReport(), cell.write(folder, cell.move)
     first, *above = [path] if isinstance(path, Path) else path
     try:
-        plan = open_plan(first) if first.name == "plan.json" else import_plan(first, Hints(**cell.hints), above, report)
+        plan = load_plan(first) if first.name == "plan.json" else import_plan(first, Hints(**cell.hints), above, report)
     except EchostepError as error:
         return f"refused: {error}"
     notes = [line for line in summary(plan, report) if line.startswith("note: ")]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the levels of the board's inputs say about its wiring: lines of facts, and findings, for `echostep doctor --electrical`.
+"""The board's wiring, judged by the levels of its inputs: lines of facts, and findings, for `echostep doctor --electrical`.
 
 In: `BoardReports` with an `Electrical`. Out: text, and `Finding`s. Owns the texts.
 """

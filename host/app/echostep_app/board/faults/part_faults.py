@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Texts on the faults of parts of the kit of 2026, and on parts that the firmware does not know.
 
-In: the part in a place, and the fault that the board reports. Out: what is wrong and the remedy. Owns the texts.
+In: the part in a place, and the fault that the board reports. Out: faults, each with its remedy. Owns the texts.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ _KINDS = {  # of rangers, in the order in which the firmware prefers them
 
 
 def mixed_rangers(left: Part, right: Part) -> tuple[str, str]:
-    """What is wrong with rangers of two kinds and the remedy."""
+    """The fault of rangers of two kinds, and its remedy."""
     what, remedy = "they are of two kinds, and one of them is not used", "plug in two of one kind"
     order = list(_KINDS)
     if left in order and right in order and left != right:
@@ -100,12 +100,12 @@ def mixed_rangers(left: Part, right: Part) -> tuple[str, str]:
 
 
 def foot_text(fault: Fault) -> tuple[str, str]:
-    """What is wrong with the part of a foot board and the remedy."""
+    """The fault of a foot board's part, and its remedy."""
     return _ICM20649.get(fault, (f"failed ({fault.name.lower().replace('_', ' ')})", _SPI))
 
 
 def strange_foot_text(identity: int) -> tuple[str, str]:
-    """What is wrong with a part at the thigh's chip select that names itself like a foot board's, and the remedy."""
+    """The fault of a part at the thigh's chip select whose identity is a foot board's, and its remedy."""
     what = f"an {LIKE_FOOT_PARTS[identity]} answers at its chip select (D8, identity register 0x{identity:02X})"
     if identity == 0xE1:
         return f"{what}, but its other registers are not those of one", f"{_AGAIN}; {_SPI}"
@@ -113,7 +113,7 @@ def strange_foot_text(identity: int) -> tuple[str, str]:
 
 
 def part_text(part: Part, identity: int, device: Healthy, fault: Fault) -> tuple[str, str] | None:
-    """What is wrong with this part and the remedy; None where the general text fits."""
+    """The fault of this part and its remedy; None where the general text fits."""
     if part is Part.NONE and identity and device in _WANTED:
         what = f"holds a part that the firmware does not know (identity register 0x{identity:02X})"
         return what, f"plug in a part of firmware/README.md ({_WANTED[device]})"

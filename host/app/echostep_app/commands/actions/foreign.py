@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a file is that is no recording, and which command reads it.
+"""The kind of a file that is no recording, and the command that reads it.
 
 In: a path. Out: one sentence; "" for an MCAP file. Owns nothing. The first bytes decide, and of a table the names of its columns.
 """

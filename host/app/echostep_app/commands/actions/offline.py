@@ -77,7 +77,7 @@ def foot_on_plan(
 
 
 def _told(path: Path, naming: Naming) -> Imu:
-    """The samples of a foot IMU's file; what was mended is printed."""
+    """The samples of a foot IMU's file; repairs are printed."""
     imu = load_foot(path, naming)
     for note in imu.notes:
         console.print(f"{path.name}: {note}")
@@ -85,7 +85,7 @@ def _told(path: Path, naming: Naming) -> Imu:
 
 
 def foot(path: Path, out: Path, profile: str, picture: Path | None, naming: Naming = OWN) -> None:
-    """Track a recorded foot IMU with this project's method or that of a paper."""
+    """Track a recorded foot IMU with this project's method or a paper's."""
     track_recording = method("foot", profile, own_track)
     imu = _told(path, naming)
     track = track_recording(imu, path.name)
@@ -114,7 +114,7 @@ class LegOptions:
 
 
 def legs(paths: list[Path], out: Path, options: LegOptions, picture: Path | None = None, naming: Naming = OWN) -> None:
-    """Track a recorded leg, or both of one person, with this project's method or that of a paper."""
+    """Track a recorded leg, or both of one person, with this project's method or a paper's."""
     profile, scale = options.profile, options.scale
     track_leg = method("legs", profile, track_default)
     if scale is not None and not SCALE_RANGE[0] < scale < SCALE_RANGE[1]:

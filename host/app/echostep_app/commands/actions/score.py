@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`echostep score`: tracks against the truth, by published metrics.
 
-In: CSV files, recordings, a plan. Out: a table, JSON or an HTML page. Owns nothing.
+In: CSV files, recordings, a plan. Out: a table or JSON. Owns nothing.
 """
 
 from __future__ import annotations
@@ -11,54 +11,78 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import NamedTuple
 
 from rich.markup import escape
 
 from echostep.errors import EchostepError
 from echostep.plan import NO_PLAN, Plan
 from echostep.walk.walk import replay
-from echostep_app.output.score_page import ScoreReport, page, short_names
 from echostep_app.output.table import Table
 from echostep_app.plan.importers.limited import open_limited
 from echostep_app.printing.console import console_for_people
-from echostep_app.printing.lines import as_error, complain, say
+from echostep_app.printing.lines import complain
+from echostep_app.scorecard.card import Scorecard
 from echostep_app.scorecard.card import score as score_track
 from echostep_app.scorecard.definitions import METRICS, as_text, notes
+from echostep_app.scorecard.taps import tapped_walk
 from echostep_app.scorecard.track_columns import ScoredPath, load_path, track_of
 from echostep_app.scorecard.truth import is_recording, load_truth
 from echostep_app.session.metadata import start_given
 from echostep_app.session.options import TrackingOptions
 
 
+class Compared(NamedTuple):
+    """The name of the truth, each track with its true path, and sentences about what was read."""
+
+    truth: str
+    pairs: list[tuple[ScoredPath, ScoredPath]]
+    words: list[str]
+
+
 def score(
     tracks: Sequence[Path],
     truth: Path | None,
     tracking: TrackingOptions,
-    html: Path | None,
     setup_s: float | None,
     *,
+    taps: bool,
     as_json: bool,
 ) -> None:
-    """Print the scores as a table, or as JSON; write them to a page. Raises EchostepError."""
+    """Print the scores as a table, or as JSON; `taps`: against the places that were tapped in each recording. Raises EchostepError."""
     plan = open_limited(tracking.plan_path) if tracking.plan_path else None
+    compared = (_with_taps if taps else _with_truth)(tracks, truth, plan, tracking)
+    cards = [score_track(track, true, plan, setup_s) for track, true in compared.pairs]
+    if as_json:
+        json.dump(_tree(cards, compared.truth, plan), sys.stdout, indent=1)
+        sys.stdout.write("\n")
+        return
+    console = console_for_people(highlight=False)
+    for line in compared.words:
+        console.print(line, markup=False)
+    title = f"Scores against {Path(compared.truth).name}" + (f" on {plan.name}" if plan else "")
+    _table(title, cards, _short_names(tracks)).print()
+
+
+def _with_truth(tracks: Sequence[Path], truth: Path | None, plan: Plan | None, tracking: TrackingOptions) -> Compared:
+    """All tracks with the same true path: the given one, or that of the first recording."""
     truth = truth or next((path for path in tracks if is_recording(path)), None)
     if truth is None:
         raise EchostepError("the true path is missing: give it with --truth FILE, or score a recording that carries it")
     true = load_truth(truth, plan)
     loaded = [_track(path, plan, tracking) for path in tracks]
-    scored = [score_track(track, true, plan, setup_s) for track in loaded]
-    report = ScoreReport(scored, short_names(tracks), truth.name, plan)
-    if as_json:
-        json.dump(_tree(report, truth), sys.stdout, indent=1)
-        sys.stdout.write("\n")
-    else:
-        console = console_for_people(highlight=False)
-        for one in (true, *loaded):
-            console.print(one.described(), markup=False)
-        _table(report).print()
-    if html:
-        _write(html, page(report))
-        (complain if as_json else say)(f"page: {html}")
+    return Compared(str(truth), [(track, true) for track in loaded], [one.described() for one in (true, *loaded)])
+
+
+def _with_taps(tracks: Sequence[Path], truth: Path | None, plan: Plan | None, tracking: TrackingOptions) -> Compared:
+    """Each recording with its own taps."""
+    if truth is not None or plan is None:
+        raise EchostepError("--taps: give the plan on which the places were tapped with --plan, and no --truth")
+    start = start_given(tracking, plan)
+    walks = [tapped_walk(path, plan, start) for path in tracks]
+    for line in (line for walk in walks for line in walk.damage):
+        complain(line)
+    return Compared("taps", [(walk.track, walk.truth) for walk in walks], [walk.words for walk in walks])
 
 
 def _track(path: Path, plan: Plan | None, tracking: TrackingOptions) -> ScoredPath:
@@ -68,31 +92,34 @@ def _track(path: Path, plan: Plan | None, tracking: TrackingOptions) -> ScoredPa
     return track_of(replay(path, plan, start=start_given(tracking, plan or NO_PLAN)).estimates, str(path))
 
 
-def _table(report: ScoreReport) -> Table:
+def _short_names(paths: Sequence[Path]) -> list[str]:
+    """The shortest unique endings of the paths."""
+    for parts in range(1, max(len(path.parts) for path in paths) + 1):
+        names = ["/".join(path.parts[-parts:]) for path in paths]
+        if len(set(names)) == len(names):
+            return names
+    return [f"{k + 1}: {path.name}" for k, path in enumerate(paths)]
+
+
+def _table(title: str, cards: Sequence[Scorecard], names: Sequence[str]) -> Table:
     rows = [
         {"metric": metric.name, "source": metric.source}
-        | {f"track {k}": as_text(metric.value(one.card), metric.unit) for k, one in enumerate(report.scored)}
+        | {f"track {k}": as_text(metric.value(card), metric.unit) for k, card in enumerate(cards)}
         for metric in METRICS
     ]
-    names = {f"track {k}": escape(name) for k, name in enumerate(report.names)}
-    footnotes = [escape(line) for one in report.scored for line in notes(one.card)]
-    return Table(escape(report.title), rows, {"metric": "", **names, "source": "defined in"}, footnotes)
+    columns = {f"track {k}": escape(name) for k, name in enumerate(names)}
+    footnotes = [escape(line) for card in cards for line in notes(card)]
+    return Table(escape(title), rows, {"metric": "", **columns, "source": "defined in"}, footnotes)
 
 
-def _tree(report: ScoreReport, truth: Path) -> dict[str, object]:
+def _tree(cards: Sequence[Scorecard], truth: str, plan: Plan | None) -> dict[str, object]:
     """The scores as JSON objects: figures in metres, seconds and shares; null where there is none."""
     return {
-        "truth": str(truth),
-        "plan": report.plan.name if report.plan else None,
-        "tracks": [asdict(one.card) for one in report.scored],
+        "truth": truth,
+        "plan": plan.name if plan else None,
+        "tracks": [asdict(card) for card in cards],
         "definitions": [
             {"name": m.name, "unit": "share" if m.unit == "%" else m.unit, "source": m.source, "meaning": m.meaning}
             for m in METRICS
         ],
     }
-
-
-def _write(path: Path, text: str) -> None:
-    with as_error(f"{path}: cannot write the page"):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")

@@ -113,9 +113,10 @@ class Graph:
         """The level of each of these nodes (k,)."""
         return np.zeros(len(node), np.int64) if self.levels is None else self.levels.of[node]
 
-    def paths(self) -> tuple[Floats, ...]:
-        """The path (k, 2) of each walk; nodes before the first walk belong to a plan."""
-        return tuple(np.split(self.pose[:, :2], self.nodes.begins)[1:])
+    @property
+    def path(self) -> Floats:
+        """The corrected path (n, 2)."""
+        return self.pose[:, :2]
 
     def places(self) -> tuple[Floats, Floats]:
         """Centres (f, 2) and normals (f,) of all fragments, in the map."""
@@ -144,8 +145,7 @@ class Graph:
         rows.add(
             weight * ((b[:, 2] - a[:, 2]) - (odo[1:, 2] - odo[:-1, 2])), [(3 * i + 2, -weight), (3 * i + 5, weight)]
         )
-        free = self.base_rad is not None and self.nodes.begins[:1] == (0,)
-        start_sd = (START_SD_M, START_SD_M, FREE_SD_RAD if free else START_SD_RAD)
+        start_sd = (START_SD_M, START_SD_M, START_SD_RAD if self.base_rad is None else FREE_SD_RAD)
         for k, (value, sd) in enumerate(zip(odo[0], start_sd, strict=True)):
             rows.add(np.array([(pose[0, k] - value) / sd]), [(np.array([k]), np.array([1.0 / sd]))])
 

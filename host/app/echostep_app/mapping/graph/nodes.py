@@ -27,7 +27,7 @@ LEAST_SD_M = 0.005  # of a turn on the spot: the trunk moves over the foot
 class Nodes:
     """`t_s` (n,), `pose` (n, 3): x, y, heading by odometry; standard deviations (n - 1,) of the way from each node to the next.
 
-    `way_m` (n,): length of the path so far. `begins`: the first node of each walk.
+    `way_m` (n,): length of the path so far.
     """
 
     t_s: Floats
@@ -35,7 +35,6 @@ class Nodes:
     sd_m: Floats
     turn_sd_rad: Floats
     way_m: Floats
-    begins: tuple[int, ...] = (0,)
 
     def __len__(self) -> int:
         return len(self.t_s)

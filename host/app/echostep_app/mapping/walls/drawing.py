@@ -43,7 +43,7 @@ class Drawing:
 
     `doubtful` (d, 4), `doubtful_sd_m` (d,): the same of short walls that no second passage confirmed, and of walls whose place in the building is
     not known well enough. `place_sd` (p, 3): x, y of pieces of both, and the standard deviation per axis of their place in the building. `paths_m`:
-    the corrected path (k, 2) of each walk, or each piece of it on this level.
+    the corrected path (k, 2), or each piece of it on this level.
     """
 
     walls: Floats
@@ -65,21 +65,16 @@ def draw(graph: Graph, pings: Pings) -> tuple[Drawing, ...]:
     """The walls that the echoes of a walk show, on each level."""
     levels = graph.levels
     if levels is None:
-        return (_drawn(graph, pings, graph.paths()),)
+        return (_drawn(graph, pings, (graph.path,)),)
     walls = []
     for k in range(len(levels.height_m)):
         on = levels.of == k
         of = np.where(on[graph.fragments.node], graph.walls.of, -1)
         own = on[pings.node]
-        paths = tuple(piece for path in graph.paths() for piece in pieces_on(path, on))
+        paths = tuple(graph.path[a:b] for a, b in spans(on))
         part = replace(graph, walls=replace(graph.walls, of=of))
         walls.append(_drawn(part, Pings(*(getattr(pings, f.name)[own] for f in fields(pings))), paths))
     return tuple(walls)
-
-
-def pieces_on(path: Floats, on: Bools) -> list[Floats]:
-    """The pieces (k, 2) of a path (n, 2) whose nodes are `on` (n,) a level."""
-    return [path[a:b] for a, b in spans(on)]
 
 
 class _Heard(NamedTuple):

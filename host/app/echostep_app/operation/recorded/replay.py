@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from collections import deque
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,9 +71,7 @@ def replay(path: Path, plan: Plan, seconds: float | None, views: Views, console:
     with ExitStack() as opened:
         page = views.open_page(opened, tape.operation, "echostep command, recorded", console, tape)
         with suppress(KeyboardInterrupt):
-            reader = None
-            for reader in tape.read():
-                pass
+            reader = next(iter(deque(tape.read(), maxlen=1)), None)  # it is at the end
             if reader is None:
                 raise EchostepError(f"{path}: nothing of the operation can be read")
             _say(reader, console)

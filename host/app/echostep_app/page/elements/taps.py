@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Taps: the preview of a check-in's effect; the surveyed point that an acceptance walk asks for.
+"""Taps: the preview of a check-in's effect.
 
 In: a plan; a check-in that a page considers, and the scene that it was shown. Out: `Considered`: plain data. Owns the known spaces of the plan.
 One thread asks at a time.
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from echostep.localization import Estimate, TrackStatus, claims_place
 from echostep.plan import Plan
@@ -22,7 +22,6 @@ from echostep_app.plan.places.spaces import PlanSpaces
 from echostep_app.plan.places.standing import StandingGround
 from echostep_app.plan.places.whereabouts import Whereabouts
 
-NO_TAP = "u"  # as a line of the terminal: the newest tap at a point was a mistake
 DOUBTED_M = 1.0  # a check-in that is farther than this outside the ellipse of a fitting place is doubted; assumed
 
 
@@ -41,29 +40,6 @@ class Considered:
     possible: bool
     text: str
     kind: Literal["considered"] = "considered"
-
-
-@dataclass(frozen=True, slots=True)
-class ShownPoints:
-    """What an acceptance walk asks for. The field names are keys of the frame's JSON.
-
-    `number`: of the visit that comes next, to `name`, empty when all are over; `text`: what to do there. `later`: names of all points still to come.
-    `undo`: there is a tap that can be taken back.
-    """
-
-    number: int
-    name: str
-    text: str
-    later: tuple[str, ...]
-    undo: bool
-
-
-class PointPress(NamedTuple):
-    """At `t_ns` of the host's clock a page that showed visit `number` had its button pressed; `typed`: as a line of the terminal."""
-
-    t_ns: int
-    number: int
-    typed: str
 
 
 class Taps:

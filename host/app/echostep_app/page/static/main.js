@@ -40,7 +40,7 @@ const timeBar = new TimeBar(page.send);
 const parts = new ROLES[role](page);
 const floors = new Floors((level) => parts.floorChosen(level), parts.hasAllFloors);
 const link = page.link = new Link({
-  onHello: hello, onFrame: frame, onRefused: (reason) => { parts.refused?.(); hint(reason); }, onFailed: (reason, ended) => { parts.failed?.(ended); fault(reason); },
+  onHello: hello, onFrame: frame, onRefused: (reason) => hint(reason), onFailed: (reason, ended) => { parts.failed?.(ended); fault(reason); },
   onConsidered: (answer) => parts.considered(answer), onAge: aged, onUnsent: (text) => parts.unsent?.(text), isLive: () => page.isLive && scene.frame?.ended == null, parse: parts.parse,
 });
 const showLegend = startLegend($('legend-button'), parts.legend, parts.keyNames, () => parts.inOtherUnit());

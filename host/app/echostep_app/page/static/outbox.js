@@ -6,10 +6,10 @@ import { tr } from './language.js';
 import { remember } from './storage.js';
 
 const LABELS = {
-  call: 'Help!', check_in: 'I am here', undo: 'Undo', met: 'I met a teammate', understood: 'Understood', order: 'Order', at_point: 'At the point', no_tap: 'Undo', go_to: 'Go here', go_nowhere: 'End of the guidance',
+  call: 'Help!', check_in: 'I am here', undo: 'Undo', met: 'I met a teammate', understood: 'Understood', order: 'Order', go_to: 'Go here', go_nowhere: 'End of the guidance',
   acknowledge: 'Acknowledge', send: 'Send', mark: 'Mark', unmark: 'Remove', crew: 'Crew', crew_does: 'Crew', log: 'Note',
 };
-const FRESH_S = { check_in: 5, undo: 5, met: 5, at_point: 2, no_tap: 2 };  // what is said of this moment is wrong later; assumed
+const FRESH_S = { check_in: 5, undo: 5, met: 5 };  // what is said of this moment is wrong later; assumed
 const STORED_S = 600;  // what an earlier page left behind is sent for so long; assumed
 const TOO_LATE = 'not sent: too late by now, do it again';
 const SLOW_S = 1, SHOWN_MS = 6000, REFUSED_MS = 20000, REMIND_S = 10, MOST_NEWS = 2;

@@ -53,7 +53,6 @@ class DrawnLevel:
     obstacles: list[Polygon] = field(default_factory=list)
     rooms: list[Room] = field(default_factory=list)
     connectors: list[ConnectorShape] = field(default_factory=list)
-    openings: list[Polygon] = field(default_factory=list)  # holes in the floor
     cuts: list[BaseGeometry] = field(
         default_factory=list
     )  # where walls drawn as lines are cut, besides the doors' lines

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from echostep.errors import EchostepError
-from echostep.plan import Plan, load_plan
+from echostep.plan import Plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.parsing import FORMATS, GML
 from echostep_app.plan.importers.report import ImportReport
@@ -51,7 +51,7 @@ def import_plan(
 ) -> Plan:
     """Import a file of another program; drawings have one file per level, `above` are the files of the higher levels. Fills the report.
 
-    Raises EchostepError that names the file and the position in it.
+    Raises EchostepError with the file's name and the position.
     """
     hints = hints or Hints()
     if hints.doors_m is not None and not _is_imdf(path):
@@ -70,15 +70,9 @@ def import_plan(
     return replace(plan, digest=hashlib.sha256(plan_json(plan).encode()).hexdigest())
 
 
-def open_plan(path: Path | str) -> Plan:
-    """Read plan.json, or import another format without hints. Raises EchostepError that names the file and the position in it."""
-    path = Path(path)
-    return import_plan(path) if is_foreign(path) else load_plan(path)
-
-
 def is_foreign(path: Path) -> bool:
     """Whether a file has another format than plan.json, by its name."""
-    return path.is_dir() or path.suffix.casefold() in OTHERS or path.name in ("main.json", "core.txt") or _is_map(path)
+    return path.is_dir() or path.suffix.casefold() in OTHERS or _is_map(path)
 
 
 def _imported(path: Path, hints: Hints, above: Sequence[Path], report: ImportReport) -> Plan:
@@ -90,14 +84,10 @@ def _imported(path: Path, hints: Hints, above: Sequence[Path], report: ImportRep
         plan = _module("dxf.drawing").import_dxf([path, *above], hints, report)
     elif suffix in (".osm", ".xml", ".geojson") or _is_map(path):
         plan = _module("osm.building").import_osm(path, height_m, report)
-    elif path.name == "main.json" or (path / "main.json").exists():
-        plan = _module("wrld").import_wrld(path / "main.json" if path.is_dir() else path, height_m, report)
     elif suffix in (".ifc", ".ifczip"):
         plan = _module("ifc.building").import_ifc(path, report)
     elif _is_imdf(path):
         plan = _module("imdf.venue").import_imdf(path, height_m, hints.doors_m, report)
-    elif path.name == "core.txt" or (path / "core.txt").exists():
-        plan = _module("nodelink").import_nodelink(path / "core.txt" if path.is_dir() else path, report)
     elif suffix in (".yaml", ".yml"):
         plan = _module("raster.ros_map").import_ros_map(path, report)
     elif suffix in PICTURES and hints.scale_m is not None:
@@ -122,7 +112,7 @@ def _is_imdf(path: Path) -> bool:
 def _is_map(path: Path) -> bool:
     """Whether a JSON file is from OpenStreetMap: of Overpass, or GeoJSON."""
     begins = [_begins_with(path, text) for text in ('"elements"', '"FeatureCollection"', '"echostep_plan"')]
-    return path.suffix.casefold() == ".json" and any(begins[:2]) and not begins[2] and path.name != "main.json"
+    return path.suffix.casefold() == ".json" and any(begins[:2]) and not begins[2]
 
 
 def _begins_with(path: Path, text: str) -> bool:

@@ -30,7 +30,7 @@ CHILD = "from echostep_app.plan.importers.limited import main; main()"
 
 
 def open_limited(path: Path | str) -> Plan:
-    """As `formats.open_plan`, with formats other than plan.json in a process with limits; doubts about an import go to stderr."""
+    """Read plan.json, or import another format without hints in a process with limits; doubts about an import go to stderr."""
     path = Path(path)
     if not is_foreign(path):
         return load_plan(path)

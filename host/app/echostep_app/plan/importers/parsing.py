@@ -18,7 +18,7 @@ from echostep_app.printing.lines import as_error
 
 PROJECTED = "are these metres of a projected system? save it as EPSG:4326 (longitude, latitude)"
 GML = "IndoorGML or CityGML is not read: export the building as IFC, IMDF or DXF"
-FORMATS = "DXF, IFC, IMDF (zip or folder), OpenStreetMap (.osm, .xml, .geojson, JSON of Overpass), ROS (map.yaml), WRLD (main.json), biba (core.txt)"
+FORMATS = "DXF, IFC, IMDF (zip or folder), OpenStreetMap (.osm, .xml, .geojson, JSON of Overpass), ROS (map.yaml)"
 LARGEST_BYTES = 512 * 2**20
 
 
@@ -63,7 +63,7 @@ def number(value: Any, where: str, limit: float, unit: str) -> float:
 
 
 def finite(text: str, where: str) -> float:
-    """The finite number that a text stands for; raises EchostepError."""
+    """A text as a finite number; raises EchostepError."""
     try:
         value = float(text)
     except ValueError as error:
@@ -71,13 +71,6 @@ def finite(text: str, where: str) -> float:
     if not math.isfinite(value):
         raise EchostepError(f"{where}: {text[:40]!r} is not finite")
     return value
-
-
-def beside(file: Path, name: str, where: str) -> Path:
-    """The file of a name in the folder of another file, and nowhere else; raises EchostepError."""
-    if Path(name).name != name or name in ("", "..") or "\x00" in name:
-        raise EchostepError(f"{file}: {where}: {name[:60]!r} is not a file beside {file.name}")
-    return file.parent / name
 
 
 def text(value: Any, where: str) -> str:

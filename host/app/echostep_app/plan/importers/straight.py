@@ -29,7 +29,7 @@ def pieces_of(lines: Sequence[BaseGeometry]) -> Floats:
 
 
 def merge_collinear(segments: Floats, off_m: float = OFF_M) -> Floats:
-    """Join pieces that continue or cover each other, up to `off_m` beside the line. Walls end where pieces do; the longest piece's comes first."""
+    """Join pieces that continue or cover each other, up to `off_m` from the line. Walls end where pieces do; the longest piece's comes first."""
     if not len(segments):
         return segments
     segments = segments[np.argsort(-np.hypot(*(segments[:, 2:] - segments[:, :2]).T), kind="stable")]

@@ -141,7 +141,7 @@ def _draw_bare(plan: Plan, level: int, bounds: Bounds, pixels_per_m: float, file
 
 
 def _draw_ground(axes: Any, level: Level) -> None:
-    """White, nearly opaque, in the spaces between the walls, and beside each wall: legible on any map."""
+    """White, nearly opaque, between the walls and along each wall: legible on any map."""
     from matplotlib.collections import LineCollection, PolyCollection
 
     areas = (

@@ -64,7 +64,7 @@ def extend(segments: Floats, by_m: float) -> Floats:
 
 
 def _ticks(doors: Floats) -> Floats:
-    """Short lines across both ends of doors (n, 4) -> (2n, 4): a wall that continues a door in line may lie beside it because of rounding."""
+    """Short lines across both ends of doors (n, 4) -> (2n, 4): a wall that continues a door may be off its line by rounding."""
     along = doors[:, 2:] - doors[:, :2]
     across = (along / np.hypot(*along.T)[:, None] * TOUCH_M)[:, ::-1] * (-1.0, 1.0)
     ends = (doors[:, :2], doors[:, 2:])

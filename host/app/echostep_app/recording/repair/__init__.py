@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Recordings that are damaged, cut, or joined: their contents, and whole files made of them.
+"""Damaged, cut and joined recordings: their contents, and whole files made from the contents.
 
 In: recordings. Out: recordings, a summary of the contents. Owns nothing.
 """

@@ -205,7 +205,7 @@ def damage_of(recovery: Recovery, contents: Contents) -> list[str]:
 
 
 def damage_notes(recovery: Recovery, contents: Contents) -> list[str]:
-    """Damage of a recording and of the recordings before it, for the one that is made of it."""
+    """Damage of a recording and of its predecessors, for the recording made from it."""
     return [*made_of(recovery.path, damage_of(recovery, contents)), *recovery.before]
 
 

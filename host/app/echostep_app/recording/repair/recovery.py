@@ -4,7 +4,7 @@
 In: an MCAP file: complete, truncated, damaged in the middle, from our recorder or rewritten by another tool. Out: its messages in the order of
 the file, both the ports' and derived ones, and the byte ranges without valid records. Owns the read position in the file.
 
-What a valid record is: `damage/scan.py`.
+Validity of a record: `damage/scan.py`.
 """
 
 from __future__ import annotations
@@ -205,7 +205,7 @@ class _Waiting:
 
 @dataclass
 class ArrivalOrder:
-    """Corrects arrival times of one recording that are not between those of the port's neighbours: to the later one; `corrected` counts them."""
+    """Corrects arrival times of one recording that lie outside the port's neighbouring times: to the later one; `corrected` counts them."""
 
     corrected: int = 0
     _waiting: deque[_Waiting] = field(default_factory=deque)

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
 
 from echostep.board.frames import BoardReader, StaleFirmwareError, encode
 from echostep.board.messages import Identify
@@ -21,7 +20,7 @@ from echostep.board.subscription import SUBSCRIBE, BoardSubscription
 from echostep.errors import EchostepError
 from echostep.localization import Start
 from echostep.plan import Plan
-from echostep.ports.chunks import BOARD, FOOT, GATEWAY, LINES, MTX, POINT, Chunk
+from echostep.ports.chunks import BOARD, FOOT, GATEWAY, LINES, MTX, Chunk
 from echostep.settings import Settings, parse_settings, read_settings
 from echostep.timing.timeline import MtxTiming
 from echostep.tracker import Tracker
@@ -55,35 +54,17 @@ from echostep_app.session.runs.port_roles import with_right_names, with_role_che
 from echostep_app.session.session import Session
 from echostep_app.xsens.startup import MtxStart
 
-if TYPE_CHECKING:
-    from echostep_app.page.mailbox import Mailbox
-    from echostep_app.team.endpoint import Outlet
-
 BAUD = dict.fromkeys((BOARD, MTX, FOOT, GATEWAY, LINES), 115200)
 
 
-class Guide(Protocol):
-    """Leads a wearer from point to point: `metadata` for the recording."""
-
-    metadata: dict[str, str]
-
-    def attach(self, page: Mailbox) -> None:
-        """Show the points on a page, too."""
-
-    def pop(self) -> list[bytes]:
-        """Taps since the last call."""
-
-    def is_over(self) -> bool:
-        """Whether the run ends."""
-
-
-def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions, guide: Guide | None = None) -> Path:
-    """Track a wearer and record everything, with the taps of a guide, if any; returns the recording."""
+def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -> None:
+    """Track a wearer and record everything."""
     plan = plan_of(tracking)
     if port_of(ports.foot) is None:
-        return _live(plan, tracking, ports, output, guide)
-    with closing(_open_ports(ports, output.outlet)) as opened:
-        return _live(plan, tracking, ports, output, guide, opened)
+        _live(plan, tracking, ports, output)
+        return
+    with closing(_open_ports(ports)) as opened:
+        _live(plan, tracking, ports, output, opened)
 
 
 def _live(
@@ -91,9 +72,8 @@ def _live(
     tracking: TrackingOptions,
     ports: PortOptions,
     output: OutputOptions,
-    guide: Guide | None,
     early: SerialPorts | None = None,
-) -> Path:
+) -> None:
     """The run; `early`: open ports whose lines tell the rate of the foot's samples."""
     path = tracking.settings_path
     settings_toml = read_settings(path) if path else ""
@@ -104,30 +84,23 @@ def _live(
     start = _last_start(output.folder, plan, number, settings) if is_last else start_given(tracking, plan)
     tracker = Tracker(plan, start, settings, seed)
     check_start(plan, tracker.start, given=tracking.start is not None and not is_last, recorded=is_last)
-    session = Session(tracker, f"echostep {'acceptance' if guide else 'live'}", "live", output, tracking.guide_to)
+    session = Session(tracker, "echostep live", "live", output, tracking.guide_to)
     session.prepare(SEARCH)  # a search may begin with the first steps
     folder = output_folder(output.folder)
     tracker.watchers.append(PlaceKeeper(folder, tracker, number).note)
-    with closing(early or _open_ports(ports, output.outlet)) as opened:
+    with closing(early or _open_ports(ports)) as opened:
         _identify(opened)
         metadata = run_metadata(plan, tracker.start, seed, "live", settings_toml) | clock_metadata()
         session.arrivals.urls = opened.urls
-        if guide is not None:
-            metadata |= guide.metadata
-            session.message_sources.append((POINT, guide.pop))
         with session:
-            if guide is not None and session.page is not None:
-                guide.attach(session.page.mailbox)
             with start_recording(folder / "walk.mcap", metadata, ports.keep, ports.split) as recorder:
-                ended = guide.is_over if guide is not None else is_asked
-                chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session, ended, lines)
+                chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session, lines)
                 session.track(portions_of(chunks, 1), None, recorder)
             print_notices(recorder.notices)
             session.finish("live")
             if lines:
                 console.print(lines.report(), markup=False, highlight=False)
         recorder.check_whole()
-    return recorder.path
 
 
 def _last_start(folder: Path, plan: Plan, board: str, settings: Settings) -> Start:
@@ -142,8 +115,8 @@ def _last_start(folder: Path, plan: Plan, board: str, settings: Settings) -> Sta
     return start
 
 
-def record(ports: PortOptions, out: Path) -> Path:
-    """Record the ports without tracking; returns the recording's own name."""
+def record(ports: PortOptions, out: Path) -> None:
+    """Record the ports without tracking."""
     outlast_output()
     warm_up()
     byte_count: Counter[str] = Counter()
@@ -167,7 +140,6 @@ def record(ports: PortOptions, out: Path) -> Path:
     foot = f"{byte_count[LINES]} in the foot's lines" if lines else f"{byte_count[name]} from {device}"
     console.print(f"{recorder.path}: {byte_count[BOARD]} bytes from the board, {foot}{from_gateway}")
     recorder.check_whole()
-    return Path(recorder.path)
 
 
 def _passed(seconds: float | None) -> Callable[[], float | None]:
@@ -183,16 +155,15 @@ def _identify(ports: SerialPorts) -> None:
             ports.send(name, encode(Identify(), 0))
 
 
-def _open_ports(options: PortOptions, outlet: Outlet | None = None) -> SerialPorts:
-    """The ports of a run; raises EchostepError when two uses of the run have the same one, the radio of `outlet` included."""
+def _open_ports(options: PortOptions) -> SerialPorts:
+    """The ports of a run; raises EchostepError when two uses of the run have the same one."""
     if options.mtx is not None and options.foot is not None:
         raise EchostepError("--mtx and --foot: only one of them is on the foot: give that one")
     lines = port_of(options.foot)
     foot = options.foot if lines is None else None
     urls = {BOARD: options.board, MTX: options.mtx, FOOT: foot, GATEWAY: options.beacons, LINES: lines}
     given = {name: url for name, url in urls.items() if url is not None}
-    radios = [endpoint.host for endpoint in outlet.endpoints if endpoint.scheme == "mesh"] if outlet else []
-    check_different(given | {f"--publish mesh://{port} ({k})": port for k, port in enumerate(radios, 1)})
+    check_different(given)
     return SerialPorts(given, BAUD)
 
 
@@ -202,11 +173,10 @@ def _recorded_chunks(
     rate_hz: float,
     seconds: float | None,
     session: Session | None = None,
-    ended: Callable[[], bool] = is_asked,
     lines: LineFoot | None = None,
 ) -> Iterator[Chunk | None]:
     """Chunks of the ports, check-ins and meetings of the page, messages of teammates, each recorded before it is used; the MTx is set up."""
-    chunks = with_right_names(_chunks_for(ports, seconds, ended), ports)
+    chunks = with_right_names(_chunks_for(ports, seconds), ports)
     chunks = lines.with_samples(chunks) if lines else chunks
     if session is not None:
         chunks = with_messages(chunks, session.message_sources, lambda _: now_ns())
@@ -214,8 +184,8 @@ def _recorded_chunks(
     return _with_mtx_setup(chunks, ports, rate_hz) if MTX in ports.names else chunks
 
 
-def _chunks_for(ports: SerialPorts, seconds: float | None, ended: Callable[[], bool]) -> Iterator[Chunk | None]:
-    """Chunks of the ports for so many seconds, until a signal or until it has `ended`; then what has arrived. None when nothing came for a while."""
+def _chunks_for(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk | None]:
+    """Chunks of the ports for so many seconds or until a signal; then what has arrived. None when nothing came for a while."""
     end_s = math.inf if seconds is None else time.monotonic() + seconds
     watch = SleepWatch()
     for chunk in ports.chunks():
@@ -223,7 +193,7 @@ def _chunks_for(ports: SerialPorts, seconds: float | None, ended: Callable[[], b
         if slept_s := watch.slept_s():
             console.print(f"The computer slept for {slept_s:.0f} s: nothing was received; the position is uncertain")
         yield chunk
-        if is_asked() or ended() or time.monotonic() >= end_s:
+        if is_asked() or time.monotonic() >= end_s:
             ports.stop()
 
 

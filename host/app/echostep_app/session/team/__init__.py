@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Exchange of a run with its team: teammates' reports, meetings, marks, the plan that is being drawn.
+"""Exchange of a run with its team: teammates' reports, meetings, marks.
 
 In: messages of a team. Out: chunks for the tracker, notices. Owns the connections.
 """

@@ -3,7 +3,6 @@
 
 In: the team subscription. Out: payloads of chunks of the port `TEAM`, at most one a second; marks on this plan, when they change; names of
 commanders; an errand, when it is new. Owns the roster of received reports, and the board of received marks.
-A live walk without a plan is drawn for the team by the page, or here where there is no page.
 """
 
 from __future__ import annotations
@@ -12,15 +11,9 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from datetime import UTC, datetime
 
-from echostep.localization import Estimate
-from echostep.path import MeasuredSegment
-from echostep.plan import NO_PLAN, Plan
-from echostep.tracker import Tracker
-from echostep_app.page.drawing_process import DrawingProcess
+from echostep.plan import Plan
 from echostep_app.page.elements.marks import ShownMark, ShownOrder
-from echostep_app.page.shared import SharedDrawing
 from echostep_app.ports.teammate import Teammate
 from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.team.endpoint import Outlet
@@ -36,7 +29,6 @@ from echostep_app.team.messages.orders import (
     receipt_message,
 )
 from echostep_app.team.messages.report import BadReportError
-from echostep_app.team.messages.shared_drawings import MOST_BYTES
 from echostep_app.team.roster import Member, MemberState, Roster
 
 NEWS_S = 1.0  # between two places that are passed on; assumed
@@ -160,29 +152,3 @@ class MarkFeed:
             self._board.receive(message.topic or "", message.payload)
         except BadReportError as error:
             self.rejected[str(error)] += 1
-
-
-def shared_drawing(tracker: Tracker, name: str) -> SharedDrawing:
-    """The drawing of a tracker without a plan, in the frame of its start, named after the wearer and the time (UTC) at which the walk begins."""
-    start = tracker.start.pose if tracker.start else None
-    assert NO_PLAN.start is not None
-    return SharedDrawing(start or NO_PLAN.start, f"drawn by {name}, {datetime.now(UTC):%Y-%m-%d %H:%M}Z", MOST_BYTES)
-
-
-class UnseenDrawing:
-    """Draws a run that has no page, from the tracker's segments; `close` ends it."""
-
-    def __init__(self, tracker: Tracker, shared: SharedDrawing, fail: Callable[[str], object]) -> None:
-        """`fail` is called with the words for an end before the end, in another thread."""
-        self._tracker = tracker
-        self._process = DrawingProcess(lambda _drawing: None, fail, live=True, shared=shared)
-        tracker.watchers.append(self._watch)
-
-    def close(self) -> None:
-        """End the process."""
-        self._tracker.watchers.remove(self._watch)
-        self._process.close()
-
-    def _watch(self, measured: MeasuredSegment | None, estimate: Estimate) -> None:
-        if measured is not None:
-            self._process.add(measured, estimate, 0)

@@ -77,11 +77,6 @@ class TeamSubscription:
         """Have the broker keep a message; it waits while the connection is broken. False when too many wait."""
         return self._receiver is not None and self._receiver.send(topic, payload)
 
-    @property
-    def sent_all(self) -> bool:
-        """Whether no message waits."""
-        return self._receiver is not None and not self._receiver.waiting
-
     def close(self) -> None:
         """Disconnect."""
         if self._receiver is not None:

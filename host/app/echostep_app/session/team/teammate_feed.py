@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The teammate feed: teammates whom the wearer may have met.
 
-In: the team subscription; the beacons that this wearer has placed, and what its walk has drawn. Out: names of teammates with reports on this
-plan, when they change; the bytes of a meeting with one of them, and of the beacons that they share; this wearer's own and its drawing for the
-broker. Owns the roster of received reports.
+In: the team subscription; the beacons that this wearer has placed. Out: names of teammates with reports on this plan, when they change; the bytes
+of a meeting with one of them, and of the beacons that they share; this wearer's own for the broker. Owns the roster of received reports.
 """
 
 from __future__ import annotations
@@ -19,11 +18,9 @@ from echostep.plan import Plan
 from echostep.ports.people.meeting import MeetingMessage, Status
 from echostep.ports.people.payloads import MOST_LEVELS, Spread
 from echostep.ports.people.team_beacons import BEACONS, SHARE_S, SharedBeacon, TeamBeacons, parse_team_beacons
-from echostep_app.page.shared import SharedDrawing
 from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.team.endpoint import Outlet
 from echostep_app.team.inbox import ReceivedMessage
-from echostep_app.team.messages.shared_drawings import drawing_topic
 from echostep_app.team.roster import Member, MemberState, Roster
 
 KNOWN: dict[str, Status] = {"tracking": "tracking", "uncertain": "uncertain"}  # any other state carries no position
@@ -68,7 +65,7 @@ class TeammateFeed:
         self._roster = Roster()
         self.rejected = self._roster.rejected
         self._names: tuple[str, ...] = ()
-        self._shared_s = self._drawing_s = -math.inf
+        self._shared_s = -math.inf
         self._placed: dict[str, bytes] = {}  # newest beacons of each teammate that were not taken yet, by name
         self._taken: dict[str, tuple[float, bytes]] = {}  # those that were taken, and when
         self._shared = b""
@@ -116,15 +113,6 @@ class TeammateFeed:
         topic, payload = message.topic(self._own[0]), message.encode()
         if payload != self._shared and (beacons or self._shared) and self._subscription.send(topic, payload):
             self._shared, self._shared_s = payload, now_s
-
-    def share_drawing(self, drawing: SharedDrawing) -> None:
-        """Publish the newest drawing, every SHARE_S when there is a newer one and the last one has been sent."""
-        now_s = time.monotonic()
-        if now_s - self._drawing_s < SHARE_S or not self._subscription.sent_all:
-            return
-        plan = drawing.take()
-        if plan is not None and self._subscription.send(drawing_topic(*self._own), plan):
-            self._drawing_s = now_s
 
     def _members(self, now_s: float) -> dict[str, Member]:
         """The run with the newest report of each teammate with a position on this plan, by name."""

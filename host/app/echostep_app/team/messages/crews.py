@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Crews inside: who is in a crew, since when, for how much air, and when it last answered (accountability check, PAR).
+"""Crews inside: members, time of entry, air in minutes, and last answer (accountability check, PAR).
 
 In: retained messages from untrusted senders, on `echostep-table/crew/<id>`; an empty one removes. Out: `Crew`s, and the messages for new ones. Owns
 nothing. Of several messages about one crew the latest counts, as of errands (`shared.Kept`).

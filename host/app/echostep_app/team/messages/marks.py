@@ -98,7 +98,7 @@ class Errand(msgspec.Struct, frozen=True):
 
     @property
     def words(self) -> str:
-        """For the wearer who is sent."""
+        """For the wearer who is sent there."""
         return f"{self.by} sends you to {self.to}, in distress{f': {self.where}' if self.where else ''}"
 
 
@@ -184,7 +184,7 @@ class MarkBoard:
 
     @property
     def messages(self) -> Iterator[tuple[str, bytes]]:
-        """Topic and payload of all that is known."""
+        """Topic and payload of the whole state."""
         for mark in (*self.marks.values(), *self.removed.values()):
             yield mark.message
         for kept in self._kept:
@@ -244,7 +244,7 @@ def _checked_key(parts: Sequence[str]) -> tuple[str, str, str]:
 
 
 def _names(team: str, name: str) -> tuple[str, str]:
-    """Team and wearer; raises BadReportError for what is no name."""
+    """Team and wearer; raises BadReportError for a text that is no name."""
     check_name(team)
     check_name(name)
     return team, name

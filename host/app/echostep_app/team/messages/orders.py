@@ -28,7 +28,7 @@ ReceiptKey = tuple[str, str, str]  # "everybody" or "note", team, wearer
 
 
 class Order(msgspec.Struct, frozen=True):
-    """What the commander `by` wrote at `unix_s`. `ended`: it holds no longer."""
+    """An order that the commander `by` wrote at `unix_s`. `ended`: it holds no longer."""
 
     echostep_order: Literal[1]
     text: NoteText

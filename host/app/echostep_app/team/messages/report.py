@@ -28,7 +28,7 @@ WITHOUT_PLAN = 64 * "0"  # the SHA-256 of no file: the wearer is tracked without
 
 
 def between(least: float, most: float, words: str) -> Meta:
-    """The limits of a number, both included, and what it is."""
+    """The limits of a number, both included, and its meaning."""
     return Meta(ge=least, le=most, description=words)
 
 
@@ -135,7 +135,7 @@ class ReportedAlarm:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """All of it; `position` is missing until the tracker has its first estimate, and while it is lost."""
+    """The whole report; `position` is missing until the tracker has its first estimate, and while it is lost."""
 
     echostep_report: Annotated[Literal[1], Meta(description="version of this form")]
     team: Name
@@ -179,7 +179,7 @@ class Report:
 
     @property
     def last_known(self) -> Position | None:
-        """The position, or while lost the last one that was known."""
+        """The position; while lost, the last known one."""
         return self.position or self.last_place
 
     @property
@@ -195,7 +195,7 @@ class Report:
 
 @dataclass(frozen=True, slots=True)
 class Presence:
-    """The retained message beside the reports: the tracker is online, has ended, or its connection broke (last will at the broker)."""
+    """The retained message besides the reports: the tracker is online, has ended, or its connection broke (last will at the broker)."""
 
     echostep_presence: Literal[1]
     run: Annotated[str, Meta(pattern="^[0-9a-f]{8}$")]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the commanders' shared messages have in common: types of fields, decoding, checks, and which of two counts.
+"""Parts common to the commanders' shared messages: types of fields, decoding, checks, and which of two is valid.
 
 In: payloads from untrusted senders. Out: their fields; BadReportError with the reason of a rejection. Owns those that are known; their number is
 bounded.
@@ -48,7 +48,7 @@ def check_printable(*texts: str) -> None:
 
 
 def check_room(known: Mapping[K, object], key: K, most: int, what: str) -> None:
-    """Raises BadReportError for a new key where `most` are known."""
+    """Raises BadReportError for a new key where `most` keys exist."""
     if key not in known and len(known) >= most:
         raise BadReportError(f"more than {most} {what}")
 
@@ -68,7 +68,7 @@ class Kept(dict[K, S]):
         self, kind: type[S], what: str, most: int, message: Callable[[K, S], Message], texts: Callable[[S], Iterable[str]], *,
         earliest: bool = False,
     ) -> None:  # fmt: skip
-        """`what`: one in words; `most` keys; `message`: topic and payload of one; `texts`: what is in it to be printed."""
+        """`what`: one in words; `most` keys; `message`: topic and payload of one; `texts`: its printed fields."""
         super().__init__()
         self._decoder, self._what, self._most, self._earliest = msgspec.json.Decoder(kind), what, most, earliest
         self._message, self._texts = message, texts
@@ -79,7 +79,7 @@ class Kept(dict[K, S]):
         return (self._message(key, known) for key, known in self.items())
 
     def receive(self, key: K, message: Message, answers: deque[Message]) -> None:
-        """Take one message, an empty one removes; an outdated one is answered with what is known. Raises BadReportError."""
+        """Take one message, an empty one removes; an outdated one is answered with the present state. Raises BadReportError."""
         topic, payload = message
         if not payload:
             self.pop(key, None)

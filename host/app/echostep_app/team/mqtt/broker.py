@@ -24,7 +24,7 @@ ANSWER_S = 5.0  # longest wait for an answer of the broker
 KEEPALIVE_S = 6  # the broker sends the last will after 1.5 times as long [MQTT 3.1.1, 3.1.2.10]
 QOS_NOT_SUPPORTED = 155  # reason code [MQTT 5, 2.4]
 LOOP_S = 0.05  # longest wait for a packet in one call of `run_once`
-MAX_PACKET = 65_536  # bytes; a broker of MQTT 5 sends no longer packet than this, unless it was asked for
+MAX_PACKET = 65_536  # bytes; a broker of MQTT 5 sends no longer packet than this
 CLIENT_ERRORS = (  # what paho raises on broken connections and malformed packets
     OSError,
     ValueError,
@@ -61,12 +61,10 @@ def make_client(endpoint: Endpoint, tls: Any, identity: str, *, newest: bool = F
     return client
 
 
-def connect(client: paho.Client, endpoint: Endpoint, most_bytes: int = MAX_PACKET) -> int:
+def connect(client: paho.Client, endpoint: Endpoint) -> int:
     """Connect and wait for the broker's acceptance; returns the greatest QoS that it takes, 0 or 1.
 
     Raises OSError, which is a RefusedError when the host answers.
-
-    `most_bytes`: of a packet that a broker of MQTT 5 sends.
     """
     refused: list[Any] = []
     greatest = [1]
@@ -80,7 +78,7 @@ def connect(client: paho.Client, endpoint: Endpoint, most_bytes: int = MAX_PACKE
     properties = None
     if client.protocol == paho.MQTTv5:
         properties = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
-        properties.MaximumPacketSize = most_bytes
+        properties.MaximumPacketSize = MAX_PACKET
     try:
         client.connect(endpoint.host, endpoint.port, keepalive=KEEPALIVE_S, properties=properties)
     except (OSError, ValueError) as error:

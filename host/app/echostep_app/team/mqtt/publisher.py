@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""MQTT: sends reports to a broker, and receives the reports of a team from it.
+"""MQTT: sends reports to a broker, and receives a team's reports.
 
 In: reports; or an endpoint to subscribe at. Out: messages on `echostep/<team>/<wearer>/estimate` (retained, QoS 1: a commander that
 connects late gets the last report) and `.../presence` (retained, with a last will); or the messages of the broker. Owns one connection,
@@ -20,7 +20,6 @@ from echostep_app.team.messages.report import Presence, Report, encode
 from echostep_app.team.mqtt.broker import (
     CLIENT_ERRORS,
     LOOP_S,
-    MAX_PACKET,
     QosError,
     RefusedError,
     UnwantedError,
@@ -107,14 +106,9 @@ class Listener:
     """A subscription: `run_once` runs the connection and passes each message to `put(topic, payload, retained)`."""
 
     def __init__(
-        self,
-        endpoint: Endpoint,
-        topics: Sequence[str],
-        put: Callable[[str | None, bytes, bool], None],
-        most_bytes: int = MAX_PACKET,
+        self, endpoint: Endpoint, topics: Sequence[str], put: Callable[[str | None, bytes, bool], None]
     ) -> None:
-        """`most_bytes`: of a packet; a broker of MQTT 5 sends no longer one."""
-        self._endpoint, self._topics, self._put, self._most_bytes = endpoint, topics, put, most_bytes
+        self._endpoint, self._topics, self._put = endpoint, topics, put
         self._tls = tls_context(endpoint) if endpoint.secure else None
         self._client: paho.Client | None = None
         self._use_mqtt5, self._qos = True, 1
@@ -128,7 +122,7 @@ class Listener:
         client.on_message = self._message
         self._client = client
         try:
-            self._qos = connect(client, self._endpoint, self._most_bytes)
+            self._qos = connect(client, self._endpoint)
         except RefusedError:
             self._use_mqtt5 = not self._use_mqtt5
             raise

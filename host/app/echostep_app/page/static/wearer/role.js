@@ -11,7 +11,6 @@ import { Tools } from '../tools/tools.js';
 import { WearerPainter } from './layers.js';
 import { Orders } from './orders.js';
 import { Panel } from './panel.js';
-import { Points } from './points.js';
 import { Speech } from './speech.js';
 import { Taps } from './taps.js';
 import { extend, parseFrame } from './wire.js';
@@ -37,7 +36,6 @@ export class Wearer {
     });
     this.speech = new Speech($('speech'), $('sentence'), $('invitation'), $('unspoken'));
     this.orders = new Orders(send, (text) => this.speech.unsent(text));
-    this.points = new Points(send);
     this.drops = new Drops(hint);
     this.charts = new Charts($('charts'), () => this.painter.colour, seek);
     this.tools = new Tools({ view, scene, planView, layers: scene.layers, charts: this.charts, hint, seek, enter: (mode) => this.enter(mode), changed: () => view.changed(), plan: () => page.plan, globe: () => page.globe, takesFiles: () => this.drops.takes });
@@ -83,7 +81,6 @@ export class Wearer {
     const { page, panel } = this, { isLive, scene } = page;
     scene.trail.count = 0;
     scene.drawing = null;
-    this.points.show(null);
     Object.assign(this, { invited: false, broken: false });
     panel.hello(message);
     $('here').hidden = $('sheet-here').hidden = $('help').hidden = !isLive;
@@ -117,7 +114,6 @@ export class Wearer {
     if (view.scale === this.fittedScale && !this.linked) view.approach(estimate.x_m, estimate.y_m, planView.box);
   }
 
-  refused() { this.points.ready(); }
   failed(ended) { this.broken = Boolean(ended); }  // by the error that ended the run
   considered(answer) { this.taps.considered(answer); }
   unsent(text) { this.speech.unsent(text); }
@@ -142,11 +138,10 @@ export class Wearer {
   }
 
   frame(received) {
-    const { page, panel, speech } = this, { scene } = page, { cloud, drawing, team, points, met, marks, play, alarm, words } = received;
+    const { page, panel, speech } = this, { scene } = page, { cloud, drawing, team, met, marks, play, alarm, words } = received;
     if (cloud) scene.cloud = cloud;
     if (drawing) panel.drawing(scene.drawing = drawing.path.length ? drawing : null);
     if (team) panel.team(team);
-    if (points) this.points.show(points);
     if (met && met.number !== this.metNumber) {
       this.metNumber = met.number;
       page.hint(met.text, 8000);

@@ -41,7 +41,7 @@ Line = tuple[float, float, float, float]
 
 @dataclass(slots=True)
 class PlacedDoors:
-    """Doors in walls; `jambs`: ends of the walls beside them, from face to face; `cuts`: areas of walls that are drawn through the `cut_doors`.
+    """Doors in walls; `jambs`: ends of the adjacent walls, from face to face; `cuts`: areas of walls that are drawn through the `cut_doors`.
 
     `strays`: middles of symbols in no wall, and their possible doors.
     `marks`: number of small shapes that are not doors: frames of numbers, jambs.
@@ -137,7 +137,7 @@ def _lines(symbol: Symbol, walls: WallBands) -> Iterator[Line]:
 
 
 def _drawn_line(symbol: Symbol) -> Line:
-    """The line of a door that stands in no wall: from the hinge to the closed end of its arc, else along its longest side."""
+    """The line of a door that lies in no wall: from the hinge to the closed end of its arc, else along its longest side."""
     if symbol.swings:
         swing = symbol.swings[0]
         return (*swing.hinge, *swing.ends[0 if swing.leaf == 1 else 1])
@@ -186,7 +186,7 @@ def _of_swing(swing: Swing, walls: WallBands) -> Line | None:
 
 
 def _leaf_in_wall(swing: Swing, walls: WallBands) -> Line | None:
-    """The line of a leaf that is drawn closed, in a wall that is drawn through it; the open end of its arc stands free in the room."""
+    """The line of a leaf that is drawn closed, in a wall that is drawn through it; the open end of its arc lies free in the room."""
     if swing.leaf is None or not walls.is_at_wall(swing.hinge):
         return None
     shut, free = swing.ends[swing.leaf], swing.ends[1 - swing.leaf]

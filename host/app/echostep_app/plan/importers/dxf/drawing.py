@@ -282,7 +282,7 @@ def _swings_elsewhere(
 
 
 def _take_leaves(storey: _Storey, leaves: list[tuple[Swing, tuple[float, float]]]) -> None:
-    """Leaves drawn open beside a door's swing count as neither walls nor windows."""
+    """Leaves drawn open at a door's swing count as neither walls nor windows."""
     kinds = storey.sheet.kinds
     drawn = [(entity, lines) for entity, _ in (*kinds["walls"], *kinds["windows"]) if (lines := storey.of(entity))]
     tree = shapely.STRtree([lines[0] for _, lines in drawn]) if leaves else shapely.STRtree([])

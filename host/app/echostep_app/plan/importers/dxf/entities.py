@@ -185,7 +185,7 @@ def _area(corners: Any) -> BaseGeometry:
 
 
 def clipped(entity: Any, shown: BaseGeometry) -> list[Any]:
-    """What is shown of an entity: itself when it lies inside, polylines where the edge crosses it, nothing outside."""
+    """The visible part of an entity: itself when it lies inside, polylines where the edge crosses it, nothing outside."""
     from ezdxf.entities import factory
 
     try:

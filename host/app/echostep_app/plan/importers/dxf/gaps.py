@@ -117,7 +117,7 @@ class WallBands:
         return len(self._tree.query(shapely.Point(*at), predicate="dwithin", distance=within_m)) > 0
 
     def faces(self, line: tuple[float, float, float, float], within_m: float) -> BaseGeometry:
-        """The area of the wall that runs through a door's line: between the outermost of its faces beside the line that pass both ends."""
+        """The area of the wall that runs through a door's line: between the outermost of its faces along the line that pass both ends."""
         x0, y0, x1, y1 = line
         length = math.dist(line[:2], line[2:])
         u, v = (x1 - x0) / length, (y1 - y0) / length

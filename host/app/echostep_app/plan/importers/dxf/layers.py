@@ -78,7 +78,7 @@ def matches(layer: str, patterns: Sequence[str]) -> bool:
 def faces_m(lines: Sequence[LineString]) -> float:
     """Length of the lines of a layer that look like faces of walls, 0 where most do not.
 
-    A face has a parallel partner at the distance of a wall's thickness, and few other parallels beside it: treads, tiles, hatching have many. Half
+    A face has a parallel partner at the distance of a wall's thickness, and few other parallels nearby: treads, tiles, hatching have many. Half
     of the length of walls is in pieces of a metre or more: furniture is shorter.
     """
     pieces = pieces_of(lines)
@@ -92,7 +92,7 @@ def faces_m(lines: Sequence[LineString]) -> float:
 
 
 def parallels(pieces: Floats, most: float) -> tuple[Floats, Ints]:
-    """For each piece (n, 4): distance (n,) to the nearest parallel beside its middle, infinite if none is within `most`; and how many are."""
+    """For each piece (n, 4): distance (n,) from its middle to the nearest parallel, infinite if none is within `most`; and how many are."""
     nearest, count = np.full(len(pieces), np.inf), np.zeros(len(pieces), dtype=np.int64)
     if not len(pieces):
         return nearest, count

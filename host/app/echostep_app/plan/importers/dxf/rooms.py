@@ -41,7 +41,7 @@ TEXTS = ("TEXT", "MTEXT", "ATTRIB")
 
 
 class Written(NamedTuple):
-    """A text as a room, height (m) and direction (rad) of its letters, what it is called where it is left out, an attribute's block and tag."""
+    """A text as a room, height (m) and direction (rad) of its letters, its name in the list of omissions, an attribute's block and tag."""
 
     room: Room
     height_m: float
@@ -59,7 +59,7 @@ class Written(NamedTuple):
 def rooms_of(
     entities: Sequence[tuple[Any, str]], frame: DrawingFrame, file: Path, report: ImportReport, texts: list[Written]
 ) -> list[Room]:
-    """A room for each text, with the smallest outline around it, and for each outline without one, named by the `texts` of other layers in it."""
+    """A room for each text, with the smallest outline around it, and for each outline without one, named by enclosed `texts` of other layers."""
     names: dict[tuple[str, tuple[float, float]], Written] = {}  # one of each that is drawn twice
     outlines: list[Polygon] = []
     for entity, layer in entities:
@@ -79,7 +79,7 @@ def rooms_of(
 
 
 def names_of_blocks(texts: Sequence[Written]) -> list[Written]:
-    """Texts without the attributes of a block beside those that its tags call name and number."""
+    """Texts without a block's attributes other than those that its tags call name and number."""
     named = {text.block for text in texts if NAME.search(text.tag)}
     return [text for text in texts if text.block not in named or PART.search(text.tag)]
 
@@ -100,7 +100,7 @@ def _matched(names: list[Written], outlines: list[Polygon], texts: list[Written]
 
 
 def _stamps(texts: Sequence[Written], report: ImportReport) -> list[Room]:
-    """Texts that stand beneath each other, or in one block, as lines of one room's name; of these, smaller letters and measures are none."""
+    """Texts beneath each other, or in one block, as lines of one room's name; of these, smaller letters and measures are none."""
     texts = sorted(texts, key=lambda one: (-one.read_at()[1], one.read_at()[0]))
     places = shapely.points(np.array([text.room.at_m for text in texts]).reshape(-1, 2))
     tree, reach_m = shapely.STRtree(places), 2.0 * NEXT_LINE * max((text.height_m for text in texts), default=0.0)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Storeys of drawings: several side by side in one drawing, and storeys that do not lie over each other.
 
-In: walls of levels. Out: windows of a drawing, the move that lays one level over another, doubts. Owns what counts as a storey beside another.
+In: walls of levels. Out: windows of a drawing, the move that lays one level over another, doubts. Owns the test of storeys side by side.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def _storey(name: str) -> int | None:
 
 
 def storey_boxes(walls: Sequence[LineString]) -> list[Box]:
-    """Rectangles (m) of groups of walls that look like storeys drawn beside each other; one rectangle when there is one group.
+    """Rectangles (m) of groups of walls that look like storeys drawn side by side; one rectangle when there is one group.
 
     A detail close to one storey hides that the storeys are alike: then they are looked for with smaller distances.
     """
@@ -62,7 +62,7 @@ def storey_boxes(walls: Sequence[LineString]) -> list[Box]:
 
 
 def beside_house(walls: Sequence[LineString]) -> tuple[int, Box] | None:
-    """How many lines lie around or beside the longest group of walls, and its rectangle (m): a frame, a title block, a north arrow."""
+    """Number of lines outside the longest group of walls, and the group's rectangle (m): a frame, a title block, a north arrow."""
     lines = np.array(list(walls), dtype=object)
     x0, y0, x1, y1 = shapely.total_bounds(lines)
     around = np.abs(shapely.bounds(lines) - (x0, y0, x1, y1)).max(axis=1) < APART * max(x1 - x0, y1 - y0)

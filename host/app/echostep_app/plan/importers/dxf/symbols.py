@@ -144,7 +144,7 @@ def _circle(points: Floats) -> Swing | None:
 
 
 def _with_leaf(swing: Swing, straight: Sequence[LineString]) -> Swing:
-    """The swing with the end that a drawn leaf reaches: a line from the hinge to it.
+    """The swing with the end that a drawn leaf, a line from the hinge, reaches.
 
     A threshold may also be drawn to the other end: then no end is chosen.
     """

@@ -85,7 +85,7 @@ def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: I
 
 
 def _open(drawn: DrawnLevel, doors: list[LineString]) -> None:
-    """Cut the walls in which doors stand without an opening: a door's two ends and its middle are in the wall, or at its face."""
+    """Cut the walls that have doors without an opening: a door's two ends and its middle are in the wall, or at its face."""
     tree = shapely.STRtree(drawn.walls)
     for door in doors:
         stands = [
@@ -148,7 +148,7 @@ def _georeference(model: Any) -> Georeference | None:
 
 
 def _place_on_earth(model: Any, shapes: Shapes, report: ImportReport) -> Georeference | None:
-    """The georeference of the plan's origin by the map conversion, else by the site: its longitude and latitude are those of its placement."""
+    """The georeference of the plan's origin by the map conversion, else by the site, whose longitude and latitude belong to its placement."""
     x, y = shapes.origin_m
     scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
     if (x, y) != (0.0, 0.0):

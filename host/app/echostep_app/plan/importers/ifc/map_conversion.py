@@ -2,7 +2,7 @@
 """Where a model lies by its map conversion [IFC 4, IfcMapConversion; in IFC 2x3 the property set ePSet_MapConversion].
 
 In: a model, the plan's origin in it. Out: longitude, latitude and direction of the plan's axes, None without a conversion; doubts where it
-contradicts itself. Owns nothing. The unit of eastings and northings is that of the coordinate system, or by its scale; where neither is stated, it
+contradicts itself. Owns nothing. The unit of eastings and northings is the coordinate system's, or by its scale; where neither is stated, it
 is the one in which they lie where the coordinate system is used.
 """
 

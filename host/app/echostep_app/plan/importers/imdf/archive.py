@@ -49,7 +49,7 @@ class Archive:
             self._zip.close()
 
     def label(self, name: str) -> str:
-        """The name of a file in error messages: the archive and the file in it."""
+        """The name of a file in error messages: archive and member."""
         return f"{self.path}: {name}"
 
     def has(self, name: str) -> bool:

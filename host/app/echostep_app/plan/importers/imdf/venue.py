@@ -238,7 +238,7 @@ def _doors(one: Feature) -> list[Door]:
 
 
 def _place_doors(drawn: DrawnLevel, openings: list[Feature], report: ImportReport) -> None:
-    """Add the doors of openings, each on the wall beside it and on that wall's other face; those in no wall stay where they are, and are told."""
+    """Add the doors of openings, each on the nearest wall and on that wall's other face; those in no wall keep their place, and are reported."""
     walls = pieces([*drawn.walls, *(area.exterior for area in drawn.filled)])
     tree, astray = shapely.STRtree(walls), 0
     for door in (door for one in openings for door in _doors(one)):

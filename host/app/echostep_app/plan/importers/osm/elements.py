@@ -174,7 +174,7 @@ def _xml_places(element: ET.Element) -> list[dict[str, Any] | None]:
 
 
 def _json_number(text: str | None) -> Any:
-    """An attribute as the JSON value that its text stands for; the text itself when it is not JSON."""
+    """An attribute's text as a JSON value; the text itself when it is not JSON."""
     try:
         return None if text is None else json.loads(text, parse_constant=str)
     except (ValueError, RecursionError):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Pictures of a plan (a scan, a photograph, a page of a PDF made into a picture) -> `Plan`.
 
-In: a picture, metres a pixel. Out: `Plan` of one level. Owns what is too small for a wall. Areas darker than the threshold of Otsu [1979: the one
+In: a picture, metres a pixel. Out: `Plan` of one level. Owns the least size of a wall. Areas darker than the threshold of Otsu [1979: the one
 that separates the grey values best] become walls by their outlines; a picture shows no doors, so gaps are the ways through.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pings at known poses, with the plan's echo sources before each: the data of the fits of ranger models.
+"""Pings at known poses, with the plan's echo sources before each.
 
 In: walls, poses, ranges. Out: `KnownPings`; the log-density of each by an echo model. Owns nothing.
 """
@@ -27,10 +27,6 @@ class KnownPings(NamedTuple):
     off_axis_rad: Floats
     kind: Floats
 
-    def rows(self, which: np.ndarray) -> KnownPings:
-        """These pings alone: by a mask, or by their numbers."""
-        return KnownPings(*(column[which] for column in self))
-
 
 def known_pings(walls: Walls, x_m: Floats, y_m: Floats, axis_rad: Floats, range_m: Floats) -> KnownPings:
     """Pings (n,) from these places along these axes; a range that is NaN or not positive is not an echo."""
@@ -51,8 +47,8 @@ def _sources(x: Floats, y: Floats, axis: Floats, index: WallIndex) -> tuple[Ints
 
 
 @kernel
-def log_densities(pings: KnownPings, bias_m: float, missed: float, m: EchoModel) -> Floats:
-    """Log-density (n,) of the pings of a ranger that measures `bias_m` too much and misses a share of all echoes.
+def log_densities(pings: KnownPings, m: EchoModel) -> Floats:
+    """Log-density (n,) of the pings.
 
     A range beyond the ranger's limits is an echo of a source, or an outlier uniform over the reach of any ranger: otherwise narrow limits would
     cost nothing.
@@ -60,8 +56,6 @@ def log_densities(pings: KnownPings, bias_m: float, missed: float, m: EchoModel)
     found = np.empty(len(pings.range_m))
     for i in range(len(found)):
         range_m = pings.range_m[i]
-        if range_m > 0.0:
-            range_m = max(range_m - bias_m, 1e-3)
         if range_m > m.maximum_m or 0.0 < range_m < m.minimum_m:
             density = planned_density(
                 range_m, pings.listed[i], pings.distance_m[i], pings.off_axis_rad[i], pings.kind[i], m.stray, 0.0, m
@@ -72,5 +66,5 @@ def log_densities(pings: KnownPings, bias_m: float, missed: float, m: EchoModel)
             density = echo_density(
                 range_m, pings.listed[i], pings.distance_m[i], pings.off_axis_rad[i], pings.kind[i], m
             )
-        found[i] = math.log((1.0 - missed) * density + (missed if range_m <= 0.0 else 0.0))
+        found[i] = math.log(density)
     return found
