@@ -11,11 +11,10 @@ from typing import Any
 import pytest
 
 from echostep.plan import Georeference, Plan
-from echostep_app.page.mailbox import Mailbox
 from echostep_app.plan.places.bearing import heading_words, north_rad
-from operation.teams import ServedTeam, Team, place
-from page.browser import FRAMED, READY, TABLE_READY, loaded_page, wait_for
-from page.frames import PLAN, scene, served, told
+from page.browser import FRAMED, loaded_page, wait_for
+from page.frames import PLAN
+from page.roles import role_page
 
 DESK = {"viewport": {"width": 1280, "height": 800}}
 POINTS = """(heading) => {
@@ -62,25 +61,18 @@ def check(page: Any, plan: Plan, shot: Path) -> None:
         page.evaluate("echostep.view.rotate(-echostep.view.turn)")
 
 
-@pytest.mark.parametrize("rotation_deg", [30.0, -100.0, None])
-def test_the_live_page_turns_to_the_north_of_its_words(
-    browser: Any, rotation_deg: float | None, tmp_path: Path
+@pytest.mark.parametrize(
+    ("role", "rotation_deg"), [("wearer", 30.0), ("wearer", -100.0), ("wearer", None), ("commander", 30.0)]
+)
+def test_the_page_turns_to_the_north_of_its_words(
+    browser: Any, role: str, rotation_deg: float | None, tmp_path: Path
 ) -> None:
     plan = turned(rotation_deg)
-    with served(Mailbox(plan, "test", replay=False)) as (server, mailbox):
-        mailbox.publish(replace(scene(), estimate=replace(told(), heading_rad=north_rad(plan))))
-        page = loaded_page(browser, server.url, DESK, READY)
-        assert "heading N 000°" in page.text_content("#place")
-        check(page, plan, tmp_path / "live.png")
-        assert not page.wrong
-
-
-def test_the_commanders_page_turns_to_the_north_of_its_words(browser: Any, tmp_path: Path) -> None:
-    plan = turned(30.0)
-    team = Team(plan)
-    team.hear("Anna", place(plan, 6.0, 7.5, 0, heading_rad=north_rad(plan)))
-    with ServedTeam(team) as team_page, loaded_page(browser, team_page.page.url, DESK, TABLE_READY) as page:
-        page.click("#list button")
-        wait_for(page, "document.querySelector('#facts').innerText.includes('N 000°')")
-        check(page, plan, tmp_path / "table.png")
+    with role_page(role, plan, (6.0, 7.5), 0, north_rad(plan)) as (url, ready):
+        page = loaded_page(browser, url, DESK, ready)
+        if role == "commander":
+            page.click("#list button")
+        words = {"wearer": "#place", "commander": "#facts"}[role]
+        wait_for(page, f"document.querySelector('{words}').textContent.includes('N 000°')")
+        check(page, plan, tmp_path / f"{role}.png")
         assert not page.wrong

@@ -11,10 +11,8 @@ import numpy as np
 import pytest
 
 from echostep.plan import Connector, Plan
-from echostep_app.page.mailbox import Mailbox
-from operation.teams import ServedTeam, Team, place
-from page.browser import READY, loaded_page, violations, wait_for
-from page.frames import scene, served, told
+from page.browser import loaded_page, violations, wait_for
+from page.roles import role_page
 from plan.imported_plans import seven_floors
 
 SIZES = {"desk": (1280, 800), "phone": (360, 740), "sideways": (740, 360)}
@@ -68,25 +66,9 @@ def looked_at(page: Any, name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_a_wearer_sees_stairs_lifts_doors_and_windows(browser: Any, size: str, tmp_path: Path) -> None:
-    plan = building()
-    width, height = SIZES[size]
-    with served(Mailbox(plan, "test", replay=False)) as (server, mailbox):
-        shares = tuple(float(k == 1) for k in range(len(plan.levels)))
-        estimate = replace(told(4.0, 7.0), level=1, levels=shares)
-        mailbox.publish(
-            replace(scene(), estimate=estimate, echo_lines=(), particles=None, status_text="tracking, 0.2 m")
-        )
-        page = loaded_page(browser, server.url, {"viewport": {"width": width, "height": height}}, READY)
-        looked_at(page, size, tmp_path)
-
-
-@pytest.mark.parametrize("size", SIZES)
-def test_a_commander_sees_stairs_lifts_doors_and_windows(browser: Any, size: str, tmp_path: Path) -> None:
-    team = Team(building())
-    width, height = SIZES[size]
-    team.hear("Anna", place(team.plan, 4.0, 7.0, 1))
-    with ServedTeam(team) as team_page:
-        ready = "echostep.last && document.querySelector('#walls path')"
-        page = loaded_page(browser, team_page.page.url, {"viewport": {"width": width, "height": height}}, ready)
-        looked_at(page, size, tmp_path)
+@pytest.mark.parametrize("role", ["wearer", "commander"])
+def test_stairs_lifts_doors_and_windows_are_seen(browser: Any, role: str, size: str, tmp_path: Path) -> None:
+    plan, (width, height) = building(), SIZES[size]
+    with role_page(role, plan, (4.0, 7.0), 1) as (url, ready):
+        page = loaded_page(browser, url, {"viewport": {"width": width, "height": height}}, ready)
+        looked_at(page, f"{role}-{size}", tmp_path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A newcomer, a responder and a commander each visit their page in Chromium, in five windows at once, on the demo's plan and on seven floors."""
+"""A newcomer and a responder each visit the wearer's page in Chromium, in five windows at once, on the demo's plan and on seven floors."""
 
 from __future__ import annotations
 
@@ -11,10 +11,8 @@ from typing import Any
 import pytest
 
 from echostep.plan import Plan
-from echostep_app.team.messages.report import ReportedAlarm
-from operation.teams import ServedTeam, Team, place
-from page.browser import HELD_MS, READY, TABLE_READY, loaded_page, overflow, violations, wait_for
-from page.web.test_page_visit import PLACES, Place, Visit
+from page.browser import HELD_MS, READY, loaded_page, overflow, violations, wait_for
+from page.web.test_page_visit import PLACES, Visit
 from waiting import until
 
 SIZES = ((1280, 800), (360, 740), (740, 360), (320, 256), (1920, 1080))
@@ -22,9 +20,9 @@ Look = Callable[[str], None]
 
 
 @contextmanager
-def windows(browser: Any, url: str, ready: str, tmp_path: Path) -> Iterator[tuple[list[Any], Look]]:
+def windows(browser: Any, url: str, tmp_path: Path) -> Iterator[tuple[list[Any], Look]]:
     """A page of each size, and `look`, which checks all of them by axe and takes their pictures; what goes wrong on them fails the test."""
-    pages = [loaded_page(browser, url, {"viewport": {"width": w, "height": h}}, ready) for w, h in SIZES]
+    pages = [loaded_page(browser, url, {"viewport": {"width": w, "height": h}}, READY) for w, h in SIZES]
 
     def look(moment: str) -> None:
         for (width, _), page in zip(SIZES, pages, strict=True):
@@ -55,7 +53,7 @@ def test_a_newcomer_looks_around(browser: Any, name: str, tmp_path: Path) -> Non
     visit = Visit(spot)
     with visit.page:
         visit.walk(0.5)
-        with windows(browser, visit.page.url, READY, tmp_path) as (pages, look):
+        with windows(browser, visit.page.url, tmp_path) as (pages, look):
             look("0-arrives")
             before = visit.estimates[-1]
             for page in pages:
@@ -109,7 +107,7 @@ def test_a_responder_is_guided_and_calls(browser: Any, name: str, tmp_path: Path
     visit = Visit(spot)
     with visit.page:
         visit.walk(0.5)
-        with windows(browser, visit.page.url, READY, tmp_path) as (pages, look):
+        with windows(browser, visit.page.url, tmp_path) as (pages, look):
             pages[2].select_option("#goal", label=spot.room)  # a phone held sideways
             for page in pages:
                 wait_for(page, "echostep.last.guidance?.own && echostep.last.guidance.path.length > 1")
@@ -143,61 +141,3 @@ def called(visit: Visit, kind: str) -> bool:
     visit.hear(undone=0, check_ins=0)
     alarm = visit.tracker.watch.alarm
     return alarm is not None and alarm.kind == kind
-
-
-def team_on(spot: Place) -> Team:
-    """Three wearers along the walk of a plan, and one on its last floor."""
-    team = Team(spot.plan)
-    for who, (x_m, y_m) in zip(("Anna", "Eve", "Gil"), spot.way, strict=True):
-        team.hear(who, place(spot.plan, x_m, y_m, 0))
-    team.hear("Kim", place(spot.plan, *spot.way[1], len(spot.plan.levels) - 1))
-    return team
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", PLACES)
-def test_a_commander_answers_a_mayday(browser: Any, name: str, tmp_path: Path) -> None:
-    """Sees it come, opens its details, sends the nearest one, acknowledges it, and goes back: each on another window, seen on all."""
-    spot = PLACES[name]
-    team, last = team_on(spot), len(spot.plan.levels) - 1
-    sent: list[tuple[str, bytes]] = []
-    with ServedTeam(team) as served:
-
-        def send(topic: str, payload: bytes) -> bool:
-            sent.append((topic, payload))
-            return True
-
-        served.page.feed.send = send
-
-        def arrives() -> None:
-            """What the broker distributes."""
-            assert until(lambda: sent)
-            team.put_bytes(*sent.pop())
-            served.show()
-
-        with windows(browser, served.page.url, TABLE_READY, tmp_path) as (pages, look):
-            for page in pages:
-                wait_for(page, "document.querySelector('#status-text').textContent === 'connected'")
-                legend(page)
-                page.fill("#me", "Ben")
-            team.hear("Kim", place(spot.plan, *spot.way[1], last), alarm=ReportedAlarm("mayday", "fall", 1, 14.0))
-            served.show()
-            for page in pages:
-                wait_for(page, f"!document.querySelector('#mayday').hidden && echostep.scene.level === {last}")
-                page.click("#mayday-open")
-                wait_for(page, "document.querySelectorAll('#rescuers li').length === 3")
-            look("1-distress")
-            pages[2].click("#rescuers li:first-child button")
-            arrives()
-            for page in pages:
-                wait_for(page, "document.querySelector('#rescuers li').innerText.includes('sent by Ben')")
-            pages[3].click("#acknowledge")
-            arrives()
-            for page in pages:
-                wait_for(
-                    page, "document.querySelector('#acknowledge').hidden && document.querySelector('#mayday').hidden"
-                )
-                wait_for(page, "document.body.dataset.alarm === 'false'")
-                page.click("#close")
-                wait_for(page, "document.querySelector('#list .note').textContent.includes('acknowledged by Ben')")
-            look("2-acknowledged")
