@@ -49,13 +49,13 @@ def walls() -> Iterator[Box]:
 
 
 def clutter() -> Iterator[Line]:
-    """A desk with its chair, a word in one stroke, or hatching, in turns."""
+    """A desk with its chair, a word in one go, or hatching, in turns."""
     for row, (low, _) in enumerate(ROWS):
         for k in range(ROOMS):
             x, y = left(k) + 0.6, low + 0.6
             if (k + row) % 3 == 0:
-                yield [(x, y), (x + 1.6, y), (x + 1.6, y + 0.8), (x, y + 0.8), (x, y)]
-                yield [(x + 0.4, y + 1.0), (x + 1.1, y + 1.0), (x + 1.0, y + 1.5), (x + 0.5, y + 1.5), (x + 0.4, y + 1.0)]
+                yield [(x, y), (x + 1.6, y), (x + 1.6, y + 0.7), (x, y + 0.7), (x, y)]
+                yield [(x + 0.4, y + 0.9), (x + 1.1, y + 0.9), (x + 1.0, y + 1.3), (x + 0.5, y + 1.3), (x + 0.4, y + 0.9)]
             elif (k + row) % 3 == 1:
                 yield [(x + 0.25 * i, y + 0.6 * (i % 2)) for i in range(9)]
             else:

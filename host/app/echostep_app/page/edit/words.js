@@ -8,10 +8,10 @@ export const KINDS = { stairs: 'stairs', lift: 'lift', ramp: 'ramp' };
 const SNAPPED = { end: 'to a corner', wall: 'to a wall', 'right angle': 'at a right angle', grid: 'to the 5 cm grid' };
 
 export const HINTS = {
-  select: 'Tap one, or drag about all that is to go, then Delete: what lies wholly inside is selected. Two fingers or the right button move the sheet',
-  wall: 'Drag, or tap from corner to corner; the last corner once more ends it',
+  select: 'Tap one or drag about many, then Delete. Two fingers or the right button move the sheet',
+  wall: 'Drag, or tap from corner to corner; tap the last one again to end',
   door: 'Drag along a wall or over a gap, from jamb to jamb',
-  room: 'Tap into a room', scale: 'Drag between two points whose distance you know',
+  room: 'Tap into a room', scale: 'Drag along a distance that you know',
 };
 
 export const WORDS = {
@@ -36,7 +36,7 @@ export const WORDS = {
   doorHere: 'Tap the wall where the door belongs', roomHere: 'Tap where the room is',
   question: (k, count, text) => `${k} of ${count}: ${text}`,
   questions: (count) => `Questions of the import: ${count}, marked on the plan. Answer them one by one, or draw and delete as you like`,
-  scaleFirst: 'Set the scale first: Scale, then drag between two points whose distance you know',
+  scaleFirst: 'Set the scale first: Scale, then drag along a distance that you know',
   unsaved: '(not saved)',
   length: m,
   // why nothing changed
