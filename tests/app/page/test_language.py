@@ -151,8 +151,10 @@ def test_every_text_of_the_editor_has_an_entry(browser: Any, tmp_path: Path, lan
             "import(`${location.href}static/words.js`).then(({ KINDS }) => Object.values(KINDS).forEach(echostep.tr))"
         )
         assert page.evaluate(MISSING) == []
-        count = "Questions of the import: {}, marked on the plan. Answer them one by one, or draw and delete as you like"
-        told = [page.evaluate("(text) => echostep.tr(text)", count.format(n)) for n in (1, 2)]
+        asked = (
+            "Questions of the import: {}, marked on the plan. Answer them one by one, or draw and delete as you like"
+        )
+        told = [page.evaluate("(text) => echostep.tr(text)", asked.format(n)) for n in (1, 2)]
         assert lang != "de" or [text.split(" des ")[0] for text in told] == ["1 Frage", "2 Fragen"]
 
 

@@ -23,6 +23,8 @@ from page.edit.traced_house import PIXEL_M, ROOMS, draw, room_middles
 
 MOST_STROKES = 40
 NEAR_M = 0.1  # two and a half pixels
+# Round a wall of 1 m that begins at 0, 0
+ROUND = (0.2, 0.7), (3.4, 0.7), (3.4, -2.1), (0.2, -2.1), (0.2, -0.25), (1.2, -0.25), (1.2, 0.25), (0.2, 0.25)
 
 
 class Hand:
@@ -84,8 +86,7 @@ def clean(hand: Hand) -> None:
     hand.drag((29.6, 11.4), (30.4, 13.4), held="Shift")  # what touches the outer wall
     hand.key("l")
     for x, y in ((9.1, 3.5), (37.1, 3.5), (25.1, 10.7)):  # round the walls that stand in a room
-        corners = ((0.2, 0.7), (3.4, 0.7), (3.4, -2.1), (0.2, -2.1), (0.2, -0.25), (1.2, -0.25), (1.2, 0.25), (0.2, 0.25))
-        hand.drag(*((x + dx, y + dy) for dx, dy in corners), held="Shift")
+        hand.drag(*((x + dx, y + dy) for dx, dy in ROUND), held="Shift")
 
 
 def test_a_traced_picture_of_30_rooms_is_clean_after_40_strokes(browser: Any, tmp_path: Path) -> None:
@@ -94,7 +95,7 @@ def test_a_traced_picture_of_30_rooms_is_clean_after_40_strokes(browser: Any, tm
     assert len(dirty.levels[0].walls) > 3 * len(wanted.levels[0].walls)
     save_plan(dirty, tmp_path / "plan.json")
     with EditServer(tmp_path / "plan.json", picture, 0) as server:
-        page = opened(browser, server, viewport={"width": 1280, "height": 800})
+        page = opened(browser, server, viewport={"width": 1280, "height": 520})
         hand = Hand(page)
         hand.tap('[data-tool="scale"]')
         shown = page.evaluate("echostep.sheet.picture.perPx") / PIXEL_M

@@ -40,8 +40,8 @@ APART = """(() => {
     return boxes.length > 3 && boxes.every((a) => boxes.every((b) => apart(a, b)));
 })()"""
 LEFT = """(() => {
-    const { level, tree } = echostep.sheet, count = (list) => list?.length ?? 0;
-    return [count(level.walls), count(level.doors), count(level.windows), count(level.obstacles), count(level.rooms), count(tree.connectors), tree.start ? 1 : 0];
+    const { level, tree } = echostep.sheet, lists = [level.walls, level.doors, level.windows, level.obstacles, level.rooms, tree.connectors];
+    return [...lists.map((list) => list?.length ?? 0), tree.start ? 1 : 0];
 })()"""  # elements of the plan by kind
 VIEW = "[echostep.view.x, echostep.view.y, echostep.view.scale]"
 WALLS = "echostep.sheet.level.walls"
@@ -175,24 +175,25 @@ def test_keys_alone_draw_name_and_delete(browser: Any, drawn: EditServer) -> Non
     page.focus("#map")
     page.evaluate("echostep.tools.cross = [5, 5]")
 
-    def press(*keys: str) -> None:
-        for name in keys:
+    def press(keys: str) -> None:
+        for name in keys.split():
             page.keyboard.press(name)
 
-    press("w", "Enter", *["ArrowRight"] * 20)
+    press("w Enter" + 20 * " ArrowRight")
     reached = page.evaluate("echostep.tools.cross[0]")
-    press("Enter", "Escape", *["ArrowLeft"] * 10, "d", "Enter", "ArrowLeft", "ArrowLeft", "Enter", "ArrowUp", "ArrowUp", "n", "Enter")
+    press("Enter Escape" + 10 * " ArrowLeft" + " d Enter ArrowLeft ArrowLeft Enter ArrowUp ArrowUp n Enter")
     answer(page, "Hall")
     press("Control+s")
     page.get_by_text("Saved new.json").wait_for()
     level = load_plan(drawn.file.path).levels[0]
     assert (level.walls[0, :2].tolist(), level.walls[-1, 2:].tolist()) == ([5.0, 5.0], [pytest.approx(reached), 5.0])
     assert (len(level.doors), [room.name for room in level.rooms]) == (1, ["Hall"])
-    press("v", "Enter")
+    press("v Enter")
     says(page, "Selected: 1")
-    press("ArrowDown", "ArrowDown", "Shift+Enter")
+    press("ArrowDown ArrowDown Shift+Enter")
     says(page, "Selected: 2")
-    press("Delete", "Control+z", "ArrowUp", "l", "Space", *["ArrowRight"] * 20, *["ArrowDown"] * 3, *["ArrowLeft"] * 40, *["ArrowUp"] * 3, "Space")
+    press("Delete Control+z ArrowUp l Space" + 20 * " ArrowRight" + 3 * " ArrowDown")
+    press(40 * "ArrowLeft " + 3 * " ArrowUp" + " Space")
     says(page, "Selected: 3")  # two walls and the door
     press("Delete")
     assert page.evaluate(LEFT)[:5] == [0, 0, 0, 0, 1]

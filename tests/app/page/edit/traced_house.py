@@ -30,7 +30,7 @@ def room_middles() -> list[tuple[float, float]]:
 
 
 def left(column: int) -> float:
-    """x of the inner face of a room's left wall."""
+    """The inner face of a room's left wall in x."""
     return 1.1 + ROOM_M * column
 
 
@@ -55,7 +55,7 @@ def clutter() -> Iterator[Line]:
             x, y = left(k) + 0.6, low + 0.6
             if (k + row) % 3 == 0:
                 yield [(x, y), (x + 1.6, y), (x + 1.6, y + 0.7), (x, y + 0.7), (x, y)]
-                yield [(x + 0.4, y + 0.9), (x + 1.1, y + 0.9), (x + 1.0, y + 1.3), (x + 0.5, y + 1.3), (x + 0.4, y + 0.9)]
+                yield [(x + 0.4, y + 0.9), (x + 1.1, y + 0.9), (x + 0.8, y + 1.3), (x + 0.4, y + 0.9)]
             elif (k + row) % 3 == 1:
                 yield [(x + 0.25 * i, y + 0.6 * (i % 2)) for i in range(9)]
             else:
@@ -73,8 +73,8 @@ def draw(path: Path, *, cluttered: bool) -> Path:
     image = Image.new("L", (width, height), PAPER)
     pen = ImageDraw.Draw(image)
     for x0, y0, x1, y1 in walls():
-        corners = (round(x0 / PIXEL_M), round(height - y1 / PIXEL_M), round(x1 / PIXEL_M) - 1, round(height - y0 / PIXEL_M) - 1)
-        pen.rectangle(corners, fill=INK)
+        left_px, right_px = round(x0 / PIXEL_M), round(x1 / PIXEL_M) - 1
+        pen.rectangle((left_px, round(height - y1 / PIXEL_M), right_px, round(height - y0 / PIXEL_M) - 1), fill=INK)
     for line in clutter() if cluttered else ():
         pen.line([(x / PIXEL_M, height - y / PIXEL_M) for x, y in line], fill=INK, width=2)
     image.save(path)
