@@ -86,6 +86,7 @@ export class Tools {
   snapped(p) {
     const { chain, sheet, reach, name } = this, { walls } = sheet.level;
     if (name === 'scale') return { at: p };
+    if (name === 'wall' && chain && !chain.dragged && distance(p, chain.at) <= reach) return { at: chain.at }; // the last corner again
     return snap(p, { walls, reach, ...(name === 'wall' && { from: chain?.at, before: chain?.before }) });
   }
 
