@@ -48,6 +48,7 @@ function draw() {
   const names = sheet.tree.levels.map((level) => level.name), options = byId('level');
   if (names.join('\n') !== [...options.options].map((o) => o.text).join('\n')) options.replaceChildren(...names.map((name, k) => new Option(name, k)));
   options.value = sheet.k;
+  options.hidden = names.length < 2;
   if (sheet.picture) remember(`picture of ${sheet.tree.name}`, JSON.stringify(sheet.picture));
 }
 
