@@ -56,7 +56,6 @@ EDITOR: dict[str, tuple[str, ...] | None] = {
     "plan/importers/dxf/drawing.py": ("_left_out_walls",),
     "plan/places/reachability.py": None,
     "plan/questions.py": None,
-    "plan/two_points.py": ("fit_two_points", "_percent"),
 }
 WORDS = re.compile(r"[a-z]{2}.* .*[a-z]|^[A-Z][a-z]+[a-z.!?]$")
 NO_WORDS = re.compile(r"[<{/]|system-ui|^\(|^trans(form|late)\b|, select,|^#|^sign |^circle |^name ")

@@ -227,7 +227,7 @@ def edit(
     headless: Annotated[bool, typer.Option("--headless", help="Open no browser: print the address alone.")] = False,
     lang: Lang = None,
 ) -> None:
-    """Draw and drag walls and doors on a page in the browser, until Ctrl-C."""
+    """Clean a plan, draw walls and doors, name rooms on a page in the browser, until Ctrl-C."""
     require("the plan editor", *PAGE)
     from echostep_app.page.editor import edit_plan
 

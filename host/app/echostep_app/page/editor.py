@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The plan editor: walls, doors and rooms are drawn in a browser on this machine, over a picture of a plan if there is one.
+"""The plan editor: a plan is cleaned, mended and named in a browser on this machine, over a picture of it if there is one.
 
 In: a plan file (which need not exist yet), a picture, plans posted by the page. Out: the page, the plan as JSON, the plan file. Owns the server, and
 the plan file while it runs. It listens on the loopback interface only; the address contains a random token, and requests without it are refused.
@@ -12,8 +12,6 @@ import hashlib
 import secrets
 import sys
 import threading
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -32,8 +30,7 @@ from echostep_app.page.server import STATIC, STOP_S, Address, open_listener, pag
 from echostep_app.page.web.access import AccessControl
 from echostep_app.page.web.connections import Connections, GatedServer
 from echostep_app.plan.check import check_plan
-from echostep_app.plan.two_points import parse_two_points
-from echostep_app.plan.writer import georeference_fields, plan_json
+from echostep_app.plan.writer import plan_json
 from echostep_app.printing.lines import as_error, say, write_whole
 
 PAGE = Path(__file__).parent / "edit"
@@ -43,7 +40,6 @@ MOST_BODY = 8_000_000  # bytes of a plan: a browser draws this much smoothly
 MOST_PICTURE = 32_000_000  # bytes
 MOST_FOUND = 200  # findings of a check
 POST_S = 20.0  # time for a posted plan to arrive
-Tree = dict[str, object]  # as JSON
 NO_FILE = "none"  # state of a plan file that does not exist
 
 
@@ -139,8 +135,7 @@ class EditServer:
             Route("/picture", self._get_picture),
             Route("/plan", self._get_plan, methods=["GET"]),
             Route("/plan", self._post_plan, methods=["POST"]),
-            Route("/georeference", partial(_post, _georeference), methods=["POST"]),
-            Route("/check", partial(_post, _findings), methods=["POST"]),
+            Route("/check", self._check, methods=["POST"]),
         ]
         return Starlette(routes=[Mount(f"/{token}", routes=routes)])
 
@@ -184,28 +179,16 @@ class EditServer:
             return _error(500, str(error))
         return JSONResponse({"saved": self.file.path.name}, headers={"etag": f'"{state}"'})
 
-
-async def _post(act: Callable[[bytes], Tree], request: Request) -> Response:
-    """What `act` makes of a posted body; nothing is written."""
-    raw = await _body(request)
-    if isinstance(raw, Response):
-        return raw
-    try:
-        return JSONResponse(await asyncio.to_thread(act, raw))
-    except (ValueError, EchostepError) as error:
-        return _error(422, str(error))
-
-
-def _georeference(raw: bytes) -> Tree:
-    """The georeference of two points, and their distances."""
-    fit = parse_two_points(raw)
-    return {"georeference": georeference_fields(fit.georeference), "plan_m": fit.plan_m, "earth_m": fit.earth_m}
-
-
-def _findings(raw: bytes) -> Tree:
-    """What is wrong with a plan."""
-    found = check_plan(parse_plan(raw))[:MOST_FOUND]
-    return {"found": [{"level": f.level, "at": f.position_m, "text": f.text} for f in found]}
+    async def _check(self, request: Request) -> Response:
+        """The findings of `plan check` in a posted plan; nothing is written."""
+        raw = await _body(request)
+        if isinstance(raw, Response):
+            return raw
+        try:
+            found = await asyncio.to_thread(lambda: check_plan(parse_plan(raw))[:MOST_FOUND])
+        except (ValueError, EchostepError) as error:
+            return _error(422, str(error))
+        return JSONResponse({"found": [{"level": f.level, "at": f.position_m, "text": f.text} for f in found]})
 
 
 async def _body(request: Request) -> bytes | Response:

@@ -29,7 +29,7 @@ def plan_json(plan: Plan) -> str:
     if plan.uncertainty_m is not None:
         tree["uncertainty_m"] = plan.uncertainty_m
     if plan.georeference is not None:
-        tree["georeference"] = georeference_fields(plan.georeference)
+        tree["georeference"] = _georeference(plan.georeference)
     tree["levels"] = [_level(level) for level in plan.levels]
     if plan.connectors:
         tree["connectors"] = [_connector(connector) for connector in plan.connectors]
@@ -91,7 +91,7 @@ def _start(start: Pose) -> dict[str, Any]:
     return tree | ({"level": start.level} if start.level else {})
 
 
-def georeference_fields(georeference: Georeference) -> dict[str, Any]:
+def _georeference(georeference: Georeference) -> dict[str, Any]:
     """The field `georeference` of plan.json."""
     return {
         "crs": georeference.crs,

@@ -49,12 +49,7 @@ def answer(page: Any, text: str) -> None:
     page.locator("#ask[open]").wait_for()
     page.fill("#answer", text)
     page.press("#answer", "Enter")
-    answered(page)
-
-
-def answered(page: Any) -> None:
-    """The last answer has arrived: a dialog closes before it gives it."""
-    wait_for(page, "!echostep.isOpen()")
+    wait_for(page, "!echostep.isOpen()")  # the answer has arrived: a dialog closes before it gives it
 
 
 def drag(page: Any, begin: tuple[float, float], end: tuple[float, float], button: str = "left") -> None:

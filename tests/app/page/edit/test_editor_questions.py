@@ -19,7 +19,7 @@ from echostep_app.plan.importers.summary import doors_in_gaps
 from echostep_app.plan.questions import with_questions
 from echostep_app.plan.writer import save_plan
 from page.browser import violations, wait_for
-from page.edit.drawing import PICTURES, click, opened
+from page.edit.drawing import PICTURES, click, drag, opened
 from plan.drawings.drawn_houses import DOOR, WALL, Gap, boxes, corners, leaf, loose
 
 LEFT_OUT = {"layer": "X-NEW"}
@@ -180,7 +180,8 @@ def test_a_door_in_a_wall_of_two_faces(browser: Any, tmp_path: Path) -> None:
         cut, filled, closed = page.evaluate(
             """async ([walls, imported]) => { const g = await import(location.href + 'static/geometry.js');
             const cut = g.cutDoor({ walls }, 0, [4, 0.05], 0.9);
-            return [cut, g.fillDoor(cut, 0).level, g.fillDoor(imported, 0).level]; }""",
+            const closed = (level) => g.closed(level.walls, level.doors[0].line);
+            return [cut, closed(cut), closed(imported)]; }""",
             [thick, imported],
         )
     assert cut["doors"][0]["line"] == [3.55, 0, 4.45, 0]
@@ -188,8 +189,8 @@ def test_a_door_in_a_wall_of_two_faces(browser: Any, tmp_path: Path) -> None:
         [[0, 0, 3.55, 0], [4.45, 0, 8, 0], [0, 0.2, 3.55, 0.2], [4.45, 0.2, 8, 0.2],
          [3.55, 0, 3.55, 0.2], [4.45, 0, 4.45, 0.2], [0, 5, 8, 5]]
     )  # fmt: skip
-    assert lines(filled["walls"]) == lines(thick)
-    assert lines(closed["walls"]) == lines(thick[:2])
+    assert lines(filled) == lines(thick)
+    assert lines(closed) == lines(thick[:2])
 
 
 def lines(walls: list[list[float]]) -> list[list[tuple[float, float]]]:
@@ -217,7 +218,7 @@ def test_answers_are_undone(browser: Any, doubtful: Plan, tmp_path: Path) -> Non
         page.click("#whole")
         click(page, x, y)  # a mark on the sheet shows its question
         asks(page, "4 of 4")
-        page.click('[data-tool="erase"]')
-        click(page, x + 0.1, y)  # deleted by hand: answered too
+        drag(page, (x - 0.4, y - 0.3), (x + 0.4, y + 0.3))
+        page.keyboard.press("Delete")  # by hand: answered too
         assert page.evaluate("echostep.sheet.level.questions.length") == 3
         assert not page.wrong

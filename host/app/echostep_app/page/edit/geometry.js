@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Geometry of the plan editor: pure functions from a level of plan.json {walls, doors, windows, rooms, ...} to a new level. Metres, x east, y north.
 
-export const GRID_M = 0.05;
-export const JOINT_M = 1e-3; // ends with a smaller distance are one joint
+const GRID_M = 0.05;
+const JOINT_M = 1e-3; // ends with a smaller distance are one joint
 const THICK_M = 0.6, JAMB_M = 0.15; // distance of a wall's two faces, and of a door's end from the wall's end there, at most
 const PARALLEL = 0.02; // sine of the angle below which the faces of a wall are parallel
 const IN_LINE = 1e-3; // sine of the angle below which two segments are in line
@@ -18,7 +18,7 @@ const spot = ([x, y]) => [round(x), round(y)];
 
 // The point of a segment nearest to p: its position `at`, its share `t` of the segment (0 to 1), its distance `away` from p.
 export function foot(p, [x0, y0, x1, y1]) {
-  const dx = x1 - x0, dy = y1 - y0, t = Math.min(Math.max(((p[0] - x0) * dx + (p[1] - y0) * dy) / (dx * dx + dy * dy), 0), 1);
+  const dx = x1 - x0, dy = y1 - y0, t = Math.min(Math.max(((p[0] - x0) * dx + (p[1] - y0) * dy) / (dx * dx + dy * dy || 1), 0), 1);
   const at = [x0 + t * dx, y0 + t * dy];
   return { at, t, away: distance(p, at) };
 }
@@ -30,20 +30,6 @@ function nearest(p, rows, reach) {
     if (here.away <= reach && (!found || here.away < found.away)) found = { ...here, k };
   });
   return found;
-}
-
-// The element within reach of p: {kind: 'end' | 'door' | 'window' | 'room' | 'wall', k: index, ...} or null. Small elements have precedence.
-export function hit(level, p, reach) {
-  const doors = level.doors ?? [], lines = doors.map((door) => door.line);
-  const room = (level.rooms ?? []).findIndex((r) => distance(r.at, p) <= reach);
-  const door = nearest(p, lines, reach), wall = nearest(p, level.walls, reach), glass = nearest(p, level.windows ?? [], reach);
-  if (door && (!wall || door.away <= wall.away) && door.t > 0.15 && door.t < 0.85) return { kind: 'door', k: door.k };
-  if (glass && (!wall || glass.away <= wall.away) && glass.t > 0.15 && glass.t < 0.85) return { kind: 'window', k: glass.k };
-  const joint = level.walls.flatMap(ends).filter((e) => distance(e, p) <= reach).sort((a, b) => distance(a, p) - distance(b, p))[0];
-  if (joint) return { kind: 'end', at: joint, k: wall.k };
-  if (room >= 0) return { kind: 'room', k: room };
-  if (door && (!wall || door.away <= wall.away)) return { kind: 'door', k: door.k };
-  return wall && { kind: 'wall', k: wall.k };
 }
 
 // Snap a point: to the end of a wall, to a right angle with the last wall of the chain (or along x or y), onto a wall, or to the grid.
@@ -67,21 +53,21 @@ export function snap(p, { walls = [], from = null, before = null, reach = 0.2 } 
 }
 
 // The intersection of a line (point, unit vector) with a segment, or null.
-export function crossing([px, py], [ux, uy], [x0, y0, x1, y1]) {
+function crossing([px, py], [ux, uy], [x0, y0, x1, y1]) {
   const vx = x1 - x0, vy = y1 - y0, d = ux * vy - uy * vx;
   if (Math.abs(d) < IN_LINE * Math.hypot(vx, vy)) return null;
   const t = ((x0 - px) * uy - (y0 - py) * ux) / d;
   return t < 0 || t > 1 ? null : [x0 + t * vx, y0 + t * vy];
 }
 
-// Cut a door of a width into wall k at the point nearest to p, in steps along the wall; null where the wall is too short. Remaining pieces shorter than a joint are dropped.
+// Cut a door of a width into wall k at the point nearest to p, in steps of 5 cm along the wall; null where the wall is too short. Remaining pieces shorter than a joint are dropped.
 // Of a wall that is drawn as two faces the other one is cut too, and the gap's ends join both.
-export function cutDoor(level, k, p, width, kept = { state: 'unknown' }, step = GRID_M) {
+export function cutDoor(level, k, p, width, kept = { state: 'unknown' }) {
   const wall = level.walls[k], [a, b] = ends(wall), long = length(wall);
   if (!(width > JOINT_M) || long < width - JOINT_M) return null;
   const u = unit(a, b), w = Math.min(width, long);
   let s = Math.min(Math.max(foot(p, wall).t * long - w / 2, 0), long - w);
-  s = Math.min(Math.round(s / step) * step, long - w);
+  s = Math.min(Math.round(s / GRID_M) * GRID_M, long - w);
   const at = (d) => (d <= JOINT_M ? a : d >= long - JOINT_M ? b : spot([a[0] + d * u[0], a[1] + d * u[1]]));
   const jambs = [at(s), at(s + w)], other = otherFace(level.walls, k, jambs), walls = level.walls.toSpliced(k, 1, ...beside(wall, jambs));
   if (other >= 0) {
@@ -119,16 +105,16 @@ function continues(a, b) {
 
 // Fill the gap of a line: the walls that continue it and the gap become one wall, the last. Returns the walls; the same ones when no wall is beside the gap.
 function filled(walls, line) {
-  const sides = [];
+  const joined = [];
   for (const end of ends(line)) {
-    const i = walls.findIndex((w, j) => !sides.includes(j) && continues(line, w) && ends(w).some((e) => same(e, end)));
-    if (i >= 0) sides.push(i);
+    const i = walls.findIndex((w, j) => !joined.includes(j) && continues(line, w) && ends(w).some((e) => same(e, end)));
+    if (i >= 0) joined.push(i);
   }
-  if (!sides.length) return walls;
-  const points = [...ends(line), ...sides.flatMap((i) => ends(walls[i]))], u = unit(...ends(line));
+  if (!joined.length) return walls;
+  const points = [...ends(line), ...joined.flatMap((i) => ends(walls[i]))], u = unit(...ends(line));
   const along = (e) => e[0] * u[0] + e[1] * u[1];
   points.sort((a, b) => along(a) - along(b));
-  return [...walls.filter((_, i) => !sides.includes(i)), [...points[0], ...points.at(-1)]];
+  return [...walls.filter((_, i) => !joined.includes(i)), [...points[0], ...points.at(-1)]];
 }
 
 // The two ends of a gap in a wall that is drawn as two faces: short walls across the line, one at each of its ends; null for other gaps.
@@ -140,69 +126,32 @@ function jambsOf(walls, line) {
   return found.every(Boolean) && Math.abs(length(found[0]) - length(found[1])) < GRID_M ? found : null;
 }
 
-// Remove door k: the walls on both sides and the gap become one wall, of a wall with two faces both. Returns {level, wall: its index, or -1 when no wall was beside the door}.
-export function fillDoor(level, k) {
-  const { line } = level.doors[k], doors = level.doors.toSpliced(k, 1), jambs = jambsOf(level.walls, line);
-  let walls = level.walls;
-  if (jambs) {
-    const [[a, b], other] = jambs.map(ends), [c, d] = distance(a, other[0]) < distance(a, other[1]) ? other : other.toReversed();
-    const off = (row) => foot(line.slice(0, 2), row).away, faces = [[...a, ...c], [...b, ...d]].sort((one, two) => off(two) - off(one));
-    walls = faces.reduce(filled, walls.filter((wall) => !jambs.includes(wall)));
-  } else walls = filled(walls, line);
-  return { level: { ...level, walls, doors }, wall: walls === level.walls ? -1 : walls.length - 1 };
+// Close the gap of a line: the walls on both sides and the gap become one wall, of a wall with two faces both. Returns the walls.
+export function closed(walls, line) {
+  const jambs = jambsOf(walls, line);
+  if (!jambs) return filled(walls, line);
+  const [[a, b], other] = jambs.map(ends), [c, d] = distance(a, other[0]) < distance(a, other[1]) ? other : other.toReversed();
+  const off = (row) => foot(line.slice(0, 2), row).away, faces = [[...a, ...c], [...b, ...d]].sort((one, two) => off(two) - off(one));
+  return faces.reduce(filled, walls.filter((wall) => !jambs.includes(wall)));
 }
 
-// Move the centre of door k to p: along its wall, or freely where it has none; in steps of the grid unless `exact`. Null where it does not fit.
-export function moveDoor(level, k, p, exact = false) {
-  const { line, ...kept } = level.doors[k], filled = fillDoor(level, k);
-  if (filled.wall >= 0) return cutDoor(filled.level, filled.wall, p, length(line), kept, exact ? 1e-4 : GRID_M);
-  const [mx, my] = [(line[0] + line[2]) / 2, (line[1] + line[3]) / 2], [dx, dy] = [p[0] - mx, p[1] - my].map(exact ? round : onGrid);
-  return { ...filled.level, doors: [...filled.level.doors, { ...kept, line: [line[0] + dx, line[1] + dy, line[2] + dx, line[3] + dy].map(round) }] };
+export const sides = (corners) => corners.map((p, i) => [...p, ...corners[(i + 1) % corners.length]]);
+export const middle = (corners) => [0, 1].map((i) => (Math.max(...corners.map((p) => p[i])) + Math.min(...corners.map((p) => p[i]))) / 2);
+export const rectangle = ([ax, ay], [bx, by]) => [[ax, ay], [bx, ay], [bx, by], [ax, by]];
+
+function inside([x, y], corners) {
+  return sides(corners).filter(([x0, y0, x1, y1]) => y0 > y !== y1 > y && x < x0 + (y - y0) * (x1 - x0) / (y1 - y0)).length % 2 === 1;
 }
 
-// A window is cut, moved and filled as a door is: the level with window k as its last door, and with its last door as a window.
-export const asDoor = (level, k) => ({ ...level, windows: level.windows.toSpliced(k, 1), doors: [...(level.doors ?? []), { line: level.windows[k] }] });
-export const asWindow = (level) => level && { ...level, windows: [...(level.windows ?? []), level.doors.at(-1).line], doors: level.doors.slice(0, -1) };
+// On which side of a segment a point lies, by its sign.
+const sideOf = ([x0, y0, x1, y1], [x, y]) => (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0);
+const cross = (a, b) => [[a, b], [b, a]].every(([row, other]) => { const [p, q] = ends(other); return sideOf(row, p) * sideOf(row, q) < 0; });
 
-// Move all ends of walls, windows and doors at some joints ([from, to] pairs); segments that have no length then are dropped.
-export function moveJoints(level, moves) {
-  const to = (e) => moves.find(([from]) => same(from, e))?.[1] ?? e;
-  const moved = (row) => { const [a, b] = ends(row).map(to); return [...a, ...b]; };
-  const left = (row) => length(row) > JOINT_M;
-  return {
-    ...level, walls: level.walls.map(moved).filter(left),
-    ...(level.windows && { windows: level.windows.map(moved).filter(left) }),
-    ...(level.doors && { doors: level.doors.map((d) => ({ ...d, line: moved(d.line) })).filter((d) => left(d.line)) }),
-  };
-}
+// Whether a segment lies wholly within a polygon.
+export const within = (row, corners) => ends(row).every((p) => inside(p, corners)) && !sides(corners).some((side) => cross(row, side));
 
-// The joints of wall k and of all doors, windows and walls that continue it in line: they move together.
-export function runOf(level, k) {
-  const doors = [...(level.doors ?? []).map((d) => d.line), ...(level.windows ?? [])], rows = [level.walls[k]], tried = new Set([level.walls[k]]);
-  for (let i = 0; i < rows.length; i++) {
-    const others = doors.includes(rows[i]) ? level.walls : doors; // walls are connected by doors and windows only
-    for (const row of others) if (!tried.has(row) && continues(rows[i], row)) { tried.add(row); rows.push(row); }
-  }
-  const joints = [];
-  for (const e of rows.flatMap(ends)) if (!joints.some((j) => same(j, e))) joints.push(e);
-  return joints;
-}
-
-export function moveWall(level, k, [dx, dy]) {
-  return moveJoints(level, runOf(level, k).map(([x, y]) => [[x, y], [round(x + dx), round(y + dy)]]));
-}
-
-// Scale a picture {x, y, perPx} (lower left corner in metres, metres per pixel) so that a and b are `metres` apart; a keeps its position.
-export function scaled(picture, a, b, metres) {
-  const factor = metres / distance(a, b);
-  return { x: a[0] + (picture.x - a[0]) * factor, y: a[1] + (picture.y - a[1]) * factor, perPx: picture.perPx * factor };
-}
-
-// The bounds of a level, of a picture and of other points.
-export function box(level, picture, points = []) {
-  const xs = points.map(([x]) => x), ys = points.map(([, y]) => y);
-  for (const row of [...level.walls, ...(level.windows ?? []), ...(level.doors ?? []).map((d) => d.line)]) { xs.push(row[0], row[2]); ys.push(row[1], row[3]); }
-  if (picture) { xs.push(picture.x, picture.x + picture.width * picture.perPx); ys.push(picture.y, picture.y + picture.height * picture.perPx); }
-  const least = (v) => v.reduce((a, b) => Math.min(a, b)), most = (v) => v.reduce((a, b) => Math.max(a, b));
-  return xs.length ? [least(xs), least(ys), most(xs), most(ys)] : [0, 0, 10, 8];
+// The bounds of segments.
+export function box(rows) {
+  const bound = (picks, of) => rows.flatMap((row) => picks.map((i) => row[i])).reduce((a, b) => of(a, b));
+  return rows.length ? [bound([0, 2], Math.min), bound([1, 3], Math.min), bound([0, 2], Math.max), bound([1, 3], Math.max)] : [0, 0, 10, 8];
 }

@@ -2,24 +2,22 @@
 // The plan editor: loads the plan and the picture, connects sheet, tools, view and buttons, saves. A *level* is an index into the plan's levels.
 
 import { Asking } from './asking.js';
-import { ask, askConnector, isOpen } from './dialogs.js';
-import { paintNorth } from './earth.js';
+import { ask, isOpen } from './dialogs.js';
+import { elementsOf } from './elements.js';
 import { box } from './geometry.js';
-import { paintGrid, squareOf } from './grid.js';
 import { paint } from './paint.js';
 import { localise, missing, tr } from './language.js';
 import { Pointer } from './pointer.js';
-import { outlined } from './shapes.js';
+import { paintBar, stepOf } from './scale.js';
 import { Sheet } from './sheet.js';
 import { recall, remember } from './storage.js';
 import { startTheme } from './theme.js';
 import { Tools } from './tools.js';
-import { takesTyped, typed } from './typed.js';
 import { View } from './view.js';
 import { HINTS, WORDS } from './words.js';
 
 const byId = (id) => document.getElementById(id);
-const KEYS = { v: 'select', w: 'wall', d: 'door', i: 'window', x: 'erase', n: 'room', s: 'scale', o: 'origin', b: 'obstacle', t: 'stairs', l: 'lift', p: 'ramp', g: 'start', e: 'earth' };
+const KEYS = { v: 'select', w: 'wall', d: 'door', n: 'room', s: 'scale' };
 const FIRST_WIDTH_M = 20; // of a picture without a scale
 const view = new View(), map = byId('map');
 let sheet, tools, asking, stamp, waiting = false, checked = {};
@@ -27,11 +25,6 @@ let sheet, tools, asking, stamp, waiting = false, checked = {};
 // The plan's own names stay as they are: its title and its list of levels.
 const say = (text) => { byId('status').textContent = tr(text); };
 const wrong = (text) => { byId('wrong').textContent = tr(String(text)); };
-
-function doorWidth() {
-  const width = byId('width').valueAsNumber;
-  return width >= 0.3 && width <= 20 ? width : 0.9;
-}
 
 function changed() {
   if (waiting) return;
@@ -42,13 +35,12 @@ function changed() {
 function draw() {
   waiting = false;
   asking.paint();
-  paintGrid(view);
-  paintNorth(sheet.tree);
+  paintBar(view);
   paint(tools, view, asking.current);
-  byId('door').hidden = !['door', 'window'].includes(tools.name);
-  byId('typed').hidden = !byId('door').hidden;
-  for (const field of byId('typed').elements) field.disabled = !takesTyped(tools);
+  const pressed = { rectangle: !tools.isLasso, lasso: tools.isLasso, add: tools.adds };
+  for (const [id, is] of Object.entries(pressed)) byId(id).setAttribute('aria-pressed', String(is));
   for (const button of document.querySelectorAll('[data-tool]')) button.setAttribute('aria-pressed', String(button.dataset.tool === tools.name));
+  byId('delete').disabled = !tools.chosen.size;
   byId('step-back').disabled = !sheet.past.length;
   byId('step-forth').disabled = !sheet.future.length;
   byId('save').toggleAttribute('data-unsaved', sheet.unsaved);
@@ -56,31 +48,21 @@ function draw() {
   const names = sheet.tree.levels.map((level) => level.name), options = byId('level');
   if (names.join('\n') !== [...options.options].map((o) => o.text).join('\n')) options.replaceChildren(...names.map((name, k) => new Option(name, k)));
   options.value = sheet.k;
+  options.hidden = names.length < 2;
   if (sheet.picture) remember(`picture of ${sheet.tree.name}`, JSON.stringify(sheet.picture));
 }
 
 function show() {
-  view.fit(box(sheet.level, sheet.picture, outlined(sheet.tree, sheet.k).flatMap(({ outline }) => outline)));
+  const { picture } = sheet, rows = elementsOf(sheet.tree, sheet.k).flatMap((element) => element.rows);
+  view.fit(box(picture ? [...rows, [0, 0, picture.width * picture.perPx, picture.height * picture.perPx]] : rows));
   changed();
 }
 
 function goLevel(level) {
   if (level < 0 || level >= sheet.tree.levels.length) return;
-  const given = tools.choose(tools.name);
-  sheet.k = level;
-  say(given + WORDS.level(sheet.level.name, sheet.level.height_m));
-  changed();
-}
-
-async function addLevel() {
-  const { levels } = sheet.tree, name = (await ask(WORDS.levelName, ''))?.trim();
-  if (!name) return;
-  if (levels.some((level) => level.name === name)) { say(WORDS.levelExists(name)); return; }
-  const height = Number((await ask(WORDS.levelHeight, String(levels.at(-1).height_m + 3.5)))?.replace(',', '.') ?? NaN);
-  if (!(Math.abs(height) < 1e5)) { say(WORDS.noHeight); return; }
-  sheet.change({ ...sheet.tree, levels: [...levels, { name, height_m: height, walls: [], rooms: [] }] }, WORDS.levelAdded(name, height));
-  sheet.k = levels.length;
   tools.choose(tools.name);
+  sheet.k = level;
+  say(WORDS.level(sheet.level.name, sheet.level.height_m));
   changed();
 }
 
@@ -126,24 +108,35 @@ function turn(way) {
 }
 
 function step(e, [dx, dy]) {
-  const by = e.shiftKey ? 0.05 : squareOf(view), [x, y] = tools.cross;
+  const by = e.shiftKey ? 0.05 : stepOf(view), [x, y] = tools.cross;
   tools.move([Math.round((x + dx * by) / 0.05) * 0.05, Math.round((y + dy * by) / 0.05) * 0.05]);
   view.keep(...tools.cross);
-  if (!tools.draft && !tools.live) say(WORDS.cross(tools.cross));
+  if (!tools.draft && !tools.area) say(WORDS.cross(tools.cross));
 }
 
-function enter() {
-  if (!tools.drags) tools.up(tools.cross, true);
-  else if (tools.held) tools.up(tools.cross, false);
-  else say(tools.down(tools.cross) ? WORDS.pickedUp : WORDS.nothing);
+// A tap at the cross.
+function enter(e) {
+  tools.down(tools.cross);
+  tools.up(tools.cross, true, e.shiftKey);
 }
 
-// Draws or moves by the typed length and angle.
-function go(e) {
-  e.preventDefault();
-  if (typed(tools, byId('length').value, byId('angle').value)) byId('typed').reset();
-  byId('length').focus();
+// Begins and ends a rectangle or lasso at the cross.
+function surround(e) {
+  if (tools.name !== 'select') enter(e);
+  else if (tools.area) tools.up(tools.cross, false, e.shiftKey);
+  else tools.down(tools.cross);
+}
+
+// Which kind of area the next drag draws.
+function surroundBy(isLasso) {
+  if (tools.name !== 'select') pick('select');
+  tools.isLasso = isLasso;
   changed();
+}
+
+function escape() {
+  tools.choose(tools.name);
+  say(WORDS.ended);
 }
 
 function key(e) {
@@ -155,20 +148,18 @@ function key(e) {
   if (ctrl || e.altKey || document.activeElement !== map) return;
   const done = {
     ArrowLeft: () => step(e, [-1, 0]), ArrowRight: () => step(e, [1, 0]), ArrowUp: () => step(e, [0, 1]), ArrowDown: () => step(e, [0, -1]),
-    Enter: enter, ' ': enter, Escape: () => tools.end(), Delete: () => tools.chosen && tools.remove(tools.chosen), Backspace: () => tools.chosen && tools.remove(tools.chosen),
+    Enter: () => enter(e), ' ': () => surround(e), Escape: escape, Delete: () => tools.remove(), Backspace: () => tools.remove(), l: () => surroundBy(!tools.isLasso),
     '+': () => view.zoom(1.25), '=': () => view.zoom(1.25), '-': () => view.zoom(0.8), 0: show, a: () => asking.accept(), m: () => asking.place(), r: () => asking.reject(), q: () => asking.next(), c: check, PageUp: () => goLevel(sheet.k + 1), PageDown: () => goLevel(sheet.k - 1),
   }[name] ?? (KEYS[name] && (() => pick(KEYS[name])));
-  if (!done) {
-    if (/^[1-9.,]$/.test(name) && takesTyped(tools)) byId('length').focus(); // what is typed goes there
-    return;
-  }
+  if (!done) return;
   e.preventDefault();
   done();
   changed();
 }
 
 function pick(name) {
-  say(tools.choose(name) + HINTS[name]);
+  tools.choose(name);
+  say(name === 'scale' && !sheet.picture ? WORDS.noPicture : HINTS[name]);
   changed();
 }
 
@@ -185,7 +176,7 @@ async function loadPicture(name) {
   let kept = null;
   try { kept = JSON.parse(recall(`picture of ${name}`)); } catch { /* not of this page */ }
   const fits = kept?.width === width && kept.height === height && kept.perPx > 0;
-  sheet.picture = fits ? kept : { x: 0, y: 0, perPx: FIRST_WIDTH_M / width, width, height, set: false };
+  sheet.picture = fits ? kept : { perPx: FIRST_WIDTH_M / width, width, height, set: false };
 }
 
 async function start() {
@@ -195,9 +186,9 @@ async function start() {
   stamp = answer.headers.get('etag');
   sheet = new Sheet(tree, say);
   await loadPicture(tree.name);
-  tools = new Tools(sheet, view, { ask, askConnector: (kind, fields) => askConnector(kind, sheet.tree.levels.map((level) => level.name), fields), say, changed, doorWidth, asked: (question) => asking.show(question, false), placed: (p) => asking.placed(p) });
+  tools = new Tools(sheet, view, { ask, say, changed, asked: (question) => asking.show(question, false), placed: (p) => asking.placed(p) });
   asking = new Asking(sheet, view, tools, { say, changed });
-  new Pointer(map, view, { down: (p) => tools.down(p), move: (p) => tools.move(p), up: (p, click) => tools.up(p, click), cancel: () => { tools.cancel(); changed(); }, moved: changed });
+  new Pointer(map, view, { down: (p, e) => tools.down(p, e.altKey || e.ctrlKey), move: (p) => tools.move(p), up: (p, isTap, e) => tools.up(p, isTap, e.shiftKey), cancel: () => { tools.cancel(); changed(); }, moved: changed });
   new ResizeObserver(() => { view.resize(map.clientWidth, map.clientHeight); changed(); }).observe(map);
   view.resize(map.clientWidth, map.clientHeight);
   show();
@@ -205,12 +196,11 @@ async function start() {
   document.addEventListener('keydown', key);
   for (const button of document.querySelectorAll('[data-tool]')) button.onclick = () => pick(button.dataset.tool);
   const clicks = {
-    end: () => tools.end(), add: addLevel, 'step-back': () => turn('undo'), 'step-forth': () => turn('redo'), whole: show, save: () => save(), check,
+    rectangle: () => surroundBy(false), lasso: () => surroundBy(true), add: () => { tools.adds = !tools.adds; changed(); }, delete: () => tools.remove(),
+    'step-back': () => turn('undo'), 'step-forth': () => turn('redo'), whole: show, save: () => save(), check,
     closer: () => { view.zoom(1.25); changed(); }, farther: () => { view.zoom(0.8); changed(); },
   };
   for (const [id, done] of Object.entries(clicks)) byId(id).onclick = done;
-  byId('typed').onsubmit = go;
-  byId('typed').onkeydown = (e) => { if (e.key === 'Escape') map.focus(); };
   byId('level').onchange = () => goLevel(Number(byId('level').value));
   startTheme(byId('look'), changed);
   addEventListener('beforeunload', (e) => { if (sheet.unsaved) e.preventDefault(); });

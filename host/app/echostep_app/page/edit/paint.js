@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The sheet in SVG. In: the tools (plan, picture, selected element, draft), the view and the question that is shown. Owns the SVG elements.
+// The sheet in SVG. In: the tools (plan, picture, selection, draft), the view and the question that is shown. Owns the SVG elements.
 
-import { ends, length } from './geometry.js';
-import { middle, outlined, outlineOf, sides, size, startOn } from './shapes.js';
+import { connectorsOf, startOn } from './elements.js';
+import { ends, length, middle } from './geometry.js';
 import { tr } from './language.js';
 import { halfOf, isFree } from './plan.js';
 import { KINDS, WORDS } from './words.js';
@@ -43,57 +43,38 @@ function startMark({ x, y, heading_deg }, view, chosen) {
   return made;
 }
 
-// The elements that are outlines; names of rooms, and of stairs, lifts and ramps in their middle. Returns the names and the start.
-function paintShapes({ tree, sheet: { k }, chosen }, view) {
-  const rows = outlined(tree, k), closed = (kind) => rows.filter((row) => row.kind === kind).map(({ outline }) => `M${outline.map((p) => p.join(' ')).join('L')}Z`).join('');
-  byId('obstacles').setAttribute('d', closed('obstacle'));
-  byId('connectors').setAttribute('d', closed('connector'));
-  const ways = rows.filter(({ way }) => way).map(({ outline, way, name }) => ({ at: middle(outline), name: name || tr(KINDS[way]) }));
-  const rooms = (tree.levels[k].rooms ?? []).map((room, n) => ({ ...room, isChosen: chosen?.kind === 'room' && chosen.k === n }));
-  const names = paintNames([...rooms, ...ways].sort((a, b) => (b.isChosen ?? false) - (a.isChosen ?? false)), view);
-  return startOn(tree, k) ? [...names, startMark(tree.start, view, chosen?.kind === 'start')] : names;
+// Names of rooms, and of stairs, lifts and ramps in their middle; the start.
+function paintNames({ sheet: { tree, k }, chosen }, view) {
+  const ways = connectorsOf(tree, k).map((way) => ({ at: middle(way.outline), name: way.name || tr(KINDS[way.kind]), isChosen: chosen.has(way) }));
+  const rooms = (tree.levels[k].rooms ?? []).map((room) => ({ ...room, isChosen: chosen.has(room) }));
+  const names = freeNames([...rooms, ...ways].sort((a, b) => b.isChosen - a.isChosen), view);
+  return startOn(tree, k) ? [...names, startMark(tree.start, view, chosen.has(tree.start))] : names;
 }
 
 // Names of which none covers an earlier one.
-function paintNames(rows, view) {
+function freeNames(rows, view) {
   const taken = [], placed = rows.map((row) => ({ ...row, spot: [...view.toScreen(...row.at), halfOf(row.name)] }));
   return placed.filter(({ spot }) => isFree(taken, spot) && taken.push(spot)).map(({ spot, name, isChosen }) => mark('text', spot, name, isChosen));
 }
 
-// The segments of the selected element.
-function chosenRows({ tree, level, sheet: { k }, chosen }) {
-  if (!chosen) return [];
-  const { kind, of } = chosen;
-  if (kind === 'obstacle' || kind === 'connector' || of) return sides(outlineOf(tree, k, of ?? chosen));
-  return [{ wall: level.walls[chosen.k], end: level.walls[chosen.k], door: level.doors?.[chosen.k]?.line, window: level.windows?.[chosen.k] }[kind]].filter(Boolean);
-}
-
-// The length of what is drawn or moved, or the size of a rectangle: [text, position].
-function measured({ draft, box, live }, rows) {
-  if (box) return [tr(WORDS.size(...size(box))), middle(box)];
-  const row = draft ?? (live && rows.length === 1 ? rows[0] : null);
-  return row && length(row) > 0 ? [tr(WORDS.length(...ends(row))), middle(ends(row))] : ['', [0, 0]];
-}
-
 export function paint(tools, view, shown) {
-  const { level, picture, draft, box, chain, cross, points } = tools, doors = level.doors ?? [];
+  const { sheet: { tree, k, level, picture }, area, chain, cross, draft } = tools, outlines = (rows) => rows.map((corners) => `M${corners.map((p) => p.join(' ')).join('L')}Z`).join('');
   byId('world').setAttribute('transform', `matrix(${view.matrix().join(' ')})`);
   const image = byId('image');
   image.toggleAttribute('hidden', !picture);
-  if (picture) image.setAttribute('transform', `matrix(${picture.perPx} 0 0 ${-picture.perPx} ${picture.x} ${picture.y + picture.height * picture.perPx})`);
-  const below = tools.tree.levels.filter(({ height_m }) => height_m < level.height_m).sort((a, b) => b.height_m - a.height_m)[0];
-  byId('below').setAttribute('d', path(below?.walls ?? []));
-  byId('walls').setAttribute('d', path(level.walls));
-  byId('windows').setAttribute('d', path(level.windows ?? []));
-  byId('doors').setAttribute('d', path(doors.map((door) => door.line)));
-  const rows = chosenRows(tools), drawn = chain?.corners ? sides(chain.corners).slice(0, -1) : [];
-  byId('chosen').setAttribute('d', path(rows));
-  byId('draft').setAttribute('d', path([...drawn, ...(box ? sides(box) : draft ? [draft] : [])]));
-  const marks = [...rows.flatMap(ends), ...points].map((p) => mark('circle', view.toScreen(...p)));
-  byId('marks').replaceChildren(...marks, ...paintShapes(tools, view), ...paintQuestions(level.questions ?? [], shown, view));
+  if (picture) image.setAttribute('transform', `matrix(${picture.perPx} 0 0 ${-picture.perPx} 0 ${picture.height * picture.perPx})`);
+  const below = tree.levels.filter(({ height_m }) => height_m < level.height_m).sort((a, b) => b.height_m - a.height_m)[0];
+  const lines = {
+    below: path(below?.walls ?? []), walls: path(level.walls), windows: path(level.windows ?? []), doors: path((level.doors ?? []).map((door) => door.line)),
+    obstacles: outlines(level.obstacles ?? []), connectors: outlines(connectorsOf(tree, k).map(({ outline }) => outline)),
+    chosen: path(tools.selected.flatMap(({ rows }) => rows)), draft: path(draft ? [draft] : []), area: outlines(area ? [area.corners] : []),
+  };
+  for (const [id, d] of Object.entries(lines)) byId(id).setAttribute('d', d);
+  const points = (chain ? [chain.at] : []).map((p) => mark('circle', view.toScreen(...p)));
+  byId('marks').replaceChildren(...points, ...paintNames(tools, view), ...paintQuestions(level.questions ?? [], shown, view));
   byId('cross').setAttribute('transform', `translate(${view.toScreen(...cross).join(' ')})`);
-  const [text, at] = measured(tools, rows), [x, y] = view.toScreen(...at), label = byId('measure');
-  label.textContent = text;
+  const label = byId('measure'), [x, y] = view.toScreen(...middle(ends(draft ?? [0, 0, 0, 0])));
+  label.textContent = draft && length(draft) > 0 ? tr(WORDS.length(length(draft))) : '';
   label.setAttribute('x', x);
   label.setAttribute('y', y - 12);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Mouse and fingers on the sheet. `actions`: down(position) -> whether the tool uses the press, move(position), up(position, whether it was a click), cancel(), moved().
+// Mouse and fingers on the sheet. `actions`: down(position, event), move(position), up(position, whether it was a tap, event), cancel(), moved().
 
-const SLOP_PX = 6; // a movement below this is a click
+const SLOP_PX = 6; // a movement below this is a tap
 
 export class Pointer {
   constructor(map, view, actions) {
@@ -11,7 +11,7 @@ export class Pointer {
     map.addEventListener('pointerup', (e) => this.up(e));
     map.addEventListener('pointercancel', (e) => { this.drop(e); actions.cancel(); });
     map.addEventListener('contextmenu', (e) => e.preventDefault());
-    map.addEventListener('touchend', (e) => e.preventDefault()); // else a dialog that a tap opens is clicked by the same tap
+    map.addEventListener('touchend', (e) => e.cancelable && e.preventDefault()); // else a dialog that a tap opens is clicked by the same tap
     map.addEventListener('wheel', (e) => {
       e.preventDefault();
       view.grip(this.pixel(e), this.pixel(e), Math.exp(-e.deltaY * (e.deltaMode ? 20 : 1) * 0.0015));
@@ -25,14 +25,17 @@ export class Pointer {
   }
 
   down(e) {
-    const pixel = this.pixel(e), place = this.view.toMap(...pixel);
+    const pixel = this.pixel(e);
     this.map.setPointerCapture(e.pointerId);
     this.map.focus({ preventScroll: true });
     this.fingers.set(e.pointerId, pixel);
     if (this.fingers.size > 1) {
       this.begun = null;
       this.actions.cancel();
-    } else this.begun = { pixel, far: false, holds: e.button === 0 && this.actions.down(place), pans: e.button !== 0 };
+    } else {
+      this.begun = { pixel, far: false, pans: e.button !== 0 };
+      if (!this.begun.pans) this.actions.down(this.view.toMap(...pixel), e);
+    }
   }
 
   move(e) {
@@ -45,7 +48,7 @@ export class Pointer {
       this.actions.moved();
     } else if (begun) {
       begun.far ||= Math.hypot(now[0] - begun.pixel[0], now[1] - begun.pixel[1]) > SLOP_PX;
-      if (begun.far && begun.holds) this.actions.move(view.toMap(...now));
+      if (begun.far && !begun.pans) this.actions.move(view.toMap(...now));
       else if (begun.far) { view.pan(now[0] - before[0], now[1] - before[1]); this.actions.moved(); }
     }
     this.fingers.set(e.pointerId, now);
@@ -54,7 +57,7 @@ export class Pointer {
   up(e) {
     const { begun } = this;
     this.drop(e);
-    if (begun && !begun.pans && (begun.holds || !begun.far)) this.actions.up(this.view.toMap(...this.pixel(e)), !begun.far);
+    if (begun && !begun.pans) this.actions.up(this.view.toMap(...this.pixel(e)), !begun.far, e);
   }
 
   drop(e) {

@@ -2,13 +2,14 @@
 // Questions that an import left: {text, about: door | wall | room, at, lines, proposed}. In: a level of plan.json. Out: a new level with the answer in it.
 // A question is open while its element is proposed, or still there as it was: a door that is moved or deleted otherwise answers its question.
 
-import { cutDoor, distance, ends, fillDoor, foot, length, onGrid, same } from './geometry.js';
+import { closed, cutDoor, distance, ends, foot, length, onGrid, same } from './geometry.js';
 
 const WALL_REACH_M = 1; // a door is put into a wall that is nearer than this
 
 const alike = (a, b) => ends(a).every((end, k) => same(end, ends(b)[k]));
 const doorOf = (level, { lines }) => (level.doors ?? []).findIndex((door) => lines.some((line) => alike(door.line, line)));
 const isOf = ({ at, lines }) => (room) => [at, ...lines.map((line) => line.slice(0, 2))].some((place) => same(room.at, place));
+const withoutDoor = (level, k) => ({ ...level, walls: closed(level.walls, level.doors[k].line), doors: level.doors.toSpliced(k, 1) });
 const without = (level, question) => ({ ...level, questions: level.questions.filter((other) => other !== question) });
 
 const isOpen = (level, question) => question.proposed
@@ -35,7 +36,7 @@ export function reject(level, question) {
   if (question.about === 'room') return { ...left, rooms: left.rooms.filter((room) => !isOf(question)(room)) };
   if (question.about === 'door') return question.lines.reduce((kept, line) => {
     const k = doorOf(kept, { lines: [line] });
-    return k < 0 ? kept : fillDoor(kept, k).level;
+    return k < 0 ? kept : withoutDoor(kept, k);
   }, left);
   return { ...left, walls: left.walls.filter((wall) => !question.lines.some((line) => alike(wall, line))) };
 }
@@ -49,7 +50,7 @@ export function put(level, question, p) {
     return { ...left, rooms: left.rooms.with(k, { ...left.rooms[k], at: p.map(onGrid) }) };
   }
   const k = question.proposed ? -1 : doorOf(left, question), { line, ...kept } = k < 0 ? { line: question.lines[0], state: 'unknown' } : left.doors[k];
-  const base = k < 0 ? left : fillDoor(left, k).level;
+  const base = k < 0 ? left : withoutDoor(left, k);
   const near = base.walls.map((wall, w) => ({ w, ...foot(p, wall) })).sort((a, b) => a.away - b.away)[0];
   return near && near.away < WALL_REACH_M ? cutDoor(base, near.w, p, length(line), kept) : null;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The sheet: the plan and the picture's position, with undo and redo. Owns the history; every change makes a new tree and says in a sentence what it did.
+// The sheet: the plan and the picture's scale, with undo and redo. Owns the history; every change makes a new tree and says in a sentence what it did.
 
 import { settled } from './questions.js';
 import { WORDS } from './words.js';

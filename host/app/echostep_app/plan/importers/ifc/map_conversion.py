@@ -20,7 +20,7 @@ from echostep_app.plan.georeference import WGS84, EarthTransform
 from echostep_app.plan.importers.report import ImportReport
 
 AHEAD_M = 100.0  # along the plan's x axis: the second place that gives its direction
-TWO_POINTS = "echostep plan edit takes two known points"
+BY_HAND = "write the plan's georeference by hand (docs/plan.md)"
 
 
 def map_georeference(
@@ -40,7 +40,7 @@ def map_georeference(
     try:
         crs = CRS.from_user_input(name)
     except CRSError:
-        report.doubt(f"its map conversion is in {name!r}, which pyproj does not know: {TWO_POINTS}")
+        report.doubt(f"its map conversion is in {name!r}, which pyproj does not know: {BY_HAND}")
         return None
     east, north, along, across, scale = (
         _number(conversion.get(key)) for key in ("Eastings", "Northings", "XAxisAbscissa", "XAxisOrdinate", "Scale")
@@ -64,7 +64,7 @@ def map_georeference(
         places += [ends] if _is_used_there(crs, *ends[0]) else []
     if len(places) != 1:
         report.doubt(
-            f"its map conversion lies {'outside of ' if not places else 'in several places of '}{name!r}: {TWO_POINTS}"
+            f"its map conversion lies {'outside of ' if not places else 'in several places of '}{name!r}: {BY_HAND}"
         )
         return None
     (lon, lat), ahead = places[0]
