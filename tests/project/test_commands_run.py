@@ -37,7 +37,6 @@ LEFT_OUT = {  # beginnings of commands, and why they are not run here
     "live": "ports",
     "doctor": "a board",
     "bench-report": "a board",
-    "calibrate": "a board, or the walks of a wearer (tests/app/commissioning)",
     "demo --guide": "a browser",
     r"demo$": "a browser",
     "demo --headless --publish": "a broker; test_docs runs the team's",
