@@ -27,17 +27,8 @@ Triangles = NDArray[np.float64]
 def render(name: str, part: str, folder: Path) -> Triangles:
     """Render a part to NAME-PART.stl in a folder by OpenSCAD, and read it."""
     path = folder / f"{name}-{part}.stl"
-    command = [
-        "openscad",
-        "-q",
-        "--export-format",
-        "binstl",
-        "-D",
-        f'part="{part}"',
-        "-o",
-        path,
-        BOXES / f"{name}.scad",
-    ]
+    drawn = ("-D", f'part="{part}"', str(BOXES / f"{name}.scad"))
+    command = ["openscad", "-q", "--export-format", "binstl", "-o", str(path), *drawn]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode or done.stderr:
         raise SystemExit(f"{name}, {part}: {done.stderr}")
