@@ -7,6 +7,7 @@ import gzip
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +17,13 @@ import shapely
 from command_line import echostep
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization import CloudSettings, Start, TrackStatus
+from echostep.localization import Start, TrackStatus
 from echostep.path import MeasuredSegment
 from echostep.plan import Plan
 from echostep_studies.bench.filtering import Claim, FilterRun
 from echostep_studies.bench.laser.building import building_of, hear, walk_from
 from echostep_studies.bench.laser.carmen_log import CarmenLog, logs_in, read_log
-from echostep_studies.bench.laser.odometry import odometry_of
+from echostep_studies.bench.laser.odometry import calibrated, odometry_of
 from echostep_studies.bench.laser.wall_lines import straight_pieces, wall_segments
 from echostep_studies.clutter import study
 from echostep_studies.frame.report import as_dicts
@@ -212,6 +213,17 @@ def test_odometry_states_its_own_errors(
     assert math.degrees(odometry.turn_sd_rad) == pytest.approx(turn_deg, abs=0.05)
 
 
+def test_calibrated_odometry_has_no_turn_on_each_metre(tmp_path: Path) -> None:
+    write_log(tmp_path / "a.log", WALLS)
+    log = read_log(tmp_path / "a.log")
+    true = odometry_of(log, np.random.default_rng(1))
+    biased = replace(true, steps=tuple(s + np.outer(np.hypot(s[:, 0], s[:, 1]), [0.0, 0.0, 0.05]) for s in true.steps))
+    turns, exact = (
+        np.concatenate([step[:, 2] for step in steps]) for steps in (calibrated(biased, log).steps, true.steps)
+    )
+    assert turns == pytest.approx(exact, abs=1e-3)
+
+
 # ---- the command ----
 
 
@@ -228,9 +240,7 @@ def test_the_command_tracks_every_log_of_a_folder(log_file: Path, tmp_path: Path
 
 
 def test_unknown_starts_lie_where_the_log_goes_on(log_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def at_the_origin(
-        segments: Sequence[MeasuredSegment], _plan: Plan, start: Start, _seed: int, _cloud: CloudSettings
-    ) -> FilterRun:
+    def at_the_origin(segments: Sequence[MeasuredSegment], _plan: Plan, start: Start, _seed: int) -> FilterRun:
         assert start.pose is None
         assert start.room_m is None
         claims = [Claim(s.segment.t1_s, 0.0, 0.0, 0, 0.0, TrackStatus.LOST, math.inf) for s in segments]

@@ -226,7 +226,6 @@ class MapFilter:
                 found = each.cloud.found()
                 if found is not None:
                     self._way.pass_again(found, self._blurred, walls)
-                    found.draw_veer()
                     belief.find(each, found)
             elif (loss := self.building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m)) is not None:
                 each.cloud.reweight(loss)

@@ -21,10 +21,9 @@ class CloudSettings:
     """Size of the cloud, spread of a start whose errors are not stated, and noise that the path's own covariance leaves out.
 
     `step_sd`: of a move's length, per square root of a metre, twice a foot's; `turn_sd_deg`, `scale_sd`: drift of the walk frame's rotation
-    and of the lengths, likewise. `start_scale_sd`, `scale_sd`: of nine walks with surveyed or captured feet. `start_veer_sd_deg`: of a bias
-    of the path, degrees that it turns on each metre of a straight way, as by unequal wheels; feet have none. `resample_below`: effective share of the
-    cloud at which it is resampled (systematic). The size follows the spread [Fox 2003, KLD-sampling]: enough particles that the distribution over
-    cells of `cell_m`, `cell_m`, `cell_deg` is met within `kld`, at least `size`, at most `largest`. A scattered cloud is roughened by
+    and of the lengths, likewise. `start_scale_sd`, `scale_sd`: of nine walks with surveyed or captured feet. `resample_below`: effective share of
+    the cloud at which it is resampled (systematic). The size follows the spread [Fox 2003, KLD-sampling]: enough particles that the distribution
+    over cells of `cell_m`, `cell_m`, `cell_deg` is met within `kld`, at least `size`, at most `largest`. A scattered cloud is roughened by
     `rough_m` and `rough_deg` until it has contracted.
     `wall_cost`: log-weight that crossing a wall costs. `rescue_sd_m`: widening of a cloud that crossed a wall as a whole.
     """
@@ -37,7 +36,6 @@ class CloudSettings:
     start_sd_m: float = 0.15
     start_turn_sd_deg: float = 5.0
     start_scale_sd: float = 0.01
-    start_veer_sd_deg: float = 0.0
     step_sd: float = 0.02
     turn_sd_deg: float = 0.3
     scale_sd: float = 0.001

@@ -15,7 +15,6 @@ import numpy as np
 
 from echostep.localization import (
     Building,
-    CloudSettings,
     DrawnPlaces,
     Estimate,
     FilterSettings,
@@ -58,16 +57,14 @@ class FilterRun:
     cpu_s: float
 
 
-def track(
-    segments: Sequence[MeasuredSegment], plan: Plan, start: Start, seed: int, cloud: CloudSettings | None = None
-) -> FilterRun:
-    """The filter with its default settings, or others of the cloud, and the uncertainty that the plan states, from the first segment on.
+def track(segments: Sequence[MeasuredSegment], plan: Plan, start: Start, seed: int) -> FilterRun:
+    """The filter with its default settings, and the uncertainty that the plan states, from the first segment on.
 
     The CPU time is that of the updates, without the tables that a plan needs once.
     """
     laid_out = lay_out_levels(plan)
     building = Building(laid_out.walls, laid_out.sheet, DrawnPlaces(plan.levels))
-    settings = FilterSettings(cloud=cloud or CloudSettings(), plan_sd_m=plan.uncertainty_m or 0.0)
+    settings = FilterSettings(plan_sd_m=plan.uncertainty_m or 0.0)
     warm = _new_filter(building, start, segments, settings, seed)
     for segment in segments[:WARM_UP]:
         warm.update(segment)

@@ -45,16 +45,13 @@ class SearchGrid:
     """The weights of all poses on the grid."""
 
     def __init__(
-        self, cells: GridCells, places: Places, unplanned: RangeMemory, heights: GridHeights | None = None,
-        veer_sd_rad: float = 0.0,
-    ) -> None:  # fmt: skip
+        self, cells: GridCells, places: Places, unplanned: RangeMemory, heights: GridHeights | None = None
+    ) -> None:
         """Begin evenly at these places, with any rotation.
 
         `unplanned`: density without a plan, as inexact as the table. `heights`: None in a building of one level.
-        `veer_sd_rad`: standard deviation of a bias of the path, its turn on a metre.
         """
         self._cells, self._places, self._heights = cells, places, heights
-        self._turn_variance = SPREAD_RAD**2 + 4.0 * veer_sd_rad**2
         self._turned_rad = 0.0  # of the walk frame since the search began
         self._scratch = np.zeros(len(cells.row), np.float32)
         self._pings, self._unplanned = TablePings(), unplanned
@@ -125,7 +122,7 @@ class SearchGrid:
         self.path_m += length
         self._x_m, self._y_m = self._x_m + move.dx_m, self._y_m + move.dy_m
         self._var_m2 += SPREAD_M**2 * length + move.sd_m**2 + bend**2
-        self._var_rad2 += self._turn_variance * length + move.turn_sd_rad**2
+        self._var_rad2 += SPREAD_RAD**2 * length + move.turn_sd_rad**2
         self._refine()
         return log_ratio
 
@@ -175,7 +172,7 @@ class SearchGrid:
     def _refine(self) -> None:
         """Halve the sectors if the way within one errs by a cell, and spread the weight that is due."""
         layers = len(self._states.offset_m)
-        if self._turned(self._turn_variance, 2 * layers) < MOST_TURNED and self.path_m * math.pi / layers > CELL_M:
+        if self._turned(SPREAD_RAD**2, 2 * layers) < MOST_TURNED and self.path_m * math.pi / layers > CELL_M:
             self._states, layers = halved(self._states), 2 * layers
         beside, turned = 0.5 * self._var_m2 / CELL_M**2, self._turned(self._var_rad2, layers)
         if beside > SPREAD_SHARE:

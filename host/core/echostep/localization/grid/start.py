@@ -39,7 +39,7 @@ def grid_about(
 ) -> SearchGrid:  # fmt: skip
     """The grid of a cloud's poses, by which the cloud is compared with a search as long as the search is on a grid."""
     heights = None if cloud.sheet is None else GridHeights(cloud.sheet, settings.climb, Start(air=cloud.air))
-    grid = SearchGrid(cells, (floor.x_m, floor.y_m), unplanned, heights, math.radians(settings.cloud.start_veer_sd_deg))
+    grid = SearchGrid(cells, (floor.x_m, floor.y_m), unplanned, heights)
     chosen = systematic(cloud.weight, float(rng.random()), len(cloud.x_m))
     grid.begin_about(cloud.x_m[chosen], cloud.y_m[chosen], cloud.turn_rad[chosen], 1.0)
     return grid
@@ -52,9 +52,7 @@ def grid_of(
     """The grid of an unknown start. `walk_heading_rad`: the trunk's heading in the walk frame at the start."""
     allowed = allowed_floor(floor, start, sheet)
     heights = None if sheet is None else GridHeights(sheet, settings.climb, start)
-    grid = SearchGrid(
-        cells, (allowed.x_m, allowed.y_m), unplanned, heights, math.radians(settings.cloud.start_veer_sd_deg)
-    )
+    grid = SearchGrid(cells, (allowed.x_m, allowed.y_m), unplanned, heights)
     about = start.pose or start.near
     if about is not None:
         facing = _facing(about.heading_rad - walk_heading_rad, start.heading_sd_rad)

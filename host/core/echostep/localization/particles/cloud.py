@@ -4,8 +4,8 @@
 In: moves of the trunk in the walk frame, with the pings on them. Out: a `Cloud` whose moments are the estimate. Owns the particles; draws from the
 generator that it is given. Only the filter's kernels go from the walk frame to the map.
 
-A particle is (x, y) on the sheet of levels, `turn` = rotation walk -> map, `scale` = true length / measured length, `veer` = turn of the path on a
-metre that the wearer has not made. In a building of several levels it also has a height `z` and an offset `lag` of the height by pressure.
+A particle is (x, y) on the sheet of levels, `turn` = rotation walk -> map, `scale` = true length / measured length. In a building
+of several levels it also has a height `z` and an offset `lag` of the height by pressure.
 Weights are logarithms.
 """
 
@@ -30,7 +30,7 @@ from echostep.localization.height.levels import (
     set_levels_by_pressure,
 )
 from echostep.localization.particle_arrays import DrawnPoses, Move, PingBatch
-from echostep.localization.particles.kernels import NOISE_BEND, NOISE_TURN, effective_size, systematic
+from echostep.localization.particles.kernels import NOISE_BEND, effective_size, systematic
 from echostep.localization.particles.particles import GATHERED_REST, Particles
 from echostep.localization.particles.reweighting import CloudModel, EchoMemory, MoveProgress, propagate_and_reweight
 from echostep.localization.particles.sampling import kld_size, log_mode_weight, spread_evenly
@@ -92,17 +92,10 @@ class Cloud(Particles):
         count = min(max(self._wanted_size(), START_SIZE), len(self.x_m))
         self.keep(np.arange(count))
         self.log_weight = log_weight[:count]
-        self.draw_veer()
 
     def contract(self) -> None:
         """Resample to the size for the spread."""
         self._resample(self.log_weight, self.log_weight, min(self._wanted_size(), self._settings.largest))
-
-    def draw_veer(self) -> None:
-        """Draw each particle's veer; after a search, once its second pass is over: the pass begins where the path leads back to."""
-        sd_rad_m = math.radians(self._settings.start_veer_sd_deg)
-        if sd_rad_m > 0.0:  # otherwise nothing is drawn: a walk on foot stays the same to the bit
-            self.veer_rad_m = sd_rad_m * self._rng.standard_normal(len(self.x_m))
 
     @property
     def is_scattered(self) -> bool:
@@ -248,7 +241,6 @@ class Cloud(Particles):
         noise[:NOISE_BEND] = self._rng.standard_normal((NOISE_BEND, len(self.x_m)))
         scale_sd = math.hypot(move.scale_sd, s.scale_sd * math.sqrt(length))
         noise[:NOISE_BEND] *= np.array([[sd], [sd], [turn_sd], [scale_sd]]) * math.sqrt(share)
-        noise[NOISE_TURN] += share * length * self.veer_rad_m
         noise[NOISE_BEND] = self.bend
         return noise
 

@@ -33,7 +33,6 @@ class Particles:
     y_m: Floats
     turn_rad: Floats
     scale: Floats
-    veer_rad_m: Floats
     lag_m: Floats
     log_weight: Floats
     hidden: Floats
@@ -55,7 +54,7 @@ class Particles:
         self.x_m, self.y_m, self.turn_rad, self.z_m, self.lag_m = poses
         count = len(self.x_m)
         self.scale = 1.0 + self._settings.start_scale_sd * self._rng.standard_normal(count)
-        self.veer_rad_m, self.log_weight, self.bend = np.zeros(count), np.zeros(count), np.zeros(count)
+        self.log_weight, self.bend = np.zeros(count), np.zeros(count)
         self.hidden = np.zeros((2, count))
         self.carried = ()
 
@@ -157,7 +156,7 @@ class Particles:
     def keep(self, chosen: Ints) -> None:
         """Replace the particles by the chosen ones (m,), with equal weights."""
         self.x_m, self.y_m = self.x_m[chosen], self.y_m[chosen]
-        self.turn_rad, self.scale, self.veer_rad_m = self.turn_rad[chosen], self.scale[chosen], self.veer_rad_m[chosen]
+        self.turn_rad, self.scale = self.turn_rad[chosen], self.scale[chosen]
         self.z_m, self.lag_m, self.bend = self.z_m[chosen], self.lag_m[chosen], self.bend[chosen]
         self.carried = tuple(each[chosen] for each in self.carried)
         self.hidden = np.ascontiguousarray(self.hidden[:, chosen])

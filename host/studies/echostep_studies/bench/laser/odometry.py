@@ -8,7 +8,7 @@ root mean square of its own errors against the corrected poses, as a data sheet 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,7 +20,6 @@ FITS_RAD = math.radians(10.0)  # error of a turn between two scans above which t
 FITTING = 0.95  # least share of turns that fit
 LENGTH_NOISE, TURN_NOISE_RAD = 0.03, math.radians(2.0)  # of the corrected increments, where the odometry does not fit
 SAME_M = 0.01  # the odometry counts on from a scan's pose when it begins so near to it
-VEER_SD_DEG = 2.0  # bias of wheels' odometry, on a metre: wheels 0.4 m apart that differ by 1.4 %; assumed
 PIECE_M, PIECE_RAD = 0.3, math.radians(10.0)  # a piece ends when it is so long or turns so much
 
 
@@ -28,14 +27,13 @@ PIECE_M, PIECE_RAD = 0.3, math.radians(10.0)  # a piece ends when it is so long 
 class Odometry:
     """`steps[i]` (m, 3): pieces from scan i to the next, in the frame of the piece before: forward, left (m), turn (rad).
 
-    `sd_m` per axis and `turn_sd_rad`: standard deviations over one scan; `veer_sd_deg`: of its bias, a turn on each metre. `source`: for the table.
+    `sd_m` per axis and `turn_sd_rad`: standard deviations over one scan. `source`: for the table.
     """
 
     steps: tuple[Floats, ...]
     sd_m: float
     turn_sd_rad: float
     source: str
-    veer_sd_deg: float = 0.0
 
 
 def odometry_of(log: CarmenLog, rng: np.random.Generator) -> Odometry:
@@ -46,12 +44,25 @@ def odometry_of(log: CarmenLog, rng: np.random.Generator) -> Odometry:
     error[:, 2] = wrap(error[:, 2])
     if np.mean(np.abs(error[:, 2]) <= FITS_RAD) >= FITTING:
         sd_m = math.sqrt(0.5 * float(np.mean(error[:, 0] ** 2 + error[:, 1] ** 2)))
-        return Odometry(steps, sd_m, math.sqrt(float(np.mean(error[:, 2] ** 2))), "raw odometry", VEER_SD_DEG)
+        return Odometry(steps, sd_m, math.sqrt(float(np.mean(error[:, 2] ** 2))), "raw odometry")
     noise = rng.standard_normal((2, len(true)))
     noisy = true * (1.0 + LENGTH_NOISE * noise[:1].T)
     noisy[:, 2] = true[:, 2] + TURN_NOISE_RAD * noise[1]
     sd_m = LENGTH_NOISE * float(np.sqrt(np.mean(true[:, 0] ** 2 + true[:, 1] ** 2)))
     return Odometry(tuple(noisy[:, None]), sd_m, TURN_NOISE_RAD, "corrected increments, 3 % and 2 degrees of noise")
+
+
+def calibrated(odometry: Odometry, log: CarmenLog) -> Odometry:
+    """The odometry without the turn on each metre that unequal wheels add: its least-squares fit to the corrected poses, as a robot is calibrated."""
+    turn_rad = relative(log.pose[:-1], log.pose[1:])[:, 2]
+    error_rad = wrap(np.array([step[:, 2].sum() for step in odometry.steps]) - turn_rad)
+    way_m = np.array([float(np.hypot(step[:, 0], step[:, 1]).sum()) for step in odometry.steps])
+    bias_rad_m = float(way_m @ error_rad) / max(float(way_m @ way_m), SAME_M)
+    steps = tuple(
+        np.column_stack([step[:, :2], step[:, 2] - bias_rad_m * np.hypot(step[:, 0], step[:, 1])])
+        for step in odometry.steps
+    )
+    return replace(odometry, steps=steps)
 
 
 def relative(a: Floats, b: Floats) -> Floats:
