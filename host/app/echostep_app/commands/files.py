@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`echostep map`, `import`, `foot`, `legs`, `score` and `decode`: commands that read files and write others.
+"""`echostep map`, `import`, `foot`, `legs`, `floors`, `score` and `decode`: commands that read files and write others.
 
 In: the command's arguments and options. Out: files, text. Slow imports wait until a command runs.
 """
@@ -137,6 +137,32 @@ def legs(
 
     naming = parse_naming(columns, units)
     offline.legs(samples, out, offline.LegOptions(thigh, shank, profile, scale, walked), picture, naming)
+
+
+@app.command()
+def floors(
+    pressure: Annotated[
+        Path, typer.Argument(help="CSV: t_s,pressure_pa[,temperature_c] in s, Pa, degC; 0.5 to 50 Hz.")
+    ],
+    heights: Annotated[
+        str,
+        typer.Option(
+            "--heights", metavar="METRES", help="Heights of the floors, as 0,3.5,7; auto: from the recording."
+        ),
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The floors to write (CSV).")] = Path("floors.csv"),
+    start: Annotated[
+        int | None, typer.Option("--start", metavar="FLOOR", help="Floor at the start, if known.", min=0)
+    ] = None,
+    picture: Annotated[Path | None, picture_option("Draw the floors there")] = None,
+    columns: Columns = None,
+    units: Units = None,
+) -> None:
+    """Floors of a recorded barometer. Writes t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
+    from echostep_app.commands.actions import offline
+    from echostep_app.offline.foreign_columns import parse_naming
+
+    offline.floors(pressure, heights, out, start, picture, parse_naming(columns, units))
 
 
 @app.command()

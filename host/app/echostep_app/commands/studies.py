@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""`echostep evaluate ...` and `echostep floors`: commands of the studies, which are a distribution of their own.
+"""`echostep evaluate ...`: the commands of the studies, which are a distribution of their own.
 
-In: entry points of the group `echostep_app.commands`. Out: the commands that another distribution brings, or ones that say how to get them.
+In: the entry point of the group `echostep_app.commands`. Out: the commands that another distribution brings, or one that says how to get them.
 Owns nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from importlib.metadata import entry_points
 from typing import Any, NoReturn
 
@@ -17,7 +16,7 @@ import typer.core
 from echostep.errors import EchostepError
 
 GROUP = "echostep_app.commands"
-NAMES = ("evaluate", "floors")
+NAME = "evaluate"
 MISSING = "The studies are a package of their own: pip install echostep-studies."
 
 
@@ -29,21 +28,9 @@ class _Missing(typer.core.TyperGroup):
 
 
 def add_studies(app: typer.Typer) -> None:
-    """Add the commands of `echostep-studies`; without it, ones that raise EchostepError."""
+    """Add the commands of `echostep-studies`; without it, a group of which each raises EchostepError."""
     entries = {entry.name: entry for entry in entry_points(group=GROUP)}
-    for name in NAMES:
-        loaded = entries[name].load() if name in entries else _missing()
-        if not isinstance(loaded, typer.Typer):
-            app.add_typer(_alone(name, loaded))  # a command of its own would be listed before those of the core
-        else:
-            app.add_typer(loaded, name=name)
-
-
-def _alone(name: str, function: Callable[..., Any]) -> typer.Typer:
-    """A nameless group of one command."""
-    alone = typer.Typer()
-    alone.command(name)(function)
-    return alone
+    app.add_typer(entries[NAME].load() if NAME in entries else _missing(), name=NAME)
 
 
 def _missing() -> typer.Typer:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of single recorded sensors: a foot's track and its height, a leg's track and its strides.
+"""Pictures of single recorded sensors: a foot's track and its height, a leg's track and its strides, the floors of a barometer.
 
-In: a track, strides. Out: a figure of matplotlib, or a PNG, SVG or PDF. Owns nothing.
+In: a track, strides, floors. Out: a figure of matplotlib, or a PNG, SVG or PDF. Owns nothing.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from echostep.foot.steps import Track
+    from echostep_app.offline.floors import Floors
 
 PARTIAL_COLOUR = "#999999"
+MOST_POINTS = 5000  # about, of a curve
 
 
 def draw_foot(path: Path, track: Track, title: str) -> None:
@@ -67,6 +69,28 @@ def draw_legs(path: Path, rows: Floats, strides: Sequence[Stride], title: str) -
     side.bar([], [], color=PARTIAL_COLOUR, label="at an edge or a gap")
     side.legend(fontsize=8)
     side.set(ylabel="stride / m", xlim=(t_s[0], t_s[-1]), ylim=(0.0, None))
+    save_picture(figure, path)
+
+
+def draw_floors(path: Path, floors: Floors, title: str) -> None:
+    """Draw height and floor over time, and the probability of the floor; raises EchostepError when the file cannot be written."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 7), dpi=120, layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+    few = slice(None, None, max(1, len(floors.t_s) // MOST_POINTS))
+    t_s, heights_m = floors.t_s[few], floors.heights_m
+    above.set_yticks(heights_m, [f"{k}: {height:g}" for k, height in enumerate(heights_m.tolist())])
+    above.grid(axis="y")
+    above.plot(t_s, floors.height_m[few], color=TRACK_COLOUR, linewidth=1, label="height")
+    above.step(
+        t_s, heights_m[floors.floor[few]], color=TRUTH_COLOUR, where="post", linewidth=2, alpha=0.5, label="floor"
+    )
+    above.set_title(title, parse_math=False)
+    above.set(ylabel="floor: height / m")
+    above.legend(fontsize=8)
+    below.plot(t_s, floors.probability[few], color=TRUTH_COLOUR, linewidth=1)
+    below.set(xlabel="t / s", ylabel="probability", ylim=(0.0, 1.05))
     save_picture(figure, path)
 
 

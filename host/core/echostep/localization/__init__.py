@@ -36,7 +36,14 @@ if TYPE_CHECKING:
         trust,
         unobserved,
     )
-    from echostep.localization.height.levels import ClimbSettings, drift_m
+    from echostep.localization.height.height_filter import RelativeHeight
+    from echostep.localization.height.levels import (
+        ClimbSettings,
+        HeightChange,
+        drift_m,
+        level_change_model,
+        pressure_cost,
+    )
     from echostep.localization.limits import BELIEVED, PROBABLE, TRACKING_M
     from echostep.localization.map_filter import MapFilter, call_kernels
     from echostep.localization.particles.particles import Particles
@@ -53,7 +60,8 @@ __getattr__ = face(
         "echoes.likelihood": "EchoModel EchoSettings echo_density echo_model likeliest_source outlier_density planned_density",
         "echoes.rangers": "echo_of",
         "estimate": "CHI2_95 RISK WALKER_M_S Estimate TrackStatus claims_place digest ellipse95 in_ellipse95 trust unobserved",
-        "height.levels": "ClimbSettings drift_m",
+        "height.height_filter": "RelativeHeight",
+        "height.levels": "ClimbSettings HeightChange drift_m level_change_model pressure_cost",
         "limits": "BELIEVED PROBABLE TRACKING_M",
         "map_filter": "MapFilter call_kernels",
         "particles.particles": "Particles",

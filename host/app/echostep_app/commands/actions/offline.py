@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`echostep import`, `foot`, `legs` and `decode`: recorded files of single sensors, without a plan.
+"""`echostep import`, `foot`, `legs`, `floors` and `decode`: recorded files of single sensors, without a plan.
 
-In: files of a foot IMU or of leg gyros, captured bytes. Out: track files and a summary; JSON lines. Owns nothing.
+In: files of a foot IMU, of leg gyros or of a barometer, captured bytes. Out: track files and a summary; JSON lines. Owns nothing.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from echostep.offline.imu_csv import Imu, describe_track, own_track, write_foot_
 from echostep.recording import Decoder, as_json, read_capture
 from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import OutputFormats
+from echostep_app.offline.floor_table import describe, find_levels, parse_heights, write_floors
+from echostep_app.offline.floors import record_floors
 from echostep_app.offline.foot_files import load_foot, refuse_glide
 from echostep_app.offline.foreign_columns import OWN, Naming
 from echostep_app.offline.importing import Beside, import_imu
@@ -32,7 +34,9 @@ from echostep_app.offline.leg_track import (
     track_default,
     write_leg_track,
 )
-from echostep_app.output.offline_plots import draw_foot, draw_legs
+from echostep_app.offline.pressure_csv import load_pressures
+from echostep_app.offline.stays import height_record
+from echostep_app.output.offline_plots import draw_floors, draw_foot, draw_legs
 from echostep_app.printing.console import console
 from echostep_app.printing.lines import complain
 from echostep_app.printing.people import is_unread
@@ -140,6 +144,30 @@ def legs(paths: list[Path], out: Path, options: LegOptions, picture: Path | None
     if options.walked_m is not None:
         factor = calibrated_scale(track.distance_m, options.walked_m)
         console.print(f"--scale {(scale or 1.0) * factor:.4f} makes this walk {options.walked_m:g} m long")
+
+
+def floors(
+    path: Path, heights: str, out: Path, start: int | None, picture: Path | None = None, naming: Naming = OWN
+) -> None:
+    """Write the floors of a recorded barometer and print the stays; raises EchostepError for options or samples that cannot be used."""
+    given_m = None if heights.strip().lower() == "auto" else parse_heights(heights)
+    if start is not None and given_m is None:
+        raise EchostepError("--start is an index into --heights: with --heights auto there are none yet")
+    if start is not None and given_m is not None and not 0 <= start < len(given_m):
+        raise EchostepError(f"--start {start}: the floors of --heights are 0 to {len(given_m) - 1}")
+    record = load_pressures(path, naming)
+    for note in record.notes:
+        console.print(f"{path}: {note}", markup=False)
+    above = height_record(record.samples)
+    if given_m is None:
+        given_m = find_levels(above, path.name)
+        console.print("floors found: --heights " + ",".join(f"{height:g}" for height in given_m))
+    found = record_floors(record.samples.t_s, above, given_m, start)
+    write_floors(out, found)
+    console.print(describe(found, above), markup=False)
+    if picture is not None:
+        draw_floors(picture, found, path.name)
+    console.print(f"floors: {out}" + (f", picture: {picture}" if picture else ""), markup=False)
 
 
 def decode(path: Path, mode: str | None = None, settings: str | None = None) -> None:
