@@ -16,7 +16,7 @@ import pytest
 import echostep
 from echostep import kernel_cache
 from echostep.errors import EchostepError
-from echostep.jit import DAMAGED, CheckedFiles, kernel
+from echostep.jit import DAMAGED, CheckedFiles
 from echostep.kernel_cache import PACKAGE, cache_folder
 from users import ANOTHER_USER, AS_ANOTHER_USER, needs_another_user
 from waiting import PATIENCE_S
@@ -86,14 +86,6 @@ def test_folders_stand_beside_the_sources_or_where_numba_is_told_to_put_them() -
     assert cache_folder(__file__) is None
     assert cache_folder(f"{PACKAGE}/nowhere.py") is None
     assert echostep.__file__.startswith(PACKAGE)
-
-
-def test_a_kernel_of_another_package_stays_where_numba_puts_it() -> None:
-    @kernel
-    def here(x: float) -> float:
-        return x
-
-    assert str(PACKAGE) not in str(here._cache.cache_path)  # type: ignore[attr-defined]
 
 
 def folder_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: Path | None) -> Path:

@@ -65,28 +65,6 @@ def run(name: str, monkeypatch: pytest.MonkeyPatch, folder: Path) -> tuple[dict[
     return names, shown
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_is_kept_without_outputs(path: Path) -> None:
-    tree = json.loads(path.read_text())
-    assert (tree["nbformat"], tree["nbformat_minor"]) == (4, 4)
-    assert cells(path)[0]["source"][0].startswith("# ")
-    for cell in cells(path):
-        assert set(cell) == {"cell_type", "metadata", "source"} | (
-            {"execution_count", "outputs"} if cell["cell_type"] == "code" else set()
-        )
-        assert not cell.get("outputs")
-        assert cell.get("execution_count") is None
-
-
-def test_the_page_lists_them() -> None:
-    assert len(NOTEBOOKS) == 3
-    assert re.findall(r"\((\w+\.ipynb)\)", (FOLDER / "README.md").read_text()) == [
-        "first_track.ipynb",
-        "foot_error.ipynb",
-        "inside.ipynb",
-    ]
-
-
 @pytest.mark.process
 @pytest.mark.long
 def test_a_first_track(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -143,10 +121,3 @@ def test_an_example_gives_what_it_says(name: str, tmp_path: Path, monkeypatch: p
     said: list[str] = []
     failed, _ = doctest.DocTestRunner().run(example, out=said.append)
     assert not failed, "".join(said)
-
-
-def test_the_page_shows_them_as_code() -> None:
-    page = (ROOT / "host/docs/python.md").read_text()
-    for name in WITH_EXAMPLE:
-        section = page.partition(f"### {name}\n")[2].partition("\n### ")[0]
-        assert "```python\n>>> import echostep\n" in section, name

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import ast
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -40,12 +39,6 @@ def test_each_source_file_names_its_licence() -> None:
         licence = "GPL-3.0-or-later" if path.is_relative_to(ROOT / "tools/twin") else "MIT"
         first_lines = "\n".join(path.read_text().splitlines()[:2]) + "\n"
         assert f"SPDX-License-Identifier: {licence}" in first_lines, path
-
-
-@pytest.mark.slow
-def test_a_module_keeps_its_docstring_below_the_licence() -> None:
-    for path in (path for path in all_sources() if path.suffix == ".py"):
-        assert ast.get_docstring(ast.parse(path.read_text())), path
 
 
 def test_the_licence_of_every_dependency_is_listed() -> None:

@@ -23,27 +23,6 @@ from reliability.fault_outcomes import FaultOutcome
 from reliability.fuzz import codec, host
 from walks import walk_chunks
 
-HERE = "tools/test_tools.py"
-STARTED_BY = {
-    "docs.generate": HERE,
-    "hardware.boxes": "tools/test_boxes.py",
-    "hardware.nets": HERE,
-    "release.licences": "tools/test_licences.py",
-    "release.same_bits": HERE,
-    "release.sizes": "tools/test_sizes.py",
-    "release.tested_versions": HERE,
-    "release.wheel": "tools/test_wheel.py",
-    "reliability.faults": HERE,
-    "reliability.calls.campaign": "tools/test_calls.py",
-    "reliability.fuzz.codec": HERE,
-    "reliability.fuzz.host": HERE,
-    "reliability.kill_recorder": HERE,
-    "reliability.left_behind": "tools/test_left_behind.py",
-    "reliability.soak": "tools/test_faults.py",
-    "twin.acceptance_walk": "app/session/acceptance/test_acceptance_command.py",
-    "twin.measure": HERE,
-    "twin.run": "app/commands/test_live.py",
-}
 Start = Callable[..., int | None]
 
 
@@ -65,12 +44,6 @@ def tools() -> list[str]:
     return [".".join(path.relative_to(ROOT / "tools").with_suffix("").parts) for path in files]
 
 
-def test_every_tool_is_started_by_a_test() -> None:
-    assert tools() == sorted(STARTED_BY)
-    for name, test in STARTED_BY.items():
-        assert name.rpartition(".")[2] in (ROOT / "tests" / test).read_text(), name
-
-
 @pytest.mark.parametrize("name", tools())
 def test_every_tool_says_what_it_is_for(name: str, start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
@@ -79,15 +52,6 @@ def test_every_tool_says_what_it_is_for(name: str, start: Start, capsys: pytest.
     said = " ".join(capsys.readouterr().out.split())
     assert "usage:" in said
     assert len(said.partition("options:")[0]) > 60
-
-
-def test_what_the_makefile_and_the_pages_start_exists() -> None:
-    pages = [*(ROOT / "host").glob("*.md"), *(ROOT / "host/docs").glob("*.md"), ROOT / "tools/twin/README.md"]
-    named = set(re.findall(r"\$\(TOOL\) ([\w.]+)", (ROOT / "Makefile").read_text()))
-    for page in pages:
-        named |= set(re.findall(r"PYTHONPATH=tools\S*\s+\.venv/bin/python\s+-m\s+([a-z_.]+)", page.read_text()))
-    assert len(named) > 12
-    assert named <= set(STARTED_BY) | {"twin.line_foot"}  # which app/commands/test_lines.py starts
 
 
 def test_stages_of_a_replay_sum_up(tmp_path: Path, start: Start, capsys: pytest.CaptureFixture[str]) -> None:
@@ -188,12 +152,6 @@ def test_measured_seconds_of_the_firmware(start: Start, capsys: pytest.CaptureFi
     said = capsys.readouterr().out
     assert said.count("PASS") > 20
     assert "FAIL" not in said
-
-
-@pytest.mark.parametrize(("passed", "status"), [(True, 0), (None, 0), (False, 1)])
-def test_a_missed_limit_is_the_exit_status(passed: bool | None, status: int) -> None:
-    figures = [campaign.Figure("a", "1"), campaign.Figure("b", "2", "<= 1", passed), campaign.none("c", 0)]
-    assert campaign.report("x", figures) == status
 
 
 def test_the_nets_of_the_boards_have_no_problem(start: Start, capsys: pytest.CaptureFixture[str]) -> None:

@@ -21,8 +21,7 @@ from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
-from echostep_app.plan.importers.summary import doors_in_gaps, size_m
-from needs_data import data_or_skip
+from echostep_app.plan.importers.summary import size_m
 
 DEG = 1e-5  # degrees of the small houses on the Earth
 
@@ -102,7 +101,7 @@ ROOM = '<way id="5">{}<tag k="indoor" v="room"/><tag k="level" v="0"/></way>'
 REFS = "".join(f'<nd ref="{k}"/>' for k in (1, 2, 3, 4, 1))
 
 
-def test_words_about_tags_and_other_xml(tmp_path: Path) -> None:
+def test_elements_without_a_level_are_told(tmp_path: Path) -> None:
     more = "".join(
         f'<way id="{k}">{REFS}<tag k="indoor" v="{v}"/></way>'
         for k, v in ((6, "no"), (7, "no"), (8, "yes"), (10, "yes"))
@@ -111,48 +110,6 @@ def test_words_about_tags_and_other_xml(tmp_path: Path) -> None:
     said = " ".join(imported(tmp_path / "a.osm")[1].doubts)
     assert "2 indoor=yes have no level" in said
     assert "indoor=no" not in said
-    (tmp_path / "a.xml").write_text('<c:X xmlns:c="http://www.opengis.net/indoorgml/1.0/core"/>')
-    with pytest.raises(EchostepError, match="this XML is <X>, not <osm>: IndoorGML or CityGML is not read"):
-        imported(tmp_path / "a.xml")
-    (tmp_path / "a.xml").write_text('<c:X xmlns:c="urn:other"/>')
-    with pytest.raises(EchostepError, match=r"this XML is <X>, not <osm>: .*DXF, IFC, IMDF"):
-        imported(tmp_path / "a.xml")
-
-
-@pytest.fixture(scope="module")
-def found() -> Path:
-    return data_or_skip("small/found")
-
-
-@pytest.mark.parametrize(("name", "doors"), [
-    ("stacked/stacked.osm", [2, 1, 1]), ("stacked/stacked.geojson", [2, 1, 1]), ("geom/out_geom.osm", [2, 1, 1]), ("josm-deleted/josm.osm", [0]),
-])  # fmt: skip
-def test_doors_found(found: Path, name: str, doors: list[int]) -> None:
-    assert [len(level.doors) for level in imported(found / name)[0].levels] == doors
-
-
-@pytest.mark.parametrize(("name", "size", "walls"), [
-    ("ros-raw/raw.yaml", (5.05, 3.55), 8), ("decimetres/plan.dxf", (20, 12), 8), ("decimetres/yards.dxf", (20, 12), 8),
-    ("picture-kinds/transparent.png", (18.05, 13.05), 16), ("picture-kinds/la.png", (18.05, 13.05), 16),
-    ("picture-kinds/palette_t.png", (18.05, 13.05), 16), ("picture-kinds/sixteen.png", (18.05, 13.05), 16),
-    ("picture-kinds/exif6.jpg", (13.05, 18.05), 16), ("clipped-block/plan.dxf", (12, 8), 5), ("binary-dxf/plan.dxf", (20, 12), 8),
-])  # fmt: skip
-def test_sizes_found(found: Path, name: str, size: tuple[float, float], walls: int) -> None:
-    plan, _ = imported(found / name, **({"scale_m": 0.05} if "picture" in name else {}))
-    assert size_m(plan.levels[0]) == pytest.approx(size, abs=0.01)
-    assert len(plan.levels[0].walls) == walls
-
-
-def test_a_model_in_a_national_grid_is_the_same_house(found: Path) -> None:
-    near, far = (imported(found / f"grid/{name}.ifc") for name in ("local", "site_in_utm"))
-    assert size_m(far[0].levels[0]) == pytest.approx(size_m(near[0].levels[0]), abs=1e-3)
-    assert len(far[0].levels[0].walls) == len(near[0].levels[0].walls)
-    assert "the plan's origin is x 311988 m, y 5996148 m there" in " ".join(far[1].doubts)
-
-
-@pytest.mark.parametrize("name", ["wall_24cm", "wall_30cm_at_0", "wall_30cm_at_1"])
-def test_jambs_found(found: Path, name: str) -> None:
-    assert not check_plan(parse_plan((found / f"jamb/{name}.json").read_bytes()))
 
 
 def clip_of(path: Path, corners: list[tuple[float, float]]) -> Path:
@@ -181,15 +138,3 @@ def test_a_binary_drawing_that_is_cut_is_refused(tmp_path: Path) -> None:
         (tmp_path / "b.dxf").write_bytes(content[:cut])
         with pytest.raises(EchostepError, match=r"b\.dxf: "):
             imported(tmp_path / "b.dxf")
-
-
-@pytest.mark.parametrize("name", ["leaf_closed_wall", "leaf_closed_gap"])
-def test_leaves_drawn_closed_found(found: Path, name: str) -> None:
-    plan, report = imported(found / f"leaf/{name}.dxf")
-    assert doors_in_gaps(plan.levels[0]) == 2
-    assert ("2 doors lie where a wall is drawn through" in " ".join(report.doubts)) == (name == "leaf_closed_wall")
-
-
-@pytest.mark.parametrize("name", ["storeys_frame", "storeys_frame_detail"])
-def test_storeys_side_by_side_found(found: Path, name: str) -> None:
-    assert "looks like 3 storeys beside each other" in " ".join(imported(found / f"storeys/{name}.dxf")[1].doubts)

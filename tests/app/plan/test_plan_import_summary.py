@@ -13,7 +13,7 @@ import command_line
 from echostep.plan import Door, load_plan
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.importers.summary import MOST_LINES, doors_in_gaps, summary
-from plan.drawings.drawn_houses import Gap, loose, outlines, write_house
+from plan.drawings.drawn_houses import write_house
 from plan.imported_plans import seven_floors
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -21,7 +21,7 @@ PNG = b"\x89PNG\r\n\x1a\n"
 
 @pytest.mark.process
 def test_an_import_shows_what_came_in(tmp_path: Path) -> None:
-    source = write_house(tmp_path / "house.dxf", outlines, loose, Gap())
+    source = write_house(tmp_path / "house.dxf")
     done = command_line.echostep("plan", "import", source, "-o", tmp_path / "plan.json")
     assert done.stdout.splitlines() == [
         "house, 0 m: 10 x 8 m, 14 walls (84 m), 1 door (1 in a gap of a wall), 0 rooms",
@@ -37,7 +37,7 @@ def test_an_import_shows_what_came_in(tmp_path: Path) -> None:
 @pytest.mark.process
 def test_the_picture_beside_the_plan(tmp_path: Path) -> None:
     """It replaces one that an import drew, and no other; --no-picture draws none."""
-    source = write_house(tmp_path / "house.dxf", outlines, loose, Gap())
+    source = write_house(tmp_path / "house.dxf")
     command = ["plan", "import", source, "-o", tmp_path / "plan.json"]
     assert command_line.echostep(*command, "--no-picture").returncode == 0
     assert not (tmp_path / "plan.png").exists()

@@ -115,23 +115,6 @@ def test_hostile_drawings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
         imported(doc, tmp_path)
 
 
-@pytest.mark.parametrize(
-    "raw",
-    [
-        b"",
-        b"hello",
-        b"\x00" * 1000,
-        b"0\nSECTION\n2\nENTITIES\n0\nLINE\n",
-        b"AutoCAD Binary DXF\r\n\x1a\x00" + b"\xff" * 99,
-    ],
-)
-def test_no_drawing(tmp_path: Path, raw: bytes) -> None:
-    (tmp_path / "a.dxf").write_bytes(raw)
-    with pytest.raises(EchostepError, match=r"a.dxf: ") as caught:
-        import_plan(tmp_path / "a.dxf")
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize(("deep", "walls"), [(16, 5), (17, 4)])
 def test_blocks_in_blocks_are_read_to_a_depth(tmp_path: Path, deep: int, walls: int) -> None:
     doc, space = drawing()

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from echostep.errors import EchostepError
 from echostep.plan import Plan
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers.formats import import_plan, open_plan
@@ -108,40 +107,6 @@ def test_levels(tags: dict[str, str], levels: list[float]) -> None:
     assert levels_of(tags) == levels
 
 
-@pytest.mark.parametrize(("text", "named"), [
-    ('{"elements": 3}', "elements: expected a list"),
-    ('{"elements": []}', "indoor"),
-    ('{"elements": [{"type": "node", "id": "a"}]}', "node 'a'"),
-    ('{"elements": [{"type": "node", "id": 7, "lon": 200, "lat": 0}]}', "node 7: lon"),
-    ('{"elements": [{"type": "node", "id": 7, "lon": NaN, "lat": 0}]}', "NaN"),
-    ('{"elements": [{"type": "way", "id": 7, "nodes": [true]}]}', "way 7"),
-    ('{"elements": [{"type": "way", "id": 7, "nodes": [1, 2], "tags": {"indoor": "room", "level": "0"}}]}', "indoor"),
-    (json.dumps({"elements": [*HOUSE, node(50, 4e6, 0)]}), "km apart"),
-    (json.dumps({"elements": [*HOUSE, way(51, [1, 5], indoor="wall", level="0-9999999")]}), r"a\.json: way 51: level .* is no range of levels"),
-])  # fmt: skip
-def test_wrong_json(tmp_path: Path, text: str, named: str) -> None:
-    (tmp_path / "a.json").write_text(text)
-    with pytest.raises(EchostepError, match=named):
-        import_plan(tmp_path / "a.json")
-
-
-@pytest.mark.parametrize(("text", "named"), [
-    ("", "not XML"),
-    ("<osm>", "not XML"),
-    ("<html/>", "this XML is <html>, not <osm>: plans are read as DXF, IFC, IMDF"),
-    ('<!DOCTYPE x [<!ENTITY a "aaaa">]><osm>&a;</osm>', "DTD"),
-    ('<osm><node id="x" lon="1" lat="1"/></osm>', "node 'x'"),
-    ('<osm><node id="1" lon="nan" lat="1"/></osm>', "node 1: lon"),
-    ('<osm><node id="1" lon="1"/></osm>', "node 1: lat"),
-    ("<osm>" + "<a>" * 100_000, "not XML"),
-])  # fmt: skip
-def test_wrong_xml(tmp_path: Path, text: str, named: str) -> None:
-    (tmp_path / "a.osm").write_text(text)
-    with pytest.raises(EchostepError, match=named) as caught:
-        import_plan(tmp_path / "a.osm")
-    assert "\n" not in str(caught.value)
-
-
 def geojson(*shapes: tuple[str, Any, dict[str, str]]) -> str:
     features = [
         {"type": "Feature", "properties": {"@id": f"way/{k}"} | tags, "geometry": {"type": kind, "coordinates": at}}
@@ -175,19 +140,6 @@ def test_geojson_of_overpass_turbo(tmp_path: Path, name: str) -> None:
     assert report.left_out == {"door on no wall": 1}
     assert plan.georeference is not None
     assert len(plan.levels[0].walls) == 4 + 3 + 1  # outline, hole, the wall beside
-
-
-@pytest.mark.parametrize(("text", "named"), [
-    (geojson(("Polygon", [[[0, 0], [1, 0], [0, 0]]], {"building": "yes"})), "indoor"),
-    (geojson(("Curve", [], ROOM)), "no type of geometry"),
-    (geojson(("Point", [200, 0], ROOM)), r"features\[0\]"),
-    (geojson(("Point", [1], ROOM)), "expected .longitude, latitude."),
-    (geojson(("Polygon", 3, ROOM)), "coordinates"),
-])  # fmt: skip
-def test_wrong_geojson(tmp_path: Path, text: str, named: str) -> None:
-    (tmp_path / "a.geojson").write_text(text)
-    with pytest.raises(EchostepError, match=named):
-        import_plan(tmp_path / "a.geojson")
 
 
 def test_rooms_without_a_level_are_told(tmp_path: Path) -> None:

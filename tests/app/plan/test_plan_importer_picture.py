@@ -10,9 +10,8 @@ import pytest
 from PIL import Image, ImageDraw
 
 import command_line
-from echostep.errors import EchostepError
 from echostep.plan import load_plan
-from echostep_app.plan.importers.formats import PICTURES, import_plan
+from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.raster.picture import threshold
 from echostep_app.plan.importers.report import ImportReport
@@ -64,28 +63,6 @@ def test_the_command_takes_two_points(tmp_path: Path) -> None:
     done = command_line.echostep("plan", "import", path, "-o", out, "--scale", "50,50,550,50=10", "--no-picture")
     assert done.returncode == 0, done.stderr
     assert size_m(load_plan(out).levels[0]) == pytest.approx((10.0, 8.0), abs=0.1)
-
-
-@pytest.mark.parametrize("suffix", PICTURES)
-def test_a_picture_without_a_scale_is_asked_about(tmp_path: Path, suffix: str) -> None:
-    Image.new("RGB" if suffix != ".pbm" else "1", (40, 40)).save(tmp_path / f"a{suffix}")
-    with pytest.raises(EchostepError, match=r"--scale X0,Y0,X1,Y1=M traces.*plan edit PLAN --picture"):
-        import_plan(tmp_path / f"a{suffix}")
-    with pytest.raises(EchostepError, match="--units"):
-        import_plan(tmp_path / f"a{suffix}", Hints(units="m", scale_m=1.0))
-
-
-@pytest.mark.parametrize(("colour", "named"), [(255, "nothing dark"), (0, "one colour|nothing dark")])
-def test_a_picture_of_nothing(tmp_path: Path, colour: int, named: str) -> None:
-    Image.new("L", (60, 60), colour).save(tmp_path / "a.png")
-    with pytest.raises(EchostepError, match=named):
-        import_plan(tmp_path / "a.png", Hints(scale_m=PIXEL_M))
-
-
-def test_no_picture(tmp_path: Path) -> None:
-    (tmp_path / "a.png").write_bytes(b"no picture")
-    with pytest.raises(EchostepError, match="not a picture that can be read"):
-        import_plan(tmp_path / "a.png", Hints(scale_m=PIXEL_M))
 
 
 def test_the_threshold_lies_between_ink_and_paper() -> None:

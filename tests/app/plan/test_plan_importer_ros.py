@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from echostep.errors import EchostepError
-from echostep_app.plan.importers.formats import NEXT_STEPS, import_plan, open_plan
+from echostep_app.plan.importers.formats import import_plan, open_plan
 from echostep_app.plan.importers.report import ImportReport
 
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
@@ -46,33 +45,3 @@ def test_a_slanting_wall_is_no_stair(tmp_path: Path) -> None:
     Image.fromarray(slanting).save(tmp_path / "map.pgm")
     (tmp_path / "map.yaml").write_text(YAML.format("pgm", 0, 0))
     assert len(import_plan(tmp_path / "map.yaml").levels[0].walls) <= 8
-
-
-@pytest.mark.parametrize(("text", "named"), [
-    ("", "no field image"),
-    ("a: 1", "no field image"),
-    ("image: none.pgm\nresolution: 0.05", "none.pgm: no such file"),
-    ("image: map.pgm", "resolution: '' is not a number"),
-    ("image: map.pgm\nresolution: 0", "resolution: expected metres"),
-    ("image: map.pgm\nresolution: nan", "resolution"),
-    ("image: map.pgm\nresolution: 0.05\norigin: [1]", "origin: expected"),
-    ("image: map.pgm\nresolution: 0.05\norigin: [1, x, 0]", "origin: 'x'|origin: ' x'"),
-    ("image: map.pgm\nresolution: 0.05\norigin: [1, 1e9, 0]", "origin"),
-    ("image: map.yaml\nresolution: 0.05", "not a picture"),
-    ("image: map.pgm\nresolution: 0.05\nnegate: 1\noccupied_thresh: 1", "no pixel is occupied"),
-])  # fmt: skip
-def test_wrong_maps(tmp_path: Path, text: str, named: str) -> None:
-    Image.fromarray(grid()).save(tmp_path / "map.pgm")
-    (tmp_path / "map.yaml").write_text(text)
-    with pytest.raises(EchostepError, match=named) as caught:
-        import_plan(tmp_path / "map.yaml")
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("suffix", sorted(NEXT_STEPS))
-def test_formats_that_are_not_read_name_the_next_step(tmp_path: Path, suffix: str) -> None:
-    path = tmp_path / f"plan{suffix.upper()}"
-    path.write_bytes(b"x")
-    for opened in (import_plan, open_plan):
-        with pytest.raises(EchostepError, match=r"--picture|save|export"):
-            opened(path)

@@ -167,6 +167,17 @@ def filled(space: Any, box: Box, layer: Layer) -> None:
     space.add_trace([a, b, d, c], dxfattribs=layer)
 
 
+def along_the_middle(space: Any, box: Box, layer: Layer) -> None:
+    """One line; walls end at the axes of those that they meet."""
+    (x, y), (p, q), _ = axis(box)
+    reach = OUTER / 2 + INNER / 2
+    if y == q:
+        x, p = x - reach * (x == OUTER), p + reach * (p == WIDE - OUTER)
+    else:
+        y, q = y - reach * (y in (OUTER, UP + INNER)), q + reach * (q in (HIGH - OUTER, LOW - INNER))
+    space.add_line((x, y), (p, q), layer)
+
+
 def mirrored_axes(space: Any, box: Box, layer: Layer) -> None:
     """As MIRROR leaves them: the entity's own axes look down."""
     points = [(-x, y) for x, y in corners(box)]
@@ -194,6 +205,65 @@ def usual(space: Any, gap: Leaf, layer: Layer) -> None:
     for leaf in leaves(gap):
         arc(space, leaf, layer)
         space.add_line(leaf.hinge, leaf.turned(90), layer)
+
+
+def in_the_middle_of_the_wall(space: Any, gap: Leaf, layer: Layer) -> None:
+    for leaf in leaves(gap):
+        usual(space, Leaf(leaf.at(0, -leaf.thick / 2), leaf.along, leaf.side, leaf.width, leaf.thick), layer)
+
+
+def in_a_frame(space: Any, gap: Leaf, layer: Layer) -> None:
+    """Frames of 5 cm at both jambs; the leaf is as much smaller."""
+    for a in (0, gap.width - 0.05):
+        panel(space, gap, layer, (a, -gap.thick, a + 0.05, 0))
+    inner = Leaf(gap.at(0.05, 0), gap.along, gap.side, gap.width - 0.1, gap.thick)
+    thick_leaf(space, inner, layer)
+
+
+def swing_alone(space: Any, gap: Leaf, layer: Layer) -> None:
+    for leaf in leaves(gap):
+        arc(space, leaf, layer)
+
+
+def swing_on_another_layer(space: Any, gap: Leaf, _layer: Layer) -> None:
+    swing_alone(space, gap, {"layer": "A-FINE"})
+
+
+def on_the_wall_layer(space: Any, gap: Leaf, _layer: Layer) -> None:
+    usual(space, gap, WALL)
+
+
+def swing_on_the_wall_layer(space: Any, gap: Leaf, _layer: Layer) -> None:
+    swing_alone(space, gap, WALL)
+
+
+def bulge(space: Any, gap: Leaf, layer: Layer) -> None:
+    """Leaf and swing as one polyline with a round piece."""
+    for leaf in leaves(gap):
+        (u, v), (p, q) = leaf.along, leaf.side
+        round_ = math.copysign(math.tan(math.pi / 8), v * p - u * q)
+        points = [(*leaf.hinge, 0.0), (*leaf.turned(90), round_), (*leaf.turned(0), 0.0)]
+        space.add_lwpolyline(points, format="xyb", dxfattribs=layer)
+
+
+def spline(space: Any, gap: Leaf, layer: Layer) -> None:
+    for leaf in leaves(gap):
+        space.add_spline([leaf.turned(15 * k) for k in range(7)], dxfattribs=layer)
+        space.add_line(leaf.hinge, leaf.turned(90), layer)
+
+
+def ellipse(space: Any, gap: Leaf, layer: Layer) -> None:
+    for leaf in leaves(gap):
+        (x, y), ends = leaf.hinge, (leaf.turned(0), leaf.turned(90))
+        (a, b), (c, d) = ((p - x, q - y) for p, q in ends)
+        begin = ends[0] if a * d - b * c > 0 else ends[1]
+        space.add_ellipse((x, y), (begin[0] - x, begin[1] - y), 1.0, 0, math.pi / 2, dxfattribs=layer)
+        space.add_line((x, y), leaf.turned(90), layer)
+
+
+def closed(space: Any, gap: Leaf, layer: Layer) -> None:
+    middle = -gap.thick / 2
+    space.add_line(gap.at(0, middle), gap.at(gap.width, middle), layer)
 
 
 def on_layer_0(space: Any, gap: Leaf, _layer: Layer) -> None:
@@ -314,10 +384,12 @@ def furnished(space: Any) -> None:
 
 WALL_STYLES: Sequence[Walls] = (
     outlines, old_polylines, polylines_at_a_height, four_lines, two_faces, short_pieces, drawn_twice, wide_polylines, multilines, hatches,
-    faces_of_bodies, filled, mirrored_axes, scaled_blocks,
+    faces_of_bodies, filled, mirrored_axes, scaled_blocks, along_the_middle,
 )  # fmt: skip
 DOOR_STYLES: Sequence[Doors] = (
     usual, on_layer_0, thick_leaf, opened_a_little, coarse, both_ways, single_blocks, sliding, pocket, two_panels, thresholds, folding,
+    in_the_middle_of_the_wall, in_a_frame, swing_alone, swing_on_another_layer, on_the_wall_layer, swing_on_the_wall_layer, bulge, spline, ellipse,
+    closed,
 )  # fmt: skip
 
 

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+from itertools import count
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,7 +17,7 @@ from echostep_app.plan.places.faces import OUTSIDE
 from echostep_app.plan.places.spaces import find_spaces
 from echostep_app.plan.questions import with_questions
 from plan.drawings import drawn_offices as drawn
-from plan.drawings.drawn_offices import DOOR_STYLES, WALL_STYLES, Doors, Walls, write_office
+from plan.drawings.drawn_offices import DOOR_STYLES, WALL_STYLES, Doors, Layer, Leaf, Walls, write_office
 
 TURN = 33.0
 ROOM_M2 = 5.88 * 4.63  # R2, between its walls
@@ -30,16 +32,29 @@ def facts(plan: Plan) -> tuple[int, int, int, float]:
     return len(level.doors), doors_in_gaps(level), len(set(homes.values()) - {OUTSIDE}), float(area)
 
 
-def is_right(plan: Plan) -> bool:
+def is_right(plan: Plan, walls: Walls = drawn.outlines) -> bool:
     doors, in_gaps, spaces, area = facts(plan)
-    return (doors, in_gaps, spaces) == (7, 7, 7) and abs(area - ROOM_M2) < 0.6
+    right = ROOM_M2 if walls is not drawn.along_the_middle else 6.0 * 4.815
+    return (doors, in_gaps, spaces) == (7, 7, 7) and abs(area - right) < 0.6
 
 
-@pytest.mark.parametrize("turn", [0.0, TURN])
 @pytest.mark.parametrize("walls", WALL_STYLES, ids=lambda walls: str(walls.__name__))
-def test_walls_of_all_habits(tmp_path: Path, walls: Walls, turn: float) -> None:
-    plan = import_plan(write_office(tmp_path / "a.dxf", walls, turn=turn))
-    assert is_right(plan), facts(plan)
+def test_walls_of_all_habits(tmp_path: Path, walls: Walls) -> None:
+    plan = import_plan(write_office(tmp_path / "a.dxf", walls))
+    assert is_right(plan, walls), facts(plan)
+
+
+@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize("walls", WALL_STYLES, ids=lambda walls: str(walls.__name__))
+def test_doors_of_all_habits_in_walls_of_all_habits(tmp_path: Path, walls: Walls, part: int) -> None:
+    """Each of the seven doors of a file in another habit; the parts have all of them."""
+    styles = count(WALL_STYLES.index(walls) + 7 * part)
+
+    def door(space: Any, gap: Leaf, layer: Layer) -> None:
+        DOOR_STYLES[next(styles) % len(DOOR_STYLES)](space, gap, layer)
+
+    plan = import_plan(write_office(tmp_path / "a.dxf", walls, door, turn=TURN))
+    assert is_right(plan, walls), facts(plan)
 
 
 @pytest.mark.parametrize("turn", [0.0, TURN])

@@ -7,41 +7,27 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ezdxf.filemanagement import new
 
 from echostep.errors import EchostepError
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.importers.summary import size_m
-from plan.drawings.drawn_houses import DOOR, WALL, Gap, boxes, corners
+from plan.drawings.drawn_houses import house, sheet
 
 
-def sheet(insunits: int = 6) -> tuple[Any, Any]:
-    doc = new("R2010")
-    doc.header["$INSUNITS"] = insunits
-    return doc, doc.modelspace()
-
-
-def house(space: Any, x: float = 0.0, y: float = 0.0, metre: float = 1.0, gap: float = 3.0, name: str = "") -> None:
-    """The house with its lower left corner at x, y metres."""
-
-    def at(u: float, v: float) -> tuple[float, float]:
-        return (u + x) * metre, (v + y) * metre
-
-    for box in boxes(Gap(gap, gap + 0.9)):
-        space.add_lwpolyline([at(*corner) for corner in corners(box)], close=True, dxfattribs=WALL)
-    space.add_arc(at(4.05, gap), 0.9 * metre, 0, 90, dxfattribs=DOOR)
-    space.add_line(at(4.05, gap), at(4.95, gap), DOOR)
-    if name:
-        space.add_text(name, dxfattribs={"layer": "ROOM", "insert": at(2, 2), "height": 0.3 * metre})
+def named_house(space: Any, x: float, y: float, begin: float, name: str) -> None:
+    """The house in millimetres, with a name in its room."""
+    house(space, x=x, y=y, one=1000.0, begin=begin, door=True)
+    at = (1000 * (x + 2), 1000 * (y + 2))
+    space.add_text(name, dxfattribs={"layer": "ROOM", "insert": at, "height": 300.0})
 
 
 def test_several_storeys_in_one_drawing(tmp_path: Path) -> None:
     """They are told with the windows to give; these make levels that lie over each other."""
     doc, space = sheet(4)
-    house(space, 0, 0, 1000, 3.0, "Hall")
-    house(space, 15, 0.5, 1000, 5.0, "Loft")
+    named_house(space, 0, 0, 3.0, "Hall")
+    named_house(space, 15, 0.5, 5.0, "Loft")
     doc.saveas(tmp_path / "a.dxf")
     report = ImportReport()
     import_plan(tmp_path / "a.dxf", report=report)
@@ -61,7 +47,7 @@ def test_several_storeys_in_one_drawing(tmp_path: Path) -> None:
 
 def test_a_window_without_walls_is_refused(tmp_path: Path) -> None:
     doc, space = sheet()
-    house(space)
+    house(space, door=True)
     doc.saveas(tmp_path / "a.dxf")
     with pytest.raises(EchostepError, match="--window 50,50,60,60: no walls in it"):
         import_plan(tmp_path / "a.dxf", Hints(windows=[(50, 50, 60, 60)]))
@@ -73,7 +59,7 @@ def test_storeys_drawn_apart(tmp_path: Path) -> None:
     """They are told, and --align lays them over each other."""
     for name, x, y in (("ground", 0.0, 0.0), ("first", 103.0, -47.0)):
         doc, space = sheet()
-        house(space, x, y)
+        house(space, x=x, y=y, door=True)
         doc.saveas(tmp_path / f"{name}.dxf")
     files = tmp_path / "ground.dxf", [tmp_path / "first.dxf"]
     report = ImportReport()
@@ -88,8 +74,7 @@ def test_storeys_drawn_apart(tmp_path: Path) -> None:
 def test_different_units_that_contradict_each_other(tmp_path: Path) -> None:
     for name, code in (("ground", 5), ("first", 1)):
         doc, space = sheet(code)
-        for box in boxes(Gap()):
-            space.add_lwpolyline([(x * 100, y * 100) for x, y in corners(box)], close=True, dxfattribs=WALL)
+        house(space, one=100.0)
         doc.saveas(tmp_path / f"{name}.dxf")
     with pytest.raises(EchostepError, match=r"first.dxf: its units \(in\) are not those of ground.dxf \(cm\).*--units"):
         import_plan(tmp_path / "ground.dxf", Hints(), [tmp_path / "first.dxf"])
@@ -100,7 +85,7 @@ def test_different_units_that_contradict_each_other(tmp_path: Path) -> None:
 def test_different_units_that_are_right(tmp_path: Path) -> None:
     for name, code, metre in (("ground", 5, 100.0), ("first", 4, 1000.0)):
         doc, space = sheet(code)
-        house(space, metre=metre)
+        house(space, one=metre, door=True)
         doc.saveas(tmp_path / f"{name}.dxf")
     report = ImportReport()
     plan = import_plan(tmp_path / "ground.dxf", Hints(), [tmp_path / "first.dxf"], report)

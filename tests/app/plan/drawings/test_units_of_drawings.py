@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ezdxf.filemanagement import new
+from ezdxf.filemanagement import readfile
 
 from echostep.errors import EchostepError
 from echostep_app.commands.options import scale_of as scale_option
@@ -17,22 +17,15 @@ from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.importers.summary import size_m
-from plan.drawings.drawn_houses import DOOR, WALL, Gap, boxes, corners
+from plan.drawings.drawn_houses import WALL, house, sheet
 
 CODES = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, None: 0}
 
 
 def drawing(path: Path, drawn: str, stated: str | None, *, door: bool = True) -> Path:
     """The house of 10 m by 8 m drawn in one unit, with the header of another."""
-    doc = new("R2010")
-    doc.header["$INSUNITS"] = CODES[stated]
-    space = doc.modelspace()
-    one = 1 / METRES[drawn]
-    for box in boxes(Gap()):
-        space.add_lwpolyline([(x * one, y * one) for x, y in corners(box)], close=True, dxfattribs=WALL)
-    if door:
-        space.add_arc((4.05 * one, 3 * one), 0.9 * one, 0, 90, dxfattribs=DOOR)
-        space.add_line((4.05 * one, 3 * one), (4.95 * one, 3 * one), DOOR)
+    doc, space = sheet(CODES[stated])
+    house(space, one=1 / METRES[drawn], door=door)
     doc.saveas(path)
     return path
 
@@ -97,8 +90,6 @@ def test_wrong_scales(text: str) -> None:
 
 def test_stray_lines_do_not_count(tmp_path: Path) -> None:
     path = drawing(tmp_path / "a.dxf", "mm", "mm")
-    from ezdxf.filemanagement import readfile
-
     doc: Any = readfile(path)
     doc.modelspace().add_line((0, 0), (5e7, 0), WALL)  # 50 km
     doc.saveas(path)
