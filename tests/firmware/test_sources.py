@@ -13,34 +13,6 @@ import pytest
 from board_runs import ELF, ROOT, needs_twin
 from waiting import PATIENCE_S
 
-GUIDE = (ROOT / "firmware/README.md").read_text()
-BENCH = (ROOT / "firmware/bench.md").read_text()
-TWIN = ROOT / "tools/twin"
-PLACE = re.compile(r"chapters? \d|table \d|pages? \d")
-MARK = re.compile(r"\*unverified, \[bench (\d+)\]\(bench\.md\)\*")
-
-
-def test_each_unverified_statement_names_its_measurement_and_each_measurement_settles_one() -> None:
-    definition = "are marked *unverified*, with"
-    assert definition in GUIDE
-    assert len(re.findall("unverified", GUIDE, flags=re.I)) == len(MARK.findall(GUIDE)) + 1  # none without a number
-    numbers = {str(n) for n in range(1, 16)}
-    assert set(MARK.findall(GUIDE)) == numbers
-    assert set(re.findall(r"^\| .+ \| (\d+) \|$", BENCH, flags=re.M)) == numbers
-    assert set(re.findall(r"^## (\d+)\. ", BENCH, flags=re.M)) == numbers
-
-
-def test_each_model_cites_a_place_or_stands_in_the_list_from_memory() -> None:
-    page = (TWIN / "README.md").read_text()
-    memory = page.partition("## From memory")[2].partition("\n## ")[0]
-    sources = dict[str, str]()
-    for names, source in re.findall(r"^\| (`\w+/.+?) \| .* \| (.+) \|$", page, flags=re.M):
-        sources |= dict.fromkeys(re.findall(r"`(\w+/\w+\.c)`", names), source)
-    files = {str(path.relative_to(TWIN)) for folder in ("mcu", "parts", "usb") for path in (TWIN / folder).glob("*.c")}
-    assert sources.keys() == files
-    for name, source in sources.items():
-        assert source == "-" or PLACE.search(source) or f"`{name}`" in memory or "nets of" in source, name
-
 
 def test_platformio_builds_the_same_sources_with_the_same_options() -> None:
     ini = configparser.ConfigParser()

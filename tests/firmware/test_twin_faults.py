@@ -14,22 +14,6 @@ from echostep.board import messages as m
 pytestmark = needs_twin
 
 
-@pytest.mark.parametrize("kind", ["absent", "nack", "mute"])
-def test_a_ranger_that_fails_does_not_stop_the_other(bench: Bench, kind: str) -> None:
-    bench.run(1_000)
-    bench.fault(f"srf_right={kind}")
-    found = bench.run(3_000)
-    assert len(pings(found, m.Ranger.LEFT)) >= 3 * 14
-    assert {p.outcome for p in pings(found, m.Ranger.RIGHT)[2:]} == {m.Outcome.BUS_ERROR}
-    assert bench.status.errors_ranger_right > 0
-    assert bench.status.fault_ranger_right == m.Fault.NO_ANSWER
-    assert not bench.status.healthy & m.Healthy.RANGER_RIGHT
-    bench.fault("srf_right=ok")
-    bench.run(1_000)
-    assert {p.outcome for p in pings(bench.run(1_000), m.Ranger.RIGHT)} == {m.Outcome.ECHO}
-    assert bench.status.healthy & m.Healthy.RANGER_RIGHT
-
-
 def test_a_ranger_that_hears_nothing_is_no_failure(bench: Bench) -> None:
     bench.fault("srf_left=deaf")
     bench.run(1_000)
@@ -63,23 +47,6 @@ def test_a_bus_that_stays_stuck_leaves_the_rest_running(bench: Bench) -> None:
     bench.fault("sda=ok")
     bench.run(1_000)
     assert {p.outcome for p in pings(bench.run(1_000), m.Ranger.LEFT)} == {m.Outcome.ECHO}
-
-
-@pytest.mark.parametrize("name", ["thigh", "calf", "belt"])
-@pytest.mark.parametrize("kind", ["absent", "wrong_channel"])
-def test_a_gyro_that_fails_says_so(bench: Bench, name: str, kind: str) -> None:
-    bench.run(1_000)
-    bench.fault(f"{name}={kind}")
-    bench.run(20)
-    found = [g for g in bench.run(1_500) if isinstance(g, m.Gyros)]
-    assert {getattr(g, name) for g in found} == {-32768}
-    others = {"thigh", "calf", "belt"} - {name}
-    assert all(getattr(g, other) != -32768 for g in found for other in others)
-    assert getattr(bench.status, f"errors_{name}") > 100
-    assert not bench.status.healthy & m.Healthy[name.upper()]
-    cause = m.Fault.NO_ANSWER if kind == "absent" else m.Fault.WRONG_CHANNEL
-    assert getattr(bench.status, f"fault_{name}") == cause
-    assert gyro_health(found_all=bench.messages)[m.Gyro[name.upper()]].temperature == -32768
 
 
 def gyro_health(found_all: list[m.Message]) -> dict[int, m.GyroHealth]:
@@ -137,40 +104,6 @@ def test_a_reset_in_the_middle_of_a_self_test_is_borne(bench: Bench) -> None:
     assert {g.self_test for g in gyro_health(bench.messages).values()} == {m.SelfTest.PASSED}
 
 
-@pytest.mark.parametrize(
-    ("kind", "cause"),
-    [
-        ("absent", m.Fault.NO_ANSWER),
-        ("zeros", m.Fault.NO_ANSWER),
-        ("drdy_stuck", m.Fault.ALWAYS_READY),
-        ("drdy_low", m.Fault.NEVER_READY),
-    ],
-)
-def test_a_barometer_that_fails_says_so(bench: Bench, kind: str, cause: m.Fault) -> None:
-    bench.run(1_000)
-    bench.fault(f"scp1000={kind}")
-    bench.run(4_000)
-    found = bench.run(1_000)
-    assert kinds(found)["Pressure"] == 0
-    assert bench.status.errors_pressure > 0
-    assert bench.status.fault_pressure == cause
-    assert not bench.status.healthy & m.Healthy.PRESSURE
-    assert kinds(found)["Ping"] >= 28
-    bench.fault("scp1000=ok")
-    bench.run(4_000)
-    assert kinds(bench.run(1_000))["Pressure"] >= 8
-
-
-@pytest.mark.parametrize(("kind", "cause"), [("no_eeprom", m.Fault.EEPROM), ("no_start", m.Fault.NEVER_STARTED)])
-def test_a_barometer_that_does_not_start_is_not_believed(bench: Bench, kind: str, cause: m.Fault) -> None:
-    bench.fault(f"scp1000={kind}")
-    assert kinds(bench.run(3_000))["Pressure"] == 0
-    assert bench.status.errors_pressure > 0
-    assert bench.status.fault_pressure == cause
-    bench.fault("scp1000=ok")
-    assert kinds(bench.run(3_000))["Pressure"] >= 8
-
-
 def test_the_barometer_has_two_modes(bench: Bench) -> None:
     rows = quiet_rows(5_000)
     rows["pressure"] = 405_303
@@ -186,21 +119,6 @@ def test_the_barometer_has_two_modes(bench: Bench) -> None:
     assert 42 <= len(fast) <= 46  # 9 Hz
     assert {p.pressure for p in fast} == {405_296}  # 15 bits
     assert bench.status.errors_pressure == 0
-
-
-@pytest.mark.parametrize(
-    ("kind", "cause"),
-    [("absent", m.Fault.NO_ANSWER), ("nack", m.Fault.NO_ANSWER), ("bad_value", m.Fault.BAD_VALUE)],
-)
-def test_a_compass_that_fails_says_so(bench: Bench, kind: str, cause: m.Fault) -> None:
-    bench.run(500)
-    bench.fault(f"compass={kind}")
-    bench.run(200)
-    found = bench.run(2_000)
-    assert not any(isinstance(c, m.Compass) and c.bearing != 65535 for c in found)
-    assert bench.status.errors_compass > 0
-    assert bench.status.fault_compass == cause
-    assert kinds(found)["Ping"] >= 2 * 28
 
 
 def test_a_compass_that_stretches_the_clock_is_borne(bench: Bench) -> None:

@@ -86,31 +86,6 @@ def test_the_other_rangers_ping_moves_with_the_schedule(rangers: Bench) -> None:
     assert np.ptp(heard) > 2_000
 
 
-@pytest.mark.parametrize(
-    ("kind", "cause", "words"),
-    [
-        ("absent", m.Fault.NO_ANSWER, "left ranger (MaxSonar): does not answer at I2C address 0x70"),
-        ("nack", m.Fault.NO_ANSWER, "left ranger (MaxSonar): does not answer at I2C address 0x70"),
-        ("mute", m.Fault.NO_ANSWER, "left ranger (MaxSonar): does not answer at I2C address 0x70"),
-        ("misread", m.Fault.BAD_VALUE, "left ranger (MaxSonar): gives ranges above 765 cm"),
-    ],
-)
-def test_a_maxsonar_that_fails_is_named_and_comes_back(rangers: Bench, kind: str, cause: m.Fault, words: str) -> None:
-    rangers.fault(f"maxsonar_left={kind}")
-    rangers.run(1_500)
-    found = rangers.run(1_000)
-    assert outcomes(found, m.Ranger.LEFT) == {m.Outcome.BUS_ERROR}
-    assert outcomes(found, m.Ranger.RIGHT) == {m.Outcome.ECHO}
-    assert len(pings(found, m.Ranger.RIGHT)) >= 9
-    assert cause in {x.fault_ranger_left for x in rangers.messages if isinstance(x, m.Status)}
-    assert any(text.startswith(words) for text in rangers.all_findings)
-    rangers.fault("maxsonar_left=ok")
-    rangers.run(2_500)
-    found = rangers.run(1_000)
-    assert outcomes(found, m.Ranger.LEFT) == {m.Outcome.ECHO}
-    assert rangers.status.healthy & m.Healthy.RANGER_LEFT
-
-
 def test_a_deaf_maxsonar_reports_no_echo_and_a_long_stretch_of_the_clock_is_borne(rangers: Bench) -> None:
     rangers.fault("maxsonar_right=deaf")
     rangers.run(200)

@@ -4,13 +4,16 @@
 from __future__ import annotations
 
 import hashlib
+import subprocess
 
+import numpy as np
 import pytest
 
 from board_runs import ELF, TWIN, Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
 from echostep.errors import EchostepError
 from echostep_simulation.devices.board import BoardProcess
+from waiting import PATIENCE_S
 
 pytestmark = needs_twin
 
@@ -75,28 +78,62 @@ def test_equal_input_gives_equal_bytes() -> None:
     assert run(1) != run(2)
 
 
-def provoke(board: BoardProcess, fault: str) -> None:
-    for _ in range(100):
-        if fault:
-            board.fault(fault)
-        board.advance(quiet_rows(1))
-
-
 @pytest.mark.parametrize(
-    ("arguments", "fault"), [(["--elf", "none.elf"], ""), (["--elf", str(ELF)], "nonsense=1"), ([], "")]
+    ("arguments", "sent", "reason"),
+    [
+        ([], b"Q\0\0\0\0", "no firmware given"),
+        (["--elf", "none.elf"], b"Q\0\0\0\0", "cannot read the firmware"),
+        (["--elf", "/bin/sh"], b"Q\0\0\0\0", "not a program for an AVR"),
+        (["--elf", "/etc/passwd"], b"Q\0\0\0\0", "not a program for an AVR"),
+        (["--elf", str(ELF), "--seed", "x"], b"Q\0\0\0\0", "not a number"),
+        (["--elf", str(ELF), "more"], b"Q\0\0\0\0", "not an option"),
+        (["--elf", str(ELF)], b"", "ends without a record Q"),
+        (["--elf", str(ELF)], b"R\x18\0", "middle of a record"),
+        (["--elf", str(ELF)], b"R\x18\0\0\0abc", "middle of a record"),
+        (["--elf", str(ELF)], b"R\xff\xff\xff\xff", "too long"),
+        (["--elf", str(ELF)], b"R\x05\0\0\0abcde", "not a multiple"),
+        (["--elf", str(ELF)], b"X\0\0\0\0", "unknown record"),
+    ],
 )
-def test_mistakes_end_the_twin_with_one_line(
-    capfd: pytest.CaptureFixture[str], arguments: list[str], fault: str
-) -> None:
-    board = BoardProcess([str(TWIN), *arguments])
-    try:
-        with pytest.raises(EchostepError, match="ended"):
-            provoke(board, fault)
-    finally:
-        board.close()
-    assert capfd.readouterr().err.count("\n") == 1
+def test_mistakes_are_named(arguments: list[str], sent: bytes, reason: str) -> None:
+    found = subprocess.run([str(TWIN), *arguments], input=sent, capture_output=True, timeout=PATIENCE_S, check=False)
+    lines = found.stderr.decode().splitlines()
+    assert found.returncode == 2
+    assert len(lines) == 1
+    assert reason in lines[0]
 
 
-def test_a_twin_that_is_not_there_is_named() -> None:
+def test_rangers_keep_power_when_the_processor_is_reset() -> None:
+    """A ping under way goes on: its ranger does not answer until the ranging is over."""
+    bench = Bench()
+    bench.run(1_000)
+    bench.fault("reset=external")
+    bench.run(1_000)
+    bench.board.close()
+    for side in ("left", "right"):
+        t_ns = np.array([t for t, text in bench.board.trace if text == f"trigger {side}"])
+        assert np.diff(t_ns).min() >= 61_000_000
+
+
+def test_nothing_is_read_through_a_stuck_line() -> None:
+    """Whatever the bus is at when the line gets stuck; a byte that is on its way then arrives."""
+    for milliseconds in range(1_045, 1_065):
+        bench = Bench()
+        bench.fault("srf_left=stretch")
+        bench.run(milliseconds)
+        bench.fault("sda=stuck_forever")
+        bench.run(2)
+        found = [x for x in bench.run(100) if isinstance(x, m.Ping)]
+        bench.board.close()
+        assert found
+        assert {p.outcome for p in found} == {m.Outcome.BUS_ERROR}
+
+
+def test_a_twin_that_is_not_there_or_ends_is_named() -> None:
     with pytest.raises(EchostepError, match="cannot start"):
         BoardProcess(["/no/such/twin"])
+    board = BoardProcess([str(TWIN), "--elf", str(ELF)])
+    board.fault("nonsense=1")
+    with pytest.raises(EchostepError, match="ended"):
+        board.advance(quiet_rows(1_000))
+    board.close()

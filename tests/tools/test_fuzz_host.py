@@ -5,12 +5,9 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Iterator
-from dataclasses import replace
-from itertools import islice
 
 import pytest
 
-from echostep.errors import EchostepError
 from reliability.fuzz import host as fuzz_host
 from reliability.fuzz.targets import TARGETS
 
@@ -37,18 +34,3 @@ def test_inputs_that_once_were_faults_are_none() -> None:
     assert len(kept) >= 4
     for name, data in kept:
         assert fuzz_host.fault(name, data) == ""
-
-
-@pytest.mark.parametrize(("error", "is_fault"), [(KeyError("x"), True), (EchostepError("x"), False)])
-def test_only_an_error_in_words_is_no_fault(monkeypatch: pytest.MonkeyPatch, error: Exception, is_fault: bool) -> None:
-    def take(_: bytes) -> object:
-        raise error
-
-    monkeypatch.setitem(TARGETS, "board", replace(TARGETS["board"], take=take))
-    assert bool(fuzz_host.fault("board", b"x")) == is_fault
-
-
-def test_shards_are_repeatable_and_differ() -> None:
-    one, again, other = (list(islice(fuzz_host.inputs("plan", shard), 20)) for shard in (1, 1, 2))
-    assert one == again
-    assert one[1:] != other[1:]

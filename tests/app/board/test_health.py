@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from board_runs import ROOT, Bench, needs_twin
+from board_runs import ROOT
 from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep.board.reports import BoardReports
@@ -39,12 +39,6 @@ def test_a_healthy_board_is_no_finding() -> None:
     fine = [m.GyroHealth(0, gyro, -34, m.SelfTest.PASSED, -221, 221) for gyro in m.Gyro]
     assert texts(words(m.Identity(0, 0, 1, 1, 0, m.ResetCause.POWER_ON), status(), *fine)) == []
     assert texts(BoardReports()) == []
-
-
-def test_a_failed_eeprom_is_said_with_what_to_do() -> None:
-    heard = words(status(healthy=0x3F, errors_pressure=4, fault_pressure=m.Fault.EEPROM))
-    (text,) = texts(heard)
-    assert text.startswith("barometer: EEPROM check failed; power-cycle the board, check 3.3 V and the level shifter")
 
 
 def test_a_device_that_is_switched_off_is_no_finding() -> None:
@@ -133,17 +127,6 @@ def test_maxsonars_are_expected_to_ping_less_often() -> None:
     assert [f.severity for f in rate_findings(heard, expected_rates(heard) | {"Ping": 9.0})] == [Severity.FAULT]
 
 
-@pytest.mark.parametrize(
-    ("identity", "what"),
-    [(0xE1, "an ICM-20649 answers at its chip select"), (0xEA, "an ICM-20948 answers"), (0x5A, "does not answer")],
-)
-def test_a_foots_part_at_the_thigh_that_was_not_accepted_is_named(identity: int, what: str) -> None:
-    parts = m.Parts(**dict.fromkeys(m.Parts._fields, 0) | {"identity_foot": identity})
-    mute = status(healthy=0x7F & ~m.Healthy.THIGH, errors_thigh=9, fault_thigh=m.Fault.NO_ANSWER)
-    (finding,) = board_findings(words(mute, parts))
-    assert str(finding).startswith(f"thigh gyro: {what}")
-
-
 def test_temperature_of_a_gyro() -> None:
     assert gyro_celsius(m.GyroHealth(0, 0, -34, 2, 0, 0)) == pytest.approx(20.06, abs=0.01)
 
@@ -170,40 +153,3 @@ def test_any_words_have_a_meaning(said: list[m.Status], sensors: int, cause: int
         assert finding.what
         assert finding.remedy
         assert "\n" not in str(finding)
-
-
-TWIN_FAULTS = [
-    ("srf_left=absent", "left ranger: does not answer at I2C address 0x70"),
-    ("srf_right=mute", "right ranger: does not answer at I2C address 0x71"),
-    ("compass=absent", "compass: does not answer at I2C address 0x60"),
-    ("compass=bad_value", "compass: gives bearings above"),
-    ("sda=stuck_forever", "I2C bus: stuck, a line is held low (left ranger, right ranger, compass"),
-    ("thigh=absent", "thigh gyro: does not answer; check its SPI cable, 5 V and its chip select (D8)"),
-    ("calf=wrong_channel", "calf gyro: answers with another channel"),
-    ("belt=zeros", "belt gyro: does not answer"),
-    ("scp1000=absent", "barometer: does not answer"),
-    ("scp1000=drdy_stuck", "barometer: DRDY stays high"),
-    ("scp1000=drdy_low", "barometer: has had no sample for 2 s"),
-]
-
-
-@needs_twin
-def test_every_fault_of_the_twin_is_named() -> None:
-    bench, heard, said = Bench(), BoardReports(), 0
-    bench.run(2_000)
-    try:
-        for fault, text in TWIN_FAULTS:
-            bench.fault(fault)
-            bench.run(4_500 if "scp1000" in fault else 2_100)
-            for message in bench.messages[said:]:
-                heard.add(message)
-            assert any(found.startswith(text) for found in texts(heard)), (fault, texts(heard))
-            assert len(texts(heard)) <= 3, (fault, texts(heard))
-            bench.fault(fault.split("=")[0] + "=ok")
-            bench.run(4_000 if "scp1000" in fault else 2_100)
-            for message in bench.messages[said:]:
-                heard.add(message)
-            said = len(bench.messages)
-            assert texts(heard) == [], (fault, texts(heard))
-    finally:
-        bench.board.close()

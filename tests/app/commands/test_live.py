@@ -188,12 +188,6 @@ def test_a_wrong_setting_is_named(tmp_path: Path, text: str, named: str) -> None
     assert "settings.toml" in done.stderr
 
 
-def test_help_lists_the_commands() -> None:
-    done = echostep("--help")
-    assert done.returncode == 0
-    assert all(name in done.stdout for name in ("demo", "live", "record", "replay", "decode"))
-
-
 @pytest.mark.long
 @pytest.mark.process
 def test_record_keeps_the_bytes_of_both_ports(tmp_path: Path) -> None:

@@ -112,6 +112,7 @@ FAULTY = {
     "a window over a wall": flat([[0, 0, 5, 0]], windows=[[1, 0, 2, 0]]),
     "a closed house": flat([*box(), *box(10), [11, 0, 12, 0]], **APART | {"doors": [door()]}),
     "a start outside": house([{"walls": SHUT, "rooms": [ROOM]}], start={"x": 9, "y": 2, "heading_deg": 0}),
+    "a start in a wall": house([STOREY], start={"x": 4.0, "y": 2, "heading_deg": 0}),
     "a door on the moon": flat(box(), doors=[door(), {"line": [10, 1, 11, 1], "name": "moon"}]),
     "a door beside its wall": flat(box(), doors=[{"line": [1, 0.3, 2, 0.3]}]),
     "a wall through a door": flat(SHUT, doors=[door()]),

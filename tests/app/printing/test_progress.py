@@ -8,8 +8,6 @@ import io
 import pytest
 from rich.console import Console
 
-from command_line import echostep
-from echostep.board.messages import SCHEMA_HASH
 from echostep_app.printing import progress
 from waiting import PATIENCE_S, until
 
@@ -42,8 +40,3 @@ def test_bars_fill(monkeypatch: pytest.MonkeyPatch) -> None:
     with progress.listening_bar("Listening for 1 s", 1.0, console):
         assert until(lambda: "0:00:00" in shown.getvalue())
     assert "Listening for 1 s" in shown.getvalue()
-
-
-def test_the_version_is_printed() -> None:
-    done = echostep("--version")
-    assert (done.returncode, done.stdout) == (0, f"echostep 0.1.0, protocol 0x{SCHEMA_HASH:08X}\n")

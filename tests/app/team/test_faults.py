@@ -77,8 +77,3 @@ def test_a_file_that_is_no_certificate_is_named_with_the_remedy(
         tls_context(parse_endpoint(f"cot+tls://h?cert={path}&key={path}"))
     assert name in str(caught.value)
     assert "_ssl.c" not in str(caught.value)
-
-
-def test_a_name_needs_tls() -> None:
-    with pytest.raises(EchostepError, match="ca, cert, key, password and name are for cot"):
-        parse_endpoint("cot+tcp://h?name=takserver")

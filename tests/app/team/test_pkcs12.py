@@ -98,11 +98,3 @@ def test_the_key_is_never_written_without_a_password(folder: Path, monkeypatch: 
     tls_context(parse_endpoint(f"cot+tls://host?cert={folder}/tak.p12"))
     assert b"BEGIN ENCRYPTED PRIVATE KEY" in b"".join(written)
     assert b"BEGIN PRIVATE KEY" not in b"".join(written)
-
-
-def test_without_the_package_both_remedies_are_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("echostep_app.extras.find_spec", lambda name: None if name == "cryptography" else object())
-    with pytest.raises(
-        EchostepError, match=r"pip install 'echostep\[pkcs12\]'; or once: openssl pkcs12 .* -out tak.pem"
-    ):
-        tls_context(parse_endpoint(f"cot+tls://host?cert={folder}/tak.p12"))

@@ -7,15 +7,12 @@ import hashlib
 import json
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 from unittest.mock import Mock
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from command_line import echostep, interrupt_once_called
 from echostep.errors import EchostepError
@@ -94,13 +91,6 @@ def test_what_no_walk_can_have_drawn_is_refused_in_a_sentence(payload: bytes, wh
     with pytest.raises(EchostepError, match=why) as refusal:
         checked_drawing(payload)
     assert "\n" not in str(refusal.value)
-
-
-@given(st.binary(max_size=200), st.integers(0, 400), st.integers(0, 40))
-def test_damaged_bytes_are_a_plan_or_refused(damage: bytes, at: int, length: int) -> None:
-    whole = drawing()
-    with suppress(EchostepError):
-        checked_drawing(whole[:at] + damage + whole[at + length :])
 
 
 def test_a_plan_is_a_wearers_by_its_prefix_alone() -> None:
