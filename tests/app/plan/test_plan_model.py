@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Plans: what is read, and the one line that a wrong file gets."""
+"""Plans: what is read, the one line that a wrong file gets, and the published schema, which says what the reader does."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
 
+from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.plan import Connector, Door, Georeference, Level, Plan, Pose, Question, Room, load_plan, parse_plan
 from echostep_app.plan.writer import plan_json, save_plan
+from plan.test_plan_model import FULL, GOOD, PLANS, WRONG
 
 GOOD: dict[str, Any] = {
     "echostep_plan": 1,
@@ -66,6 +69,7 @@ def test_a_good_plan(tmp_path: Path) -> None:
 
 
 CORNERS = [[0, 0], [1, 0], [1, 1]]
+
 WRONG: list[tuple[dict[str, Any], str]] = [
     ({"echostep_plan": 2}, "echostep_plan"),
     ({"levels": []}, "levels"),
@@ -195,11 +199,17 @@ def test_what_is_saved_is_read_back(tmp_path: Path) -> None:
 
 
 METRES = st.floats(-1e5, 1e5)
+
 SEGMENTS = st.lists(st.tuples(METRES, METRES, METRES, METRES).filter(lambda s: s[:2] != s[2:]), max_size=4)
+
 TEXTS = st.text(st.characters(exclude_categories=["Cs", "Cc", "Cn"]), max_size=8)  # XML has no control characters
+
 OUTLINES = st.lists(st.tuples(METRES, METRES), min_size=3, max_size=6, unique=True).map(np.array)
+
 DOORS = st.builds(Door, SEGMENTS.filter(bool).map(lambda rows: rows[0]), st.sampled_from(("open", "closed")), TEXTS)
+
 ROOMS = st.builds(Room, TEXTS, st.tuples(METRES, METRES), st.none() | OUTLINES)
+
 LEVELS = st.builds(
     Level,
     TEXTS,
@@ -210,7 +220,9 @@ LEVELS = st.builds(
     SEGMENTS.map(lambda rows: np.array(rows).reshape(-1, 4)),
     st.lists(OUTLINES, max_size=2).map(tuple),
 )
+
 DEGREES = st.floats(-360, 360).map(math.radians)
+
 PLANS = st.builds(
     Plan,
     TEXTS,
@@ -240,3 +252,43 @@ def test_a_million_walls_open(tmp_path: Path) -> None:
     walls = load_plan(tmp_path / "city.json").levels[0].walls
     assert walls.shape == (1_000_000, 4)
     assert np.array_equal(walls[:1000], walls[-1000:])
+
+
+SCHEMA = json.loads((ROOT / "host/core/echostep/plans/plan.schema.json").read_text())
+
+VALID = Draft202012Validator(SCHEMA)
+
+BEYOND = {"without length", r"levels\[0\].doors\[0\].line", r"obstacles\[0\]"}  # what a schema cannot say
+
+NAMES = {"connectors", "start"}  # refer to levels, which a schema cannot follow
+
+
+def test_the_schema_is_one() -> None:
+    Draft202012Validator.check_schema(SCHEMA)
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "host/core/echostep/plans").glob("*.json")), ids=lambda path: path.name)
+def test_plans_of_the_package(path: Path) -> None:
+    if path.name != "plan.schema.json":
+        VALID.validate(json.loads(path.read_text()))
+        parse_plan(path.read_bytes())
+
+
+def test_good_plans() -> None:
+    VALID.validate(GOOD)
+    VALID.validate(FULL)
+
+
+@pytest.mark.slow
+@given(PLANS)
+@settings(max_examples=50, deadline=None)
+def test_what_is_saved_is_valid(plan: Plan) -> None:
+    VALID.validate(json.loads(plan_json(plan)))
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [case for case in WRONG if case[1] not in BEYOND and case[0].get("name") != "\ud800" and not set(case[0]) & NAMES],
+)
+def test_what_the_reader_refuses_is_invalid(change: dict[str, Any], named: str) -> None:
+    assert not VALID.is_valid(GOOD | change), named

@@ -21,7 +21,7 @@ from echostep_app.plan.importers.imdf import archive
 from echostep_app.plan.importers.parsing import FORMATS
 from plan import test_plan_importer_imdf as imdf
 from plan import test_plan_importer_osm as osm
-from plan.test_plan_importer_ros import grid
+from plan.test_plan_importer_rasters import grid
 from snapshots import expect, refusal
 
 
