@@ -18,7 +18,6 @@ from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.plan import Connector, Door, Georeference, Level, Plan, Pose, Question, Room, load_plan, parse_plan
 from echostep_app.plan.writer import plan_json, save_plan
-from plan.test_plan_model import FULL, GOOD, PLANS, WRONG
 
 GOOD: dict[str, Any] = {
     "echostep_plan": 1,
