@@ -246,11 +246,3 @@ def test_unknown_starts_lie_where_the_log_goes_on(log_file: Path, monkeypatch: p
     assert len(starts) > 50
     last = walk_from(building_of(log_file, 1), max(starts), 2.0)
     assert last.walked_m[-1] >= 2.0
-
-
-def test_the_command_names_a_bad_log(tmp_path: Path) -> None:
-    (tmp_path / "bad.log").write_bytes(SCAN * 3 + b"FLASER 90 1.0\n")
-    found = echostep("evaluate", "clutter", "--data", str(tmp_path), cwd=tmp_path)
-    assert found.returncode != 0
-    assert "bad.log: line 4" in found.stderr
-    assert "Traceback" not in found.stderr

@@ -59,14 +59,6 @@ def test_files_that_are_none_end_with_one_line(tmp_path: Path, sweep: str, walls
     assert "\n" not in str(error.value)
 
 
-def test_a_folder_without_walls_or_sweeps_says_what_is_needed(tmp_path: Path) -> None:
-    with pytest.raises(EchostepError, match=r"walls\.csv: not there"):
-        read_sweeps(tmp_path)
-    (tmp_path / "walls.csv").write_text(WALLS)
-    with pytest.raises(EchostepError, match="no sweep"):
-        read_sweeps(tmp_path)
-
-
 def test_simulated_shares_go_with_the_angle_like_the_real_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     """Right echoes give way to none and to too long ones."""
     monkeypatch.setattr("echostep_studies.echoes.sweeps.SWEEPS", 48)

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""`make faults`: its list of faults exists in the twin, its judgement of gaps, its table; two faults of the host in short.
-
-`make soak` in short: seconds of the real firmware around the wraps of its clock, and the seam of the walk.
-"""
+"""`make faults`, `make soak` and `make fuzz-host` in short: the twin has each fault, gaps are judged, mutated inputs are no fault."""
 
 from __future__ import annotations
 
 import re
+import signal
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
@@ -23,6 +22,8 @@ from echostep_simulation.stimulus import NO_SYNC
 from places import PLAN
 from reliability import faults, soak
 from reliability.fault_outcomes import NORMAL_S, FaultOutcome, judge_streams, table
+from reliability.fuzz import host as fuzz_host
+from reliability.fuzz.targets import TARGETS
 from reliability.soak_walk import EndlessWalk
 from twin.host_faults import kill, plug_mtx, unplug_mtx
 from twin.late_clock import HALF_WRAP, WRAP
@@ -145,3 +146,28 @@ def test_rounds_of_the_walk_have_no_seam() -> None:
     assert np.diff(arrived).max() < 30e6
     assert reader.counts.good >= len(walk.samples) + 199
     assert reader.counts.lost == reader.counts.bad_counter == 0
+
+
+SLOW = {"dxf": 2, "ifc": 3, "osm": 3, "wrld": 5, "wrld-floor": 2}  # inputs, where one takes tens of milliseconds
+
+
+@pytest.fixture(autouse=True)
+def limited() -> Iterator[None]:
+    before = signal.signal(signal.SIGALRM, fuzz_host.too_slow)
+    yield
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(TARGETS))
+def test_mutated_inputs_are_no_fault(name: str) -> None:
+    count, data, text = fuzz_host.run_shard(name, 0, 60.0, SLOW.get(name, 20))
+    assert text == "", data.hex()
+    assert count == SLOW.get(name, 20)
+
+
+def test_inputs_that_once_were_faults_are_none() -> None:
+    kept = list(fuzz_host.kept_inputs())
+    assert len(kept) >= 4
+    for name, data in kept:
+        assert fuzz_host.fault(name, data) == ""
