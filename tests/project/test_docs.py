@@ -36,34 +36,9 @@ RESULTS = sorted((ROOT / "host/docs/results").glob("*.md"))
 
 SERIES = (DESIGN, DECISIONS, NOTEBOOK)
 
-PAGES = [
-    *(
-        ROOT / name
-        for name in (
-            "README.md",
-            "host/README.md",
-            "host/CHANGELOG.md",
-            "host/CONTRIBUTING.md",
-            "host/SECURITY.md",
-        )
-    ),
-    *(
-        ROOT / name
-        for name in (
-            "protocol/README.md",
-            "firmware/README.md",
-            "firmware/bench.md",
-            "firmware/hardware/README.md",
-            "tools/twin/README.md",
-        )
-    ),
-    *MANUAL,
-    *DESIGN,
-    *DECISIONS,
-    *NOTEBOOK,
-    *RESULTS,
-]
-
+BESIDE = "README.md host/README.md host/CHANGELOG.md host/CONTRIBUTING.md host/SECURITY.md protocol/README.md firmware/README.md firmware/bench.md"
+PAGES = [ROOT / name for name in (*BESIDE.split(), "firmware/hardware/README.md", "tools/twin/README.md")]
+PAGES += [*MANUAL, *DESIGN, *DECISIONS, *NOTEBOOK, *RESULTS]
 # That console blocks may call besides echostep and make
 PROGRAMS = ("python3", ".", ".venv/bin/pip", "pip", "pipx", "sudo")
 

@@ -27,7 +27,6 @@ from echostep_app.extras import EXTRAS
 from walks import DEMO
 
 FOLDER = ROOT / "host/docs/notebooks"
-NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 
 
 def cells(path: Path) -> list[dict[str, Any]]:

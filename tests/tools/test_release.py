@@ -75,7 +75,6 @@ def test_make_licences_prints_a_row_for_each(
 
 TEXT = (ROOT / "host/tested-versions.txt").read_text()
 
-LISTED = [Requirement(entry.partition(" \\")[0]) for entry in entries(TEXT)]
 
 PROJECTS = [tomllib.loads((ROOT / f"host/{ring}/pyproject.toml").read_text())["project"] for ring in ("core", "app")]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Importing OpenStreetMap indoor data: XML and Overpass JSON give the same plan; tags; what a damaged file gets."""
+"""Importing OpenStreetMap indoor data: what becomes of a house, levels, tags, GeoJSON (all kinds of files: habits)."""
 
 from __future__ import annotations
 
@@ -41,22 +41,9 @@ HOUSE = [
 ]  # fmt: skip
 
 
-def xml(elements: list[dict[str, Any]]) -> str:
-    rows = []
-    for e in elements:
-        inner = "".join(f'<tag k="{k}" v="{v}"/>' for k, v in e["tags"].items()) + "".join(
-            f'<nd ref="{n}"/>' for n in e.get("nodes", [])
-        )
-        place = f' lon="{e["lon"]!r}" lat="{e["lat"]!r}"' if "lon" in e else ""
-        rows.append(f'<{e["type"]} id="{e["id"]}"{place}>{inner}</{e["type"]}>')
-    return '<?xml version="1.0" encoding="UTF-8"?><osm version="0.6">' + "".join(rows) + "</osm>"
-
-
-def imported(folder: Path, elements: Any, name: str = "house.json") -> Plan:
-    (folder / name).write_text(
-        json.dumps({"version": 0.6, "elements": elements}) if name.endswith("json") else xml(elements)
-    )
-    return import_plan(folder / name)
+def imported(folder: Path, elements: Any) -> Plan:
+    (folder / "house.json").write_text(json.dumps({"version": 0.6, "elements": elements}))
+    return import_plan(folder / "house.json")
 
 
 def test_what_becomes_of_a_house(tmp_path: Path) -> None:
