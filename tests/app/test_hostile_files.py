@@ -14,7 +14,6 @@ from echostep.errors import EchostepError
 from echostep.plan import load_plan, parse_plan
 from echostep.recording import open_parts
 from echostep.settings import parse_settings
-from echostep.walk.recorded import recorded_start
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.leg_csv import load_legs
 from echostep_app.plan.writer import save_plan
@@ -35,12 +34,6 @@ def test_settings_nested_too_deeply_are_one_error(tmp_path: Path) -> None:
             recorder.write(chunk)
     with pytest.raises(EchostepError, match=r"a\.mcap: its values are nested too deeply"):
         tracker_of(open_parts([tmp_path / "a.mcap"]), load_plan(DEMO), TrackingOptions(DEMO))
-
-
-@pytest.mark.parametrize("fields", [{"start": "anywhere", "start_room": "[" * 5000}, {"start_x_y_rad": "[" * 5000}])
-def test_metadata_nested_too_deeply_are_one_error(fields: dict[str, str]) -> None:
-    with pytest.raises(EchostepError, match="its recorded start is damaged"):
-        recorded_start(fields, Path("a.mcap"))
 
 
 @pytest.mark.parametrize("number", ["1e308", "-1e308", "1.1e19"])

@@ -173,3 +173,35 @@ def test_a_part_that_is_wrong_from_the_start_is_named(bench: Bench, failure: Fai
     bench.fault(failure.switch.partition("=")[0] + "=ok")
     run(4_500)
     assert measured(run(1_000))[failure.measures]
+
+
+SWAPPED = {
+    "barometers": ("part_pressure={}", ("scp1000", "bmp390")),
+    "compasses": ("part_compass={}", ("cmps10", "lis3mdl")),
+    "rangers": ("part_ranger_left={0} part_ranger_right={0}", ("srf02", "maxsonar", "pulse", "maxsonar", "srf02")),
+}
+
+
+@pytest.mark.parametrize("kind", SWAPPED)
+def test_parts_may_be_swapped_in_mid_walk_and_survive_a_reset(bench: Bench, kind: str) -> None:
+    run = begun(bench)
+    plugged, parts = SWAPPED[kind]
+    for part in parts:
+        for switch in plugged.format(part).split():
+            bench.fault(switch)
+        run(5_000)
+        assert sorted(measured(run(1_000))) == [
+            "belt",
+            "calf",
+            "compass",
+            "pressure",
+            "ranger_left",
+            "ranger_right",
+            "thigh",
+        ]
+        assert part.upper() in {m.Part(value).name for value in bench.parts[1:9]}
+        bench.fault("reset=watchdog")
+        bench.subscribe()
+        run(2_000)
+        assert {p.outcome for p in run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
+        assert findings(bench)[1:] == []  # but the crash

@@ -70,20 +70,6 @@ def test_the_slow_mode_of_the_bmp390(barometer: Bench) -> None:
     assert 5 <= len(pressures(barometer.run(2_000))) <= 7
 
 
-def test_barometers_may_be_swapped_in_mid_walk(barometer: Bench) -> None:
-    for part, name in (("scp1000", m.Part.SCP1000), ("bmp390", m.Part.BMP390)):
-        barometer.fault(f"part_pressure={part}")
-        barometer.run(5_000)
-        found = pressures(barometer.run(1_000))
-        assert barometer.parts.part_pressure == name
-        assert np.ptp([x.pressure for x in found]) <= 1
-        assert abs(found[-1].pressure - 405_296) <= 8  # 15 bits of an SCP1000
-
-
-def test_a_board_that_nobody_has_asked_sends_no_parts(bench: Bench) -> None:
-    assert not kinds(bench.run(2_000))["Parts"]
-
-
 def test_the_parts_of_the_papers_are_named(bench: Bench) -> None:
     bench.subscribe()
     bench.run(2_000)
@@ -216,19 +202,6 @@ def test_sync_pulses_are_not_taken_for_a_pulse_ranger(bench: Bench) -> None:
     found = bench.run(3_000)
     assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.BUS_ERROR}
     assert kinds(found)["Sync"] >= 290
-
-
-def test_pulse_rangers_survive_a_reset_in_the_middle_of_a_ping(rangers: Bench) -> None:
-    rangers.fault("reset=watchdog")
-    rangers.run(1_500)
-    assert {p.outcome for p in rangers.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
-
-
-def test_a_right_pulse_ranger_answers_after_the_bootloader(rangers: Bench) -> None:
-    """The bootloader leaves PC7, the pin of its LED and of the right echo line, as an output."""
-    rangers.fault("reset=external")
-    rangers.run(9_500)
-    assert {p.outcome for p in pings(rangers.run(1_000), m.Ranger.RIGHT)} == {m.Outcome.ECHO}
 
 
 PLACES = ("thigh", "calf", "belt")
@@ -368,14 +341,6 @@ def test_the_field_of_a_lis3mdl_comes_at_the_compass_rate(magnetometer: Bench) -
     assert magnetometer.parts.identity_compass == 0x3D
     assert magnetometer.status.errors_compass == 0
     assert kinds(found)["Ping"] >= 56  # the bus is shared with SRF02
-
-
-def test_compasses_may_be_swapped_in_mid_walk(magnetometer: Bench) -> None:
-    for part, kind, name in (("cmps10", "Compass", m.Part.CMPS10), ("lis3mdl", "Magnetic", m.Part.LIS3MDL)):
-        magnetometer.fault(f"part_compass={part}")
-        magnetometer.run(3_500)
-        assert kinds(magnetometer.run(1_000))[kind] >= 9
-        assert magnetometer.parts.part_compass == name
 
 
 def test_an_older_host_reads_the_kit_of_2026_but_for_its_compass(bench: Bench) -> None:

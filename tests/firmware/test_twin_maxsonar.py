@@ -97,18 +97,6 @@ def test_a_deaf_maxsonar_reports_no_echo_and_a_long_stretch_of_the_clock_is_born
     assert not rangers.status.bus_recoveries
 
 
-def test_rangers_of_all_kinds_may_be_swapped_in_mid_walk(rangers: Bench) -> None:
-    expected = {"srf02": (m.Part.SRF02, 28), "maxsonar": (m.Part.MAXSONAR, 19), "pulse": (m.Part.PULSE, 28)}
-    for part in ("srf02", "maxsonar", "pulse", "maxsonar", "srf02"):
-        plug(rangers, part)
-        rangers.run(4_000)
-        found = rangers.run(1_000)
-        name, least = expected[part]
-        assert rangers.parts.part_ranger_left == rangers.parts.part_ranger_right == name
-        assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
-        assert least <= kinds(found)["Ping"] <= least + 3
-
-
 @pytest.mark.parametrize(("other", "name"), [("srf02", "an SRF02"), ("pulse", "a pulse ranger")])
 def test_a_maxsonar_beside_another_kind_is_used_alone_and_named(bench: Bench, other: str, name: str) -> None:
     plug(bench, other, "left")
@@ -125,12 +113,3 @@ def test_a_maxsonar_beside_another_kind_is_used_alone_and_named(bench: Bench, ot
     bench.run(3_000)
     assert {p.outcome for p in bench.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
     assert bench.parts.wiring == m.Wiring.OK
-
-
-@pytest.mark.long
-def test_maxsonars_survive_a_reset_in_the_middle_of_a_ping(rangers: Bench) -> None:
-    rangers.fault("reset=watchdog")
-    rangers.run(2_000)
-    assert {p.outcome for p in rangers.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
-    rangers.run(1_000)
-    assert not [text for text in rangers.all_findings if "ranger" in text]

@@ -90,15 +90,6 @@ def test_a_series_lists_its_pages(series: list[Path]) -> None:
         assert page == index or f"]({page.name})" in rows, page.name
 
 
-@pytest.mark.parametrize("page", [page for page in DECISIONS if page.name != "README.md"], ids=name_of)
-def test_a_decision_is_short_and_whole(page: Path) -> None:
-    text = page.read_text()
-    assert len(text.splitlines()) <= 25
-    assert re.findall(r"^\*\*(\w+)\.\*\*", text, flags=re.M) == ["Status", "Context", "Decision", "Consequences"]
-    assert re.fullmatch(r"\d{4}-[a-z0-9-]+\.md", page.name)
-    assert text.startswith(f"# {int(page.name[:4])}. ")
-
-
 @pytest.mark.parametrize("page", DESIGN, ids=name_of)
 def test_a_name_in_the_design_stands_in_the_code(page: Path) -> None:
     """`Class.method`, `function_name` and `CONSTANT` of the text, wherever in the package, the settings or the protocol."""

@@ -4,46 +4,13 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import os
 import signal
 import subprocess
 from pathlib import Path
-from types import SimpleNamespace
-
-import numpy as np
-import pytest
 
 from board_runs import needs_twin, tool
-from echostep_simulation.stimulus import ROW
 from waiting import PATIENCE_S, until
-
-run = importlib.import_module("twin.run")
-
-
-class CountedBoard:
-    """A board whose port is open for so many blocks."""
-
-    def __init__(self, blocks: int) -> None:
-        self.left, self.is_open, self.t_s = blocks, True, 7.0
-
-    def advance(self, _: object) -> None:
-        self.left -= 1
-        self.is_open = self.left > 0
-
-
-def walk_of(blocks: int) -> SimpleNamespace:
-    sensors = SimpleNamespace(rows=lambda begin, end: np.zeros(end - begin, ROW))
-    mtx = SimpleNamespace(arrival_s=np.zeros(0), frames=())
-    return SimpleNamespace(mtx=mtx, sensors=sensors, walk=SimpleNamespace(t_s=np.zeros(blocks * run.BLOCK_MS)))
-
-
-@pytest.mark.parametrize(("open_for", "played", "to_its_end"), [(3, 3, False), (20, 10, True)])
-def test_a_walk_is_left_when_the_port_is_closed(open_for: int, played: int, to_its_end: bool) -> None:
-    board = CountedBoard(open_for)
-    mtx = SimpleNamespace(device=SimpleNamespace(pulses=True), answer_requests=lambda: None)
-    assert run.play(walk_of(10), board, mtx) is to_its_end
-    assert open_for - board.left == played
 
 
 @needs_twin
@@ -72,11 +39,3 @@ def test_a_port_that_is_opened_again_begins_the_walk_anew(tmp_path: Path) -> Non
     finally:
         twin.send_signal(signal.SIGINT)
         twin.communicate(timeout=PATIENCE_S)
-
-
-def test_the_gateway_of_a_walk_that_was_left_ends() -> None:
-    gateway = run.Gateway(CountedBoard(1))
-    assert gateway.now_s() == 7.0
-    gateway.left = True
-    with pytest.raises(SystemExit):
-        gateway.now_s()

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 from pathlib import Path
 
@@ -31,20 +30,6 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str
         raise
     programs = wheels.environment(folder / "fresh", built, borrow=True)
     return programs, wheels.environment_variables(programs, folder)
-
-
-@pytest.mark.long
-def test_an_installed_wheel_decodes_and_looks_into_recordings(
-    fresh: tuple[Path, dict[str, str]], tmp_path: Path
-) -> None:
-    programs, env = fresh
-    where = wheels.run([programs / "python", "-c", "import echostep; print(echostep.__file__)"], env, tmp_path)
-    assert str(programs.parent) in where
-    decoded = wheels.run([programs / "echostep", "decode", ROOT / "tests/captures/board.bin"], env, tmp_path)
-    expected = (ROOT / "tests/captures/board.jsonl").read_text().splitlines()
-    assert [json.loads(line) for line in decoded.splitlines()] == [json.loads(line) for line in expected]
-    told = wheels.run([programs / "echostep", "info", ROOT / "tests/captures/walk.mcap"], env, tmp_path)
-    assert told.rstrip().endswith("whole")
 
 
 def test_an_installed_wheel_has_what_the_demo_needs(fresh: tuple[Path, dict[str, str]], tmp_path: Path) -> None:

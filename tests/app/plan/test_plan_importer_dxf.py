@@ -78,15 +78,6 @@ def with_gap() -> tuple[Any, Any]:
     return doc, space
 
 
-def test_a_plain_line_is_a_door_and_cuts_the_wall(tmp_path: Path) -> None:
-    doc, space = drawing()
-    space.add_line((0, 0), (9, 0), {"layer": "A-WALL"})
-    space.add_line((4, 0), (5, 0), {"layer": "A-DOOR"})
-    plan = imported(doc, tmp_path)
-    assert walls_of(plan) == {((0, 0), (4, 0)), ((5, 0), (9, 0))}
-    assert plan.levels[0].doors[0].line == pytest.approx((4, 0, 5, 0), abs=0.002)
-
-
 def test_hostile_drawings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dxf_entities, "MOST_PARTS", 3000)
     doc, space = drawing()
