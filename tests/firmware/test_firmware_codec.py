@@ -18,19 +18,12 @@ from reliability.fuzz import codec as fuzz_codec
 from waiting import PATIENCE_S
 
 FIRMWARE = ROOT / "firmware"
-
 CODEC = [FIRMWARE / name for name in ("cobs.c", "frame.c", "messages.c")]
-
 FUZZ = [Path(__file__).parent / "fuzz_codec.c", *CODEC, FIRMWARE / "link.c", FIRMWARE / "status.c"]
-
 FLAGS = ["-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", f"-I{FIRMWARE}", "-fno-sanitize-recover=all"]
-
 HOST_MESSAGES = ("identify", "clock_query", "configure", "check_gyros", "subscribe")
-
 TIMEOUT_S = 600  # reached only by a program that hangs
-
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-
 PROLOGUE = """
 #include <stdio.h>
 #include <string.h>

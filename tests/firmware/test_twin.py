@@ -115,7 +115,6 @@ def test_damaged_commands_are_counted(bench: Bench) -> None:
 
 
 HALF_WRAP_S = HALF_WRAP / TICKS_PER_S
-
 SECOND = np.zeros(1_000, ROW)
 
 SECOND["own_us"], SECOND["sync_us"] = 500, NO_SYNC

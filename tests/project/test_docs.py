@@ -25,23 +25,16 @@ from echostep_app.cli import app
 from team.team_broker import Broker, needs_broker
 
 MANUAL = sorted((ROOT / "host/docs").glob("*.md"))
-
 DESIGN = sorted((ROOT / "host/docs/design").glob("*.md"))
-
 DECISIONS = sorted((ROOT / "host/docs/decisions").glob("*.md"))
-
 NOTEBOOK = sorted((ROOT / "host/studies/notebook").glob("*.md"))
-
 RESULTS = sorted((ROOT / "host/docs/results").glob("*.md"))
-
 SERIES = (DESIGN, DECISIONS, NOTEBOOK)
-
 BESIDE = "README.md host/README.md host/CHANGELOG.md host/CONTRIBUTING.md host/SECURITY.md protocol/README.md firmware/README.md firmware/bench.md"
 PAGES = [ROOT / name for name in (*BESIDE.split(), "firmware/hardware/README.md", "tools/twin/README.md")]
 PAGES += [*MANUAL, *DESIGN, *DECISIONS, *NOTEBOOK, *RESULTS]
 # That console blocks may call besides echostep and make
 PROGRAMS = ("python3", ".", ".venv/bin/pip", "pip", "pipx", "sudo")
-
 SOURCE = "\n".join(
     path.read_text()
     for folder in ("host/core", "host/simulation", "host/app", "host/studies", "protocol", "firmware")
@@ -245,7 +238,6 @@ TABLES = {
 }
 
 SECURITY = "host/SECURITY.md"  # several tables, whose last column names the test; what is not defended has none
-
 NAMED = re.compile(r"`(?:tests/)?([\w/]+\.py)::(\w+)`")  # a test, its file from tests/ on
 
 

@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A researcher's visit: the notebooks of the manual run as they stand, and show tables, pictures and small errors.
-
-The cells run in this process, one after the other, as a notebook's kernel runs them.
-The examples in the docstrings of the public names run as they stand in docs/python.md.
-"""
+"""A researcher's visit: notebooks and examples run as they stand, in this process as in a notebook's kernel; the benchmark measures."""
 
 from __future__ import annotations
 
@@ -24,6 +20,7 @@ from packaging.requirements import Requirement
 import echostep
 from board_runs import ROOT
 from echostep_app.extras import EXTRAS
+from waiting import PATIENCE_S
 from walks import DEMO
 
 FOLDER = ROOT / "host/docs/notebooks"
@@ -120,3 +117,20 @@ def test_an_example_gives_what_it_says(name: str, tmp_path: Path, monkeypatch: p
     said: list[str] = []
     failed, _ = doctest.DocTestRunner().run(example, out=said.append)
     assert not failed, "".join(said)
+
+
+@pytest.mark.long
+@pytest.mark.process
+def test_a_tiny_benchmark(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "echostep_studies.speed.bench", "--tiny", "--out", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=10.0 * PATIENCE_S, check=False)
+    assert done.returncode == 0, done.stderr
+    rows = json.loads((tmp_path / "bench.json").read_text())
+    assert len(rows) >= 8
+    for row in rows:
+        assert set(row) == {"name", "ratio", "median_s", "peer_s"}
+        assert row["name"].split(";")[0] in done.stdout.replace("\n", " ")
+        assert row["ratio"] > 0.0
+        assert row["median_s"] > 0.0
+        assert row["peer_s"] > 0.0
+    assert (tmp_path / "bench.png").stat().st_size > 1000

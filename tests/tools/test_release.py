@@ -20,7 +20,6 @@ from release import licences
 from release.tested_versions import entries
 
 SOURCES = {".py", ".c", ".h", ".js", ".css", ".html", ".svg", ".sh", ".toml", ".rules"}
-
 BUILT = {"__pycache__", "build", "dist", "node_modules"}
 
 
@@ -77,7 +76,6 @@ TEXT = (ROOT / "host/tested-versions.txt").read_text()
 
 
 PROJECTS = [tomllib.loads((ROOT / f"host/{ring}/pyproject.toml").read_text())["project"] for ring in ("core", "app")]
-
 EXTRAS = PROJECTS[1]["optional-dependencies"]
 
 
@@ -105,7 +103,6 @@ def test_every_dependency_has_a_tested_version_that_is_allowed() -> None:
 
 
 HASHED, OWN = "--require-hashes -r", "--no-deps --no-build-isolation -e host/core -e host/app -e host/studies"
-
 NEWEST = "-e host/core -e host/app[dev] -e host/studies[cluster]"
 
 

@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""Every tool of tools/ starts and says what it is for; those without a test of their own run in small; what Makefile and pages name exists."""
+"""Every tool of tools/ starts and says what it is for; those without a test of their own run in small; the twin in real time."""
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import json
+import os
 import re
 import shutil
+import signal
+import subprocess
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
-from board_runs import ROOT, needs_twin
+from board_runs import ROOT, needs_twin, tool
 from command_line import echostep
 from echostep_app.recording.recorder import Recorder
 from echostep_studies.speed import stages
@@ -21,6 +25,7 @@ from release import same_bits, tested_versions
 from reliability import campaign, faults
 from reliability.fault_outcomes import FaultOutcome
 from reliability.fuzz import codec, host
+from waiting import PATIENCE_S, until
 from walks import walk_chunks
 
 Start = Callable[..., int | None]
@@ -157,3 +162,31 @@ def test_measured_seconds_of_the_firmware(start: Start, capsys: pytest.CaptureFi
 def test_the_nets_of_the_boards_have_no_problem(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     assert start("hardware.nets") == 0
     assert "each with one driver at a time" in capsys.readouterr().out
+
+
+@needs_twin
+def test_a_port_that_is_opened_again_begins_the_walk_anew(tmp_path: Path) -> None:
+    """The true path then begins at the time of the second opening."""
+    twin = subprocess.Popen([*tool("twin.run"), "--out", tmp_path], stdout=subprocess.PIPE, text=True)
+
+    def began_s(after_s: float = -1.0) -> float | None:
+        with contextlib.suppress(FileNotFoundError, IndexError, ValueError):
+            t_s = float((tmp_path / "truth.csv").read_text().splitlines()[1].split(",")[0])
+            return t_s if t_s > after_s else None
+        return None
+
+    try:
+        assert twin.stdout is not None
+        port = twin.stdout.readline().split()[1]
+        opened = os.open(port, os.O_RDWR | os.O_NOCTTY)
+        assert until(lambda: began_s() is not None)
+        first_s = began_s()
+        assert first_s is not None
+        os.close(opened)
+        assert any("begins the walk anew" in line for line in iter(twin.stdout.readline, ""))
+        opened = os.open(port, os.O_RDWR | os.O_NOCTTY)
+        assert until(lambda: began_s(first_s) is not None)
+        os.close(opened)
+    finally:
+        twin.send_signal(signal.SIGINT)
+        twin.communicate(timeout=PATIENCE_S)

@@ -159,7 +159,6 @@ def test_any_words_have_a_meaning(said: list[m.Status], sensors: int, cause: int
 
 
 IDENTITY = m.Identity(0, m.SCHEMA_HASH, 1, 2, 0, m.ResetCause.POWER_ON)
-
 HEALTH = m.BoardHealth(0, 5_000, 4_980, 1, 0, m.CrashPlace.NONE, 0, 0)
 
 

@@ -28,14 +28,11 @@ from players import pseudo_terminal, python_board
 from waiting import PATIENCE_S, until
 
 PLAN = ROOT / "host/core/echostep/plans/demo.json"
-
 FULL = Path("/dev/full")  # refuses every byte: no space left [full(4)]
-
 pytestmark = pytest.mark.process
 
 # Runs the program with files closed that its parent left open, as the shell does for >&-
 COMMAND = ("command", "mqtt://127.0.0.1:9", "--plan", str(PLAN), "--port", "0")
-
 CLOSING = "import os, sys; [os.close(int(k)) for k in sys.argv[1]]; os.execv(sys.argv[2], sys.argv[2:])"
 
 

@@ -25,7 +25,6 @@ from echostep_app.guidance.guided_run import guidance_of
 from echostep_app.guidance.own_way import JOIN_M, STEP_M, OwnWay
 
 MEASURED = MeasuredSegment(PathSegment(0.0, 1.0, 0.4, 0.0, 0.0, 0.0, 0.02, 0.0, 1), *np.empty((3, 0)))
-
 CORNERS = np.array([(0.0, 0.0), (0.0, 20.0), (15.0, 20.0), (15.0, 35.0)])  # of a way in, m
 
 
@@ -135,16 +134,12 @@ def test_without_a_plan_the_start_is_the_only_destination() -> None:
 
 
 RETURNS = 100
-
 SPEED_M_S, PERIOD_S = 0.8, 0.5
-
 OBEYS_RAD, DELAY = math.radians(15.0), 2  # error of a turn; periods until a cue is followed
 
 # A metre of drift, per root of a metre, of the lengths
 BIAS_RAD_M, NOISE_RAD, SCALE = (math.radians(0.02), math.radians(0.1), 0.007)
-
 CLOSE_M = 2.0  # from the door
-
 MOST_TIMES = 3  # the length of the way in that a return may take
 
 

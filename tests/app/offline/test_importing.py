@@ -143,7 +143,6 @@ def test_arrays_of_any_length_are_tracked_as_the_recording_is(walk: Imu, tmp_pat
 
 
 BEGIN_S = 7.0  # of the file's times
-
 START = "1,2,90"
 
 

@@ -226,9 +226,7 @@ def test_a_replay_computes_the_same_bits(plain: Path, dated: Path) -> None:
 
 # 2 m along the walk frame's x axis in 2 s; in the map, along its y axis to (5, 8)
 SEGMENT = PathSegment(10.0, 12.0, 2.0, 0.0, 0.0, 0.0, 0.05, 0.01, 3)
-
 MEASURED = MeasuredSegment(SEGMENT, np.array([9.9, 11.0, 12.0]), np.array([0, 1, 0]), np.array([1.0, math.nan, 2.0]))
-
 END = Estimate(12.0, 5.0, 8.0, 0.01, 0.0, 0.01, 0.5 * math.pi, 0.01, 3, TrackStatus.TRACKING, level=2)
 
 

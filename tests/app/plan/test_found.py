@@ -102,7 +102,6 @@ def osm(ways: str) -> str:
 
 
 ROOM = '<way id="5">{}<tag k="indoor" v="room"/><tag k="level" v="0"/></way>'
-
 REFS = "".join(f'<nd ref="{k}"/>' for k in (1, 2, 3, 4, 1))
 
 
@@ -179,20 +178,6 @@ def test_the_picture_beside_the_plan(tmp_path: Path) -> None:
         assert command_line.echostep(*command).stdout.endswith(f", {tmp_path / 'plan.png'}\n")
 
 
-@pytest.mark.process
-def test_options_of_drawings_are_refused_elsewhere(tmp_path: Path) -> None:
-    for name in ("a.osm", "a.pdf"):
-        (tmp_path / name).write_text("<osm/>")
-    for option in (("--units", "mm"), ("--window", "0,0,1,1"), ("--align",), ("--scale", "1"), ("--level", "a")):
-        done = command_line.echostep("plan", "import", tmp_path / "a.osm", "-o", tmp_path / "plan.json", *option)
-        assert f"{option[0]} is for drawings (DXF) alone" in done.stderr
-        assert done.returncode == 2
-    done = command_line.echostep("plan", "import", tmp_path / "a.pdf", "-o", tmp_path / "p.json", "--scale", "1")
-    assert "a.pdf: PDF: make a picture of its page" in done.stderr
-    done = command_line.echostep("plan", "import", tmp_path / "a.dxf", "-o", tmp_path / "p.json", "--window", "1,1,0,2")
-    assert "--window 1,1,0,2: expected X0 < X1" in done.stderr
-
-
 def test_at_most_twelve_lines() -> None:
     report = ImportReport(units="mm", layers={kind: [f"{kind}-{k}" for k in range(50)] for kind in ("walls", "doors")})
     for k in range(40):
@@ -229,19 +214,16 @@ def test_sizes_that_no_building_has_are_told() -> None:
     assert "note: half of the doors are 0.05 m wide or less: is the scale right?" in lines
 
 
-@pytest.mark.process
 def test_walls_with_gaps_are_not_called_closed(tmp_path: Path) -> None:
     """Rooms that a gap leads to can be entered, doors or not."""
-    from ezdxf.filemanagement import new
-
-    doc = new("R2010")
-    doc.header["$INSUNITS"] = 6
+    doc = new("R2010", units=6)
     space = doc.modelspace()
     for line in ((0, 0, 12, 0), (12, 0, 12, 8), (12, 8, 0, 8), (0, 8, 0, 0), (0, 5, 2, 5), (2.9, 5, 12, 5)):
         space.add_line(line[:2], line[2:], {"layer": "A-WALL"})
     space.add_text("Kitchen", dxfattribs={"layer": "ROOM", "height": 0.3, "insert": (3, 6.5)})
     doc.saveas(tmp_path / "a.dxf")
-    done = command_line.echostep("plan", "import", tmp_path / "a.dxf", "-o", tmp_path / "p.json", "--no-picture")
-    assert "0 doors, 1 gap that people can pass, 1 room" in done.stdout
-    assert "cannot be entered" not in done.stdout
-    assert json.loads((tmp_path / "p.json").read_text())["levels"][0]["rooms"][0]["name"] == "Kitchen"
+    plan, report = imported(tmp_path / "a.dxf")
+    said = "\n".join(summary(plan, report))
+    assert "0 doors, 1 gap that people can pass, 1 room" in said
+    assert "cannot be entered" not in said
+    assert plan.levels[0].rooms[0].name == "Kitchen"

@@ -32,10 +32,10 @@ TRUE = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("true", TRUE)
-@pytest.mark.parametrize(
-    "points_m", [[[1.0, 2.0], [25.0, 13.0]], [[-400.0, 900.0], [300.0, -200.0]], [[30_000.0, 1.0], [30_100.0, 1.0]]]
-)
+APART = ([[1.0, 2.0], [25.0, 13.0]], [[-400.0, 900.0], [300.0, -200.0]], [[30_000.0, 1.0], [30_100.0, 1.0]])
+
+
+@pytest.mark.parametrize(("true", "points_m"), [*zip(TRUE, (*APART, *APART[1:]), strict=True), (TRUE[0], APART[2])])
 def test_the_georeference_that_gave_the_degrees_is_found(true: Georeference, points_m: list[list[float]]) -> None:
     xy_m = np.array(points_m)
     fit = fit_two_points(xy_m, EarthTransform(true).degrees(xy_m))
@@ -91,7 +91,6 @@ def test_what_are_no_two_points_is_refused_by_its_field(raw: bytes, names: str) 
 
 
 PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
-
 DEGREE_M = 111_320.0  # along a meridian
 
 
@@ -134,9 +133,7 @@ def test_no_georeference_no_globe() -> None:
 
 
 DEMO = ROOT / "host/core/echostep/plans/demo.json"
-
 PLACELESS = replace(load_plan(DEMO), georeference=None)
-
 QUARTER = 0.5 * math.pi
 
 

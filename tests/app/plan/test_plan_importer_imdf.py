@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-import command_line
 from echostep.errors import EchostepError
 from echostep.plan import Plan
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
+from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.summary import summary
 
 LON, LAT = -2.978, 56.46
 EAST, NORTH = 1 / 61_650.0, 1 / 111_360.0  # degrees a metre there
@@ -203,11 +204,12 @@ def test_doors_that_are_drawn_stay_as_they_are(mall: Plan, tmp_path: Path) -> No
     assert import_plan(folder(tmp_path / "a", files()), Hints(doors_m=0.9)).levels[0].doors == mall.levels[0].doors
 
 
-@pytest.mark.process
 def test_the_import_says_that_there_are_no_doors(tmp_path: Path) -> None:
-    source, out = folder(tmp_path / "a", without_openings()), tmp_path / "plan.json"
-    done = command_line.echostep("plan", "import", source, "-o", out)
-    assert "has no door openings, so its rooms cannot be entered: --doors 0.9" in done.stdout
-    done = command_line.echostep("plan", "import", source, "-o", out, "--doors", "0.9")
-    assert "9 doors are assumed" in done.stdout
-    assert "no door openings" not in done.stdout
+    said = []
+    for hints in (Hints(), Hints(doors_m=0.9)):
+        report = ImportReport()
+        plan = import_plan(folder(tmp_path / "a", without_openings()), hints, report=report)
+        said.append("\n".join(summary(plan, report)))
+    assert "has no door openings, so its rooms cannot be entered: --doors 0.9" in said[0]
+    assert "9 doors are assumed" in said[1]
+    assert "no door openings" not in said[1]

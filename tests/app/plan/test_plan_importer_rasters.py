@@ -19,7 +19,6 @@ from echostep_app.plan.importers.summary import size_m
 from echostep_app.plan.places.gaps import door_gaps
 
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
-
 YAML = "image: map.{}\nresolution: 0.05\norigin: [-10.0, -20.0, {}]\nnegate: {}\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
 
 
@@ -55,7 +54,6 @@ def test_a_slanting_wall_is_no_stair(tmp_path: Path) -> None:
 
 
 PIXEL_M = 0.02
-
 WALLS = (
     (50, 50, 550, 59),
     (50, 441, 550, 450),

@@ -68,7 +68,6 @@ def test_a_good_plan(tmp_path: Path) -> None:
 
 
 CORNERS = [[0, 0], [1, 0], [1, 1]]
-
 WRONG: list[tuple[dict[str, Any], str]] = [
     ({"echostep_plan": 2}, "echostep_plan"),
     ({"levels": []}, "levels"),
@@ -198,17 +197,11 @@ def test_what_is_saved_is_read_back(tmp_path: Path) -> None:
 
 
 METRES = st.floats(-1e5, 1e5)
-
 SEGMENTS = st.lists(st.tuples(METRES, METRES, METRES, METRES).filter(lambda s: s[:2] != s[2:]), max_size=4)
-
 TEXTS = st.text(st.characters(exclude_categories=["Cs", "Cc", "Cn"]), max_size=8)  # XML has no control characters
-
 OUTLINES = st.lists(st.tuples(METRES, METRES), min_size=3, max_size=6, unique=True).map(np.array)
-
 DOORS = st.builds(Door, SEGMENTS.filter(bool).map(lambda rows: rows[0]), st.sampled_from(("open", "closed")), TEXTS)
-
 ROOMS = st.builds(Room, TEXTS, st.tuples(METRES, METRES), st.none() | OUTLINES)
-
 LEVELS = st.builds(
     Level,
     TEXTS,
@@ -221,7 +214,6 @@ LEVELS = st.builds(
 )
 
 DEGREES = st.floats(-360, 360).map(math.radians)
-
 PLANS = st.builds(
     Plan,
     TEXTS,
@@ -254,11 +246,8 @@ def test_a_million_walls_open(tmp_path: Path) -> None:
 
 
 SCHEMA = json.loads((ROOT / "host/core/echostep/plans/plan.schema.json").read_text())
-
 VALID = Draft202012Validator(SCHEMA)
-
 BEYOND = {"without length", r"levels\[0\].doors\[0\].line", r"obstacles\[0\]"}  # what a schema cannot say
-
 NAMES = {"connectors", "start"}  # refer to levels, which a schema cannot follow
 
 

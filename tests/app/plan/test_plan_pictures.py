@@ -82,9 +82,7 @@ def test_a_font_that_has_the_letters_is_used(tmp_path: Path, monkeypatch: pytest
 
 
 LINE = (2.0, 0.0, 3.0, 0.0)
-
 SHAFT = np.array([(0.0, 0.0), (0.0, 5.0), (2.0, 5.0), (2.0, 0.0)])
-
 BENT = np.array([(0.0, 0.0), (6.0, 0.0), (6.0, 2.0), (2.0, 2.0), (2.0, 4.0), (0.0, 4.0)])
 
 

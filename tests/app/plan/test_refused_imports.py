@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from echostep_app.commands.options import windows_of
 from echostep_app.plan.importers.formats import NEXT_STEPS, PICTURES, import_plan, open_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.imdf import archive
@@ -160,7 +161,15 @@ def test_archives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         packed.writestr("readme.txt", "x")
     said["archive: no model"] = of_import(tmp_path / "a.ifczip")
     said["archive: none"] = of_import(tmp_path / "none.zip")
-    said["doors of another format"] = of_import(tmp_path / "plan.osm", Hints(doors_m=0.9))
+    options = {
+        "doors": Hints(doors_m=0.9), "units": Hints(units="mm"), "window": Hints(windows=[(0, 0, 1, 1)]), "align": Hints(align=True),
+        "scale": Hints(scale_m=1.0), "level": Hints(level_names=["a"]), "layer": Hints(layers={"walls": ["a"]}),
+    }  # fmt: skip
+    said |= {
+        f"another format's option {name}": of_import(tmp_path / "plan.osm", hints) for name, hints in options.items()
+    }
+    said["a PDF with a scale"] = of_import(tmp_path / "a.pdf", Hints(scale_m=1.0))
+    said["a window of no size"] = refusal(lambda: windows_of(["1,1,0,2"]))
     expect("plan import refused", said, FOLDER=tmp_path)
 
 

@@ -47,21 +47,22 @@ def without_name(plan: Plan, *names: str) -> Plan:
     return replace(plan, levels=(replace(level, rooms=tuple(r for r in level.rooms if r.name not in names)),))
 
 
-def test_a_corridor_without_a_name_and_the_door_beside() -> None:
-    whereabouts = Whereabouts(without_name(DEMO, "North corridor", "South corridor"))
-    assert whereabouts.words(9.5, 7.5, 0) == "in the corridor, by the door of Office 2"
-    assert whereabouts.words(24.0, 5.0, 0) == "in the corridor"
+CORRIDORS = "North corridor", "South corridor"
+FIELD = Plan("field", (Level("G", 0.0, np.zeros((0, 4))),), None, "")
 
 
-def test_a_room_without_a_name_is_told_by_its_neighbour() -> None:
-    whereabouts = Whereabouts(without_name(DEMO, "Lab"))
-    assert whereabouts.words(15.7, 11.2, 0) == "near North corridor"  # its door leads to two names
-
-
-def test_a_plan_without_names_says_nothing() -> None:
-    level = replace(DEMO.levels[0], rooms=())
-    assert Whereabouts(replace(DEMO, levels=(level,))).words(24.0, 5.0, 0) == "in the corridor"
-    assert Whereabouts(Plan("field", (Level("G", 0.0, np.zeros((0, 4))),), None, "")).words(1.0, 2.0, 0) == ""
+@pytest.mark.parametrize(
+    ("plan", "at", "words"),
+    [
+        (without_name(DEMO, *CORRIDORS), (9.5, 7.5), "in the corridor, by the door of Office 2"),
+        (without_name(DEMO, *CORRIDORS), (24.0, 5.0), "in the corridor"),
+        (without_name(DEMO, "Lab"), (15.7, 11.2), "near North corridor"),  # its door leads to two names
+        (without_name(DEMO, *(room.name for room in DEMO.levels[0].rooms)), (24.0, 5.0), "in the corridor"),
+        (FIELD, (1.0, 2.0), ""),
+    ],
+)
+def test_places_without_a_name_are_told_by_what_is_near(plan: Plan, at: tuple[float, float], words: str) -> None:
+    assert Whereabouts(plan).words(*at, 0) == words
 
 
 def test_gaps_are_found_once_and_jambs_do_not_hide_them() -> None:
@@ -121,5 +122,4 @@ def test_where_nothing_encloses_the_hull_of_the_walls_is_the_building() -> None:
     assert ground.objection(19.0, 1.0, 0) is None
     assert (outside := ground.objection(10.0, 5.0, 0)) is not None
     assert outside.nearest_m == pytest.approx((10.0, 1.7))
-    field = Plan("field", (Level("G", 0.0, np.zeros((0, 4))),), None, "")
-    assert StandingGround(field).objection(1e3, 0.0, 0) is None
+    assert StandingGround(FIELD).objection(1e3, 0.0, 0) is None

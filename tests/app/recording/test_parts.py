@@ -145,7 +145,6 @@ def test_the_files_of_a_run_are_found_by_any_of_them(tmp_path: Path) -> None:
 
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(600)]
-
 THREE_S = SplitLimit(span_ns=3_000_000_000)
 
 

@@ -199,9 +199,7 @@ def test_a_chunk_with_a_window_above_128_mib_is_left_closed(exponent: int, opene
 
 
 PYTHON = ["rerun-sdk==0.41.0", "databeam-mcap-reader==0.5.2"]  # the second brings the program mcap 0.0.62
-
 NODE = ["@mcap/core@2.2.2", "@mcap/nodejs@1.0.2"]
-
 INDEXED = """
 import { open } from "fs/promises";
 import { McapIndexedReader } from "@mcap/core";

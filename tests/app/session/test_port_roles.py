@@ -22,7 +22,6 @@ from echostep_app.session.runs.port_roles import SURE_BYTES, with_right_names
 from echostep_app.team.endpoint import Outlet, parse_endpoint
 
 CAPTURES = ROOT / "tests/captures"
-
 BYTES = {name: (CAPTURES / f"{name}.bin").read_bytes()[: 2 * SURE_BYTES] for name in (BOARD, MTX)}
 
 

@@ -79,9 +79,7 @@ def test_the_name_of_a_plan_is_no_markup() -> None:
 
 
 UNIX = 1_800_000_000.0
-
 OFFICE, CORRIDOR = (6.0, 9.0), (6.3, 7.5)  # of the demo's building
-
 PLACES = tuple(LikelyPlace(0.5, x, y, 0, 0.1, 0.0) for x, y in (OFFICE, CORRIDOR))
 
 

@@ -25,7 +25,6 @@ from echostep_studies.simulation.falling import sideways, walk_then
 from wearer.fall_bytes import fall_chunks
 
 PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
-
 END_STILL_S = 60.0
 
 
@@ -47,7 +46,6 @@ def state(alarm: WearerAlarm) -> tuple[AlarmKind, AlarmReason] | None:
 
 
 ASKING, MAYDAY, OVER = AlarmKind.ASKING, AlarmKind.MAYDAY, AlarmKind.OVER
-
 STILL, HELP = AlarmReason.STILL, AlarmReason.HELP
 
 

@@ -139,7 +139,6 @@ def test_too_few_samples_are_no_tenth_and_missing_ones_are_told() -> None:
 
 
 RATE_HZ, NOISE = 100.0, 0.005  # rad/s
-
 T_S: Floats = np.arange(6000) / RATE_HZ
 
 

@@ -27,9 +27,7 @@ from echostep_studies.simulation.sites import otb
 from naive import walls as naive
 
 ROOM = np.array([[0.0, 0.0, 5.0, 0.0], [5.0, 0.0, 5.0, 3.0], [5.0, 3.0, 0.0, 3.0], [0.0, 3.0, 0.0, 0.0]])
-
 PRINTED = GirardSettings()
-
 floats = st.floats(0.05, 6.0)
 
 

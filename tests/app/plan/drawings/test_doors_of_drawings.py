@@ -23,7 +23,6 @@ from plan.drawings.drawn_houses import DOOR, OTHER, WALL, corners, house, outlin
 from plan.drawings.drawn_offices import WALL_STYLES, Walls, write_office
 
 TURN = 33.0
-
 ROOM_M2 = 5.88 * 4.63  # R2, between its walls
 
 

@@ -18,18 +18,14 @@ from echostep_app.team.messages.report import Report, ReportedPlace
 from team.team_reports import report
 
 REQUIRED = ("version", "type", "uid", "time", "start", "stale", "how")
-
 OPTIONAL = ("access", "qos", "opex")
-
 PATTERNS = {"type": r"\w+(-\w+)*(;[^;]*)?", "how": r"\w(-\w+)*", "qos": r"\d-\w-\w"}
-
 HOW_MACHINE = {
     "m-i": "mensurated", "m-g": "GPS", "m-m": "magnetic", "m-s": "simulated", "m-f": "fused", "m-c": "configured",
     "m-p": "predicted", "m-r": "relayed",
 }  # fmt: skip
 
 POINT = {"lat": (Decimal(-90), Decimal(90)), "lon": (Decimal(-180), Decimal(180)), "hae": None, "ce": None, "le": None}
-
 DATE_TIME = r"-?\d{4,}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?(Z|[+-]\d\d:\d\d)?"  # xs:dateTime
 
 

@@ -29,7 +29,6 @@ from echostep_app.team.messages.report import BadReportError, ReportedAlarm
 from operation.teams import TOWER, Team, place
 
 HAZARD = Mark(1, "0123abcd", "hazard", 3.0, 2.0, 1, "Ann", 1.8e9, "7" * 64)
-
 TOPIC, PAYLOAD = HAZARD.message
 
 
@@ -160,9 +159,7 @@ def test_a_flood_of_marks_is_bounded_and_keeps_those_that_are_there() -> None:
 
 
 KEY = ("red", "anna", "0123abcd")
-
 ERRAND = Errand(1, "finn", "2nd floor, in corridor", 3.0, 2.0, 2, "Ben", 1.8e9, "7" * 64)
-
 LATER = structs.replace(ERRAND, to="kim", where="", unix_s=1.8e9 + 60.0)
 
 
