@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -57,19 +55,6 @@ def test_the_licence_of_every_dependency_is_listed() -> None:
     for name, package in listed.items():
         assert licences.licence(package) != licences.UNKNOWN, name
         assert "GPL" not in licences.licence(package).replace("LGPL", ""), f"{name} would bind a program that is MIT"
-
-
-@pytest.mark.slow
-def test_make_licences_prints_a_row_for_each(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("sys.argv", ["licences.py"])
-    assert licences.main() == 0
-    rows = capsys.readouterr().out.splitlines()[2:]
-    assert len(rows) > len(licences.needed("echostep-app"))
-    for name, use in (("numpy", "to run"), ("scipy", "by an extra"), ("distributed", "to develop, or by the studies")):
-        row = next(row for row in rows if row.startswith(f"| {name} "))
-        assert re.fullmatch(rf"\| {name} \| [\d.]+ \| .*BSD.* \| {use} \|", row)
 
 
 TEXT = (ROOT / "host/tested-versions.txt").read_text()
@@ -129,40 +114,3 @@ def test_set_up_takes_no_file_with_another_hash(
     asked = (tmp_path / "asked").read_text().splitlines()
     assert [re.sub(r"(-r) .*", r"\1", words) for words in asked] == installs
     assert ("DO NOT MATCH" in capsys.readouterr().err) == bool(status)
-
-
-def test_a_python_that_is_too_new_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert not install.newer_python()
-    monkeypatch.setattr(sys, "version_info", (3, 99, 0))
-    assert install.newer_python().startswith("Python 3.99 is newer than 3.")
-
-
-@pytest.mark.process
-@pytest.mark.parametrize(
-    ("user", "apt", "words"),
-    [
-        ("0", "", "Installing: x"),
-        ("1000", "", "this user has no right to"),
-        (
-            "0",
-            "echo 'E: Release file for http://x/InRelease is expired' >&2; exit 100",
-            "apt's package list has expired",
-        ),
-        ("0", "echo 'E: Unable to locate package x' >&2; exit 100", "apt says: Unable to locate package x"),
-    ],
-)
-def test_apts_own_reason_is_told(tmp_path: Path, user: str, apt: str, words: str) -> None:
-    """With an apt that fails so."""
-    done = _installed(tmp_path, apt, user, "x")
-    assert words in done.stdout
-    assert done.returncode == int("Installing" not in words)
-
-
-def _installed(folder: Path, apt: str, user: str, *packages: str) -> subprocess.CompletedProcess[str]:
-    """`tools/apt.sh` with this apt, none of the packages there."""
-    stubs = {"dpkg-query": "exit 1", "apt-get": apt, "id": f"echo {user}", "sudo": "exit 1"}
-    for name, body in stubs.items():
-        (folder / name).write_text(f"#!/bin/sh\n{body}\n")
-        (folder / name).chmod(0o755)
-    command, env = [str(ROOT / "tools/apt.sh"), *packages], {"PATH": f"{folder}:/usr/bin:/bin"}
-    return subprocess.run(command, env=env, capture_output=True, text=True, check=False)

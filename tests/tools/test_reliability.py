@@ -3,28 +3,20 @@
 
 from __future__ import annotations
 
-import re
 import signal
 from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from board_runs import ROOT, Bench, needs_twin
-from echostep.plan import load_plan
+from board_runs import Bench, needs_twin
 from echostep.ports.chunks import BOARD, MTX
 from echostep.recording import open_recording
-from echostep.xsens import MtxReader
 from echostep_simulation.devices.board import PythonBoard
-from echostep_simulation.stimulus import NO_SYNC
-from places import PLAN
 from reliability import faults, soak
 from reliability.fault_outcomes import NORMAL_S, FaultOutcome, judge_streams, table
 from reliability.fuzz import host as fuzz_host
 from reliability.fuzz.targets import TARGETS
-from reliability.soak_walk import EndlessWalk
 from twin.host_faults import kill, plug_mtx, unplug_mtx
 from twin.late_clock import HALF_WRAP, WRAP
 from twin.live_walk import HostFault, LiveWalk
@@ -40,30 +32,6 @@ def test_every_fault_of_the_matrix_exists() -> None:
         bench.run(1)
     finally:
         bench.board.close()
-
-
-def test_the_matrix_has_a_fault_of_each_switch() -> None:
-    names = re.findall(r"^\| (`[a-z_0-9`, ]+`) \| .* \|$", (ROOT / "tools/twin/README.md").read_text(), flags=re.M)
-    known = {name for group in names for name in re.findall(r"`(\w+)`", group)}
-    used = {switch.split("=")[0] for fault in faults.FAULTS for switch in fault.switches}
-    assert used <= known
-    like_others = {"belt", "part_calf", "part_belt", "imu_calf", "imu_belt", "pulse_right", "maxsonar_right"}
-    without_an_effect_alone = {"reset", "brown_out_fuse", "usb"}
-    of_another_board = {"icm20649"}  # tests/firmware/test_twin_foot.py
-    # tests/firmware
-    of_the_wiring = {
-        "miso_undefined",
-        "miso_resistor",
-        "spi_errors",
-        "twi_errors",
-        "hum",
-        "glitch",
-        "echo_resistor",
-        "jtag_fuse",
-        "d13_led",
-    }
-    of_the_host = {"host_system", "host_hub"}  # tests/firmware/test_twin_usb.py
-    assert known - used <= like_others | without_an_effect_alone | of_another_board | of_the_wiring | of_the_host
 
 
 def test_gaps_are_judged() -> None:
@@ -127,25 +95,6 @@ def test_seconds_of_the_real_firmware_around_a_wrap_of_its_clock(tmp_path: Path,
     assert failed <= {"memory of the host", "memory of the twin"}  # of seconds says nothing
     assert soak.wraps(measured.clock).measured == str(wraps)
     assert measured.outcome.tracking == 1.0
-
-
-@pytest.mark.slow
-def test_rounds_of_the_walk_have_no_seam() -> None:
-    walk = EndlessWalk(load_plan(PLAN), 1, PythonBoard(1), ROUND)
-    edges = np.flatnonzero(walk.rows["sync_us"] != NO_SYNC)
-    edges_us = 1000 * edges + walk.rows["sync_us"][edges]
-    apart_us = np.diff([*edges_us, edges_us[0] + 1000 * walk.length_ms])
-    assert len(edges) == len(walk.samples)
-    assert set(apart_us.tolist()) <= {10_000, 10_001}
-    ends_s = [0.0, 1e-3 * walk.length_ms]
-    assert max(np.ptp(np.interp(ends_s, walk.truth[:, 0], walk.truth[:, k])) for k in (1, 2)) < 0.1
-    reader, arrived = MtxReader(), []
-    for chunk in islice(walk.mtx_chunks(), len(walk.samples) + 200):
-        arrived.append(chunk.t_arrival_ns)
-        reader.feed(chunk.data)
-    assert np.diff(arrived).max() < 30e6
-    assert reader.counts.good >= len(walk.samples) + 199
-    assert reader.counts.lost == reader.counts.bad_counter == 0
 
 
 SLOW = {"dxf": 2, "ifc": 3, "osm": 3, "wrld": 5, "wrld-floor": 2}  # inputs, where one takes tens of milliseconds

@@ -8,23 +8,17 @@ import importlib
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
-from collections.abc import Callable, Iterable
-from dataclasses import asdict
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from board_runs import ROOT, needs_twin, tool
-from command_line import echostep
 from echostep_app.recording.recorder import Recorder
 from echostep_studies.speed import stages
-from release import same_bits, tested_versions
-from reliability import campaign, faults
-from reliability.fault_outcomes import FaultOutcome
-from reliability.fuzz import codec, host
+from reliability.fuzz import host
 from waiting import PATIENCE_S, until
 from walks import walk_chunks
 
@@ -70,52 +64,6 @@ def test_stages_of_a_replay_sum_up(tmp_path: Path, start: Start, capsys: pytest.
     assert ms["replay"] == pytest.approx(ms["bytes to legs and pings"] + ms["cloud and estimates"], abs=0.2)
 
 
-def test_the_pages_are_compared(start: Start) -> None:
-    assert start("docs.generate", "--check") == 0
-
-
-@pytest.mark.process
-def test_the_versions_are_written(tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tested_versions, "FILE", tmp_path / "versions.txt")
-    uv = tmp_path / "uv"
-    uv.write_text("#!/bin/sh\ncat\n")  # without the network: no hashes
-    uv.chmod(0o755)
-    assert start("release.tested_versions", "--uv", uv) == 0
-    assert re.search(r"^numpy==[\d.]+$", (tmp_path / "versions.txt").read_text(), flags=re.M)
-
-
-@pytest.mark.long
-@pytest.mark.process
-def test_same_bits_are_digests(
-    start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    (tmp_path / "tests/captures").mkdir(parents=True)
-    capture = Path(shutil.copy(ROOT / "tests/captures/board.bin", tmp_path / "tests/captures"))
-    monkeypatch.setattr(same_bits, "ROOT", tmp_path)
-    assert start("release.same_bits", "--only", "captures") == 0
-    assert capsys.readouterr().out == f"decode/board.bin {same_bits.sha256(echostep('decode', capture).stdout)}\n"
-
-
-def test_faults_go_on_where_they_stopped(
-    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    journal, played = campaign.CampaignJournal(tmp_path / "faults.jsonl"), list[str]()
-    names = list(faults.matrix(tmp_path))
-    for name in names[1:]:
-        journal.add(asdict(FaultOutcome(name, lost_frames=7)))
-
-    def play(fault: faults.TwinFault, always: Iterable[str]) -> FaultOutcome:
-        assert not [*always]
-        played.append(fault.name)
-        return FaultOutcome(fault.name, wrongly_sure=len(played))
-
-    monkeypatch.setattr(faults, "run", play)
-    for status in (1, 1):
-        assert start("reliability.faults", "--out", tmp_path / "faults.jsonl") == status
-    assert played == names[:1]
-    assert capsys.readouterr().out.count("| 7 |") == 2 * len(names[1:])
-
-
 @pytest.mark.process
 def test_kills(tmp_path: Path, start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     for kills in (1, 2):
@@ -137,18 +85,6 @@ def test_mutated_inputs_go_on_where_they_stopped(
     runs = [json.loads(line) for line in (tmp_path / "host.jsonl").read_text().splitlines()]
     assert [run["shard"] for run in runs] == [1, 2]
     assert all(run["executions"]["drawing"] > 10 for run in runs)
-
-
-@pytest.mark.process
-@pytest.mark.skipif(not shutil.which("clang"), reason="clang is missing (make test installs it when it may)")
-def test_the_codecs_corpus_is_kept(
-    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(codec, "CORPUS", Path(shutil.copy(codec.CORPUS, tmp_path)))
-    monkeypatch.setattr(codec, "FOLDER", tmp_path / "fuzz")
-    assert start("reliability.fuzz.codec", "--seconds", 1) == 0
-    assert "codec, shard 1: none failed" in capsys.readouterr().out
-    assert len((tmp_path / "corpus.txt").read_text().splitlines()) > 10
 
 
 @needs_twin

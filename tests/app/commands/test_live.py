@@ -85,22 +85,6 @@ def test_a_live_run_replays_to_identical_estimates(
     assert (tmp_path / "again/track.csv").read_bytes() == (tmp_path / "live/track.csv").read_bytes()
 
 
-@pytest.mark.long
-def test_two_runs_of_one_seed_are_identical(tmp_path: Path) -> None:
-    runs = [
-        echostep("demo", "--headless", "--seed", seed, "--out", tmp_path / str(k)) for k, seed in enumerate((3, 3, 4))
-    ]
-    assert all(run.returncode == 0 for run in runs), runs[0].stderr
-    first, second, other = (sha_of(run.stdout) for run in runs)
-    assert first == second != other
-    tracks = [
-        (tmp_path / str(k) / name).read_bytes() for k in (0, 1) for name in ("track.csv", "walk.mcap", "truth.csv")
-    ]
-    assert tracks[:3] == tracks[3:]
-    replay = echostep("replay", tmp_path / "0/walk.mcap", "--plan", PLAN, "--headless", "--out", tmp_path / "r")
-    assert sha_of(replay.stdout) == first
-
-
 def records(path: Path) -> bool:
     """Whether bytes of a port are in a recording: its run is under way."""
     try:

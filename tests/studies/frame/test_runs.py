@@ -7,7 +7,6 @@ import configparser
 import math
 import multiprocessing
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -24,10 +23,8 @@ from typer.testing import CliRunner
 
 from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep_app.cli import app
 from echostep_app.commands import studies
 from echostep_app.commands.actions import offline as profiles
-from echostep_studies.commands import OURS, PAPERS, REAL, STUDIES, StudyCommand
 from echostep_studies.frame.report import as_dicts, write_json
 from echostep_studies.frame.runs import Journal, SeededRuns
 from waiting import until
@@ -202,35 +199,6 @@ def test_without_the_distribution_a_command_says_how_to_get_it(name: str, monkey
     assert "pip install echostep-studies" in alone.output
     assert isinstance(asked.exception, EchostepError)
     assert "pip install echostep-studies" in str(asked.exception)
-
-
-@pytest.mark.parametrize(("part", "name"), [("foot", "fischer2008"), ("legs", "lee2010")])
-def test_without_the_distribution_a_profile_says_how_to_get_it(
-    part: str, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert profiles.method(part, name, None) is not None
-    monkeypatch.setattr(profiles, "entry_points", lambda **_: ())
-    with pytest.raises(EchostepError, match="pip install echostep-studies"):
-        profiles.method(part, name, None)
-
-
-@pytest.mark.parametrize("row", STUDIES, ids=lambda row: row.name)
-def test_each_command_has_its_help(row: StudyCommand) -> None:
-    done = CliRunner().invoke(app, ["evaluate", row.name, "--help"], env={"COLUMNS": "150"})
-    assert done.exit_code == 0, done.output
-    assert all(f"--{option.name.replace('_', '-')}" in done.output for option in row.options)
-
-
-def test_the_help_lists_every_study_once_in_its_group_with_its_runs_and_duration() -> None:
-    done = CliRunner().invoke(app, ["evaluate", "--help"], env={"COLUMNS": "100"})
-    assert [group for group in (PAPERS, OURS, REAL) if f"\n{group}:\n" not in done.output] == []
-    listed = re.findall(r"^  (\w+)  +\S", done.output.partition(f"{PAPERS}:")[2], flags=re.M)
-    assert listed == [row.name for group in (PAPERS, OURS, REAL) for row in STUDIES if row.group == group]
-    assert sorted(listed) == sorted(row.name for row in STUDIES)
-    words = " ".join(done.output.split())
-    assert "what they could not handle (simulated). 200 runs: minutes." in words
-    assert "as an order of magnitude on two cores" in words
-    assert all(row.described in words for row in STUDIES)
 
 
 def test_without_a_command_run_nothing_heavy_is_imported() -> None:
