@@ -187,19 +187,6 @@ def test_a_dtr_that_twiggles_does_not(bench: Bench) -> None:
     assert kinds(bench.run(1_000))["Ping"] >= 28
 
 
-@pytest.mark.parametrize("system", ["windows", "macos"])
-def test_the_board_answers_whatever_the_order_of_requests(bench: Bench, system: str) -> None:
-    bench.fault(f"host_system={system}")
-    bench.run(600)
-    assert traces(bench, "^enumerated$")
-    assert traces(bench, "serial number [0-9A-F]{20}$")
-    assert not traces(bench, "no answer")
-    bench.ask(m.ClockQuery(7))
-    found = bench.run(1_000)
-    assert [x.token for x in found if isinstance(x, m.ClockReply)] == [7]
-    assert kinds(found)["Ping"] >= 28
-
-
 BOOTLOADER_MS = 8_000
 
 

@@ -48,27 +48,6 @@ def test_a_board_that_is_well_gets_status_0() -> None:
     assert "ppm" in done.stdout
 
 
-@pytest.mark.long
-@needs_twin
-def test_what_is_wrong_is_said_in_words() -> None:
-    with twin_board("scp1000=no_eeprom", "compass=absent", "calf=no_self_test", "belt=absent") as port:
-        done = doctor("--board", port, "--seconds", 5)
-    assert done.returncode == 1, done.stdout
-    assert "Traceback" not in done.stderr
-    for words in (
-        "barometer: EEPROM check failed",
-        "power-cycle the board, check 3.3 V and the level shifter",
-        "compass: does not answer",
-        "check its plug and 5 V, SDA (D2) and SCL (D3)",
-        "calf gyro: failed its self-test",
-        "belt gyro: does not answer",
-        "firmware 1.8.0",
-        "thigh gyro: answers, 20 degC, self-test passed",
-        "belt gyro: FAILS",
-    ):
-        assert words in done.stdout, (words, done.stdout)
-
-
 @needs_twin
 def test_the_real_firmware_is_well() -> None:
     with twin_board() as port:
@@ -329,12 +308,3 @@ def test_the_report_of_a_board(tmp_path: Path) -> None:
     ):
         assert words in found, (words, found)
     assert str(out) in done.stdout
-
-
-@pytest.mark.process
-def test_without_a_board_there_is_one_clear_error(tmp_path: Path) -> None:
-    done = echostep(
-        "bench-report", "--board", "/dev/no-such-port", "--seconds", 3, "--out", tmp_path / "report.txt", ends=2
-    )
-    assert "there is no such port" in done.stderr
-    assert "Traceback" not in done.stderr

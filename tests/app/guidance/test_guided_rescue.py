@@ -187,12 +187,6 @@ def winding_stairs() -> Plan:
     return Plan("winding", (Level("0", 0.0, walls), Level("1", STOREY_M, walls)), None, "", (stairs,))
 
 
-def test_a_path_through_a_wall_is_noticed() -> None:
-    plan = winding_stairs()
-    assert in_walls(plan, walked([(0.0, 0.0, 0.0, 0.0), (5.0, 1.0, 0.0, 0.0)], 1))
-    assert not in_walls(plan, walked([(0.0, 0.0, 0.0, 0.0), (5.0, -1.0, 0.0, 0.0)], 1))
-
-
 @pytest.mark.parametrize("levels", [(0, 1), (1, 0)])
 def test_winding_stairs_are_walked_between_their_walls(levels: tuple[int, int]) -> None:
     plan = winding_stairs()

@@ -198,15 +198,13 @@ def test_pictures(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["$x^$", "$\\frac{1}", "a\tb\nc", "x" * 5000, "\U0001f600", "$$", "&<>"])
-def test_any_name_is_drawn(tmp_path: Path, name: str) -> None:
-    plan = house(
-        [{"name": name, "walls": box(), "rooms": [{"name": name, "at": [2, 1]}]}] * 2,
-        connectors=[STAIRS | {"name": name}],
-    )
+def test_any_name_is_drawn(tmp_path: Path) -> None:
+    names = ("$x^$", "$\\frac{1}", "a\tb\nc", "x" * 5000, "\U0001f600", "$$", "&<>")
+    levels = [{"name": name, "walls": box(), "rooms": [{"name": name, "at": [2, 1]}]} for name in names]
+    plan = house(levels, connectors=[STAIRS | {"name": name} for name in names])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # letters that the font lacks
-        draw_plan(plan, tmp_path / "plan.svg", [0, 1], None, check_plan(plan))
+        draw_plan(plan, tmp_path / "plan.svg", list(range(len(names))), None, check_plan(plan))
         draw_plan(plan, tmp_path / "plan.png", [0])
     ET.parse(tmp_path / "plan.svg")
 

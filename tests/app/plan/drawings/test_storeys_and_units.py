@@ -138,13 +138,6 @@ def test_a_drawing_without_units_is_asked_about(tmp_path: Path, drawn: str) -> N
         import_plan(drawing(tmp_path / "a.dxf", drawn, None))
 
 
-def test_how_the_units_were_decided(tmp_path: Path) -> None:
-    for hints, words in ((Hints(), "cm ($INSUNITS; sizes fit)"), (Hints(units="cm"), "cm (--units)")):
-        report = ImportReport()
-        import_plan(drawing(tmp_path / "a.dxf", "cm", "cm"), hints, report=report)
-        assert report.units == words
-
-
 def test_a_free_scale(tmp_path: Path) -> None:
     """A scanned drawing, 1 unit being 1.7 cm."""
     path = drawing(tmp_path / "a.dxf", "cm", None)
