@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pytest
 
-from board_runs import ROOT, needs_twin, tool
+from board_runs import needs_twin, tool
 from command_line import PROGRAM, echostep, interrupt_after
 from echostep.errors import EchostepError
 from echostep.plan import load_plan
@@ -29,8 +29,7 @@ from echostep_app.session.last_place import read_kept
 from players import pseudo_terminal
 from snapshots import expect
 from waiting import PATIENCE_S, until
-
-PLAN = ROOT / "host/core/echostep/plans/demo.json"
+from walks import DEMO as PLAN
 
 
 def sha_of(text: str) -> str:

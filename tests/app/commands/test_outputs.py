@@ -18,7 +18,6 @@ from unittest import mock
 import pytest
 from mcap.reader import make_reader
 
-from board_runs import ROOT
 from command_line import PROGRAM, echostep, interrupt_once_called
 from echostep.recording import open_recording
 from echostep_app.cli import main
@@ -26,8 +25,8 @@ from echostep_app.operation.session import TableFeed
 from echostep_app.recording import background_writer
 from players import pseudo_terminal, python_board
 from waiting import PATIENCE_S, until
+from walks import DEMO as PLAN
 
-PLAN = ROOT / "host/core/echostep/plans/demo.json"
 FULL = Path("/dev/full")  # refuses every byte: no space left [full(4)]
 pytestmark = pytest.mark.process
 

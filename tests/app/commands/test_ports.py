@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from board_runs import ROOT, needs_twin
+from board_runs import needs_twin
 from bridges import bridged
 from command_line import echostep, interrupt_after, interrupt_when
 from echostep.ports.chunks import Chunk
@@ -27,9 +27,8 @@ from echostep_app.recording.device import sender
 from echostep_studies.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from players import babbling_port, pseudo_terminal, python_board, walking_twin
 from waiting import PATIENCE_S
+from walks import DEMO as PLAN
 from xsens.mt_lines import on_a_terminal
-
-PLAN = ROOT / "host/core/echostep/plans/demo.json"
 
 
 @contextmanager

@@ -14,7 +14,6 @@ from typing import TextIO
 
 import pytest
 
-from board_runs import ROOT
 from command_line import echostep
 from echostep.file_mode import claim, share_files
 from echostep.ports.chunks import Chunk
@@ -24,6 +23,7 @@ from echostep_app.printing.lines import complain, say, shown
 from echostep_app.printing.stream import QUEUE_BYTES, PeopleStream
 from echostep_app.recording.recorder import Recorder
 from waiting import ends, until
+from walks import DEMO as PLAN
 from walks import walk_chunks
 
 FULL = Path("/dev/full")  # refuses every byte: no space left [full(4)]
@@ -157,9 +157,6 @@ def test_a_console_still_moves_its_own_cursor() -> None:
     console.print("[bold]wall[/bold]")
     assert "\x1b[?25l" in file.getvalue()
     assert "\x1b[1mwall" in file.getvalue()
-
-
-PLAN = ROOT / "host/core/echostep/plans/demo.json"
 
 
 @pytest.fixture(autouse=True)

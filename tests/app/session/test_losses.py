@@ -13,7 +13,6 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from board_runs import ROOT
 from echostep.localization import Estimate, TrackStatus
 from echostep.plan import Pose, load_plan
 from echostep.ports.chunks import BOARD, FOOT, MTX, Chunk, portion_of
@@ -23,9 +22,8 @@ from echostep_app.session import losses
 from echostep_app.session.losses import Arrivals, Losses
 from echostep_app.session.metadata import run_metadata
 from page.frames import told
+from walks import DEMO as PLAN
 from walks import walk_chunks
-
-PLAN = ROOT / "host/core/echostep/plans/demo.json"
 
 
 class Run:

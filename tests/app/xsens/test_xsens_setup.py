@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from board_runs import ROOT
 from command_line import echostep, interrupt_once_called, interrupt_when
 from echostep.ports.chunks import Chunk
 from echostep.recording import open_recording
@@ -24,6 +23,7 @@ from echostep_app.xsens.startup import MtxStart
 from echostep_studies.simulation.devices.mtx_setup import FACTORY, DeviceState, MtxDevice
 from players import pseudo_terminal
 from waiting import PATIENCE_S
+from walks import DEMO as PLAN
 from xsens.mt_lines import SAMPLE, STEP_S, Line, on_a_terminal
 
 
@@ -264,9 +264,6 @@ def test_what_waited_in_the_system_is_no_rate() -> None:
     for k in range(200):
         setup.advance(made.measure(SAMPLE._replace(counter=100 + k)), 1.01 + k * STEP_S)
     assert setup.state is State.UNANSWERED
-
-
-PLAN = ROOT / "host/core/echostep/plans/demo.json"
 
 
 @contextlib.contextmanager
