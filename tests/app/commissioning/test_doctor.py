@@ -13,14 +13,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from board_runs import ROOT, Bench, needs_twin, quiet_rows
+from board_runs import Bench, needs_twin, quiet_rows
 from command_line import echostep
 from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep.ports.chunks import BOARD, Chunk
 from echostep_app.board.faults.health import Severity
 from echostep_app.commissioning import serial_ports as ports
-from echostep_app.commissioning.bench_report import MEASUREMENTS, text
+from echostep_app.commissioning.bench_report import text
 from echostep_app.commissioning.diagnosis import Diagnosis, judge_board, judge_mtx, loop_diagnosis
 from echostep_app.commissioning.doctor import examine
 from echostep_app.commissioning.probe import ProbeResult, _Probe, drift_of, probe
@@ -264,12 +264,6 @@ def test_a_program_that_holds_the_port_is_named_with_the_next_step(tmp_path: Pat
     found = [*ports.holder_findings("board", str(tmp_path / "port"), tmp_path), refusal("/dev/ttyUSB9", tmp_path)]
     expect("doctor", {f"{taker} has the port": found}, FOLDER=tmp_path)
     assert taker_of(processes=tmp_path) == TAKERS.get(taker, "")
-
-
-def test_the_measurements_are_those_of_the_page() -> None:
-    page = (ROOT / "firmware/bench.md").read_text()
-    assert re.findall(r"^## (\d+)\. (.*)$", page, flags=re.M) == [(str(n), t) for n, t in enumerate(MEASUREMENTS, 1)]
-    assert [int(n) for n in re.findall(r"^\| .* \| (\d+) \|$", page, flags=re.M)] == list(range(1, 16))
 
 
 def test_a_gyro_that_varies_at_rest_is_named() -> None:

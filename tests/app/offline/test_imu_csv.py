@@ -174,16 +174,6 @@ def test_a_gigabyte_of_garbage_ends_at_once_and_takes_no_memory(tmp_path: Path, 
         assert time.process_time() - began < 20.0
 
 
-NO_TABLES = ["", "a,b,c\n1,2,3\n", "\x00\x01\x02", HEADER + "\n", HEADER + "\nx,y\n", "0,0,0,9.81,0,0,0\n"]
-
-
-@pytest.mark.parametrize("content", NO_TABLES)
-def test_what_is_no_table_is_named(tmp_path: Path, content: str) -> None:
-    (tmp_path / "x.csv").write_text(content)
-    with pytest.raises(EchostepError, match=r"x\.csv" + ": .*first line must name" * content.startswith("0,")):
-        load_foot(tmp_path / "x.csv")
-
-
 @needs_data("xio_ngimu")
 def test_a_real_walk_ends_where_it_began(tmp_path: Path) -> None:
     raw = np.loadtxt(DATA / "xio_ngimu/short_walk.csv", delimiter=",", skiprows=1)

@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from ezdxf.filemanagement import new
-from typer.testing import CliRunner
 
 from echostep.errors import EchostepError
-from echostep.plan import Plan, load_plan
-from echostep_app.cli import app
+from echostep.plan import Plan
 from echostep_app.plan.importers.dxf import entities as dxf_entities
-from echostep_app.plan.importers.formats import import_plan, open_plan
+from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 
 
@@ -129,27 +127,3 @@ def test_room_numbers_of_blocks(tmp_path: Path) -> None:
     for k, (tag, text) in enumerate(texts.items()):
         beside.add_attrib(tag, text, (6 + 0.5 * (k % 2), 2 - 0.6 * k), layer)
     assert [room.name for room in imported(doc, tmp_path).levels[0].rooms] == ["2.14", "101 Office"]
-
-
-@pytest.mark.long
-@pytest.mark.process
-def test_commands(tmp_path: Path) -> None:
-    doc, _ = with_gap()
-    doc.saveas(tmp_path / "ground.dxf")
-    command = ["plan", "import", str(tmp_path / "ground.dxf"), "-o", str(tmp_path / "plan.json")]
-    done = CliRunner().invoke(app, command)
-    assert done.exit_code == 0
-    assert "ground, 0 m: 9 x 0 m, 2 walls (8 m)" in done.output
-    assert load_plan(tmp_path / "plan.json").digest == open_plan(tmp_path / "ground.dxf").digest
-    again = CliRunner().invoke(app, [*command, "--layer", "walls=A-DOOR", "--layer", "walls=A-W*", "--units", "mm"])
-    assert again.exit_code == 0
-    for wrong, named in (
-        (["--layer", "roofs=A"], "KIND=PATTERN"),
-        (["--layer", "walls"], "KIND"),
-        (["--units", "li"], "--units li"),
-    ):
-        failed = CliRunner().invoke(app, [*command, *wrong])
-        assert isinstance(failed.exception, EchostepError)
-        assert named in str(failed.exception)
-    both = ["plan", "import", str(tmp_path / "a.ifc"), str(tmp_path / "b.ifc"), "-o", str(tmp_path / "plan.json")]
-    assert "only drawings" in str(CliRunner().invoke(app, both).exception)

@@ -153,13 +153,6 @@ def test_files_may_end_in_json(mall: Plan, tmp_path: Path) -> None:
         import_plan(folder(tmp_path / "c", renamed))
 
 
-def test_rooms_without_openings_are_one_cause(tmp_path: Path) -> None:
-    plan = import_plan(folder(tmp_path / "a", without_openings()))
-    (finding,) = check_plan(plan)
-    assert finding.kind == "no door"
-    assert finding.text.startswith("9 rooms have no door, as 'R0'; the level has none at all")
-
-
 def test_assumed_doors_reach_every_room(tmp_path: Path) -> None:
     plan = import_plan(folder(tmp_path / "a", without_openings()), Hints(doors_m=0.9))
     doors = plan.levels[0].doors

@@ -129,16 +129,6 @@ def test_geojson_of_overpass_turbo(tmp_path: Path, name: str) -> None:
     assert len(plan.levels[0].walls) == 4 + 3 + 1  # outline, hole, the wall beside
 
 
-def test_rooms_without_a_level_are_told(tmp_path: Path) -> None:
-    rooms = [way(60, [1, 2, 3, 4, 1], indoor="room", name="Lost"), way(61, [1, 2, 3, 4, 1], indoor="area")]
-    (tmp_path / "a.json").write_text(json.dumps({"elements": [*HOUSE, *rooms]}))
-    report = ImportReport()
-    import_plan(tmp_path / "a.json", report=report)
-    assert report.left_out["room without level"] == 1
-    assert report.left_out["indoor=area without level"] == 1
-    assert report.doubts[0].startswith("1 room has no level and was left out (way 60)")
-
-
 ROOFS = [({"building": kind}, None) for kind in ("roof", "carport", "canopy")]  # without walls, so without doors
 
 

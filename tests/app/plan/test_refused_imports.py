@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from echostep_app.commands.options import windows_of
+from echostep_app.commands.options import layers_of, unit_of, windows_of
 from echostep_app.plan.importers.formats import NEXT_STEPS, PICTURES, import_plan, open_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.imdf import archive
@@ -170,6 +170,10 @@ def test_archives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     }
     said["a PDF with a scale"] = of_import(tmp_path / "a.pdf", Hints(scale_m=1.0))
     said["a window of no size"] = refusal(lambda: windows_of(["1,1,0,2"]))
+    said["a layer of no kind"] = refusal(lambda: layers_of(["roofs=A"]))
+    said["a layer without a pattern"] = refusal(lambda: layers_of(["walls"]))
+    said["no unit"] = refusal(lambda: unit_of("li"))
+    said["two models"] = refusal(lambda: import_plan(tmp_path / "a.ifc", Hints(), [tmp_path / "b.ifc"]))
     expect("plan import refused", said, FOLDER=tmp_path)
 
 

@@ -242,12 +242,6 @@ def test_rates(rate_hz: float, period: int, skip: int) -> None:
     assert (first.payload, second.payload) == (period.to_bytes(2, "big"), skip.to_bytes(2, "big"))
 
 
-@pytest.mark.parametrize("rate_hz", [7.3, 99.9, 1000.0, 196.0, 0.5])
-def test_a_rate_that_cannot_be_is_refused(rate_hz: float) -> None:
-    with pytest.raises(ValueError, match="rate_hz"):
-        project_requests(rate_hz)
-
-
 def test_messages_are_the_ones_of_the_manual() -> None:
     frames = {request.name: encode_frame(request.mid, request.payload).hex() for request in project_requests(100.0)}
     assert frames["ReqOutputMode"] == "faffd00031"  # MT0100P.N, 5.3.2

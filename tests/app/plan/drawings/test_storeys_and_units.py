@@ -132,12 +132,6 @@ def test_a_unit_that_is_possible_but_odd_is_told(tmp_path: Path) -> None:
     assert report.doubts[0].endswith("in centimetres: --units cm?")
 
 
-@pytest.mark.parametrize("drawn", list(METRES))
-def test_a_drawing_without_units_is_asked_about(tmp_path: Path, drawn: str) -> None:
-    with pytest.raises(EchostepError, match=rf"does not say its units.*--units {drawn}$"):
-        import_plan(drawing(tmp_path / "a.dxf", drawn, None))
-
-
 def test_a_free_scale(tmp_path: Path) -> None:
     """A scanned drawing, 1 unit being 1.7 cm."""
     path = drawing(tmp_path / "a.dxf", "cm", None)

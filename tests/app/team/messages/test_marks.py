@@ -178,11 +178,6 @@ def test_of_one_run_the_latest_counts_in_any_order_and_a_board_gives_it_back() -
         assert not board.errands
 
 
-def test_words_for_who_is_sent() -> None:
-    assert ERRAND.words == "Ben sends you to finn, in distress: 2nd floor, in corridor"
-    assert LATER.words == "Ben sends you to kim, in distress"
-
-
 @pytest.mark.parametrize(
     ("topic", "errand", "reason"),
     [
