@@ -75,6 +75,6 @@ def _renew(path: Path, found: Mapping[str, str]) -> None:
     with path.open("a+") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         file.seek(0)
-        known = _paragraphs(file.read()) | found
+        known = _paragraphs(file.read()) | dict(found)
         file.truncate(0)
         file.write("\n".join(f"{HEAD}{case}\n{text}\n" for case, text in sorted(known.items())))

@@ -149,8 +149,9 @@ def test_mistakes_end_with_one_line(tmp_path: Path) -> None:
         settings.write_text(text)
         case = f"settings {text[:20]!r}"
         said[case] = echostep("live", "--plan", PLAN, *TWO_PORTS, "--settings", settings, *out)
-    assert {(done.returncode, done.stderr.count("\n"), done.stdout) for done in said.values()} == {(2, 1, "")}
-    expect("live, record, replay, decode, demo", said, FILE=__file__, FOLDER=tmp_path)
+    assert {(done.returncode, done.stderr.count("\n")) for done in said.values()} == {(2, 1)}
+    printed = {case: re.sub("there are .*", "there are ...", done.stderr) for case, done in said.items()}
+    expect("live, record, replay, decode, demo", printed, FILE=__file__, FOLDER=tmp_path)
 
 
 @pytest.mark.long

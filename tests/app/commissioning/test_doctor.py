@@ -107,10 +107,8 @@ def faults_of(report: Diagnosis) -> list[str]:
 
 def test_a_port_that_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
-    said = {
-        f"port {port}": faults_of(examine(str(port), None, 0.1))
-        for port in ("/dev/no-such-port", tmp_path / "file", "nonsense://x")
-    }
+    places = {"no such port": "/dev/no-such-port", "a file": tmp_path / "file", "no such kind of port": "nonsense://x"}
+    said = {case: faults_of(examine(str(port), None, 0.1)) for case, port in places.items()}
     seen = {
         "nothing is plugged in": [],
         "a board in its bootloader": [PortSeen("/dev/ttyACM9", Role.BOOTLOADER, "Arduino Leonardo")],
@@ -121,12 +119,13 @@ def test_a_port_that_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         report = examine(None, None, 0.1)
         said[case] = [*report.lines, *(str(finding) for finding in report.findings if finding.subject == "board")]
         assert not report.fine
+    expect("doctor", said, FOLDER=tmp_path)
     monkeypatch.setattr(os, "access", lambda *_: False)
     with pseudo_terminal() as (_, port):
         (finding,) = ports.access_findings("board", port)
-        said["no right to open it"] = str(finding)
         owner = f"{Path(port).owner()}:{Path(port).group()}"
-        expect("doctor", said, FOLDER=tmp_path, PORT=port, OWNER=owner, GROUP=Path(port).group())
+        said = {"no right to open it": re.sub(r"-aG \w+", "-aG GROUP", str(finding))}
+        expect("doctor", said, PORT=port, OWNER=owner)
 
 
 @pytest.mark.slow
@@ -146,7 +145,7 @@ def test_a_port_of_something_else() -> None:
             HASH=f"0x{m.SCHEMA_HASH:08X}",
         )
     with pseudo_terminal() as (_, port):
-        said = faults_of(examine(None, port, 2.5))
+        said = [text for text in faults_of(examine(None, port, 2.5)) if "MTx" in text]
         expect("doctor", {"silent MTx": said}, PORT=port)
 
 
