@@ -68,6 +68,10 @@ board: $(READY)
 	@tools/apt.sh $(APT_PACKAGES) $(TEST_PACKAGES) || echo "Tests that need them are skipped and named."
 	@if command -v avr-gcc >/dev/null && [ -e /usr/include/simavr/sim_avr.h ]; then $(MAKE) --quiet -C firmware && $(MAKE) --quiet -C tools/twin; fi
 
+snapshots: $(READY) ## write anew what the tests expect commands to print (tests/snapshots); the difference is read before it is committed
+	rm -f tests/snapshots/*.txt
+	RENEW_SNAPSHOTS=1 $(SUITE) -m "not speed" $$(grep -rl --include="test_*.py" "^from snapshots import" tests)
+
 suite: $(READY) ## the tests of make test, which runs the checks beside them
 	$(SUITE) $(RINGS)
 
@@ -168,4 +172,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: elsewhere help setup firmware twin demo real quick test long board suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak kill hardware docs site licences lock audit flash clean
+.PHONY: elsewhere help setup firmware twin demo real quick test long board suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak kill hardware docs site snapshots licences lock audit flash clean

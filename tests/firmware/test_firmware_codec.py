@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""The firmware's own C, compiled for this machine with its sanitizers: every golden vector, and hostile bytes.
-
-In: firmware/*.c, protocol/vectors.jsonl, tests/firmware/fuzz_codec.c. Out: pass or fail; skipped without a C compiler.
-"""
+"""The firmware's own C, compiled for this machine with its sanitizers: every golden vector, hostile bytes; builds and atomic reads."""
 
 from __future__ import annotations
 
+import configparser
 import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -14,18 +13,17 @@ from typing import Any
 
 import pytest
 
+from board_runs import ELF, ROOT, needs_twin
 from reliability.fuzz import codec as fuzz_codec
+from waiting import PATIENCE_S
 
-ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
 CODEC = [FIRMWARE / name for name in ("cobs.c", "frame.c", "messages.c")]
 FUZZ = [Path(__file__).parent / "fuzz_codec.c", *CODEC, FIRMWARE / "link.c", FIRMWARE / "status.c"]
 FLAGS = ["-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", f"-I{FIRMWARE}", "-fno-sanitize-recover=all"]
 HOST_MESSAGES = ("identify", "clock_query", "configure", "check_gyros", "subscribe")
 TIMEOUT_S = 600  # reached only by a program that hangs
-
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-
 PROLOGUE = """
 #include <stdio.h>
 #include <string.h>
@@ -141,3 +139,31 @@ def test_the_whole_firmware_on_a_hostile_board(tmp_path: Path) -> None:
     done = fuzz_codec.fuzz(program, corpus, 1, *limits, longest=fuzz_codec.WHOLE_LONGEST)
     assert done.returncode == 0, done.stderr[-2000:]
     assert fuzz_codec.executions(done.stderr) >= 5_000
+
+
+def test_platformio_builds_the_same_sources_with_the_same_options() -> None:
+    ini = configparser.ConfigParser()
+    ini.read(ROOT / "platformio.ini")
+    make = (ROOT / "firmware/Makefile").read_text()
+    (optimize,) = re.findall(r"^OPTIMIZE := (.*)$", make, flags=re.M)
+    (linked,) = re.findall(r"\$\(OPTIMIZE\) (-mrelax \S+) -o", make)
+    board, flags = ini["env:micro"], ini["env:micro"]["build_flags"].split()
+    assert flags == ["-std=c11", "-DCLOCK_START=0ul", *optimize.split(), *linked.split()]
+    assert "-std=c11" in make
+    assert re.findall(r"wildcard ([^)]+)\)", make)[:2] == re.findall(r"<(\S+)>", board["build_src_filter"])
+    assert ini["platformio"]["src_dir"] == "firmware"
+
+
+@needs_twin
+@pytest.mark.skipif(
+    not shutil.which("avr-objdump"), reason="avr-objdump is missing (make test installs it when it may)"
+)
+def test_both_timers_are_read_with_interrupts_off() -> None:
+    """An interrupt between the two readings would shift all stamps of the right ranger."""
+    command = ["avr-objdump", "-d", str(ELF)]
+    listing = subprocess.run(command, check=True, capture_output=True, text=True, timeout=PATIENCE_S).stdout
+    steps = re.findall(r"\t(cli|sei|reti?|r?call|out\t0x3f|lds\tr\d+, 0x00(?:84|94))", listing)
+    (timer3,) = [k for k, step in enumerate(steps) if step.endswith("94")]  # wherever the compiler has inlined it
+    assert steps[timer3 - 2] == "cli"
+    assert steps[timer3 - 1].endswith("84")  # no call in between, and no interrupt let in
+    assert steps[timer3 + 1] == "out\t0x3f"

@@ -1,33 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""The real firmware in the simulator: sensors and buses that fail."""
+"""The real firmware in the simulator: sensors and buses that fail, resets, unplugging, a host that does not read, mistakes of its user."""
 
 from __future__ import annotations
 
+import hashlib
 import re
+import subprocess
 
 import numpy as np
 import pytest
 
-from board_runs import ROOT, Bench, kinds, needs_twin, pings, quiet_rows
+from board_runs import ELF, ROOT, TWIN, Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
+from echostep.errors import EchostepError
+from echostep_simulation.devices.board import BoardProcess
+from waiting import PATIENCE_S
 
 pytestmark = needs_twin
-
-
-@pytest.mark.parametrize("kind", ["absent", "nack", "mute"])
-def test_a_ranger_that_fails_does_not_stop_the_other(bench: Bench, kind: str) -> None:
-    bench.run(1_000)
-    bench.fault(f"srf_right={kind}")
-    found = bench.run(3_000)
-    assert len(pings(found, m.Ranger.LEFT)) >= 3 * 14
-    assert {p.outcome for p in pings(found, m.Ranger.RIGHT)[2:]} == {m.Outcome.BUS_ERROR}
-    assert bench.status.errors_ranger_right > 0
-    assert bench.status.fault_ranger_right == m.Fault.NO_ANSWER
-    assert not bench.status.healthy & m.Healthy.RANGER_RIGHT
-    bench.fault("srf_right=ok")
-    bench.run(1_000)
-    assert {p.outcome for p in pings(bench.run(1_000), m.Ranger.RIGHT)} == {m.Outcome.ECHO}
-    assert bench.status.healthy & m.Healthy.RANGER_RIGHT
 
 
 def test_a_ranger_that_hears_nothing_is_no_failure(bench: Bench) -> None:
@@ -63,23 +52,6 @@ def test_a_bus_that_stays_stuck_leaves_the_rest_running(bench: Bench) -> None:
     bench.fault("sda=ok")
     bench.run(1_000)
     assert {p.outcome for p in pings(bench.run(1_000), m.Ranger.LEFT)} == {m.Outcome.ECHO}
-
-
-@pytest.mark.parametrize("name", ["thigh", "calf", "belt"])
-@pytest.mark.parametrize("kind", ["absent", "wrong_channel"])
-def test_a_gyro_that_fails_says_so(bench: Bench, name: str, kind: str) -> None:
-    bench.run(1_000)
-    bench.fault(f"{name}={kind}")
-    bench.run(20)
-    found = [g for g in bench.run(1_500) if isinstance(g, m.Gyros)]
-    assert {getattr(g, name) for g in found} == {-32768}
-    others = {"thigh", "calf", "belt"} - {name}
-    assert all(getattr(g, other) != -32768 for g in found for other in others)
-    assert getattr(bench.status, f"errors_{name}") > 100
-    assert not bench.status.healthy & m.Healthy[name.upper()]
-    cause = m.Fault.NO_ANSWER if kind == "absent" else m.Fault.WRONG_CHANNEL
-    assert getattr(bench.status, f"fault_{name}") == cause
-    assert gyro_health(found_all=bench.messages)[m.Gyro[name.upper()]].temperature == -32768
 
 
 def gyro_health(found_all: list[m.Message]) -> dict[int, m.GyroHealth]:
@@ -137,40 +109,6 @@ def test_a_reset_in_the_middle_of_a_self_test_is_borne(bench: Bench) -> None:
     assert {g.self_test for g in gyro_health(bench.messages).values()} == {m.SelfTest.PASSED}
 
 
-@pytest.mark.parametrize(
-    ("kind", "cause"),
-    [
-        ("absent", m.Fault.NO_ANSWER),
-        ("zeros", m.Fault.NO_ANSWER),
-        ("drdy_stuck", m.Fault.ALWAYS_READY),
-        ("drdy_low", m.Fault.NEVER_READY),
-    ],
-)
-def test_a_barometer_that_fails_says_so(bench: Bench, kind: str, cause: m.Fault) -> None:
-    bench.run(1_000)
-    bench.fault(f"scp1000={kind}")
-    bench.run(4_000)
-    found = bench.run(1_000)
-    assert kinds(found)["Pressure"] == 0
-    assert bench.status.errors_pressure > 0
-    assert bench.status.fault_pressure == cause
-    assert not bench.status.healthy & m.Healthy.PRESSURE
-    assert kinds(found)["Ping"] >= 28
-    bench.fault("scp1000=ok")
-    bench.run(4_000)
-    assert kinds(bench.run(1_000))["Pressure"] >= 8
-
-
-@pytest.mark.parametrize(("kind", "cause"), [("no_eeprom", m.Fault.EEPROM), ("no_start", m.Fault.NEVER_STARTED)])
-def test_a_barometer_that_does_not_start_is_not_believed(bench: Bench, kind: str, cause: m.Fault) -> None:
-    bench.fault(f"scp1000={kind}")
-    assert kinds(bench.run(3_000))["Pressure"] == 0
-    assert bench.status.errors_pressure > 0
-    assert bench.status.fault_pressure == cause
-    bench.fault("scp1000=ok")
-    assert kinds(bench.run(3_000))["Pressure"] >= 8
-
-
 def test_the_barometer_has_two_modes(bench: Bench) -> None:
     rows = quiet_rows(5_000)
     rows["pressure"] = 405_303
@@ -186,21 +124,6 @@ def test_the_barometer_has_two_modes(bench: Bench) -> None:
     assert 42 <= len(fast) <= 46  # 9 Hz
     assert {p.pressure for p in fast} == {405_296}  # 15 bits
     assert bench.status.errors_pressure == 0
-
-
-@pytest.mark.parametrize(
-    ("kind", "cause"),
-    [("absent", m.Fault.NO_ANSWER), ("nack", m.Fault.NO_ANSWER), ("bad_value", m.Fault.BAD_VALUE)],
-)
-def test_a_compass_that_fails_says_so(bench: Bench, kind: str, cause: m.Fault) -> None:
-    bench.run(500)
-    bench.fault(f"compass={kind}")
-    bench.run(200)
-    found = bench.run(2_000)
-    assert not any(isinstance(c, m.Compass) and c.bearing != 65535 for c in found)
-    assert bench.status.errors_compass > 0
-    assert bench.status.fault_compass == cause
-    assert kinds(found)["Ping"] >= 2 * 28
 
 
 def test_a_compass_that_stretches_the_clock_is_borne(bench: Bench) -> None:
@@ -234,3 +157,124 @@ def test_wrong_bits_on_i2c_cost_pings_and_nothing_else(bench: Bench) -> None:
     bench.fault("twi_errors=0")
     bench.run(1_000)
     assert {p.outcome for p in bench.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
+
+
+def test_a_host_that_does_not_read_costs_counted_frames_and_heals_at_once(bench: Bench) -> None:
+    bench.run(1_000)
+    bench.fault("host=stall")
+    assert sum(kinds(bench.run(3_000)).values()) < 60  # what the host had already fetched
+    bench.fault("host=read")
+    found = bench.run(2_000)
+    dropped = sum(v for k, v in bench.status._asdict().items() if k.startswith("dropped_"))
+    assert dropped > 600
+    assert bench.reader.counts.lost == dropped
+    assert bench.reader.counts.rejected == 0  # no torn frame
+    assert kinds(found)["Ping"] >= 2 * 28
+
+
+def test_unplugged_and_plugged_in_again(bench: Bench) -> None:
+    bench.run(1_000)
+    bench.fault("usb=unplug")
+    assert bench.run(1_000) == []
+    bench.fault("usb=plug")
+    found = bench.run(2_000)
+    first = next(x for x in found if isinstance(x, m.Identity))
+    assert first.reset_cause == m.ResetCause.POWER_ON
+    assert first.ticks < 2_000_000
+    assert kinds(found)["Ping"] >= 28
+
+
+def test_a_bus_reset_enumerates_again(bench: Bench) -> None:
+    bench.run(1_000)
+    bench.fault("usb=reset")
+    bench.run(300)
+    assert kinds(bench.run(1_000))["Ping"] >= 28
+
+
+def test_an_echo_of_the_other_ping_is_heard(bench: Bench) -> None:
+    rows = quiet_rows(3_000)
+    rows["own_us"] = 0
+    rows["cross_us"] = [34_000, 0]  # the right ranger's ping reaches the left one
+    found = pings(bench.run(3_000, rows), m.Ranger.LEFT)
+    heard = [p.time_of_flight_us for p in found if p.outcome == m.Outcome.ECHO]
+    assert heard
+    assert len(set(heard)) > len(heard) // 2  # it moves with the jitter, an own echo would stay
+
+
+@pytest.mark.long
+def test_equal_input_gives_equal_bytes() -> None:
+    def run(seed: int) -> str:
+        bench = Bench(BoardProcess([str(TWIN), "--elf", str(ELF), "--seed", str(seed)]))
+        sha = hashlib.sha256()
+        for fault in ("srf_left=nack", "sda=stuck", "usb=unplug", "usb=plug", "host=stall", "host=read"):
+            bench.run(500)
+            bench.fault(fault)
+        bench.run(1_000)
+        for t_ns, part in bench.sent:
+            sha.update(t_ns.to_bytes(8, "little") + part)
+        bench.board.close()
+        return sha.hexdigest()
+
+    assert run(1) == run(1)
+    assert run(1) != run(2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sent", "reason"),
+    [
+        ([], b"Q\0\0\0\0", "no firmware given"),
+        (["--elf", "none.elf"], b"Q\0\0\0\0", "cannot read the firmware"),
+        (["--elf", "/bin/sh"], b"Q\0\0\0\0", "not a program for an AVR"),
+        (["--elf", "/etc/passwd"], b"Q\0\0\0\0", "not a program for an AVR"),
+        (["--elf", str(ELF), "--seed", "x"], b"Q\0\0\0\0", "not a number"),
+        (["--elf", str(ELF), "more"], b"Q\0\0\0\0", "not an option"),
+        (["--elf", str(ELF)], b"", "ends without a record Q"),
+        (["--elf", str(ELF)], b"R\x18\0", "middle of a record"),
+        (["--elf", str(ELF)], b"R\x18\0\0\0abc", "middle of a record"),
+        (["--elf", str(ELF)], b"R\xff\xff\xff\xff", "too long"),
+        (["--elf", str(ELF)], b"R\x05\0\0\0abcde", "not a multiple"),
+        (["--elf", str(ELF)], b"X\0\0\0\0", "unknown record"),
+    ],
+)
+def test_mistakes_are_named(arguments: list[str], sent: bytes, reason: str) -> None:
+    found = subprocess.run([str(TWIN), *arguments], input=sent, capture_output=True, timeout=PATIENCE_S, check=False)
+    lines = found.stderr.decode().splitlines()
+    assert found.returncode == 2
+    assert len(lines) == 1
+    assert reason in lines[0]
+
+
+def test_rangers_keep_power_when_the_processor_is_reset() -> None:
+    """A ping under way goes on: its ranger does not answer until the ranging is over."""
+    bench = Bench()
+    bench.run(1_000)
+    bench.fault("reset=external")
+    bench.run(1_000)
+    bench.board.close()
+    for side in ("left", "right"):
+        t_ns = np.array([t for t, text in bench.board.trace if text == f"trigger {side}"])
+        assert np.diff(t_ns).min() >= 61_000_000
+
+
+def test_nothing_is_read_through_a_stuck_line() -> None:
+    """Whatever the bus is at when the line gets stuck; a byte that is on its way then arrives."""
+    for milliseconds in range(1_045, 1_065):
+        bench = Bench()
+        bench.fault("srf_left=stretch")
+        bench.run(milliseconds)
+        bench.fault("sda=stuck_forever")
+        bench.run(2)
+        found = [x for x in bench.run(100) if isinstance(x, m.Ping)]
+        bench.board.close()
+        assert found
+        assert {p.outcome for p in found} == {m.Outcome.BUS_ERROR}
+
+
+def test_a_twin_that_is_not_there_or_ends_is_named() -> None:
+    with pytest.raises(EchostepError, match="cannot start"):
+        BoardProcess(["/no/such/twin"])
+    board = BoardProcess([str(TWIN), "--elf", str(ELF)])
+    board.fault("nonsense=1")
+    with pytest.raises(EchostepError, match="ended"):
+        board.advance(quiet_rows(1_000))
+    board.close()

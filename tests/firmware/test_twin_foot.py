@@ -124,50 +124,6 @@ def test_the_ranges_are_30_g_and_4000_degrees_a_second(foot: Bench) -> None:
     assert samples(run(foot, 200))[-1][2:] == (32_767, 32_767, 32_767, 30_720, 30_720, 30_720)
 
 
-@pytest.mark.parametrize(
-    ("kind", "cause", "what"),
-    [
-        ("absent", m.Fault.NO_ANSWER, "foot sensor (ICM-20649): does not answer"),
-        ("zeros", m.Fault.NO_ANSWER, "foot sensor (ICM-20649): does not answer"),
-        (
-            "never_ready",
-            m.Fault.NEVER_READY,
-            "foot sensor (ICM-20649): answers, but its data-ready line does not pulse",
-        ),
-        (
-            "stuck_ready",
-            m.Fault.NEVER_READY,
-            "foot sensor (ICM-20649): answers, but its data-ready line does not pulse",
-        ),
-    ],
-)
-def test_a_part_that_fails_is_named_and_comes_back(foot: Bench, kind: str, cause: m.Fault, what: str) -> None:
-    foot.fault(f"icm20649={kind}")
-    run(foot, 600)
-    assert not samples(run(foot, 1_500))
-    said = [x for x in foot.messages if isinstance(x, m.FootHealth)]
-    assert cause in {x.fault for x in said}
-    assert said[-1].foot_state != m.FootState.RUNNING
-    assert [text for text in words(foot) if text.startswith(what)]
-    foot.fault("icm20649=ok")
-    run(foot, 800)
-    assert len(samples(run(foot, 1_000))) > 220
-    assert health(foot).foot_state == m.FootState.RUNNING
-
-
-def test_a_wrong_part_is_named_and_the_board_stays_a_belt_board(bench: Bench) -> None:
-    bench.fault("kit=foot")
-    bench.fault("icm20649=wrong_identity")
-    run(bench, 300)
-    bench.ask(SUBSCRIBE)
-    found = run(bench, 1_500)
-    parts = next(x for x in reversed(found) if isinstance(x, m.Parts))
-    assert (parts.part_foot, parts.identity_foot) == (m.Part.NONE, 0xEA)
-    assert not samples(found)
-    assert kinds(found)["Gyros"]
-    assert any(text.startswith("thigh gyro: an ICM-20948 answers at its chip select") for text in bench.all_findings)
-
-
 def test_a_part_that_is_plugged_in_later_is_found(bench: Bench) -> None:
     bench.fault("kit=foot")
     bench.fault("icm20649=absent")

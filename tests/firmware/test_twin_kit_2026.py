@@ -70,72 +70,6 @@ def test_the_slow_mode_of_the_bmp390(barometer: Bench) -> None:
     assert 5 <= len(pressures(barometer.run(2_000))) <= 7
 
 
-@pytest.mark.parametrize(
-    ("kind", "cause", "words"),
-    [
-        ("absent", m.Fault.NO_ANSWER, "barometer (BMP390): does not answer"),
-        ("zeros", m.Fault.NEVER_READY, "barometer (BMP390): has had no sample for 2 s"),
-        ("stuck_ready", m.Fault.ALWAYS_READY, "barometer (BMP390): reports a sample that it cannot have yet"),
-        ("never_ready", m.Fault.NEVER_READY, "barometer (BMP390): has had no sample for 2 s"),
-    ],
-)
-def test_a_bmp390_that_fails_is_named_and_comes_back(barometer: Bench, kind: str, cause: m.Fault, words: str) -> None:
-    before = kinds(barometer.run(1_000))
-    barometer.fault(f"bmp390={kind}")
-    barometer.run(3_500)
-    assert cause in {x.fault_pressure for x in barometer.messages if isinstance(x, m.Status)}
-    assert any(str(f).startswith(words) for f in barometer.all_findings)
-    barometer.fault("bmp390=ok")
-    barometer.run(4_000)
-    again = kinds(barometer.run(1_000))
-    assert again["Pressure"] >= 12
-    assert again["Gyros"] == pytest.approx(before["Gyros"], abs=2)
-    assert barometer.status.healthy & m.Healthy.PRESSURE
-
-
-@pytest.mark.long
-def test_wrong_bits_from_a_bmp390_are_counted_and_named(barometer: Bench) -> None:
-    """Its identity is read again with each sample; what was measured beside them is sent."""
-    barometer.fault("spi_errors=30")
-    found = [x for _ in range(3) for x in barometer.run(20_000)]  # about one finding in ten seconds
-    words = "barometer (BMP390): sent wrong bits"
-    assert [x for x in barometer.all_findings if x.startswith(words) and "SPI wires" in x]
-    assert kinds(found)["Pressure"] > 200
-
-
-@pytest.mark.parametrize(
-    ("kind", "cause", "words"),
-    [
-        ("wrong_identity", None, "barometer: holds a part that the firmware does not know (identity register 0x58)"),
-        ("empty", m.Fault.EEPROM, "barometer (BMP390): its calibration is empty"),
-    ],
-)
-def test_a_wrong_part_and_an_empty_memory_are_named_at_the_start(
-    bench: Bench, kind: str, cause: m.Fault | None, words: str
-) -> None:
-    bench.fault("part_pressure=bmp390")
-    bench.fault(f"bmp390={kind}")
-    bench.subscribe()
-    bench.run(2_500)
-    assert not pressures(bench.messages)
-    assert cause is None or bench.status.fault_pressure == cause
-    assert any(text.startswith(words) for text in bench.all_findings)
-
-
-def test_barometers_may_be_swapped_in_mid_walk(barometer: Bench) -> None:
-    for part, name in (("scp1000", m.Part.SCP1000), ("bmp390", m.Part.BMP390)):
-        barometer.fault(f"part_pressure={part}")
-        barometer.run(5_000)
-        found = pressures(barometer.run(1_000))
-        assert barometer.parts.part_pressure == name
-        assert np.ptp([x.pressure for x in found]) <= 1
-        assert abs(found[-1].pressure - 405_296) <= 8  # 15 bits of an SCP1000
-
-
-def test_a_board_that_nobody_has_asked_sends_no_parts(bench: Bench) -> None:
-    assert not kinds(bench.run(2_000))["Parts"]
-
-
 def test_the_parts_of_the_papers_are_named(bench: Bench) -> None:
     bench.subscribe()
     bench.run(2_000)
@@ -203,30 +137,6 @@ def test_a_pulse_ranger_hears_the_other_rangers_ping(rangers: Bench) -> None:
     assert {p.time_of_flight_us for p in pings(rangers.messages, m.Ranger.RIGHT)} == {7_000}
 
 
-@pytest.mark.parametrize(
-    ("kind", "cause", "words"),
-    [
-        ("absent", m.Fault.ALWAYS_READY, "left ranger (pulse ranger): its echo line stays high; check its plug"),
-        ("stuck_low", m.Fault.NO_ANSWER, "left ranger (pulse ranger): does not answer its trigger"),
-        ("stuck_high", m.Fault.ALWAYS_READY, "left ranger (pulse ranger): its echo line stays high"),
-    ],
-)
-def test_a_pulse_ranger_that_fails_is_named_and_comes_back(
-    rangers: Bench, kind: str, cause: m.Fault, words: str
-) -> None:
-    rangers.fault(f"pulse_left={kind}")
-    rangers.run(1_200)
-    found = rangers.run(1_000)
-    assert {p.outcome for p in pings(found, m.Ranger.LEFT)} == {m.Outcome.BUS_ERROR}
-    assert len(pings(found, m.Ranger.RIGHT)) >= 14
-    assert rangers.status.fault_ranger_left == cause
-    assert any(text.startswith(words) for text in rangers.all_findings)
-    rangers.fault("pulse_left=ok")
-    rangers.run(1_500)
-    assert {p.outcome for p in pings(rangers.run(1_000), m.Ranger.LEFT)} == {m.Outcome.ECHO}
-    assert rangers.status.healthy & m.Healthy.RANGER_LEFT
-
-
 @pytest.mark.parametrize(("kind", "per_second"), [("deaf", 15), ("held", 11), ("long", 4)])
 def test_a_pulse_ranger_without_an_echo_is_no_failure(rangers: Bench, kind: str, per_second: int) -> None:
     """Also one that holds its line for 70 or 200 ms: it is triggered again when the line is low."""
@@ -286,36 +196,12 @@ def test_rangers_of_two_kinds_are_refused_in_words(bench: Bench) -> None:
     assert bench.parts.wiring == m.Wiring.OK
 
 
-def test_rangers_may_be_swapped_in_mid_walk(rangers: Bench) -> None:
-    for part, name in (("srf02", m.Part.SRF02), ("pulse", m.Part.PULSE)):
-        for side, _ in SIDES:
-            rangers.fault(f"part_ranger_{side}={part}")
-        rangers.run(2_500)
-        found = rangers.run(1_000)
-        assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
-        assert kinds(found)["Ping"] >= 28
-        assert rangers.parts.part_ranger_left == rangers.parts.part_ranger_right == name
-
-
 def test_sync_pulses_are_not_taken_for_a_pulse_ranger(bench: Bench) -> None:
     bench.fault("srf_left=absent")
     bench.fault("srf_right=absent")
     found = bench.run(3_000)
     assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.BUS_ERROR}
     assert kinds(found)["Sync"] >= 290
-
-
-def test_pulse_rangers_survive_a_reset_in_the_middle_of_a_ping(rangers: Bench) -> None:
-    rangers.fault("reset=watchdog")
-    rangers.run(1_500)
-    assert {p.outcome for p in rangers.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
-
-
-def test_a_right_pulse_ranger_answers_after_the_bootloader(rangers: Bench) -> None:
-    """The bootloader leaves PC7, the pin of its LED and of the right echo line, as an output."""
-    rangers.fault("reset=external")
-    rangers.run(9_500)
-    assert {p.outcome for p in pings(rangers.run(1_000), m.Ranger.RIGHT)} == {m.Outcome.ECHO}
 
 
 PLACES = ("thigh", "calf", "belt")
@@ -373,15 +259,6 @@ def test_a_vibration_faster_than_the_samples_is_filtered(imus: Bench) -> None:
     assert np.ptp(forces) < 0.2 / 0.244e-3
 
 
-def test_wrong_bits_from_an_lsm6dso_are_counted_and_named(imus: Bench) -> None:
-    """Its samples carry no checksum: once a second its identity is read again."""
-    imus.fault("spi_errors=100")
-    imus.run(12_000, extended_rows(12_000))
-    assert {m.Fault.BAD_VALUE} <= {x.fault_calf for x in imus.messages if isinstance(x, m.Status)}
-    words = "calf gyro (LSM6DSO): sent wrong bits"
-    assert [x for x in imus.all_findings if x.startswith(words) and "SPI wires" in x]
-
-
 def test_lsm6dso_test_themselves_at_the_start(imus: Bench) -> None:
     newest = {x.gyro: x for x in imus.messages if isinstance(x, m.GyroHealth)}
     assert {x.self_test for x in newest.values()} == {m.SelfTest.PASSED}
@@ -399,38 +276,6 @@ def test_lsm6dso_of_all_boards_pass_their_self_test() -> None:
         bench.board.close()
         tested = [x for x in bench.messages if isinstance(x, m.GyroHealth)]
         assert {x.self_test for x in tested[-3:]} == {m.SelfTest.PASSED}
-
-
-def test_an_lsm6dso_without_a_self_test_is_named(imus: Bench) -> None:
-    imus.fault("imu_calf=no_self_test")
-    imus.ask(m.CheckGyros())
-    imus.run(2_000)
-    (text,) = [str(f) for f in board_findings(reports(imus))]
-    assert text.startswith("calf gyro (LSM6DSO): failed its self-test (responses ")
-    assert "proper are -615 to -2870" in text
-
-
-@pytest.mark.parametrize(
-    ("kind", "cause", "words"),
-    [
-        ("absent", m.Fault.NO_ANSWER, "calf gyro (LSM6DSO): does not answer"),
-        ("zeros", m.Fault.NO_ANSWER, "calf gyro (LSM6DSO): does not answer"),
-        ("never_ready", m.Fault.NEVER_READY, "calf gyro (LSM6DSO): has no new rates"),
-    ],
-)
-def test_an_lsm6dso_that_fails_is_named_and_comes_back(imus: Bench, kind: str, cause: m.Fault, words: str) -> None:
-    imus.fault(f"imu_calf={kind}")
-    imus.run(100)
-    found = imus.run(2_000)
-    assert {x.calf for x in found if isinstance(x, m.Gyros)} == {-32768}
-    assert {x.calf_acceleration_z for x in found if isinstance(x, m.Motion)} == {-32768}
-    assert all(x.thigh == 41 and x.belt == 5 for x in found if isinstance(x, m.Gyros))
-    assert cause in {x.fault_calf for x in found if isinstance(x, m.Status)}
-    assert any(text.startswith(words) for text in imus.all_findings)
-    imus.fault("imu_calf=ok")
-    imus.run(1_500)
-    assert {x.calf for x in imus.run(500) if isinstance(x, m.Gyros)} == {-82}
-    assert imus.status.healthy & m.Healthy.CALF
 
 
 def test_a_saturated_lsm6dso_shows_its_full_scale(imus: Bench) -> None:
@@ -474,15 +319,6 @@ def test_an_imu_that_is_not_plugged_in_has_no_rate(bench: Bench, undefined: str)
     assert not [text for _, text in bench.board.trace if "misreads" in text]
 
 
-def test_a_part_that_is_neither_gyro_is_not_read(bench: Bench) -> None:
-    bench.fault("part_thigh=lsm6dso")
-    bench.fault("imu_thigh=wrong_identity")
-    found = bench.run(2_000)
-    assert {x.thigh for x in found if isinstance(x, m.Gyros)} == {-32768}
-    assert bench.status.errors_thigh
-    assert not kinds(found)["Motion"]
-
-
 @pytest.fixture
 def magnetometer(bench: Bench) -> Bench:
     """A board of the papers with a LIS3MDL, subscribed."""
@@ -505,46 +341,6 @@ def test_the_field_of_a_lis3mdl_comes_at_the_compass_rate(magnetometer: Bench) -
     assert magnetometer.parts.identity_compass == 0x3D
     assert magnetometer.status.errors_compass == 0
     assert kinds(found)["Ping"] >= 56  # the bus is shared with SRF02
-
-
-@pytest.mark.parametrize(
-    ("kind", "cause", "words"),
-    [
-        ("absent", m.Fault.NO_ANSWER, "compass (LIS3MDL): does not answer at I2C address 0x1C or 0x1E"),
-        ("nack", m.Fault.NO_ANSWER, "compass (LIS3MDL): does not answer at I2C address 0x1C or 0x1E"),
-        ("never_ready", m.Fault.NEVER_READY, "compass (LIS3MDL): has no new field"),
-    ],
-)
-def test_a_lis3mdl_that_fails_is_named_and_comes_back(
-    magnetometer: Bench, kind: str, cause: m.Fault, words: str
-) -> None:
-    magnetometer.fault(f"lis3mdl={kind}")
-    magnetometer.run(200)
-    found = magnetometer.run(2_000)
-    assert not fields_of(found)
-    assert cause in {x.fault_compass for x in found if isinstance(x, m.Status)}
-    assert any(text.startswith(words) for text in magnetometer.all_findings)
-    magnetometer.fault("lis3mdl=ok")
-    magnetometer.run(3_000)
-    assert len(fields_of(magnetometer.run(1_000))) >= 9
-    assert magnetometer.status.healthy & m.Healthy.COMPASS
-
-
-def test_a_wrong_magnetometer_is_named(bench: Bench) -> None:
-    bench.fault("part_compass=lis3mdl")
-    bench.fault("lis3mdl=wrong_identity")
-    bench.subscribe()
-    bench.run(2_000)
-    words = "compass: holds a part that the firmware does not know (identity register 0x40)"
-    assert any(text.startswith(words) for text in bench.all_findings)
-
-
-def test_compasses_may_be_swapped_in_mid_walk(magnetometer: Bench) -> None:
-    for part, kind, name in (("cmps10", "Compass", m.Part.CMPS10), ("lis3mdl", "Magnetic", m.Part.LIS3MDL)):
-        magnetometer.fault(f"part_compass={part}")
-        magnetometer.run(3_500)
-        assert kinds(magnetometer.run(1_000))[kind] >= 9
-        assert magnetometer.parts.part_compass == name
 
 
 def test_an_older_host_reads_the_kit_of_2026_but_for_its_compass(bench: Bench) -> None:

@@ -86,31 +86,6 @@ def test_the_other_rangers_ping_moves_with_the_schedule(rangers: Bench) -> None:
     assert np.ptp(heard) > 2_000
 
 
-@pytest.mark.parametrize(
-    ("kind", "cause", "words"),
-    [
-        ("absent", m.Fault.NO_ANSWER, "left ranger (MaxSonar): does not answer at I2C address 0x70"),
-        ("nack", m.Fault.NO_ANSWER, "left ranger (MaxSonar): does not answer at I2C address 0x70"),
-        ("mute", m.Fault.NO_ANSWER, "left ranger (MaxSonar): does not answer at I2C address 0x70"),
-        ("misread", m.Fault.BAD_VALUE, "left ranger (MaxSonar): gives ranges above 765 cm"),
-    ],
-)
-def test_a_maxsonar_that_fails_is_named_and_comes_back(rangers: Bench, kind: str, cause: m.Fault, words: str) -> None:
-    rangers.fault(f"maxsonar_left={kind}")
-    rangers.run(1_500)
-    found = rangers.run(1_000)
-    assert outcomes(found, m.Ranger.LEFT) == {m.Outcome.BUS_ERROR}
-    assert outcomes(found, m.Ranger.RIGHT) == {m.Outcome.ECHO}
-    assert len(pings(found, m.Ranger.RIGHT)) >= 9
-    assert cause in {x.fault_ranger_left for x in rangers.messages if isinstance(x, m.Status)}
-    assert any(text.startswith(words) for text in rangers.all_findings)
-    rangers.fault("maxsonar_left=ok")
-    rangers.run(2_500)
-    found = rangers.run(1_000)
-    assert outcomes(found, m.Ranger.LEFT) == {m.Outcome.ECHO}
-    assert rangers.status.healthy & m.Healthy.RANGER_LEFT
-
-
 def test_a_deaf_maxsonar_reports_no_echo_and_a_long_stretch_of_the_clock_is_borne(rangers: Bench) -> None:
     rangers.fault("maxsonar_right=deaf")
     rangers.run(200)
@@ -120,18 +95,6 @@ def test_a_deaf_maxsonar_reports_no_echo_and_a_long_stretch_of_the_clock_is_born
     found = rangers.run(2_000)
     assert outcomes(found, m.Ranger.RIGHT) == outcomes(found, m.Ranger.LEFT) == {m.Outcome.ECHO}
     assert not rangers.status.bus_recoveries
-
-
-def test_rangers_of_all_kinds_may_be_swapped_in_mid_walk(rangers: Bench) -> None:
-    expected = {"srf02": (m.Part.SRF02, 28), "maxsonar": (m.Part.MAXSONAR, 19), "pulse": (m.Part.PULSE, 28)}
-    for part in ("srf02", "maxsonar", "pulse", "maxsonar", "srf02"):
-        plug(rangers, part)
-        rangers.run(4_000)
-        found = rangers.run(1_000)
-        name, least = expected[part]
-        assert rangers.parts.part_ranger_left == rangers.parts.part_ranger_right == name
-        assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
-        assert least <= kinds(found)["Ping"] <= least + 3
 
 
 @pytest.mark.parametrize(("other", "name"), [("srf02", "an SRF02"), ("pulse", "a pulse ranger")])
@@ -150,12 +113,3 @@ def test_a_maxsonar_beside_another_kind_is_used_alone_and_named(bench: Bench, ot
     bench.run(3_000)
     assert {p.outcome for p in bench.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
     assert bench.parts.wiring == m.Wiring.OK
-
-
-@pytest.mark.long
-def test_maxsonars_survive_a_reset_in_the_middle_of_a_ping(rangers: Bench) -> None:
-    rangers.fault("reset=watchdog")
-    rangers.run(2_000)
-    assert {p.outcome for p in rangers.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
-    rangers.run(1_000)
-    assert not [text for text in rangers.all_findings if "ranger" in text]

@@ -124,11 +124,6 @@ def test_the_commands_of_a_page_run_in_their_order(page: Path, tmp_path: Path) -
             assert done.returncode == 0, f"echostep {line}\n{done.stderr}{done.stdout}"
 
 
-def test_what_is_left_out_stands_on_a_page() -> None:
-    told = {left_out(line) for page in PAGES for line in lines(page)}
-    assert told >= {f"{why} ({begin})" for begin, why in LEFT_OUT.items()}
-
-
 INSTALLED = {line for page in PAGES for line in re.findall(r"pip install (\./host[^`\n]*)", page.read_text())}
 
 

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""The pages are true: generated ones are fresh, links lead somewhere, commands run or exist, examples work."""
+"""The pages are true: generated ones are fresh, links lead somewhere, commands run or exist, examples work, promises name their tests."""
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import shlex
 import subprocess
 import sys
 import tomllib
-from importlib import import_module
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,7 @@ import typer
 from board_runs import ROOT
 from command_line import echostep
 from docs import generate
-from docs.pages import commands, teams
+from docs.pages import teams
 from echostep.plan import load_plan
 from echostep_app.cli import app
 from team.team_broker import Broker, needs_broker
@@ -29,47 +30,17 @@ DECISIONS = sorted((ROOT / "host/docs/decisions").glob("*.md"))
 NOTEBOOK = sorted((ROOT / "host/studies/notebook").glob("*.md"))
 RESULTS = sorted((ROOT / "host/docs/results").glob("*.md"))
 SERIES = (DESIGN, DECISIONS, NOTEBOOK)
-PAGES = [
-    *(
-        ROOT / name
-        for name in (
-            "README.md",
-            "host/README.md",
-            "host/CHANGELOG.md",
-            "host/CONTRIBUTING.md",
-            "host/SECURITY.md",
-        )
-    ),
-    *(
-        ROOT / name
-        for name in (
-            "protocol/README.md",
-            "firmware/README.md",
-            "firmware/bench.md",
-            "firmware/hardware/README.md",
-            "tools/twin/README.md",
-        )
-    ),
-    *MANUAL,
-    *DESIGN,
-    *DECISIONS,
-    *NOTEBOOK,
-    *RESULTS,
-]
+BESIDE = "README.md host/README.md host/CHANGELOG.md host/CONTRIBUTING.md host/SECURITY.md protocol/README.md firmware/README.md firmware/bench.md"
+PAGES = [ROOT / name for name in (*BESIDE.split(), "firmware/hardware/README.md", "tools/twin/README.md")]
+PAGES += [*MANUAL, *DESIGN, *DECISIONS, *NOTEBOOK, *RESULTS]
 # That console blocks may call besides echostep and make
 PROGRAMS = ("python3", ".", ".venv/bin/pip", "pip", "pipx", "sudo")
-
-
-FILE_NAMES = {path.name for folder in ("host", "tools", "tests", "protocol") for path in (ROOT / folder).rglob("*.py")}
-
-
 SOURCE = "\n".join(
     path.read_text()
     for folder in ("host/core", "host/simulation", "host/app", "host/studies", "protocol", "firmware")
     for path in sorted((ROOT / folder).rglob("*"))
     if path.suffix in {".py", ".toml", ".c", ".h", ".js"}
 )
-
 
 RINGS = (ROOT / "host/core/echostep", ROOT / "host/simulation", ROOT / "host/app/echostep_app")
 
@@ -112,35 +83,6 @@ def test_a_series_lists_its_pages(series: list[Path]) -> None:
         assert page == index or f"]({page.name})" in rows, page.name
 
 
-def test_an_entry_of_the_changelog_is_one_line() -> None:
-    _, *entries = (ROOT / "host/CHANGELOG.md").read_text().partition("\n## ")[2].splitlines()
-    assert len(entries) > 50
-    for line in entries:
-        assert line.startswith(("- ", "#")) or not line, line
-        assert len(line) <= 200, line
-
-
-@pytest.mark.parametrize("page", DESIGN, ids=name_of)
-def test_a_page_of_the_design_has_a_length_to_read(page: Path) -> None:
-    assert 40 <= len(page.read_text().splitlines()) <= 130
-
-
-@pytest.mark.parametrize("page", [page for page in DECISIONS if page.name != "README.md"], ids=name_of)
-def test_a_decision_is_short_and_whole(page: Path) -> None:
-    text = page.read_text()
-    assert len(text.splitlines()) <= 25
-    assert re.findall(r"^\*\*(\w+)\.\*\*", text, flags=re.M) == ["Status", "Context", "Decision", "Consequences"]
-    assert re.fullmatch(r"\d{4}-[a-z0-9-]+\.md", page.name)
-    assert text.startswith(f"# {int(page.name[:4])}. ")
-
-
-@pytest.mark.parametrize("page", [page for page in NOTEBOOK if page.name != "README.md"], ids=name_of)
-def test_a_page_of_the_notebook_is_whole(page: Path) -> None:
-    text = page.read_text()
-    assert re.findall(r"^\*\*(\w+)\.\*\*", text, flags=re.M) == ["Question", "Change", "Command", "Seeds"]
-    assert re.findall(r"^## (.*)$", text, flags=re.M) == ["Measured", "Verdict"]
-
-
 @pytest.mark.parametrize("page", DESIGN, ids=name_of)
 def test_a_name_in_the_design_stands_in_the_code(page: Path) -> None:
     """`Class.method`, `function_name` and `CONSTANT` of the text, wherever in the package, the settings or the protocol."""
@@ -154,13 +96,6 @@ def test_a_named_file_of_the_project_exists(page: Path) -> None:
     roots = (ROOT, *RINGS, page.parent)
     for path in re.findall(r"`((?:[\w.-]+/)+[\w-]+\.(?:py|c|h|toml|js|md))`", page.read_text()):
         assert "NAME" in path or any((root / path).exists() for root in roots), path
-
-
-@pytest.mark.parametrize("page", [page for page in PAGES if page.name != "CHANGELOG.md"], ids=name_of)
-def test_a_file_named_without_its_folder_exists(page: Path) -> None:
-    """`estimate.py` and the like in the text."""
-    names = set(re.findall(r"`([a-z][a-z0-9_]*\.py)`", page.read_text()))
-    assert names <= FILE_NAMES, names - FILE_NAMES
 
 
 @pytest.mark.parametrize("flow", ["echo", "step", "tap", "plan file"])
@@ -181,31 +116,6 @@ def test_every_make_target_that_is_named_exists() -> None:
     targets = {line.split()[0] for line in listed.splitlines()}
     assert {"setup", "firmware", "twin", "demo", "test", "check", "size", "bench", "flash", "clean", "help"} <= targets
     assert {m for page in PAGES for m in re.findall(r"`make ([a-z-]+)", page.read_text())} <= targets
-
-
-def test_the_readme_has_exactly_two_commands() -> None:
-    assert [block.strip() for block in blocks(ROOT / "README.md", "sh")] == ["make demo", "make test"]
-
-
-def test_every_command_and_option_has_its_row() -> None:
-    text = (ROOT / "host/docs/commands.md").read_text()
-    usage = echostep("cut", "--help", env={"COLUMNS": "200"}).stdout
-    section = text.split("## echostep cut\n")[1].split("\n## ")[0]
-    options = set(re.findall(r"`(--[a-z-]+)`", section))
-    assert options == {"--out", "--from", "--to"}
-    assert all(option in usage for option in options)
-    assert [name for name, _ in commands.commands("echostep", app)][:3] == [
-        "echostep demo",
-        "echostep live",
-        "echostep record",
-    ]
-
-
-def test_every_public_name_has_its_docstring() -> None:
-    page = (ROOT / "host/docs/python.md").read_text()
-    for package in ("echostep", "echostep.plan", "echostep.foot", "echostep.xsens"):
-        for name in import_module(package).__all__:
-            assert f"## {package}.{name}" in page or f"### {name}" in page or name == "messages", name
 
 
 def test_every_field_of_plan_and_report_is_explained() -> None:
@@ -307,31 +217,6 @@ def test_an_install_line_names_what_there_is(page: Path) -> None:
                 assert set(extras.rstrip("]").split(",")) <= set(project["optional-dependencies"]), span
 
 
-def test_the_readme_says_what_it_is_before_its_commands() -> None:
-    first = (ROOT / "README.md").read_text().partition("## Two commands")[0]
-    project = tomllib.loads((ROOT / "host/core/pyproject.toml").read_text())["project"]
-    for words in (
-        f"`version {project['version']}`",
-        f"Python {project['requires-python'].removeprefix('>=')} or newer",
-        f"`{project['license']}`",
-    ):
-        assert words in first, words
-    for words in ("**For** ", "**Not built in hardware yet.**", "host/pictures/page.webp"):
-        assert words in first, words
-
-
-def test_the_readme_is_short() -> None:
-    text = (ROOT / "README.md").read_text()
-    assert len(text.splitlines()) <= 90
-    assert len(text.split()) <= 600
-
-
-def test_the_results_stand_beside_those_of_others() -> None:
-    rows = re.findall(r"^\|.*\|$", (ROOT / "host/docs/results.md").read_text(), flags=re.M)
-    for other in ("AMCL", "OpenShoe", "PyShoe", "FootSLAM", "UWB"):
-        assert any(other in row for row in rows), other
-
-
 def test_a_question_about_the_code_is_answered_in_two_hops() -> None:
     """README -> design/README, whose table names files, and functions that stand in one of them."""
     assert "(host/docs/design/README.md)" in (ROOT / "README.md").read_text()
@@ -347,14 +232,49 @@ def test_a_question_about_the_code_is_answered_in_two_hops() -> None:
             assert re.search(rf"\b{name}\b", source), (question, name)
 
 
-def test_the_readme_leads_to_every_page() -> None:
-    """By the manual's index, which lists them all."""
-    text = (ROOT / "README.md").read_text()
-    for page in (
-        "host/docs/README.md",
-        "host/docs/results.md",
-        "host/docs/design/README.md",
-        "firmware/README.md",
-        "protocol/README.md",
-    ):
-        assert f"({page})" in text, page
+# Page, and the title of its table: | promise | shown by |
+TABLES = {
+    "host/docs/recordings.md": "What is promised",
+}
+
+SECURITY = "host/SECURITY.md"  # several tables, whose last column names the test; what is not defended has none
+NAMED = re.compile(r"`(?:tests/)?([\w/]+\.py)::(\w+)`")  # a test, its file from tests/ on
+
+
+@cache
+def names_in(path: Path) -> frozenset[str]:
+    """Names of the test functions of a file."""
+    tree = ast.parse(path.read_text())
+    return frozenset(f.name for f in tree.body if isinstance(f, ast.FunctionDef) and f.name.startswith("test_"))
+
+
+def promises(page: str) -> list[tuple[str, str]]:
+    """The rows of the page's table: promise, what it is shown by."""
+    text = (ROOT / page).read_text()
+    section = text.partition(f"## {TABLES[page]}\n")[2].partition("\n## ")[0]
+    rows = [re.split(r"(?<!\\) \| ", line.strip("| \n")) for line in section.splitlines() if line.startswith("| ")]
+    assert rows, f"{page}: no table under {TABLES[page]!r}"
+    assert all(len(row) == 2 for row in rows), rows
+    return [(promise, shown_by) for promise, shown_by in rows[1:]]
+
+
+@pytest.mark.parametrize("page", TABLES)
+def test_each_promise_names_its_tests(page: str) -> None:
+    rows = promises(page)
+    assert len(rows) >= 5
+    assert not [promise for promise, shown_by in rows if not NAMED.search(shown_by)]
+
+
+def test_each_promise_of_security_names_its_test() -> None:
+    promised = (ROOT / SECURITY).read_text().partition("## Not defended")[0]
+    rows = [line for line in promised.splitlines() if line.startswith("| ") and not line.endswith("| test |")]
+    assert len(rows) > 30
+    assert not [row for row in rows if not NAMED.search(row.rsplit(" | ", 1)[1])]
+
+
+@pytest.mark.parametrize("page", [*TABLES, SECURITY])
+def test_the_named_tests_exist(page: str) -> None:
+    for file, name in NAMED.findall((ROOT / page).read_text()):
+        path = ROOT / "tests" / file
+        assert path.is_file(), f"{page}: no file tests/{file}"
+        assert name in names_in(path), f"{page}: tests/{file} has no {name}"

@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A researcher's visit: the notebooks of the manual run as they stand, and show tables, pictures and small errors.
-
-The cells run in this process, one after the other, as a notebook's kernel runs them.
-The examples in the docstrings of the public names run as they stand in docs/python.md.
-"""
+"""A researcher's visit: notebooks and examples run as they stand, in this process as in a notebook's kernel; the benchmark measures."""
 
 from __future__ import annotations
 
@@ -24,10 +20,10 @@ from packaging.requirements import Requirement
 import echostep
 from board_runs import ROOT
 from echostep_app.extras import EXTRAS
+from waiting import PATIENCE_S
 from walks import DEMO
 
 FOLDER = ROOT / "host/docs/notebooks"
-NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 
 
 def cells(path: Path) -> list[dict[str, Any]]:
@@ -63,28 +59,6 @@ def run(name: str, monkeypatch: pytest.MonkeyPatch, folder: Path) -> tuple[dict[
         if isinstance(last, ast.Expr):
             shown.append(eval(compile(ast.Expression(last.value), f"{name}.ipynb, cell {number}", "eval"), names))
     return names, shown
-
-
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_is_kept_without_outputs(path: Path) -> None:
-    tree = json.loads(path.read_text())
-    assert (tree["nbformat"], tree["nbformat_minor"]) == (4, 4)
-    assert cells(path)[0]["source"][0].startswith("# ")
-    for cell in cells(path):
-        assert set(cell) == {"cell_type", "metadata", "source"} | (
-            {"execution_count", "outputs"} if cell["cell_type"] == "code" else set()
-        )
-        assert not cell.get("outputs")
-        assert cell.get("execution_count") is None
-
-
-def test_the_page_lists_them() -> None:
-    assert len(NOTEBOOKS) == 3
-    assert re.findall(r"\((\w+\.ipynb)\)", (FOLDER / "README.md").read_text()) == [
-        "first_track.ipynb",
-        "foot_error.ipynb",
-        "inside.ipynb",
-    ]
 
 
 @pytest.mark.process
@@ -145,8 +119,18 @@ def test_an_example_gives_what_it_says(name: str, tmp_path: Path, monkeypatch: p
     assert not failed, "".join(said)
 
 
-def test_the_page_shows_them_as_code() -> None:
-    page = (ROOT / "host/docs/python.md").read_text()
-    for name in WITH_EXAMPLE:
-        section = page.partition(f"### {name}\n")[2].partition("\n### ")[0]
-        assert "```python\n>>> import echostep\n" in section, name
+@pytest.mark.long
+@pytest.mark.process
+def test_a_tiny_benchmark(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "echostep_studies.speed.bench", "--tiny", "--out", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=10.0 * PATIENCE_S, check=False)
+    assert done.returncode == 0, done.stderr
+    rows = json.loads((tmp_path / "bench.json").read_text())
+    assert len(rows) >= 8
+    for row in rows:
+        assert set(row) == {"name", "ratio", "median_s", "peer_s"}
+        assert row["name"].split(";")[0] in done.stdout.replace("\n", " ")
+        assert row["ratio"] > 0.0
+        assert row["median_s"] > 0.0
+        assert row["peer_s"] > 0.0
+    assert (tmp_path / "bench.png").stat().st_size > 1000

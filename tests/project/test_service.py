@@ -7,24 +7,18 @@ import os
 import re
 import shlex
 import shutil
-import signal
 import subprocess
 import sys
-import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from board_runs import ROOT, needs_twin
+from board_runs import ROOT
 from echostep.board import messages as m
 from echostep.board.frames import encode
-from echostep.kernel_cache import PACKAGE, cache_folder
-from free_ports import free_port
-from page.frames import fetched
-from players import babbling_port, twin_board
-from users import ANOTHER_USER, AS_ANOTHER_USER, needs_another_user
-from waiting import PATIENCE_S, until
+from players import babbling_port
+from waiting import PATIENCE_S
 
 PYTHON = [sys.executable, "-m", "echostep"]
 MANUAL = (ROOT / "host/docs/page.md").read_text()
@@ -130,72 +124,3 @@ def test_it_records_as_another_user_on_a_read_only_system(
     assert lines[:2] == ["1000", "read-only"]
     assert "walk.mcap" in lines
     assert "echostep" in lines[lines.index("walk.mcap") :], "no kernels in their folder"
-
-
-@pytest.fixture
-def folder() -> Iterator[Path]:
-    """With `out` and `temporary` for another user; `temporary` has the kernels that are compiled already, as if by that user."""
-    with tempfile.TemporaryDirectory() as name:
-        kernels = Path(name) / f"temporary/echostep-kernels-{ANOTHER_USER}"
-        for source in Path(PACKAGE).rglob("*.py"):
-            compiled = cache_folder(str(source))
-            if compiled and compiled.is_dir():
-                inside = source.parent.relative_to(Path(PACKAGE).parent) / compiled.name
-                shutil.copytree(compiled, kernels / inside, dirs_exist_ok=True)
-        (Path(name) / "out").mkdir()
-        kernels.mkdir(parents=True, exist_ok=True)
-        for path in (Path(name), *Path(name).rglob("*")):
-            os.chown(path, ANOTHER_USER, ANOTHER_USER)
-        kernels.chmod(0o700)
-        yield Path(name)
-
-
-@needs_twin
-@needs_another_user
-@pytest.mark.long
-@pytest.mark.process
-@pytest.mark.twin
-def test_another_user_tracks_replays_and_looks_with_an_installation_that_only_root_can_write(folder: Path) -> None:
-    environment = {"PATH": os.environ["PATH"], "PYTHONPATH": os.pathsep.join(sys.path), "HOME": "/nonexistent"}
-    environment |= {"TMPDIR": str(folder / "temporary"), "NUMBA_CACHE_DIR": "/proc"}
-    plan, out, log = ROOT / "host/core/echostep/plans/demo.json", folder / "out", folder / "log"
-    program = [*AS_ANOTHER_USER, *PYTHON]
-    with twin_board() as port, log.open("w") as printed:
-        os.chmod(port, 0o666)  # noqa: PTH101 (a port, not a file)
-        command = [
-            *program,
-            "live",
-            "--plan",
-            plan,
-            "--board",
-            port,
-            "--out",
-            out,
-            "--page",
-            "--port",
-            str(free_port()),
-        ]
-        run = subprocess.Popen(
-            list(map(str, command)), env=environment, cwd=out, stdout=printed, stderr=subprocess.STDOUT
-        )
-        try:
-            assert until(lambda: "The page: " in log.read_text() or run.poll() is not None, 5.0 * PATIENCE_S)
-            assert run.poll() is None, log.read_text()
-            (address,) = re.findall(r"The page: (\S+)", log.read_text())
-            assert fetched(address).status == 200
-            assert until(lambda: (out / "walk.mcap").exists() and (out / "walk.mcap").stat().st_size > 20_000)
-        finally:
-            run.send_signal(signal.SIGINT)
-        assert run.wait(timeout=PATIENCE_S) == 0, log.read_text()
-    replay = subprocess.run(
-        [*program, "replay", out / "walk.mcap", "--plan", plan, "--out", out / "again", "--headless"],
-        capture_output=True, text=True, env=environment, cwd=out, timeout=5.0 * PATIENCE_S, check=False,
-    )  # fmt: skip
-    assert replay.returncode == 0, replay.stderr
-    kept = folder / f"temporary/echostep-kernels-{ANOTHER_USER}"
-    for said in (log.read_text(), replay.stderr):
-        assert said.count(f"NUMBA_CACHE_DIR: /proc cannot be written: compiled kernels are kept in {kept}") == 1
-        assert "Traceback" not in said
-        assert "atplotlib" not in said
-    assert list(kept.glob("echostep/*/*/*/*.nbi"))
-    assert {path.stat().st_uid for path in out.rglob("*")} == {ANOTHER_USER}

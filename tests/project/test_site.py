@@ -6,10 +6,8 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from html import unescape
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import pytest
 
@@ -18,8 +16,6 @@ from page.browser import opened_page
 from waiting import PATIENCE_S
 
 pytestmark = [pytest.mark.process, pytest.mark.long]
-
-LOADED = re.compile(r"<(?:script|img|source|iframe|link(?! rel=\"canonical\"))\b[^>]*?\b(?:src|href)=\"([^\"]+)\"")
 
 
 def build(source: Path, out: Path, *more: str) -> subprocess.CompletedProcess[str]:
@@ -38,57 +34,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     return out
-
-
-def pages(site: Path) -> list[Path]:
-    return [page for page in site.rglob("*.html") if "_static" not in page.parts]
-
-
-def test_make_site_builds_as_this_test_does() -> None:
-    recipe = (ROOT / "Makefile").read_text().partition("\nsite:")[2].partition("\n\n")[0]
-    assert "sphinx-build -q -n -W --keep-going -c tools/docs/manual" in recipe
-    assert " out/site" in recipe
-
-
-@pytest.mark.long
-def test_each_page_of_the_manual_is_in_the_contents(site: Path) -> None:
-    contents = (site / "index.html").read_text()
-    listed = re.findall(r"^\| \[[^]]+\]\(([^)]+)\.md\)", (ROOT / "host/docs/README.md").read_text(), flags=re.M)
-    assert len(listed) > 15
-    assert re.findall(r'class="caption-text">([^<]+)<', contents) == ["Use", "Results", "How it is built"]
-    for name in listed:
-        page = (site / "host/docs" / f"{name}.html").resolve().relative_to(site.resolve())
-        assert re.search(rf'toctree-l1(?: has-children)?"><a class="reference internal" href="{page}"', contents), name
-
-
-@pytest.mark.long
-def test_links_lead_to_a_file_and_to_an_anchor_of_it(site: Path) -> None:
-    anchors = {page: set(re.findall(r'\bid="([^"]+)"', page.read_text())) for page in pages(site)}
-    checked = 0
-    for page in anchors:
-        for raw in re.findall(r'\b(?:href|src)="([^"]+)"', page.read_text()):
-            target, _, anchor = unescape(raw).partition("#")
-            if target.startswith(("http:", "https:", "data:", "mailto:")):
-                continue
-            path = (page.parent / unquote(target.partition("?")[0])).resolve() if target else page
-            assert path.exists(), f"{page}: {raw}"
-            assert not anchor or path not in anchors or unquote(anchor) in anchors[path], f"{page}: {raw}"
-            checked += 1
-    assert checked > 500
-
-
-def test_nothing_is_loaded_from_the_network(site: Path) -> None:
-    for page in pages(site):
-        for source in LOADED.findall(page.read_text()):
-            assert not source.startswith(("http:", "https:", "//")), f"{page}: {source}"
-    for style in (site / "_static").rglob("*.css"):
-        assert not re.search(r"(?:@import|url\()\s*['\"]?(?:https?:)?//", style.read_text()), style
-
-
-def test_the_python_api_is_in_the_site(site: Path) -> None:
-    api = (site / "host/docs/python.html").read_text()
-    for name in ("Tracker", "read_capture", "walk_track", "load_plan", "MtxReader"):
-        assert re.search(rf"<h3>{name}<", api), name
 
 
 @pytest.mark.long

@@ -322,9 +322,3 @@ def test_the_peer_is_run_where_it_is_named(rows: str, peers: int) -> None:
     names = anywhere_study(None, rows).run.args[0]  # type: ignore[attr-defined]
     assert sum(name.endswith(PEER) for name in names) == peers
     assert peers in (0, len(names))
-
-
-def test_an_unknown_row_is_answered_by_those_that_there_are(tmp_path: Path) -> None:
-    found = echostep("evaluate", "anywhere", "--rows", "nothing", cwd=tmp_path)
-    assert found.returncode != 0
-    assert "start/exact" in found.stderr

@@ -22,7 +22,7 @@ from echostep.path import MeasuredSegment
 from echostep.plan import Plan
 from echostep_studies.bench.filtering import Claim, FilterRun
 from echostep_studies.bench.laser.building import building_of, hear, walk_from
-from echostep_studies.bench.laser.carmen_log import CarmenLog, logs_in, read_log
+from echostep_studies.bench.laser.carmen_log import CarmenLog, read_log
 from echostep_studies.bench.laser.odometry import calibrated, odometry_of
 from echostep_studies.bench.laser.wall_lines import straight_pieces, wall_segments
 from echostep_studies.clutter import study
@@ -94,17 +94,6 @@ def test_damaged_archives_are_answered_with_the_line(tmp_path: Path) -> None:
         path.write_bytes(content)
         with pytest.raises(EchostepError, match=r"cut\.log\.gz: cannot be read after line"):
             read_log(path)
-
-
-def test_folders_without_logs_and_with_twins(tmp_path: Path) -> None:
-    with pytest.raises(EchostepError, match="no such folder"):
-        logs_in(tmp_path / "nowhere")
-    with pytest.raises(EchostepError, match="no CARMEN log"):
-        logs_in(tmp_path)
-    (tmp_path / "a.log").touch()
-    (tmp_path / "a-corrected.log.gz").touch()
-    with pytest.raises(EchostepError, match="two logs are named a"):
-        logs_in(tmp_path)
 
 
 # ---- the plans ----
@@ -256,11 +245,3 @@ def test_unknown_starts_lie_where_the_log_goes_on(log_file: Path, monkeypatch: p
     assert len(starts) > 50
     last = walk_from(building_of(log_file, 1), max(starts), 2.0)
     assert last.walked_m[-1] >= 2.0
-
-
-def test_the_command_names_a_bad_log(tmp_path: Path) -> None:
-    (tmp_path / "bad.log").write_bytes(SCAN * 3 + b"FLASER 90 1.0\n")
-    found = echostep("evaluate", "clutter", "--data", str(tmp_path), cwd=tmp_path)
-    assert found.returncode != 0
-    assert "bad.log: line 4" in found.stderr
-    assert "Traceback" not in found.stderr

@@ -55,16 +55,6 @@ def values(rows: list[Row], group: str, metric: str) -> list[float]:
     return found
 
 
-@pytest.mark.long
-@needs_recordings
-def test_rows_have_the_promised_form(rows: list[Row]) -> None:
-    for row in rows:
-        assert set(row) == {"set", "recording", "metric", "value", "distance_m", "peer", "peer_name"}
-        assert math.isfinite(row["value"])
-        assert row["set"] == "live" or row["distance_m"] > 4.0
-        assert (row["peer"] is None) == (row["peer_name"] is None)
-
-
 @needs_recordings
 def test_motion_capture(rows: list[Row]) -> None:
     assert median(values(rows, "vicon", "2D RMSE")) <= 0.055

@@ -11,7 +11,7 @@ import pytest
 from command_line import echostep
 from echostep.errors import EchostepError
 from echostep_studies.importers.study import buildings_in, importers_study
-from plan.drawings.drawn_houses import Gap, loose, outlines, write_house
+from plan.drawings.drawn_houses import write_house
 from plan.test_plan_importer_imdf import files
 from plan.test_plan_importer_imdf import folder as write_venue
 
@@ -21,7 +21,7 @@ def folder(tmp_path: Path) -> Path:
     """A drawing, one in wrong units, a format that is not read, a building of several files, and what is none."""
     drawings = tmp_path / "drawings"
     drawings.mkdir()
-    write_house(drawings / "house.dxf", outlines, loose, Gap())
+    write_house(drawings / "house.dxf")
     (drawings / "plan.dwg").write_bytes(b"AC1032")
     (drawings / "notes.txt").write_text("x")
     wrong = (drawings / "house.dxf").read_text().replace("$INSUNITS\n 70\n6\n", "$INSUNITS\n 70\n4\n")

@@ -1,46 +1,27 @@
 # SPDX-License-Identifier: MIT
-"""Every tool of tools/ starts and says what it is for; those without a test of their own run in small; what Makefile and pages name exists."""
+"""Every tool of tools/ starts and says what it is for; those without a test of their own run in small; the twin in real time."""
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import json
+import os
 import re
-import shutil
+import signal
+import subprocess
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
-from board_runs import ROOT, needs_twin
-from command_line import echostep
+from board_runs import ROOT, needs_twin, tool
 from echostep_app.recording.recorder import Recorder
 from echostep_studies.speed import stages
-from release import same_bits, tested_versions
-from reliability import campaign, faults
-from reliability.fault_outcomes import FaultOutcome
-from reliability.fuzz import codec, host
+from reliability.fuzz import host
+from waiting import PATIENCE_S, until
 from walks import walk_chunks
 
-HERE = "tools/test_tools.py"
-STARTED_BY = {
-    "docs.generate": HERE,
-    "hardware.boxes": "tools/test_boxes.py",
-    "hardware.nets": HERE,
-    "release.licences": "tools/test_licences.py",
-    "release.same_bits": HERE,
-    "release.sizes": "tools/test_sizes.py",
-    "release.tested_versions": HERE,
-    "release.wheel": "tools/test_wheel.py",
-    "reliability.faults": HERE,
-    "reliability.fuzz.codec": HERE,
-    "reliability.fuzz.host": HERE,
-    "reliability.kill_recorder": HERE,
-    "reliability.soak": "tools/test_faults.py",
-    "twin.measure": HERE,
-    "twin.run": "app/commands/test_live.py",
-}
 Start = Callable[..., int | None]
 
 
@@ -62,12 +43,6 @@ def tools() -> list[str]:
     return [".".join(path.relative_to(ROOT / "tools").with_suffix("").parts) for path in files]
 
 
-def test_every_tool_is_started_by_a_test() -> None:
-    assert tools() == sorted(STARTED_BY)
-    for name, test in STARTED_BY.items():
-        assert name.rpartition(".")[2] in (ROOT / "tests" / test).read_text(), name
-
-
 @pytest.mark.parametrize("name", tools())
 def test_every_tool_says_what_it_is_for(name: str, start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
@@ -76,15 +51,6 @@ def test_every_tool_says_what_it_is_for(name: str, start: Start, capsys: pytest.
     said = " ".join(capsys.readouterr().out.split())
     assert "usage:" in said
     assert len(said.partition("options:")[0]) > 60
-
-
-def test_what_the_makefile_and_the_pages_start_exists() -> None:
-    pages = [*(ROOT / "host").glob("*.md"), *(ROOT / "host/docs").glob("*.md"), ROOT / "tools/twin/README.md"]
-    named = set(re.findall(r"\$\(TOOL\) ([\w.]+)", (ROOT / "Makefile").read_text()))
-    for page in pages:
-        named |= set(re.findall(r"PYTHONPATH=tools\S*\s+\.venv/bin/python\s+-m\s+([a-z_.]+)", page.read_text()))
-    assert len(named) > 12
-    assert named <= set(STARTED_BY) | {"twin.line_foot"}  # which app/commands/test_lines.py starts
 
 
 def test_stages_of_a_replay_sum_up(tmp_path: Path, start: Start, capsys: pytest.CaptureFixture[str]) -> None:
@@ -96,51 +62,6 @@ def test_stages_of_a_replay_sum_up(tmp_path: Path, start: Start, capsys: pytest.
     ms = {name: float(value) for name, value in rows}
     assert {"foot samples", "cloud and estimates", "replay"} <= ms.keys()
     assert ms["replay"] == pytest.approx(ms["bytes to legs and pings"] + ms["cloud and estimates"], abs=0.2)
-
-
-def test_the_pages_are_compared(start: Start) -> None:
-    assert start("docs.generate", "--check") == 0
-
-
-@pytest.mark.process
-def test_the_versions_are_written(tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tested_versions, "FILE", tmp_path / "versions.txt")
-    uv = tmp_path / "uv"
-    uv.write_text("#!/bin/sh\ncat\n")  # without the network: no hashes
-    uv.chmod(0o755)
-    assert start("release.tested_versions", "--uv", uv) == 0
-    assert re.search(r"^numpy==[\d.]+$", (tmp_path / "versions.txt").read_text(), flags=re.M)
-
-
-@pytest.mark.long
-@pytest.mark.process
-def test_same_bits_are_digests(
-    start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    (tmp_path / "tests/captures").mkdir(parents=True)
-    capture = Path(shutil.copy(ROOT / "tests/captures/board.bin", tmp_path / "tests/captures"))
-    monkeypatch.setattr(same_bits, "ROOT", tmp_path)
-    assert start("release.same_bits", "--only", "captures") == 0
-    assert capsys.readouterr().out == f"decode/board.bin {same_bits.sha256(echostep('decode', capture).stdout)}\n"
-
-
-def test_faults_go_on_where_they_stopped(
-    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    journal, played = campaign.CampaignJournal(tmp_path / "faults.jsonl"), list[str]()
-    names = list(faults.matrix(tmp_path))
-    for name in names[1:]:
-        journal.add(asdict(FaultOutcome(name, lost_frames=7)))
-
-    def play(fault: faults.TwinFault) -> FaultOutcome:
-        played.append(fault.name)
-        return FaultOutcome(fault.name, wrongly_sure=len(played))
-
-    monkeypatch.setattr(faults, "run", play)
-    for status in (1, 1):
-        assert start("reliability.faults", "--out", tmp_path / "faults.jsonl") == status
-    assert played == names[:1]
-    assert capsys.readouterr().out.count("| 7 |") == 2 * len(names[1:])
 
 
 @pytest.mark.process
@@ -166,18 +87,6 @@ def test_mutated_inputs_go_on_where_they_stopped(
     assert all(run["executions"]["drawing"] > 10 for run in runs)
 
 
-@pytest.mark.process
-@pytest.mark.skipif(not shutil.which("clang"), reason="clang is missing (make test installs it when it may)")
-def test_the_codecs_corpus_is_kept(
-    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(codec, "CORPUS", Path(shutil.copy(codec.CORPUS, tmp_path)))
-    monkeypatch.setattr(codec, "FOLDER", tmp_path / "fuzz")
-    assert start("reliability.fuzz.codec", "--seconds", 1) == 0
-    assert "codec, shard 1: none failed" in capsys.readouterr().out
-    assert len((tmp_path / "corpus.txt").read_text().splitlines()) > 10
-
-
 @needs_twin
 def test_measured_seconds_of_the_firmware(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     start("twin.measure", "--minutes", 0.1)
@@ -186,12 +95,34 @@ def test_measured_seconds_of_the_firmware(start: Start, capsys: pytest.CaptureFi
     assert "FAIL" not in said
 
 
-@pytest.mark.parametrize(("passed", "status"), [(True, 0), (None, 0), (False, 1)])
-def test_a_missed_limit_is_the_exit_status(passed: bool | None, status: int) -> None:
-    figures = [campaign.Figure("a", "1"), campaign.Figure("b", "2", "<= 1", passed), campaign.none("c", 0)]
-    assert campaign.report("x", figures) == status
-
-
 def test_the_nets_of_the_boards_have_no_problem(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     assert start("hardware.nets") == 0
     assert "each with one driver at a time" in capsys.readouterr().out
+
+
+@needs_twin
+def test_a_port_that_is_opened_again_begins_the_walk_anew(tmp_path: Path) -> None:
+    """The true path then begins at the time of the second opening."""
+    twin = subprocess.Popen([*tool("twin.run"), "--out", tmp_path], stdout=subprocess.PIPE, text=True)
+
+    def began_s(after_s: float = -1.0) -> float | None:
+        with contextlib.suppress(FileNotFoundError, IndexError, ValueError):
+            t_s = float((tmp_path / "truth.csv").read_text().splitlines()[1].split(",")[0])
+            return t_s if t_s > after_s else None
+        return None
+
+    try:
+        assert twin.stdout is not None
+        port = twin.stdout.readline().split()[1]
+        opened = os.open(port, os.O_RDWR | os.O_NOCTTY)
+        assert until(lambda: began_s() is not None)
+        first_s = began_s()
+        assert first_s is not None
+        os.close(opened)
+        assert any("begins the walk anew" in line for line in iter(twin.stdout.readline, ""))
+        opened = os.open(port, os.O_RDWR | os.O_NOCTTY)
+        assert until(lambda: began_s(first_s) is not None)
+        os.close(opened)
+    finally:
+        twin.send_signal(signal.SIGINT)
+        twin.communicate(timeout=PATIENCE_S)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The board's words in plain words: every fault of the twin, and what a host that listens may conclude."""
+"""The board's reports in plain words: what a host that listens may conclude, restarts, crashes, the supply; older and newer firmware."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ from board_runs import ROOT, Bench, needs_twin
 from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep.board.reports import BoardReports
+from echostep.board.subscription import SUBSCRIBE, BoardSubscription
 from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.tracker import Tracker
 from echostep_app.board.faults.health import Severity, board_findings, expected_rates, gyro_celsius, rate_findings
+from echostep_app.commissioning.diagnosis import Diagnosis, judge_board
+from echostep_app.commissioning.probe import ProbeResult
 from echostep_app.output.terminal import findings
 
 CONFIGURATION = m.Configuration(0, 0xFF, m.Schedule.CONCURRENT, 200, 10, m.PressureMode.HIGH_SPEED)
@@ -39,12 +42,6 @@ def test_a_healthy_board_is_no_finding() -> None:
     fine = [m.GyroHealth(0, gyro, -34, m.SelfTest.PASSED, -221, 221) for gyro in m.Gyro]
     assert texts(words(m.Identity(0, 0, 1, 1, 0, m.ResetCause.POWER_ON), status(), *fine)) == []
     assert texts(BoardReports()) == []
-
-
-def test_a_failed_eeprom_is_said_with_what_to_do() -> None:
-    heard = words(status(healthy=0x3F, errors_pressure=4, fault_pressure=m.Fault.EEPROM))
-    (text,) = texts(heard)
-    assert text.startswith("barometer: EEPROM check failed; power-cycle the board, check 3.3 V and the level shifter")
 
 
 def test_a_device_that_is_switched_off_is_no_finding() -> None:
@@ -133,17 +130,6 @@ def test_maxsonars_are_expected_to_ping_less_often() -> None:
     assert [f.severity for f in rate_findings(heard, expected_rates(heard) | {"Ping": 9.0})] == [Severity.FAULT]
 
 
-@pytest.mark.parametrize(
-    ("identity", "what"),
-    [(0xE1, "an ICM-20649 answers at its chip select"), (0xEA, "an ICM-20948 answers"), (0x5A, "does not answer")],
-)
-def test_a_foots_part_at_the_thigh_that_was_not_accepted_is_named(identity: int, what: str) -> None:
-    parts = m.Parts(**dict.fromkeys(m.Parts._fields, 0) | {"identity_foot": identity})
-    mute = status(healthy=0x7F & ~m.Healthy.THIGH, errors_thigh=9, fault_thigh=m.Fault.NO_ANSWER)
-    (finding,) = board_findings(words(mute, parts))
-    assert str(finding).startswith(f"thigh gyro: {what}")
-
-
 def test_temperature_of_a_gyro() -> None:
     assert gyro_celsius(m.GyroHealth(0, 0, -34, 2, 0, 0)) == pytest.approx(20.06, abs=0.01)
 
@@ -172,38 +158,76 @@ def test_any_words_have_a_meaning(said: list[m.Status], sensors: int, cause: int
         assert "\n" not in str(finding)
 
 
-TWIN_FAULTS = [
-    ("srf_left=absent", "left ranger: does not answer at I2C address 0x70"),
-    ("srf_right=mute", "right ranger: does not answer at I2C address 0x71"),
-    ("compass=absent", "compass: does not answer at I2C address 0x60"),
-    ("compass=bad_value", "compass: gives bearings above"),
-    ("sda=stuck_forever", "I2C bus: stuck, a line is held low (left ranger, right ranger, compass"),
-    ("thigh=absent", "thigh gyro: does not answer; check its SPI cable, 5 V and its chip select (D8)"),
-    ("calf=wrong_channel", "calf gyro: answers with another channel"),
-    ("belt=zeros", "belt gyro: does not answer"),
-    ("scp1000=absent", "barometer: does not answer"),
-    ("scp1000=drdy_stuck", "barometer: DRDY stays high"),
-    ("scp1000=drdy_low", "barometer: has had no sample for 2 s"),
-]
+IDENTITY = m.Identity(0, m.SCHEMA_HASH, 1, 2, 0, m.ResetCause.POWER_ON)
+HEALTH = m.BoardHealth(0, 5_000, 4_980, 1, 0, m.CrashPlace.NONE, 0, 0)
+
+
+def texts_of(*heard: m.Message) -> list[str]:
+    reports = BoardReports()
+    for message in heard:
+        reports.add(message)
+    return [str(finding) for finding in board_findings(reports)]
+
+
+def test_a_board_that_is_well_is_no_finding() -> None:
+    assert texts_of(IDENTITY, HEALTH) == []
+    assert texts_of(IDENTITY, HEALTH._replace(supply_mv=0, supply_least_mv=0)) == []  # not measured yet
+
+
+def test_a_crash_says_where_it_was() -> None:
+    crashed = HEALTH._replace(starts=3, crashes=2, crash_place=m.CrashPlace.GYROS, crash_address=0x1380)
+    for cause in (m.ResetCause.WATCHDOG, m.ResetCause.EXTERNAL):  # the button does not hide it
+        (text,) = texts_of(IDENTITY._replace(reset_cause=cause), crashed)
+        assert "2 times since it got power, last in gyros, address 0x2700" in text
+    (text,) = texts_of(IDENTITY._replace(reset_cause=m.ResetCause.WATCHDOG))  # older firmware
+    assert text.startswith("board: was restarted by its watchdog; ")
+
+
+@pytest.mark.parametrize(("least_mv", "words"), [(4_700, ""), (4_500, "sagged to 4.50 V"), (4_000, "needs 4.5 V")])
+def test_a_supply_that_sags(least_mv: int, words: str) -> None:
+    found = texts_of(IDENTITY, HEALTH, HEALTH._replace(supply_least_mv=least_mv))
+    assert [words in text for text in found] == ([True] if words else [])
+
+
+def test_a_board_is_asked_once_and_again_after_a_restart() -> None:
+    subscription = BoardSubscription()
+    streamed: list[m.Message] = [
+        IDENTITY,
+        HEALTH,
+        m.Gyros(0, 0, 0, 0),
+        IDENTITY,
+        HEALTH,
+        IDENTITY,
+        IDENTITY,
+        HEALTH,
+        IDENTITY,
+    ]
+    assert [subscription.is_due(x) for x in streamed] == [k in {0, 6} for k in range(len(streamed))]
+
+
+def test_older_firmware_is_not_asked_and_the_doctor_says_what_to_do() -> None:
+    old = IDENTITY._replace(version_minor=1)
+    assert not BoardSubscription().is_due(old)
+    reports = BoardReports()
+    reports.add(old)
+    report = Diagnosis()
+    judge_board(report, ProbeResult(reports=reports), "/dev/x")
+    assert any("older than 1.2" in f.what and "flash --port /dev/x" in f.remedy for f in report.findings)
 
 
 @needs_twin
-def test_every_fault_of_the_twin_is_named() -> None:
-    bench, heard, said = Bench(), BoardReports(), 0
-    bench.run(2_000)
+def test_a_host_that_follows_the_rule_keeps_its_subscription_over_a_crash() -> None:
+    bench, subscription = Bench(), BoardSubscription()
     try:
-        for fault, text in TWIN_FAULTS:
-            bench.fault(fault)
-            bench.run(4_500 if "scp1000" in fault else 2_100)
-            for message in bench.messages[said:]:
-                heard.add(message)
-            assert any(found.startswith(text) for found in texts(heard)), (fault, texts(heard))
-            assert len(texts(heard)) <= 3, (fault, texts(heard))
-            bench.fault(fault.split("=")[0] + "=ok")
-            bench.run(4_000 if "scp1000" in fault else 2_100)
-            for message in bench.messages[said:]:
-                heard.add(message)
-            said = len(bench.messages)
-            assert texts(heard) == [], (fault, texts(heard))
+        for ms in range(0, 5_000, 50):
+            if ms == 2_000:
+                bench.fault("reset=watchdog")
+            for message in bench.run(50):
+                if subscription.is_due(message):
+                    bench.board.send(encode(SUBSCRIBE, 0))
     finally:
         bench.board.close()
+    health = [x for x in bench.messages if isinstance(x, m.BoardHealth)]
+    assert [x.crashes for x in health][:1] == [0]
+    assert health[-1].crashes == 1
+    assert bench.status.bad_frames == 0

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import socket
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -14,7 +15,6 @@ import pytest
 from board_runs import ROOT
 from echostep.board.frames import encode
 from echostep.board.gateway import FEW_S, MOST_BEACONS, Gateway
-from echostep.errors import EchostepError
 from echostep.ports.chunks import GATEWAY, MTX, Chunk
 from echostep_app.commands.actions.beacon_player import _open_sender
 from echostep_app.ports import serial_ports, udp
@@ -23,6 +23,7 @@ from echostep_app.ports.serial_ports import ChunkQueue
 from echostep_app.ports.udp import UdpPort
 from echostep_simulation.devices.beacon_gateway import message
 from free_ports import free_port
+from snapshots import refusal
 from waiting import until
 
 KEY = bytes(range(32))
@@ -106,18 +107,13 @@ def test_the_vector_of_the_protocol() -> None:
     assert Opener(KEY).open(datagram) == b""
 
 
-@pytest.mark.parametrize("content", [None, "", "xyz", "00", "ü", "00" * 65])
-def test_what_is_no_key_is_named(tmp_path: Path, content: str | None) -> None:
-    if content is not None:
-        (tmp_path / "key").write_text(content)
-    with pytest.raises(EchostepError, match="key"):
-        read_key(tmp_path / "key")
-
-
-@pytest.mark.parametrize("query", ["?kye=a", "?key", "?key=", "#key=a", "?key=a&key=b"])
-def test_a_query_that_is_not_a_key_is_refused(query: str) -> None:
-    with pytest.raises(EchostepError, match=r"udp://|key"):
-        UdpPort(free_url() + query)
+def test_what_is_no_key_is_named(tmp_path: Path) -> None:
+    for content in (None, "", "xyz", "00", "ü", "00" * 65):
+        if content is not None:
+            (tmp_path / "key").write_text(content)
+        assert "key" in refusal(lambda: read_key(tmp_path / "key"))
+    for query in ("?kye=a", "?key", "?key=", "#key=a", "?key=a&key=b"):
+        assert re.search("udp://|key", refusal(lambda query=query: UdpPort(free_url() + query))), query
 
 
 def test_a_queue_drops_and_counts_what_finds_no_room(monkeypatch: pytest.MonkeyPatch) -> None:

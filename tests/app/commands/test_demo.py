@@ -7,30 +7,19 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
-from websockets.sync.client import ClientConnection
 
 from board_runs import ELF, ROOT, TWIN, needs_twin
 from command_line import echostep
 from echostep.plan import Door, Plan, Room, load_plan
-from echostep.ports.chunks import portion_of
 from echostep.recording import open_recording
-from echostep.tracker import Tracker
 from echostep_app.guidance.tours import room_tour
-from echostep_app.page.elements.scene import TruePath
-from echostep_app.page.live import LivePage
 from echostep_app.scorecard.track_columns import load_path
 from echostep_app.session.runs import demo
 from echostep_app.session.session import open_browser
 from echostep_simulation.scenario import DEMO_WAYPOINTS, start_of
 from echostep_studies.simulation.tower import tower
-from page.browser import LOCAL
-from page.frames import header, opened_url
-from waiting import PATIENCE_S
-from walks import walk_chunks
 
 PLAN_FILE = ROOT / "host/core/echostep/plans/demo.json"
 PLAN = load_plan(PLAN_FILE)
@@ -70,58 +59,6 @@ def test_the_pace_changes_no_bit_and_the_summary_has_lines_of_its_own(tmp_path: 
     assert "To see the walk again" not in fast.stdout  # nothing was to be seen
     for word in ("error: mean", "95 % ellipse:", "estimates: ", "files: "):
         assert [line for line in lines if line.startswith(word)], word
-
-
-def message(socket: ClientConnection, kind: str) -> dict[str, Any]:
-    """The next message of a kind; frames on the way are reported as drawn."""
-    while True:
-        received = socket.recv(timeout=PATIENCE_S)
-        tree = header(received) if isinstance(received, bytes) else json.loads(received)
-        if tree["kind"] == "frame":
-            socket.send(json.dumps({"kind": "drawn", "seq": tree["seq"]}))
-        if tree["kind"] == kind:
-            return dict(tree)
-
-
-def hello(socket: ClientConnection) -> dict[str, Any]:
-    return message(socket, "hello")
-
-
-def frame(socket: ClientConnection) -> dict[str, Any]:
-    return message(socket, "frame")
-
-
-@pytest.mark.long
-def test_at_the_end_the_page_says_so_and_plays_the_run_again() -> None:
-    tracker = Tracker(PLAN, seed=1)
-    with LivePage(tracker, "demo", LOCAL, keeps=True) as page:
-        truth = some_truth()
-        page.truth = truth
-        page.announce("preparing")
-        with opened_url(page.url) as socket:
-            assert hello(socket)["replay"] is False
-            assert frame(socket)["words"] == "preparing"
-            for chunk in walk_chunks():
-                tracker.take(portion_of([chunk]))
-                page.publish(portion_of([chunk]))
-            page.mailbox.end("mean error 0.05 m")
-            assert hello(socket)["replay"] is True
-            last = frame(socket)
-            play = last["play"]
-            assert last["ended"] == "mean error 0.05 m"
-            assert (play["playing"], play["t_s"]) == (False, play["end_s"])
-            at = truth.at(play["end_s"])
-            assert last["truth"] == {"x_m": at.x_m, "y_m": at.y_m, "level": 0}
-            socket.send(json.dumps({"kind": "seek", "t_s": play["begin_s"]}))
-            first = frame(socket)
-            while first["t_s"] != play["begin_s"]:
-                first = frame(socket)
-            assert first["ended"] is None
-
-
-def some_truth() -> TruePath:
-    t_s = np.arange(0.0, 20.0, 0.1)
-    return TruePath(np.column_stack([t_s, 2.0 + 0.5 * t_s, 7.5 + 0.0 * t_s, 0.0 * t_s]))
 
 
 def test_a_browser_is_opened_only_where_there_is_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:

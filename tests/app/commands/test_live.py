@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pytest
 
-from board_runs import ROOT, needs_twin, tool
+from board_runs import needs_twin, tool
 from command_line import PROGRAM, echostep, interrupt_after
 from echostep.errors import EchostepError
 from echostep.plan import load_plan
@@ -27,9 +27,9 @@ from echostep.recording import open_recording
 from echostep_app.ports.serial_ports import SerialPorts
 from echostep_app.session.last_place import read_kept
 from players import pseudo_terminal
+from snapshots import expect
 from waiting import PATIENCE_S, until
-
-PLAN = ROOT / "host/core/echostep/plans/demo.json"
+from walks import DEMO as PLAN
 
 
 def sha_of(text: str) -> str:
@@ -85,22 +85,6 @@ def test_a_live_run_replays_to_identical_estimates(
     assert (tmp_path / "again/track.csv").read_bytes() == (tmp_path / "live/track.csv").read_bytes()
 
 
-@pytest.mark.long
-def test_two_runs_of_one_seed_are_identical(tmp_path: Path) -> None:
-    runs = [
-        echostep("demo", "--headless", "--seed", seed, "--out", tmp_path / str(k)) for k, seed in enumerate((3, 3, 4))
-    ]
-    assert all(run.returncode == 0 for run in runs), runs[0].stderr
-    first, second, other = (sha_of(run.stdout) for run in runs)
-    assert first == second != other
-    tracks = [
-        (tmp_path / str(k) / name).read_bytes() for k in (0, 1) for name in ("track.csv", "walk.mcap", "truth.csv")
-    ]
-    assert tracks[:3] == tracks[3:]
-    replay = echostep("replay", tmp_path / "0/walk.mcap", "--plan", PLAN, "--headless", "--out", tmp_path / "r")
-    assert sha_of(replay.stdout) == first
-
-
 def records(path: Path) -> bool:
     """Whether bytes of a port are in a recording: its run is under way."""
     try:
@@ -133,65 +117,41 @@ def test_ctrl_c_ends_a_live_run_with_its_files(tmp_path: Path) -> None:
     assert "No estimate" in out
 
 
+TWO_PORTS = ("--board", "x", "--mtx", "y")
+MISTAKES: dict[str, list[object]] = {
+    "no such recording": ["replay", "none.mcap", "--plan", PLAN],
+    "a file that is no recording": ["replay", __file__, "--plan", PLAN],
+    "no such plan": ["live", "--plan", "none.json", *TWO_PORTS],
+    "no such port": ["live", "--plan", PLAN, "--board", "/dev/no-such-port", "--mtx", "y"],
+    "no such kind of port": ["live", "--plan", PLAN, "--board", "nonsense://x", "--mtx", "y"],
+    "a start without heading": ["live", "--plan", PLAN, *TWO_PORTS, "--start", "1,2"],
+    "a start of no number": ["live", "--plan", PLAN, *TWO_PORTS, "--start", "1,2,nan"],
+    "no such settings": ["live", "--plan", PLAN, *TWO_PORTS, "--settings", "none.toml"],
+    "record: no such port": ["record", "--board", "/dev/no-such-port", "--mtx", "y"],
+    "no such capture": ["decode", "none.bin"],
+    "a file that is no capture": ["decode", __file__],
+    "no such board command": ["demo", "--headless", "--board-command", "/no/such/twin"],
+    "a board command that ends": ["demo", "--headless", "--board-command", "/bin/true"],
+    "a board command that is none": ["demo", "--headless", "--board-command", "/bin/echo hello"],
+}
+SETTINGS = [
+    "[clud]\nsize = 3", "[cloud]\nsizee = 3", "[cloud]\nsize = 'many'", "[cloud]\nsize = 1.5", "[cloud]\nsize = -4", "[cloud]\nstart_sd_m = nan",
+    "[cloud]\nsize = 1" + 400 * "0", "[echo]\nsd_m = 0", "[mtx]\nrate_hz = 0", "cloud = 3", "[cloud",
+]  # fmt: skip
+
+
 @pytest.mark.process
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (["replay", "none.mcap", "--plan", PLAN], "none.mcap"),
-        (["replay", __file__, "--plan", PLAN], "test_live.py"),
-        (["live", "--plan", "none.json", "--board", "x", "--mtx", "y"], "none.json"),
-        (["live", "--plan", PLAN, "--board", "/dev/no-such-port", "--mtx", "y"], "/dev/no-such-port"),
-        (["live", "--plan", PLAN, "--board", "nonsense://x", "--mtx", "y"], "nonsense"),
-        (["live", "--plan", PLAN, "--board", "x", "--mtx", "y", "--start", "1,2"], "--start"),
-        (["live", "--plan", PLAN, "--board", "x", "--mtx", "y", "--start", "1,2,nan"], "--start"),
-        (["live", "--plan", PLAN, "--board", "x", "--mtx", "y", "--settings", "none.toml"], "none.toml"),
-        (["record", "--board", "/dev/no-such-port", "--mtx", "y"], "/dev/no-such-port"),
-        (["decode", "none.bin"], "none.bin"),
-        (["decode", __file__], "test_live.py"),
-        (["demo", "--headless", "--board-command", "/no/such/twin"], "/no/such/twin"),
-        (["demo", "--headless", "--board-command", "/bin/true"], "/bin/true"),
-        (["demo", "--headless", "--board-command", "/bin/echo hello"], "/bin/echo"),
-    ],
-)
-def test_a_mistake_ends_with_one_line_that_names_it(tmp_path: Path, arguments: list[object], named: str) -> None:
-    done = echostep(*arguments, *(["--out", tmp_path / "out"] if arguments[0] != "decode" else []))
-    assert done.returncode == 2
-    assert "Traceback" not in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert named in done.stderr
-
-
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        ("[clud]\nsize = 3", "clud"),
-        ("[cloud]\nsizee = 3", "sizee"),
-        ("[cloud]\nsize = 'many'", "size"),
-        ("[cloud]\nsize = 1.5", "size"),
-        ("[cloud]\nsize = -4", "size"),
-        ("[cloud]\nstart_sd_m = nan", "start_sd_m"),
-        ("[cloud]\nsize = 1" + 400 * "0", "size: a huge number"),
-        ("[echo]\nsd_m = 0", "sd_m"),
-        ("[mtx]\nrate_hz = 0", "rate_hz"),
-        ("cloud = 3", "cloud"),
-        ("[cloud", "settings.toml"),
-    ],
-)
-def test_a_wrong_setting_is_named(tmp_path: Path, text: str, named: str) -> None:
+def test_mistakes_end_with_one_line(tmp_path: Path) -> None:
+    out = ["--out", tmp_path / "out"]
+    said = {case: echostep(*words, *(out if words[0] != "decode" else [])) for case, words in MISTAKES.items()}
     settings = tmp_path / "settings.toml"
-    settings.write_text(text)
-    done = echostep(
-        "live", "--plan", PLAN, "--board", "x", "--mtx", "y", "--settings", settings, "--out", tmp_path / "out"
-    )
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert named in done.stderr
-    assert "settings.toml" in done.stderr
-
-
-def test_help_lists_the_commands() -> None:
-    done = echostep("--help")
-    assert done.returncode == 0
-    assert all(name in done.stdout for name in ("demo", "live", "record", "replay", "decode"))
+    for text in SETTINGS:
+        settings.write_text(text)
+        case = f"settings {text[:20]!r}"
+        said[case] = echostep("live", "--plan", PLAN, *TWO_PORTS, "--settings", settings, *out)
+    assert {(done.returncode, done.stderr.count("\n")) for done in said.values()} == {(2, 1)}
+    printed = {case: re.sub("there are .*", "there are ...", done.stderr) for case, done in said.items()}
+    expect("live, record, replay, decode, demo", printed, FILE=__file__, FOLDER=tmp_path)
 
 
 @pytest.mark.long

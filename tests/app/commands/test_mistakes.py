@@ -36,49 +36,33 @@ WALK = ROOT / "tests/captures/walk.mcap"
 PAGE = ROOT / "host/docs/mistakes.md"
 Finished = subprocess.CompletedProcess[str]
 ROWS = dict(re.findall(r"^\| ([^|]+) \| `([^`]+)`", PAGE.read_text(), flags=re.M))  # what is printed, by mistake
-Mistake = Callable[
-    [Path, pytest.MonkeyPatch], dict[str, str]
-]  # {"said": what is printed, and what to put capitals for}
+# {"said": what is printed, and what to put capitals for}
+Mistake = Callable[[Path, pytest.MonkeyPatch], dict[str, str]]
 
 
-def live(folder: Path, *arguments: object, plan: object = PLAN) -> str:
-    """What `live` prints as its error, which is one line."""
+def live(folder: Path, *arguments: object, plan: object = PLAN, **names: object) -> dict[str, str]:
+    """What `live` prints as its error, which is one line, and the names of what differs."""
     done = echostep("live", "--plan", plan, "--headless", "--out", folder / "out", "--seconds", PATIENCE_S, *arguments)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stdout + done.stderr
-    return done.stderr.removeprefix("echostep: ").strip()
-
-
-def wrong_port(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
-    return {"said": live(folder, "--board", "/dev/ttyACM7"), "PORT": "/dev/ttyACM7"}
+    return {"said": done.stderr.removeprefix("echostep: ").strip()} | {
+        name: str(value) for name, value in names.items()
+    }
 
 
 def swapped_ports(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
     with python_board() as board, on_a_terminal(MtxDevice(FACTORY, deaf=True)) as mtx:
-        return {"said": live(folder, "--board", mtx, "--mtx", board), "PORT1": mtx, "PORT2": board}
-
-
-def no_plan(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
-    path = folder / "plan.json"
-    return {"said": live(folder, "--board", "x", plan=path), "PLAN": str(path)}
+        return live(folder, "--board", mtx, "--mtx", board, PORT1=mtx, PORT2=board)
 
 
 def another_format(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
     path = folder / "plan.pdf"
     path.write_bytes(b"%PDF-1.7 a drawing")
-    return {"said": live(folder, "--board", "x", plan=path), "PLAN": str(path)}
-
-
-def start_outside(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
-    return {"said": live(folder, "--board", "x", "--start", "75,7.5,0")}
-
-
-def start_in_a_wall(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
-    return {"said": live(folder, "--board", "x", "--start", "7,3,0")}
+    return live(folder, "--board", "x", plan=path, PLAN=path)
 
 
 def wrong_firmware(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
     with babbling_port(b"\0" + encode(m.Identity(0, 0x12345678, 1, 0, 0, 0), 0)) as port:
-        return {"said": live(folder, "--board", port), "HASH": f"0x{m.SCHEMA_HASH:08X}"}
+        return live(folder, "--board", port, HASH=f"0x{m.SCHEMA_HASH:08X}")
 
 
 def no_rights(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
@@ -86,7 +70,7 @@ def no_rights(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
     patch.setattr(os, "access", lambda path, mode: "/pts/" not in str(path) and access(path, mode))
     with pseudo_terminal() as (_, port):
         owner = f"{Path(port).owner()}:{Path(port).group()}"
-        return {"said": live(folder, "--board", port), "PORT": port, "OWNER:GROUP": owner, "GROUP": Path(port).group()}
+        return live(folder, "--board", port, PORT=port) | {"OWNER:GROUP": owner, "GROUP": Path(port).group()}
 
 
 def no_broker(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
@@ -177,12 +161,14 @@ def disk_full(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
 
 
 MISTAKES: dict[str, Mistake] = {
-    "a port that does not exist": wrong_port,
+    "a port that does not exist": lambda folder, _: live(folder, "--board", "/dev/ttyACM7", PORT="/dev/ttyACM7"),
     "the ports are swapped": swapped_ports,
-    "there is no plan": no_plan,
+    "there is no plan": lambda folder, _: live(
+        folder, "--board", "x", plan=folder / "plan.json", PLAN=folder / "plan.json"
+    ),
     "the plan has a format that cannot be read": another_format,
-    "the start is outside of the building": start_outside,
-    "the start is in a wall": start_in_a_wall,
+    "the start is outside of the building": lambda folder, _: live(folder, "--board", "x", "--start", "75,7.5,0"),
+    "the start is in a wall": lambda folder, _: live(folder, "--board", "x", "--start", "7,3,0"),
     "the board has another firmware": wrong_firmware,
     "no right to open the port": no_rights,
     "the broker is not there": no_broker,

@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A terminal, a pipe or a log that takes nothing ends no run: the walk is recorded, files and status are as always.
-
-The recording says it once.
-"""
+"""A terminal, a pipe or a log that takes nothing ends no run; a run whose recording the disk has not taken says so by its status."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 import signal
@@ -20,17 +18,18 @@ from unittest import mock
 import pytest
 from mcap.reader import make_reader
 
-from board_runs import ROOT
-from command_line import PROGRAM, interrupt_once_called
+from command_line import PROGRAM, echostep, interrupt_once_called
 from echostep.recording import open_recording
 from echostep_app.cli import main
 from echostep_app.operation.session import TableFeed
+from echostep_app.recording import background_writer
 from players import pseudo_terminal, python_board
 from waiting import PATIENCE_S, until
+from walks import DEMO as PLAN
 
-PLAN = ROOT / "host/core/echostep/plans/demo.json"
 FULL = Path("/dev/full")  # refuses every byte: no space left [full(4)]
 pytestmark = pytest.mark.process
+
 # Runs the program with files closed that its parent left open, as the shell does for >&-
 COMMAND = ("command", "mqtt://127.0.0.1:9", "--plan", str(PLAN), "--port", "0")
 CLOSING = "import os, sys; [os.close(int(k)) for k in sys.argv[1]]; os.execv(sys.argv[2], sys.argv[2:])"
@@ -121,3 +120,34 @@ def test_a_command_whose_result_is_lost_has_status_2() -> None:
     with unread_pipe() as gone:
         done = subprocess.run([*PROGRAM, "--help"], stdout=gone, stderr=subprocess.PIPE, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.fixture
+def full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No recording becomes longer than a few kilobytes."""
+    write = os.write
+
+    def refused(file: int, data: bytes) -> int:
+        if Path(f"/proc/self/fd/{file}").readlink().suffix == ".mcap" and os.fstat(file).st_size > 100:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(file, data)
+
+    monkeypatch.setattr(os, "write", refused)
+    monkeypatch.setattr(background_writer, "RETRY_S", 0.05)
+
+
+@pytest.mark.usefixtures("full_disk")
+@pytest.mark.parametrize("command", ["demo", "command"])
+def test_a_run_whose_recording_is_not_whole_ends_with_status_1(tmp_path: Path, command: str) -> None:
+    """It has tracked to its end; the last line says what is missing."""
+    arguments = {
+        "demo": ("demo", "--headless", "--out", tmp_path),
+        "command": ("command", "mqtt://127.0.0.1:9", "--plan", PLAN, "--no-page", "--seconds", "0.3", "--out", tmp_path / "o.mcap"),
+    }  # fmt: skip
+    done = echostep(*arguments[command])
+    assert done.returncode == 1, done.stdout + done.stderr
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"echostep: {tmp_path}")
+    assert line.endswith(".mcap: the recording is not whole; all else was done")
+    assert "the disk is full" in done.stdout
+    assert command == "command" or (tmp_path / "track.csv").exists()

@@ -17,7 +17,6 @@ from pathlib import Path
 import pytest
 from numba.core.registry import cpu_target
 
-from board_runs import ROOT
 from command_line import PROGRAM, echostep
 from echostep.ports.chunks import Chunk
 from echostep.recording import MCAP_MAGIC, open_recording
@@ -25,8 +24,8 @@ from echostep_app.interruption import end_by_signals, holding_signals, is_asked,
 from echostep_app.recording.recorder import Recorder
 from players import python_board
 from waiting import PATIENCE_S, until
+from walks import DEMO as PLAN
 
-PLAN = ROOT / "host/core/echostep/plans/demo.json"
 COST_BYTES = 200_000  # of a recording: some five seconds of a board alone
 
 

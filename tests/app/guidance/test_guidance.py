@@ -180,11 +180,6 @@ def test_arrow_comes_to_rest_where_it_should() -> None:
     assert describe_cue(cue).startswith("←  Turn left   17 m")
 
 
-def test_way_without_stretches_is_refused() -> None:
-    with pytest.raises(EchostepError, match="stretch"):
-        Guide(Route(()))
-
-
 # ---- ways on a plan
 
 

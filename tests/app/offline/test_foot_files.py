@@ -13,8 +13,6 @@ from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 from echostep.errors import EchostepError
-from echostep.offline import imu_csv
-from echostep.offline.csv_table import CsvLimits
 from echostep_app.offline.foot_files import load_foot
 from foot.foot_walks import MANNERS, course, samples
 
@@ -177,10 +175,3 @@ def test_what_a_file_lacks_is_one_sentence(tmp_path: Path) -> None:
     broken = bytearray((tmp_path / "c.zip").read_bytes())
     broken[40:60] = bytes(20)
     assert "c.zip: " in refused(tmp_path, "c.zip", bytes(broken))
-
-
-def test_a_file_of_too_many_rows_is_refused(tmp_path: Path, walk: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(imu_csv, "LIMITS", CsvLimits(lines=100))
-    path = table(tmp_path / "long.csv", "t_s,ax,ay,az,gx,gy,gz", walk)
-    with pytest.raises(EchostepError, match=r"long\.csv: more than 100 lines: cut the recording into parts"):
-        load_foot(path)

@@ -17,12 +17,9 @@ from echostep.recording import Decoder, read_capture
 from echostep.xsens import MTDATA, encode_frame
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.leg_csv import load_legs
-from echostep_app.plan.importers.formats import import_plan
-from echostep_app.plan.importers.report import ImportReport
 from echostep_app.recording.capture_summary import summary
 from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.contents import info
-from echostep_app.scorecard.track_columns import load_path
 from echostep_studies.barometer.pressure_csv import load_pressures
 from echostep_studies.simulation.rolling_foot import MANNERS, course, samples
 
@@ -39,15 +36,12 @@ def decoded(folder: Path, content: bytes) -> str:
     return "\n".join(summary(decoder))
 
 
-def described(folder: Path, port: str, content: bytes, junk: bytes = b"") -> str:
-    """What `info` says of a recording with bytes of one port, and with junk in the middle of the file."""
+def described(folder: Path, port: str, content: bytes) -> str:
+    """What `info` says of a recording with bytes of one port."""
     path = folder / "walk.mcap"
     with Recorder(path, {}) as recorder:
         for k in range(0, len(content), 100):
             recorder.write(Chunk(port, k * 1_000_000, content[k : k + 100]))
-    whole = path.read_bytes()
-    half = len(whole) // 2
-    path.write_bytes(whole[:half] + junk + whole[half:])
     return "\n".join(info(path))
 
 
@@ -79,37 +73,11 @@ def air(folder: Path, first: dict[int, str]) -> str:
     return "\n".join(load_pressures(table(folder, "t_s,pressure_pa", rows, first)).notes)
 
 
-def scored(folder: Path, first: dict[int, str]) -> str:
-    rows = [[f"{k}", f"{k}", "0"] for k in range(9)]
-    with pytest.raises(EchostepError) as caught:
-        load_path(table(folder, "t_s,x_m,y_m", rows, first), None)
-    return str(caught.value)
-
-
-def mapped(folder: Path) -> str:
-    """An indoor map of two rooms, one without a level."""
-    corners = [(0, 0), (0, 9), (9, 9), (9, 0), (20, 0), (20, 9), (29, 9), (29, 0)]
-    nodes = "".join(
-        f'<node id="{k + 1}" lat="{52 + y * 9e-6}" lon="{13 + x * 14e-6}"/>' for k, (x, y) in enumerate(corners)
-    )
-    rooms = "".join(
-        f'<way id="{way}">{"".join(f"<nd ref={chr(34)}{k}{chr(34)}/>" for k in (*refs, refs[0]))}<tag k="indoor" v="room"/>{level}</way>'
-        for way, refs, level in ((1, (1, 2, 3, 4), '<tag k="level" v="0"/>'), (2, (5, 6, 7, 8), ""))
-    )
-    path, report = folder / "a.osm", ImportReport()
-    path.write_text(f'<?xml version="1.0"?><osm version="0.6">{nodes}{rooms}</osm>')
-    import_plan(path, report=report)
-    return str(report)
-
-
 READERS: dict[str, tuple[Callable[[Path], str], str]] = {
     "decode, board: frames": (lambda f: decoded(f, BOARD[:5000] + b"\xff" * 300 + BOARD[5000:]), r"[2-9] were rejected \(1 of a wrong length"),
     "decode, board: the end": (lambda f: decoded(f, BOARD.rstrip(b"\0")), r"\d+ bytes at the end are no whole frame"),
-    "decode, MT: bytes": (lambda f: decoded(f, MTX + b"\xfa\xff\x32" + MTX[:500]), r"\d+ bytes outside of frames"),
-    "decode, MT: samples": (lambda f: decoded(f, MTX + STRANGE), "and refuse 1 of another length"),
     "info, board": (lambda f: described(f, "board", BOARD), r"board frames: \d+ good, 1 bad, 4 lost"),
     "info, MTx": (lambda f: described(f, "mtx", MTX + STRANGE), "refused: 1 of another length"),
-    "info, file": (lambda f: described(f, "mtx", MTX, bytes(99)), r"99 damaged bytes in one place were not used, the first at byte"),
     "foot: no number": (lambda f: foot(f, {3: "x,1,2,3,4,5,6"}), "^1 rows without a number in some column: skipped"),
     "foot: decimal commas": (lambda f: foot(f, {3: "0,03,1,2,3,4,5,6"}), "^1 rows without a number in some column: skipped"),
     "foot: half a magnetometer": (
@@ -120,8 +88,6 @@ READERS: dict[str, tuple[Callable[[Path], str], str]] = {
     "floors: no number": (lambda f: air(f, {3: "0.3,x"}), r"^1 rows without a number in t_s or pressure_pa: skipped \(first: line 5\)"),
     "floors: no air": (lambda f: air(f, {3: "0.3,5"}), "1 rows with pressure_pa outside of"),
     "floors: reset value": (lambda f: air(f, {0: "0.0,68500"}), "1 rows before the barometer had settled"),
-    "score": (lambda f: scored(f, {3: "3,x,0"}), r"table\.csv:5: column x_m: 'x' is not a number"),
-    "plan import, map": (mapped, "1 room has no level"),
 }  # fmt: skip
 
 

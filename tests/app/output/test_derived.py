@@ -1,27 +1,34 @@
 # SPDX-License-Identifier: MIT
-"""Derived messages: viewers can read them, and the tracker does not notice that they are written."""
+"""Derived messages: viewers can read them, in UTC where the time of day is known; the tracker does not notice that they are written."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import jsonschema
 import numpy as np
 import pytest
+from echostep_app.output.ping_poses import placed_pings
+from echostep_app.session.acceptance.heard import SeenPings
 from mcap.reader import make_reader
 
-from echostep.localization import Estimate, digest
+from echostep.localization import Estimate, TrackStatus, digest
+from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Georeference, Plan, load_plan
 from echostep.ports.chunks import portion_of
-from echostep.recording import open_recording
+from echostep.recording import open_recording, utc_offset_ns
 from echostep.tracker import Tracker
 from echostep_app.output.derived import TOPICS, Derived, east_north
 from echostep_app.output.foxglove import FRAME, LOCATION, POSE, SCENE
+from echostep_app.output.track_files import export
 from echostep_app.recording.recorder import Recorder
+from echostep_app.session.options import TrackingOptions
+from echostep_app.session.runs.replay import tracker_of
 from walks import DEMO, walk_chunks
 
 TAY = Georeference(-2.978, 56.46, math.radians(30.0))
@@ -136,3 +143,121 @@ def test_covariance_on_earth_is_the_turned_one() -> None:
     expected = turn @ np.array([[0.5, 0.1], [0.1, 0.2]]) @ turn.T
     east, both, north = east_north(TAY.rotation_rad, 0.5, 0.1, 0.2)
     assert np.array([[east, both], [both, north]]) == pytest.approx(expected)
+
+
+CLOCK = {"started_utc": "2026-11-26T10:00:00.123+00:00", "started_ns": "0"}
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A simulated walk with derived messages, without a time of day."""
+    return recorded_and_exported(tmp_path_factory.mktemp("plain"), {})
+
+
+@pytest.fixture(scope="module")
+def dated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same walk with the time of day of its start."""
+    return recorded_and_exported(tmp_path_factory.mktemp("dated"), CLOCK)
+
+
+def recorded_and_exported(folder: Path, clock: dict[str, str]) -> Path:
+    with Recorder(folder / "walk.mcap", {"seed": "3"} | clock) as recorder:
+        for chunk in walk_chunks(12.0):
+            recorder.write(chunk)
+    out = folder / "derived.mcap"
+    export(folder / "walk.mcap", DEMO, out, lambda recording, on: tracker_of(recording, on, TrackingOptions(DEMO)))
+    return out
+
+
+def messages(path: Path) -> list[tuple[str, int, bytes]]:
+    with path.open("rb") as file:
+        return [
+            (channel.topic, m.log_time, m.data)
+            for _, channel, m in make_reader(file).iter_messages(log_time_order=False)
+        ]
+
+
+def replayed(path: Path) -> list[Estimate]:
+    recording = open_recording(path)
+    tracker = tracker_of(recording, load_plan(DEMO), TrackingOptions(DEMO))
+    return [e for portion in recording.portions() for e in tracker.take(portion)]
+
+
+def undated(body: Any, offset_ns: int) -> Any:
+    """A derived message with its stamps back on the clock of the arrivals."""
+    if isinstance(body, list):
+        return [undated(part, offset_ns) for part in body]
+    if not isinstance(body, dict):
+        return body
+    if "timestamp" in body:
+        stamp = body["timestamp"]["sec"] * 10**9 + body["timestamp"]["nsec"] - offset_ns
+        body["timestamp"] = {"sec": stamp // 10**9, "nsec": stamp % 10**9}
+    return {key: undated(value, offset_ns) for key, value in body.items()}
+
+
+def test_all_messages_are_the_same_but_for_the_clock(plain: Path, dated: Path) -> None:
+    offset_ns = utc_offset_ns(CLOCK)
+    assert offset_ns
+    without, with_clock = messages(plain), messages(dated)
+    assert {topic for topic, _, _ in without} >= {
+        "/board/bytes",
+        "/estimate",
+        "/pose",
+        "/scene",
+        "/echo/left",
+        "/status",
+    }
+    assert [topic for topic, _, _ in with_clock] == [topic for topic, _, _ in without]
+    assert [t_ns - offset_ns for _, t_ns, _ in with_clock] == [t_ns for _, t_ns, _ in without]
+    for (topic, t_ns, data), (_, _, other) in zip(with_clock, without, strict=True):
+        if topic.endswith("/bytes"):
+            assert data == other
+            continue
+        body = json.loads(data)
+        if "timestamp" in body:
+            assert body["timestamp"] == {"sec": t_ns // 10**9, "nsec": t_ns % 10**9}
+        assert undated(body, offset_ns) == json.loads(other)
+
+
+def test_a_replay_computes_the_same_bits(plain: Path, dated: Path) -> None:
+    assert replayed(dated)
+    assert digest(replayed(dated)) == digest(replayed(plain)) == digest(replayed(plain.with_name("walk.mcap")))
+
+
+# 2 m along the walk frame's x axis in 2 s; in the map, along its y axis to (5, 8)
+SEGMENT = PathSegment(10.0, 12.0, 2.0, 0.0, 0.0, 0.0, 0.05, 0.01, 3)
+MEASURED = MeasuredSegment(SEGMENT, np.array([9.9, 11.0, 12.0]), np.array([0, 1, 0]), np.array([1.0, math.nan, 2.0]))
+END = Estimate(12.0, 5.0, 8.0, 0.01, 0.0, 0.01, 0.5 * math.pi, 0.01, 3, TrackStatus.TRACKING, level=2)
+
+
+def test_pings_lie_on_the_way_to_the_estimate() -> None:
+    ranger, x, y, axis, range_m = placed_pings(MEASURED, END).T
+    assert ranger.tolist() == [0, 1, 0]
+    assert x == pytest.approx([5.0, 5.0, 5.0])
+    assert y == pytest.approx([6.0, 7.0, 8.0])  # one of before the segment: at its begin
+    assert axis == pytest.approx([math.pi, 0.0, math.pi])
+    assert np.isnan(range_m).tolist() == [False, True, False]
+
+
+def test_in_a_turn_the_axis_turns_with_the_trunk() -> None:
+    turning = replace(MEASURED, segment=replace(SEGMENT, heading0_rad=-0.4))
+    axis = placed_pings(turning, END)[:, 3]
+    assert axis == pytest.approx([math.pi - 0.4, -0.2, math.pi])
+
+
+@pytest.mark.parametrize("status", [TrackStatus.UNCERTAIN, TrackStatus.LOST])
+def test_no_ping_of_a_doubted_place(status: TrackStatus) -> None:
+    assert len(placed_pings(MEASURED, replace(END, status=status))) == 0
+
+
+def test_no_ping_of_a_way_that_was_not_observed() -> None:
+    assert len(placed_pings(replace(MEASURED, segment=replace(SEGMENT, sd_m=2.0)), END)) == 0
+    assert len(placed_pings(None, END)) == 0
+
+
+def test_seen_pings_are_these_on_the_estimates_level() -> None:
+    seen = SeenPings()
+    seen.note(MEASURED, END)
+    seen.note(None, END)
+    assert len(seen.pings) == 3
+    assert tuple(seen.pings[2]) == pytest.approx((5.0, 8.0, 2, math.pi, 0, 2.0))

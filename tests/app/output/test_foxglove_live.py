@@ -7,7 +7,6 @@ import json
 import socket
 import struct
 import subprocess
-import sys
 import threading
 import time
 from collections import deque
@@ -208,12 +207,6 @@ def test_a_port_in_use_is_one_line() -> None:
         port = taken.getsockname()[1]
         with pytest.raises(EchostepError, match=f"--foxglove 127.0.0.1:{port}: cannot listen there"):
             FoxgloveServer(FoxgloveAddress("127.0.0.1", port), "a test")
-
-
-def test_without_the_package_there_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "foxglove", None)
-    with pytest.raises(EchostepError, match=r"pip install 'echostep\[foxglove\]'"):
-        FoxgloveServer(FoxgloveAddress("127.0.0.1", 0), "a test")
 
 
 @pytest.mark.long

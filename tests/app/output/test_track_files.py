@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tracks for other programs: read again by others' libraries, they are what was estimated."""
+"""Tracks for other programs: read again by others' libraries, they are what was estimated, to the last bit."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import csv
 import dataclasses
 import json
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -18,9 +19,10 @@ from pyarrow import parquet
 
 from command_line import echostep
 from echostep.errors import EchostepError
-from echostep.localization import Estimate, TrackStatus
+from echostep.localization import Estimate, LikelyPlace, TrackStatus
 from echostep.plan import load_plan
 from echostep.recording import clock_of, open_recording
+from echostep.walk.table import write_track
 from echostep_app.output.map_files import TrackOnPlan
 from echostep_app.output.track_files import FORMATS
 from echostep_app.output.track_files import export as write
@@ -29,6 +31,7 @@ from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.contents import info
 from echostep_app.session.options import TrackingOptions
 from echostep_app.session.runs.replay import tracker_of
+from page.frames import told
 from walks import DEMO, walk_chunks
 
 
@@ -189,3 +192,14 @@ def test_a_track_on_a_map_has_times(folder: Path, estimates: list[Estimate]) -> 
 @pytest.mark.parametrize("damaged", [{}, {"started_utc": "soon", "started_ns": "1"}, {"started_utc": "2026-11-21"}])
 def test_a_recording_without_a_usable_clock_has_none(damaged: dict[str, str]) -> None:
     assert clock_of(damaged) is None
+
+
+def test_each_estimate_is_a_row_with_its_hypotheses(tmp_path: Path) -> None:
+    places = (LikelyPlace(0.58, 12.31, 4.5, 0, 1.0, 0.0), LikelyPlace(0.4, 2.0, 7.5, 1, 1.0, 0.0))
+    spread = replace(told(x_m=0.1 + 0.2, status=TrackStatus.LOST), hypotheses=places, right=0.3, plan_fits=0.25)
+    write_track(tmp_path / "track.csv", [told(), spread])
+    sure, unsure = csv.DictReader((tmp_path / "track.csv").read_text().splitlines())
+    assert (sure["hypotheses"], sure["status"], sure["protection_m"]) == ("", "tracking", "inf")
+    assert float(unsure["x_m"]) == 0.1 + 0.2
+    assert unsure["hypotheses"] == "0.58:12.3,4.5,0 0.40:2.0,7.5,1"
+    assert [unsure[name] for name in ("right", "outside", "plan_fits")] == ["0.3", "0.0", "0.25"]

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""What other programs really write: deleted, copied and clipped elements, other data, units and pictures, thick walls; each by its right result."""
+"""What other programs really write, each by its right result; and what `plan import` shows of it: a summary, a picture, advice."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -13,16 +14,18 @@ import pytest
 from ezdxf.filemanagement import new
 from ezdxf.xclip import XClip
 
+import command_line
 from echostep.errors import EchostepError
-from echostep.plan import Plan
+from echostep.plan import Door, Plan, load_plan
 from echostep.plan.model import parse_plan
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
-from echostep_app.plan.importers.summary import doors_in_gaps, size_m
-from needs_data import data_or_skip
+from echostep_app.plan.importers.summary import MOST_LINES, doors_in_gaps, size_m, summary
+from plan.drawings.drawn_houses import write_house
+from plan.imported_plans import seven_floors
 
 DEG = 1e-5  # degrees of the small houses on the Earth
 
@@ -102,7 +105,7 @@ ROOM = '<way id="5">{}<tag k="indoor" v="room"/><tag k="level" v="0"/></way>'
 REFS = "".join(f'<nd ref="{k}"/>' for k in (1, 2, 3, 4, 1))
 
 
-def test_words_about_tags_and_other_xml(tmp_path: Path) -> None:
+def test_elements_without_a_level_are_told(tmp_path: Path) -> None:
     more = "".join(
         f'<way id="{k}">{REFS}<tag k="indoor" v="{v}"/></way>'
         for k, v in ((6, "no"), (7, "no"), (8, "yes"), (10, "yes"))
@@ -111,48 +114,6 @@ def test_words_about_tags_and_other_xml(tmp_path: Path) -> None:
     said = " ".join(imported(tmp_path / "a.osm")[1].doubts)
     assert "2 indoor=yes have no level" in said
     assert "indoor=no" not in said
-    (tmp_path / "a.xml").write_text('<c:X xmlns:c="http://www.opengis.net/indoorgml/1.0/core"/>')
-    with pytest.raises(EchostepError, match="this XML is <X>, not <osm>: IndoorGML or CityGML is not read"):
-        imported(tmp_path / "a.xml")
-    (tmp_path / "a.xml").write_text('<c:X xmlns:c="urn:other"/>')
-    with pytest.raises(EchostepError, match=r"this XML is <X>, not <osm>: .*DXF, IFC, IMDF"):
-        imported(tmp_path / "a.xml")
-
-
-@pytest.fixture(scope="module")
-def found() -> Path:
-    return data_or_skip("small/found")
-
-
-@pytest.mark.parametrize(("name", "doors"), [
-    ("stacked/stacked.osm", [2, 1, 1]), ("stacked/stacked.geojson", [2, 1, 1]), ("geom/out_geom.osm", [2, 1, 1]), ("josm-deleted/josm.osm", [0]),
-])  # fmt: skip
-def test_doors_found(found: Path, name: str, doors: list[int]) -> None:
-    assert [len(level.doors) for level in imported(found / name)[0].levels] == doors
-
-
-@pytest.mark.parametrize(("name", "size", "walls"), [
-    ("ros-raw/raw.yaml", (5.05, 3.55), 8), ("decimetres/plan.dxf", (20, 12), 8), ("decimetres/yards.dxf", (20, 12), 8),
-    ("picture-kinds/transparent.png", (18.05, 13.05), 16), ("picture-kinds/la.png", (18.05, 13.05), 16),
-    ("picture-kinds/palette_t.png", (18.05, 13.05), 16), ("picture-kinds/sixteen.png", (18.05, 13.05), 16),
-    ("picture-kinds/exif6.jpg", (13.05, 18.05), 16), ("clipped-block/plan.dxf", (12, 8), 5), ("binary-dxf/plan.dxf", (20, 12), 8),
-])  # fmt: skip
-def test_sizes_found(found: Path, name: str, size: tuple[float, float], walls: int) -> None:
-    plan, _ = imported(found / name, **({"scale_m": 0.05} if "picture" in name else {}))
-    assert size_m(plan.levels[0]) == pytest.approx(size, abs=0.01)
-    assert len(plan.levels[0].walls) == walls
-
-
-def test_a_model_in_a_national_grid_is_the_same_house(found: Path) -> None:
-    near, far = (imported(found / f"grid/{name}.ifc") for name in ("local", "site_in_utm"))
-    assert size_m(far[0].levels[0]) == pytest.approx(size_m(near[0].levels[0]), abs=1e-3)
-    assert len(far[0].levels[0].walls) == len(near[0].levels[0].walls)
-    assert "the plan's origin is x 311988 m, y 5996148 m there" in " ".join(far[1].doubts)
-
-
-@pytest.mark.parametrize("name", ["wall_24cm", "wall_30cm_at_0", "wall_30cm_at_1"])
-def test_jambs_found(found: Path, name: str) -> None:
-    assert not check_plan(parse_plan((found / f"jamb/{name}.json").read_bytes()))
 
 
 def clip_of(path: Path, corners: list[tuple[float, float]]) -> Path:
@@ -183,13 +144,86 @@ def test_a_binary_drawing_that_is_cut_is_refused(tmp_path: Path) -> None:
             imported(tmp_path / "b.dxf")
 
 
-@pytest.mark.parametrize("name", ["leaf_closed_wall", "leaf_closed_gap"])
-def test_leaves_drawn_closed_found(found: Path, name: str) -> None:
-    plan, report = imported(found / f"leaf/{name}.dxf")
-    assert doors_in_gaps(plan.levels[0]) == 2
-    assert ("2 doors lie where a wall is drawn through" in " ".join(report.doubts)) == (name == "leaf_closed_wall")
+PNG = b"\x89PNG\r\n\x1a\n"
 
 
-@pytest.mark.parametrize("name", ["storeys_frame", "storeys_frame_detail"])
-def test_storeys_side_by_side_found(found: Path, name: str) -> None:
-    assert "looks like 3 storeys beside each other" in " ".join(imported(found / f"storeys/{name}.dxf")[1].doubts)
+@pytest.mark.process
+def test_an_import_shows_what_came_in(tmp_path: Path) -> None:
+    source = write_house(tmp_path / "house.dxf")
+    done = command_line.echostep("plan", "import", source, "-o", tmp_path / "plan.json")
+    assert done.stdout.splitlines() == [
+        "house, 0 m: 10 x 8 m, 14 walls (84 m), 1 door (1 in a gap of a wall), 0 rooms",
+        "units: m ($INSUNITS; sizes fit)",
+        "layers: walls: A-WALL; doors: A-DOOR",
+        f"{tmp_path / 'plan.json'}, {tmp_path / 'plan.png'}",
+    ]
+    assert (tmp_path / "plan.png").read_bytes().startswith(PNG)
+    assert load_plan(tmp_path / "plan.json").levels[0].name == "house"
+
+
+@pytest.mark.long
+@pytest.mark.process
+def test_the_picture_beside_the_plan(tmp_path: Path) -> None:
+    """It replaces one that an import drew, and no other; --no-picture draws none."""
+    source = write_house(tmp_path / "house.dxf")
+    command = ["plan", "import", source, "-o", tmp_path / "plan.json"]
+    assert command_line.echostep(*command, "--no-picture").returncode == 0
+    assert not (tmp_path / "plan.png").exists()
+    (tmp_path / "plan.png").write_bytes(b"a scan")
+    done = command_line.echostep(*command)
+    assert "plan.png is another picture and stays" in done.stdout
+    assert (tmp_path / "plan.png").read_bytes() == b"a scan"
+    (tmp_path / "plan.png").unlink()
+    for _ in range(2):
+        assert command_line.echostep(*command).stdout.endswith(f", {tmp_path / 'plan.png'}\n")
+
+
+def test_at_most_twelve_lines() -> None:
+    report = ImportReport(units="mm", layers={kind: [f"{kind}-{k}" for k in range(50)] for kind in ("walls", "doors")})
+    for k in range(40):
+        report.leave_out(f"LINE on layer {k}", 40 - k)
+        report.doubt(f"doubt {k}")
+    lines = summary(seven_floors(), report)
+    assert len(lines) <= MOST_LINES - 1  # the command adds the names of the files
+    text = "\n".join(lines)
+    assert "... and 2 levels more" in text
+    assert "left out: 40 LINE on layer 0, 39 LINE on layer 1" in text
+    assert "of 34 other kinds" in text
+    assert "note: doubt 0" in text
+    assert all(len(line) < 400 for line in lines)
+
+
+def test_doors_in_gaps_are_counted() -> None:
+    """The entrance of this building is drawn in a wall without a gap."""
+    level = seven_floors().levels[1]
+    assert (doors_in_gaps(level), len(level.doors)) == (6, 7)
+    away = Door((4.5, 2.0, 5.5, 2.0))
+    through = Door((17.0, 14.0, 18.0, 14.0))
+    assert doors_in_gaps(replace(level, doors=(*level.doors, away, through))) == 6
+
+
+def test_sizes_that_no_building_has_are_told() -> None:
+    plan = seven_floors()
+    assert not any("scale" in line for line in summary(plan, ImportReport()))
+    small = tuple(
+        replace(level, walls=level.walls / 20, windows=level.windows / 20, doors=(Door((0.0, 0.0, 0.05, 0.0)),))
+        for level in plan.levels[:1]
+    )
+    lines = summary(replace(plan, levels=small, connectors=()), ImportReport())
+    assert "note: Basement is 1.21 m long: is the scale right?" in lines
+    assert "note: half of the doors are 0.05 m wide or less: is the scale right?" in lines
+
+
+def test_walls_with_gaps_are_not_called_closed(tmp_path: Path) -> None:
+    """Rooms that a gap leads to can be entered, doors or not."""
+    doc = new("R2010", units=6)
+    space = doc.modelspace()
+    for line in ((0, 0, 12, 0), (12, 0, 12, 8), (12, 8, 0, 8), (0, 8, 0, 0), (0, 5, 2, 5), (2.9, 5, 12, 5)):
+        space.add_line(line[:2], line[2:], {"layer": "A-WALL"})
+    space.add_text("Kitchen", dxfattribs={"layer": "ROOM", "height": 0.3, "insert": (3, 6.5)})
+    doc.saveas(tmp_path / "a.dxf")
+    plan, report = imported(tmp_path / "a.dxf")
+    said = "\n".join(summary(plan, report))
+    assert "0 doors, 1 gap that people can pass, 1 room" in said
+    assert "cannot be entered" not in said
+    assert plan.levels[0].rooms[0].name == "Kitchen"

@@ -10,10 +10,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pytest
-from PIL import Image
-
 from echostep.plan import Plan
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
@@ -92,17 +88,3 @@ def test_kinds_of_openstreetmap(tmp_path: Path) -> None:
         "way that is no wall, room, corridor or stairs": 2, "room without level": 1, "relation that is no multipolygon": 1,
     }  # fmt: skip
     assert sizes(plan) == {"doors": 3, "windows": 1, "rooms": 4, "obstacles": 0, "connectors": 2}
-
-
-@pytest.mark.parametrize("name", ["map.yaml", "map.png"])
-def test_groups_of_pixels(tmp_path: Path, name: str) -> None:
-    """Of ten groups of dark pixels five are as large as walls."""
-    pixels = np.full((200, 200), 254, dtype=np.uint8)
-    for k in range(5):
-        pixels[20 + 30 * k : 22 + 30 * k, 10:150] = 0
-        pixels[30 + 30 * k, 170] = 0
-    Image.fromarray(pixels).save(tmp_path / "map.png")
-    (tmp_path / "map.yaml").write_text("image: map.png\nresolution: 0.05\norigin: [0, 0, 0]\n")
-    plan, left_out = counted(tmp_path / name, **({"scale_m": 0.05} if name == "map.png" else {}))
-    assert sum(left_out.values()) == 5
-    assert len(plan.levels[0].walls) == 5 * 4

@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 from ezdxf.filemanagement import new
-from typer.testing import CliRunner
 
 from echostep.errors import EchostepError
-from echostep.plan import Plan, load_plan
-from echostep_app.cli import app
+from echostep.plan import Plan
 from echostep_app.plan.importers.dxf import entities as dxf_entities
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
@@ -78,15 +76,6 @@ def with_gap() -> tuple[Any, Any]:
     return doc, space
 
 
-def test_a_plain_line_is_a_door_and_cuts_the_wall(tmp_path: Path) -> None:
-    doc, space = drawing()
-    space.add_line((0, 0), (9, 0), {"layer": "A-WALL"})
-    space.add_line((4, 0), (5, 0), {"layer": "A-DOOR"})
-    plan = imported(doc, tmp_path)
-    assert walls_of(plan) == {((0, 0), (4, 0)), ((5, 0), (9, 0))}
-    assert plan.levels[0].doors[0].line == pytest.approx((4, 0, 5, 0), abs=0.002)
-
-
 def test_hostile_drawings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dxf_entities, "MOST_PARTS", 3000)
     doc, space = drawing()
@@ -115,23 +104,6 @@ def test_hostile_drawings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
         imported(doc, tmp_path)
 
 
-@pytest.mark.parametrize(
-    "raw",
-    [
-        b"",
-        b"hello",
-        b"\x00" * 1000,
-        b"0\nSECTION\n2\nENTITIES\n0\nLINE\n",
-        b"AutoCAD Binary DXF\r\n\x1a\x00" + b"\xff" * 99,
-    ],
-)
-def test_no_drawing(tmp_path: Path, raw: bytes) -> None:
-    (tmp_path / "a.dxf").write_bytes(raw)
-    with pytest.raises(EchostepError, match=r"a.dxf: ") as caught:
-        import_plan(tmp_path / "a.dxf")
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize(("deep", "walls"), [(16, 5), (17, 4)])
 def test_blocks_in_blocks_are_read_to_a_depth(tmp_path: Path, deep: int, walls: int) -> None:
     doc, space = drawing()
@@ -155,27 +127,3 @@ def test_room_numbers_of_blocks(tmp_path: Path) -> None:
     for k, (tag, text) in enumerate(texts.items()):
         beside.add_attrib(tag, text, (6 + 0.5 * (k % 2), 2 - 0.6 * k), layer)
     assert [room.name for room in imported(doc, tmp_path).levels[0].rooms] == ["2.14", "101 Office"]
-
-
-@pytest.mark.long
-@pytest.mark.process
-def test_commands(tmp_path: Path) -> None:
-    doc, _ = with_gap()
-    doc.saveas(tmp_path / "ground.dxf")
-    command = ["plan", "import", str(tmp_path / "ground.dxf"), "-o", str(tmp_path / "plan.json")]
-    done = CliRunner().invoke(app, command)
-    assert done.exit_code == 0
-    assert "ground, 0 m: 9 x 0 m, 2 walls (8 m)" in done.output
-    assert load_plan(tmp_path / "plan.json").digest == import_plan(tmp_path / "ground.dxf").digest
-    again = CliRunner().invoke(app, [*command, "--layer", "walls=A-DOOR", "--layer", "walls=A-W*", "--units", "mm"])
-    assert again.exit_code == 0
-    for wrong, named in (
-        (["--layer", "roofs=A"], "KIND=PATTERN"),
-        (["--layer", "walls"], "KIND"),
-        (["--units", "li"], "--units li"),
-    ):
-        failed = CliRunner().invoke(app, [*command, *wrong])
-        assert isinstance(failed.exception, EchostepError)
-        assert named in str(failed.exception)
-    both = ["plan", "import", str(tmp_path / "a.ifc"), str(tmp_path / "b.ifc"), "-o", str(tmp_path / "plan.json")]
-    assert "only drawings" in str(CliRunner().invoke(app, both).exception)

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-import command_line
 from echostep.errors import EchostepError
 from echostep.plan import Plan
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
-from echostep_app.plan.importers.imdf import archive
+from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.summary import summary
 
 LON, LAT = -2.978, 56.46
 EAST, NORTH = 1 / 61_650.0, 1 / 111_360.0  # degrees a metre there
@@ -128,46 +128,6 @@ def test_a_relationship_joins_stairs_apart(tmp_path: Path) -> None:
     assert len(import_plan(folder(tmp_path / "c", tree)).connectors) == 1
 
 
-def changed(name: str, place: int, **about: Any) -> dict[str, Any]:
-    tree = files()
-    tree[name]["features"][place] |= about
-    return tree
-
-
-@pytest.mark.parametrize(("tree", "named"), [
-    ({"unit.geojson": "{}"}, "no level.geojson in it"),
-    ({"manifest.json": "{}"}, "level.geojson"),
-    (files() | {"unit.geojson": "[1"}, "unit.geojson: not JSON"),
-    (files() | {"unit.geojson": "[" * 100_000}, "unit.geojson: not JSON"),
-    (files() | {"level.geojson": {"type": "FeatureCollection", "features": []}}, "no levels"),
-    (changed("unit.geojson", 1, properties={"category": 4, "level_id": "L0"}), r"unit.geojson.*category"),
-    (changed("unit.geojson", 1, geometry={"type": "Polygon", "coordinates": [[[0, 0]]]}), r"unit.geojson: features\[1\].geometry"),
-    (changed("level.geojson", 1, properties={"ordinal": "x"}), r"level features\[1\].properties.ordinal"),
-    (changed("level.geojson", 0, geometry={"coordinates": []}), r"level.geojson: features\[0\].geometry"),
-])  # fmt: skip
-def test_wrong_archives(tmp_path: Path, tree: dict[str, Any], named: str) -> None:
-    with pytest.raises(EchostepError, match=named) as caught:
-        import_plan(zipped(tmp_path / "a.zip", tree))
-    assert "\n" not in str(caught.value)
-
-
-def test_hostile_zips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "a.zip").write_bytes(b"PK\x03\x04 nothing")
-    with pytest.raises(EchostepError, match="not a zip file"):
-        import_plan(tmp_path / "a.zip")
-    with pytest.raises(EchostepError, match="not a zip file"):
-        import_plan(tmp_path / "none.zip")
-    monkeypatch.setattr(archive, "LARGEST_BYTES", 1_000_000)
-    bomb = zipped(tmp_path / "b.zip", files() | {"level.geojson": " " * 2_000_000})
-    with pytest.raises(EchostepError, match=r"level.geojson: unpacks to more than 0 MiB"):
-        import_plan(bomb)
-    raw = bytearray(zipped(tmp_path / "c.zip", files()).read_bytes())
-    raw[200:400] = bytes(200)
-    (tmp_path / "c.zip").write_bytes(raw)
-    with pytest.raises(EchostepError, match=r"c\.zip"):
-        import_plan(tmp_path / "c.zip")
-
-
 def without_openings(rooms: int = 8) -> dict[str, Any]:
     """One level: a corridor of 40 m, rooms of 5 m on one side, and a store behind the first room that only this room touches."""
     on = {"level_id": "L0"}
@@ -191,13 +151,6 @@ def test_files_may_end_in_json(mall: Plan, tmp_path: Path) -> None:
     renamed["level.json"]["features"] = []
     with pytest.raises(EchostepError, match=r"level\.json: it has no levels"):
         import_plan(folder(tmp_path / "c", renamed))
-
-
-def test_rooms_without_openings_are_one_cause(tmp_path: Path) -> None:
-    plan = import_plan(folder(tmp_path / "a", without_openings()))
-    (finding,) = check_plan(plan)
-    assert finding.kind == "no door"
-    assert finding.text.startswith("9 rooms have no door, as 'R0'; the level has none at all")
 
 
 def test_assumed_doors_reach_every_room(tmp_path: Path) -> None:
@@ -244,16 +197,12 @@ def test_doors_that_are_drawn_stay_as_they_are(mall: Plan, tmp_path: Path) -> No
     assert import_plan(folder(tmp_path / "a", files()), Hints(doors_m=0.9)).levels[0].doors == mall.levels[0].doors
 
 
-@pytest.mark.process
 def test_the_import_says_that_there_are_no_doors(tmp_path: Path) -> None:
-    source, out = folder(tmp_path / "a", without_openings()), tmp_path / "plan.json"
-    done = command_line.echostep("plan", "import", source, "-o", out)
-    assert "has no door openings, so its rooms cannot be entered: --doors 0.9" in done.stdout
-    done = command_line.echostep("plan", "import", source, "-o", out, "--doors", "0.9")
-    assert "9 doors are assumed" in done.stdout
-    assert "no door openings" not in done.stdout
-
-
-def test_doors_are_for_imdf(tmp_path: Path) -> None:
-    with pytest.raises(EchostepError, match="--doors is for IMDF alone"):
-        import_plan(tmp_path / "plan.osm", Hints(doors_m=0.9))
+    said = []
+    for hints in (Hints(), Hints(doors_m=0.9)):
+        report = ImportReport()
+        plan = import_plan(folder(tmp_path / "a", without_openings()), hints, report=report)
+        said.append("\n".join(summary(plan, report)))
+    assert "has no door openings, so its rooms cannot be entered: --doors 0.9" in said[0]
+    assert "9 doors are assumed" in said[1]
+    assert "no door openings" not in said[1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Importing OpenStreetMap indoor data: XML and Overpass JSON give the same plan; tags; what a damaged file gets."""
+"""Importing OpenStreetMap indoor data: what becomes of a house, levels, tags, GeoJSON (all kinds of files: habits)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from echostep.errors import EchostepError
 from echostep.plan import Plan
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers.formats import import_plan, is_foreign
@@ -42,22 +41,9 @@ HOUSE = [
 ]  # fmt: skip
 
 
-def xml(elements: list[dict[str, Any]]) -> str:
-    rows = []
-    for e in elements:
-        inner = "".join(f'<tag k="{k}" v="{v}"/>' for k, v in e["tags"].items()) + "".join(
-            f'<nd ref="{n}"/>' for n in e.get("nodes", [])
-        )
-        place = f' lon="{e["lon"]!r}" lat="{e["lat"]!r}"' if "lon" in e else ""
-        rows.append(f'<{e["type"]} id="{e["id"]}"{place}>{inner}</{e["type"]}>')
-    return '<?xml version="1.0" encoding="UTF-8"?><osm version="0.6">' + "".join(rows) + "</osm>"
-
-
-def imported(folder: Path, elements: Any, name: str = "house.json") -> Plan:
-    (folder / name).write_text(
-        json.dumps({"version": 0.6, "elements": elements}) if name.endswith("json") else xml(elements)
-    )
-    return import_plan(folder / name)
+def imported(folder: Path, elements: Any) -> Plan:
+    (folder / "house.json").write_text(json.dumps({"version": 0.6, "elements": elements}))
+    return import_plan(folder / "house.json")
 
 
 def test_what_becomes_of_a_house(tmp_path: Path) -> None:
@@ -108,40 +94,6 @@ def test_levels(tags: dict[str, str], levels: list[float]) -> None:
     assert levels_of(tags) == levels
 
 
-@pytest.mark.parametrize(("text", "named"), [
-    ('{"elements": 3}', "elements: expected a list"),
-    ('{"elements": []}', "indoor"),
-    ('{"elements": [{"type": "node", "id": "a"}]}', "node 'a'"),
-    ('{"elements": [{"type": "node", "id": 7, "lon": 200, "lat": 0}]}', "node 7: lon"),
-    ('{"elements": [{"type": "node", "id": 7, "lon": NaN, "lat": 0}]}', "NaN"),
-    ('{"elements": [{"type": "way", "id": 7, "nodes": [true]}]}', "way 7"),
-    ('{"elements": [{"type": "way", "id": 7, "nodes": [1, 2], "tags": {"indoor": "room", "level": "0"}}]}', "indoor"),
-    (json.dumps({"elements": [*HOUSE, node(50, 4e6, 0)]}), "km apart"),
-    (json.dumps({"elements": [*HOUSE, way(51, [1, 5], indoor="wall", level="0-9999999")]}), r"a\.json: way 51: level .* is no range of levels"),
-])  # fmt: skip
-def test_wrong_json(tmp_path: Path, text: str, named: str) -> None:
-    (tmp_path / "a.json").write_text(text)
-    with pytest.raises(EchostepError, match=named):
-        import_plan(tmp_path / "a.json")
-
-
-@pytest.mark.parametrize(("text", "named"), [
-    ("", "not XML"),
-    ("<osm>", "not XML"),
-    ("<html/>", "this XML is <html>, not <osm>: plans are read as DXF, IFC, IMDF"),
-    ('<!DOCTYPE x [<!ENTITY a "aaaa">]><osm>&a;</osm>', "DTD"),
-    ('<osm><node id="x" lon="1" lat="1"/></osm>', "node 'x'"),
-    ('<osm><node id="1" lon="nan" lat="1"/></osm>', "node 1: lon"),
-    ('<osm><node id="1" lon="1"/></osm>', "node 1: lat"),
-    ("<osm>" + "<a>" * 100_000, "not XML"),
-])  # fmt: skip
-def test_wrong_xml(tmp_path: Path, text: str, named: str) -> None:
-    (tmp_path / "a.osm").write_text(text)
-    with pytest.raises(EchostepError, match=named) as caught:
-        import_plan(tmp_path / "a.osm")
-    assert "\n" not in str(caught.value)
-
-
 def geojson(*shapes: tuple[str, Any, dict[str, str]]) -> str:
     features = [
         {"type": "Feature", "properties": {"@id": f"way/{k}"} | tags, "geometry": {"type": kind, "coordinates": at}}
@@ -175,29 +127,6 @@ def test_geojson_of_overpass_turbo(tmp_path: Path, name: str) -> None:
     assert report.left_out == {"door on no wall": 1}
     assert plan.georeference is not None
     assert len(plan.levels[0].walls) == 4 + 3 + 1  # outline, hole, the wall beside
-
-
-@pytest.mark.parametrize(("text", "named"), [
-    (geojson(("Polygon", [[[0, 0], [1, 0], [0, 0]]], {"building": "yes"})), "indoor"),
-    (geojson(("Curve", [], ROOM)), "no type of geometry"),
-    (geojson(("Point", [200, 0], ROOM)), r"features\[0\]"),
-    (geojson(("Point", [1], ROOM)), "expected .longitude, latitude."),
-    (geojson(("Polygon", 3, ROOM)), "coordinates"),
-])  # fmt: skip
-def test_wrong_geojson(tmp_path: Path, text: str, named: str) -> None:
-    (tmp_path / "a.geojson").write_text(text)
-    with pytest.raises(EchostepError, match=named):
-        import_plan(tmp_path / "a.geojson")
-
-
-def test_rooms_without_a_level_are_told(tmp_path: Path) -> None:
-    rooms = [way(60, [1, 2, 3, 4, 1], indoor="room", name="Lost"), way(61, [1, 2, 3, 4, 1], indoor="area")]
-    (tmp_path / "a.json").write_text(json.dumps({"elements": [*HOUSE, *rooms]}))
-    report = ImportReport()
-    import_plan(tmp_path / "a.json", report=report)
-    assert report.left_out["room without level"] == 1
-    assert report.left_out["indoor=area without level"] == 1
-    assert report.doubts[0].startswith("1 room has no level and was left out (way 60)")
 
 
 ROOFS = [({"building": kind}, None) for kind in ("roof", "carport", "canopy")]  # without walls, so without doors

@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 from board_runs import ROOT
-from echostep.errors import EchostepError
-from echostep.plan import Level, Plan, Pose, Room, load_plan
-from echostep_app.plan.check import check_plan
+from echostep.plan import Level, Plan, Room, load_plan
 from echostep_app.plan.places.gaps import door_gaps
-from echostep_app.plan.places.standing import StandingGround, refuse_impossible
+from echostep_app.plan.places.standing import StandingGround
 from echostep_app.plan.places.whereabouts import Whereabouts
 from plan.imported_plans import seven_floors
 
@@ -49,21 +47,22 @@ def without_name(plan: Plan, *names: str) -> Plan:
     return replace(plan, levels=(replace(level, rooms=tuple(r for r in level.rooms if r.name not in names)),))
 
 
-def test_a_corridor_without_a_name_and_the_door_beside() -> None:
-    whereabouts = Whereabouts(without_name(DEMO, "North corridor", "South corridor"))
-    assert whereabouts.words(9.5, 7.5, 0) == "in the corridor, by the door of Office 2"
-    assert whereabouts.words(24.0, 5.0, 0) == "in the corridor"
+CORRIDORS = "North corridor", "South corridor"
+FIELD = Plan("field", (Level("G", 0.0, np.zeros((0, 4))),), None, "")
 
 
-def test_a_room_without_a_name_is_told_by_its_neighbour() -> None:
-    whereabouts = Whereabouts(without_name(DEMO, "Lab"))
-    assert whereabouts.words(15.7, 11.2, 0) == "near North corridor"  # its door leads to two names
-
-
-def test_a_plan_without_names_says_nothing() -> None:
-    level = replace(DEMO.levels[0], rooms=())
-    assert Whereabouts(replace(DEMO, levels=(level,))).words(24.0, 5.0, 0) == "in the corridor"
-    assert Whereabouts(Plan("field", (Level("G", 0.0, np.zeros((0, 4))),), None, "")).words(1.0, 2.0, 0) == ""
+@pytest.mark.parametrize(
+    ("plan", "at", "words"),
+    [
+        (without_name(DEMO, *CORRIDORS), (9.5, 7.5), "in the corridor, by the door of Office 2"),
+        (without_name(DEMO, *CORRIDORS), (24.0, 5.0), "in the corridor"),
+        (without_name(DEMO, "Lab"), (15.7, 11.2), "near North corridor"),  # its door leads to two names
+        (without_name(DEMO, *(room.name for room in DEMO.levels[0].rooms)), (24.0, 5.0), "in the corridor"),
+        (FIELD, (1.0, 2.0), ""),
+    ],
+)
+def test_places_without_a_name_are_told_by_what_is_near(plan: Plan, at: tuple[float, float], words: str) -> None:
+    assert Whereabouts(plan).words(*at, 0) == words
 
 
 def test_gaps_are_found_once_and_jambs_do_not_hide_them() -> None:
@@ -116,14 +115,6 @@ def test_no_start_in_a_thick_wall_or_a_table_of_seven_floors() -> None:
     assert ground.objection(1.0, 1.0, 7) is not None
 
 
-def test_a_refused_start_names_the_nearest_place() -> None:
-    with pytest.raises(
-        EchostepError, match=r"--start 100,7,0: .*outside the building.*nearest possible place is 24.70,7.00"
-    ):
-        refuse_impossible(DEMO, Pose(100.0, 7.0, 0.0), "--start 100,7,0")
-    refuse_impossible(DEMO, Pose(2.0, 7.5, 0.0), "--start 2,7.5,0")
-
-
 def test_where_nothing_encloses_the_hull_of_the_walls_is_the_building() -> None:
     walls = np.array([[0, 0, 20, 0], [0, 2, 20, 2]], dtype=float)
     corridor = Plan("corridor", (Level("G", 0.0, walls, (Room("Corridor", (10.0, 1.0)),)),), None, "")
@@ -131,16 +122,4 @@ def test_where_nothing_encloses_the_hull_of_the_walls_is_the_building() -> None:
     assert ground.objection(19.0, 1.0, 0) is None
     assert (outside := ground.objection(10.0, 5.0, 0)) is not None
     assert outside.nearest_m == pytest.approx((10.0, 1.7))
-    field = Plan("field", (Level("G", 0.0, np.zeros((0, 4))),), None, "")
-    assert StandingGround(field).objection(1e3, 0.0, 0) is None
-
-
-def test_a_check_of_the_plan_finds_a_start_where_nobody_can_stand() -> None:
-    start = DEMO.start
-    assert start is not None
-    assert not check_plan(DEMO)
-    (finding,) = check_plan(replace(DEMO, start=replace(start, x_m=1.02)))
-    assert (finding.kind, finding.text) == (
-        "start",
-        "the start: it is inside a wall; the nearest possible place is 1.30,7.50",
-    )
+    assert StandingGround(FIELD).objection(1e3, 0.0, 0) is None

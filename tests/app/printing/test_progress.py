@@ -1,16 +1,27 @@
 # SPDX-License-Identifier: MIT
-"""Whatever takes longer than two seconds shows how far it is: on a terminal a bar, elsewhere one plain line."""
+"""Progress of what takes long; kernels are compiled before the first bytes come, counted, told of, and never in a run."""
 
 from __future__ import annotations
 
 import io
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
 
+import numba
+import numpy as np
 import pytest
 from rich.console import Console
 
-from command_line import echostep
-from echostep.board.messages import SCHEMA_HASH
+import echostep.jit  # noqa: F401 (it reports what is compiled)
+from echostep.jit import kernel, part
+from echostep.kernel_cache import on_compiling
+from echostep_app import kernel_parts
+from echostep_app.kernel_parts import LATER, TRACKING, Part, compile_parts, compiling_later
 from echostep_app.printing import progress
+from echostep_app.printing.compiling import COMPILING, counting_compiled, tell_of_compiling
 from waiting import PATIENCE_S, until
 
 
@@ -44,6 +55,148 @@ def test_bars_fill(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "Listening for 1 s" in shown.getvalue()
 
 
-def test_the_version_is_printed() -> None:
-    done = echostep("--version")
-    assert (done.returncode, done.stdout) == (0, f"echostep 0.1.0, protocol 0x{SCHEMA_HASH:08X}\n")
+class Screen(io.StringIO):
+    """Standard error, on a terminal or not."""
+
+    def __init__(self, *, terminal: bool) -> None:
+        super().__init__()
+        self._terminal = terminal
+
+    def isatty(self) -> bool:
+        return self._terminal
+
+
+@pytest.fixture(autouse=True)
+def _told_anew() -> Iterator[None]:
+    before = list(on_compiling)
+    tell_of_compiling()
+    yield
+    on_compiling[:] = before
+
+
+def compile_two() -> None:
+    """Two kernels without a cache; the second calls another one."""
+    inner = numba.njit(lambda x: x + 1)
+    numba.njit(lambda x: x - 1)(1)
+    numba.njit(lambda x: inner(x))(1)  # noqa: PLW0108 (a kernel that calls a kernel)
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_one_line_on_a_terminal(monkeypatch: pytest.MonkeyPatch, terminal: bool) -> None:
+    screen = Screen(terminal=terminal)
+    monkeypatch.setattr(sys, "stderr", screen)
+    compile_two()
+    assert screen.getvalue() == (f"{COMPILING}\n" if terminal else "")
+
+
+def test_progress_that_is_shown_counts_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    screen, counts = Screen(terminal=True), list[int]()
+    monkeypatch.setattr(sys, "stderr", screen)
+    with counting_compiled(counts.append):
+        compile_two()
+    assert counts == [1, 2]  # the inner one is compiled within
+    assert not screen.getvalue()
+    numba.njit(lambda x: x)(1)
+    assert screen.getvalue() == f"{COMPILING}\n"
+
+
+def test_a_kernel_that_is_kept_is_not_compiled() -> None:
+    kept = numba.njit(lambda x: x)
+    kept(1)
+    counts = list[int]()
+    with counting_compiled(counts.append):
+        kept(2)
+    assert not counts
+
+
+RUN = """
+from numba.core import event
+from echostep.plan import Pose, load_plan
+from echostep_app.session.runs.demo import SIMULATION
+from echostep.tracker import Tracker
+from echostep_app.kernel_parts import LATER, SEARCH, TRACKING, compile_parts, compiling_later
+from echostep.tracker.kernels import beacons, search
+from walks import DEMO, walk_chunks
+
+class Compiled(event.Listener):
+    def on_start(self, event):
+        print("compiled:", event.data["dispatcher"].py_func.__qualname__)
+    def on_end(self, event):
+        pass
+
+shares = []
+compile_parts([*TRACKING, SIMULATION, SEARCH], shares.append)
+assert max(shares, default=1.0) == 1.0, max(shares)
+assert sum(share < 1.0 for share in shares) >= 0.8 * len(shares), "the numbers of kernels are too small"
+chunks = walk_chunks(6.0)
+tracker = Tracker(load_plan(DEMO), Pose(1.0, 1.0, 0.0))  # not where the walk begins
+tracker.warm_up()
+event.register("numba:compile", Compiled())
+with compiling_later(LATER) as child:
+    assert child is None or child.wait() == 0
+estimates = [estimate for chunk in chunks for estimate in tracker.feed(chunk)]
+assert len(estimates) > 5
+search()
+beacons()
+"""
+
+
+def run(folder: Path) -> str:
+    """What a run prints of the kernels that it compiles by itself, with a cache in this folder."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": str(folder)}
+    done = subprocess.run(
+        [sys.executable, "-c", RUN],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=20 * PATIENCE_S,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.process
+@pytest.mark.long
+def test_a_run_never_waits_for_a_kernel_when_its_first_search_begins(tmp_path: Path) -> None:
+    """With an empty cache."""
+    assert run(tmp_path) == ""
+
+
+@pytest.mark.process
+def test_what_is_compiled_is_not_compiled_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    compile_parts(TRACKING)
+    monkeypatch.setattr(kernel_parts, "start_compiling", lambda *_: pytest.fail("it starts a process"))
+    compile_parts(TRACKING)
+    with compiling_later(TRACKING) as child:
+        assert child is None
+
+
+def test_a_python_that_cannot_be_started_leaves_the_kernels_to_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Part, "is_compiled", False)
+    monkeypatch.setattr(sys, "executable", "/nowhere/python")
+
+    def refuse(*_: object, **__: object) -> None:
+        raise FileNotFoundError("/nowhere/python")
+
+    monkeypatch.setattr(subprocess, "Popen", refuse)
+    compile_parts(LATER)
+
+
+@part
+def _doubled(x: float) -> float:
+    return 2.0 * x
+
+
+@kernel
+def _sum_of_doubled(x: np.ndarray) -> float:
+    total = _doubled(0)
+    for k in range(len(x)):
+        total += _doubled(x[k])
+    return total
+
+
+def test_a_part_is_called_by_kernels_alone() -> None:
+    assert _sum_of_doubled(np.arange(4.0)) == 12.0
+    with pytest.raises(TypeError, match=r"_doubled is a part of kernels: Python cannot call it"):
+        _doubled(1.0)

@@ -106,20 +106,6 @@ def test_a_wrong_length_costs_a_few_messages_not_all_behind_it(tmp_path: Path) -
         assert any("damaged bytes in one place were not used" in line for line in said)
 
 
-def test_channels_are_read_from_the_end_when_the_beginning_is_damaged(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    content = write(path)
-    damage(path, content.index(b"/mtx/bytes") - 9 - 8, 7)  # opcode or length of the channel's record
-    assert len(list(open_recording(path).chunks())) >= len(CHUNKS) - 2
-
-
-def test_a_whole_recording_says_nothing(tmp_path: Path) -> None:
-    write(tmp_path / "a.mcap")
-    recording = open_recording(tmp_path / "a.mcap")
-    list(recording.chunks())
-    assert skipped(recording, Tracker(load_plan(DEMO)).streams) == []
-
-
 @pytest.mark.slow
 def test_no_flip_ends_a_track_early_without_a_word(tmp_path: Path) -> None:
     """Nor does the track of the repaired file; a campaign of 314 flips had the same result."""

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Recordings: nothing that was written is lost, and a file that ends too early is read up to there."""
+"""Recordings: nothing that was written is lost, a file that ends too early is read up to there, and other programs' readers find all."""
 
 from __future__ import annotations
 
 import contextlib
+import re
 import struct
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -15,14 +18,17 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.writer import CompressionType, Writer
 
+from command_line import echostep
 from echostep.errors import EchostepError
 from echostep.ports.chunks import LATEST_NS, Chunk
 from echostep.recording import open_recording
 from echostep.recording.mcap_records import RECORD_LIMIT, decompress_chunk, port_of
 from echostep.recording.message_runs import PORTION_BYTES
 from echostep_app.recording.recorder import Recorder
+from echostep_app.recording.repair.contents import info
 from echostep_app.recording.repair.recovery import Recovery
 from waiting import PATIENCE_S, until
+from walks import DEMO
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 256]) * (n % 40 + 1)) for n in range(300)]
 
@@ -53,21 +59,6 @@ def test_a_cut_file_gives_what_came_before_the_cut(tmp_path: Path, draw: st.Data
     found = list(recording.chunks())
     assert found == CHUNKS[: len(found)]
     assert len(found) >= len(CHUNKS) * (cut - 800) // len(whole) - 1
-
-
-@given(st.data())
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_damage_never_raises_anything_else(tmp_path: Path, draw: st.DataObject) -> None:
-    damaged = bytearray(write(tmp_path / "a.mcap", CHUNKS[:40]))
-    changed = draw.draw(st.integers(1, 6))
-    for _ in range(changed):
-        damaged[draw.draw(st.integers(0, len(damaged) - 1))] = draw.draw(st.integers(0, 255))
-    (tmp_path / "bad.mcap").write_bytes(damaged)
-    with contextlib.suppress(EchostepError):
-        found, recovered = list(open_recording(tmp_path / "bad.mcap").chunks()), recovered_chunks(tmp_path / "bad.mcap")
-        assert len(found) >= len(recovered) - changed  # a message whose number is damaged is out of order, and left out
-        rest = iter(recovered)
-        assert all(chunk in rest for chunk in found)
 
 
 def recovered_chunks(path: Path) -> list[Chunk]:
@@ -207,13 +198,54 @@ def test_a_chunk_with_a_window_above_128_mib_is_left_closed(exponent: int, opene
     assert decompress_chunk(head + frame) == (bytes(10) if opened else None)
 
 
-@pytest.mark.parametrize("content", [b"", b"hello", b"\x89MCAP0\r\n"])
-def test_what_is_no_recording_is_named(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / "x.mcap").write_bytes(content)
-    with pytest.raises(EchostepError, match=r"x\.mcap"):
-        open_recording(tmp_path / "x.mcap")
+PYTHON = ["rerun-sdk==0.41.0", "databeam-mcap-reader==0.5.2"]  # the second brings the program mcap 0.0.62
+NODE = ["@mcap/core@2.2.2", "@mcap/nodejs@1.0.2"]
+INDEXED = """
+import { open } from "fs/promises";
+import { McapIndexedReader } from "@mcap/core";
+import { FileHandleReadable } from "@mcap/nodejs";
+const readable = new FileHandleReadable(await open(process.argv[2], "r"));
+const reader = await McapIndexedReader.Initialize({ readable });
+let count = 0;
+for await (const _ of reader.readMessages()) count++;
+console.log(count);
+"""
 
 
-def test_a_missing_recording_is_named(tmp_path: Path) -> None:
-    with pytest.raises(EchostepError, match="cannot read"):
-        open_recording(tmp_path / "none.mcap")
+def run(*words: str | Path, cwd: Path) -> str:
+    done = subprocess.run([*map(str, words)], capture_output=True, text=True, check=False, cwd=cwd)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture
+def readers(tmp_path: Path) -> Path:
+    """A folder with the readers; the test is skipped where a registry gives none."""
+    for words in (
+        [sys.executable, "-m", "venv", tmp_path / "env"],
+        [tmp_path / "env/bin/pip", "install", "--quiet", *PYTHON],
+        ["npm", "install", "--silent", *NODE],
+    ):
+        try:
+            subprocess.run([*map(str, words)], capture_output=True, check=True, cwd=tmp_path)
+        except (OSError, subprocess.CalledProcessError) as error:
+            pytest.skip(f"no reader to be had: {error}")
+    (tmp_path / "read.mjs").write_text(INDEXED)
+    return tmp_path
+
+
+@pytest.mark.long
+@pytest.mark.process
+def test_every_reader_of_a_registry_finds_every_message(readers: Path) -> None:
+    walk = readers / "out/walk.mcap"
+    assert echostep("demo", "--plan", DEMO, "--out", walk.parent, "--no-page").returncode == 0
+    told = "\n".join(info(walk))
+    count = sum(int(n) for pair in re.findall(r"in (\d+) chunks|/[a-z/]+ (\d+)", told) for n in pair if n)
+    (mcap,) = readers.glob("env/lib/*/site-packages/databeam_mcap_reader/mcap_cli")
+    assert int(run("node", "read.mjs", walk, cwd=readers)) == count
+    assert len(run(mcap, "cat", walk, cwd=readers).splitlines()) == count
+    run(mcap, "doctor", walk, cwd=readers)
+    run(mcap, "sort", walk, "-o", readers / "sorted.mcap", cwd=readers)
+    run(readers / "env/bin/rerun", "mcap", "convert", walk, "-o", readers / "walk.rrd", cwd=readers)
+    told = run(readers / "env/bin/rerun", "rrd", "stats", readers / "walk.rrd", cwd=readers)
+    assert int(re.sub(r"\s", "", told.partition("num_rows = ")[2].splitlines()[0])) >= count

@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""`--start last`: what a live run keeps, and what the next one makes of it."""
+"""Starts of runs: the last place that a live run keeps, the start in a recording's fields, as written and damaged."""
 
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from echostep.errors import EchostepError
 from echostep.localization import Air, ClimbSettings, Estimate, Start, TrackStatus
+from echostep.plan import NO_PLAN, Pose
 from echostep.settings import Settings
 from echostep.tracker import Tracker
 from echostep.tracker.last_place import LastPlace, last_place
@@ -22,6 +25,7 @@ from echostep_app.session.last_place import FILE, KEPT_S, Kept, PlaceKeeper, rea
 from echostep_app.session.metadata import parse_start, run_metadata
 from echostep_app.session.runs.live import _last_start
 from echostep_studies.simulation.tower import tower
+from snapshots import expect, refusal
 
 PLAN = tower(3)
 BOARD = "85837343139351E09080"
@@ -105,16 +109,6 @@ def test_nothing_else_does(kept: Kept, board: str) -> None:
     assert ("clock was set back" in words) == (kept.utc > NOW)
 
 
-def test_another_plan_is_refused() -> None:
-    with pytest.raises(EchostepError, match="another plan"):
-        start_last(KEPT, tower(2), BOARD, ClimbSettings(), NOW)
-
-
-def test_no_file_is_said(tmp_path: Path) -> None:
-    with pytest.raises(EchostepError, match="no run has kept a place there"):
-        read_kept(tmp_path)
-
-
 @pytest.mark.parametrize(
     "change",
     [
@@ -135,22 +129,22 @@ def test_a_damaged_file_is_refused(tmp_path: Path, change: dict[str, Any]) -> No
         read_kept(tmp_path)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{", "3", "\x00" * 9])
-def test_a_file_of_something_else_is_refused(tmp_path: Path, text: str) -> None:
-    (tmp_path / FILE).write_text(text)
-    with pytest.raises(EchostepError, match="cannot be used"):
-        read_kept(tmp_path)
+def test_what_is_no_last_place_is_told(tmp_path: Path) -> None:
+    said = {
+        "another plan": refusal(lambda: start_last(KEPT, tower(2), BOARD, ClimbSettings(), NOW)),
+        "no file": refusal(lambda: read_kept(tmp_path)),
+        "in a replay": refusal(lambda: parse_start("last", None, PLAN)),
+    }
+    for text in ("", "[]", "{", "3", "\x00" * 9):
+        (tmp_path / FILE).write_text(text)
+        assert said.setdefault("another file", sentence := refusal(lambda: read_kept(tmp_path))) == sentence
+    expect("start last", said, FOLDER=tmp_path)
 
 
 @pytest.mark.parametrize("board", [BOARD, "another"])
 def test_a_replay_begins_as_the_run_did(board: str) -> None:
     start, _ = start_last(KEPT, PLAN, board, ClimbSettings(), NOW)
     assert recorded_start(run_metadata(PLAN, start, 0, ""), Path("walk.mcap")) == start
-
-
-def test_a_replay_has_no_last_run() -> None:
-    with pytest.raises(EchostepError, match="only of a live run"):
-        parse_start("last", None, PLAN)
 
 
 @pytest.mark.slow
@@ -160,3 +154,40 @@ def test_a_tracker_of_a_last_place_searches_the_building() -> None:
     tracker = Tracker(PLAN, start)
     tracker.warm_up()
     assert tracker.last_place() is None
+
+
+PATH = Path("walk.mcap")
+AFTER_PAUSE = Start(Pose(1.0, 2.0, 0.5, 1), 0.3, math.pi, air=Air(12.0, 0.4), after_pause=True)
+ROOM = Start(room_m=np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0]]), level=2)
+
+
+@pytest.mark.parametrize("start", [Pose(1.0, 2.0, 0.5, 1), Start(Pose(1.0, 2.0, 0.5), 0.3, 0.2), AFTER_PAUSE])
+def test_a_start_is_read_as_it_was_written(start: Pose | Start) -> None:
+    assert recorded_start(run_metadata(NO_PLAN, start, 1, ""), PATH) == start
+
+
+def test_a_room_is_read_as_it_was_written() -> None:
+    read = recorded_start(run_metadata(NO_PLAN, ROOM, 1, ""), PATH)
+    assert isinstance(read, Start)
+    assert read.level == 2
+    np.testing.assert_array_equal(read.room_m, ROOM.room_m)
+
+
+@pytest.mark.parametrize(
+    ("start", "damage"),
+    [
+        *((Pose(1.0, 2.0, 0.5), {"start_x_y_rad": text}) for text in ("", "1,2", "nan,0,0", "0,inf,0", "1e300,0,0", "0,0,0,inf", "[" * 5000)),
+        *((AFTER_PAUSE, {"start_sd_m_rad": text}) for text in ("0.1", "nan,0.1", "0.1,inf", "-0.1,0.1")),
+        *(
+            (AFTER_PAUSE, {"start_after_pause": json.dumps({"air": air})})
+            for air in (3, {"zero_m": 1.0}, *({"zero_m": v, "sd_m": 0.1} for v in (math.nan, math.inf, 1e300)))
+        ),
+        *((AFTER_PAUSE, {"start_after_pause": json.dumps({"air": {"zero_m": 1.0, "sd_m": v}})}) for v in (math.nan, -1.0)),
+        (ROOM, {"start_room": "[" * 5000}),
+        *((ROOM, {"start_room": json.dumps({"outline_m": o})}) for o in ([[math.nan, 0.0]], [[1.0]], "wall", [[1e300, 0.0]])),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_damaged_start_is_refused(start: Pose | Start, damage: dict[str, str]) -> None:
+    with pytest.raises(EchostepError, match="its recorded start is damaged: give one with --start"):
+        recorded_start(run_metadata(NO_PLAN, start, 1, "") | damage, PATH)

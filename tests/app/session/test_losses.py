@@ -13,7 +13,6 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from board_runs import ROOT
 from echostep.localization import Estimate, TrackStatus
 from echostep.plan import Pose, load_plan
 from echostep.ports.chunks import BOARD, FOOT, MTX, Chunk, portion_of
@@ -23,9 +22,8 @@ from echostep_app.session import losses
 from echostep_app.session.losses import Arrivals, Losses
 from echostep_app.session.metadata import run_metadata
 from page.frames import told
+from walks import DEMO as PLAN
 from walks import walk_chunks
-
-PLAN = ROOT / "host/core/echostep/plans/demo.json"
 
 
 class Run:
@@ -94,24 +92,6 @@ def test_a_replay_says_how_it_went_and_where_it_ended(recording: Path, tmp_path:
     lines = said.splitlines()
     assert any(line.startswith("walk: never lost in 1") for line in lines), said
     assert "end: in Office 2" in lines or "end: in North corridor" in lines, said
-
-
-def test_a_start_outside_is_refused_with_the_nearest_place(recording: Path, tmp_path: Path) -> None:
-    code, said = replayed(recording, tmp_path, "--start", "100,7.5,0")
-    assert code != 0
-    assert "--start 100,7.5,0: it is outside the building: the nearest possible place is 24.70,7.50" in said
-    assert not (tmp_path / "track.csv").exists()
-
-
-def test_a_plan_whose_start_is_in_a_wall_is_refused(tmp_path: Path) -> None:
-    walled = tmp_path / "walled.json"
-    walled.write_text(PLAN.read_text().replace('"x": 2.0', '"x": 1.02'))
-    assert walled.read_text() != PLAN.read_text()
-    done = CliRunner().invoke(app, ["live", "--plan", str(walled), "--board", str(tmp_path / "no-port"), "--headless"])
-    assert done.exit_code != 0
-    assert "the plan's start 1.02,7.5,0: it is inside a wall: the nearest possible place is 1.30,7.50" in str(
-        done.exception
-    )
 
 
 S = 1_000_000_000

@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""Ports that come back: under the names of the devices that send, whoever has which port then; a foreign device is refused and named."""
+"""Ports of a live run: devices keep their names when they come back; the board is asked for its optional messages."""
 
 from __future__ import annotations
 
 import re
 from collections import deque
 from collections.abc import Iterable
+from types import SimpleNamespace
 
 import pytest
 
 from board_runs import ROOT
+from echostep.board import messages as m
+from echostep.board.frames import encode
+from echostep.board.subscription import SUBSCRIBE
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep_app.session.options import PortOptions
-from echostep_app.session.runs.live import _open_ports
+from echostep_app.session.runs.live import _open_ports, _with_subscription
 from echostep_app.session.runs.port_roles import SURE_BYTES, with_right_names
 
 CAPTURES = ROOT / "tests/captures"
@@ -116,3 +120,22 @@ def test_two_uses_of_one_port_are_refused_at_once(options: dict[str, str], named
         _open_ports(
             PortOptions("/dev/null", options.get("mtx"), options.get("beacons"), None, None, options.get("foot"))
         )
+
+
+def test_the_board_is_asked_and_no_chunk_is_lost() -> None:
+    identity = m.Identity(0, m.SCHEMA_HASH, 1, 2, 0, m.ResetCause.POWER_ON)
+    health = m.BoardHealth(0, 5_000, 5_000, 1, 0, 0, 0, 0)
+    # At the fifth it has restarted
+    messages: list[m.Message] = [identity, health, identity, health, identity, identity]
+    chunks = [Chunk(BOARD, k, encode(message, k)) for k, message in enumerate(messages)]
+    stream = [None, Chunk(MTX, 0, b"\xfa"), *chunks]
+    sent: list[tuple[str, bytes]] = []
+    ports = SimpleNamespace(send=lambda port, data: sent.append((port, data)))
+    assert list(_with_subscription(stream, ports)) == stream  # type: ignore[arg-type]
+    assert sent == [(BOARD, encode(SUBSCRIBE, 0))] * 2
+
+
+def test_a_stale_board_is_not_asked() -> None:
+    stale = Chunk(BOARD, 0, encode(m.Identity(0, 0x12345678, 9, 0, 0, 0), 0))
+    ports = SimpleNamespace(send=lambda *_: 1 / 0)
+    assert list(_with_subscription([stale], ports)) == [stale]  # type: ignore[arg-type]

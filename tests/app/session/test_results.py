@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Results of a run: the tables and the summary are there before the picture is drawn; a run without a page loads no server.
-
-What a run leaves behind in its process when it has ended: nothing of its tracker, session and page.
-"""
+"""Results of a run: each sink gets every portion and the end; tables and summary are there before the picture; no server without a page."""
 
 from __future__ import annotations
 
@@ -18,13 +15,18 @@ import pytest
 from board_runs import ROOT
 from command_line import echostep
 from echostep.errors import EchostepError
+from echostep.localization import Estimate
 from echostep.plan import load_plan
+from echostep.ports.chunks import Portion, portion_of
 from echostep.tracker import Tracker
 from echostep_app.page.live import LivePage
 from echostep_app.session import results
+from echostep_app.session.options import OutputOptions
 from echostep_app.session.runs import demo
 from echostep_app.session.session import Session
+from echostep_app.session.sinks import Sink, derived_sink
 from echostep_simulation.scenario import DEMO_WAYPOINTS
+from page.browser import PLAN, demo_walk
 from page.frames import told
 from waiting import PATIENCE_S
 
@@ -84,3 +86,47 @@ def test_runs_in_one_process_leave_no_tracker_and_no_page_behind(
     for seed in (1, 2):
         echostep("demo", "--port", 0, "--seed", seed, "--out", tmp_path, "--no-open", ends=0)
     assert alive() <= before
+
+
+class Heard:
+    """What a sink is called with."""
+
+    def __init__(self, tracker: Tracker) -> None:
+        self.calls: list[str] = []
+        self.estimates: list[Estimate] = []
+        self._tracker = tracker
+
+    def arrive(self) -> None:
+        self.calls.append("arrive")
+
+    def take(self, portion: Portion, estimates: list[Estimate]) -> None:
+        assert not estimates or self._tracker.state.estimate == estimates[-1]
+        self.calls.append(f"take {len(portion.t_arrival_ns)}")
+        self.estimates += estimates
+
+    def end(self, summary: str) -> None:
+        self.calls.append(summary)
+
+
+def test_a_sink_gets_every_portion_and_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    start, chunks = demo_walk(beacons=False)
+    tracker = Tracker(PLAN, start, seed=1)
+    session, sink = Session(tracker, "sinks", "live", OutputOptions(tmp_path, terminal=False)), Heard(tracker)
+    monkeypatch.setattr(session, "_sinks", [Sink(sink.take, sink.arrive, sink.end)])
+    with session:
+        session.track([portion_of(chunks[:3000]), portion_of([]), portion_of(chunks[3000:6000])])
+    assert sink.calls == ["arrive", "take 3000", "arrive", "take 0", "arrive", "take 3000"]
+    assert sink.estimates == session.estimates
+    assert len(sink.estimates) > 2
+    session.finish("sinks")
+    assert "positions" in sink.calls[-1]
+
+
+def test_every_writer_gets_what_is_derived() -> None:
+    start, chunks = demo_walk(beacons=False)
+    tracker = Tracker(PLAN, start, seed=1)
+    written: tuple[list[object], list[object]] = ([], [])
+    sink, portion = derived_sink(tracker, [w.extend for w in written]), portion_of(chunks[:3000])
+    sink.take(portion, tracker.take(portion))
+    assert written[0] == written[1]
+    assert written[0]

@@ -255,6 +255,7 @@ def test_no_name_breaks_the_xml(name: str) -> None:
         ("mqtts://host?colour=red", "colour"),
         ("cot+udp://me:secret@host", "user"),
         ("ftp://me:secret@host", "ftp|expected"),
+        ("cot+tcp://h?name=takserver", "ca, cert, key, password and name are for cot"),
     ],
 )
 def test_a_wrong_address_is_named_without_its_password(url: str, why: str) -> None:

@@ -84,12 +84,6 @@ JSON = st.recursive(
 )
 
 
-@given(st.binary(max_size=300))
-def test_no_bytes_do_more_than_to_be_refused(payload: bytes) -> None:
-    with pytest.raises(BadReportError):
-        decode(payload)
-
-
 @pytest.mark.long
 @given(st.data())
 def test_a_report_with_one_field_replaced_is_believed_only_as_the_schema_says(draw: st.DataObject) -> None:

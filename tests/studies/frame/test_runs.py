@@ -1,21 +1,30 @@
 # SPDX-License-Identifier: MIT
-"""The runs of a study: its journal, from which a killed study goes on, on this machine and on a cluster."""
+"""The runs of a study: its journal, from which a killed study goes on, here and on a cluster; the studies' own distribution."""
 
 from __future__ import annotations
 
+import configparser
 import math
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
+import zipfile
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 from msgspec import UNSET, UnsetType
+from typer.testing import CliRunner
 
+from board_runs import ROOT
 from echostep.errors import EchostepError
+from echostep_app.commands import studies
+from echostep_app.commands.actions import offline as profiles
 from echostep_studies.frame.report import as_dicts, write_json
 from echostep_studies.frame.runs import Journal, SeededRuns
 from waiting import until
@@ -155,16 +164,58 @@ def math_run(seed: int) -> list[Counted]:
     return [Counted(name="m", value=float(np.random.default_rng(seed).random()))]
 
 
-def test_no_cluster_is_one_clear_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("distributed", reason="skipped: no Dask (pip install 'echostep-studies[cluster]')")
-    monkeypatch.setattr("echostep_studies.frame.runs.SCHEDULER_TIMEOUT", "1s")
-    with pytest.raises(EchostepError, match="no Dask scheduler answers there"):
-        SeededRuns("s", 2, 1, math_run, tmp_path, KINDS, "tcp://127.0.0.1:9").rows()
-
-
 def test_results_that_cannot_be_written_are_one_clear_error(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(EchostepError, match="cannot write"):
         write_json(tmp_path / "file" / "x.json", "s", 1, 1, [])
     with pytest.raises(EchostepError, match="cannot write there"):
         SeededRuns("s", 1, 1, math_run, tmp_path / "file", KINDS).rows()
+
+
+PACKAGE = ROOT / "host/studies/echostep_studies"
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
+    pytest.importorskip("hatchling")
+    folder = tmp_path_factory.mktemp("wheel")
+    words = ["wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", str(folder), str(ROOT / "host/studies")]
+    done = subprocess.run([sys.executable, "-m", "pip", *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    (built,) = folder.glob("echostep_studies-*.whl")
+    return zipfile.ZipFile(built)
+
+
+def test_the_wheel_holds_every_module_and_nothing_else(wheel: zipfile.ZipFile) -> None:
+    modules = {str(path.relative_to(PACKAGE.parent)) for path in PACKAGE.rglob("*.py")}
+    held = {name for name in wheel.namelist() if ".dist-info/" not in name}
+    assert held == modules | {"echostep_studies/py.typed"}
+
+
+def test_each_entry_point_leads_into_the_wheel(wheel: zipfile.ZipFile) -> None:
+    (name,) = (name for name in wheel.namelist() if name.endswith(".dist-info/entry_points.txt"))
+    points = configparser.ConfigParser()
+    points.read_string(wheel.read(name).decode())
+    found = {group: dict(points[group]) for group in points.sections()}
+    assert set(found) == {studies.GROUP, profiles.GROUP}
+    assert set(found[studies.GROUP]) == set(studies.NAMES)
+    assert set(found[profiles.GROUP]) == {"foot.fischer2008", "legs.lee2010"}
+    modules = [point.split(":")[0] for group in found.values() for point in group.values()]
+    assert {f"{module.replace('.', '/')}.py" for module in modules} <= set(wheel.namelist())
+
+
+@pytest.mark.parametrize("name", studies.NAMES)
+def test_without_the_distribution_a_command_says_how_to_get_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(studies, "entry_points", lambda **_: ())
+    alone_app = typer.Typer()
+    studies.add_studies(alone_app)
+    words = name, "girard2011", "--runs", "1"
+    alone, asked = (CliRunner().invoke(alone_app, given) for given in (words[:1], words))
+    assert "pip install echostep-studies" in alone.output
+    assert isinstance(asked.exception, EchostepError)
+    assert "pip install echostep-studies" in str(asked.exception)
+
+
+def test_without_a_command_run_nothing_heavy_is_imported() -> None:
+    code = "import sys, echostep_studies.commands; print([m for m in ('numpy', 'rich.table', 'scipy') if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from echostep.arrays import Floats
-from echostep.errors import EchostepError
 from echostep.foot import steps as foot
 from echostep_app.cli import app
 from echostep_app.commands.actions.offline import foot as run_foot
@@ -141,14 +140,6 @@ def test_the_world_s_yaw_does_not_matter_and_headings_are_turns_since_the_start(
     one, other = (fischer2008.walk_track(t, accel, gyro, m) for m in (matrices, turned))
     assert other.position_m == pytest.approx(one.position_m, abs=1e-9)
     assert np.exp(1j * one.heading_rad[-1]) == pytest.approx(np.exp(1j * 8 * 0.6), abs=1e-6)
-
-
-def test_a_foot_that_is_always_fast_gives_no_steps_at_all() -> None:
-    """A pace at which "the stance phase may not always be detected": it is not, and no stance is invented."""
-    t, accel, gyro, matrices, _ = walked()
-    track = fischer2008.walk_track(t, accel, gyro, matrices, Fischer2008(threshold=0.0))
-    assert track.events == []
-    assert not track.stance.any()
 
 
 def test_bad_samples_are_counted_and_change_nothing() -> None:
@@ -279,13 +270,6 @@ def test_without_a_magnetometer_the_paper_s_profile_says_so(tmp_path: Path, caps
     run_foot(path, tmp_path / "track.csv", "fischer2008", tmp_path / "track.png")
     assert "without its magnetometer" in capsys.readouterr().out
     assert (tmp_path / "track.png").stat().st_size > 10_000
-
-
-def test_an_unknown_profile_is_one_line_that_lists_those_that_exist(samples: Path, tmp_path: Path) -> None:
-    with pytest.raises(EchostepError, match=r"--profile girard.*default, fischer2008") as error:
-        run_foot(samples, tmp_path / "track.csv", "girard", None)
-    assert "\n" not in str(error.value)
-    assert not (tmp_path / "track.csv").exists()
 
 
 # ---- real feet ----

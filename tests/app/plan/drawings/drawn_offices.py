@@ -14,9 +14,8 @@ from typing import Any
 from ezdxf.filemanagement import new
 from ezdxf.math import Matrix44
 
-Box = tuple[float, float, float, float]
-Point = tuple[float, float]
-Layer = dict[str, Any]
+from plan.drawings.drawn_doors import PLAIN, Box, Doors, Layer, Leaf, Point, usual
+
 Walls = Callable[[Any, Box, Layer], None]
 
 WIDE, HIGH, OUTER, INNER = 18.0, 12.0, 0.25, 0.12
@@ -27,8 +26,6 @@ LOW_GAPS, UP_GAPS, ENTRANCE = (
     (5.5, 6.6),
 )
 ROOMS = {"R1": (3, 2), "R2": (9, 2), "R3": (15, 2), "R4": (3, 9), "R5": (9, 9), "R6": (15, 9), "Corridor": (9, 6)}
-DOUBLE_M = 1.3  # wider doors have two leaves
-WALL, DOOR, PLAIN = {"layer": "A-WALL"}, {"layer": "A-DOOR"}, {"layer": "0"}
 
 
 def along(y: float, gaps: Sequence[Point]) -> list[Box]:
@@ -44,47 +41,12 @@ BOXES: list[Box] = [
 ]  # fmt: skip
 
 
-class Leaf:
-    """A leaf's own axes: `at(a, b)` is a along the gap from the hinge, and b to the side that it swings to; `thick`: of the wall."""
-
-    def __init__(self, hinge: Point, along: Point, side: Point, width: float, thick: float) -> None:
-        self.hinge, self.along, self.side, self.width, self.thick = hinge, along, side, width, thick
-
-    def at(self, a: float, b: float) -> tuple[float, float]:
-        (x, y), (u, v), (p, q) = self.hinge, self.along, self.side
-        return x + a * u + b * p, y + a * v + b * q
-
-    def turned(self, degrees: float, radius: float | None = None) -> tuple[float, float]:
-        """The end of the leaf, opened by an angle."""
-        radius, angle = self.width if radius is None else radius, math.radians(degrees)
-        return self.at(radius * math.cos(angle), radius * math.sin(angle))
-
-    def across(self) -> Leaf:
-        """The same leaf, swinging to the other side."""
-        return Leaf(self.hinge, self.along, (-self.side[0], -self.side[1]), self.width, self.thick)
-
-
-Doors = Callable[[Any, Leaf, Layer], None]
-
-
 def gaps() -> list[Leaf]:
     """The seven gaps; each leaf hangs at the face of its wall."""
     north, south, east = (0.0, 1.0), (0.0, -1.0), (1.0, 0.0)
     rows = [Leaf((a, LOW), (1.0, 0.0), north, b - a, INNER) for a, b in LOW_GAPS]
     rows += [Leaf((b, UP), (-1.0, 0.0), south, b - a, INNER) for a, b in UP_GAPS]
     return [*rows, Leaf((OUTER, ENTRANCE[0]), north, east, ENTRANCE[1] - ENTRANCE[0], OUTER)]
-
-
-def leaves(gap: Leaf) -> list[Leaf]:
-    """One leaf, or two that meet in the middle of a wide gap."""
-    if gap.width < DOUBLE_M:
-        return [gap]
-    back = (-gap.along[0], -gap.along[1])
-    half = gap.width / 2
-    return [
-        Leaf(gap.hinge, gap.along, gap.side, half, gap.thick),
-        Leaf(gap.at(gap.width, 0), back, gap.side, half, gap.thick),
-    ]
 
 
 def corners(box: Box) -> list[Point]:
@@ -167,6 +129,17 @@ def filled(space: Any, box: Box, layer: Layer) -> None:
     space.add_trace([a, b, d, c], dxfattribs=layer)
 
 
+def along_the_middle(space: Any, box: Box, layer: Layer) -> None:
+    """One line; walls end at the axes of those that they meet."""
+    (x, y), (p, q), _ = axis(box)
+    reach = OUTER / 2 + INNER / 2
+    if y == q:
+        x, p = x - reach * (x == OUTER), p + reach * (p == WIDE - OUTER)
+    else:
+        y, q = y - reach * (y in (OUTER, UP + INNER)), q + reach * (q in (HIGH - OUTER, LOW - INNER))
+    space.add_line((x, y), (p, q), layer)
+
+
 def mirrored_axes(space: Any, box: Box, layer: Layer) -> None:
     """As MIRROR leaves them: the entity's own axes look down."""
     points = [(-x, y) for x, y in corners(box)]
@@ -180,120 +153,6 @@ def scaled_blocks(space: Any, box: Box, layer: Layer) -> None:
     outlines(space.doc.blocks.new(name), (0, 0, 1, 1), PLAIN)
     space.doc.blocks.new(name + "-OUTER").add_blockref(name, (0, 0), PLAIN | {"xscale": -1})
     space.add_blockref(name + "-OUTER", (x1, y0), layer | {"xscale": x1 - x0, "yscale": y1 - y0})
-
-
-def arc(space: Any, leaf: Leaf, layer: Layer, degrees: float = 90) -> None:
-    """The swing from the closed leaf to the opened one."""
-    x, y = leaf.hinge
-    begin, end = (math.degrees(math.atan2(q - y, p - x)) for p, q in (leaf.at(1, 0), leaf.turned(degrees, 1)))
-    begin, end = (begin, end) if (end - begin) % 360 < 180 else (end, begin)
-    space.add_arc((x, y), leaf.width, begin, end, dxfattribs=layer)
-
-
-def usual(space: Any, gap: Leaf, layer: Layer) -> None:
-    for leaf in leaves(gap):
-        arc(space, leaf, layer)
-        space.add_line(leaf.hinge, leaf.turned(90), layer)
-
-
-def on_layer_0(space: Any, gap: Leaf, _layer: Layer) -> None:
-    usual(space, gap, PLAIN)
-
-
-def thick_leaf(space: Any, gap: Leaf, layer: Layer) -> None:
-    for leaf in leaves(gap):
-        arc(space, leaf, layer)
-        box = [leaf.at(a, b) for a, b in ((0, 0), (0.04, 0), (0.04, leaf.width), (0, leaf.width))]
-        space.add_lwpolyline(box, close=True, dxfattribs=layer)
-
-
-def opened_a_little(space: Any, gap: Leaf, layer: Layer) -> None:
-    for leaf in leaves(gap):
-        arc(space, leaf, layer, 30)
-        space.add_line(leaf.hinge, leaf.turned(30), layer)
-
-
-def coarse(space: Any, gap: Leaf, layer: Layer) -> None:
-    """Leaf and swing as one polyline, the swing in three pieces."""
-    for leaf in leaves(gap):
-        space.add_lwpolyline([leaf.hinge, *(leaf.turned(angle) for angle in (90, 60, 30, 0))], dxfattribs=layer)
-
-
-def both_ways(space: Any, gap: Leaf, layer: Layer) -> None:
-    """Drawn closed, with a swing to each side."""
-    for leaf in leaves(gap):
-        arc(space, leaf, layer)
-        arc(space, leaf.across(), layer)
-        space.add_line(leaf.hinge, leaf.at(leaf.width, 0), layer)
-
-
-def single_blocks(space: Any, gap: Leaf, layer: Layer) -> None:
-    """A block for each leaf, mirrored and scaled, with threshold, frame and a text."""
-    name = "LEAF"
-    if name not in space.doc.blocks:
-        block = space.doc.blocks.new(name)
-        block.add_arc((0.05, 0), 0.8, 0, 90, dxfattribs=PLAIN)
-        block.add_lwpolyline([(0.05, 0), (0.09, 0), (0.09, 0.8), (0.05, 0.8)], close=True, dxfattribs=PLAIN)
-        for a in (0, 0.85):
-            block.add_lwpolyline(
-                [(a, 0.02), (a + 0.05, 0.02), (a + 0.05, -0.1), (a, -0.1)], close=True, dxfattribs=PLAIN
-            )
-        block.add_line((0.05, -0.08), (0.85, -0.08), PLAIN)
-        block.add_text("T30", height=0.15, dxfattribs=PLAIN)
-    for leaf in leaves(gap):
-        (u, v), (p, q) = leaf.along, leaf.side
-        scale = leaf.width / 0.9
-        about = {
-            "rotation": math.degrees(math.atan2(v, u)),
-            "xscale": scale,
-            "yscale": math.copysign(scale, u * q - v * p),
-        }
-        space.add_blockref(name, leaf.hinge, layer | about)
-
-
-def leaves_alone(space: Any, gap: Leaf, layer: Layer) -> None:
-    for leaf in leaves(gap):
-        space.add_line(leaf.hinge, leaf.turned(45), layer)
-
-
-def panel(space: Any, gap: Leaf, layer: Layer, box: Box) -> None:
-    a, b, c, d = box
-    space.add_lwpolyline([gap.at(*point) for point in ((a, b), (c, b), (c, d), (a, d))], close=True, dxfattribs=layer)
-
-
-def sliding(space: Any, gap: Leaf, layer: Layer) -> None:
-    """A panel before the wall."""
-    panel(space, gap, layer, (-0.05, 0.02, gap.width + 0.05, 0.06))
-
-
-def pocket(space: Any, gap: Leaf, layer: Layer) -> None:
-    """A panel half inside the wall."""
-    middle = -gap.thick / 2
-    panel(space, gap, layer, (-gap.width / 2, middle - 0.02, gap.width / 2, middle + 0.02))
-
-
-def two_panels(space: Any, gap: Leaf, layer: Layer) -> None:
-    middle, width = -gap.thick / 2, gap.width
-    panel(space, gap, layer, (0, middle, 0.55 * width, middle + 0.04))
-    panel(space, gap, layer, (0.45 * width, middle - 0.04, width, middle))
-
-
-def thresholds(space: Any, gap: Leaf, layer: Layer) -> None:
-    for b in (0.0, -gap.thick):
-        space.add_line(gap.at(0, b), gap.at(gap.width, b), layer)
-
-
-def folding(space: Any, gap: Leaf, layer: Layer) -> None:
-    """Two pairs of panels, half folded."""
-    q = gap.width / 4
-    for a, s in ((0.0, 1), (gap.width, -1)):
-        space.add_lwpolyline(
-            [gap.at(a, 0), gap.at(a + s * 0.6 * q, 0.8 * q), gap.at(a + s * 1.2 * q, 0)], dxfattribs=layer
-        )
-
-
-def nothing(_space: Any, _gap: Leaf, _layer: Layer) -> None:
-    """A gap alone."""
 
 
 def furnished(space: Any) -> None:
@@ -314,10 +173,7 @@ def furnished(space: Any) -> None:
 
 WALL_STYLES: Sequence[Walls] = (
     outlines, old_polylines, polylines_at_a_height, four_lines, two_faces, short_pieces, drawn_twice, wide_polylines, multilines, hatches,
-    faces_of_bodies, filled, mirrored_axes, scaled_blocks,
-)  # fmt: skip
-DOOR_STYLES: Sequence[Doors] = (
-    usual, on_layer_0, thick_leaf, opened_a_little, coarse, both_ways, single_blocks, sliding, pocket, two_panels, thresholds, folding,
+    faces_of_bodies, filled, mirrored_axes, scaled_blocks, along_the_middle,
 )  # fmt: skip
 
 

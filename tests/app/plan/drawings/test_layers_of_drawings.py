@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 from ezdxf.enums import TextEntityAlignment
-from ezdxf.filemanagement import new
 from ezdxf.math import Matrix44
 
 from echostep.errors import EchostepError
@@ -21,18 +20,7 @@ from echostep_app.plan.importers.dxf.layers import LAYERS, meaning, patterns_of
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
-from plan.drawings.drawn_houses import WALL, Gap, boxes, corners, outlines
-
-
-def sheet() -> tuple[Any, Any]:
-    doc = new("R2010")
-    doc.header["$INSUNITS"] = 6
-    return doc, doc.modelspace()
-
-
-def house(space: Any, layer: str = "A-WALL") -> None:
-    for box in boxes(Gap()):
-        space.add_lwpolyline(corners(box), close=True, dxfattribs={"layer": layer})
+from plan.drawings.drawn_houses import WALL, boxes, corners, house, outlines, sheet
 
 
 def imported(doc: Any, folder: Path, **hints: Any) -> tuple[Plan, ImportReport]:
@@ -130,7 +118,7 @@ def test_a_hatch_with_islands_adds_no_walls(tmp_path: Path) -> None:
     house(space)
     plain, _ = imported(doc, tmp_path)
     hatch = space.add_hatch(dxfattribs=WALL)
-    for box in boxes(Gap())[:3]:
+    for box in boxes()[:3]:
         hatch.paths.add_polyline_path(corners(box), is_closed=True)
     hatched, _ = imported(doc, tmp_path)
     assert len(hatched.levels[0].walls) == len(plain.levels[0].walls) == 14
@@ -140,7 +128,7 @@ def test_a_hatch_with_islands_adds_no_walls(tmp_path: Path) -> None:
 def test_a_multiline_whose_offsets_are_wrong_has_both_faces(tmp_path: Path) -> None:
     """Some programs write offsets that point along the line."""
     doc, space = sheet()
-    for box in boxes(Gap())[:4]:
+    for box in boxes()[:4]:
         outlines(space, box)
     for y0, y1 in ((0.3, 3.0), (3.9, 7.7)):
         made = space.add_mline([(4, y0), (4, y1)], dxfattribs=WALL | {"scale_factor": 0.2})

@@ -11,7 +11,8 @@ from ezdxf.filemanagement import new
 from ezdxf.math import Matrix44
 from ezdxf.xclip import XClip
 
-from plan.drawings.drawn_offices import Doors, Layer, Leaf, Walls, arc, leaves, outlines, usual
+from plan.drawings.drawn_doors import Doors, Layer, Leaf, arc, leaves, usual
+from plan.drawings.drawn_offices import Walls, outlines
 from plan.habits.house import ROOMS, STAIRS, STOREYS, Line, Move, boxes, doors_on
 
 PLAIN = {"layer": "0"}

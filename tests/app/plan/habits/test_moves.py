@@ -18,11 +18,12 @@ from echostep_app.plan.importers.dxf.units import INSUNITS, STATED
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.report import ImportReport
 from needs_data import data_or_skip
+from plan.drawings import drawn_doors as doors
 from plan.drawings import drawn_offices as drawn
 
 STYLES = [
     *({"walls": walls} for walls in drawn.WALL_STYLES),
-    *({"door": door} for door in (*drawn.DOOR_STYLES, drawn.leaves_alone, drawn.nothing)),
+    *({"door": door} for door in (*doors.DOOR_STYLES, doors.leaves_alone, doors.nothing)),
 ]
 SAME_M = 0.006
 

@@ -18,7 +18,7 @@ from echostep_app.team.endpoint import Outlet
 from echostep_app.team.messages.report import BadReportError, ReportedAlarm, decode, encode
 from echostep_app.team.publish import Publishing
 from echostep_app.team.roster import MemberState
-from team.cot_schema import faults
+from team.cot.test_cot_schema import faults
 from team.team_reports import NOW, PLACE, PLAN, heard, report, said
 
 MAYDAY = ReportedAlarm("mayday", "no motion", 3, 34.0)

@@ -2,7 +2,7 @@
 """The plan on the Earth, as a page needs it: longitude, latitude and UTM as linear functions of the place.
 
 In: a plan with a georeference. Out: `Globe`; None without one, and without pyproj. Owns the rules of zones and bands.
-The projection bends by 1 to 2 mm within 100 m of the middle of the plan, by 0.2 m within 1 km (`tests/app/plan/test_globe.py`).
+The projection bends by 1 to 2 mm within 100 m of the middle of the plan, by 0.2 m within 1 km (`tests/app/plan/test_georeference.py`).
 """
 
 from __future__ import annotations
