@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from echostep_simulation.people.walker import Manner, Person, walk
+from echostep_simulation.world.tower import STOREY_M, stairs_from, tower
 from echostep_studies.frame.study import StudyRequest, run_study
 from echostep_studies.operation import study
 from echostep_studies.operation.walks import CHANGE_S, MANNERS, operation, waypoints
-from echostep_studies.simulation.tower import STOREY_M, stairs_from, tower
 
 
 @pytest.mark.parametrize("manner", {m.name: m for m in MANNERS}.values(), ids=lambda m: m.name)

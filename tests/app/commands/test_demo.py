@@ -26,7 +26,7 @@ from echostep_app.scorecard.track_columns import load_path
 from echostep_app.session.runs import demo
 from echostep_app.session.session import open_browser
 from echostep_simulation.scenario import DEMO_WAYPOINTS, start_of
-from echostep_studies.simulation.tower import tower
+from echostep_simulation.world.tower import tower
 from page.browser import LOCAL
 from page.frames import header, opened_url
 from waiting import PATIENCE_S

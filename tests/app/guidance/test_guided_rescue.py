@@ -25,7 +25,7 @@ from echostep_app.plan.routing import Route
 from echostep_app.ports.teammate import Teammate, parse_teammate
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import Scenario
-from echostep_studies.simulation.tower import tower
+from echostep_simulation.world.tower import tower
 
 TOWER = tower(3)
 DEMO = load_plan(ROOT / "host/core/echostep/plans/demo.json")

@@ -19,7 +19,7 @@ from command_line import echostep
 from echostep.plan import Georeference, Plan, load_plan
 from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.pictures.overlay import EDGE_M, Overlay, overlays, write_overlays
-from echostep_studies.simulation.tower import tower
+from echostep_simulation.world.tower import tower
 
 DEMO = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 

@@ -19,7 +19,7 @@ from echostep.tracker.last_place import LastPlace, last_place
 from echostep.walk.recorded import recorded_start
 from echostep_app.session.last_place import FILE, KEPT_S, Kept, PlaceKeeper, read_kept, start_last
 from echostep_app.session.metadata import parse_start, run_metadata
-from echostep_studies.simulation.tower import tower
+from echostep_simulation.world.tower import tower
 
 PLAN = tower(3)
 BOARD = "85837343139351E09080"

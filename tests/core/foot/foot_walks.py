@@ -10,7 +10,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.foot.steps import Stance, Step, Track
-from echostep_studies.simulation.rolling_foot import MANNERS, Course, FootManner, course, felt, pitched, samples
+from echostep_simulation.people.rolling_foot import MANNERS, Course, FootManner, course, felt, pitched, samples
 from foot import foot_walks as fw
 
 __all__ = ["MANNERS", "Course", "FootManner", "any_rotation", "course", "felt", "pitched", "samples"]

@@ -14,9 +14,9 @@ from echostep.foot.steps import Track, walk_track
 from echostep.foot.trunk_path import KNOWN_SCALE_SD, GaitSettings, TrunkPath
 from echostep.localization.settings import CloudSettings
 from echostep.offline.imu_checks import contradiction, end_sd_m
+from echostep_simulation.people.rolling_foot import glide
 from echostep_studies.bench.recordings.feet import SETS
 from echostep_studies.frame.recordings import DATA, recordings_in
-from echostep_studies.simulation.rolling_foot import glide
 from foot import foot_walks as fw
 from needs_data import needs_data
 

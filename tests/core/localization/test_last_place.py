@@ -15,7 +15,7 @@ from echostep.path import MeasuredSegment, PathSegment
 from echostep.tracker.last_place import LastPlace
 from echostep.walls.level_sheet import lay_out_levels
 from echostep_app.session.last_place import MOVED_M, start_after
-from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tower
+from echostep_simulation.world.tower import LIFT_AT, STOREY_M, tower
 
 ZERO_M = 100.0  # height by pressure on the lowest floor
 AWAY_S = 60.0

@@ -29,9 +29,9 @@ from echostep.localization.window import MOST_PIECES, PAST_M, RecentWay
 from echostep.path import MeasuredSegment
 from echostep.plan import Plan, Pose
 from echostep.walls.level_sheet import lay_out_levels
+from echostep_simulation.world.tower import STOREY_M, tower
 from echostep_studies.bench import sites
 from echostep_studies.bench.walks import SimulatedWalk, simulate
-from echostep_studies.simulation.tower import STOREY_M, tower
 
 pytestmark = pytest.mark.slow
 

@@ -26,7 +26,7 @@ from echostep.localization import (
 from echostep.localization.particles.cloud import cloud_about
 from echostep.plan import Pose
 from echostep.walls.level_sheet import lay_out_levels
-from echostep_studies.simulation.tower import tower
+from echostep_simulation.world.tower import tower
 
 APART_M = 30.0
 

@@ -19,7 +19,7 @@ from echostep.ports.chunks import BOARD, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import lay_out_levels
 from echostep_simulation.devices.board import PythonBoard
-from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tower
+from echostep_simulation.world.tower import LIFT_AT, STOREY_M, tower
 from walks import DEMO
 
 RESET_M = 3_150.0  # the height of 68500 Pa

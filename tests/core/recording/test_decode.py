@@ -27,8 +27,8 @@ from echostep.xsens import MTDATA, MTDATA2, MtMessage, MtSample, OutputFormat, e
 from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import BY_LENGTH, CONFIGURED, GIVEN, OutputFormats
 from echostep_app.recording.capture_summary import summary
+from echostep_simulation.devices.mtx_formats import pack
 from echostep_studies.frame.recordings import DATA
-from echostep_studies.simulation.devices.mtx_setup import pack
 from naive.frames import valid_frames
 from needs_data import needs_data
 

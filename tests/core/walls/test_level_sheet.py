@@ -37,9 +37,9 @@ from echostep_app.plan.importers.formats import open_plan
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import Person, Waypoint, walk
 from echostep_simulation.scenario import Scenario
+from echostep_simulation.world.tower import LIFT_AT, STOREY_M, tour, tower
 from echostep_studies.floors.storeys import judge, through
 from echostep_studies.frame.recordings import DATA
-from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tour, tower
 from needs_data import needs_data
 
 FLAT = HeightChange(0.0, 0.02, 0.0, math.inf, 0.0, 1.0)

@@ -15,7 +15,7 @@ from echostep.xsens.frames import MAX_LENGTH
 from echostep.xsens.packets import read_packets
 from echostep_app.xsens.requests import project_requests
 from echostep_app.xsens.setup import MtxSetup
-from echostep_studies.simulation.devices.mtx_setup import pack
+from echostep_simulation.devices.mtx_formats import pack
 
 BLOCK = 20_000  # frames mutated together
 MAX_PENDING = MAX_LENGTH + 6  # bytes of the longest unfinished frame

@@ -31,9 +31,9 @@ from echostep_app.scorecard.error_statistics import error_statistics
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import Person, Waypoint
 from echostep_simulation.scenario import Scenario
+from echostep_simulation.world.tower import tour, tower
 from echostep_studies.frame.report import LOST_END_M, Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
-from echostep_studies.simulation.tower import tour, tower
 
 STOREYS = 5
 WESTPORT = "storeys/westport"  # name of the row of the real plan

@@ -14,7 +14,7 @@ from echostep.localization.grid.kernels import LevelFactors
 from echostep.localization.height.levels import UNKNOWN_LAG_M2, HeightChange
 from echostep.walls.floor import CELL_M
 from echostep.walls.level_sheet import LIFT, STAIRS, lay_out_levels
-from echostep_studies.simulation.tower import STOREY_M, tower
+from echostep_simulation.world.tower import STOREY_M, tower
 
 SHEET = lay_out_levels(tower(3)).sheet
 STAIR, RIDE = (int(np.flatnonzero(SHEET.kind == kind)[0]) + 1 for kind in (STAIRS, LIFT))

@@ -19,7 +19,7 @@ from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
 from echostep.walls.level_sheet import lay_out_levels, level_of
-from echostep_studies.simulation.tower import LIFT_AT, tower
+from echostep_simulation.world.tower import LIFT_AT, tower
 
 STOREYS = 3
 CORRIDOR = np.array([(0.0, 0.0, 20.0, 0.0), (20.0, 0.0, 20.0, 2.0), (20.0, 2.0, 0.0, 2.0), (0.0, 2.0, 0.0, 0.0)])
