@@ -12,6 +12,7 @@ from echostep.board.reports import BoardReports
 from echostep.board.subscription import SUBSCRIBE
 from echostep_app.board.faults.health import board_findings
 from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC
+from firmware.findings import findings_of
 
 pytestmark = needs_twin
 
@@ -165,7 +166,7 @@ def test_a_wrong_part_is_named_and_the_board_stays_a_belt_board(bench: Bench) ->
     assert (parts.part_foot, parts.identity_foot) == (m.Part.NONE, 0xEA)
     assert not samples(found)
     assert kinds(found)["Gyros"]
-    assert any(text.startswith("thigh gyro: an ICM-20948 answers at its chip select") for text in bench.all_findings)
+    assert any(text.startswith("thigh gyro: an ICM-20948 answers at its chip select") for text in findings_of(bench))
 
 
 def test_a_part_that_is_plugged_in_later_is_found(bench: Bench) -> None:

@@ -17,6 +17,7 @@ from echostep_app.board.faults.findings import part_text_of
 from echostep_app.board.faults.health import board_findings, gyro_celsius
 from echostep_simulation.devices.board import BoardProcess
 from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC
+from firmware.findings import findings_of
 
 pytestmark = needs_twin
 
@@ -84,7 +85,7 @@ def test_a_bmp390_that_fails_is_named_and_comes_back(barometer: Bench, kind: str
     barometer.fault(f"bmp390={kind}")
     barometer.run(3_500)
     assert cause in {x.fault_pressure for x in barometer.messages if isinstance(x, m.Status)}
-    assert any(str(f).startswith(words) for f in barometer.all_findings)
+    assert any(str(f).startswith(words) for f in findings_of(barometer))
     barometer.fault("bmp390=ok")
     barometer.run(4_000)
     again = kinds(barometer.run(1_000))
@@ -99,7 +100,7 @@ def test_wrong_bits_from_a_bmp390_are_counted_and_named(barometer: Bench) -> Non
     barometer.fault("spi_errors=30")
     found = [x for _ in range(3) for x in barometer.run(20_000)]  # about one finding in ten seconds
     words = "barometer (BMP390): sent wrong bits"
-    assert [x for x in barometer.all_findings if x.startswith(words) and "SPI wires" in x]
+    assert [x for x in findings_of(barometer) if x.startswith(words) and "SPI wires" in x]
     assert kinds(found)["Pressure"] > 200
 
 
@@ -119,7 +120,7 @@ def test_a_wrong_part_and_an_empty_memory_are_named_at_the_start(
     bench.run(2_500)
     assert not pressures(bench.messages)
     assert cause is None or bench.status.fault_pressure == cause
-    assert any(text.startswith(words) for text in bench.all_findings)
+    assert any(text.startswith(words) for text in findings_of(bench))
 
 
 def test_barometers_may_be_swapped_in_mid_walk(barometer: Bench) -> None:
@@ -220,7 +221,7 @@ def test_a_pulse_ranger_that_fails_is_named_and_comes_back(
     assert {p.outcome for p in pings(found, m.Ranger.LEFT)} == {m.Outcome.BUS_ERROR}
     assert len(pings(found, m.Ranger.RIGHT)) >= 14
     assert rangers.status.fault_ranger_left == cause
-    assert any(text.startswith(words) for text in rangers.all_findings)
+    assert any(text.startswith(words) for text in findings_of(rangers))
     rangers.fault("pulse_left=ok")
     rangers.run(1_500)
     assert {p.outcome for p in pings(rangers.run(1_000), m.Ranger.LEFT)} == {m.Outcome.ECHO}
@@ -379,7 +380,7 @@ def test_wrong_bits_from_an_lsm6dso_are_counted_and_named(imus: Bench) -> None:
     imus.run(12_000, extended_rows(12_000))
     assert {m.Fault.BAD_VALUE} <= {x.fault_calf for x in imus.messages if isinstance(x, m.Status)}
     words = "calf gyro (LSM6DSO): sent wrong bits"
-    assert [x for x in imus.all_findings if x.startswith(words) and "SPI wires" in x]
+    assert [x for x in findings_of(imus) if x.startswith(words) and "SPI wires" in x]
 
 
 def test_lsm6dso_test_themselves_at_the_start(imus: Bench) -> None:
@@ -426,7 +427,7 @@ def test_an_lsm6dso_that_fails_is_named_and_comes_back(imus: Bench, kind: str, c
     assert {x.calf_acceleration_z for x in found if isinstance(x, m.Motion)} == {-32768}
     assert all(x.thigh == 41 and x.belt == 5 for x in found if isinstance(x, m.Gyros))
     assert cause in {x.fault_calf for x in found if isinstance(x, m.Status)}
-    assert any(text.startswith(words) for text in imus.all_findings)
+    assert any(text.startswith(words) for text in findings_of(imus))
     imus.fault("imu_calf=ok")
     imus.run(1_500)
     assert {x.calf for x in imus.run(500) if isinstance(x, m.Gyros)} == {-82}
@@ -523,7 +524,7 @@ def test_a_lis3mdl_that_fails_is_named_and_comes_back(
     found = magnetometer.run(2_000)
     assert not fields_of(found)
     assert cause in {x.fault_compass for x in found if isinstance(x, m.Status)}
-    assert any(text.startswith(words) for text in magnetometer.all_findings)
+    assert any(text.startswith(words) for text in findings_of(magnetometer))
     magnetometer.fault("lis3mdl=ok")
     magnetometer.run(3_000)
     assert len(fields_of(magnetometer.run(1_000))) >= 9
@@ -536,7 +537,7 @@ def test_a_wrong_magnetometer_is_named(bench: Bench) -> None:
     bench.subscribe()
     bench.run(2_000)
     words = "compass: holds a part that the firmware does not know (identity register 0x40)"
-    assert any(text.startswith(words) for text in bench.all_findings)
+    assert any(text.startswith(words) for text in findings_of(bench))
 
 
 def test_compasses_may_be_swapped_in_mid_walk(magnetometer: Bench) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from board_runs import Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
+from firmware.findings import findings_of
 
 pytestmark = needs_twin
 
@@ -103,7 +104,7 @@ def test_a_maxsonar_that_fails_is_named_and_comes_back(rangers: Bench, kind: str
     assert outcomes(found, m.Ranger.RIGHT) == {m.Outcome.ECHO}
     assert len(pings(found, m.Ranger.RIGHT)) >= 9
     assert cause in {x.fault_ranger_left for x in rangers.messages if isinstance(x, m.Status)}
-    assert any(text.startswith(words) for text in rangers.all_findings)
+    assert any(text.startswith(words) for text in findings_of(rangers))
     rangers.fault("maxsonar_left=ok")
     rangers.run(2_500)
     found = rangers.run(1_000)
@@ -145,7 +146,7 @@ def test_a_maxsonar_beside_another_kind_is_used_alone_and_named(bench: Bench, ot
     assert outcomes(found, m.Ranger.LEFT) == {m.Outcome.BUS_ERROR}
     assert bench.parts.wiring == m.Wiring.MIXED_RANGERS
     words = f"rangers: the left one is {name}, the right one a MaxSonar; the left one is not used"
-    assert any(text.startswith(words) for text in bench.all_findings)
+    assert any(text.startswith(words) for text in findings_of(bench))
     plug(bench, "maxsonar", "left")
     bench.run(3_000)
     assert {p.outcome for p in bench.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
@@ -158,4 +159,4 @@ def test_maxsonars_survive_a_reset_in_the_middle_of_a_ping(rangers: Bench) -> No
     rangers.run(2_000)
     assert {p.outcome for p in rangers.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
     rangers.run(1_000)
-    assert not [text for text in rangers.all_findings if "ranger" in text]
+    assert not [text for text in findings_of(rangers) if "ranger" in text]

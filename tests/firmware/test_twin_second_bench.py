@@ -14,6 +14,7 @@ from echostep.board.reports import BoardReports
 from echostep.board.subscription import SUBSCRIBE_ELECTRICAL
 from echostep_app.board.faults.electrical import electrical_findings
 from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC
+from firmware.findings import findings_of
 
 pytestmark = needs_twin
 BARE = ("bmp390", "imu_thigh", "imu_calf", "imu_belt", "pulse_left", "pulse_right", "lis3mdl")
@@ -71,7 +72,7 @@ def test_a_module_that_holds_its_line_is_named(bench: Bench, module: str, words:
     bench.run(2_000, rows(2_000, ECHO_US))
     bench.run(4_000, rows(4_000))
     assert [
-        x for x in bench.all_findings if x.startswith(f"left ranger (pulse ranger): {words}") and "does not fit" in x
+        x for x in findings_of(bench) if x.startswith(f"left ranger (pulse ranger): {words}") and "does not fit" in x
     ]
 
 
@@ -132,7 +133,7 @@ def test_one_wrong_byte_in_a_thousand_is_seen(bench: Bench, errors: int) -> None
     """N3: status bits and the reserved byte are known in every sample."""
     begin(bench, "kit=2026", f"spi_errors={errors}")
     bench.run(6_000, rows(6_000))
-    assert [text for text in bench.all_findings if "(LSM6DSO): sent wrong bits" in text]
+    assert [text for text in findings_of(bench) if "(LSM6DSO): sent wrong bits" in text]
 
 
 def test_a_part_that_is_confused_by_i3c_answers_after_each_reset(bench: Bench) -> None:

@@ -30,7 +30,7 @@ from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import demo_scenario
 from page.browser import PLAN, demo_walk
 from team.team_broker import Broker, needs_broker
-from walks import card_of, truth_of
+from walks import errors_of
 
 PORTION = 500
 LEAST_M = 60.0  # of wall in the drawing of the demo's walk
@@ -99,8 +99,7 @@ def test_what_one_walk_has_drawn_tracks_a_teammate(tmp_path: Path, monkeypatch: 
             for chunk in portion:
                 recorder.write(chunk)
             estimates += wearer.take(portion_of(portion))
-    found = card_of(estimates, truth_of(scenario))
-    assert found.horizontal.mean_m < 0.2
+    assert errors_of(estimates, scenario).horizontal_m.mean() < 0.2
     again = echostep("replay", recorder.path, "--plan", path, "--headless", "--out", tmp_path / "again", ends=0)
     assert "is not the plan" not in again.stdout
     rows = list(csv.DictReader((tmp_path / "again/track.csv").read_text().splitlines()))

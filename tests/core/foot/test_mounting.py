@@ -24,7 +24,7 @@ from echostep_studies.bench.recordings.feet import SETS
 from echostep_studies.frame.recordings import DATA, read_sets
 from foot import foot_walks as fw
 from needs_data import needs_data
-from walks import card_of, truth_of
+from walks import errors_of
 
 
 def axis_mountings() -> list[Floats]:
@@ -111,10 +111,10 @@ def test_live_the_mtx_may_sit_in_any_way(live: tuple[Plan, Scenario, list[Chunk]
             chunk = replace(chunk, data=b"".join(encode_frame(MTDATA, pack_mtdata(s)) for s in samples))
         turned.append(chunk)
     found = Tracker(plan, scenario.start, seed=0).take(portion_of(turned))
-    off = card_of(found, truth_of(scenario))
-    assert off.horizontal.mean_m < 0.2
-    assert off.horizontal.max_m < 0.8
-    assert (off.ellipse95_holds or 0.0) > 0.8
+    off = errors_of(found, scenario)
+    assert off.horizontal_m.mean() < 0.2
+    assert off.horizontal_m.max() < 0.8
+    assert off.in_ellipse95 > 0.8
 
 
 def test_a_foot_that_does_not_tip_is_taken_to_have_x_to_the_toe_until_it_tips() -> None:
