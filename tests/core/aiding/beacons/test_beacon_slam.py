@@ -35,7 +35,6 @@ from echostep.aiding.beacons.step import Beacons, no_waiting, update_by_reading
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex
-from echostep_studies.fischer2008.beacon_cloud import resample_beliefs
 
 MODEL = beacon_model(BeaconSettings())
 Floats = np.ndarray
@@ -154,7 +153,8 @@ def test_moved_beacon_is_noticed_while_others_vouch_for_the_cloud() -> None:
             update_by_measurement(particles, beliefs, health, measurement, MODEL, OPEN, rng)
         chosen = np.sort(rng.choice(n, n, p=np.exp(weight) / np.exp(weight).sum()))
         weight[:], x[:], y[:] = 0.0, x[chosen], y[chosen]
-        resample_beliefs(beliefs, chosen)
+        for part in beliefs:
+            part[:] = part[chosen]
     assert health.each[:2, TIMES_MOVED].tolist() == [0.0, 0.0]
     assert health.each[2, TIMES_MOVED] >= 1.0
     assert health.all[CLOUD_FIT] > 0.5
@@ -185,15 +185,6 @@ def test_no_measurement_makes_a_belief_infinite(
     assert np.isfinite(weight).all()
     assert all(np.isfinite(part).all() for part in beliefs)
     assert (beliefs.cov[:, 0, (0, 3, 5)] >= -1e-9).all()
-
-
-def test_inherit_copies_what_the_chosen_believed() -> None:
-    mean, cov = np.arange(12.0).reshape(2, 2, 3), np.arange(24.0).reshape(2, 2, 6)
-    beliefs = BeaconBeliefs(mean.copy(), cov.copy(), np.arange(4.0).reshape(2, 2))
-    resample_beliefs(beliefs, np.array([1, 1]))
-    assert (beliefs.mean == mean[[1, 1]]).all()
-    assert (beliefs.cov == cov[[1, 1]]).all()
-    assert beliefs.doubt.tolist() == [[2.0, 3.0], [2.0, 3.0]]
 
 
 def test_beacon_that_was_moved_costs_no_more_than_a_moved_one_and_is_trusted_again() -> None:

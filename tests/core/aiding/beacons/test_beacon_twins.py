@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 
 import numpy as np
@@ -33,7 +32,6 @@ from echostep.aiding.beacons.step import MOST_READINGS, Beacons, no_waiting, upd
 from echostep.arrays import Floats
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.index import build_index
-from echostep_studies.fischer2008.beacon_cloud import resample_beliefs
 from naive import beacon_readings as naive_readings
 from naive import beacons as naive
 
@@ -109,16 +107,6 @@ def test_moments_are_those_of_the_twin(seed: int, n: int) -> None:
         assert found == pytest.approx([*place, math.sqrt(0.5 * np.trace(cov)), axis], abs=1e-6)
         if n > 1:
             assert place_covariance(beliefs, slot, weight) == pytest.approx(cov, abs=1e-9)
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(1, 30))
-def test_beliefs_are_those_of_the_chosen(seed: int, n: int) -> None:
-    rng = np.random.default_rng(seed)
-    _, beliefs = any_cloud(rng, n, 2)
-    before, chosen = copy.deepcopy(beliefs), np.sort(rng.integers(0, n, n))
-    resample_beliefs(beliefs, chosen)
-    for part, old in zip(beliefs, before, strict=True):
-        assert (part == old[chosen]).all()
 
 
 def test_jumps_are_those_of_the_twin() -> None:
@@ -252,10 +240,9 @@ def test_a_walk_is_that_of_the_twin(seed: int, lost_from: int, recoveries: int) 
         if size < 0.5 * n:
             share = np.exp(particles.log_weight)
             chosen = np.sort(rng.choice(n, n, p=share / share.sum()))
-            for part in particles[:3]:
+            for part in (*particles[:3], *beacons.beliefs):
                 part[:] = part[chosen]
             particles.log_weight[:] = 0.0
-            resample_beliefs(beacons.beliefs, chosen)
             twin.cloud = twin_of(particles, beacons.beliefs)
     health = [[k.in_place, k.measurements, k.times_moved, k.suspect] for k in twin.known]
     np.testing.assert_allclose(beacons.health.each, np.array(health, np.float64), atol=1e-6)
