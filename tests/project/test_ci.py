@@ -37,6 +37,7 @@ def test_the_oldest_and_the_newest_are_tested(tmp_path: Path) -> None:
         "Two Pythons are tested: first Python 3.13.0 with the quick tests, then Python 3.11.7 with all.",
         "make setup PYTHON=python3.13 VENV=.venv/newest",
         "make quick PYTHON=python3.13 VENV=.venv/newest",
+        "make core-alone PYTHON=python3.11",
         "make test PYTHON=python3.11",
         "make long PYTHON=python3.11",
     ]
@@ -47,6 +48,7 @@ def test_a_name_that_does_not_run_is_no_python(tmp_path: Path) -> None:
     pythons = {"python3.11": PYTHON.format("3.11.7"), "python3.13": "exit 127"}
     assert run(tmp_path / "one", pythons) == [
         "One Python is tested: Python 3.11.7.",
+        "make core-alone PYTHON=python3.11",
         "make test PYTHON=python3.11",
         "make long PYTHON=python3.11",
     ]
@@ -56,6 +58,7 @@ def test_a_name_that_does_not_run_is_no_python(tmp_path: Path) -> None:
     )
     assert run(tmp_path / "none", {}) == [
         "One Python is tested: Python 3.9.2.",
+        "make core-alone PYTHON=python3",
         "make test PYTHON=python3",
         "make long PYTHON=python3",
     ]

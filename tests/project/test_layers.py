@@ -28,7 +28,5 @@ def test_a_marked_test_may_start_one() -> None:
 
 
 def test_make_quick_leaves_out_the_other_layers() -> None:
-    (recipe,) = re.findall(r"^quick:.*\n\t(.*)$", (ROOT / "Makefile").read_text(), flags=re.M)
-    left_out = re.search(r'-m "not \((.*)\)"', recipe)
-    assert left_out
-    assert left_out[1].split(" or ") == [*LAYERS, "slow", "long", "speed"]
+    (left_out,) = re.findall(r'^QUICK := -m "not \((.*)\)"$', (ROOT / "Makefile").read_text(), flags=re.M)
+    assert left_out.split(" or ") == [*LAYERS, "slow", "long", "speed"]

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A packed file, or a pointer of Git LFS, in place of a table, a recording or a plan is named, with the next step.
-
-Numbers in CSV files that no sensor and no clock gives.
-"""
+"""A packed file, or a pointer of Git LFS, in place of a table, a recording or a plan is named, with the next step."""
 
 from __future__ import annotations
 
@@ -10,17 +7,16 @@ import bz2
 import gzip
 import io
 import lzma
-import math
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from command_line import echostep
-from echostep.offline.csv_table import EARLY_ROWS, CsvLimits, number_of, read_rows
 
 TABLE = b"t_s,ax,ay,az,gx,gy,gz\n0,0,0,9.8,0,0,0\n" * 9
+
+
 POINTER = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a214614ab2935c943f9e0ff69d22e\nsize 12345\n"
 
 
@@ -64,26 +60,3 @@ def test_tabs_with_decimal_commas_are_read_as_semicolons_are(tmp_path: Path) -> 
     assert done.returncode == 0, done.stderr
     assert "floor 0 (0 m): 0.0 to " in done.stdout
     assert "stays on 2 floors" in done.stdout
-
-
-@pytest.mark.parametrize("cell", ["inf", "-inf", "Infinity", "1e308", "1e400", "nan", "", "x", "1e20"])
-def test_impossible_numbers_are_none(cell: str) -> None:
-    assert math.isnan(number_of(cell))
-
-
-@pytest.mark.parametrize("cell", ["0", "-1.5", "1.7e18", " 3 "])
-def test_possible_numbers_are_read(cell: str) -> None:
-    assert number_of(cell) == float(cell)
-
-
-def test_a_file_of_garbage_is_given_up_early() -> None:
-    read = list[int]()
-
-    def lines() -> Iterator[str]:
-        for k in range(10 * EARLY_ROWS):
-            read.append(k)
-            yield "x\n" if k % 3 else "1\n"
-
-    with pytest.raises(ValueError, match="67 % of the first 2000 rows have no number"):
-        read_rows(lines(), (["a"], ","), [0], 1, CsvLimits())
-    assert len(read) == EARLY_ROWS
