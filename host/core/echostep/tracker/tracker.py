@@ -44,10 +44,10 @@ from echostep.localization import (
     unobserved,
 )
 from echostep.odometry import FrontEnd, WearerWatch
-from echostep.offline.imu_chunks import ImuChunks
-from echostep.path import MeasuredSegment, PathSegment
+from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.plan import NO_PLAN, Plan, Pose
 from echostep.ports.chunks import FOOT, GATEWAY, TEAM, Chunk, Portion, portion_of
+from echostep.ports.imu_samples import SampleCounter
 from echostep.ports.people.check_in import HEADING_SD_RAD, PERSON, Call, CheckIn, Undo, parse_person
 from echostep.ports.people.meeting import MEETING
 from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon
@@ -91,7 +91,7 @@ class Tracker:
         self._building = Building(self.laid_out.walls, self.laid_out.sheet, DrawnPlaces(plan.levels))
         self.filter: AidedFilter | None = None  # from the first segment on
         self.gateway = Gateway()
-        self._imu = ImuChunks(s.mtx.rate_hz)  # for `feed_samples`
+        self._imu = SampleCounter(s.mtx.rate_hz)  # for `feed_samples`
         self.watchers: list[Watch] = []  # called in this order
         self.team_watchers: list[Callable[[bytes], None]] = []  # called with each chunk of the port TEAM
         self._readings: list[BeaconReading] = []  # waiting for their segment
@@ -190,7 +190,9 @@ class Tracker:
 
     def feed_samples(self, t_s: Floats, accel: Floats, gyro: Floats) -> list[Estimate]:
         """Process any number of a foot IMU's samples: t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s, body frame [`Settings.of_imu`]."""
-        return self.take(portion_of(list(self._imu.of(t_s, accel, gyro))))
+        estimates = self._published(self.front_end.process_samples(self._imu.of(t_s, accel, gyro)))
+        self.watch.advance()
+        return estimates
 
     def take(self, portion: Portion) -> list[Estimate]:
         """Process many chunks; the estimates are the same as for the chunks one by one."""
@@ -217,16 +219,21 @@ class Tracker:
 
     def _track(self, portion: Portion) -> list[Estimate]:
         """Estimates from a portion in which only the last chunk may be the gateway's: its readings are used from the next portion on."""
-        estimates: list[Estimate] = []
         # Odometry: chunks -> segments of the trunk's path with their pings, and dropouts.
-        for piece in self.front_end.process(portion):
+        estimates = self._published(self.front_end.process(portion))
+        # Beacons: bytes of the gateway -> readings.
+        if received := portion.of(GATEWAY).received:
+            self._readings += self.gateway.read(received, self.front_end.newest_s)
+        return estimates
+
+    def _published(self, pieces: list[MeasuredSegment | Dropout]) -> list[Estimate]:
+        """Estimates of new segments, and after dropouts."""
+        estimates: list[Estimate] = []
+        for piece in pieces:
             if isinstance(piece, MeasuredSegment):
                 estimates += self._follow(piece)
             elif self._estimate is not None:
                 estimates.append(self._publish(None, unobserved(self._estimate, piece.t_s)))
-        # Beacons: bytes of the gateway -> readings.
-        if received := portion.of(GATEWAY).received:
-            self._readings += self.gateway.read(received, self.front_end.newest_s)
         return estimates
 
     def _follow(self, measured: MeasuredSegment) -> list[Estimate]:
