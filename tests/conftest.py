@@ -8,7 +8,7 @@ import contextlib
 import os
 import subprocess
 import sys
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -22,6 +22,7 @@ settings.load_profile("repeatable")
 os.environ.setdefault("PYTEST_TIMEOUT", "1200")  # seconds; for pytest-timeout, where it is installed
 
 COMPILER = Path(__file__).with_name("compile_kernels.py")
+CORE, ABOVE = Path(__file__).with_name("core"), ("echostep_app", "echostep_studies")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -35,6 +36,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Marks by rule."""
     for item in items:
         layers.mark(item)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def core_alone(request: pytest.FixtureRequest) -> Iterator[None]:
+    """A run of the core's tests alone has imported nothing that is built on core and simulation."""
+    yield
+    if all(CORE in item.path.parents for item in request.session.items):
+        assert not sorted(name for name in sys.modules if name.startswith(ABOVE))
 
 
 @pytest.hookimpl(wrapper=True)

@@ -12,7 +12,8 @@ import numpy as np
 
 from board_runs import ROOT
 from echostep.arrays import Floats
-from echostep.localization import Estimate, in_ellipse95
+from echostep.localization import Estimate
+from echostep.particles.ellipse import in_ellipse95
 from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk
 from echostep_simulation.devices.board import PythonBoard

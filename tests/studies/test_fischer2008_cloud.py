@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.aiding import BeaconSettings
 from echostep.arrays import Ints
+from echostep.beacons.model import BeaconSettings
 from echostep_studies.fischer2008.beacon_cloud import new_cloud, resample_beliefs
 
 

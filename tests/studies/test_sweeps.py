@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from echostep.echoes.likelihood import echo_model
 from echostep.errors import EchostepError
-from echostep.localization import echo_model
 from echostep_studies.echoes.placing import grid_table, place
 from echostep_studies.echoes.sweep_rows import LIMITS_KNOWN, REAL_SHARES, share_rows
 from echostep_studies.echoes.sweeps import ROOM, Sweep, read_sweeps, simulated_sweeps

@@ -18,8 +18,8 @@ from command_line import echostep, interrupt_when
 from echostep.arrays import Floats
 from echostep.board.calibration import RangerSettings, ranges
 from echostep.board.messages import ROWS, Outcome
+from echostep.echoes.likelihood import EchoSettings
 from echostep.errors import EchostepError
-from echostep.localization import EchoSettings
 from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import parse_settings

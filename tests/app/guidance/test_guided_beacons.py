@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aiding.beacons.beacon_walk import SEED, Walk, beacon_walk, demo
+from beacons.beacon_walk import SEED, Walk, beacon_walk, demo
 from command_line import echostep
 from echostep.errors import EchostepError
 from echostep.ports.chunks import GATEWAY, portion_of

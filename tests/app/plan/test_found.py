@@ -14,8 +14,7 @@ from ezdxf.filemanagement import new
 from ezdxf.xclip import XClip
 
 from echostep.errors import EchostepError
-from echostep.plan import Plan
-from echostep.plan.model import parse_plan
+from echostep.plan import Plan, parse_plan
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.importers.formats import import_plan

@@ -13,7 +13,8 @@ from typing import Any, cast
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.localization import Air, ClimbSettings, Estimate, Start, TrackStatus
+from echostep.height.levels import Air, ClimbSettings
+from echostep.localization import Estimate, Start, TrackStatus
 from echostep.tracker import Tracker
 from echostep.tracker.last_place import LastPlace, last_place
 from echostep.walk.recorded import recorded_start

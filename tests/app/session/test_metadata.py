@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.localization import Air, Start
+from echostep.height.levels import Air
+from echostep.localization import Start
 from echostep.plan import NO_PLAN, Pose
 from echostep.walk.recorded import recorded_start
 from echostep_app.session.metadata import run_metadata

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.aiding.beacons.initialisation import locate_beacon
+from echostep.beacons.initialisation import locate_beacon
 from echostep.board.frames import encode
 from echostep.board.gateway import MOST_BEACONS, NEW_CLOCK_MESSAGES, Gateway
 from echostep.board.messages import Beacon, Identity

@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization import STATED, Air, Building, ClimbSettings, FilterSettings, MapFilter, Start
+from echostep.height.levels import Air, ClimbSettings
+from echostep.localization import STATED, Building, FilterSettings, MapFilter, Start
 from echostep.localization.belief import PLAN_FITS
 from echostep.localization.map_filter import UNOBSERVED_DOUBT
 from echostep.path import MeasuredSegment, PathSegment

@@ -11,23 +11,15 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.localization import (
-    BELIEVED,
-    Air,
-    Building,
-    CloudSettings,
-    EchoSettings,
-    Estimate,
-    MapFilter,
-    Start,
-    TrackStatus,
-    echo_model,
-)
-from echostep.localization.echoes.unplanned import UsablePings
+from echostep.echoes.likelihood import EchoSettings, echo_model
+from echostep.echoes.unplanned import UsablePings
+from echostep.height.levels import Air
+from echostep.localization import Building, CloudSettings, Estimate, MapFilter, Start, TrackStatus
 from echostep.localization.motion import height_change, move_of
-from echostep.localization.particle_arrays import Move
 from echostep.localization.particles.cloud import PASSING, cloud_about
 from echostep.localization.window import MOST_PIECES, PAST_M, RecentWay
+from echostep.particles.arrays import Move
+from echostep.particles.limits import BELIEVED
 from echostep.path import MeasuredSegment
 from echostep.plan import Plan, Pose
 from echostep.ports.chunks import portion_of

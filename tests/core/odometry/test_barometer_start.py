@@ -8,9 +8,9 @@ import pytest
 
 from board_runs import quiet_rows
 from echostep.board.calibration import PRESSURE_PA
+from echostep.height.height_filter import RelativeHeight
+from echostep.height.levels import HeightChange
 from echostep.localization import Building, FilterSettings, MapFilter, Start
-from echostep.localization.height.height_filter import RelativeHeight
-from echostep.localization.height.levels import HeightChange
 from echostep.odometry.barometer_start import BarometerStart
 from echostep.odometry.synchronizer import BAROMETER, MEASUREMENT, _measured
 from echostep.path import MeasuredSegment, PathSegment

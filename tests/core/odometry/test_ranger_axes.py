@@ -11,11 +11,12 @@ import pytest
 from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.board.calibration import RangerSettings
+from echostep.echoes.likelihood import EchoSettings, echo_model
+from echostep.echoes.unplanned import UsablePings
 from echostep.errors import EchostepError
 from echostep.foot.steps import FootSettings
 from echostep.foot.trunk_path import GaitSettings
-from echostep.localization import Building, EchoSettings, echo_model
-from echostep.localization.echoes.unplanned import UsablePings
+from echostep.localization import Building
 from echostep.odometry import FrontEnd
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import load_plan

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.localization import PROBABLE, Building, MapFilter, Start
+from echostep.localization import Building, MapFilter, Start
+from echostep.particles.limits import PROBABLE
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose, load_plan
 from echostep.walls.echo_sources import Walls

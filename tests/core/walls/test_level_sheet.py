@@ -16,11 +16,11 @@ from shapely import Point, Polygon
 
 from echostep.arrays import Floats
 from echostep.board import messages as m
-from echostep.localization import ANY_LEVEL, ClimbSettings, CloudSettings, Estimate, Start, TrackStatus
-from echostep.localization.height.levels import HeightArrays, HeightChange, change_levels, level_change_model
-from echostep.localization.particle_arrays import Move, ParticleArrays
+from echostep.height.levels import ClimbSettings, HeightArrays, HeightChange, change_levels, level_change_model
+from echostep.localization import CloudSettings, Estimate, Start, TrackStatus
 from echostep.localization.particles.cloud import Cloud, cloud_about
-from echostep.plan import Connector, Level, Plan, Pose
+from echostep.particles.arrays import Move, ParticleArrays
+from echostep.plan import ANY_LEVEL, Connector, Level, Plan, Pose
 from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import (

@@ -12,19 +12,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from echostep.aiding.beacon_map import BeaconMap
-from echostep.aiding.beacons.model import BeaconSettings
 from echostep.aiding.team.meeting import WRONG, Meeting, start_at
 from echostep.aiding.team.meeting_memory import MeetingEffect, MeetingMemory, moved_by
 from echostep.aiding.team.meetings import weigh_by
+from echostep.beacons.model import BeaconSettings
 from echostep.board.gateway import BeaconReading
 from echostep.localization.building import Building
 from echostep.localization.estimate import Estimate
 from echostep.localization.grid.search import Search
-from echostep.localization.limits import PROBABLE
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import FilterSettings
+from echostep.particles.limits import PROBABLE
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose
 

@@ -15,13 +15,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from echostep.height.levels import HeightChange
 from echostep.localization.grid.search import Search
 from echostep.localization.grid.search_grid import SearchGrid
-from echostep.localization.height.levels import HeightChange
-from echostep.localization.limits import PROBABLE, SURE
-from echostep.localization.particle_arrays import Move
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.settings import UNPLANNED_DOOR
+from echostep.particles.arrays import Move
+from echostep.particles.limits import PROBABLE, SURE
 from echostep.plan import Pose
 
 # Assumed, not measured.

@@ -14,8 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.particles.start import ANY_LEVEL, Start
-from echostep.plan import Level
+from echostep.localization.particles.start import Start
+from echostep.plan import ANY_LEVEL, Level
 
 HEARD_M = 5.0  # of a wall, within which it places the wearer: the rangers' reach without a second reflection
 

@@ -11,8 +11,8 @@ import math
 from enum import Enum, auto
 from statistics import median
 
-from echostep.localization.height.levels import HeightChange
-from echostep.localization.particle_arrays import Move
+from echostep.height.levels import HeightChange
+from echostep.particles.arrays import Move
 from echostep.path import MeasuredSegment, Odometer, PathSegment
 
 BESIDE_M = 0.05  # of the trunk from a foot on the floor: half of a step's width of 10 cm

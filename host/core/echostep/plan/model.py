@@ -141,6 +141,9 @@ class Connector:
     outline_m: Floats = field(repr=False)
 
 
+ANY_LEVEL = -1  # of a pose whose level is not known
+
+
 @dataclass(frozen=True, slots=True)
 class Pose:
     """Position in metres and heading in radians, counter-clockwise from the map's x axis; `level` is an index into Plan.levels."""

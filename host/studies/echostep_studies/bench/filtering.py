@@ -16,7 +16,6 @@ import numpy as np
 from echostep.localization import (
     Building,
     CloudSettings,
-    DrawnPlaces,
     Estimate,
     FilterSettings,
     MapFilter,
@@ -66,7 +65,7 @@ def track(
     The CPU time is that of the updates, without the tables that a plan needs once.
     """
     laid_out = lay_out_levels(plan)
-    building = Building(laid_out.walls, laid_out.sheet, DrawnPlaces(plan.levels))
+    building = Building.of(plan, laid_out)
     settings = FilterSettings(cloud=cloud or CloudSettings(), plan_sd_m=plan.uncertainty_m or 0.0)
     warm = _new_filter(building, start, segments, settings, seed)
     for segment in segments[:WARM_UP]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Floats
-from echostep.localization import EchoSettings, echo_model
+from echostep.echoes.likelihood import EchoSettings, echo_model
 from echostep.walls.echo_sources import Walls
 from echostep_app.commissioning.rangers.fit import BIAS, FITTED, MISSED, fit_ranger, score
 from echostep_app.commissioning.rangers.known_pings import KnownPings, known_pings

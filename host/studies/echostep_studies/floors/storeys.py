@@ -19,8 +19,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization import ANY_LEVEL, Estimate, TrackStatus
-from echostep.plan import Connector, Plan, Pose
+from echostep.localization import Estimate, TrackStatus
+from echostep.plan import ANY_LEVEL, Connector, Plan, Pose
 from echostep.ports.chunks import MTX, portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.tours import tour as tour_of

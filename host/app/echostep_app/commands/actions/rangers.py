@@ -11,9 +11,9 @@ from pathlib import Path
 
 from rich.console import Console
 
+from echostep.echoes.rangers import echo_of
 from echostep.errors import EchostepError
 from echostep.file_mode import claim
-from echostep.localization import echo_of
 from echostep.recording import open_parts, open_recording
 from echostep.settings import parse_settings
 from echostep.tracker import Tracker

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization import EchoSettings
+from echostep.echoes.likelihood import EchoSettings
 from echostep.walls.echo_sources import Walls
 from echostep_app.commissioning.rangers.fit import BLOCK, score
 from echostep_app.commissioning.rangers.known_pings import KnownPings, known_pings

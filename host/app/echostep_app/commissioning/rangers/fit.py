@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization import EchoSettings, echo_model
+from echostep.echoes.likelihood import EchoSettings, echo_model
 from echostep.walls.index import EAR_REACH_M
 from echostep_app.commissioning.rangers.known_pings import KnownPings, log_densities
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.board.calibration import RangerSettings
-from echostep.localization import EchoSettings
+from echostep.echoes.likelihood import EchoSettings
 from echostep.walls.echo_sources import Walls
 from echostep_app.commissioning.fitting import Values
 from echostep_app.commissioning.rangers.faults import SIDES, faults_of

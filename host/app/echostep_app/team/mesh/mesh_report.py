@@ -11,7 +11,7 @@ import math
 import struct
 from dataclasses import replace
 
-from echostep.localization import ellipse95
+from echostep.particles.ellipse import ellipse95
 from echostep.plan import Plan
 from echostep_app.plan.places.whereabouts import Whereabouts
 from echostep_app.printing.lines import moment

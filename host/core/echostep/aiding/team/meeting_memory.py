@@ -14,7 +14,7 @@ from enum import StrEnum
 from msgspec import structs
 
 from echostep.aiding.team.meeting import WRONG, Meeting, TimedMeeting, carries_position
-from echostep.localization.limits import PROBABLE
+from echostep.particles.limits import PROBABLE
 from echostep.path import Odometer
 from echostep.ports.people.meeting import parse_meeting
 

@@ -29,8 +29,8 @@ from echostep.aiding.team.meeting import RANGE_BODY_SD_M, WRONG, Meeting, covari
 from echostep.arrays import Bools, Floats
 from echostep.localization.belief import CloudHypothesis
 from echostep.localization.grid.search import Search
-from echostep.localization.limits import HALF_STOREY_M, PROBABLE
 from echostep.localization.particles.cloud import Cloud
+from echostep.particles.limits import HALF_STOREY_M, PROBABLE
 
 # Assumed, not measured.
 MOST_DOUBT = math.log(WRONG["tracking"])  # of all ranges of one teammate: then this teammate is wrong

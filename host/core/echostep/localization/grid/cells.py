@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Int32s, Ints
+from echostep.echoes.range_table import UNKNOWN, RangeTable
+from echostep.height.levels import UpperLevels
 from echostep.jit import kernel
-from echostep.localization.echoes.range_table import UNKNOWN, RangeTable
-from echostep.localization.height.levels import UpperLevels
 from echostep.walls.floor import CELL_M
 from echostep.walls.index import WallIndex, crosses_wall
 from echostep.walls.level_sheet import LevelSheet, connector_at, level_of, level_on_sheet

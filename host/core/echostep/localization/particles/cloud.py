@@ -20,8 +20,9 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.echoes.likelihood import EchoModel
-from echostep.localization.height.levels import (
+from echostep.echoes.likelihood import EchoModel
+from echostep.echoes.reweighting import CloudModel, EchoMemory, MoveProgress, propagate_and_reweight
+from echostep.height.levels import (
     ClimbSettings,
     HeightArrays,
     HeightChange,
@@ -29,13 +30,12 @@ from echostep.localization.height.levels import (
     level_change_model,
     set_levels_by_pressure,
 )
-from echostep.localization.particle_arrays import DrawnPoses, Move, PingBatch
-from echostep.localization.particles.kernels import NOISE_BEND, NOISE_TURN, effective_size, systematic
 from echostep.localization.particles.particles import GATHERED_REST, Particles
-from echostep.localization.particles.reweighting import CloudModel, EchoMemory, MoveProgress, propagate_and_reweight
 from echostep.localization.particles.sampling import kld_size, log_mode_weight, spread_evenly
-from echostep.localization.particles.start import Start, draw_poses
+from echostep.localization.particles.start import Start
 from echostep.localization.settings import CloudSettings
+from echostep.particles.arrays import DrawnPoses, Move, PingBatch
+from echostep.particles.kernels import NOISE_BEND, NOISE_TURN, effective_size, systematic
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.index import NO_WALLS, WallIndex, crossings
@@ -66,7 +66,7 @@ def cloud_about(
 
     `floor`: for a start that is anywhere. `walls`: a start lies on one side of them.
     """
-    x_m, y_m, heading, log_weight = draw_poses(start, settings.largest, floor, sheet, rng, walls)
+    x_m, y_m, heading, log_weight = start.draw(settings.largest, floor, sheet, rng, walls)
     z_m = sheet.height_m[level_of(x_m, sheet)] if sheet else np.zeros(len(x_m))
     lag_m = np.full(len(x_m), 0.0 if start.air is None else start.air.zero_m)
     poses = DrawnPoses(x_m, y_m, heading - walk_heading_rad, z_m, lag_m)

@@ -11,12 +11,11 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.localization.height.levels import UNKNOWN_LAG_M2, ClimbSettings, HeightChange, drift_m
-from echostep.localization.limits import ROOM_M
-from echostep.localization.particle_arrays import DrawnPoses, ParticleArrays
+from echostep.height.levels import UNKNOWN_LAG_M2, Air, ClimbSettings, HeightChange, drift_m
 from echostep.localization.particles.places import LikelyPlace, hypotheses
-from echostep.localization.particles.start import Air
 from echostep.localization.settings import CloudSettings
+from echostep.particles.arrays import DrawnPoses, ParticleArrays
+from echostep.particles.limits import ROOM_M
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 # A cloud is gathered when less than this weight is farther than ROOM_M from its mean, assumed
