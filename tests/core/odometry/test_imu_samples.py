@@ -50,7 +50,10 @@ def test_arrays_are_tracked_as_their_bytes_are_to_the_last_bit(size: int) -> Non
     expected = by_bytes.process(portion_of(list(chunks_of(samples))))
     found = []
     for k in range(0, len(samples.counter), size):
-        found += by_arrays.process_samples(ImuSamples(*(column[k : k + size] for column in samples)))
+        part = slice(k, k + size)
+        found += by_arrays.process_samples(
+            ImuSamples(samples.counter[part], samples.t_arrival_ns[part], samples.accel[part], samples.gyro[part])
+        )
     assert repr(found) == repr(expected)
     assert sum(isinstance(piece, MeasuredSegment) for piece in found) > 20
     assert by_arrays.foot_source.counts == by_bytes.foot_source.counts

@@ -33,7 +33,7 @@ class SampleCounter:
 
     def __init__(self, rate_hz: float) -> None:
         self._rate_hz = rate_hz
-        self._first_s, self._last = math.nan, -1
+        self._first_s, self._last = math.nan, -1.0
         self.left_out = 0
 
     def of(self, t_s: Floats, accel: Floats, gyro: Floats) -> ImuSamples:
