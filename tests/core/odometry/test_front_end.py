@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from board_runs import ROOT
-from echostep.arrays import Floats
+from echostep.arrays import Floats, Ints
 from echostep.board.calibration import GyroSettings, RangerSettings, ranges
 from echostep.board.frames import encode
 from echostep.board.messages import ROWS, Outcome, Ping
@@ -79,8 +79,8 @@ class Heard(WearerWatch):
     def __init__(self) -> None:
         self.told: dict[str, list[bytes]] = defaultdict(list)
 
-    def add_foot(self, *samples: Floats) -> None:
-        for name, values in zip(("t_s", "gyro", "accel"), samples, strict=False):
+    def add_foot(self, t_s: Floats, gyro: Floats, accel: Floats, _message_index: Ints) -> None:
+        for name, values in (("t_s", t_s), ("gyro", gyro), ("accel", accel)):
             self.told[f"foot {name}"].append(values.tobytes())
 
     def add_legs(self, _message_index: int, block: GyroBlock) -> None:
