@@ -49,7 +49,7 @@ def added(name: str) -> Any | None:
 
 
 def needed(name: str, what: str) -> Any:
-    """The object registered under this name; raises EchostepError that says what needs it."""
+    """The object registered under this name; raises EchostepError that names `what`."""
     if (found := added(name)) is None:
         raise EchostepError(f"{what} needs echostep-app, which is not installed: pip install 'echostep[app]'")
     return found

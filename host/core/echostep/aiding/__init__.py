@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Aids of the map filter: radio beacons, and meetings with teammates.
 
-In: the filter's hypotheses, beacons' readings, meetings. Out: the same hypotheses, reweighted; places of beacons. Owns what it remembers of each.
+In: the filter's hypotheses, beacons' readings, meetings. Out: the same hypotheses, reweighted; places of beacons. Owns the records of both.
 The names below are its public interface; only its own tests look behind it.
 """
 

@@ -166,7 +166,7 @@ class BeaconMap:
 
 
 def _beliefs(cloud: Particles) -> BeaconBeliefs:
-    """What each particle believes of the beacons' places: these arrays, not copies."""
+    """Each particle's beliefs of the beacons' places; views, not copies."""
     return BeaconBeliefs(*cloud.carried) if cloud.carried else empty_beliefs(len(cloud.x_m), 0)
 
 

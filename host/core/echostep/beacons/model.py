@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 @dataclass(frozen=True, slots=True)
 class BeaconSettings:
-    """Errors of a beacon's measurements, and how often things go wrong.
+    """Errors of a beacon's measurements, and rates of faults.
 
     `range_sd_m`: a beacon's own error is 5 cm; the rest is the distance from boot to body and the width of the cloud. `bearing_sd_deg`
     [Fischer 2008, 4.1.1]. `range_outliers`, `bearing_outliers`: share of measurements that are uniform over `span_m` and over the circle. `hidden`:

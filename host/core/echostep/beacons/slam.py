@@ -221,7 +221,7 @@ def _recover(
     particles: ParticleArrays, beliefs: BeaconBeliefs, measurement: BeaconMeasurement, model: BeaconModel,
     rng: np.random.Generator,
 ) -> None:  # fmt: skip
-    """Put RECOVERED_SHARE of the particles where the measurement allows, with any heading; the others stay as they are."""
+    """Put RECOVERED_SHARE of the particles where the measurement allows, with any heading; the others are unchanged."""
     range_m, bearing = measurement.range_m, measurement.bearing_rad
     for i in range(len(particles.x_m)):
         if rng.random() >= RECOVERED_SHARE:

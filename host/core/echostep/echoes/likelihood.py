@@ -28,7 +28,7 @@ MOST_SILENT = 8  # pings between two such echoes: more mean a door
 REMEMBERED = 200.0  # pings: tens of metres of path
 ABSORPTION_DB_M = 2.6  # dB per metre of distance, there and back, 40 kHz in air [ISO 9613-1]
 DB = 20.0 / math.log(10.0)  # decibels per unit of the natural logarithm of a distance
-# Probability that no source so far was detected below which sources further away are left out, assumed
+# Sources are omitted where a nearer one is detected but for this probability, assumed
 NEGLIGIBLE_REST = 1e-4
 SILENT_SHARE = 0.2  # share of outliers and of hidden views that are "no echo", assumed
 # Of `stray`, when the ping before was silent too: among real clutter, of which `hidden` is a part, 0.70 to 0.86 are then silent where nothing is
@@ -81,8 +81,8 @@ class EchoSettings:
     `hidden`: share of views in which the plan differs from the building, `hidden_m`: length of the path over which a view stays hidden (a cupboard).
     `stray`: a second reflection when no source was detected, a quarter of it after a silent ping; `outlier`: anything else, from ping to ping.
     `correlation_m`: length of the path over which errors of successive echoes become independent: errors of the plan, of a ranger's bias, and of the
-    trunk's sway, which lasts half a stride. `own`: share of an echo's information that no echo before has brought, however far back: a plan that
-    differs from the building errs alike for metres (by the filter's errors among real clutter: echo-own of the studies' notebook).
+    trunk's sway, which lasts half a stride. `own`: share of an echo's information that is independent of all earlier
+    echoes: errors of the plan are correlated over metres (by the filter's errors among real clutter: echo-own of the studies' notebook).
     """
 
     sd_m: float = 0.036

@@ -5,9 +5,9 @@ In: pings, their places by the mean of a cloud, its covariance, the walls. Out: 
 variance.
 
 Half of the variance of a range's error is taken to stay with the ranger [SRF02: which wavefront crosses the threshold, 3-4 cm; Robot Electronics,
-sonar FAQ]. The density without a plan learns the distance of each wall that goes on, bias and all; the plan states the distance. So an excess of both
-rangers, which no place explains, would speak against the plan as long as walls go on. An excess of one over the other moves the place by half of
-the excess, and is not learnt. A Kalman filter of one state; a ping counts by its power and by the probability that it is the expected echo.
+sonar FAQ]. The density without a plan adapts to the biased distance of a continuing wall; the plan states the true one. So an excess of both rangers,
+which no place explains, would count against the plan along every wall. An excess of one over the other moves the place by half of the excess, and is
+not learnt. A Kalman filter of one state; a ping counts by its power and by the probability that it is the expected echo.
 """
 
 from __future__ import annotations

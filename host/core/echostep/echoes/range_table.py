@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A table of the range to expect at every place of the floor and in every direction, for a search of the building.
+"""Table of the expected range at each place of the floor and in each direction, for a search of the building.
 
 In: walls, their floor. Out: `RangeTable`; `log_densities` of a ping by its entries, instead of a trace; the pings that
 a search takes. Owns nothing.
@@ -34,18 +34,18 @@ LIKELY = 0.05  # probability of detection that the sources up to the expected ra
 CHANCES = 8  # steps of the probability of an echo
 RANGES = 256  # steps of the expected range
 OUTSIDE_ENTRY = CHANCES * RANGES  # entry of a place outside the building
-# The ping before, of the same ranger: silence goes on where nothing answers, and where an entry is wrong
+# The ping before, of the same ranger: silence persists where nothing reflects, and where an entry is wrong
 AFTER_ECHO, AFTER_SILENCE = 0, 1
 # Shares after an echo, and after silence: of echoes expected by the entry that are missing all the same; of "no echo" where none is expected (the
 # others are second reflections and things that no plan shows); of views that are hidden; of "no echo" in these
 MISSED, QUIET, HIDDEN, HIDDEN_QUIET = (0.02, 0.1), (0.3, 0.8), (0.1, 0.2), (0.1, 0.6)
-# Share of silence, by second reflections, for which QUIET stands: it goes with a ranger's own
+# Share of silence, by second reflections, that QUIET assumes: it scales with a ranger's own
 USUAL_SILENT = 1.0 - EchoSettings().stray
 MOST_QUIET = 0.95
 AROUND = 2  # cells about the floor, at its walls, that share the nearest row
 UNKNOWN = -1  # no row: outside the building
 USED_M = 0.25  # way of a view between two pings of one ranger that are used: a cell of the table
-INDEPENDENT_M = 0.8  # way on which pings of one ranger bring the information of one ping: walls go on
+INDEPENDENT_M = 0.8  # path over which the pings of one ranger have the information of one ping: walls continue
 
 
 class RangeTable(NamedTuple):

@@ -5,8 +5,8 @@ or as predicted by the last echoes.
 In: walls, their floor, `MeasuredSegment`s in order of time. Out: `Background`: log-density by range; `PingBatch` and the pings'
 densities without a plan. Owns the views of both rangers, each the line in the walk frame that it detected last, or none, and the length of the path.
 
-A cloud that explains the echoes no better than this density is wrong, or the plan is. So the density is the best possible without a plan: a wall that
-goes on is predicted as well as by the plan; only where a view changes does the plan have more information. A smooth wall answers from the foot of
+A cloud that explains the echoes no better than this density is wrong, or the plan is. So the density is the best possible without a plan: a
+continuing wall is predicted as well as by the plan; the plan has more information only where a view changes. A smooth wall answers from the foot of
 the perpendicular, whatever the ranger's axis: so its distance shrinks by the way along its normal. An extended Kalman filter of distance and
 direction of the normal. An edge or a corner answers as a wall whose normal turns, which TURN_SD_RAD allows.
 """
@@ -107,7 +107,7 @@ class UnplannedView:
         return self._wall is None
 
     def move(self, x_m: float, y_m: float, axis_rad: float) -> float:
-        """Go on to the place and axis of the next ping; returns the probability that the view is the same there, 0 for the first one."""
+        """Advance to the place and axis of the next ping; returns the probability that the view is the same there, 0 for the first one."""
         dx_m, dy_m, turn_rad = x_m - self._x_m, y_m - self._y_m, abs(wrap(axis_rad - self._axis_rad))
         self._x_m, self._y_m, self._axis_rad = x_m, y_m, axis_rad
         if math.isnan(dx_m):
@@ -117,7 +117,7 @@ class UnplannedView:
         return math.exp(-math.hypot(dx_m, dy_m) / VIEW_M - turn_rad / VIEW_RAD)
 
     def densities(self, range_m: float, axis_rad: float, stray: float, blur_m: float) -> tuple[float, float]:
-        """Density (1/m) of a range if the view goes on, and blurred by a standard deviation; range 0: the probability of no echo.
+        """Density (1/m) of a range if the view continues, and blurred by a standard deviation; range 0: the probability of no echo.
 
         `stray`: probability of a second reflection where nothing answers.
         """
@@ -126,7 +126,7 @@ class UnplannedView:
         return (0.0, 0.0) if range_m <= 0.0 else self._wall.densities(range_m, axis_rad, blur_m, self._model)
 
     def update(self, range_m: float, axis_rad: float, power: float, goes_on: bool) -> None:
-        """Take in a ping; `goes_on`: whether the view goes on, by the densities."""
+        """Update by a ping; `goes_on`: whether the view continues, by the densities."""
         if range_m <= 0.0:
             if not goes_on:  # otherwise it is likelier that an echo was missed
                 self._wall = None
@@ -175,7 +175,7 @@ class UnplannedDensities(NamedTuple):
     its echo, 0 for an echo; `alike`, the density if like the ping before, without these two.
 
     Logs of densities to the pings' power, anywhere in the building or like the ping before: `either`, and `blurred` as for a scattered cloud.
-    `counts`: share that is evidence for a cloud: what a turn has left only selects its particles, since the trunk follows the foot late.
+    `counts`: share that is evidence for a cloud: information deferred from a turn only selects particles, since the trunk follows the foot late.
     """
 
     stray: Floats
@@ -187,7 +187,7 @@ class UnplannedDensities(NamedTuple):
 
 
 class RangeMemory:
-    """The density of echoes without any plan: the view of the same ranger goes on, or it has changed to any in the building."""
+    """The density of echoes without any plan: the view of the same ranger continues, or it has changed to any in the building."""
 
     def __init__(self, background: Background, echo: EchoSettings, blur_m: float = 0.0) -> None:
         self._background, self._echo, self._blur_m = background, echo, blur_m
@@ -240,10 +240,10 @@ def _loss(turn_rad: float, half_rad: float) -> float:
 
 
 class UsablePings:
-    """Pings of nearly one view repeat each other's errors: each counts by the way of the view since the one before, up to `own` on `correlation_m`.
+    """Pings of nearly one view have correlated errors: each counts by the change of the view since the ping before, up to `own` on `correlation_m`.
 
-    The axis within a turn is uncertain, so its pings count less, and what they leave is left to the first ping after it.
-    Before a ranger was heard nothing tells that it works: it counts from its first echo on.
+    The axis within a turn is uncertain, so its pings count less, and the remainder is deferred to the first ping after it. A ranger counts from its
+    first echo on: until then it may not work.
     """
 
     def __init__(self, background: Background, echo: EchoSettings, blur_m: float = 0.0) -> None:
@@ -253,7 +253,7 @@ class UsablePings:
         self.set_ranger_model(background, echo)
         self._x_m, self._y_m = 0.0, 0.0  # end of the path in the walk frame
         self._viewed_m = 0.0  # way of the views: the path, and `correlation_m` for each VIEW_RAD of turning
-        # Mark on that way at each ranger's last ping, from its first echo on; what the last turn has left for its next one
+        # Mark on that way at each ranger's last ping, from its first echo on; the share deferred from the last turn to its next one
         self._last_ping_m, self._unused_m = [-math.inf, -math.inf], [0.0, 0.0]
 
     def set_ranger_model(self, background: Background, echo: EchoSettings) -> None:
@@ -267,7 +267,7 @@ class UsablePings:
         return self._viewed_m - max(self._last_ping_m)
 
     def take(self, measured: MeasuredSegment) -> tuple[PingBatch, UnplannedDensities]:
-        """The pings that bring information, with their share of the segment and their axis in the walk frame, and their densities without a plan."""
+        """The informative pings, with their share of the segment and their axis in the walk frame, and their densities without a plan."""
         segment = measured.segment
         length, span_s = math.hypot(segment.dx_m, segment.dy_m), segment.t1_s - segment.t0_s
         viewed_m = length + self._correlation_m * abs(segment.turn_rad) / VIEW_RAD
@@ -295,7 +295,7 @@ class UsablePings:
         ), unplanned._replace(counts=1.0 - unused_m[used] / travel_m[used])  # fmt: skip
 
     def _travels(self, ranger: Ints, range_m: Floats, viewed_m: Floats) -> tuple[Floats, Floats]:
-        """Way of the view (k,) between each ping and the one before it of the same ranger, 0 before its first echo; what a turn has left of it."""
+        """Way of the view (k,) between each ping and the one before it of the same ranger, 0 before its first echo; the deferred share."""
         last_m, left_m, travel_m, unused_m = self._last_ping_m, self._unused_m, *np.zeros((2, len(viewed_m)))
         for k, (which, heard_m, mark_m) in enumerate(
             zip(ranger.tolist(), range_m.tolist(), viewed_m.tolist(), strict=True)

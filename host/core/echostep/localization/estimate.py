@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The estimate: a position with its covariance, and a status that states how far to trust it.
 
-In: values computed by `cloud_estimate`. Out: `Estimate`, immutable, and what is read from it: ellipse, whether it claims a place. Owns nothing.
+In: values computed by `cloud_estimate`. Out: `Estimate`, immutable, and its derived values: ellipse, whether it claims a place. Owns nothing.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ class MapFilter:
         self, building: Building, start: Start, walk_heading_rad: float, rng: np.random.Generator,
         settings: FilterSettings | None = None,
     ) -> None:  # fmt: skip
-        """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at the start."""
+        """`walk_heading_rad`: the trunk's heading in the walk frame at the start."""
         self._settings = settings or FilterSettings()
         self.building = building
         self._rng = rng
@@ -113,7 +113,7 @@ class MapFilter:
     def update(self, measured: MeasuredSegment) -> Estimate:
         """Propagate along a segment, reweight by its pings and height change, and resample; returns the estimate at its end."""
         segment, belief = measured.segment, self.belief
-        # 1. What the last gap was: a pause, a way that was not observed, rangers that were silent.
+        # 1. Kind of the last gap: a pause, a way that was not observed, rangers that were silent.
         gap = self._gaps.ended(measured)
         # 2. How the height has changed, by the foot and by pressure.
         change = self._height_change(measured)
@@ -129,7 +129,7 @@ class MapFilter:
         # 6. The hypotheses are compared, and the rangers' bias is learnt from the likeliest.
         if not segment.unobserved:
             self._compare(segment, *self._follow(measured, change))
-        # 7. What aids the filter weighs the tracked one.
+        # 7. The aids reweight the tracked one.
         self._aid(segment)
         # 8. If the trunk is probably in none, it is searched.
         if belief.is_doubted and len(self.building.floor.x_m):
@@ -138,7 +138,7 @@ class MapFilter:
         return self._estimate(segment)
 
     def _aid(self, segment: PathSegment) -> None:
-        """Weigh the tracked cloud, which is at the end of a segment, by what aids the filter there [`echostep.aiding`]: nothing."""
+        """Reweight the tracked cloud at the end of a segment by the aids [`echostep.aiding`]: here none."""
 
     def turn_walk_frame(self, by_rad: float) -> None:
         """Rotate all particles: the heading in the walk frame has changed while the wearer's heading on the map has not."""

@@ -13,7 +13,7 @@ from echostep.echoes.likelihood import EchoModel, EchoSettings, echo_model
 from echostep.echoes.range_table import TABLE_SD_M
 from echostep.height.levels import ClimbSettings
 
-UNPLANNED_DOOR = -6.0  # log-probability (1 in 400) that a way leads through a wall of the plan all the same
+UNPLANNED_DOOR = -6.0  # log-probability (1 in 400) that a path crosses a wall of the plan
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from echostep.particles.arrays import Move, PingBatch
 from echostep.walls.echo_sources import Walls
 
 PAST_M = 40.0  # path that is passed again: the path on which a place is found
-MOST_PIECES = 1_000  # of it: eight minutes of standing
+MOST_PIECES = 1_000  # of that path: eight minutes of standing
 
 
 class RecentWay:

@@ -66,7 +66,7 @@ class FrontEndCounts:
     clock_steps: int = 0  # of the host's clock
     barometer_jumps: int = 0  # right after its start: the heights before them are not used
     stray_edges: int = 0  # on the board's SyncOut input, not from the MTx
-    foot_doubts: tuple[str, ...] = ()  # what is wrong with the foot's sensor or its place, a sentence each
+    foot_doubts: tuple[str, ...] = ()  # faults of the foot's sensor or its mounting, a sentence each
 
 
 class FrontEnd:

@@ -112,7 +112,7 @@ class Level:
     def heard(self) -> Floats:
         """All segments that echoes are compared with: the solid ones, and the doubtful walls of a drawing.
 
-        The distance of doubtful walls from places beside them is known better than their place in the building.
+        The distance of doubtful walls from nearby places is known better than their place in the building.
         """
         if not len(self.place_sd) or self.is_refused:
             return self.solid

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Data of the run in a recording, beside the bytes: start, seed, settings; and the tracker of a replay.
+"""Data of the run in a recording besides the bytes: start, seed, settings; and the tracker of a replay.
 
 In: a recording's text fields. Out: start, seed, `Tracker`. Owns nothing. The names of the fields are part of the file format.
 """

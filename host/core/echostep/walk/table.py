@@ -26,7 +26,7 @@ COLUMNS = (
     "protection_m", "right", "outside", "plan_fits",
 )  # fmt: skip
 HYPOTHESES = "hypotheses"  # the last column: probability:x,y,level of each place that fits
-PLACE = ("longitude_deg", "latitude_deg")  # columns beside those of track.csv, where the plan has a georeference
+PLACE = ("longitude_deg", "latitude_deg")  # additional columns, where the plan has a georeference
 
 
 def columns_of(estimates: list[Estimate], plan: Plan) -> Columns:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The hypothesis that the trunk is anywhere: a search on a grid, shown by particles that are drawn from it after each move.
 
-In: what a `Cloud` takes. Out: a `Cloud`, once the search has found the place. Owns the grid.
+In: the input of a `Cloud`. Out: a `Cloud`, once the search has found the place. Owns the grid.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ def cloud_about(
     settings: CloudSettings, start: Start, walk_heading_rad: float, rng: np.random.Generator, sheet: LevelSheet | None = None,
     climbing: ClimbSettings | None = None, floor: Floor = NO_FLOOR, walls: WallIndex = NO_WALLS,
 ) -> Cloud:  # fmt: skip
-    """The cloud of a start. `walk_heading_rad`: the trunk's heading in the walk frame while it stands there; without `sheet` there is one level.
+    """The cloud of a start. `walk_heading_rad`: the trunk's heading in the walk frame at the start; without `sheet` there is one level.
 
     `floor`: for a start that is anywhere. `walls`: a start lies on one side of them.
     """
@@ -206,7 +206,7 @@ class Cloud(Particles):
         self.resample_if_needed()
 
     def resample_if_needed(self, walls: WallIndex = NO_WALLS) -> None:
-        """Systematic resampling [Kitagawa 1996] when too few particles carry the weight; what roughens them leads through none of the walls.
+        """Systematic resampling [Kitagawa 1996] when too few particles carry the weight; roughening moves none of them through a wall.
 
         Until the cloud is gathered, the number of a mode's particles follows the square root of its weight, and they keep that weight: resampling
         alone would lose the lighter of two modes by chance.

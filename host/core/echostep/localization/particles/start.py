@@ -100,7 +100,7 @@ class Start:
 
 
 def wide(start: Start) -> Start:
-    """A start if what is stated is wrong: near its pose, if any."""
+    """The start if the stated one is wrong: near its pose, if any."""
     sd_m, sd_rad = math.hypot(start.sd_m, WIDE_SD_M), math.hypot(start.heading_sd_rad, WIDE_SD_RAD)
     return Start(near=start.pose, sd_m=sd_m, heading_sd_rad=sd_rad)
 
