@@ -12,6 +12,7 @@ TOOL := env PYTHONPATH=tools:tests:tests/app $(BIN)/python -m
 TWIN := tools/twin/build/echostep-twin
 RINGS := $(RING:%=tests/%)
 SUITE := $(BIN)/python -m pytest -q -n auto --dist worksteal --durations 25 --durations-min 1
+QUICK := -m "not (twin or browser or process or study or slow or long or speed)"
 APT_PACKAGES := gcc make gcc-avr avr-libc binutils-avr libsimavr-dev libelf-dev cppcheck python3-venv
 TEST_PACKAGES := mosquitto chromium clang libclang-rt-dev openscad
 
@@ -56,9 +57,18 @@ real: $(READY) ## a real recorded foot on a plan drawn around its surveyed path,
 	$(BIN)/python -m echostep_studies.figures.real_walk --out out/real
 
 quick: $(READY) ## run the tests that need no twin, browser, process, study or more than half a second
-	$(BIN)/python -m pytest -q -n auto --dist worksteal $(RINGS) -m "not (twin or browser or process or study or slow or long or speed)"
+	$(BIN)/python -m pytest -q -n auto --dist worksteal $(RINGS) $(QUICK)
 
-test: board ## run the tests that a contributor waits for, and the checks; RING=core, app or studies: the tests of that ring alone
+core-alone: $(VENV)/core/ready ## run the quick tests of the core where nothing but the core, pytest and hypothesis is installed
+	$(VENV)/core/bin/python -m pytest -q tests/core $(QUICK)
+
+$(VENV)/core/ready: host/core/pyproject.toml
+	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || tools/apt.sh python3-venv
+	$(PYTHON) -m venv $(VENV)/core
+	$(VENV)/core/bin/pip install --quiet --disable-pip-version-check -e host/core pytest hypothesis
+	@touch $@
+
+test: board ## run the tests that a contributor waits for, and the checks; RING=core, simulation, app or studies: the tests of that ring alone
 	$(MAKE) --quiet --jobs 2 check suite
 
 long: board ## run the other tests: whole campaigns, tours, soaks, studies
@@ -172,4 +182,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: elsewhere help setup firmware twin demo real quick test long board suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak kill hardware docs site snapshots licences lock audit flash clean
+.PHONY: elsewhere help setup firmware twin demo real quick core-alone test long board suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak kill hardware docs site snapshots licences lock audit flash clean

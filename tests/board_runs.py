@@ -11,23 +11,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader, encode
-from echostep.board.reports import BoardReports
 from echostep.board.subscription import SUBSCRIBE
-from echostep_app.board.faults.health import board_findings
 from echostep_simulation.devices.board import BoardProcess
 from echostep_simulation.stimulus import NO_SYNC, ROW
+from layers import needs
 
 ROOT = Path(__file__).resolve().parent.parent
 TWIN = ROOT / "tools/twin/build/echostep-twin"
 ELF = ROOT / "firmware/build/echostep.elf"
 
-needs_twin = pytest.mark.skipif(
-    not (TWIN.exists() and ELF.exists()),
+needs_twin = needs(
+    "twin",
+    missing=not (TWIN.exists() and ELF.exists()),
     reason="the twin is not built: gcc-avr or libsimavr-dev is missing (make test installs them when it may)"
     if not shutil.which("avr-gcc")
     else "the twin is not built: make -C firmware; make -C tools/twin",
@@ -92,16 +91,6 @@ class Bench:
     def parts(self) -> m.Parts:
         """The newest report of the parts, which must have been subscribed to."""
         return next(x for x in reversed(self.messages) if isinstance(x, m.Parts))
-
-    @property
-    def all_findings(self) -> list[str]:
-        """Every finding that any status gave rise to."""
-        kept, found = BoardReports(), []
-        for message in self.messages:
-            kept.add(message)
-            if isinstance(message, m.Status):
-                found += [str(f) for f in board_findings(kept)]
-        return found
 
 
 def kinds(found: list[m.Message]) -> Counter[str]:

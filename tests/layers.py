@@ -15,21 +15,25 @@ from unittest import mock
 
 import pytest
 
-from board_runs import needs_twin
-from team.team_broker import needs_broker
-
 LAYERS = ("twin", "browser", "process", "study")
 STUDIES = Path(__file__).with_name("studies")
 ADVICE = "A test that starts a process is marked: @pytest.mark.process"
+_layer_of: list[tuple[pytest.Mark, str]] = []
+
+
+def needs(layer: str, *, missing: bool, reason: str) -> pytest.MarkDecorator:
+    """A mark of the tests of a layer, which are skipped where something of it is missing."""
+    decorator = pytest.mark.skipif(missing, reason=reason)
+    _layer_of.append((decorator.mark, layer))
+    return decorator
 
 
 def mark(item: pytest.Item) -> None:
     """Give a test the marks that follow from its folder, its fixtures and what it says it needs."""
     own = list(item.iter_markers())
-    if needs_twin.mark in own:
-        item.add_marker("twin")
-    if needs_broker.mark in own:
-        item.add_marker("process")
+    for need, layer in _layer_of:
+        if need in own:
+            item.add_marker(layer)
     if "browser" in getattr(item, "fixturenames", ()):
         item.add_marker("browser")
     if STUDIES in item.path.parents:

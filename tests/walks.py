@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""The first seconds of the simulated demo walk, once for all tests that need a recording with steps in it."""
+"""The first seconds of the simulated demo walk, once for all tests that need a recording with steps in it; how good a track is."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
 from itertools import takewhile
-from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from board_runs import ROOT
+from echostep.arrays import Floats
 from echostep.localization import Estimate
+from echostep.particles.ellipse import in_ellipse95
 from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk
-from echostep_app.scorecard.card import Scorecard, score
-from echostep_app.scorecard.track_columns import ScoredPath, track_of
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import Scenario, demo_scenario
 
@@ -32,12 +32,20 @@ def walk_chunks(seconds: float = 15.0) -> tuple[Chunk, ...]:
     return (first, *rest)
 
 
-def truth_of(scenario: Scenario) -> ScoredPath:
-    """The trunk's true path."""
-    t_s = scenario.walk.t_s
-    return ScoredPath(Path("truth"), t_s, scenario.walk.trunk_m, np.zeros(len(t_s), bool), {})
+class Errors(NamedTuple):
+    """Of n estimates: distances (n,) from the trunk's true place, and the share whose 95 % ellipse holds it."""
+
+    horizontal_m: Floats
+    in_ellipse95: float
 
 
-def card_of(estimates: Sequence[Estimate], truth: ScoredPath) -> Scorecard:
-    """Their scores."""
-    return score(track_of(estimates), truth)
+def errors_of(estimates: Sequence[Estimate], scenario: Scenario) -> Errors:
+    """Those of the estimates within the time of the walk."""
+    true_s, true_m = scenario.walk.t_s, scenario.walk.trunk_m
+    within = [e for e in estimates if true_s[0] <= e.t_s <= true_s[-1]]
+    t_s = [e.t_s for e in within]
+    error_m = np.array([(e.x_m, e.y_m) for e in within]) - np.column_stack(
+        [np.interp(t_s, true_s, axis) for axis in true_m.T]
+    )
+    covariance_m2 = np.array([(e.xx_m2, e.xy_m2, e.yy_m2) for e in within])
+    return Errors(np.hypot(*error_m.T), float(in_ellipse95(error_m, covariance_m2).mean()))

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.localization.particle_arrays import Move
-from echostep.localization.particles.kernels import piece_of
+from echostep.particles.arrays import Move
+from echostep.particles.kernels import piece_of
 from echostep.path import BENT, MeasuredSegment, PathSegment
 
 TURNS = st.floats(-2.0, 2.0)

@@ -8,6 +8,7 @@ import pytest
 
 from board_runs import Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
+from firmware.findings import findings_of
 
 pytestmark = needs_twin
 
@@ -108,7 +109,7 @@ def test_a_maxsonar_beside_another_kind_is_used_alone_and_named(bench: Bench, ot
     assert outcomes(found, m.Ranger.LEFT) == {m.Outcome.BUS_ERROR}
     assert bench.parts.wiring == m.Wiring.MIXED_RANGERS
     words = f"rangers: the left one is {name}, the right one a MaxSonar; the left one is not used"
-    assert any(text.startswith(words) for text in bench.all_findings)
+    assert any(text.startswith(words) for text in findings_of(bench))
     plug(bench, "maxsonar", "left")
     bench.run(3_000)
     assert {p.outcome for p in bench.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}

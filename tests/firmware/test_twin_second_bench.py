@@ -17,6 +17,7 @@ from echostep_app.board.faults.health import Finding, board_findings
 from echostep_app.commissioning.diagnosis import _echo_findings
 from echostep_app.commissioning.probe import ProbeResult
 from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC
+from firmware.findings import findings_of
 
 pytestmark = needs_twin
 README = ROOT / "firmware/README.md"
@@ -152,7 +153,7 @@ def test_a_module_that_holds_its_line_is_named(bench: Bench, module: str, words:
     bench.run(2_000, rows(2_000, ECHO_US))
     bench.run(4_000, rows(4_000))
     assert [
-        x for x in bench.all_findings if x.startswith(f"left ranger (pulse ranger): {words}") and "does not fit" in x
+        x for x in findings_of(bench) if x.startswith(f"left ranger (pulse ranger): {words}") and "does not fit" in x
     ]
 
 
@@ -213,7 +214,7 @@ def test_one_wrong_byte_in_a_thousand_is_seen(bench: Bench, errors: int) -> None
     """N3: status bits and the reserved byte are known in every sample."""
     begin(bench, "kit=2026", f"spi_errors={errors}")
     bench.run(6_000, rows(6_000))
-    assert [text for text in bench.all_findings if "(LSM6DSO): sent wrong bits" in text]
+    assert [text for text in findings_of(bench) if "(LSM6DSO): sent wrong bits" in text]
 
 
 def test_a_part_that_is_confused_by_i3c_answers_after_each_reset(bench: Bench) -> None:

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from echostep.aiding.beacons.beliefs import BeaconMeasurement
-from echostep.aiding.beacons.initialisation import (
+from echostep.arrays import Floats
+from echostep.beacons.beliefs import BeaconMeasurement
+from echostep.beacons.initialisation import (
     APART_M,
     BEARING_SD_RAD,
     FEWEST,
@@ -23,17 +24,16 @@ from echostep.aiding.beacons.initialisation import (
     PATH_M,
     READING_SD_M,
 )
-from echostep.aiding.beacons.model import BeaconModel
-from echostep.aiding.beacons.slam import (
+from echostep.beacons.model import BeaconModel
+from echostep.beacons.slam import (
     ACQUITTED_FIT,
     FIT_SHARE,
     LOST_FIT,
     MISFIT,
     RECOVERED_FIT,
 )
-from echostep.aiding.beacons.step import FIRST, LOCATE_EVERY, LOCATED_SD_M, MOST_READINGS
-from echostep.arrays import Floats
-from echostep.localization.limits import THREE_SD2
+from echostep.beacons.step import FIRST, LOCATE_EVERY, LOCATED_SD_M, MOST_READINGS
+from echostep.particles.limits import THREE_SD2
 from naive.beacons import Belief, Particle, recover, reweight
 
 

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.aiding.beacons.beliefs import BeaconMeasurement
-from echostep.aiding.beacons.model import BeaconModel
-from echostep.aiding.beacons.slam import (
+from echostep.arrays import Floats
+from echostep.beacons.beliefs import BeaconMeasurement
+from echostep.beacons.model import BeaconModel
+from echostep.beacons.slam import (
     CLOSE_BEARING_M2,
     GREATEST_ODDS,
     KNOWN_AXIS_RAD2,
@@ -22,8 +23,7 @@ from echostep.aiding.beacons.slam import (
     RECOVERY_WIDTH,
     UNKNOWN_AXIS_RAD2,
 )
-from echostep.arrays import Floats
-from echostep.localization.limits import THREE_SD2
+from echostep.particles.limits import THREE_SD2
 from naive import walls as naive_walls
 
 CIRCLE = 2.0 * math.pi

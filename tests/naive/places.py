@@ -7,8 +7,8 @@ import numpy as np
 
 from echostep.angles import mean_angle
 from echostep.arrays import Floats, Ints
-from echostep.localization.limits import ROOM_M
 from echostep.localization.particles.places import LEAST_PROBABILITY, MOST_PLACES
+from echostep.particles.limits import ROOM_M
 
 Place = tuple[float, float, float, int, float, float]  # probability, x, y, level, standard deviation, heading
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization import EchoModel
-from echostep.localization.particle_arrays import Move, PingBatch
+from echostep.echoes.likelihood import EchoModel
+from echostep.particles.arrays import Move, PingBatch
 from naive.walls import crosses, echo_sources
 
 

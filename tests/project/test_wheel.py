@@ -124,7 +124,7 @@ def test_an_installed_wheel_has_what_the_demo_needs(fresh: tuple[Path, dict[str,
     programs, env = fresh
     code = (
         "from importlib.resources import files, as_file\n"
-        "from echostep.plan.model import load_plan\n"
+        "from echostep.plan import load_plan\n"
         "from echostep_simulation.scenario import demo_scenario\n"
         "with as_file(files('echostep') / 'plans' / 'demo.json') as path: print(len(load_plan(path).levels[0].walls))"
     )

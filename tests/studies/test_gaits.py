@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from echostep_simulation.people.rolling_foot import MANNERS
 from echostep_studies.frame.study import StudyRequest
 from echostep_studies.gaits.foot import STEPS, FootRun, foot_row, foot_rows
 from echostep_studies.gaits.legs import LegRun, leg_rows
 from echostep_studies.gaits.study import STUDY, summarize
-from echostep_studies.simulation.rolling_foot import MANNERS
 
 ROUGH = {"foot/running": 2.0, "foot/crawling": 2.0}  # percent of the way; else 0.5
 STAIRS = ("legs/upstairs", "legs/downstairs")

@@ -19,10 +19,10 @@ from echostep.localization import Estimate, TrackStatus
 from echostep.plan import load_plan
 from echostep_simulation.people.walker import Manner, Person, walk
 from echostep_simulation.scenario import START_NS
+from echostep_simulation.world.tower import STOREY_M, stairs_from, tower
 from echostep_studies.frame.study import StudyRequest, run_study
 from echostep_studies.operation import study as operation_study
 from echostep_studies.operation.walks import CHANGE_S, MANNERS, operation, waypoints
-from echostep_studies.simulation.tower import STOREY_M, stairs_from, tower
 from echostep_studies.team import study, tracking, walks
 from echostep_studies.team.beacons import MOST_EACH, dropped_on, with_dropped_beacons
 from echostep_studies.team.walks import AGAIN_S, TeamWalks, encounters

@@ -8,8 +8,7 @@ costs nothing.
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from echostep.additions import face
 
@@ -38,24 +37,7 @@ __all__ = [
     "xsens",
 ]
 
-_MODULES = {name: f"echostep.{name}" for name in ("foot", "plan", "xsens")} | {"messages": "echostep.board.messages"}
-_load = face(
-    __name__,
-    {
-        "localization": "Estimate Start",
-        "ports.chunks": "Chunk",
-        "recording": "read_capture",
-        "settings": "Settings",
-        "tracker": "Tracker",
-        "walk.walk": "Walk replay",
-    },
-)
-
-
-def __getattr__(name: str) -> Any:
-    if name in _MODULES:
-        return importlib.import_module(_MODULES[name])
-    return _load(name)
+__getattr__ = face(__name__)
 
 
 def __dir__() -> list[str]:

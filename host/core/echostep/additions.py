@@ -7,23 +7,38 @@ In: a name. Out: the object of a package's module; the one that a distribution r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
 from echostep.errors import EchostepError
 
 
-def face(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """`__getattr__` of a package, so that importing it costs nothing. `homes`: its modules, and the names in each, separated by spaces."""
-    home = {name: module for module, names in homes.items() for name in names.split()}
+def face(package: str) -> Callable[[str], Any]:
+    """`__getattr__` of a package, so that importing it costs nothing: the names are those that it imports for type checkers alone."""
+    homes: dict[str, str] = {}
 
     def load(name: str) -> Any:
-        if name not in home:
+        if not homes:
+            homes.update(_imported(package))
+        if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return getattr(import_module(f"{package}.{home[name]}"), name)
+        if homes[name] != package and hasattr(home := import_module(homes[name]), name):
+            return getattr(home, name)
+        return import_module(f"{homes[name]}.{name}")
 
     return load
+
+
+def _imported(package: str) -> dict[str, str]:
+    """Modules of the names that a package imports where `TYPE_CHECKING` holds, by its source."""
+    import ast
+    from pkgutil import get_data
+
+    source = get_data(package, "__init__.py") or b""
+    blocks = [node.body for node in ast.parse(source).body if isinstance(node, ast.If)]
+    imports = [node for body in blocks for node in body if isinstance(node, ast.ImportFrom)]
+    return {alias.name: str(node.module) for node in imports for alias in node.names}
 
 
 def added(name: str) -> Any | None:
@@ -34,7 +49,7 @@ def added(name: str) -> Any | None:
 
 
 def needed(name: str, what: str) -> Any:
-    """The object registered under this name; raises EchostepError that says what needs it."""
+    """The object registered under this name; raises EchostepError that names `what`."""
     if (found := added(name)) is None:
         raise EchostepError(f"{what} needs echostep-app, which is not installed: pip install 'echostep[app]'")
     return found

@@ -20,7 +20,7 @@ class EchostepError(Exception):
 
 
 class IncompleteError(EchostepError):
-    """A run has done its work to the end, but what it has recorded lacks something (exit status 1)."""
+    """A run is complete, but its recording lacks something (exit status 1)."""
 
 
 def words_of(error: BaseException) -> str:
@@ -31,7 +31,7 @@ def words_of(error: BaseException) -> str:
 
 
 def replaced(begin: bytes) -> str:
-    """What a file that begins so has instead of a table or a recording, and the next step; empty if nothing is known of it."""
+    """Kind of a file that is neither table nor recording, by its first bytes, and the next step; empty for an unknown kind."""
     if begin.startswith(b"version https://git-lfs"):
         return "a pointer of Git LFS in place of the file: git lfs pull brings it"
     packed = next((name for magic, name in PACKED.items() if begin.startswith(magic)), "")

@@ -2,7 +2,7 @@
 """Fields of a message from outside: kinds of numbers and texts; checked against a structure, with one sentence about a wrong one.
 
 In: parsed JSON or TOML, which may be hostile, and a msgspec struct or a dataclass. Out: the structure, or a ValueError that begins with the path of
-the wrong field, such as `levels[0].doors[2].line`. Owns nothing: a type's `Meta(description=...)` says what its values are.
+the wrong field, such as `levels[0].doors[2].line`. Owns nothing: a type's `Meta(description=...)` describes its values.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Text = Annotated[str, Meta(pattern=rf"^[^{UNWRITABLE}]*$", description="a text w
 
 
 def checked(tree: Any, kind: type[T]) -> T:
-    """The tree as a structure of this kind; raises ValueError that names the wrong field, or says what the structure's own check says."""
+    """The tree as a structure of this kind; raises ValueError that names the wrong field, or has the text of the structure's own check."""
     try:
         return msgspec.convert(tree, kind)
     except msgspec.ValidationError as error:

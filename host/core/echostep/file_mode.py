@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Who may read the files of a run: its user alone, unless `--share` was given.
+"""Mode of the files of a run: readable by its user alone, unless `--share` was given.
 
 In: a path that is about to be written. Out: a file of mode 0600 there. Owns the answer to `--share`.
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """How kernels are compiled: the only place that configures numba.
 
-In: functions. Out: the same, compiled when first called and cached in the folder that `kernel_cache` names; the commands are told of each. Owns the
-options.
+In: functions. Out: the same, compiled when first called and cached in the folder that `kernel_cache` names; the commands are notified of each. Owns
+the options.
 
 A *kernel* is called from Python; a *part* is called by kernels and other parts alone. A part has no wrapper for Python, which is a fifth of the work
 of compiling, and none of its versions is made for one constant: numba makes them while it still takes `k = 0` before a loop for the type of `k`.
@@ -10,7 +10,7 @@ of compiling, and none of its versions is made for one constant: numba makes the
 numba counts references to every array that one kernel hands to another, atomically. In kernels that run once per sample or particle that takes longer
 than their work: a lean kernel counts none, so it returns numbers or tuples of numbers and makes no arrays. numba has no public option for this.
 
-Kernels on disk have a check sum each: a file that a power failure has cut or filled with zeros is put aside, never run, and its kernel compiled anew.
+Kernels on disk have a check sum each: a file that a power failure has cut or filled with zeros is put aside, and its kernel compiled again.
 """
 
 from __future__ import annotations
@@ -175,13 +175,13 @@ def _is_of_another_numba(index: bytes) -> bool:
     """Whether an index begins with a version; damage inside the version is damage."""
     try:
         version = pickle.loads(index)
-    except Exception:  # pickle raises whatever the bytes make it raise
+    except Exception:  # damaged bytes make pickle raise any exception
         return False
     return isinstance(version, str) and version.isprintable() and version != numba.__version__
 
 
 def _put_aside(path: str) -> None:
-    """Rename a damaged file; where that fails it stays, and is compiled anew at each start."""
+    """Rename a damaged file; where that fails, its kernel is compiled again at each start."""
     _tell(DAMAGED)
     with suppress(OSError):
         os.replace(path, path + ASIDE)  # noqa: PTH105
@@ -221,9 +221,9 @@ event.register("numba:compile", _Compilations())  # type: ignore[no-untyped-call
 
 
 def _defer_blas() -> None:
-    """Load the part of numba that looks for BLAS through all of scipy (0.15 s), and let it look when a kernel asks for BLAS; none of ours does.
+    """Load numba's linear algebra without its search for BLAS, which imports all of scipy (0.15 s), until a kernel needs BLAS; none of ours does.
 
-    numba has no public way to say so: without the inner name nothing is deferred.
+    numba has no public option for this: without the inner name nothing is deferred.
     """
     look = getattr(linalg, "ensure_blas", None)
     if look is None or "numba.np.arraymath" in sys.modules:

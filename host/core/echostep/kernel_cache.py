@@ -84,7 +84,7 @@ def _can_be_written(folder: Path) -> bool:
 
 @cache
 def _tell_of_other_folder(chosen: str, used: Path) -> None:
-    """Tell of the other folder, once a run."""
+    """Report the other folder, once a run."""
     print(
         f"echostep: NUMBA_CACHE_DIR: {chosen} cannot be written: compiled kernels are kept in {used}", file=sys.stderr
     )

@@ -107,9 +107,9 @@ class PathSegment:
 
     @property
     def bend_m(self) -> tuple[float, float]:
-        """Vector in the walk frame: the middle of the way lies a quarter of it off the chord.
+        """Bend in the walk frame: the middle of the path lies a quarter of this vector off the chord.
 
-        BENT of the arc of a circle that turns with the trunk, whatever way the trunk faces. A left turn bends the way to the right of the chord.
+        BENT of the arc of a circle that turns with the trunk, whatever the trunk's heading. A left turn bends the way to the right of the chord.
         """
         bend = bend_of(self.turn_rad)
         return bend * self.dy_m, -bend * self.dx_m

@@ -13,15 +13,17 @@ from pathlib import Path
 from sys import float_info
 from typing import Any
 
-from echostep.aiding import BeaconSettings
+from echostep.beacons.model import BeaconSettings
 from echostep.board.calibration import GyroSettings, Imus, ImuSettings, RangerSettings
+from echostep.echoes.likelihood import EchoSettings
 from echostep.errors import EchostepError, has_left
 from echostep.fields import checked, short
 from echostep.foot.steps import FootSettings
 from echostep.foot.trunk_path import GaitSettings
+from echostep.height.levels import ClimbSettings
 from echostep.legs.heading import CompassErrors
 from echostep.legs.trunk_path import WearerSettings
-from echostep.localization import ClimbSettings, CloudSettings, EchoSettings
+from echostep.localization import CloudSettings
 from echostep.timing.timeline import MtxTiming
 
 

@@ -19,7 +19,7 @@ from echostep_app.scorecard.track_columns import load_path
 from echostep_app.session.runs import demo
 from echostep_app.session.session import open_browser
 from echostep_simulation.scenario import DEMO_WAYPOINTS, start_of
-from echostep_studies.simulation.tower import tower
+from echostep_simulation.world.tower import tower
 
 PLAN_FILE = ROOT / "host/core/echostep/plans/demo.json"
 PLAN = load_plan(PLAN_FILE)

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from command_line import echostep
+from echostep.height.height_filter import RelativeHeight
+from echostep.height.levels import HeightChange
 from echostep.localization import TrackStatus
-from echostep.localization.height.height_filter import RelativeHeight
-from echostep.localization.height.levels import HeightChange
 from echostep.plan import NO_PLAN
 from echostep_app.page.elements.scene import status_text
 from echostep_app.session.metadata import run_metadata, start_recording

@@ -28,13 +28,13 @@ from echostep_app.ports.teammate import Teammate, parse_teammate
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import RATE_HZ, Person, Waypoint, walk
 from echostep_simulation.scenario import Scenario
+from echostep_simulation.world.tower import tour as tower_tour
+from echostep_simulation.world.tower import tower
 from echostep_studies.bench import sites
 from echostep_studies.floors.storeys import through
 from echostep_studies.frame.recordings import DATA
 from echostep_studies.noplan import sites as drawn_sites
 from echostep_studies.operation.walks import waypoints as operation_waypoints
-from echostep_studies.simulation.tower import tour as tower_tour
-from echostep_studies.simulation.tower import tower
 from needs_data import needs_data
 
 TOWER = tower(3)

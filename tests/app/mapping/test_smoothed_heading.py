@@ -11,34 +11,10 @@ import pytest
 
 from echostep.angles import wrap
 from echostep.arrays import Floats
-from echostep.foot.steps import Step
-from echostep.odometry.heading_fusion import HeadingFusion
 from echostep.path import MeasuredSegment, PathSegment
 from echostep_app.mapping.graph.nodes import HELD_TURN_SD_RAD, TURN_SD_RAD, nodes_of
 from echostep_app.mapping.smoothed_heading import with_smoothed_headings
-from odometry.test_heading_fusion import DRIFT_RAD, STRIDE_S, Change, Walker, blocks, growth, numb
-
-
-def segments_of(walker: Walker, change: Change = lambda _, rate: rate) -> list[MeasuredSegment]:
-    """The walk's segments as the front end makes them, from the middle of one stance to that of the next."""
-    fusion, found = HeadingFusion(), list[MeasuredSegment]()
-    t_s, rate = walker.belt()
-    coming = blocks(t_s, change(t_s, rate))
-    block, before = next(coming, None), 0.0
-    for event in walker.events():
-        while block is not None and not block.t_s[-1] > event.t_end_s + 0.15:
-            fusion.add_belt(block)
-            block = next(coming, None)
-        step = fusion.corrected(event)
-        if isinstance(step, Step):
-            t1 = step.t_end_s + 0.25
-            segment = PathSegment(
-                t1 - STRIDE_S, t1, step.move_m[0], step.move_m[1], before, step.heading_rad, 0.02, step.heading_sd_rad,
-                len(found), belt=fusion.evidence,
-            )  # fmt: skip
-            found.append(MeasuredSegment(segment, np.zeros(0), np.zeros(0, np.int64), np.zeros(0)))
-            before = step.heading_rad
-    return found
+from odometry.test_heading_fusion import DRIFT_RAD, Walker, growth, numb, segments_of
 
 
 def errors(walker: Walker, segments: list[MeasuredSegment]) -> Floats:

@@ -13,8 +13,9 @@ from ezdxf.filemanagement import new
 
 import echostep
 from command_line import echostep as run
+from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization import digest
+from echostep.localization import Estimate, digest
 from echostep.offline.imu_csv import Imu
 from echostep.plan import Pose, load_plan
 from echostep.ports.chunks import MTX
@@ -131,13 +132,22 @@ def test_arrays_of_any_length_are_tracked_as_the_recording_is(walk: Imu, tmp_pat
     file, plan = tmp_path / "walk.mcap", hall(tmp_path / "plan.json")
     import_imu(walk, "imu.csv", file, {})
     start = echostep.plan.Pose(1.0, 2.0, np.pi / 2)
-    tracker = echostep.Tracker(echostep.plan.load_plan(plan), start, echostep.Settings.of_imu(rate_of(walk.t_s)))
-    estimates = [
-        estimate
-        for k in np.array_split(np.arange(len(walk.t_s)), 7)
-        for estimate in tracker.feed_samples(walk.t_s[k], walk.accel[k], walk.gyro[k])
-    ]
-    assert digest(estimates) == digest(echostep.replay(file, plan, start=start).estimates)
+    recorded = echostep.replay(file, plan, start=start).estimates
+
+    def tracked(accel: Floats, gyro: Floats) -> list[Estimate]:
+        tracker = echostep.Tracker(echostep.plan.load_plan(plan), start, echostep.Settings.of_imu(rate_of(walk.t_s)))
+        return [
+            estimate
+            for k in np.array_split(np.arange(len(walk.t_s)), 7)
+            for estimate in tracker.feed_samples(walk.t_s[k], accel[k], gyro[k])
+        ]
+
+    rounded = (each.astype(np.float32).astype(np.float64) for each in (walk.accel, walk.gyro))  # as they are recorded
+    assert digest(tracked(*rounded)) == digest(recorded)
+    exact = tracked(walk.accel, walk.gyro)
+    assert [e.t_s for e in exact] == pytest.approx([e.t_s for e in recorded])
+    assert [(e.x_m, e.y_m) for e in exact] == pytest.approx([(e.x_m, e.y_m) for e in recorded], abs=0.05)
+    tracker = echostep.Tracker(echostep.plan.load_plan(plan), start)
     with pytest.raises(EchostepError, match=r"must be \(n,\)"):
         tracker.feed_samples(walk.t_s, walk.accel[:, :2], walk.gyro)
 

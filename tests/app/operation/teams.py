@@ -20,7 +20,7 @@ from echostep_app.printing.lines import moment
 from echostep_app.team.inbox import Inbox, ReceivedMessage
 from echostep_app.team.messages.marks import Mark, MarkKind
 from echostep_app.team.messages.report import Position, Report, ReportedAlarm, encode
-from echostep_studies.simulation.tower import tower
+from echostep_simulation.world.tower import tower
 from team.team_reports import POSITION, report
 
 STOREYS = 3

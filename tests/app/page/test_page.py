@@ -13,7 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.localization import BELIEVED, PROBABLE, Estimate, digest
+from echostep.localization import Estimate, digest
+from echostep.particles.limits import BELIEVED, PROBABLE
 from echostep.plan import Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import PERSON, Call, CheckIn, Undo, parse_person

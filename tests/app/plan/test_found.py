@@ -16,8 +16,7 @@ from ezdxf.xclip import XClip
 
 import command_line
 from echostep.errors import EchostepError
-from echostep.plan import Door, Plan, load_plan
-from echostep.plan.model import parse_plan
+from echostep.plan import Door, Plan, load_plan, parse_plan
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.importers.formats import import_plan

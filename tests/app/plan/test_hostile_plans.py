@@ -16,7 +16,6 @@ import pytest
 
 from echostep.errors import EchostepError
 from echostep.plan import load_plan, parse_plan
-from echostep.plan.plan_file import MOST_CORNERS
 from echostep.recording import open_parts
 from echostep.settings import parse_settings, read_settings
 from echostep_app.offline.foot_files import load_foot
@@ -120,7 +119,7 @@ def test_repeated_corners_are_one(tmp_path: Path) -> None:
 
 
 def test_an_obstacle_of_a_million_corners_is_named(tmp_path: Path) -> None:
-    corners = [[math.cos(k), math.sin(k)] for k in range(MOST_CORNERS + 1)]
+    corners = [[math.cos(k), math.sin(k)] for k in range(10_001)]
     with pytest.raises(EchostepError, match=r"obstacles\[0\]: 10001 corners, expected 10000 at most"):
         load_plan(plan_file(tmp_path / "a.json", corners))
 

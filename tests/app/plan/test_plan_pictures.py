@@ -26,7 +26,7 @@ from echostep_app.plan.pictures import drawing, labels
 from echostep_app.plan.pictures.drawing import draw_plan
 from echostep_app.plan.pictures.overlay import EDGE_M, Overlay, overlays, write_overlays
 from echostep_app.plan.pictures.symbols import HALF_JAMB_M, HALF_WINDOW_M, MOST_TREADS, level_lines, way_names
-from echostep_studies.simulation.tower import tower
+from echostep_simulation.world.tower import tower
 
 WALLS = [[400, 300, 404, 300], [404, 300, 404, 303], [404, 303, 402, 303], [401, 303, 400, 303], [400, 303, 400, 300]]
 

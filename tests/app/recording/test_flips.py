@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from echostep.localization import TRACKING_M, Estimate
+from echostep.localization import Estimate
+from echostep.particles.limits import TRACKING_M
 from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.recording import open_recording

@@ -25,7 +25,7 @@ from echostep_app.scorecard.track_columns import load_path
 from echostep_app.scorecard.truth import card_of, load_truth
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import demo_scenario
-from echostep_studies.simulation.tower import LENGTH_M, LIFT_AT, STOREY_M, tower
+from echostep_simulation.world.tower import LENGTH_M, LIFT_AT, STOREY_M, tower
 from walks import walk_chunks
 
 DEMO = load_plan(ROOT / "host/core/echostep/plans/demo.json")

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.localization import Air, ClimbSettings, Estimate, Start, TrackStatus
+from echostep.height.levels import Air, ClimbSettings
+from echostep.localization import Estimate, Start, TrackStatus
 from echostep.plan import NO_PLAN, Pose
 from echostep.settings import Settings
 from echostep.tracker import Tracker
@@ -24,7 +25,7 @@ from echostep.walk.recorded import recorded_start
 from echostep_app.session.last_place import FILE, KEPT_S, Kept, PlaceKeeper, read_kept, start_last
 from echostep_app.session.metadata import parse_start, run_metadata
 from echostep_app.session.runs.live import _last_start
-from echostep_studies.simulation.tower import tower
+from echostep_simulation.world.tower import tower
 from snapshots import expect, refusal
 
 PLAN = tower(3)

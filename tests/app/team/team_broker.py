@@ -11,14 +11,14 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Self
 
-import pytest
 import trustme
 
 from free_ports import free_port
+from layers import needs
 from waiting import PATIENCE_S, until
 
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin")
-needs_broker = pytest.mark.skipif(MOSQUITTO is None, reason="mosquitto is not installed (apt install mosquitto)")
+needs_broker = needs("process", missing=MOSQUITTO is None, reason="mosquitto is not installed (apt install mosquitto)")
 
 
 class Certificates:

@@ -4,24 +4,18 @@
 from __future__ import annotations
 
 import math
-import socket
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.aiding.beacons.initialisation import locate_beacon
+from echostep.beacons.initialisation import locate_beacon
 from echostep.board.frames import encode
 from echostep.board.gateway import MOST_BEACONS, NEW_CLOCK_MESSAGES, Gateway
 from echostep.board.messages import Beacon, Identity
-from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, GATEWAY, Chunk, portion_of
-from echostep_app.output.terminal import gateway_words
-from echostep_app.ports.serial_ports import SerialPorts
-from echostep_app.ports.udp import UdpPort
 from echostep_simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, heard_at, lay_beacons, message
-from free_ports import free_port
 
 GOOD = message(7, 3.25, 0.5, 10.0)
 
@@ -50,11 +44,10 @@ def test_bearing_may_be_missing() -> None:
         ({"age_ms": 5_000}, "late"),
     ],
 )
-def test_impossible_words_are_counted_and_named(wrong: dict[str, int], count: str) -> None:
+def test_impossible_words_are_counted(wrong: dict[str, int], count: str) -> None:
     gateway = Gateway()
     assert said(gateway, GOOD._replace(**wrong)) == []
     assert getattr(gateway.counts, count) == 1
-    assert count.replace("_", " ") in gateway_words(gateway)
 
 
 def test_words_before_the_tracker_has_a_time_are_not_guessed() -> None:
@@ -63,12 +56,11 @@ def test_words_before_the_tracker_has_a_time_are_not_guessed() -> None:
     assert gateway.counts.early == 1
 
 
-def test_second_unit_under_a_number_is_refused_and_named() -> None:
+def test_second_unit_under_a_number_is_refused() -> None:
     gateway = Gateway()
     assert len(said(gateway, GOOD)) == 1
     assert said(gateway, GOOD._replace(unit=1), now_s=10.2) == []
     assert gateway.duplicates == {7}
-    assert "two beacons have the number 7" in gateway_words(gateway)
 
 
 def test_a_beacon_that_speaks_too_often_is_a_flood_and_others_are_still_heard() -> None:
@@ -145,35 +137,3 @@ def test_portion_is_cut_behind_each_chunk_of_a_port() -> None:
     pieces = [list(p.chunks()) for p in portion_of(chunks).cut_after(GATEWAY)]
     assert pieces == [chunks[:2], chunks[2:3], chunks[3:]]
     assert [c for p in portion_of(chunks[3:]).cut_after(GATEWAY) for c in p.chunks()] == chunks[3:]
-
-
-def test_udp_flood_and_malformed_datagrams_reach_the_reader_and_stop_nothing() -> None:
-    url = f"udp://127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
-    ports = SerialPorts({GATEWAY: url}, {GATEWAY: 115200})
-    gateway, words = Gateway(), 0
-    try:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as plug:
-            address = ("127.0.0.1", int(url.rsplit(":", 1)[1]))
-            for k, chunk in zip(range(100_000), ports.chunks(), strict=False):
-                words += len(gateway.read(chunk.data, 10.0)) if chunk else 0
-                if gateway.counts.flood <= 100 or gateway.counts.broken <= 100:
-                    for n in range(20):
-                        plug.sendto(encode(GOOD, 20 * k + n), address)
-                        plug.sendto(b"\x07garbage" * (n % 9), address)
-                elif words < 2:
-                    plug.sendto(encode(message(9, 1.0, 0.0, 10.0), 0), address)
-                else:
-                    break
-    finally:
-        ports.close()
-    assert words == 2
-    assert gateway.counts.flood > 100
-    assert gateway.counts.broken > 100
-
-
-@pytest.mark.parametrize(
-    "url", ["udp://127.0.0.1", "udp://:9000", "udp://127.0.0.1:99999", "udp://127.0.0.1:0x1", "udp://203.0.113.9:9"]
-)
-def test_udp_addresses_that_cannot_be_are_named(url: str) -> None:
-    with pytest.raises(EchostepError, match="udp://"):
-        UdpPort(url)

@@ -14,8 +14,6 @@ from echostep.board import messages as m
 from echostep.board.calibration import ImuSettings
 from echostep.board.frames import BoardReader, encode
 from echostep.board.tilt_compass import TiltCompass, heading_of
-from echostep_app.commissioning.fitting import bearings
-from echostep_app.commissioning.probe import ProbeResult
 
 NORTH_AND_DOWN = np.array([0.0, 0.2, -0.45])  # gauss: east, north, up
 
@@ -93,14 +91,3 @@ def test_an_offset_of_the_belts_accelerometer_is_taken_out() -> None:
 def test_without_an_accelerometer_the_belt_counts_as_level() -> None:
     sent = encode(m.Magnetic(0, 0, 1_368, -2_736), 0)
     assert TiltCompass().headings(BoardReader().frames(sent))[1] == pytest.approx([0.0])
-
-
-def test_calibrate_takes_the_bearings_of_a_magnetometer() -> None:
-    probed = ProbeResult()
-    for message in BoardReader().feed(frames(2, 1.1)):
-        assert isinstance(message, m.Motion | m.Magnetic)
-        probed.axes.append(message)
-        probed.ticks.setdefault(type(message).__name__, []).append(message.ticks)
-    t_s, found = bearings(probed)
-    assert len(t_s) == len(found) == 50
-    assert np.degrees(np.abs(found[20:] - (0.5 * math.pi - 1.1))).max() < 2.0

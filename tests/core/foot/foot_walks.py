@@ -10,8 +10,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.foot.steps import Stance, Step, Track
-from echostep_studies.simulation.rolling_foot import MANNERS, Course, FootManner, course, felt, pitched, samples
-from foot import foot_walks as fw
+from echostep_simulation.people.rolling_foot import MANNERS, Course, FootManner, course, felt, pitched, samples
 
 __all__ = ["MANNERS", "Course", "FootManner", "any_rotation", "course", "felt", "pitched", "samples"]
 
@@ -35,4 +34,4 @@ def same(a: list[Step | Stance], b: list[Step | Stance]) -> bool:
 
 
 def walking(steps: int = 5, rate_hz: int = 100, seed: int = 1) -> Samples:
-    return fw.samples(fw.course(fw.MANNERS["walking"], steps), rate_hz, rng=np.random.default_rng(seed))
+    return samples(course(MANNERS["walking"], steps), rate_hz, rng=np.random.default_rng(seed))

@@ -8,10 +8,7 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.foot.steps import Foot, walk_track
-from echostep_studies.bench.recordings.feet import SETS
-from echostep_studies.frame.recordings import DATA, read_sets
 from foot import foot_walks as fw
-from needs_data import needs_data
 
 EARTH = np.array([0.2, 0.05, -0.43])  # gauss, walk frame
 IRON = np.array([0.05, -0.08, 0.03])  # of the shoe
@@ -90,28 +87,3 @@ def test_any_portions_give_the_same_bits_and_broken_fields_are_passed_over() -> 
     assert walk_track(t, accel, gyro, mag=mag * np.nan).compass == (0, 0)
     with pytest.raises(ValueError, match="mag as gyro"):
         foot.feed(t, accel, gyro, mag[1:])
-
-
-@pytest.mark.slow
-@needs_data()
-def test_on_the_hallways_headings_are_never_worse_than_without() -> None:
-    """Stride headings against the survey's, with and without."""
-    seen = 0
-    for recording in read_sets(DATA, SETS)[0]:
-        if recording.group != "hallway" or recording.mag is None:
-            continue
-        seen += 1
-        assert recording.truth_m is not None
-        assert recording.truth_t_s is not None
-        plain = walk_track(recording.t_s, recording.accel, recording.gyro)
-        fused = walk_track(recording.t_s, recording.accel, recording.gyro, mag=recording.mag)
-        assert fused.compass[1] > 20
-        true = np.arctan2(*np.diff(recording.truth_m, axis=0).T[::-1])
-        errors = []
-        for track in (plain, fused):
-            at = np.searchsorted(recording.t_s, recording.truth_t_s)
-            strides = np.diff(track.position_m[at, :2], axis=0)
-            off = np.exp(1j * (np.arctan2(strides[:, 1], strides[:, 0]) - true))
-            errors.append(float(np.abs(np.angle(off / off[:5].mean())).mean()))
-        assert errors[1] <= errors[0] + 1e-9
-    assert seen

@@ -11,15 +11,11 @@ import math
 import numpy as np
 import pytest
 
-from echostep.arrays import Floats
 from echostep.foot import ins, stance
 from echostep.foot.steps import FootCounts, Stance, Step, Track, walk_track
 from echostep.offline.imu_csv import describe_track
-from echostep_studies.bench.recordings.feet import SETS
-from echostep_studies.frame.recordings import DATA, recordings_in
 from foot.foot_walks import Samples, moves, walking
 from foot.test_foot import copied, errors_between, some_nav
-from needs_data import needs_data
 
 HEIGHT_M = 0.08
 
@@ -83,33 +79,6 @@ def test_a_run_is_said_to_be_one(stood_s: float, said: str) -> None:
     flags = np.zeros(2, bool)
     track = Track(np.zeros(2), np.zeros((2, 3)), np.zeros(2), flags, events, FootCounts(2, 0, 0, 0, 0, 0))
     assert said in describe_track(track)
-
-
-@pytest.mark.slow
-@needs_data()
-def test_feet_in_a_hurry_are_no_further_off_than_they_say() -> None:
-    """Motion capture: 2D within 0.14 m (0.18 by the shape of plateaus alone), heights within 0.05 m, lengths of strides within their deviation."""
-    recordings = [recording for recording in recordings_in(DATA, SETS) if recording.group == "vicon_more"]
-    assert len(recordings) >= 4
-    for recording in recordings:
-        track = walk_track(recording.t_s, recording.accel, recording.gyro)
-        figures = {figure.metric: figure.value for figure in recording.judge(track)}
-        assert figures["2D RMSE where the truth moves"] < 0.14, recording.name
-        assert figures["height RMSE"] < 0.05, recording.name
-        assert recording.truth_m is not None
-        assert 0.5 < _normalized(track.steps, track.position_m[:, :2], recording.truth_m, recording.t_s) < 1.6
-
-
-def _normalized(steps: list[Step], track_m: Floats, truth_m: Floats, t_s: Floats) -> float:
-    """Root mean square of the error of a stride's length, from lift-off to lift-off, over its standard deviation."""
-    leaves = [*np.searchsorted(t_s, [step.t_start_s for step in steps]).tolist(), len(t_s) - 1]
-    ratios = []
-    for step, a, b in zip(steps, leaves, leaves[1:], strict=False):
-        moved, truly = track_m[b] - track_m[a], truth_m[b] - truth_m[a]
-        along = moved / math.hypot(*moved)
-        sd = math.sqrt(float(along @ step.covariance[:2, :2] @ along))
-        ratios.append((math.hypot(*moved) - math.hypot(*truly)) / sd)
-    return float(np.sqrt(np.mean(np.square(ratios))))
 
 
 RATE_HZ, STEPS = 100, 6

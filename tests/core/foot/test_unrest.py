@@ -7,21 +7,15 @@ import math
 
 import numpy as np
 import pytest
-import scipy.io
 
-from echostep.arrays import Floats
 from echostep.foot.steps import Track, walk_track
 from echostep.foot.trunk_path import KNOWN_SCALE_SD, GaitSettings, TrunkPath
 from echostep.localization.settings import CloudSettings
 from echostep.offline.imu_checks import contradiction, end_sd_m
-from echostep_studies.bench.recordings.feet import SETS
-from echostep_studies.frame.recordings import DATA, recordings_in
-from echostep_studies.simulation.rolling_foot import glide
+from echostep_simulation.people.rolling_foot import glide
 from foot import foot_walks as fw
-from needs_data import needs_data
 
 STEPS, STRIDE_M = 20, 1.4
-LEG_M = 76.0  # way of the legs of `legs_qmt`, by both feet
 
 
 def shank(lever_m: float, manner: fw.FootManner, slowest: float = 0.7) -> fw.Course:
@@ -96,40 +90,3 @@ def test_the_trunks_path_states_the_same_deviation_once() -> None:
         whole = math.sqrt(sum(segment.scale_sd**2 for segment in segments))
         assert math.hypot(whole, KNOWN_SCALE_SD if stated else 0.0) == pytest.approx(stated, abs=0.004)
         assert bool(path.doubts) == (stated > 0.0)
-
-
-@needs_data("legs_qmt")
-@pytest.mark.parametrize("segment", ["lower_leg_left", "lower_leg_right", "upper_leg_left", "upper_leg_right"])
-def test_real_legs_are_told(segment: str) -> None:
-    track = real(segment)
-    length_m = sum(math.hypot(*step.move_m[:2]) for step in track.steps)
-    assert "does not rest while the foot stands" in doubts_of(track)
-    assert LEG_M - length_m < 3.1 * track.steps[-1].scale_sd * length_m
-
-
-@needs_data("legs_qmt")
-def test_the_feet_of_the_same_walk_are_not() -> None:
-    for segment in ("foot_left", "foot_right"):
-        assert "does not rest" not in doubts_of(real(segment))
-
-
-@needs_data("vicon_pyshoe")
-def test_a_refusal_names_an_accelerometer_that_is_wrong() -> None:
-    refused = []
-    for recording in (r for r in recordings_in(DATA, SETS) if r.group == "vicon"):
-        refused.append(contradiction(walk_track(recording.t_s, 0.8 * recording.accel, recording.gyro)))
-    assert any(refused)
-    assert all("the accelerometer shows" in words and "units" not in words for words in refused if words)
-
-
-@needs_data()
-def test_no_public_recording_of_a_foot_is_taken_for_a_leg() -> None:
-    for recording in recordings_in(DATA, SETS):
-        track = walk_track(recording.t_s, recording.accel, recording.gyro)
-        assert max(step.unrest for step in track.steps) < 1.0, recording.name
-
-
-def real(segment: str) -> Track:
-    recorded = scipy.io.loadmat(DATA / "legs_qmt" / "full_body_example_data.mat")
-    samples: tuple[Floats, Floats] = tuple(np.array(recorded[segment][0, 0][name], float) for name in ("acc", "gyr"))  # type: ignore[assignment]
-    return walk_track(np.ravel(recorded["t"]), *samples)

@@ -10,37 +10,12 @@ import pytest
 
 from echostep.angles import wrap
 from echostep.legs.heading import CompassErrors, Heading, HeadingSettings
-from echostep_app.commissioning.fitting import fit_compass_errors
-from echostep_app.offline.leg_track import _adopt_errors
 
 IRON = CompassErrors(math.radians(6), math.radians(-4), math.radians(2), math.radians(1))
 
 
 def _shown(heading: np.ndarray, iron: CompassErrors) -> np.ndarray:
     return np.array([h + iron.error(h) for h in heading.tolist()])
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_iron_is_found_by_a_turn_on_the_spot(sign: float) -> None:
-    rng = np.random.default_rng(2)
-    t = np.arange(0.0, 25.0, 0.01)
-    heading = 1.0 + sign * 0.35 * t
-    rate = np.gradient(heading, t) + math.radians(0.8) + 0.01 * rng.standard_normal(len(t))
-    compass = np.where(np.arange(len(t)) % 10 == 0, _shown(heading, IRON) + 0.01 * rng.standard_normal(len(t)), np.nan)
-    found = fit_compass_errors(t, rate, np.angle(np.exp(1j * compass)))
-    error = [found.error(h) - IRON.error(h) for h in np.linspace(0, 2 * math.pi, 36)]
-    assert np.ptp(error) < math.radians(2.0)
-    assert found.rms_rad < math.radians(1.5)
-
-
-def test_half_a_turn_is_refused_in_words() -> None:
-    t = np.arange(0.0, 10.0, 0.01)
-    with pytest.raises(ValueError, match="once round"):
-        fit_compass_errors(t, np.full_like(t, 0.3), 0.3 * t)
-    with pytest.raises(ValueError, match="does not follow"):
-        fit_compass_errors(t, np.full_like(t, 0.9), np.full_like(t, 1.0))
-    with pytest.raises(ValueError, match="fewer than 20"):
-        fit_compass_errors(t, np.full_like(t, 0.9), np.full_like(t, np.nan))
 
 
 def _lap(seed: int, iron: CompassErrors) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -99,14 +74,3 @@ def test_without_compass_it_counts_from_zero_and_says_how_well() -> None:
     found = Heading(HeadingSettings()).feed(t, np.full_like(t, 0.1), np.full_like(t, np.nan))
     assert found[-1, 0] == pytest.approx(0.1 * 59.99, rel=1e-6)
     assert found[-1, 1] > math.radians(45)
-
-
-def test_a_second_pass_knows_the_bias_from_the_beginning() -> None:
-    rng, t = np.random.default_rng(3), np.arange(0.0, 90.0, 0.02)
-    compass = np.where(np.arange(len(t)) % 5 == 0, math.radians(3.0) * rng.standard_normal(len(t)), np.nan)
-    rate, settings = np.full_like(t, math.radians(0.4)), HeadingSettings(disturbance_rad=math.radians(3.0), same_s=0.1)
-    first, second = (Heading(settings, 0.0, math.radians(1.0)) for _ in range(2))
-    once = first.feed(t, rate, compass)
-    _adopt_errors(second, first)
-    assert second.bias_sd_rad_s == first.bias_sd_rad_s
-    assert np.abs(second.feed(t, rate, compass)[:, 0]).max() < 0.7 * np.abs(once[:, 0]).max()

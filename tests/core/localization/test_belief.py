@@ -34,10 +34,10 @@ from echostep.localization.belief import (
     CrossedWalls,
 )
 from echostep.localization.grid.search import Search
-from echostep.localization.limits import SURE
 from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.localization.particles.start import wide
 from echostep.localization.settings import UNPLANNED_DOOR
+from echostep.particles.limits import SURE
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from echostep.localization.cloud_estimate import weight_about
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Level, Plan, Pose
 from echostep.walls.level_sheet import lay_out_levels
-from echostep_app.plan.places.refusals import refusals
 
 ROOM = np.array([[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0, 8, 0, 0]], float)
 FAR, NEAR = [11.0, 4.0, 0.8], [1.0, 4.0, 0.1]
@@ -81,18 +79,6 @@ def test_a_map_that_may_be_off_makes_small_errors_less_likely() -> None:
     near, about = weight_about(x, zero, zero, weight, (0.0, 0.0, 0.0), (1.0, 5.0), 0.4)
     assert near == pytest.approx(0.5 * (1.0 - math.exp(-0.5 * (1.0 / 0.4) ** 2)))
     assert about == pytest.approx(1.0, abs=1e-6)
-
-
-def test_a_drawn_storey_that_is_not_known_to_a_room_is_refused() -> None:
-    """Its walls are compared with no echo, and a sentence names it; doubtful walls of one that is known are compared."""
-    known, refused = (drawing([2.0, 4.0, sd_m]).levels[0] for sd_m in (0.3, 1.2))
-    partly = replace(known, walls=ROOM[:1], doubtful=ROOM[1:])
-    assert (len(partly.heard), len(partly.solid)) == (4, 1)
-    plan = Plan("by anna", (known, replace(refused, name="1", walls=ROOM[:0], doubtful=ROOM)), None, "")
-    (sentence,) = refusals(plan)
-    assert sentence.startswith("floor 1 of by anna is refused as a plan")
-    assert len(plan.levels[1].heard) == 0
-    assert refusals(drawing()) == []
 
 
 def test_no_place_is_in_the_air_of_a_refused_storey() -> None:

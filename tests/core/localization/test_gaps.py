@@ -6,16 +6,17 @@ Bytes that waited in the ports of a stopped program come after a dropout.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from board_runs import ROOT
-from echostep.localization import TrackStatus
+from echostep.localization import Estimate, TrackStatus
 from echostep.localization.motion import LONG_S, MUTE_S, PAUSE_S, Gap, Gaps
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 from echostep.plan import load_plan
 from echostep.tracker import Tracker
-from page.frames import told
 
 
 def segment(t0_s: float, t1_s: float, length_m: float = 0.7, sd_m: float = 0.02, pings: int = 5) -> MeasuredSegment:
@@ -69,8 +70,9 @@ def test_standing_without_a_ping_is_told_once_until_the_next_ping() -> None:
 )
 def test_an_estimate_that_a_dropout_has_overtaken_claims_nothing(t_s: float, status: TrackStatus) -> None:
     tracker = Tracker(load_plan(ROOT / "host/core/echostep/plans/demo.json"))
-    tracker._publish(None, told(t_s=33.4, status=TrackStatus.LOST))
-    late = tracker._publish(None, told(x_m=12.0, t_s=t_s))
+    tracking = Estimate(t_s, 12.0, 7.5, 0.01, 0.0, 0.01, 0.0, 0.02, 1, TrackStatus.TRACKING)
+    tracker._publish(None, replace(tracking, x_m=2.0, t_s=33.4, status=TrackStatus.LOST))
+    late = tracker._publish(None, tracking)
     assert late.status is status
     assert late.t_s == max(t_s, 33.4)
     assert late.x_m == 12.0

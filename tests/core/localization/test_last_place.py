@@ -8,14 +8,14 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization import STATED, Air, Building, ClimbSettings, FilterSettings, MapFilter, Start
+from echostep.height.levels import Air, ClimbSettings
+from echostep.localization import STATED, Building, FilterSettings, MapFilter, Start
 from echostep.localization.belief import PLAN_FITS
 from echostep.localization.map_filter import UNOBSERVED_DOUBT
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.tracker.last_place import LastPlace
+from echostep.plan import Pose
 from echostep.walls.level_sheet import lay_out_levels
-from echostep_app.session.last_place import MOVED_M, start_after
-from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tower
+from echostep_simulation.world.tower import LIFT_AT, STOREY_M, tower
 
 ZERO_M = 100.0  # height by pressure on the lowest floor
 AWAY_S = 60.0
@@ -32,23 +32,6 @@ def standing(k: int, height_m: float) -> MeasuredSegment:
     """Half a second of standing, number k, with five heights by pressure."""
     path = PathSegment(0.5 * k, 0.5 * k + 0.5, 0.0, 0.0, 0.0, 0.0, 0.001, 0.0, 0)
     return MeasuredSegment(path, np.zeros(0), np.zeros(0, np.int64), np.zeros(0), np.full(5, height_m))
-
-
-def test_the_start_is_wider_than_the_place_and_has_any_heading() -> None:
-    start = start_after(LastPlace(3.0, 4.0, 0.2, 1, Air(ZERO_M, 0.1)), AWAY_S, CLIMBING)
-    assert start.pose is not None
-    assert (start.pose.x_m, start.pose.y_m, start.pose.level) == (3.0, 4.0, 1)
-    assert (start.sd_m, start.heading_sd_rad) == (math.hypot(0.2, MOVED_M), math.pi)
-    assert start.after_pause
-    assert start.air is not None
-    assert start.air.zero_m == ZERO_M
-    assert 0.15 < start.air.sd_m < 0.25
-
-
-def test_hours_make_the_pressure_worthless() -> None:
-    start = start_after(LastPlace(3.0, 4.0, 0.2, 1, Air(ZERO_M, 0.1)), 3600.0, CLIMBING)
-    assert start.air is not None
-    assert start.air.sd_m > STOREY_M
 
 
 @pytest.mark.parametrize("storey", [0, 1, 2])
@@ -70,7 +53,8 @@ def test_without_it_all_storeys_stay() -> None:
 @pytest.mark.parametrize("storey", [0, 1, 2])
 def test_after_a_change_of_the_storey_meanwhile_the_last_one_is_not_claimed(storey: int) -> None:
     """The search beside the last place is on the storey of the pressure; the last place is believed only there."""
-    resumed = filter_of(start_after(LastPlace(LIFT_AT[0] + 4.0, LIFT_AT[1], 0.1, 0, Air(ZERO_M, 0.1)), 20.0, CLIMBING))
+    there = Pose(LIFT_AT[0] + 4.0, LIFT_AT[1], 0.0, 0)
+    resumed = filter_of(Start(there, 1.0, math.pi, air=Air(ZERO_M, 0.15), after_pause=True))
     for k in range(6):
         estimate = resumed.update(standing(k, ZERO_M + storey * STOREY_M))
     search = next(each.cloud for each in resumed.belief.clouds if each.cloud.is_searching)

@@ -12,7 +12,7 @@ from echostep.localization import Building, FilterSettings, MapFilter, Start
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose
 from echostep.walls.level_sheet import lay_out_levels
-from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tower
+from echostep_simulation.world.tower import LIFT_AT, STOREY_M, tower
 
 PAUSE_S = 20.0  # a ride over two storeys
 FIRST_M = 100.0  # height by pressure on the lowest floor

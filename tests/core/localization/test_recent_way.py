@@ -5,33 +5,30 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from echostep.localization import (
-    BELIEVED,
-    Air,
-    Building,
-    CloudSettings,
-    EchoSettings,
-    Estimate,
-    MapFilter,
-    Start,
-    TrackStatus,
-    echo_model,
-)
-from echostep.localization.echoes.unplanned import UsablePings
+from echostep.arrays import Floats
+from echostep.echoes.likelihood import EchoSettings, echo_model
+from echostep.echoes.unplanned import UsablePings
+from echostep.height.levels import Air
+from echostep.localization import Building, CloudSettings, Estimate, MapFilter, Start, TrackStatus
 from echostep.localization.motion import height_change, move_of
-from echostep.localization.particle_arrays import Move
 from echostep.localization.particles.cloud import PASSING, cloud_about
 from echostep.localization.window import MOST_PIECES, PAST_M, RecentWay
+from echostep.particles.arrays import Move
+from echostep.particles.limits import BELIEVED
 from echostep.path import MeasuredSegment
 from echostep.plan import Plan, Pose
+from echostep.ports.chunks import portion_of
+from echostep.tracker import Tracker
 from echostep.walls.level_sheet import lay_out_levels
-from echostep_studies.bench import sites
-from echostep_studies.bench.walks import SimulatedWalk, simulate
-from echostep_studies.simulation.tower import STOREY_M, tower
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.people.walker import Person
+from echostep_simulation.scenario import Scenario
+from echostep_simulation.world.tower import STOREY_M, tower
 
 pytestmark = pytest.mark.slow
 
@@ -41,17 +38,34 @@ WALKED_M = 30.0
 ECHO, SETTINGS = EchoSettings(), CloudSettings()
 MODEL = echo_model(ECHO)
 ANYWHERE = Start()
+TOUR = (
+    (1.49, 4.07), (3.17, 3.42), (3.63, 2.67), (25.2, 1.31), (3.47, 2.67), (3.37, 5.87), (3.47, 2.67), (24.47, 0.27),
+    (24.33, -1.23), (23.34, -2.34), (24.47, -0.33), (24.47, 0.27), (20.72, 2.0), (5.19, 0.89),
+)  # fmt: skip
+
+
+class Walk(NamedTuple):
+    """`segments` as the filter gets them; `truth` (n, 5): t_s, x, y, heading, height of the floor."""
+
+    segments: list[MeasuredSegment]
+    truth: Floats
 
 
 @cache
-def walk() -> SimulatedWalk:
-    """On level TRUE of the tower."""
-    return simulate(sites.one_floor(SEED, TRUE), SEED)
+def walk() -> Walk:
+    """On level TRUE of the tower, which is all there is of it."""
+    level = replace(tower(STOREYS).levels[TRUE], height_m=0.0)
+    plan = replace(tower(STOREYS), levels=(level,), connectors=(), start=None)
+    scenario = Scenario(plan, TOUR, SEED, PythonBoard(SEED), Person(corner_m=0.3))
+    pieces = Tracker(plan, waits=True).front_end.process(portion_of(list(scenario.chunks())))
+    return Walk([piece for piece in pieces if isinstance(piece, MeasuredSegment)], scenario.truth)
 
 
 def segments(walked_m: float) -> list[MeasuredSegment]:
     """Those of the first metres of the way."""
-    return [m for m in walk().segments if walk().walked_m(np.array([m.segment.t1_s]))[0] < walked_m]
+    t_s, x, y, _, _ = walk().truth.T
+    way_m = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
+    return [m for m in walk().segments if np.interp(m.segment.t1_s, t_s, way_m) < walked_m]
 
 
 def building(plan: Plan) -> Building:
@@ -83,7 +97,9 @@ def way_in(where: Building, walked_m: float = WALKED_M) -> RecentWay:
 def true_end(level: int) -> tuple[Pose, float]:
     """True pose at the end of the way, on this level, and the trunk's heading in the walk frame."""
     last = segments(WALKED_M)[-1].segment
-    return replace(walk().pose_at(last.t1_s), level=level), last.heading1_rad
+    t_s, x, y, heading, _ = walk().truth.T
+    x_m, y_m, heading_rad = (float(np.interp(last.t1_s, t_s, values)) for values in (x, y, np.unwrap(heading)))
+    return Pose(x_m, y_m, heading_rad, level), last.heading1_rad
 
 
 def level_shares(where: Building, start: Start = ANYWHERE) -> list[float]:

@@ -8,12 +8,12 @@ import math
 import numpy as np
 import pytest
 
+from echostep.echoes.range_table import AFTER_ECHO, AFTER_SILENCE, INDEPENDENT_M, USED_M, TablePings
 from echostep.localization import Building, CloudSettings, MapFilter, Start
-from echostep.localization.echoes.range_table import AFTER_ECHO, AFTER_SILENCE, INDEPENDENT_M, USED_M, TablePings
 from echostep.localization.grid.search import FOUND_REST, Search
 from echostep.localization.grid.search_grid import SearchGrid
-from echostep.localization.particle_arrays import PingBatch
 from echostep.localization.particles.cloud import cloud_about
+from echostep.particles.arrays import PingBatch
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 from echostep.walls.echo_sources import Walls
 

@@ -12,21 +12,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from echostep.localization import (
-    ANY_LEVEL,
-    RISK,
-    CloudSettings,
-    Estimate,
-    Right,
-    Start,
-    TrackStatus,
-    claims_place,
-    estimate_of,
-)
+from echostep.localization import CloudSettings, Estimate, Right, Start, TrackStatus, estimate_of
 from echostep.localization.particles.cloud import cloud_about
-from echostep.plan import Pose
+from echostep.particles.limits import RISK
+from echostep.plan import ANY_LEVEL, Pose
 from echostep.walls.level_sheet import lay_out_levels
-from echostep_studies.simulation.tower import tower
+from echostep_simulation.world.tower import tower
 
 APART_M = 30.0
 
@@ -79,14 +70,14 @@ def test_the_mean_of_two_places_is_claimed_where_it_lies_in_one(apart_m: float, 
     cloud.x_m = cloud.x_m + apart_m * (np.arange(len(cloud.x_m)) % 2)
     found = replace(estimate_of(cloud, 0.0, 0.0, 0), status=TrackStatus.UNCERTAIN)
     assert found.x_m == pytest.approx(0.5 * apart_m, abs=0.1)
-    assert claims_place(found) == claimed
-    assert not claims_place(replace(found, status=TrackStatus.LOST))
+    assert found.claims_place == claimed
+    assert not replace(found, status=TrackStatus.LOST).claims_place
 
 
 def test_the_likelier_place_is_claimed_beside_others() -> None:
-    assert claims_place(_in_two_places(0.2))
+    assert _in_two_places(0.2).claims_place
     other_level = tuple(replace(place, level=1) for place in _in_two_places(0.2).hypotheses)
-    assert not claims_place(replace(_in_two_places(0.2), hypotheses=other_level))
+    assert not replace(_in_two_places(0.2), hypotheses=other_level).claims_place
 
 
 SHEET = lay_out_levels(tower(2)).sheet

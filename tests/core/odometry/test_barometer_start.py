@@ -8,9 +8,9 @@ import pytest
 
 from board_runs import quiet_rows
 from echostep.board.calibration import PRESSURE_PA
+from echostep.height.height_filter import RelativeHeight
+from echostep.height.levels import HeightChange
 from echostep.localization import Building, FilterSettings, MapFilter, Start
-from echostep.localization.height.height_filter import RelativeHeight
-from echostep.localization.height.levels import HeightChange
 from echostep.odometry.barometer_start import BarometerStart
 from echostep.odometry.synchronizer import BAROMETER, MEASUREMENT, _measured
 from echostep.path import MeasuredSegment, PathSegment
@@ -19,7 +19,7 @@ from echostep.ports.chunks import BOARD, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import lay_out_levels
 from echostep_simulation.devices.board import PythonBoard
-from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tower
+from echostep_simulation.world.tower import LIFT_AT, STOREY_M, tower
 from walks import DEMO
 
 RESET_M = 3_150.0  # the height of 68500 Pa

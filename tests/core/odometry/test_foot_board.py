@@ -4,61 +4,24 @@
 from __future__ import annotations
 
 import math
-from functools import cache
-from itertools import takewhile
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from board_runs import ELF, ROOT, TWIN, needs_twin
-from echostep.board.frames import encode
-from echostep.board.subscription import SUBSCRIBE
+from board_runs import needs_twin
 from echostep.localization import Estimate
 from echostep.odometry import FrontEnd
-from echostep.plan import load_plan
 from echostep.ports.chunks import FOOT, Chunk, portion_of
 from echostep.settings import Settings
 from echostep.tracker import Tracker
-from echostep_app.board.faults.health import all_findings
-from echostep_app.wearer.alarm import watch_of
-from echostep_simulation.devices.board import BoardProcess
-from echostep_simulation.devices.foot_board import HEAD_START_MS
-from echostep_simulation.kits import Kit
-from echostep_simulation.scenario import DEMO_WAYPOINTS, START_NS, Scenario
+from odometry.foot_board_walk import PLAN, SECONDS, walk
 
 pytestmark = needs_twin
 
-SECONDS = 24.0
 CLOCK_BEGINS_S = 1.163e-3  # of the belt board's ticks, after its power-up
 TIME_ERROR_S = 1.0e-3  # limit: a millisecond of USB
-PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
-
-
-class Walk(NamedTuple):
-    """A walk's chunks, its truth (n, 5), and the true times of the foot's samples (s of the walk)."""
-
-    chunks: list[Chunk]
-    truth: np.ndarray[tuple[int, int], np.dtype[np.float64]]
-    sampled_s: np.ndarray[tuple[int], np.dtype[np.float64]]
-
-
-@cache
-def walk(faults: tuple[tuple[float, str], ...] = ()) -> Walk:
-    """The demo's first seconds; `faults` of the foot board at times of the walk (s). A host asks it again after each."""
-    belt, foot = (BoardProcess([str(TWIN), "--elf", str(ELF), "--seed", str(seed)]) for seed in (1, 2))
-    scenario = Scenario(PLAN, DEMO_WAYPOINTS, 1, belt, kit=Kit.OF_2026, foot_board=foot)
-    due, found = list(faults), []
-    for chunk in takewhile(lambda c: c.t_arrival_ns < START_NS + SECONDS * 1e9, scenario.chunks()):
-        while due and chunk.t_arrival_ns >= START_NS + due[0][0] * 1e9:
-            text = due.pop(0)[1]
-            foot.send(encode(SUBSCRIBE, 0)) if text == "ask" else foot.fault(text)
-        found.append(chunk)
-    scenario.close()
-    sampled_s = np.array([t_ns * 1e-9 - 1e-3 * HEAD_START_MS for t_ns, text in foot.trace if text == "foot"])
-    return Walk(found, scenario.truth, sampled_s)
 
 
 def front_end() -> FrontEnd:
@@ -135,17 +98,3 @@ def test_the_first_device_on_the_foot_is_used_and_named() -> None:
         tracker.feed(chunk)
     assert tracker.streams.foot_name == "foot board"
     assert tracker.streams.mtx.good > 100
-    assert all_findings(tracker.streams.reports, tracker.streams.foot_reports) == []
-
-
-def test_the_belt_of_the_real_firmware_tells_an_upright_trunk_and_no_fall() -> None:
-    tracker, tilts_deg = Tracker(PLAN, seed=1), []
-    watch = watch_of(tracker)
-    chunks = walk().chunks
-    for k in range(0, len(chunks), 500):
-        tracker.take(portion_of(chunks[k : k + 500]))
-        tilts_deg.append(math.degrees(watch.trunk_tilt_rad(tracker.front_end.newest_s)))
-    known = [tilt for tilt in tilts_deg if not math.isnan(tilt)]
-    assert len(known) > 0.5 * len(tilts_deg)
-    assert max(known) < 20.0
-    assert not watch.wearer_alarm.changes

@@ -6,7 +6,8 @@ from __future__ import annotations
 import heapq
 import math
 import random
-from collections.abc import Iterable
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -16,19 +17,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from board_runs import ROOT
-from echostep.arrays import Floats
+from echostep.arrays import Floats, Ints
 from echostep.board.calibration import GyroSettings, RangerSettings, ranges
 from echostep.board.frames import encode
 from echostep.board.messages import ROWS, Outcome, Ping
 from echostep.foot.steps import FootSettings
 from echostep.foot.trunk_path import GaitSettings
-from echostep.odometry import FrontEnd
+from echostep.legs.trunk_path import GyroBlock
+from echostep.odometry import FrontEnd, WearerWatch
 from echostep.odometry.synchronizer import BLIND_S, MAX_WAITING, MEASUREMENT, PING_AGE_S, SILENCE_S, Synchronizer
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.timing.timeline import MtxTiming
-from echostep_app.wearer.alarm import AlarmWatch
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.devices.mtx import MtxModel
 from echostep_simulation.scenario import DEMO_WAYPOINTS, Scenario
@@ -72,9 +73,27 @@ def told(pieces: list[MeasuredSegment | Dropout]) -> Told:
     return found
 
 
+class Heard(WearerWatch):
+    """All that a watch over the wearer is told, as bytes."""
+
+    def __init__(self) -> None:
+        self.told: dict[str, list[bytes]] = defaultdict(list)
+
+    def add_foot(self, t_s: Floats, gyro: Floats, accel: Floats, _message_index: Ints) -> None:
+        for name, values in (("t_s", t_s), ("gyro", gyro), ("accel", accel)):
+            self.told[f"foot {name}"].append(values.tobytes())
+
+    def add_legs(self, _message_index: int, block: GyroBlock) -> None:
+        for name, values in zip(block._fields, block, strict=True):
+            self.told[f"legs {name}"].append(np.asarray(values).tobytes())
+
+    def add_segments(self, _message_index: int, segments: Sequence[PathSegment]) -> None:
+        self.told["segments"] += [repr(segment).encode() for segment in segments]
+
+
 def taken(chunks: list[Chunk], cuts: list[int]) -> tuple[Told, tuple[object, ...]]:
     """What a front end tells of the chunks, in portions cut there, and what it counted."""
-    ours, watch, found = front_end(), AlarmWatch(), []
+    ours, watch, found = front_end(), Heard(), []
     ours.watch = watch
     edges = sorted({0, len(chunks), *(c % (len(chunks) + 1) for c in cuts)})
     for a, b in zip(edges, edges[1:], strict=False):
@@ -86,7 +105,7 @@ def taken(chunks: list[Chunk], cuts: list[int]) -> tuple[Told, tuple[object, ...
         ours.status,
         ours.identity,
         ours.timeline.synchronised,
-        watch.pop(),
+        {name: b"".join(parts) for name, parts in watch.told.items()},
     )
 
 

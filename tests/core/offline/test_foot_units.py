@@ -14,7 +14,7 @@ import pytest
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.offline.imu_csv import load_imu
-from echostep_studies.simulation.rolling_foot import MANNERS, course, samples
+from echostep_simulation.people.rolling_foot import MANNERS, course, samples
 
 WALK = course(MANNERS["walking"], 20, np.random.default_rng(7))
 T_S, ACCEL, GYRO = samples(WALK, 100, rng=np.random.default_rng(3))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`echostep decode` of an MT's bytes: every valid frame comes out, and what was found is said.
+"""Bytes of an MT, decoded: every valid frame comes out, and nothing of it is dropped.
 
-Captured logs: the twin's own captures decode to their golden text, from Python and from the command line.
+Captured logs: the twin's own captures decode to their golden text.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import command_line
 import echostep
 from board_runs import ROOT
 from echostep.errors import EchostepError
@@ -26,13 +25,9 @@ from echostep.recording import Decoder, as_json, port_of_bytes, read_capture
 from echostep.xsens import MTDATA, MTDATA2, MtMessage, MtSample, OutputFormat, encode_frame
 from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import BY_LENGTH, CONFIGURED, GIVEN, OutputFormats
-from echostep_app.recording.capture_summary import summary
-from echostep_studies.frame.recordings import DATA
-from echostep_studies.simulation.devices.mtx_setup import pack
+from echostep_simulation.devices.mtx_formats import pack
 from naive.frames import valid_frames
-from needs_data import needs_data
 
-REAL = sorted(p for end in ("bin", "mtb", "xbus") for p in (DATA / "mtb").glob(f"**/*.{end}"))
 HALF = math.sqrt(0.5)
 
 
@@ -85,12 +80,6 @@ def test_every_valid_frame_of_any_stream_comes_out(
         stream[at % len(stream)] ^= flip
     path = tmp_path_factory.mktemp("captures") / "capture.bin"
     path.write_bytes(bytes(stream[: max(len(stream) - missing, 1)]))
-    expect_every_frame(path)
-
-
-@needs_data("mtb")
-@pytest.mark.parametrize("path", REAL, ids=lambda path: "-".join(path.parts[-2:]))
-def test_every_valid_frame_of_a_real_capture_comes_out(path: Path) -> None:
     expect_every_frame(path)
 
 
@@ -149,7 +138,6 @@ def test_devices_behind_a_master_are_told_apart(tmp_path: Path) -> None:
     assert [(message.bus, message.counter) for message in found] == [(bus, n) for n in range(3) for bus in (1, 2, 3, 4)]
     assert as_json(found[1])["bus"] == 2
     assert all(gaps.lost == gaps.jumps == 0 for gaps in decoder.mt.gaps.values())
-    assert "from bus 1, 2, 3 and 4" in "\n".join(summary(decoder))
 
 
 def test_nothing_of_a_message_is_dropped(tmp_path: Path) -> None:
@@ -251,7 +239,6 @@ def test_legacy_data_of_no_format_come_out_as_hex(tmp_path: Path) -> None:
     decoder = Decoder()
     (message,) = decoded(encode_frame(MTDATA, b"\x7f\xff" * 20), tmp_path, decoder)
     assert as_json(message) == {"message": "MTData", "hex": "7fff" * 20}
-    assert "MTData of 40 bytes: no output mode fits" in "\n".join(summary(decoder))
 
 
 def test_the_rest_of_legacy_data_comes_out() -> None:
@@ -267,31 +254,6 @@ def test_the_rest_of_legacy_data_comes_out() -> None:
         "counter": 513,
         "packets": [{"name": "raw", "value": list(range(10))}],
     }
-
-
-def test_the_command_tells_in_sentences_what_it_found(tmp_path: Path) -> None:
-    path = tmp_path / "legacy.bin"
-    path.write_bytes(b"".join(legacy(n, 2, 0) for n in range(30)) + b"\xfa\xff\x00")
-    done = command_line.echostep("decode", path)
-    assert len(done.stdout.splitlines()) == 30
-    assert json.loads(done.stdout.splitlines()[0])["mag"] == list(sample(0).mag)
-    assert done.stderr.splitlines() == [
-        "MT: 30 valid frames: 30 MtSample; 3 bytes outside of frames, no wrong checksums.",
-        "MT: MTData of 36 bytes: output mode 0x0002, output settings 0x00000000, by the length and the values.",
-        "The tracker would use no samples and refuse 30 of another length.",
-    ]
-
-
-def test_the_options_are_read_or_named(tmp_path: Path) -> None:
-    path = tmp_path / "legacy.bin"
-    path.write_bytes(legacy(0, 2, 0x20))
-    done = command_line.echostep("decode", path, "--output-mode", "2", "--output-settings", "0x20")
-    assert "mag" in json.loads(done.stdout)
-    assert "0x00000020, given." in done.stderr
-    assert (
-        "--output-mode 99999: a number up to 0xFFFF"
-        in command_line.echostep("decode", path, "--output-mode", "99999").stderr
-    )
 
 
 @pytest.mark.parametrize("counter", [0, 1])
@@ -328,12 +290,6 @@ def test_a_capture_decodes_to_its_golden_text(name: str) -> None:
     found = [json.loads(json.dumps(as_json(message))) for message in echostep.read_capture(CAPTURES / name)]
     assert found == golden
     assert len(found) > 300
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_the_command_prints_the_same(name: str) -> None:
-    done = command_line.echostep("decode", CAPTURES / name)
-    assert done.stdout == (CAPTURES / name).with_suffix(".jsonl").read_text()
 
 
 def test_the_missing_bytes_are_counted() -> None:

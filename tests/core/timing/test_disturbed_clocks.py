@@ -17,7 +17,6 @@ from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, MtxTiming, Timeline
 from echostep.tracker import Tracker
-from echostep_app.ports.arrival_clock import SleepWatch, now_ns
 from timing.messages import MS, Message, times_of
 from walks import DEMO, walk_chunks
 
@@ -163,15 +162,6 @@ def test_a_computer_that_slept_in_mid_walk_claims_no_position(counted: bool) -> 
         if e.status is TrackStatus.TRACKING and (true := ends.get(round(e.t_s, 1))):
             assert math.hypot(e.x_m - true.x_m, e.y_m - true.y_m) < 1.0
     assert any(e.status is not TrackStatus.TRACKING for e in estimates if e.t_s > times[0] + 5.0)
-
-
-def test_sleep_is_noticed() -> None:
-    arrival, awake = iter([100, 100, 60 * SECOND, 60 * SECOND, 60 * SECOND]), iter([50, 50, 50, 50, 50])
-    watch = SleepWatch(lambda: next(arrival), lambda: next(awake))
-    assert watch.slept_s() == 0.0
-    assert watch.slept_s() == pytest.approx(60.0, abs=0.1)
-    assert watch.slept_s() == 0.0
-    assert now_ns() <= now_ns()
 
 
 @pytest.mark.parametrize("wrapped", [False, True])

@@ -16,21 +16,21 @@ from echostep.plan import Plan, Pose, load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.xsens import FrameReader, encode_frame
-from echostep_app.scorecard.track_columns import ScoredPath
 from echostep_simulation.devices.board import BoardProcess, PythonBoard
 from echostep_simulation.scenario import Scenario, demo_scenario
-from walks import card_of, truth_of
+from walks import errors_of
 
 PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 WAYPOINTS = ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 7.5), (18.0, 7.5))
 
 
-def walk(plan: Plan = PLAN, seed: int = 5) -> tuple[list[Chunk], ScoredPath, Scenario]:
+def walk(plan: Plan = PLAN, seed: int = 5) -> tuple[list[Chunk], Scenario]:
     scenario = Scenario(plan, WAYPOINTS, seed, PythonBoard(seed))
-    return list(scenario.chunks()), truth_of(scenario), scenario
+    return list(scenario.chunks()), scenario
 
 
-CHUNKS, TRUTH, SCENARIO = walk()
+CHUNKS, SCENARIO = walk()
+END_S = SCENARIO.walk.t_s[-1]
 
 
 def track(chunks: list[Chunk], seed: int = 0) -> tuple[Tracker, list[Estimate]]:
@@ -40,10 +40,10 @@ def track(chunks: list[Chunk], seed: int = 0) -> tuple[Tracker, list[Estimate]]:
 
 def test_the_walk_is_tracked() -> None:
     tracker, found = track(CHUNKS)
-    off = card_of(found, TRUTH)
-    assert off.horizontal.mean_m < 0.2
-    assert off.horizontal.max_m < 0.6
-    assert (off.ellipse95_holds or 0.0) > 0.8
+    off = errors_of(found, SCENARIO)
+    assert off.horizontal_m.mean() < 0.2
+    assert off.horizontal_m.max() < 0.6
+    assert off.in_ellipse95 > 0.8
     assert tracker.front_end.timeline.synchronised
     assert tracker.front_end.counts.late_pings == tracker.front_end.counts.bad_times == 0
     assert {e.status for e in found} == {TrackStatus.TRACKING}
@@ -74,14 +74,13 @@ def test_chunks_may_be_cut_anywhere() -> None:
 
 
 def test_without_the_board_the_foot_goes_on_and_grows_less_sure() -> None:
-    half = TRUTH.t_s[-1] / 2
+    half = END_S / 2
     silent = [c for c in CHUNKS if c.port == MTX or c.t_arrival_ns < (1.0 + half) * 1e9]
     _, found = track(silent)
     _, whole = track(CHUNKS)
     assert found[-1].t_s == pytest.approx(whole[-1].t_s, abs=1.5)
     assert found[-1].ellipse95.major_m > whole[-1].ellipse95.major_m
-    off = card_of(found, TRUTH)
-    assert off.horizontal.max_m < 1.5
+    assert errors_of(found, SCENARIO).horizontal_m.max() < 1.5
 
 
 def test_without_a_board_at_all_the_plan_and_the_foot_remain() -> None:
@@ -91,49 +90,50 @@ def test_without_a_board_at_all_the_plan_and_the_foot_remain() -> None:
 
 
 def test_a_foot_that_falls_silent_is_never_shown_as_sure() -> None:
-    half_ns = int((1.0 + TRUTH.t_s[-1] / 2) * 1e9)
+    half_ns = int((1.0 + END_S / 2) * 1e9)
     tracker, found = track([c for c in CHUNKS if c.port == BOARD or c.t_arrival_ns < half_ns])
-    assert not sure_but_wrong(found, TRUTH)
-    assert found[-1].t_s > TRUTH.t_s[-1] - 3.0
+    assert not sure_but_wrong(found, SCENARIO)
+    assert found[-1].t_s > END_S - 3.0
     assert tracker.front_end.status is not None
 
 
-def sure_but_wrong(found: list[Estimate], truth: ScoredPath) -> list[Estimate]:
+def sure_but_wrong(found: list[Estimate], scenario: Scenario) -> list[Estimate]:
+    truth = scenario.walk
     off = np.array([(e.x_m, e.y_m) for e in found]) - np.column_stack(
-        [np.interp([e.t_s for e in found], truth.t_s, column) for column in truth.xy_m.T]
+        [np.interp([e.t_s for e in found], truth.t_s, column) for column in truth.trunk_m.T]
     )
     return [e for e, d in zip(found, np.hypot(*off.T), strict=True) if e.status == TrackStatus.TRACKING and d > 1.0]
 
 
 @pytest.fixture(scope="module")
-def long_walk() -> tuple[list[Chunk], ScoredPath, Scenario]:
+def long_walk() -> tuple[list[Chunk], Scenario]:
     scenario = demo_scenario(PLAN, 7, PythonBoard(7))
-    return list(scenario.chunks()), truth_of(scenario), scenario
+    return list(scenario.chunks()), scenario
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("start_s", "gap_s"), [(12, 1.5), (12, 4), (20, 6), (30, 4), (30, 8)])
 def test_after_a_silent_foot_no_wrong_place_is_shown_as_sure(
-    long_walk: tuple[list[Chunk], ScoredPath, Scenario], start_s: float, gap_s: float
+    long_walk: tuple[list[Chunk], Scenario], start_s: float, gap_s: float
 ) -> None:
-    chunks, truth, scenario = long_walk
+    chunks, scenario = long_walk
     tracker = Tracker(PLAN, scenario.start, seed=1)
     silent = range(int((1 + start_s) * 1e9), int((1 + start_s + gap_s) * 1e9))
     found = tracker.take(portion_of([c for c in chunks if c.port == BOARD or c.t_arrival_ns not in silent]))
-    assert not sure_but_wrong(found, truth)
+    assert not sure_but_wrong(found, scenario)
     assert found[-1].t_s > 55.0
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("dx", "dy", "degrees"), [(0.0, 3.5, 0.0), (6.0, -4.0, 90.0), (0.0, 0.0, 180.0)])
 def test_a_wrong_start_is_noticed(
-    long_walk: tuple[list[Chunk], ScoredPath, Scenario], dx: float, dy: float, degrees: float
+    long_walk: tuple[list[Chunk], Scenario], dx: float, dy: float, degrees: float
 ) -> None:
-    chunks, truth, scenario = long_walk
+    chunks, scenario = long_walk
     there = scenario.start
     tracker = Tracker(PLAN, Pose(there.x_m + dx, there.y_m + dy, there.heading_rad + math.radians(degrees)), seed=1)
     found = tracker.take(portion_of(chunks))
-    sure = sure_but_wrong(found, truth)
+    sure = sure_but_wrong(found, scenario)
     assert not [e for e in sure if e.t_s > 15.0]
 
 
@@ -151,8 +151,7 @@ def by_frame(chunks: list[Chunk]) -> list[Chunk]:
 def test_a_fifth_of_the_samples_may_be_missing() -> None:
     rng = random.Random(2)
     _, found = track([c for c in by_frame(CHUNKS) if c.port == BOARD or rng.random() > 0.2])
-    off = card_of(found, TRUTH)
-    assert off.horizontal.max_m < 1.5
+    assert errors_of(found, SCENARIO).horizontal_m.max() < 1.5
 
 
 def test_noise_on_both_ports_is_survived() -> None:
@@ -164,8 +163,7 @@ def test_noise_on_both_ports_is_survived() -> None:
             body[rng.randrange(len(body))] ^= 1 << rng.randrange(8)
         noisy.append(replace(chunk, data=bytes(body)))
     tracker, found = track(noisy)
-    off = card_of(found, TRUTH)
-    assert off.horizontal.max_m < 1.5
+    assert errors_of(found, SCENARIO).horizontal_m.max() < 1.5
     assert tracker.front_end.board.counts.rejected > 50
     assert tracker.front_end.foot_source.counts.bad_checksum > 10
 
@@ -194,9 +192,8 @@ def test_faults_of_the_real_board_in_mid_walk(fault: str) -> None:
     scenario.close()
     tracker = Tracker(PLAN, scenario.start)
     found = tracker.take(portion_of(chunks))
-    off = card_of(found, TRUTH)
-    assert off.horizontal.max_m < 0.8
-    assert found[-1].t_s > TRUTH.t_s[-1] - 3.0
+    assert errors_of(found, SCENARIO).horizontal_m.max() < 0.8
+    assert found[-1].t_s > END_S - 3.0
     assert tracker.front_end.timeline.board_restarts == (1 if fault == "reset=watchdog" else 0)
 
 
@@ -207,5 +204,4 @@ def test_the_demo_runs_through_the_real_firmware() -> None:
     tracker = Tracker(PLAN, scenario.start, seed=1)
     found = tracker.take(portion_of(list(scenario.chunks())))
     scenario.close()
-    off = card_of(found, truth_of(scenario))
-    assert off.horizontal.mean_m < 0.2
+    assert errors_of(found, scenario).horizontal_m.mean() < 0.2

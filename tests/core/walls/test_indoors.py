@@ -9,17 +9,20 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.localization import PROBABLE, Building, MapFilter, Start
+from echostep.localization import Building, MapFilter, Start
+from echostep.particles.limits import PROBABLE
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan import Pose
+from echostep.plan import Pose, load_plan
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import walkable_floor
 from echostep.walls.indoors import Indoors, indoors
-from page.frames import PLAN
+from walks import DEMO
 
 # A room of 8 m by 6 m with a door of 1 m in its south wall.
 ROOM = np.array([[0, 0, 3.5, 0], [4.5, 0, 8, 0], [8, 0, 8, 6], [8, 6, 0, 6], [0, 6, 0, 0]], float)
 FRONT_M = 0.75  # from the outermost wall: nearer places count as indoors
+
+PLAN = load_plan(DEMO)
 
 
 def of(walls: Floats) -> Indoors:

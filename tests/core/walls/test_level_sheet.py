@@ -16,11 +16,11 @@ from shapely import Point, Polygon
 
 from echostep.arrays import Floats
 from echostep.board import messages as m
-from echostep.localization import ANY_LEVEL, ClimbSettings, CloudSettings, Estimate, Start, TrackStatus
-from echostep.localization.height.levels import HeightArrays, HeightChange, change_levels, level_change_model
-from echostep.localization.particle_arrays import Move, ParticleArrays
+from echostep.height.levels import ClimbSettings, HeightArrays, HeightChange, change_levels, level_change_model
+from echostep.localization import CloudSettings, Estimate, Start, TrackStatus
 from echostep.localization.particles.cloud import Cloud, cloud_about
-from echostep.plan import Connector, Level, Plan, Pose, load_plan
+from echostep.particles.arrays import Move, ParticleArrays
+from echostep.plan import ANY_LEVEL, Connector, Level, Plan, Pose
 from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import (
@@ -36,10 +36,7 @@ from echostep.walls.level_sheet import (
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import Person, Waypoint, walk
 from echostep_simulation.scenario import Scenario
-from echostep_studies.floors.storeys import judge, through
-from echostep_studies.frame.recordings import DATA
-from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tour, tower
-from needs_data import needs_data
+from echostep_simulation.world.tower import LIFT_AT, STOREY_M, tour, tower
 
 FLAT = HeightChange(0.0, 0.02, 0.0, math.inf, 0.0, 1.0)
 
@@ -289,31 +286,3 @@ def test_kinds_have_the_kernels_numbers() -> None:
 
 
 # A real lay_out_levels's plan
-
-
-@pytest.mark.long
-@needs_data("maps/westport-house.json")
-def test_all_seven_floors_of_a_real_plan_are_walked() -> None:
-    """By stairs and lift; the walk is simulated."""
-    plan = load_plan(DATA / "maps" / "westport-house.json")
-    assert len(plan.levels) == 7
-    way = through(plan, 3)
-    scenario, estimates = tracked(plan, way, 3)
-    found = judge(plan, scenario.truth, estimates, "", 1)
-    assert found.floors == 7
-    assert found.floor_right == 1.0
-    assert found.mean_m < 0.5
-
-
-def test_floors_are_judged_by_what_is_nearest() -> None:
-    plan = tower(3)
-    truth = np.array([[0.0, 5.0, 1.5, 0.0, 0.0], [10.0, 5.0, 1.5, 0.0, 0.0], [20.0, 5.0, 1.5, 0.0, 7.0]])
-
-    def at(t_s: float, level: int) -> Estimate:
-        return Estimate(t_s, 5.0, 1.5, 0.01, 0.0, 0.01, 0.0, 0.1, 1, TrackStatus.TRACKING, level)
-
-    found = judge(plan, truth, [at(1.0, 0), at(2.0, 1), at(3.0, 1), at(5.0, 0), at(12.6, 0), at(20.0, 2)], "", 1)
-    assert found.floor_right == pytest.approx(4 / 6), "at 12.6 s he is 1.82 m high: both floors are as good"
-    assert found.strict_right == pytest.approx(3 / 6)
-    assert found.longest_wrong_s == pytest.approx(1.0)
-    assert found.floors == 3

@@ -14,7 +14,6 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.walls.echo_sources import CORNER, EDGE, MOST_SOURCES, WALL, Walls, echo_sources
 from echostep.walls.index import WallIndex, build_index, crosses_wall
-from echostep_studies.papers.girard2011_rays import POSES, lambda_ray_ranges
 from naive import walls as naive
 
 Sources = list[tuple[float, float, float]]
@@ -74,41 +73,6 @@ def test_sources_agree_with_the_slow_twin(
         assert [s[0] for s in found] == pytest.approx([s[0] for s in expected], abs=1e-9)
         assert by_kind(found) == by_kind(expected)
         assert sorted(s[1] for s in found) == pytest.approx(sorted(s[1] for s in expected), abs=1e-7)
-
-
-@pytest.mark.long
-@settings(max_examples=150, deadline=None)
-@given(plans(), st.sampled_from([7, 7, 7, 1, 3, 20]), st.sampled_from([0.0, 0.5, 1.0, 2.0]))
-def test_cone_readings_agree_with_plain_rays(
-    plan: tuple[Floats, np.random.Generator], rays: int, prepared: float
-) -> None:
-    walls, rng = plan
-    aperture = math.radians(55.0)
-    owner = Walls(walls, prepared * 0.5 * aperture / rays)
-    x, y, heading = rng.uniform(-2, 10, 12), rng.uniform(-2, 10, 12), rng.uniform(-4, 4, 12)
-    index = owner.near(x[:9], y[:9])
-    found = lambda_ray_ranges(x, y, heading, index, rays, aperture, 6.0)
-    for i, row in enumerate(found):
-        for axis, reading in zip((math.pi / 2, -math.pi / 2), row, strict=True):
-            expected = naive.cone_reading(x[i], y[i], heading[i] + axis, walls, rays, aperture, 6.0)
-            assert reading == pytest.approx(expected, abs=1e-9)
-
-
-@pytest.mark.slow
-def test_many_poses_read_what_each_would_alone() -> None:
-    """More in a tile than are taken at a time, in no order, some nowhere; a few go another way."""
-    rng = np.random.default_rng(5)
-    walls = rng.uniform(0.0, 6.0, (20, 4))
-    owner = Walls(walls, 0.5 * math.radians(55.0) / 7)
-    x, y, heading = rng.uniform(2.0, 4.0, 3 * POSES), rng.uniform(2.0, 3.0, 3 * POSES), rng.uniform(-4, 4, 3 * POSES)
-    x[::50], heading[7::50] = np.nan, np.inf
-    index = owner.near(x, y)
-    found = lambda_ray_ranges(x, y, heading, index)
-    alone = [lambda_ray_ranges(x[i : i + 1], y[i : i + 1], heading[i : i + 1], index)[0] for i in range(len(x))]
-    assert found == pytest.approx(np.array(alone), abs=1e-9)
-    assert (found[::50] == 6.0).all()
-    assert (found[7::50] == 6.0).all()
-    assert len(np.unique(found)) > POSES
 
 
 def test_a_wall_end_is_an_edge() -> None:

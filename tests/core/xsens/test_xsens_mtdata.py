@@ -26,7 +26,7 @@ from echostep.xsens import (
 )
 from echostep.xsens.frames import LONGEST
 from echostep.xsens.mtdata import ACCEL, ATTITUDE, CELSIUS, GYRO, MAG, decode_mtdata
-from echostep_studies.simulation.devices.mtx_setup import pack
+from echostep_simulation.devices.mtx_formats import pack
 
 
 def sample(counter: int, gyro_x: float = 0.1) -> MtSample:

@@ -39,8 +39,8 @@ from echostep_app.team.messages.report import encode as report_bytes
 from echostep_app.xsens.requests import project_requests
 from echostep_app.xsens.setup import MtxSetup
 from echostep_simulation.devices.beacon_gateway import message
+from echostep_simulation.devices.mtx_formats import pack
 from echostep_studies.barometer.pressure_csv import load_pressures
-from echostep_studies.simulation.devices.mtx_setup import pack
 from plan import test_plan_importer_imdf as imdf
 from team.team_reports import report
 from walks import DEMO, walk_chunks

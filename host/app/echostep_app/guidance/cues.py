@@ -16,7 +16,7 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.errors import EchostepError
-from echostep.localization import Estimate, claims_place
+from echostep.localization import Estimate
 from echostep.walls.polyline import along, nearest, turn_ahead, way_m
 from echostep_app.guidance.contact import CONTACT, allowed_silence, start_contact, update_contact
 from echostep_app.plan.routing import Route, RoutePlace, Stretch
@@ -118,7 +118,7 @@ class Guide:
 
     def _choose(self, e: Estimate, heard_s: float | None) -> Choice:
         """What to do at this estimate. A reached end counts, whether beacons measure there or not."""
-        lost = not claims_place(e)
+        lost = not e.claims_place
         back, silent = self._update_contact(e, heard_s, lost)
         if e.heading_sd_rad > math.radians(self._settings.heading_sd_deg):
             return CueKind.STOP, NO_HEADING, None

@@ -16,7 +16,7 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Floats
-from echostep.localization import Estimate, TrackStatus, claims_place
+from echostep.localization import Estimate, TrackStatus
 from echostep.path import MeasuredSegment, Odometer
 from echostep.tracker import Tracker
 from echostep.walls.polyline import nearest, turn_ahead, way_m
@@ -64,7 +64,7 @@ class GuidedReturn(CueList):
 
     def _cue_in(self, e: Estimate) -> Cue:
         """The cue on the way in: direction and length of the way back; the return's cue when it begins here."""
-        if claims_place(e):
+        if e.claims_place:
             self._since_end.add(self._way.add(e.x_m, e.y_m, e.z_m))
             progress_m, off_m = _nearest(self._line, e)
             if progress_m > TURN_M and off_m < _limit_m(e):
@@ -84,7 +84,7 @@ class GuidedReturn(CueList):
 
     def _cue_back(self, e: Estimate, guide: Guide) -> Cue:
         """The cue on the return, or on its end when the way back has grown."""
-        if claims_place(e):
+        if e.claims_place:
             line = self._way.line_m()
             progress_m, off_m = _nearest(line, e)
             if off_m < _limit_m(e):

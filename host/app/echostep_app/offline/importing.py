@@ -22,12 +22,12 @@ from echostep.board.frames import encode
 from echostep.board.messages import GYROS_INVALID, PRESSURE_TEMPERATURE_INVALID, Gyros, Outcome, Ping, Pressure, Ranger
 from echostep.errors import EchostepError
 from echostep.offline.csv_table import column_of, lines_of, open_samples, read_rows
-from echostep.offline.imu_chunks import ImuChunks
 from echostep.offline.imu_csv import LIMITS, Imu
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import imu_settings, parse_settings, read_settings
 from echostep.timing.timeline import TICKS_PER_S
 from echostep_app.offline.foreign_columns import OWN, read_header
+from echostep_app.offline.imu_chunks import ImuChunks
 from echostep_app.offline.leg_csv import load_pair
 from echostep_app.recording.recorder import Recorder
 

@@ -24,7 +24,7 @@ from echostep.board.messages import (
     Ranger,
     Status,
 )
-from echostep.localization import Estimate, claims_place
+from echostep.localization import Estimate
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.ports.chunks import BOARD, Portion
 from echostep.tracker import Tracker
@@ -206,7 +206,7 @@ class Derived:
 
     def _location(self, e: Estimate, t_ns: int) -> list[DerivedMessage]:
         georeference = self._tracker.plan.georeference
-        if self._earth is None or georeference is None or not claims_place(e):
+        if self._earth is None or georeference is None or not e.claims_place:
             return []
         longitude, latitude = self._earth.degrees(np.array([[e.x_m, e.y_m]]))[0].tolist()
         ee, en, nn = east_north(georeference.rotation_rad, e.xx_m2, e.xy_m2, e.yy_m2)

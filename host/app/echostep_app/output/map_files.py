@@ -20,7 +20,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.file_mode import claim
-from echostep.localization import Estimate, claims_place
+from echostep.localization import Estimate
 from echostep.plan import Plan
 from echostep.walk.table import Columns, columns_of
 from echostep_app.output.derived import outline95
@@ -77,7 +77,7 @@ class TrackOnPlan:
     @property
     def stretches(self) -> list[list[int]]:
         """Indices of the estimates in stretches in which each claims a place and none is more than GAP_S after the one before."""
-        known = [k for k, e in enumerate(self.estimates) if claims_place(e)]
+        known = [k for k, e in enumerate(self.estimates) if e.claims_place]
         t_s = np.array([self.estimates[k].t_s for k in known])
         breaks = np.flatnonzero((np.diff(known) > 1) | (np.diff(t_s) > GAP_S)) + 1
         return [stretch.tolist() for stretch in np.split(np.array(known, dtype=int), breaks) if len(stretch)]
@@ -169,7 +169,7 @@ def write_kml(out: Path, track: TrackOnPlan) -> None:
     for k, e in enumerate(estimates):
         mark = _element(folder, "Placemark")
         _element(mark, "name", f"{e.t_s:.1f} s")
-        placed = claims_place(e)
+        placed = e.claims_place
         within = f"95 % within {e.ellipse95.major_m:.2f} m" if placed else "place not known"
         _element(mark, "description", f"step {e.step}, {e.status.value}, {within}")
         _element(_element(mark, "TimeStamp"), "when", moments[k])

@@ -24,7 +24,7 @@ from rich.text import Text
 
 from echostep.arrays import Octets
 from echostep.board.gateway import Gateway
-from echostep.localization import Estimate, claims_place
+from echostep.localization import Estimate
 from echostep.plan import Level, Plan
 from echostep.tracker import Tracker
 from echostep_app.board.faults.health import Finding, Severity, all_findings
@@ -135,7 +135,7 @@ class TerminalView:
     def _level_text(self) -> str:
         """Name, probability and height of the level; empty when the plan has one level."""
         levels, here = self._tracker.plan.levels, self._last
-        if len(levels) < 2 or here is None or not claims_place(here):
+        if len(levels) < 2 or here is None or not here.claims_place:
             return ""
         return f"   level {levels[here.level].name} ({100 * here.levels[here.level]:.0f} %), {here.z_m:.1f} m"
 
@@ -158,7 +158,7 @@ class TerminalView:
         if self._fraction:
             self._progress.update(self._bar, completed=self._fraction())
         parts = [
-            self._canvas.render(self._last if self._last and claims_place(self._last) else None),
+            self._canvas.render(self._last if self._last and self._last.claims_place else None),
             Text(describe(self._last, self._tracker.plan) + self._level_text()),
             Text(health(self._tracker, silent=now - self._heard_s > SILENT_S), style="grey62"),
             *(Text(str(finding), style="bold red") for finding in findings(self._tracker)),
@@ -174,7 +174,7 @@ def describe(e: Estimate | None, plan: Plan) -> str:
     """An estimate on a plan as a line of text."""
     if e is None:
         return "waiting for the foot to stand still"
-    if not claims_place(e):
+    if not e.claims_place:
         places = f", {len(e.hypotheses)} places fit" if len(e.hypotheses) > 1 else ""
         return f"{e.status.value}: place not known{places}   step {e.step}   t {e.t_s:.1f} s"
     return (

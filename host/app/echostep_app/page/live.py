@@ -15,7 +15,8 @@ from operator import attrgetter
 from types import TracebackType
 from typing import Any, Self
 
-from echostep.localization import Estimate, echo_model, unobserved
+from echostep.echoes.likelihood import echo_model
+from echostep.localization import Estimate
 from echostep.path import MeasuredSegment
 from echostep.ports.chunks import BOARD, FOOT, MTX, Portion
 from echostep.tracker import Tracker
@@ -251,7 +252,7 @@ class LivePage:
         reason = "nothing from the foot" if silent else "no step of the foot"
         return replace(
             scene,
-            estimate=unobserved(scene.estimate, scene.estimate.t_s + age_s),
+            estimate=scene.estimate.unobserved(scene.estimate.t_s + age_s),
             echo_lines=(),
             status_text=f"lost: {reason} for {age_s:.0f} s",
             gait="",

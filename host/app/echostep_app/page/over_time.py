@@ -12,7 +12,7 @@ from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from echostep.localization import TrackStatus, claims_place
+from echostep.localization import TrackStatus
 from echostep_app.page.elements.scene import PageScene
 
 COLUMNS = 6  # time (s), range to the left and to the right (m), samples of the foot and pings a second, compass heading (deg); NaN: none
@@ -57,7 +57,7 @@ class OverTime:
         rates = (scene.streams.mtx_hz, scene.streams.pings_hz) if scene.streams else (None, None)
         known = [math.nan if rate is None else rate for rate in rates]
         bearing_deg = math.degrees(self._north_rad - scene.estimate.heading_rad) % 360.0
-        heading = bearing_deg if claims_place(scene.estimate) else math.nan
+        heading = bearing_deg if scene.estimate.claims_place else math.nan
         self._rows.extend((scene.t_s, *ranges, *known, heading))
         self._row_s = scene.t_s
 

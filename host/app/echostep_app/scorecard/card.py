@@ -17,7 +17,7 @@ import shapely
 
 from echostep.arrays import Bools, Floats, Ints
 from echostep.errors import EchostepError
-from echostep.localization import in_ellipse95
+from echostep.particles.ellipse import in_ellipse95
 from echostep.plan import Plan
 from echostep_app.plan.places.faces import OUTSIDE
 from echostep_app.plan.places.spaces import PlanSpaces, Spaces

@@ -17,7 +17,8 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.errors import EchostepError
-from echostep.localization import Estimate, TrackStatus, ellipse95
+from echostep.localization import Estimate, TrackStatus
+from echostep.particles.ellipse import ellipse95
 from echostep.plan import Plan
 from echostep_app.scorecard.csv_columns import CsvColumns, read_csv
 

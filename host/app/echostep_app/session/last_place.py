@@ -17,7 +17,8 @@ import msgspec
 
 from echostep.errors import EchostepError
 from echostep.file_mode import claim
-from echostep.localization import ClimbSettings, Estimate, Start, TrackStatus, drift_m
+from echostep.height.levels import ClimbSettings, drift_m
+from echostep.localization import Estimate, Start, TrackStatus
 from echostep.path import MeasuredSegment
 from echostep.plan import Plan, Pose
 from echostep.tracker import Tracker

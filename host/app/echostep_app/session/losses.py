@@ -11,7 +11,8 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 
-from echostep.localization import PROBABLE, Estimate, TrackStatus
+from echostep.localization import Estimate, TrackStatus
+from echostep.particles.limits import PROBABLE
 from echostep.path import MeasuredSegment
 from echostep.ports.chunks import BOARD, FOOT, LINES, MTX, Portion
 from echostep.recording import Recording

@@ -20,8 +20,8 @@ import numpy as np
 
 from echostep.board.messages import SCHEMA_HASH
 from echostep.errors import EchostepError
-from echostep.localization import ANY_LEVEL, Start
-from echostep.plan import NO_PLAN, Plan, Pose
+from echostep.localization import Start
+from echostep.plan import ANY_LEVEL, NO_PLAN, Plan, Pose
 from echostep.ports.people.check_in import MOST_SD_M
 from echostep.walk.recorded import ANYWHERE, CHECK_IN_START, START_LIMIT_M
 from echostep_app.plan.importers.limited import open_limited

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from echostep.errors import EchostepError
-from echostep.localization import Estimate, claims_place, digest
+from echostep.localization import Estimate, digest
 from echostep.plan import Plan
 from echostep.tracker import Tracker
 from echostep.walk.table import write_track
@@ -121,7 +121,7 @@ def _print_summary(result: Result, plan: Plan, card: Scorecard | None) -> None:
     estimates, end = result.estimates, result.estimates[-1]
     if result.losses:
         console.print(f"walk: {result.losses}", highlight=False)
-    if not claims_place(end):
+    if not end.claims_place:
         console.print("end: place not known")
     elif words := Whereabouts(plan).words(end.x_m, end.y_m, end.level):
         floor = f", {plan.levels[end.level].name}" if len(plan.levels) > 1 else ""

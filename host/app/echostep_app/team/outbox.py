@@ -19,7 +19,9 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Protocol
 
-from echostep.localization import RISK, WALKER_M_S, TrackStatus, ellipse95, trust
+from echostep.localization import TrackStatus
+from echostep.particles.ellipse import ellipse95
+from echostep.particles.limits import RISK, WALKER_M_S
 from echostep_app.printing.lines import moment
 from echostep_app.team.faults import in_words
 from echostep_app.team.messages.report import Position, Report, ReportedAlarm
@@ -208,7 +210,7 @@ def stamped(report: Report, sequence: int, unix_s: float, age_s: float, overtake
     """The report with its number, the time of sending, and a covariance that grows with the age of its position, until that is lost."""
     age_s, last, place = max(age_s, 0.0), report.last_place, report.place
     position = report.position and aged(report.position, age_s)
-    status = report.status if position is None or age_s <= SETTLED_S else trust(position.radius95_m).value
+    status = report.status if position is None or age_s <= SETTLED_S else TrackStatus.of(position.radius95_m).value
     last = position if position and status == "lost" else last and aged(last, last.age_s + age_s)
     if position and place:
         place = replace(place, sd_m=(place.sd_m**2 + _walk_variance_m2(age_s)) ** 0.5)

@@ -19,8 +19,9 @@ from types import TracebackType
 from typing import Literal, Self
 
 from echostep.errors import EchostepError
-from echostep.localization import CHI2_95, Estimate, TrackStatus, claims_place
+from echostep.localization import Estimate, TrackStatus
 from echostep.odometry import WearerWatch
+from echostep.particles.ellipse import CHI2_95
 from echostep.path import Odometer
 from echostep.plan import Level, Plan
 from echostep.tracker import Tracker
@@ -93,7 +94,7 @@ class Publishing:
             report = report_of(self._empty, self._levels, self._ground, estimate, motion, streams)
             assert report.position
             report = replace(report, position=replace(report.position, where=where))
-            if claims_place(estimate):
+            if estimate.claims_place:
                 self._known = report.position
             else:
                 report = without_place(report, self._last_place(estimate.t_s))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from echostep.localization import Estimate, TrackStatus, claims_place
+from echostep.localization import Estimate, TrackStatus
 from echostep.path import PathSegment
 from echostep.tracker import Tracker
 
@@ -42,6 +42,6 @@ def running_note(segment: PathSegment | None, estimate: Estimate | None) -> str:
     """That the foot runs, with the 95 % radius of a position that may be named; empty while it walks or stands, or is not worn."""
     if segment is None or estimate is None or not segment.running:
         return ""
-    if not claims_place(estimate):
+    if not estimate.claims_place:
         return "running"
     return f"running: position good to about {estimate.ellipse95.major_m:.1f} m"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Aids of the map filter: radio beacons, and meetings with teammates.
 
-In: the filter's hypotheses, beacons' readings, meetings. Out: the same hypotheses, reweighted; places of beacons. Owns what it remembers of each.
-The names below are its public interface; only studies and tests look behind it.
+In: the filter's hypotheses, beacons' readings, meetings. Out: the same hypotheses, reweighted; places of beacons. Owns the records of both.
+The names below are its public interface; only its own tests look behind it.
 """
 
 from typing import TYPE_CHECKING
@@ -12,19 +12,8 @@ from echostep.additions import face
 if TYPE_CHECKING:
     from echostep.aiding.aided_filter import AidedFilter
     from echostep.aiding.beacon_map import BeaconPlace, BeaconState
-    from echostep.aiding.beacons.model import BeaconSettings
     from echostep.aiding.team.meeting import TimedMeeting, carries_position, on_the_way, start_at
     from echostep.aiding.team.meeting_memory import MeetingEffect, MeetingNews, MeetingQueue
     from echostep.aiding.team.shared_beacons import MOST_TEAMMATES, TeamBeaconMap, shared_beacons
 
-__getattr__ = face(
-    __name__,
-    {
-        "aided_filter": "AidedFilter",
-        "beacon_map": "BeaconPlace BeaconState",
-        "beacons.model": "BeaconSettings",
-        "team.meeting": "TimedMeeting carries_position on_the_way start_at",
-        "team.meeting_memory": "MeetingEffect MeetingNews MeetingQueue",
-        "team.shared_beacons": "MOST_TEAMMATES TeamBeaconMap shared_beacons",
-    },
-)
+__getattr__ = face(__name__)

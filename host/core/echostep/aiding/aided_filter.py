@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The map filter with its aids: the readings of radio beacons on each segment, and meetings with teammates between segments.
 
-In: what a `MapFilter` takes; `BeaconReading`s, `Meeting`s. Out: `Estimate`s; the effect of each meeting. Owns the beacon map, and what was met when.
+In: the input of a `MapFilter`, `BeaconReading`s, `Meeting`s. Out: `Estimate`s; the effect of each meeting. Owns the beacon map, and the times of
+meetings.
 """
 
 from __future__ import annotations
@@ -12,19 +13,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from echostep.aiding.beacon_map import BeaconMap
-from echostep.aiding.beacons.model import BeaconSettings
 from echostep.aiding.team.meeting import WRONG, Meeting, start_at
 from echostep.aiding.team.meeting_memory import MeetingEffect, MeetingMemory, moved_by
 from echostep.aiding.team.meetings import weigh_by
+from echostep.beacons.model import BeaconSettings
 from echostep.board.gateway import BeaconReading
 from echostep.localization.building import Building
 from echostep.localization.estimate import Estimate
 from echostep.localization.grid.search import Search
-from echostep.localization.limits import PROBABLE
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import FilterSettings
+from echostep.particles.limits import PROBABLE
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose
 
@@ -36,7 +37,7 @@ class AidedFilter(MapFilter):
         self, building: Building, start: Start, walk_heading_rad: float, rng: np.random.Generator,
         settings: FilterSettings | None = None, beacons: BeaconSettings | None = None,
     ) -> None:  # fmt: skip
-        """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at the start."""
+        """`walk_heading_rad`: the trunk's heading in the walk frame at the start."""
         super().__init__(building, start, walk_heading_rad, rng, settings)
         self.beacon_map = BeaconMap(building.walls, beacons or BeaconSettings(), rng)
         self._met = MeetingMemory(self.odometer)
@@ -44,18 +45,18 @@ class AidedFilter(MapFilter):
         self._readings: Sequence[BeaconReading] = ()
 
     def update(self, measured: MeasuredSegment, readings: Sequence[BeaconReading] = ()) -> Estimate:
-        """As of the map filter, which the beacons' readings on the segment aid."""
+        """The map filter's update, with the beacons' readings on the segment."""
         self._readings = readings
         return super().update(measured)
 
     def _aid(self, segment: PathSegment) -> None:
-        """Weigh the tracked cloud, which is at the end of a segment, by the readings on it."""
+        """Reweight the tracked cloud, at the end of a segment, by the readings on the segment."""
         readings = self._readings
         if isinstance(self.cloud, Cloud):
             self.beacon_map.update(self.cloud, segment, readings, bool(readings) and self.plan_supports)
 
     def meet(self, meeting: Meeting) -> MeetingEffect:
-        """Weigh the clouds by the place of a teammate beside the wearer, and decide which of them is tracked.
+        """Reweight the clouds by the place of a teammate next to the wearer, and choose the tracked one.
 
         Agreement raises the cloud's probability to at most the meeting's: both may stem from one source. A contradiction moves a doubted cloud, a
         believed one only when a second teammate contradicts too and that is likelier. A radio range beyond PLACE_M moves nothing; ranges to two

@@ -14,11 +14,11 @@ from enum import StrEnum
 
 import numpy as np
 
-from echostep.aiding.beacons.beliefs import BeaconBeliefs, BeaconMeasurement, empty_beliefs, moments, place_covariance
-from echostep.aiding.beacons.model import BeaconSettings, beacon_model
-from echostep.aiding.beacons.slam import SUSPECT, TIMES_MOVED, BeaconHealth, initial_health, propose_heading_jumps
-from echostep.aiding.beacons.step import Beacons, Waiting, no_waiting, update_by_reading
 from echostep.arrays import Floats
+from echostep.beacons.beliefs import BeaconBeliefs, BeaconMeasurement, empty_beliefs, moments, place_covariance
+from echostep.beacons.model import BeaconSettings, beacon_model
+from echostep.beacons.slam import SUSPECT, TIMES_MOVED, BeaconHealth, initial_health, propose_heading_jumps
+from echostep.beacons.step import Beacons, Waiting, no_waiting, update_by_reading
 from echostep.board.gateway import BeaconReading
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.particles import Particles
@@ -166,7 +166,7 @@ class BeaconMap:
 
 
 def _beliefs(cloud: Particles) -> BeaconBeliefs:
-    """What each particle believes of the beacons' places: these arrays, not copies."""
+    """Each particle's beliefs of the beacons' places; views, not copies."""
     return BeaconBeliefs(*cloud.carried) if cloud.carried else empty_beliefs(len(cloud.x_m), 0)
 
 

@@ -28,7 +28,7 @@ def sound_m_s(celsius: float) -> float:
 
 
 class Air:
-    """Call `speeds` with the barometer's samples in order; a speed above zero as setting is kept whatever they say."""
+    """Call `speeds` with the barometer's samples in order; a speed above zero as setting overrides them."""
 
     def __init__(self, fixed_m_s: float) -> None:
         self._fixed = fixed_m_s > 0.0

@@ -135,7 +135,7 @@ class Gateway:
         return reading._replace(slot=slot)
 
     def _free_slot(self, t_s: float) -> int | None:
-        """The next slot; when all are in use, the slot of the beacon that has been silent longest, or None if it was heard too recently."""
+        """The next slot; when all are in use, the slot of the beacon that has been silent longest, or None if its last reading is too recent."""
         if len(self.numbers) < MOST_BEACONS:
             return len(self.numbers)
         waits_s = {
@@ -151,7 +151,7 @@ class Gateway:
         return slot
 
     def _clock_continues(self, offset_s: float) -> bool:
-        """Whether the gateway's clock goes on without a jump; `offset_s`: its time minus the tracker's, by the newest message.
+        """Whether the gateway's clock is continuous; `offset_s`: its time minus the tracker's, by the newest message.
 
         A jump means messages that the gateway has delayed, or a restart. A new offset is accepted when NEW_CLOCK_MESSAGES in a row agree on it.
         """

@@ -26,7 +26,7 @@ UP = 2  # of the walk frame's axes
 RING = 64  # samples: 0.12 s at the highest rate, for the plateaus of `soft_limit`
 WINDOW_S = 0.03
 REST_RAD_S, REST_M_S2 = 1.6, 6.0  # rms over the window: `stillness_statistic` is 1 on the ellipse between them
-# A foot that swung faster stands less still, in proportion. Walking peaks at 5 to 8 rad/s; running beyond 10, and in its stances the foot turns by 2.
+# A faster swing is followed by a less quiet stance, in proportion. Walking peaks at 5 to 8 rad/s; running beyond 10, with 2 rad/s in its stances.
 CALM_SWING_RAD_S = 8.0
 CALM, STILL = 0.25, 0.03  # `stillness_statistic` of a standing foot, and of a foot at rest
 GATE = 16.8  # chi-square with six degrees of freedom (three velocities, three accelerations), 99 % quantile

@@ -365,7 +365,7 @@ class StrideEstimator:
         return length + swing.second_half_m() + swing.first_half_m() - pace * swing.before_s
 
     def _add_edge(self, begin: int, end: int, length: float) -> None:
-        """Report an edge of a walk; beside a stride of unknown length its length is unknown, too."""
+        """Report an edge of a walk; next to a stride of unknown length its length is unknown, too."""
         blind = self._bout.blind
         length, sd = (0.0, BLIND_SD_M) if blind else (max(length, 0.0), EDGE_SD_M)
         self._add_stride(self._grid.time(begin), self._grid.time(end), length, sd, 0.0, Flag.EDGE | blind)

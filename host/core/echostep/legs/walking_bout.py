@@ -4,9 +4,9 @@
 In: angles of the knee, speeds. Out: `Bout`, flags. Owns nothing but these records.
 
 At its edges, the first and the last swing, this leg does not carry the hips; it measures their speed only while it stands. In a swing between two
-stances the speed is taken to change evenly from toe off to after heel strike. In a steady walk both are the pace. A walk begins and ends
-within about a step [Breniere and Do 1986; Jian 1993]: the first swing leaves from slow hips and lands under hips at pace; the closing one leaves at
-pace and lands beside the other foot under hips that all but rest.
+stances the speed is taken to change evenly from toe off to after heel strike. In a steady walk both are the pace. A walk begins and ends within about
+a step [Breniere and Do 1986; Jian 1993]: the first swing leaves from slow hips and lands under hips at pace; the closing one leaves at pace and lands
+beside the other foot under hips that are nearly at rest.
 """
 
 from __future__ import annotations

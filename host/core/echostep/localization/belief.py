@@ -15,13 +15,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from echostep.height.levels import HeightChange
 from echostep.localization.grid.search import Search
 from echostep.localization.grid.search_grid import SearchGrid
-from echostep.localization.height.levels import HeightChange
-from echostep.localization.limits import PROBABLE, SURE
-from echostep.localization.particle_arrays import Move
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.settings import UNPLANNED_DOOR
+from echostep.particles.arrays import Move
+from echostep.particles.limits import PROBABLE, SURE
 from echostep.plan import Pose
 
 # Assumed, not measured.
@@ -68,9 +68,9 @@ class CloudHypothesis:
 
 
 class CrossedWalls:
-    """Walls of the plan that the tracked cloud has gone through as a whole: each costs its price once.
+    """Walls of the plan that the tracked cloud has crossed as a whole: each is charged once.
 
-    What walls cut off an edge of the cloud costs nothing: they gather it, and show it right as much as wrong.
+    A wall that cuts off an edge of the cloud is not charged: it narrows the cloud, whether that is right or wrong.
     """
 
     def __init__(self) -> None:
@@ -78,7 +78,7 @@ class CrossedWalls:
         self._log_passed = 0.0  # of the last CROSSED_M
 
     def charge(self, at: Pose, path_m: float, log_passed: float) -> float:
-        """What counts for a cloud that has moved by `path_m` to `at`; `log_passed`: log of the share that crossed no wall."""
+        """Log-evidence of a cloud that has moved by `path_m` to `at`; `log_passed`: log of the share that crossed no wall."""
         if any(
             was.level == at.level and math.hypot(was.x_m - at.x_m, was.y_m - at.y_m) < CROSSED_M
             for was in self._crossed
@@ -157,7 +157,9 @@ class Belief:
         self._log_odds += log_here - log_there
 
     def weigh_heights(self, log_means: list[float]) -> None:
-        """Multiply the clouds by the mean factors of their heights, given as logarithms, relative to the greatest: they say nothing of the plan."""
+        """Multiply the clouds by the mean factors of their heights, given as logarithms, relative to the greatest: they carry no information about
+        the plan.
+        """
         for each, log_mean in zip(self.clouds, log_means, strict=True):
             each.log_weight += log_mean - max(log_means)
 

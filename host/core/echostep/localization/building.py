@@ -9,17 +9,18 @@ from __future__ import annotations
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.echoes.likelihood import EchoModel
+from echostep.echoes.range_table import range_table_of
+from echostep.echoes.unplanned import Background, background
+from echostep.height.levels import UpperLevels
 from echostep.localization.cloud_estimate import Elsewhere
 from echostep.localization.drawn_places import DrawnPlaces
-from echostep.localization.echoes.likelihood import EchoModel
-from echostep.localization.echoes.range_table import range_table_of
-from echostep.localization.echoes.unplanned import Background, background
 from echostep.localization.grid.cells import GridCells, grid_cells
-from echostep.localization.height.levels import UpperLevels
+from echostep.plan import Plan
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import Floor, walkable_floor
 from echostep.walls.indoors import indoors
-from echostep.walls.level_sheet import LevelSheet, level_of
+from echostep.walls.level_sheet import LaidOutPlan, LevelSheet, level_of
 
 
 class Building:
@@ -37,6 +38,11 @@ class Building:
         self.elsewhere = _elsewhere(self.floor, self.sheet)
         self._backgrounds: dict[EchoModel, Background] = {}
         self._cells: dict[EchoModel, GridCells] = {}
+
+    @classmethod
+    def of(cls, plan: Plan, laid_out: LaidOutPlan) -> Building:
+        """The building of a plan whose levels are laid out so."""
+        return cls(laid_out.walls, laid_out.sheet, DrawnPlaces(plan.levels))
 
     @property
     def has_walls(self) -> bool:

@@ -13,10 +13,11 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.jit import inline_part, lean_kernel
-from echostep.localization.estimate import CHI2_95, RISK, TAIL, Estimate, TrackStatus, ellipse95
-from echostep.localization.limits import BELIEVED, HALF_STOREY_M, LOST_M, PROBABLE, SURE, TRACKING_M
+from echostep.localization.estimate import TAIL, Estimate, TrackStatus
 from echostep.localization.particles.particles import Particles
 from echostep.localization.particles.places import LikelyPlace, hypotheses
+from echostep.particles.ellipse import CHI2_95, ellipse95
+from echostep.particles.limits import BELIEVED, HALF_STOREY_M, LOST_M, PROBABLE, RISK, SURE, TRACKING_M
 
 # Times the weight near the mean of a cloud of several places, with which the likeliest of them is its position, assumed
 MUCH_LIKELIER = 2.0

@@ -14,8 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.particles.start import ANY_LEVEL, Start
-from echostep.plan import Level
+from echostep.localization.particles.start import Start
+from echostep.plan import ANY_LEVEL, Level
 
 HEARD_M = 5.0  # of a wall, within which it places the wearer: the rangers' reach without a second reflection
 
@@ -28,7 +28,7 @@ class DrawnPlaces:
         self.are_stated = any(len(rows) for rows in self._places)
 
     def sd_m(self, x_m: float, y_m: float, level: int) -> float:
-        """Standard deviation per axis of the drawing about a place: the largest of the walls that may be heard there, or the nearest one's."""
+        """Standard deviation per axis of the drawing about a place: the largest of the walls in range there, or the nearest one's."""
         rows = self._places[level] if 0 <= level < len(self._places) else np.zeros((0, 3))
         if not len(rows):
             return 0.0

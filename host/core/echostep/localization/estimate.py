@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The estimate: a position with its covariance, and a status that states how far to trust it.
 
-In: values computed by `cloud_estimate`. Out: `Estimate`, immutable, and values read from it: ellipse, whether it claims a place. Owns nothing.
+In: values computed by `cloud_estimate`. Out: `Estimate`, immutable, and its derived values: ellipse, whether it claims a place. Owns nothing.
 """
 
 from __future__ import annotations
@@ -12,18 +12,14 @@ import struct
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import NamedTuple
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats
-from echostep.localization.limits import LOST_M, TRACKING_M
 from echostep.localization.particles.places import LikelyPlace
+from echostep.particles.ellipse import CHI2_95, Ellipse, ellipse95, in_ellipse95
+from echostep.particles.limits import LOST_M, TRACKING_M, WALKER_M_S
 
-CHI2_95 = 5.991464547107979  # 95 % quantile of chi-square, two degrees of freedom
-RISK = 1e-3  # probability of an error beyond the protection radius
 TAIL = 1.5  # of the protection radius of a normal distribution, assumed: errors of echoes and steps have heavier tails
-WALKER_M_S = 1.5  # speed at which an unobserved position spreads per axis: a brisk walk
 
 
 class TrackStatus(StrEnum):
@@ -32,6 +28,11 @@ class TrackStatus(StrEnum):
     TRACKING = "tracking"
     UNCERTAIN = "uncertain"
     LOST = "lost"
+
+    @classmethod
+    def of(cls, radius95_m: float) -> TrackStatus:
+        """Status of a position whose 95 % ellipse has this longer half axis."""
+        return cls.TRACKING if radius95_m <= TRACKING_M else cls.UNCERTAIN if radius95_m <= LOST_M else cls.LOST
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,61 +92,32 @@ class Estimate:
         error_m, covariance_m2 = (x_m - self.x_m, y_m - self.y_m), (self.xx_m2, self.xy_m2, self.yy_m2)
         return bool(in_ellipse95(np.array(error_m), np.array(covariance_m2)))
 
+    @property
+    def claims_place(self) -> bool:
+        """Whether the position may be named, drawn or sent: it is not lost, and the mean of several places lies in one of them.
 
-class Ellipse(NamedTuple):
-    """Half axes in metres, and the angle of the longer one from x."""
+        The one rule for page, terminal, reports, TAK, maps and the summary of a run. Without a plan only the page differs: it draws the end of the
+        path.
+        """
+        places = self.hypotheses
+        return self.status is not TrackStatus.LOST and (not places or any(map(self._lies_in, places)))
 
-    major_m: float
-    minor_m: float
-    angle_rad: float
+    def _lies_in(self, place: LikelyPlace) -> bool:
+        """Whether the position is within TRACKING_M of a place, or in the circle that holds 95 % of it."""
+        reach_m = max(TRACKING_M, math.sqrt(CHI2_95) * place.sd_m)
+        return place.level == self.level and math.hypot(place.x_m - self.x_m, place.y_m - self.y_m) <= reach_m
 
-
-def in_ellipse95(error_m: Floats, covariance_m2: Floats) -> Bools:
-    """Whether errors (..., 2) lie in the 95 % ellipses of covariances (..., 3: xx, xy, yy); in an ellipse without area, only its centre does.
-
-    False where a covariance is NaN.
-    """
-    (dx, dy), (xx, xy, yy) = np.moveaxis(error_m, -1, 0), np.moveaxis(covariance_m2, -1, 0)
-    determinant = xx * yy - xy**2
-    inside = yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy <= CHI2_95 * determinant
-    return np.where(determinant > 0.0, inside, (determinant <= 0.0) & (dx == 0.0) & (dy == 0.0))
-
-
-def ellipse95(xx_m2: float, xy_m2: float, yy_m2: float) -> Ellipse:
-    """The ellipse that holds 95 % of a normal distribution with this covariance."""
-    mean, half = 0.5 * (xx_m2 + yy_m2), math.hypot(0.5 * (xx_m2 - yy_m2), xy_m2)
-    major, minor = (math.sqrt(max(v, 0.0) * CHI2_95) for v in (mean + half, mean - half))
-    return Ellipse(major, minor, 0.5 * math.atan2(2.0 * xy_m2, xx_m2 - yy_m2))
-
-
-def claims_place(estimate: Estimate) -> bool:
-    """Whether a position is a place that may be named, drawn or sent: it is not lost, and the mean of several places lies in one of them.
-
-    The one rule for page, terminal, reports, TAK, maps and the summary of a run. Without a plan only the page differs: it draws the end of the path.
-    """
-    places, e = estimate.hypotheses, estimate
-    return e.status is not TrackStatus.LOST and (not places or any(_lies_in(place, e) for place in places))
-
-
-def _lies_in(place: LikelyPlace, e: Estimate) -> bool:
-    """Whether a position is within TRACKING_M of a place, or in the circle that holds 95 % of it."""
-    reach_m = max(TRACKING_M, math.sqrt(CHI2_95) * place.sd_m)
-    return place.level == e.level and math.hypot(place.x_m - e.x_m, place.y_m - e.y_m) <= reach_m
-
-
-def unobserved(last: Estimate, t_s: float) -> Estimate:
-    """An estimate carried on to `t_s` without measurements: the position spreads at WALKER_M_S, the heading is unknown."""
-    more = (WALKER_M_S * max(t_s - last.t_s, 0.0)) ** 2
-    return replace(
-        last, t_s=t_s, xx_m2=last.xx_m2 + more, yy_m2=last.yy_m2 + more, heading_sd_rad=math.pi, status=TrackStatus.LOST
-    )
-
-
-def trust(radius95_m: float) -> TrackStatus:
-    """Status of a position whose 95 % ellipse has this longer half axis."""
-    if radius95_m <= TRACKING_M:
-        return TrackStatus.TRACKING
-    return TrackStatus.UNCERTAIN if radius95_m <= LOST_M else TrackStatus.LOST
+    def unobserved(self, t_s: float) -> Estimate:
+        """The same at `t_s`, without measurements since: the position spreads at WALKER_M_S, the heading is unknown."""
+        more = (WALKER_M_S * max(t_s - self.t_s, 0.0)) ** 2
+        return replace(
+            self,
+            t_s=t_s,
+            xx_m2=self.xx_m2 + more,
+            yy_m2=self.yy_m2 + more,
+            heading_sd_rad=math.pi,
+            status=TrackStatus.LOST,
+        )
 
 
 def digest(estimates: Iterable[Estimate]) -> str:

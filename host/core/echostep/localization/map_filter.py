@@ -13,28 +13,28 @@ from dataclasses import replace
 import numpy as np
 
 from echostep.angles import mean_angle
+from echostep.echoes.likelihood import EchoSettings
+from echostep.echoes.range_bias import RangeBias
+from echostep.echoes.unplanned import RangeMemory, UnplannedDensities, UsablePings, evidence_share
+from echostep.height.height_filter import RelativeHeight, RidingHeight
+from echostep.height.levels import Air, HeightChange
 from echostep.localization.belief import PLAN_FITS, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
 from echostep.localization.building import Building
 from echostep.localization.cloud_estimate import Right, estimate_of, weight_about
-from echostep.localization.echoes.likelihood import EchoSettings
-from echostep.localization.echoes.range_bias import RangeBias
-from echostep.localization.echoes.unplanned import RangeMemory, UnplannedDensities, UsablePings, evidence_share
 from echostep.localization.estimate import Estimate
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.search import Search
 from echostep.localization.grid.start import grid_about, grid_of, is_unknown
-from echostep.localization.height.height_filter import RelativeHeight, RidingHeight
-from echostep.localization.height.levels import HeightChange
-from echostep.localization.limits import BELIEVED, LOST_M, PROBABLE, TRACKING_M
 from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, move_of
-from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import Cloud, cloud_about
-from echostep.localization.particles.kernels import systematic
-from echostep.localization.particles.start import ANY_LEVEL, STATED, Air, Start, wide
+from echostep.localization.particles.start import STATED, Start, wide
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
 from echostep.localization.window import RecentWay
+from echostep.particles.arrays import Move, PingBatch
+from echostep.particles.kernels import systematic
+from echostep.particles.limits import BELIEVED, LOST_M, PROBABLE, TRACKING_M
 from echostep.path import MeasuredSegment, Odometer, PathSegment
-from echostep.plan import Pose
+from echostep.plan import ANY_LEVEL, Pose
 from echostep.walls.echo_sources import Walls
 
 SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports the cloud, assumed
@@ -53,7 +53,7 @@ class MapFilter:
         self, building: Building, start: Start, walk_heading_rad: float, rng: np.random.Generator,
         settings: FilterSettings | None = None,
     ) -> None:  # fmt: skip
-        """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at the start."""
+        """`walk_heading_rad`: the trunk's heading in the walk frame at the start."""
         self._settings = settings or FilterSettings()
         self.building = building
         self._rng = rng
@@ -73,6 +73,19 @@ class MapFilter:
         if start.after_pause:
             self.belief.leave(UNOBSERVED_DOUBT)
             self._search_beside(start.air, walk_heading_rad)
+
+    @staticmethod
+    def call_kernels() -> None:
+        """Call the kernels that a filter needs later than at its first segment: resampling, and learning the rangers' common bias."""
+        systematic(np.ones(2), 0.5, 2)
+        zero = np.zeros(1)
+        ping = PingBatch(zero, zero, zero, zero, np.zeros(1, np.int64), zero, zero, zero, zero, zero)
+        model, _ = echo_models(FilterSettings())
+        RangeBias(1.0).learn(ping, (zero, zero, zero), (0.0, 0.0, 0.0), Walls(np.empty((0, 4))), model)
+
+    def stated(self, t_s: float, walk_heading_rad: float, step: int) -> Estimate:
+        """The estimate at a start that has just been stated."""
+        return estimate_of(self.cloud, t_s, walk_heading_rad, step, 0.0, Right(STATED))
 
     @property
     def echo(self) -> EchoSettings:
@@ -100,7 +113,7 @@ class MapFilter:
     def update(self, measured: MeasuredSegment) -> Estimate:
         """Propagate along a segment, reweight by its pings and height change, and resample; returns the estimate at its end."""
         segment, belief = measured.segment, self.belief
-        # 1. What the last gap was: a pause, a way that was not observed, rangers that were silent.
+        # 1. Kind of the last gap: a pause, a way that was not observed, rangers that were silent.
         gap = self._gaps.ended(measured)
         # 2. How the height has changed, by the foot and by pressure.
         change = self._height_change(measured)
@@ -116,7 +129,7 @@ class MapFilter:
         # 6. The hypotheses are compared, and the rangers' bias is learnt from the likeliest.
         if not segment.unobserved:
             self._compare(segment, *self._follow(measured, change))
-        # 7. What aids the filter weighs the tracked one.
+        # 7. The aids reweight the tracked one.
         self._aid(segment)
         # 8. If the trunk is probably in none, it is searched.
         if belief.is_doubted and len(self.building.floor.x_m):
@@ -125,7 +138,7 @@ class MapFilter:
         return self._estimate(segment)
 
     def _aid(self, segment: PathSegment) -> None:
-        """Weigh the tracked cloud, which is at the end of a segment, by what aids the filter there [`echostep.aiding`]: nothing."""
+        """Reweight the tracked cloud at the end of a segment by the aids [`echostep.aiding`]: here none."""
 
     def turn_walk_frame(self, by_rad: float) -> None:
         """Rotate all particles: the heading in the walk frame has changed while the wearer's heading on the map has not."""
@@ -310,12 +323,3 @@ class MapFilter:
             return 0.0
         at = self._believed(0.0)
         return self.building.drawn.sd_m(at.x_m, at.y_m, at.level)
-
-
-def call_kernels() -> None:
-    """Call the kernels that a filter needs later than at its first segment: resampling, and learning the rangers' common bias."""
-    systematic(np.ones(2), 0.5, 2)
-    zero = np.zeros(1)
-    ping = PingBatch(zero, zero, zero, zero, np.zeros(1, np.int64), zero, zero, zero, zero, zero)
-    model, _ = echo_models(FilterSettings())
-    RangeBias(1.0).learn(ping, (zero, zero, zero), (0.0, 0.0, 0.0), Walls(np.empty((0, 4))), model)

@@ -11,8 +11,8 @@ import math
 from enum import Enum, auto
 from statistics import median
 
-from echostep.localization.height.levels import HeightChange
-from echostep.localization.particle_arrays import Move
+from echostep.height.levels import HeightChange
+from echostep.particles.arrays import Move
 from echostep.path import MeasuredSegment, Odometer, PathSegment
 
 BESIDE_M = 0.05  # of the trunk from a foot on the floor: half of a step's width of 10 cm
@@ -22,12 +22,12 @@ AIR_SD_M = 0.1  # of a height by pressure that more samples do not reduce: draug
 # Assumed, not measured.
 PAUSE_S = 1.0  # between two segments: nothing was received
 LONG_S = 5.0  # of an unobserved segment: a walk out of the room
-MUTE_S = 10.0  # of standing without a ping, where there were pings before: rangers measure whatever the wearer does
+MUTE_S = 10.0  # of standing without a ping after earlier pings: rangers measure at rest, too
 STANDING_M = 0.5  # path that still counts as standing
 
 
 def move_of(segment: PathSegment) -> Move:
-    """The segment's way; when the wearer turns, the trunk goes round the foot that was measured."""
+    """The segment's way; in a turn the trunk moves around the measured foot."""
     sd_m = math.hypot(segment.sd_m, 2.0 * math.sin(0.5 * abs(segment.turn_rad)) * BESIDE_M)
     return Move(segment.dx_m, segment.dy_m, sd_m, segment.turn_sd_rad, segment.scale_sd, *segment.bend_m)
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
-from echostep.localization.echoes.likelihood import EchoModel, EchoSettings, echo_model
-from echostep.localization.echoes.range_table import TABLE_SD_M
-from echostep.localization.height.levels import ClimbSettings
+from echostep.echoes.likelihood import EchoModel, EchoSettings, echo_model
+from echostep.echoes.range_table import TABLE_SD_M
+from echostep.height.levels import ClimbSettings
 
-UNPLANNED_DOOR = -6.0  # log-probability (1 in 400) that a way leads through a wall of the plan all the same
+UNPLANNED_DOOR = -6.0  # log-probability (1 in 400) that a path crosses a wall of the plan
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,16 +13,16 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from echostep.localization.echoes.likelihood import EchoModel
+from echostep.echoes.likelihood import EchoModel
+from echostep.height.levels import HeightChange
 from echostep.localization.grid.search import Search
-from echostep.localization.height.levels import HeightChange
-from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.start import Start
+from echostep.particles.arrays import Move, PingBatch
 from echostep.walls.echo_sources import Walls
 
 PAST_M = 40.0  # path that is passed again: the path on which a place is found
-MOST_PIECES = 1_000  # of it: eight minutes of standing
+MOST_PIECES = 1_000  # of that path: eight minutes of standing
 
 
 class RecentWay:

@@ -15,12 +15,4 @@ if TYPE_CHECKING:
     from echostep.odometry.heading_filter import FOOT, HeadingFilter
     from echostep.odometry.wearer import Alarm, AlarmKind, AlarmReason, WearerWatch
 
-__getattr__ = face(
-    __name__,
-    {
-        "foot_source": "ICM20649_NOISE",
-        "front_end": "FrontEnd FrontEndCounts",
-        "heading_filter": "FOOT HeadingFilter",
-        "wearer": "Alarm AlarmKind AlarmReason WearerWatch",
-    },
-)
+__getattr__ = face(__name__)

@@ -61,6 +61,6 @@ class BeltAngle:
 
 
 def _unbroken(times: Floats) -> bool:
-    """Whether times (n,) go on without a gap."""
+    """Whether times (n,) have no gap."""
     steps = np.diff(times)
     return bool(((steps > 0.0) & (steps <= GAP_S)).all())

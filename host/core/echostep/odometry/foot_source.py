@@ -15,6 +15,7 @@ from echostep.board.calibration import ImuSettings
 from echostep.board.foot_board import FootBoardReader
 from echostep.foot.ins import Noise
 from echostep.ports.chunks import FOOT, MTX, Portion
+from echostep.ports.imu_samples import ImuSamples
 from echostep.xsens import MtBatch, MtxCounts, MtxReader
 
 # Differences from an MTx, which was calibrated by its maker: cross-axis sensitivity 2 %, sensitivity within 1.5 %, zero rate within 5 deg/s (three
@@ -61,3 +62,10 @@ class FootSource:
             return FootSamples(samples.ticks, samples.accel, samples.gyro, mag, from_board.rows_of(samples.end))
         batch: MtBatch = self.mtx.feed_batch(from_mtx.received)
         return FootSamples(batch.counter, batch.accel, batch.gyro, batch.mag, from_mtx.rows_of(batch.end))
+
+    def take(self, samples: ImuSamples) -> FootSamples:
+        """Samples of another foot IMU that pass the gates of an MTx's; none where a foot board is worn."""
+        self.port = self.port or MTX
+        used = slice(0 if self.port == FOOT else None)
+        batch = self.mtx.take(samples.counter[used], samples.accel[used], samples.gyro[used])
+        return FootSamples(batch.counter, batch.accel, batch.gyro, batch.mag, batch.end)

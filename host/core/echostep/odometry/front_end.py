@@ -38,6 +38,7 @@ from echostep.odometry.synchronizer import BAROMETER, MEASUREMENT, Synchronizer
 from echostep.odometry.wearer import WearerWatch
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, LINES, MTX, TEAM, Portion
+from echostep.ports.imu_samples import ImuSamples
 from echostep.ports.people.check_in import PERSON
 from echostep.ports.people.meeting import MEETING
 from echostep.ports.people.team_beacons import TEAM_BEACONS
@@ -65,7 +66,7 @@ class FrontEndCounts:
     clock_steps: int = 0  # of the host's clock
     barometer_jumps: int = 0  # right after its start: the heights before them are not used
     stray_edges: int = 0  # on the board's SyncOut input, not from the MTx
-    foot_doubts: tuple[str, ...] = ()  # what is wrong with the foot's sensor or its place, a sentence each
+    foot_doubts: tuple[str, ...] = ()  # faults of the foot's sensor or its mounting, a sentence each
 
 
 class FrontEnd:
@@ -129,11 +130,21 @@ class FrontEnd:
         # Decode: bytes of each port -> board frames, the foot's samples.
         from_board = portion.of(BOARD)
         frames, samples = self.board.frames(from_board.received), self._read_foot(portion)
+        return self._process(frames, from_board.rows_of(frames.end), samples, portion.t_arrival_ns)
+
+    def process_samples(self, samples: ImuSamples) -> list[MeasuredSegment | Dropout]:
+        """The same for the samples of a foot IMU, which need no decoding."""
+        foot, no_frames = self.foot_source.take(samples), self.board.frames(b"")
+        return self._process(no_frames, no_frames.end, foot, samples.t_arrival_ns)
+
+    def _process(
+        self, frames: Frames, frame_chunk: Ints, samples: FootSamples, t_arrival_ns: Ints
+    ) -> list[MeasuredSegment | Dropout]:
+        """Segments and dropouts from decoded messages; `frame_chunk` (n,): index in `t_arrival_ns` of each frame."""
         if not len(frames.id) and not len(samples.value):
             return []
         # Time: ticks, sample counters and arrival times -> t_s of every message.
-        board = _board_arrivals(frames, from_board.rows_of(frames.end), portion.t_arrival_ns)
-        mtx = _foot_arrivals(samples, portion.t_arrival_ns)
+        board, mtx = _board_arrivals(frames, frame_chunk, t_arrival_ns), _foot_arrivals(samples, t_arrival_ns)
         times = self.timeline.times(board, mtx)
         self._count_bad_times(board, times)
         self._advance_clock(times)

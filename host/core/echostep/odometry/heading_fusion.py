@@ -49,7 +49,7 @@ class HeadingFusion:
         self._growth = 0.0  # variance of the foot's turn since then, rad2
         self._share = 0.0  # of the foot's turn error that the last stance has taken out, and the next is expected to
         self._promised = 0.0  # variance (rad2) that steps since the last stance did not state
-        self._owed = 0.0  # the part of it that was not taken out
+        self._owed = 0.0  # its part that was not removed
         self._refused = 0  # stances in a row
         self._stances: list[StanceHeadings] = []  # since the last step
 

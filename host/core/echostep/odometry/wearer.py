@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A watch over the wearer beside the tracker: receives samples, segments and taps as they come. This one does nothing with them.
+"""Interface of a watch over the wearer: receives samples, segments and taps as they come, and ignores them.
 
 In: samples of foot, legs and belt and segments of the path, each with the index of the message that brought it; taps. Out: an `Alarm`, None while
 all is well. Owns nothing. A watch that is handed to the tracker overrides the methods that concern it.

@@ -46,7 +46,7 @@ FASTEST_WALK_M_S = 8.0  # median speed of the foot over a step
 FORCED_SAMPLES = 5  # samples of rest accepted against the innovation gate
 LOST_SHARE = 0.2  # standard deviation of the end over the length of the path
 HIGHEST_STEP_M = 1.0  # median rise of a step
-GLIDING_SHARE = 0.85  # of rest in a contradictory walk: a foot that glides more slowly than its sensor tells from rest
+GLIDING_SHARE = 0.85  # of rest in a contradictory walk: a foot that glides too slowly for its sensor
 NEEDED = "zero-velocity navigation needs a foot that stands in each step"
 LEAST_FAULT = 0.1  # excess of the force at rest that may be why a track is no foot's
 
@@ -60,7 +60,7 @@ def whole_rows(table: Floats) -> tuple[Floats, tuple[str, ...]]:
 
 
 def sorted_by_time(table: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """The rows sorted by time, with a note, if that makes the times regular. Raises ValueError for a clock that began anew."""
+    """The rows sorted by time, with a note, if that makes the times regular. Raises ValueError for a clock that restarted."""
     t_s = table[:, TIME]
     back = int((np.diff(t_s) < 0.0).sum())
     if back == 0:

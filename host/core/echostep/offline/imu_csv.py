@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A recorded foot IMU as a CSV file: samples checked and read, the track written and described.
 
-In: columns `t_s,ax,ay,az,gx,gy,gz[,mx,my,mz]` (s, m/s2, rad/s, any unit), 50 to 500 Hz, any mounting. Out: `Imu` with notes on what was
-mended, or an EchostepError; the track as CSV and in words. Owns nothing. `imu_checks` holds the checks.
+In: columns `t_s,ax,ay,az,gx,gy,gz[,mx,my,mz]` (s, m/s2, rad/s, any unit), 50 to 500 Hz, any mounting. Out: `Imu` with notes on corrections, or an
+EchostepError; the track as CSV and in words. Owns nothing. `imu_checks` holds the checks.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ TRACK_COLUMNS = ("t_s", "x", "y", "z", "heading_rad", "stance")
 class Imu:
     """`t_s` (n,), `accel` (n, 3) m/s2, `gyro` (n, 3) rad/s, `mag` (n, 3) of any unit or None, NaN where it has no number.
 
-    `notes`: what was found and mended, a line each.
+    `notes`: findings and corrections, a line each.
     """
 
     t_s: Floats
@@ -47,7 +47,7 @@ class Imu:
 
 
 def load_imu(path: Path | str, header: HeaderReader = own_header) -> Imu:
-    """Samples of a CSV file; raises EchostepError that names the file, the column and what is wrong with it."""
+    """Samples of a CSV file; raises EchostepError that names file, column and fault."""
     return open_samples(path, lambda file: imu_of(*_table(lines_of(file, LIMITS), header)))
 
 

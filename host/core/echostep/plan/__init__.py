@@ -5,6 +5,7 @@ In: a plan file. Out: `Plan`: levels of walls, doors, rooms and connectors, in m
 """
 
 from echostep.plan.model import (
+    ANY_LEVEL,
     FORMAT_VERSION,
     NO_PLAN,
     Connector,
@@ -22,22 +23,3 @@ from echostep.plan.model import (
     parse_plan,
     sides,
 )
-
-__all__ = [
-    "FORMAT_VERSION",
-    "NO_PLAN",
-    "Connector",
-    "ConnectorKind",
-    "Door",
-    "DoorState",
-    "Georeference",
-    "Level",
-    "Plan",
-    "Pose",
-    "Question",
-    "Room",
-    "is_no_plan",
-    "load_plan",
-    "parse_plan",
-    "sides",
-]

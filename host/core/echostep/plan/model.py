@@ -112,7 +112,7 @@ class Level:
     def heard(self) -> Floats:
         """All segments that echoes are compared with: the solid ones, and the doubtful walls of a drawing.
 
-        The distance of doubtful walls from places beside them is known better than their place in the building.
+        The distance of doubtful walls from nearby places is known better than their place in the building.
         """
         if not len(self.place_sd) or self.is_refused:
             return self.solid
@@ -139,6 +139,9 @@ class Connector:
     name: str
     levels: tuple[int, ...]
     outline_m: Floats = field(repr=False)
+
+
+ANY_LEVEL = -1  # of a pose whose level is not known
 
 
 @dataclass(frozen=True, slots=True)

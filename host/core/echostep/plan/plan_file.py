@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The fields of plan.json: `plan/model.py` makes a `Plan` from them.
 
-In: nothing. Out: structs whose types check each field, and say what it is. Owns the limits.
+In: nothing. Out: structs whose types check and describe each field. Owns the limits.
 """
 
 from __future__ import annotations

@@ -16,14 +16,4 @@ if TYPE_CHECKING:
     from echostep.recording.mcap_records import MCAP_MAGIC
     from echostep.recording.reading import Recording, open_recording
 
-__getattr__ = face(
-    __name__,
-    {
-        "being_written": "SUFFIX is_being_written",
-        "capture": "Decoder as_json port_of_bytes read_capture",
-        "clock": "clock_of log_offset_ns utc_offset_ns with_log_time",
-        "joining": "open_parts",
-        "mcap_records": "MCAP_MAGIC",
-        "reading": "Recording open_recording",
-    },
-)
+__getattr__ = face(__name__)

@@ -24,11 +24,11 @@ from echostep.xsens import FrameReader, MtMessage, MtxReader
 from echostep.xsens.frames import LONGEST
 from echostep.xsens.message import MessageReader, as_object
 
-# Of the bytes of a port are in frames: by chance a checksum of one byte is right in one of 256 places; assumed
+# Least share of a port's bytes in valid frames: a one-byte checksum is right by chance once in 256; assumed
 LEAST_SHARE = 0.1
 READ_BYTES = 1 << 16  # of one read of the file: many frames, little memory
 HEAD_BYTES = 1 << 20  # of a port, by which the output format of legacy data is found; assumed
-BOARD_FRAME, MT_FRAME = 10, 5  # approximate bytes of a frame besides the body, to compare what two readers understood
+BOARD_FRAME, MT_FRAME = 10, 5  # approximate bytes of a frame besides the body, to compare two readers
 MESSAGE_NAMES: dict[type, str] = {kind: kind.__name__ for kind in BY_ID.values()}
 Chunks = Iterator[tuple[str, bytes]]  # port, bytes
 
@@ -109,7 +109,7 @@ def port_of_bytes(path: Path, least_share: float = LEAST_SHARE) -> str | None:
 
 
 def _port_that_sends(path: Path) -> str:
-    """The port of which any frame is found: whoever decodes a file knows what it is. Raises EchostepError where there is none."""
+    """The port of which any frame is found: the caller knows the kind of the file. Raises EchostepError where there is none."""
     if (port := port_of_bytes(path, 0.0)) is None:
         raise EchostepError(f"{path}: neither board frames nor Xbus frames nor an MCAP recording")
     return port

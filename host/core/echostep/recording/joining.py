@@ -39,7 +39,7 @@ class JoinedRecording(Recording):
         return [path for part in self.parts for path in part.to_repair()]
 
     def damage(self) -> list[str]:
-        """What is wrong with each part, and which are missing."""
+        """Damage of each part, and missing parts."""
         return [*(f"{part.path.name}: {line}" for part in self.parts for line in part.damage()), *self._missing()]
 
     def damage_notes(self) -> list[str]:

@@ -35,9 +35,9 @@ LOG_TIME_OFFSET = 6  # in the body of a message
 CHANNEL_IDS = 1 << 16  # a channel number has 16 bits
 
 METADATA_NAME = "echostep"  # of the metadata record
-# Of a second one, at the end: what was wrong with the recording from which this one was made
+# Of a second one, at the end: damage of the recording from which this one was made
 DAMAGE_NAME = "echostep.damage"
-PART_NAME = "echostep.part"  # of a record at the end of a part: which file goes on, as the value of `NEXT`
+PART_NAME = "echostep.part"  # of a record at the end of a part: the next file, as the value of `NEXT`
 RUN, PART, NEXT = "run", "part", "next"  # metadata keys of a recording in parts: its first file, the number of the part
 LIBRARY = "echostep"  # in the header: it numbers the messages of all channels together
 RAW_ENCODING = "application/octet-stream"  # message encoding of the ports' channels

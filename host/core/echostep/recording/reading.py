@@ -2,7 +2,7 @@
 """A recording read again: its metadata, and its chunks as portions.
 
 In: an MCAP file, from our recorder or rewritten by another tool, possibly damaged. Out: the chunks that are readable, in the order in which they were
-recorded, and what is wrong with the file. Owns nothing.
+recorded, and the damage of the file. Owns nothing.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Recording:
     own_damage: FileDamage = field(default_factory=FileDamage)  # of this very file
     fraction: float = 0.0  # of the file, read so far
     grows: bool = False  # it is being written: reading ends before an unfinished record
-    resume: int = -1  # offset from which `portions_from` goes on after the last portion; -1 inside a compressed chunk
+    resume: int = -1  # offset from which `portions_from` continues after the last portion; -1 inside a compressed chunk
     library: str = ""  # that wrote the file
     goes_on_in: str = ""  # name of the file with the next part of the run
     before: list[str] = field(default_factory=list)  # damage of the recordings from which this one was made
@@ -132,7 +132,7 @@ class Recording:
                     return
                 if opcode == Opcode.DATA_END and (matches := checksum_matches(file, begin)) is not None:
                     self.own_damage.altered |= not matches
-                    if matches:  # whatever follows, everything before it is there
+                    if matches:  # everything before it is complete
                         self._ended = True
                         return
                 if opcode == Opcode.CHUNK:
@@ -141,7 +141,7 @@ class Recording:
             yield record
 
     def _note(self, opcode: int, body: bytes) -> None:
-        """Keep the recorder's name, its clock, earlier damage, and which file goes on; other metadata are read when the recording is opened."""
+        """Keep the recorder's name, its clock, earlier damage, and the name of the next file; other metadata are read at the opening."""
         if opcode == Opcode.HEADER and (header := parse_record(Header, body)):
             self.library = header.library
         if opcode == Opcode.METADATA and (stored := parse_record(Metadata, body)):
@@ -170,7 +170,7 @@ class Recording:
     def _marked(
         self, records: Iterator[MessageRun | tuple[int, bytes]], end: int
     ) -> Iterator[MessageRun | tuple[int, bytes]]:
-        """The records of a compressed chunk that ends at `end`: reading can go on only after the last one."""
+        """The records of a compressed chunk that ends at `end`: reading can continue only after the last one."""
         before = next(records, None)
         self.resume = -1
         while before is not None:

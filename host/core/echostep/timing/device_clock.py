@@ -27,10 +27,10 @@ from echostep.timing.arrival_envelope import CONFIRMING, KEPT_BUCKETS, ArrivalCl
 # Assumed, not measured.
 AHEAD_S = 1.0  # a counter further ahead of its arrival contradicts it; the arrivals of a run agree to this
 BEHIND_S = 1.0  # greatest age of a message relative to the newest one: a ping is sent after its ranging
-SMOOTH_S = 1.0  # a counter that is at most this far from the newest goes on from it
+SMOOTH_S = 1.0  # a counter that is at most this far from the newest continues it
 RATE_ERROR = 400e-6  # s/s, greatest difference of two crystals over a gap
 MOST_OF_A_WRAP = 0.125  # of the tolerance: beyond it, after a week, any arrival would agree with some number of wraps
-BACKLOG_S = 1.0  # late arrivals of a counter that goes on are believed after this time: a process that was stopped reads its backlog in less
+BACKLOG_S = 1.0  # late arrivals of a continuous counter are accepted after this time: a process that was stopped reads its backlog in less
 
 
 class DeviceClock(ArrivalClock, Protocol):
@@ -94,7 +94,7 @@ def _elapsed_s(clock: DeviceClock, t_arrival_ns: int) -> float:
 def _agrees(clock: DeviceClock, delta: int, late_s: float, wraps: int) -> bool:
     """Whether an arrival agrees with a counter `delta` counts from the newest one.
 
-    Whole wraps need confirmation where the counter goes on, and where they are so many that any arrival would agree.
+    Whole wraps need confirmation where the counter is continuous, and where there are so many that any arrival would agree.
     """
     if wraps > 0 and delta * clock.unit_s <= SMOOTH_S:
         return False
@@ -106,7 +106,7 @@ def _agrees(clock: DeviceClock, delta: int, late_s: float, wraps: int) -> bool:
 
 @part
 def _is_old(clock: DeviceClock, delta: int, late_s: float) -> bool:
-    """Whether counter and arrival both belong to a time before the newest message: it stands twice in a recording, or in the wrong place.
+    """Whether counter and arrival both belong to a time before the newest message: it is duplicated or displaced in a recording.
 
     A counter that seems to be `delta` ahead is then behind by whole wraps less `delta`, and its arrival is as much earlier.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""SyncOut edges: which edge belongs to which MTx sample, and so the time of each sample.
+"""Assignment of SyncOut edges to MTx samples, which gives the time of each sample.
 
 In: edges that the board has timed; sample counters with their time by arrival. Out: times of samples. Owns nothing: the caller keeps the
 `SyncEdges`.
@@ -8,8 +8,8 @@ The MTx gives one edge per sample, so counter - edge count is a constant offset 
 offset of the edge nearest to its time by arrival. An offset with more than half of the last `VOTES` votes is locked. Then the time of a sample is
 the time of its edge; if the board has not reported that edge, it is extrapolated from the newest edge by the measured period.
 
-An edge that comes too early is not from the MTx, but interference on the wire: it is left out, and the count goes on without it. Taken for a sample,
-it would move the times of half a second by a period, and turn a swinging foot by 0.1 rad.
+An edge that comes too early is not from the MTx, but interference on the wire: it is not counted. Taken for a sample, it would move the times of half
+a second by a period, and turn a swinging foot by 0.1 rad.
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ class Times(NamedTuple):
 
 
 class Timeline:
-    """`t_s` for everything that arrives; equal messages in equal order get equal times, in whatever portions they come."""
+    """`t_s` of each message; it does not depend on the portions in which messages come."""
 
     def __init__(self, timing: MtxTiming) -> None:
         self.timing = timing
@@ -106,7 +106,7 @@ class Timeline:
 
     @property
     def clock_steps(self) -> int:
-        """Steps of the host's clock, or periods in which it stood still."""
+        """Steps and standstills of the host's clock."""
         return int(self._board["steps"] + self._mtx["steps"])
 
     @property

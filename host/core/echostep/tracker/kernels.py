@@ -15,7 +15,7 @@ from echostep.board.frames import encode
 from echostep.board.gateway import BeaconReading
 from echostep.board.messages import Outcome, Ping
 from echostep.foot.steps import walk_track
-from echostep.localization import Building, Start, call_kernels
+from echostep.localization import Building, MapFilter, Start
 from echostep.odometry import FrontEnd
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import NO_PLAN, Plan, Pose, load_plan
@@ -48,7 +48,7 @@ def board_and_clocks() -> None:
 def cloud() -> None:
     """Particles and their rangers' bias; without a plan, for its walls are another part."""
     _filter(NO_PLAN, KNOWN).update(measured())
-    call_kernels()
+    MapFilter.call_kernels()
 
 
 def search() -> None:
@@ -64,8 +64,7 @@ def beacons() -> None:
 
 
 def _filter(plan: Plan, start: Start) -> AidedFilter:
-    laid_out = lay_out_levels(plan)
-    return AidedFilter(Building(laid_out.walls, laid_out.sheet), start, 0.0, np.random.default_rng(0))
+    return AidedFilter(Building.of(plan, lay_out_levels(plan)), start, 0.0, np.random.default_rng(0))
 
 
 def measured() -> MeasuredSegment:

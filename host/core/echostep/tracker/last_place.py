@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from echostep.localization import Air, Estimate, TrackStatus
+from echostep.height.levels import Air
+from echostep.localization import Estimate, TrackStatus
 
 
 @dataclass(frozen=True, slots=True)

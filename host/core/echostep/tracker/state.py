@@ -15,7 +15,7 @@ from echostep.board.frames import FrameCounts
 from echostep.board.gateway import GatewayCounts
 from echostep.board.messages import Identity, Status
 from echostep.board.reports import BoardReports
-from echostep.localization import Estimate, Particles
+from echostep.localization import Estimate, MapFilter
 from echostep.odometry import Alarm, FrontEndCounts
 from echostep.path import PathSegment
 from echostep.ports.people.team_beacons import SharedBeacon
@@ -90,8 +90,9 @@ class ParticleSnapshot:
     log_weight: Floats
 
     @classmethod
-    def of(cls, cloud: Particles, most: int) -> ParticleSnapshot:
-        """A copy of at most `most` particles, evenly thinned."""
+    def of(cls, tracked: MapFilter, most: int) -> ParticleSnapshot:
+        """A copy of at most `most` particles of the tracked cloud, evenly thinned."""
+        cloud = tracked.cloud
         every = slice(None, None, max(1, math.ceil(len(cloud.x_m) / most)))
         x_m, y_m, log_weight = (each[every].copy() for each in (cloud.map_x_m, cloud.y_m, cloud.log_weight))
         return cls(x_m, y_m, cloud.level[every].copy(), log_weight)

@@ -29,25 +29,14 @@ from echostep.aiding import (
 from echostep.angles import wrap
 from echostep.arrays import Floats
 from echostep.board.gateway import BeaconReading, Gateway
+from echostep.echoes.rangers import echo_of
 from echostep.errors import EchostepError
-from echostep.localization import (
-    STATED,
-    Building,
-    DrawnPlaces,
-    Estimate,
-    FilterSettings,
-    Right,
-    Start,
-    TrackStatus,
-    echo_of,
-    estimate_of,
-    unobserved,
-)
+from echostep.localization import Building, Estimate, FilterSettings, Start, TrackStatus
 from echostep.odometry import FrontEnd, WearerWatch
-from echostep.offline.imu_chunks import ImuChunks
-from echostep.path import MeasuredSegment, PathSegment
+from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.plan import NO_PLAN, Plan, Pose
 from echostep.ports.chunks import FOOT, GATEWAY, TEAM, Chunk, Portion, portion_of
+from echostep.ports.imu_samples import SampleCounter
 from echostep.ports.people.check_in import HEADING_SD_RAD, PERSON, Call, CheckIn, Undo, parse_person
 from echostep.ports.people.meeting import MEETING
 from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon
@@ -88,10 +77,10 @@ class Tracker:
         self.start = self._start_of(start or plan.start, waits)
         self.front_end = FrontEnd(s.mtx, s.ranger, s.foot, s.gait, s.wearer, s.gyro, s.iron, s.imus)
         self.laid_out = lay_out_levels(plan)
-        self._building = Building(self.laid_out.walls, self.laid_out.sheet, DrawnPlaces(plan.levels))
+        self._building = Building.of(plan, self.laid_out)
         self.filter: AidedFilter | None = None  # from the first segment on
         self.gateway = Gateway()
-        self._imu = ImuChunks(s.mtx.rate_hz)  # for `feed_samples`
+        self._imu = SampleCounter(s.mtx.rate_hz)  # for `feed_samples`
         self.watchers: list[Watch] = []  # called in this order
         self.team_watchers: list[Callable[[bytes], None]] = []  # called with each chunk of the port TEAM
         self._readings: list[BeaconReading] = []  # waiting for their segment
@@ -160,7 +149,7 @@ class Tracker:
 
     def particles(self, most: int) -> ParticleSnapshot | None:
         """A copy of at most `most` particles, evenly thinned; None before the first segment."""
-        return None if self.filter is None else ParticleSnapshot.of(self.filter.cloud, most)
+        return None if self.filter is None else ParticleSnapshot.of(self.filter, most)
 
     def beacon_places(self, t_s: float) -> list[BeaconPlace]:
         """Every beacon with a known place, as the particles believe it at `t_s`."""
@@ -190,7 +179,9 @@ class Tracker:
 
     def feed_samples(self, t_s: Floats, accel: Floats, gyro: Floats) -> list[Estimate]:
         """Process any number of a foot IMU's samples: t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s, body frame [`Settings.of_imu`]."""
-        return self.take(portion_of(list(self._imu.of(t_s, accel, gyro))))
+        estimates = self._published(self.front_end.process_samples(self._imu.of(t_s, accel, gyro)))
+        self.watch.advance()
+        return estimates
 
     def take(self, portion: Portion) -> list[Estimate]:
         """Process many chunks; the estimates are the same as for the chunks one by one."""
@@ -217,16 +208,21 @@ class Tracker:
 
     def _track(self, portion: Portion) -> list[Estimate]:
         """Estimates from a portion in which only the last chunk may be the gateway's: its readings are used from the next portion on."""
-        estimates: list[Estimate] = []
         # Odometry: chunks -> segments of the trunk's path with their pings, and dropouts.
-        for piece in self.front_end.process(portion):
-            if isinstance(piece, MeasuredSegment):
-                estimates += self._follow(piece)
-            elif self._estimate is not None:
-                estimates.append(self._publish(None, unobserved(self._estimate, piece.t_s)))
+        estimates = self._published(self.front_end.process(portion))
         # Beacons: bytes of the gateway -> readings.
         if received := portion.of(GATEWAY).received:
             self._readings += self.gateway.read(received, self.front_end.newest_s)
+        return estimates
+
+    def _published(self, pieces: list[MeasuredSegment | Dropout]) -> list[Estimate]:
+        """Estimates of new segments, and after dropouts."""
+        estimates: list[Estimate] = []
+        for piece in pieces:
+            if isinstance(piece, MeasuredSegment):
+                estimates += self._follow(piece)
+            elif self._estimate is not None:
+                estimates.append(self._publish(None, self._estimate.unobserved(piece.t_s)))
         return estimates
 
     def _follow(self, measured: MeasuredSegment) -> list[Estimate]:
@@ -286,7 +282,7 @@ class Tracker:
         """
         self._published_s = max(self._published_s, new.t_s)
         if new.t_s < self._published_s - LATE_S:
-            new = unobserved(new, self._published_s)
+            new = new.unobserved(self._published_s)
         new = new if new.t_s == self._published_s else replace(new, t_s=self._published_s)
         for watch in self.watchers:
             watch(measured, new)
@@ -338,7 +334,7 @@ class Tracker:
         self.filter = self._filter_at(check_in, segment.heading1_rad)
         self._check_in_s = self.front_end.newest_s
         t_s = max(segment.t1_s, self._estimate.t_s) if self._estimate else segment.t1_s
-        self._estimate = estimate_of(self.filter.cloud, t_s, segment.heading1_rad, segment.step, 0.0, Right(STATED))
+        self._estimate = self.filter.stated(t_s, segment.heading1_rad, segment.step)
         return [self._publish(MeasuredSegment(segment, *NO_PINGS), self._estimate)]
 
     def _undo(self, before: BeforeCheckIn) -> list[Estimate]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Data of the run in a recording, beside the bytes: start, seed, settings; and the tracker of a replay.
+"""Data of the run in a recording besides the bytes: start, seed, settings; and the tracker of a replay.
 
 In: a recording's text fields. Out: start, seed, `Tracker`. Owns nothing. The names of the fields are part of the file format.
 """
@@ -15,8 +15,9 @@ import numpy as np
 from msgspec import Meta
 
 from echostep.errors import EchostepError
-from echostep.localization import ANY_LEVEL, Air, Start
-from echostep.plan import Plan, Pose
+from echostep.height.levels import Air
+from echostep.localization import Start
+from echostep.plan import ANY_LEVEL, Plan, Pose
 from echostep.recording import Recording
 from echostep.settings import Settings, parse_settings, read_settings
 from echostep.tracker import Tracker

@@ -17,7 +17,7 @@ import numpy as np
 from echostep.additions import added
 from echostep.errors import EchostepError
 from echostep.file_mode import claim
-from echostep.localization import Estimate, claims_place
+from echostep.localization import Estimate
 from echostep.plan import Plan
 
 Columns = dict[str, list[Any]]
@@ -26,7 +26,7 @@ COLUMNS = (
     "protection_m", "right", "outside", "plan_fits",
 )  # fmt: skip
 HYPOTHESES = "hypotheses"  # the last column: probability:x,y,level of each place that fits
-PLACE = ("longitude_deg", "latitude_deg")  # columns beside those of track.csv, where the plan has a georeference
+PLACE = ("longitude_deg", "latitude_deg")  # additional columns, where the plan has a georeference
 
 
 def columns_of(estimates: list[Estimate], plan: Plan) -> Columns:
@@ -39,7 +39,7 @@ def columns_of(estimates: list[Estimate], plan: Plan) -> Columns:
         if earth := earth_of(plan):  # pyproj is installed
             degrees = earth.degrees(np.array([(e.x_m, e.y_m) for e in estimates]))
             for name, column in zip(PLACE, degrees.T.tolist(), strict=True):
-                columns[name] = [v if claims_place(e) else None for v, e in zip(column, estimates, strict=True)]
+                columns[name] = [v if e.claims_place else None for v, e in zip(column, estimates, strict=True)]
     return columns
 
 

@@ -292,7 +292,7 @@ def _add_points(
     limits: Limits,
     sources: SourceList,
 ) -> int:
-    """Corners and edges of unit u up to `reach_m`, beside n sources found before; the new number."""
+    """Corners and edges of unit u up to `reach_m`, after the n sources found before; the new number."""
     px, py, ax, ay = receiver
     for position in range(points.start[u], points.start[u + 1]):
         i = points.order[position]
@@ -315,7 +315,7 @@ def _add_points(
 
 @inline_part
 def hidden(px: float, py: float, qx: float, qy: float, walls: Floats, table: SourceTable, i: int) -> bool:
-    """Whether one of the walls that can hide row i stands between p and q."""
+    """Whether one of the walls that can hide row i lies between p and q."""
     for j in range(table.screen_start[i], table.screen_start[i + 1]):  # noqa: SIM110 (numba)
         if segments_cross(px, py, qx, qy, walls, table.screens[j]):
             return True

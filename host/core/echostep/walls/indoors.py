@@ -34,13 +34,13 @@ class Indoors:
 
 
 def indoors(floor: Floor) -> Indoors | None:
-    """The cells of a floor that walls enclose, and those under the walls beside them; None if walls enclose none."""
+    """The cells of a floor that walls enclose, and those under adjacent walls; None if walls enclose none."""
     x_m, y_m = floor.x_m[floor.enclosed], floor.y_m[floor.enclosed]
     return inside_grid(x_m, y_m) if len(x_m) else None
 
 
 def inside_grid(x_m: Floats, y_m: Floats) -> Indoors:
-    """The grid of cells with these centres (n,), n > 0, and of the cells under the walls beside them."""
+    """The grid of cells with these centres (n,), n > 0, and of the cells under adjacent walls."""
     margin = WALL_CELLS + 1
     west_m, south_m = (float(v.min()) - (margin + 0.5) * CELL_M for v in (x_m, y_m))
     column, row = (np.rint((v - low) / CELL_M - 0.5).astype(np.int64) for v, low in ((x_m, west_m), (y_m, south_m)))

@@ -2,7 +2,7 @@
 """Polylines (k, 2) in metres: length, the point at a distance along them, the nearest point.
 
 In: polylines, points. Out: lengths, points, distances. Used by guidance, routing and simulation. Owns nothing.
-The turn to a point ahead on a path is that of [Fischer 2008, Figure 8]: `Guide` and the study of guided returns call the same kernel.
+The turn to a point ahead on a path follows [Fischer 2008, Figure 8]: `Guide` and the study of guided returns call the same kernel.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ Owns the unfinished frame and the counts. No module here opens a port or waits.
 Sources, cited by these names:
 LLCP: Xsens, "MT Low-Level Communication Protocol Documentation", MT0101P (legacy messages: revisions up to U).
 Manual: Xsens, "MTi and MTx User Manual and Technical Documentation", MT0100P.N.
-CMT: the constants of Xsens' public C++ SDK (cmtdef.h), for what both documents omit.
+CMT: the constants of Xsens' public C++ SDK (cmtdef.h), for fields that both documents omit.
 """
 
 from echostep.xsens.frames import MTDATA, MTDATA2, Frame, FrameReader, encode_frame

@@ -81,7 +81,7 @@ class MtMessage(NamedTuple):
 
 @dataclass(slots=True)
 class MessageReader:
-    """Messages of a byte stream, and what was counted: `names` of the messages by bus and name, `unread` payloads, `gaps` by bus."""
+    """Messages of a byte stream, and counts: `names` of the messages by bus and name, `unread` payloads, `gaps` by bus."""
 
     formats: OutputFormats = field(default_factory=OutputFormats)
     names: Counter[tuple[int, str]] = field(default_factory=Counter)
@@ -196,7 +196,7 @@ def _quaternion(row: Floats) -> Quaternion:
 
 
 def as_object(message: MtMessage) -> dict[str, object]:
-    """The message as JSON: what was sent, with the bus unless it is a single device's, and bytes as hex."""
+    """The message as JSON: its sent fields, the bus unless the device is alone, bytes as hex."""
     sent = {
         "counter": message.counter,
         "accel": message.accel,

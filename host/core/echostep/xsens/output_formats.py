@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The output format of the MTData in a capture, which the messages do not contain.
 
-In: frames of a capture's beginning, and what the caller knows. Out: the format by bus and length, and how it was found. Owns the formats found.
+In: frames of a capture's beginning, and the caller's knowledge. Out: the format by bus and length, and how it was found. Owns the formats found.
 
 It is, in this order: given; from a Configuration message or the answers to ReqOutputMode and ReqOutputSettings in the capture; or the simplest
 format of that length with which the values are possible. A capture that states a format which is not read has none.
@@ -192,7 +192,7 @@ def _complexity(output: OutputFormat) -> tuple[int, ...]:
 
 
 def _is_measured(rows: Octets, output: OutputFormat) -> bool:
-    """Whether the floats of most messages are zero or larger than TINY: those of a date are smaller."""
+    """Whether the floats of most messages are zero or larger than TINY: the bytes of a date give smaller ones."""
     if output.settings & mt.FIXED_12_20:
         return True
     with np.errstate(invalid="ignore"):

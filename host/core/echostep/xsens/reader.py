@@ -16,7 +16,17 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.xsens import gates
 from echostep.xsens import mtdata as mt
-from echostep.xsens.frames import ERROR, MTDATA, MTDATA2, WAKE_UP, FrameReader, MtFrames, copy_payloads, encode_frame
+from echostep.xsens.frames import (
+    BUS_ID,
+    ERROR,
+    MTDATA,
+    MTDATA2,
+    WAKE_UP,
+    FrameReader,
+    MtFrames,
+    copy_payloads,
+    encode_frame,
+)
 from echostep.xsens.gates import Messages, apply_gates, joined
 from echostep.xsens.mtdata import Decoded, OutputFormat, decode_mtdata, pack_mtdata
 from echostep.xsens.mtdata2 import decode_mtdata2, find_packets
@@ -139,9 +149,18 @@ class MtxReader:
     def feed_batch(self, received: bytes) -> MtBatch:
         """Measurements completed by these bytes."""
         frames = self._frames.scan(received)
-        if not len(frames.mid):
-            return EMPTY
-        messages = joined(self._waiting, self._decode(frames))
+        return self._gated(self._decode(frames)) if len(frames.mid) else EMPTY
+
+    def take(self, counter: Ints, accel: Floats, gyro: Floats) -> MtBatch:
+        """Measurements (n,) of which no bytes are known, through the same gates; `end` is the index of each."""
+        count = len(counter)
+        values, sent = np.full((count, mt.COLUMNS), np.nan), np.zeros((count, 4), np.bool_)
+        values[:, mt.ACCEL], values[:, mt.GYRO], sent[:, :2] = accel, gyro, True
+        return self._gated(Messages(values, counter, sent, np.full(count, BUS_ID), np.arange(count)))
+
+    def _gated(self, newer: Messages) -> MtBatch:
+        """The measurements among these messages and the one that waited."""
+        messages = joined(self._waiting, newer)
         passed, waits = apply_gates(messages, self._limits, self._state, self._tally)
         self._waiting = messages.at(np.arange(waits, waits + 1)) if waits >= 0 else gates.NO_MESSAGES
         values, counter, _, _, end = messages if passed.all() else messages.at(np.flatnonzero(passed))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Literal
 
 import numpy as np
@@ -64,13 +65,10 @@ class WornGyro:
 
 def _correlated(n: int, sd: float, over: float, rng: np.random.Generator) -> Floats:
     """A Gauss-Markov series (n,) of a standard deviation, correlated over `over` samples."""
-    from scipy.signal import lfilter
-
     correlation = math.exp(-1.0 / over)
     drawn = sd * math.sqrt(1.0 - correlation * correlation) * rng.standard_normal(n)
     drawn[0] = sd * rng.standard_normal()
-    noise: Floats = lfilter([1.0], [1.0, -correlation], drawn)
-    return noise
+    return np.fromiter(accumulate(drawn.tolist(), lambda last, new: correlation * last + new), np.float64, n)
 
 
 class Adis16100Model:

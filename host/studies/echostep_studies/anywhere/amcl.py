@@ -16,26 +16,19 @@ from statistics import median
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.jit import kernel
-from echostep.localization import (
-    ClimbSettings,
-    CloudSettings,
-    EchoModel,
-    EchoSettings,
-    Start,
-    TrackStatus,
-    echo_density,
-    echo_model,
-)
-from echostep.localization.height.levels import (
+from echostep.echoes.likelihood import EchoModel, EchoSettings, echo_density, echo_model
+from echostep.height.levels import (
     UNKNOWN_LAG_M2,
+    ClimbSettings,
     HeightArrays,
     HeightChange,
     change_levels,
     level_change_model,
 )
-from echostep.localization.particle_arrays import Move, ParticleArrays
-from echostep.localization.particles.kernels import (
+from echostep.jit import kernel
+from echostep.localization import CloudSettings, Start, TrackStatus
+from echostep.particles.arrays import Move, ParticleArrays
+from echostep.particles.kernels import (
     NOISE_BEND,
     MovePiece,
     begin_segment,
@@ -44,7 +37,6 @@ from echostep.localization.particles.kernels import (
     propagate,
     systematic,
 )
-from echostep.localization.particles.start import draw_poses
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Plan
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
@@ -130,7 +122,7 @@ class AugmentedMcl:
 
     def _draw(self, start: Start, count: int) -> tuple[Floats, Floats, Floats]:
         sheet = self._sheet if len(self._sheet.height_m) > 1 else None
-        return draw_poses(start, count, self._floor, sheet, self._rng)[:3]
+        return start.draw(count, self._floor, sheet, self._rng)[:3]
 
     def _move(self, segment: PathSegment, share: float) -> None:
         """A share of a segment, with the noise that the filter of this project adds."""

@@ -17,11 +17,11 @@ import numpy as np
 from echostep.errors import EchostepError
 from echostep.localization import Start
 from echostep.plan import Plan, Pose
+from echostep_simulation.world.tower import tower
 from echostep_studies.anywhere import plan_changes
 from echostep_studies.anywhere.kidnaps import Kidnapped, asleep_in_lift, carried, off_in_lift, restarted
 from echostep_studies.bench import echo_changes, sites
 from echostep_studies.bench.walks import SimulatedWalk, X, Y, simulate, simulate_with_gap
-from echostep_studies.simulation.tower import tower
 
 KIDNAP_AT_M = 35.0  # way before a kidnapping
 CARRIED_M = 20.0

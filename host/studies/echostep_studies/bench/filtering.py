@@ -15,7 +15,6 @@ import numpy as np
 
 from echostep.localization import (
     Building,
-    DrawnPlaces,
     Estimate,
     FilterSettings,
     MapFilter,
@@ -63,7 +62,7 @@ def track(segments: Sequence[MeasuredSegment], plan: Plan, start: Start, seed: i
     The CPU time is that of the updates, without the tables that a plan needs once.
     """
     laid_out = lay_out_levels(plan)
-    building = Building(laid_out.walls, laid_out.sheet, DrawnPlaces(plan.levels))
+    building = Building.of(plan, laid_out)
     settings = FilterSettings(plan_sd_m=plan.uncertainty_m or 0.0)
     warm = _new_filter(building, start, segments, settings, seed)
     for segment in segments[:WARM_UP]:

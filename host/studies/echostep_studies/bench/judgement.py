@@ -16,7 +16,8 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.localization import TrackStatus, in_ellipse95
+from echostep.localization import TrackStatus
+from echostep.particles.ellipse import in_ellipse95
 from echostep.plan import Plan
 from echostep_studies.bench.filtering import Claim
 

@@ -18,9 +18,9 @@ from echostep.arrays import Floats
 from echostep.plan import Level, Plan, Pose, load_plan
 from echostep_app.plan.routing import RoutePlace
 from echostep_simulation.people.walker import Waypoint
+from echostep_simulation.world.tower import CORRIDOR_Y, LENGTH_M, LIFT_AT, STOREY_M, tower
 from echostep_studies.bench.tours import random_tour
 from echostep_studies.simulation.sites import hall as hall_site
-from echostep_studies.simulation.tower import CORRIDOR_Y, LENGTH_M, LIFT_AT, STOREY_M, tower
 
 WESTPORT = Path("maps") / "westport-house.json"  # in the folder of the public recordings
 OFFICE_PLAN = Path(str(files("echostep"))) / "plans" / "demo.json"

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
+from echostep.echoes.likelihood import EchoModel, echo_density, outlier_density, planned_density
 from echostep.jit import kernel
-from echostep.localization import EchoModel, echo_density, outlier_density, planned_density
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.index import EAR_REACH_M, WallIndex
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization import EchoModel, EchoSettings, echo_density, echo_model
+from echostep.echoes.likelihood import EchoModel, EchoSettings, echo_density, echo_model
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep_app.output.table import console
 from echostep_studies.simulation.marker_walk import lay_markers, walk_markers

@@ -13,7 +13,7 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
-from echostep.localization import EchoModel
+from echostep.echoes.likelihood import EchoModel
 from echostep.walls.echo_sources import Walls
 from echostep_studies.echoes.known_pings import KnownPings, known_pings, log_densities
 from echostep_studies.echoes.sweeps import Sweep

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from msgspec import UNSET, UnsetType
 
-from echostep.localization import EchoSettings, echo_model
+from echostep.echoes.likelihood import EchoSettings, echo_model
 from echostep.walls.echo_sources import Walls
 from echostep_app.output.table import Table
 from echostep_simulation.world.acoustics import SRF02, directivity_db

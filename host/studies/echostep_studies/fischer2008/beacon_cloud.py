@@ -14,16 +14,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.aiding import BeaconSettings
-from echostep.aiding.beacons.beliefs import BeaconBeliefs, BeaconMeasurement, empty_beliefs, set_beliefs
-from echostep.aiding.beacons.model import BeaconModel, beacon_model
-from echostep.aiding.beacons.slam import initial_health, propose_heading_jumps
-from echostep.aiding.beacons.step import Beacons, no_waiting, update_by_reading
 from echostep.arrays import Floats, Ints
+from echostep.beacons.beliefs import BeaconBeliefs, BeaconMeasurement, empty_beliefs, set_beliefs
+from echostep.beacons.model import BeaconModel, BeaconSettings, beacon_model
+from echostep.beacons.slam import initial_health, propose_heading_jumps
+from echostep.beacons.step import Beacons, no_waiting, update_by_reading
 from echostep.jit import kernel, part
 from echostep.localization import CloudSettings
-from echostep.localization.particle_arrays import Move, ParticleArrays
-from echostep.localization.particles.kernels import systematic
+from echostep.particles.arrays import Move, ParticleArrays
+from echostep.particles.kernels import systematic
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex
 from echostep_simulation.world.beacon_ground import BeaconGround, is_in_reach, measure

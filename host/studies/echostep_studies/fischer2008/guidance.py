@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.aiding.beacons.step import mean_place
 from echostep.arrays import Floats
+from echostep.beacons.step import mean_place
 from echostep.jit import part
 from echostep.walls.polyline import nearest, turn_ahead
 from echostep_app.guidance.contact import Contact, allowed_silence, update_contact

@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from echostep.aiding.beacons.beliefs import X, Y
 from echostep.arrays import Bools, Floats
+from echostep.beacons.beliefs import X, Y
 from echostep.jit import kernel, part
 from echostep.walls.polyline import along, way_m
 from echostep_simulation.world.beacon_ground import BeaconGround

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.aiding import BeaconSettings
 from echostep.arrays import Floats, Ints
+from echostep.beacons.model import BeaconSettings
 from echostep.jit import kernel, part
 from echostep.walls.polyline import along, way_m
 from echostep_app.guidance.contact import CONTACT, Contact, start_contact

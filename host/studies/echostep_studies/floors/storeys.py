@@ -19,8 +19,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization import ANY_LEVEL, Estimate, TrackStatus
-from echostep.plan import Connector, Plan, Pose, load_plan
+from echostep.localization import Estimate, TrackStatus
+from echostep.plan import ANY_LEVEL, Connector, Plan, Pose, load_plan
 from echostep.ports.chunks import MTX, portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.tours import tour as tour_of
@@ -30,10 +30,10 @@ from echostep_app.scorecard.error_statistics import error_statistics
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import Person, Waypoint
 from echostep_simulation.scenario import Scenario
+from echostep_simulation.world.tower import tour, tower
 from echostep_studies.bench.sites import WESTPORT
 from echostep_studies.frame.report import LOST_END_M, Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
-from echostep_studies.simulation.tower import tour, tower
 
 STOREYS = 5
 REAL = "storeys/westport"  # name of the row of the real plan

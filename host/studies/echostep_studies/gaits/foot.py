@@ -14,7 +14,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.foot.steps import walk_track
-from echostep_studies.simulation.rolling_foot import MANNERS, Course, FootManner, course, samples
+from echostep_simulation.people.rolling_foot import MANNERS, Course, FootManner, course, samples
 
 STEPS, RATE_HZ = 40, 200
 SOFT_LIMIT_RAD_S, SHARPNESS = math.radians(540.0), 24.0  # as real foot sensors bend off, at 520 to 558 deg/s

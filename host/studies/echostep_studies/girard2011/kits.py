@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from echostep.board.messages import Part, Schedule
-from echostep.localization import EchoSettings
-from echostep.localization.echoes.rangers import ECHO_OF
+from echostep.echoes.likelihood import EchoSettings
+from echostep.echoes.rangers import ECHO_OF
 from echostep_app.output.table import Table
 from echostep_simulation.devices.srf02 import HALF_US
 from echostep_simulation.world.acoustics import MAXSONAR, PULSE_RANGER, SRF02, Acoustics

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization import Building, EchoSettings, FilterSettings, MapFilter, Start
+from echostep.echoes.likelihood import EchoSettings
+from echostep.localization import Building, FilterSettings, MapFilter, Start
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls

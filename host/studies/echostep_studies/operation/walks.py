@@ -26,9 +26,9 @@ from echostep_app.session.last_place import start_after
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import Manner, Person, Waypoint
 from echostep_simulation.scenario import START_NS, Scenario
+from echostep_simulation.world.tower import STOREY_M, tower
 from echostep_studies.bench.sites import LOBBY
 from echostep_studies.bench.tours import random_tour
-from echostep_studies.simulation.tower import STOREY_M, tower
 
 STOREYS = 3
 HALF_M = 400.0  # length of the way before the change of the battery, and of that after it: twenty minutes in all

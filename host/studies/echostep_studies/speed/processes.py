@@ -22,10 +22,10 @@ from echostep_studies.speed.comparison import Row, Scale
 FIRST_FIX = """
 import time
 import numpy as np
-from echostep.localization import EchoSettings, echo_model
-from echostep.localization.particle_arrays import ParticleArrays
-from echostep.localization.particles.kernels import begin_segment
-from echostep.localization.particles.reweighting import WeightedPing, reweight_by_ping
+from echostep.echoes.likelihood import EchoSettings, echo_model
+from echostep.particles.arrays import ParticleArrays
+from echostep.particles.kernels import begin_segment
+from echostep.echoes.reweighting import WeightedPing, reweight_by_ping
 from echostep.walls.echo_sources import MOST_SOURCES, SourceList, Walls
 x = np.linspace(0.5, 3.5, 300)
 index = Walls(np.array([[0.0, 0.0, 4.0, 0.0], [4.0, 0.0, 4.0, 3.0], [4.0, 3.0, 0.0, 3.0]])).near(x, x * 0.5)

@@ -26,13 +26,13 @@ from echostep.localization import Estimate, Start, TrackStatus
 from echostep.plan import Plan, Pose, load_plan
 from echostep_app.output.table import Table
 from echostep_app.plan.routing import RoutePlace
+from echostep_simulation.world.tower import tower
 from echostep_studies.bench import judgement, sites
 from echostep_studies.bench.judgement import FALSE_TRACKING_M, TruePlaces, true_levels
 from echostep_studies.bench.tours import random_tour
 from echostep_studies.bench.walks import T, X, Y, Z
 from echostep_studies.frame.report import Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
-from echostep_studies.simulation.tower import tower
 from echostep_studies.team.beacons import with_dropped_beacons
 from echostep_studies.team.tracking import LIAR, How, track_team
 from echostep_studies.team.walks import WEARERS, TeamWalks, team_walks

@@ -21,10 +21,10 @@ from echostep_app.mapping.plan import Walked, plan_of
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.writer import plan_json
 from echostep_simulation.people.walker import Waypoint
+from echostep_simulation.world.tower import CORRIDOR_Y, STOREY_M, stairs_from, tower
 from echostep_studies.bench.sites import Site
 from echostep_studies.bench.tours import clearance_m
 from echostep_studies.bench.walks import SimulatedWalk, simulate
-from echostep_studies.simulation.tower import CORRIDOR_Y, STOREY_M, stairs_from, tower
 
 pytestmark = pytest.mark.slow
 

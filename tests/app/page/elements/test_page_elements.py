@@ -12,7 +12,7 @@ import pytest
 import shapely
 
 from echostep.errors import EchostepError
-from echostep.localization import Estimate, LikelyPlace, Start, TrackStatus, claims_place
+from echostep.localization import Estimate, LikelyPlace, Start, TrackStatus
 from echostep.path import PathSegment
 from echostep.plan import Plan, Pose
 from echostep.ports.chunks import Chunk, portion_of
@@ -126,7 +126,7 @@ def test_a_cloud_in_search_waits_for_its_estimate(chunks: list[Chunk], start: St
                     ahead.particles.y_m, last.particles.y_m
                 )
                 is_ahead = (ahead.estimate.x_m, ahead.estimate.y_m) != (last.estimate.x_m, last.estimate.y_m)
-                assert is_ahead == claims_place(last.estimate)
+                assert is_ahead == last.estimate.claims_place
                 moved.append(not stands)
     assert len(moved) > 5
     assert (not any(moved)) if isinstance(start, Start) else all(moved)

@@ -3,45 +3,30 @@
 
 from __future__ import annotations
 
-import heapq
 import math
-import random
-from dataclasses import dataclass
-from operator import attrgetter
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from board_runs import ROOT
+from aiding.team.two_wearers import PLAN, Two, told, two_wearers
 from echostep.aiding import MOST_TEAMMATES, AidedFilter, MeetingEffect, MeetingQueue, TeamBeaconMap
 from echostep.aiding.team.meeting import Meeting
 from echostep.aiding.team.meeting_memory import RENEWED_M, MeetingMemory
 from echostep.board.gateway import BeaconReading
-from echostep.localization import Building, Estimate, Start, digest
+from echostep.localization import Building, Start, digest
 from echostep.localization.belief import Belief
 from echostep.path import Odometer
-from echostep.plan import Pose, load_plan
-from echostep.ports.chunks import Chunk, portion_of
-from echostep.ports.people.team_beacons import MOST_SHARED, TEAM_BEACONS, SharedBeacon, TeamBeacons, parse_team_beacons
+from echostep.plan import Pose
+from echostep.ports.chunks import Chunk
+from echostep.ports.people.team_beacons import MOST_SHARED, TEAM_BEACONS, SharedBeacon, parse_team_beacons
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import lay_out_levels
-from echostep_app.page.elements.marks import beacon_marks
-from echostep_simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
-from echostep_simulation.devices.board import PythonBoard
-from echostep_simulation.scenario import START_NS, Scenario
 
-PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 LAID_OUT = lay_out_levels(PLAN)
 BUILDING = Building(LAID_OUT.walls, LAID_OUT.sheet)
 BEACON = SharedBeacon(7, 4.0, 7.5, 0, 0.01, 0.0, 0.01)
-SEED = 5
-RUN = "0000beac"
-
-
-def told(*beacons: SharedBeacon, name: str = "kim") -> TeamBeacons:
-    return TeamBeacons(1, name, RUN, PLAN.digest, beacons)
 
 
 def a_range(range_m: float, number: int = 7, name: str = "kim") -> Meeting:
@@ -184,41 +169,9 @@ def test_hostile_messages_are_counted_and_change_nothing(payload: bytes) -> None
     assert tracker.front_end.counts.unknown_ports == 0
 
 
-@dataclass
-class Two:
-    """Two wearers who walk the same corridor: the first one lays beacons, the second one hears them."""
-
-    beacons: tuple[SharedBeacon, ...]
-    true_places: list[tuple[float, float]]
-    chunks: list[Chunk]
-    start: Pose
-
-    def run(self, message: TeamBeacons | None, size: int = 5000) -> tuple[Tracker, list[Estimate]]:
-        """The second wearer, whose start is known to 1 m, with the message at the beginning."""
-        tracker = Tracker(PLAN, Start(self.start, 1.0), seed=SEED)
-        first = [] if message is None else [Chunk(TEAM_BEACONS, self.chunks[0].t_arrival_ns, message.encode())]
-        chunks, found, rng = first + self.chunks, [], random.Random(SEED)
-        while chunks:
-            cut = rng.randrange(1, size)
-            found += tracker.take(portion_of(chunks[:cut]))
-            chunks = chunks[cut:]
-        return tracker, found
-
-
 @pytest.fixture(scope="module")
 def two() -> Two:
-    scenario = Scenario(PLAN, ((2.0, 7.5), (16.0, 7.5)), SEED, PythonBoard(seed=SEED))
-    truth = scenario.truth
-    places = lay_beacons(truth[:, 1:3], 5.0, np.random.default_rng(SEED))
-    arrival_ns = START_NS + np.rint(1e9 * truth[:, 0]).astype(np.int64)
-    world = BeaconWorld(places, PLAN.levels[0].walls)
-    said = gateway_chunks(world, truth[:, 0], truth[:, 1:3], arrival_ns, SEED)
-    chunks = list(heapq.merge(scenario.chunks(), said, key=attrgetter("t_arrival_ns")))
-    placing = Tracker(PLAN, scenario.start, seed=1)
-    placing.take(portion_of(chunks))
-    beacons = placing.own_beacons()
-    assert beacons is not None
-    return Two(beacons, [(x, y) for x, y, _ in places.tolist()], chunks, scenario.start)
+    return two_wearers()
 
 
 def test_placed_beacons_are_told_with_a_covariance_that_holds_their_errors(two: Two) -> None:
@@ -242,16 +195,3 @@ def test_a_run_with_a_teammates_beacons_is_the_same_in_any_portions(two: Two) ->
     assert tracker.state.meetings["beacon used"] >= 2
     assert tracker.state.met is None
     assert tracker.state.team_beacons == {"kim": two.beacons}
-
-
-@pytest.mark.slow
-def test_a_page_shows_the_teammates_beacons_that_are_not_its_own(two: Two) -> None:
-    far = SharedBeacon(99, 20.0, 2.0, 0, 0.04, 0.0, 0.01)
-    tracker, estimates = two.run(told(*two.beacons, far))
-    marks = {mark.number: mark for mark in beacon_marks(tracker, estimates[-1].t_s)}
-    assert (marks[99].by, marks[99].state, marks[99].heard) == ("kim", "well", False)
-    assert marks[99].radius95_m == pytest.approx(0.2 * math.sqrt(5.991), rel=1e-3)
-    own = [mark for mark in marks.values() if mark.by is None]
-    assert (
-        {mark.number for mark in own} == {tracker.gateway.numbers[p.slot] for p in tracker.beacon_places(0.0)} != set()
-    )

@@ -8,13 +8,13 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization import Air, ClimbSettings, Start
+from echostep.height.levels import UNKNOWN_LAG_M2, Air, ClimbSettings, HeightChange
+from echostep.localization import Start
 from echostep.localization.grid.heights import GridHeights
 from echostep.localization.grid.kernels import LevelFactors
-from echostep.localization.height.levels import UNKNOWN_LAG_M2, HeightChange
 from echostep.walls.floor import CELL_M
 from echostep.walls.level_sheet import LIFT, STAIRS, lay_out_levels
-from echostep_studies.simulation.tower import STOREY_M, tower
+from echostep_simulation.world.tower import STOREY_M, tower
 
 SHEET = lay_out_levels(tower(3)).sheet
 STAIR, RIDE = (int(np.flatnonzero(SHEET.kind == kind)[0]) + 1 for kind in (STAIRS, LIFT))

@@ -8,8 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization import Building, EchoSettings, echo_model
-from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, SECTORS, UNKNOWN
+from echostep.echoes.likelihood import EchoSettings, echo_model
+from echostep.echoes.range_table import OUTSIDE_ENTRY, SECTORS, UNKNOWN
+from echostep.localization import Building
 from echostep.localization.grid.cells import EAST_WALL, NORTH_WALL
 from echostep.localization.grid.kernels import GridStates, halved, shift_and_weigh, spread
 from echostep.walls.echo_sources import Walls

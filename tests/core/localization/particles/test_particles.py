@@ -10,20 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.localization import (
-    CloudSettings,
-    EchoSettings,
-    Start,
-    TrackStatus,
-    echo_density,
-    echo_model,
-    ellipse95,
-    estimate_of,
-    trust,
-)
-from echostep.localization.particle_arrays import Move, PingBatch
+from echostep.echoes.likelihood import EchoSettings, echo_density, echo_model
+from echostep.localization import CloudSettings, Start, TrackStatus, estimate_of
 from echostep.localization.particles.cloud import BENDS, Cloud, cloud_about
-from echostep.localization.particles.kernels import (
+from echostep.particles.arrays import Move, PingBatch
+from echostep.particles.ellipse import ellipse95
+from echostep.particles.kernels import (
     NOISE_BEND,
     begin_segment,
     effective_size,
@@ -217,4 +209,4 @@ def test_the_ellipse_holds_95_percent() -> None:
 
 
 def test_words_for_trust() -> None:
-    assert [trust(r) for r in (0.3, 2.0, 8.0, math.nan)] == ["tracking", "uncertain", "lost", "lost"]
+    assert [TrackStatus.of(r) for r in (0.3, 2.0, 8.0, math.nan)] == ["tracking", "uncertain", "lost", "lost"]

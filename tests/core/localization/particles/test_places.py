@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from echostep.angles import mean_angle
 from echostep.localization.cloud_estimate import moments, weight_about
-from echostep.localization.limits import HALF_STOREY_M
 from echostep.localization.particles import places as module
 from echostep.localization.particles.places import hypotheses
+from echostep.particles.limits import HALF_STOREY_M
 from naive.places import places
 
 

@@ -8,18 +8,19 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization import ANY_LEVEL, STATED, Building, EchoSettings, FilterSettings, Start, echo_model
-from echostep.localization.echoes.unplanned import RangeMemory
+from echostep.echoes.likelihood import EchoSettings, echo_model
+from echostep.echoes.unplanned import RangeMemory
+from echostep.localization import STATED, Building, FilterSettings, Start
 from echostep.localization.grid.search_grid import MOST_STATES, SearchGrid
 from echostep.localization.grid.start import NEAR_SHARE, grid_of
 from echostep.localization.map_filter import NEAR_SD_M
-from echostep.localization.particle_arrays import Move, PingBatch
-from echostep.localization.particles.start import WIDE_SHARE, draw_poses
+from echostep.localization.particles.start import WIDE_SHARE
 from echostep.localization.settings import UNPLANNED_DOOR
-from echostep.plan import Pose
+from echostep.particles.arrays import Move, PingBatch
+from echostep.plan import ANY_LEVEL, Pose
 from echostep.walls.echo_sources import Walls
 from echostep.walls.level_sheet import lay_out_levels, level_of
-from echostep_studies.simulation.tower import LIFT_AT, tower
+from echostep_simulation.world.tower import LIFT_AT, tower
 
 STOREYS = 3
 CORRIDOR = np.array([(0.0, 0.0, 20.0, 0.0), (20.0, 0.0, 20.0, 2.0), (20.0, 2.0, 0.0, 2.0), (0.0, 2.0, 0.0, 0.0)])
@@ -76,7 +77,7 @@ def test_a_start_behind_a_wall_weighs_as_a_way_through_it() -> None:
     walls = Walls(CORRIDOR)
     floor = Building(walls).floor
     pose = Pose(10.0, 1.5, 0.0)
-    _, y, _, log_weight = draw_poses(Start(pose), 20_000, floor, None, np.random.default_rng(1), walls.index)
+    _, y, _, log_weight = Start(pose).draw(20_000, floor, None, np.random.default_rng(1), walls.index)
     is_behind = y > 2.0
     assert 50 < is_behind.sum() < 20_000 * WIDE_SHARE
     assert log_weight[is_behind].max() < log_weight[~is_behind].max() + UNPLANNED_DOOR + 1e-9

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echostep.echoes.likelihood import EchoModel, likeliest_source
 from echostep.jit import kernel
-from echostep.localization import EchoModel, Estimate, likeliest_source
+from echostep.localization import Estimate
 from echostep.path import MeasuredSegment
 from echostep.walls.echo_sources import MOST_SOURCES, echo_sources
 from echostep.walls.index import WallIndex

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import count
 
-from echostep.localization import Estimate, LikelyPlace, claims_place
+from echostep.localization import Estimate, LikelyPlace
 from echostep.plan import Plan
 
 SAME_M = 3.0  # by which a place moves from one estimate to the next at most; assumed
@@ -20,7 +20,7 @@ KEPT_S = 10.0  # for which the number of a place that no longer fits is given to
 
 def shown_places(estimate: Estimate) -> tuple[LikelyPlace, ...]:
     """The hypotheses that are listed and ringed: not a single one where the position, which has its ellipse, is claimed."""
-    is_position = len(estimate.hypotheses) == 1 and claims_place(estimate)
+    is_position = len(estimate.hypotheses) == 1 and estimate.claims_place
     return () if is_position else estimate.hypotheses
 
 

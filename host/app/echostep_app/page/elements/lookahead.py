@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from echostep.angles import wrap
-from echostep.localization import Estimate, claims_place, ellipse95, trust
+from echostep.localization import Estimate, TrackStatus
+from echostep.particles.ellipse import ellipse95
 from echostep.path import PathSegment
 from echostep_app.plan.places.bearing import KNOWN_HEADING_RAD
 
@@ -23,7 +24,7 @@ def moves_as_one(estimate: Estimate) -> bool:
 
     In a search each has its own heading; the step of their mean would move them through walls.
     """
-    return not estimate.hypotheses and claims_place(estimate) and estimate.heading_sd_rad <= KNOWN_HEADING_RAD
+    return not estimate.hypotheses and estimate.claims_place and estimate.heading_sd_rad <= KNOWN_HEADING_RAD
 
 
 def extrapolate(estimate: Estimate, segment: PathSegment, later: Sequence[PathSegment]) -> Estimate:
@@ -41,7 +42,11 @@ def extrapolate(estimate: Estimate, segment: PathSegment, later: Sequence[PathSe
             yy + position_m2 + heading_rad2 * dx * dx,
         )
     last = later[-1]
-    status, before, after = estimate.status, trust(estimate.ellipse95.major_m), trust(ellipse95(xx, xy, yy).major_m)
+    status, before, after = (
+        estimate.status,
+        TrackStatus.of(estimate.ellipse95.major_m),
+        TrackStatus.of(ellipse95(xx, xy, yy).major_m),
+    )
     if after is not before:  # otherwise the filter's own status holds, which knows more than the radius
         status = max(status, after, key=list(type(status)).index)
     heading = float(wrap(last.heading1_rad + turn))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 from echostep.aiding import BeaconState, MeetingEffect
-from echostep.localization import CHI2_95, ellipse95
+from echostep.particles.ellipse import CHI2_95, ellipse95
 from echostep.ports.people.team_beacons import MOST_SHARED
 from echostep.tracker import Tracker
 from echostep.tracker.state import TrackerState

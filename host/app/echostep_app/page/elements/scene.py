@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Floats, Octets
-from echostep.localization import PROBABLE, Estimate, TrackStatus, claims_place
+from echostep.localization import Estimate, TrackStatus
+from echostep.particles.limits import PROBABLE
 from echostep.plan import Plan
 from echostep.tracker.state import ParticleSnapshot
 from echostep_app.page.elements.alarm import ShownAlarm
@@ -73,7 +74,7 @@ class PageScene:
 
 def is_placed(estimate: Estimate, plan: Plan) -> bool:
     """Whether an estimate is shown as a place; without a plan it is the end of the drawn path in any case."""
-    return claims_place(estimate) or not plan.is_drawn
+    return estimate.claims_place or not plan.is_drawn
 
 
 def sample_of(particles: ParticleSnapshot) -> ParticleSample:

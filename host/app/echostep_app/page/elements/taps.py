@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from echostep.localization import Estimate, TrackStatus, claims_place
+from echostep.localization import Estimate, TrackStatus
 from echostep.plan import Plan
 from echostep.ports.people.check_in import CheckIn
 from echostep_app.page.elements.likely_places import numbered, places_text
@@ -66,7 +66,7 @@ class Taps:
             words = self.whereabouts.words
             shown = numbered(estimate, numbers)
             places = tuple(words(h.x_m, h.y_m, h.level) for _, h in shown)
-            where = words(estimate.x_m, estimate.y_m, estimate.level) if claims_place(estimate) else ""
+            where = words(estimate.x_m, estimate.y_m, estimate.level) if estimate.claims_place else ""
             self._last = estimate, where, places_text(shown, places, self._plan)
         return self._last[1:]
 
@@ -103,7 +103,7 @@ class Taps:
             heading = "Your direction stays: drag to change it."
         else:
             heading = "Drag to where you look, or your direction is found while you walk."
-        if scene is None or estimate is None or not claims_place(estimate):
+        if scene is None or estimate is None or not estimate.claims_place:
             return [heading]
         away_m = math.dist((x_m, y_m), (estimate.x_m, estimate.y_m))
         moved = estimate.level != check_in.level or away_m > estimate.ellipse95.major_m + DOUBTED_M

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from echostep.localization import BELIEVED, PROBABLE
+from echostep.particles.limits import BELIEVED, PROBABLE
 from echostep.tracker.state import TrackerState
 
 UNDO_NS = 10_000_000_000  # the page offers for this long to undo a check-in, and again once echoes contradict it

@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.estimate import TAIL, ellipse95
-from echostep.localization.limits import LOST_M
+from echostep.localization.estimate import TAIL
+from echostep.particles.ellipse import ellipse95
+from echostep.particles.limits import LOST_M
 from echostep.path import PathSegment
 from echostep.ports.people.check_in import MOST_SD_M, CheckIn
 

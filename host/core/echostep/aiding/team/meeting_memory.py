@@ -14,14 +14,14 @@ from enum import StrEnum
 from msgspec import structs
 
 from echostep.aiding.team.meeting import WRONG, Meeting, TimedMeeting, carries_position
-from echostep.localization.limits import PROBABLE
+from echostep.particles.limits import PROBABLE
 from echostep.path import Odometer
 from echostep.ports.people.meeting import parse_meeting
 
 # Assumed, not measured.
 # Path on which a wearer's own echoes, or drift, renew the filter's information
 RENEWED_M = 10.0
-CONTRADICTIONS = 2  # teammates who have to contradict a believed cloud: one of a team is at a wrong start, as simulated
+CONTRADICTIONS = 2  # teammates that must contradict a believed cloud: one of a team has a wrong start, as simulated
 PLACE_M = 2.0  # radio range within which the teammate's place is the wearer's, as after a tap; reflections are longer, hardly ever shorter
 MOST_NAMES = 4096  # teammates and beacons that are remembered: the most of a team's beacons that a tracker keeps
 MOST_WAITING = 64  # meetings that wait for their segment
@@ -44,7 +44,7 @@ class MeetingEffect(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class MeetingNews:
-    """The newest meeting: its number, counted from 1, with whom, and its effect."""
+    """The newest meeting: its number, counted from 1, the teammate, and the effect."""
 
     number: int
     name: str

@@ -6,7 +6,7 @@ In: a cloud with its probability, a `Meeting`. Out: the same cloud, reweighted, 
 The cloud is at the beginning of a segment, the meeting happened during it, up to a stride later: `on_the_way` gives it the displacement until
 then, and each particle is reweighted at its place displaced by it.
 
-If the meeting is right, the wearer stands beside the teammate: the offset is N(0, SIDE_SD_M^2) per axis after a tap, and a radio range is N(distance,
+If the meeting is right, the wearer is next to the teammate: the offset is N(0, SIDE_SD_M^2) per axis after a tap, and a radio range is N(distance,
 range_sd_m^2); the teammate's own covariance is added to both. With probability `wrong` (another name was tapped, the teammate is sure of a wrong
 place, the range is a reflection) the meeting carries no information: the teammate is then uniformly distributed over the floor.
 
@@ -29,14 +29,14 @@ from echostep.aiding.team.meeting import RANGE_BODY_SD_M, WRONG, Meeting, covari
 from echostep.arrays import Bools, Floats
 from echostep.localization.belief import CloudHypothesis
 from echostep.localization.grid.search import Search
-from echostep.localization.limits import HALF_STOREY_M, PROBABLE
 from echostep.localization.particles.cloud import Cloud
+from echostep.particles.limits import HALF_STOREY_M, PROBABLE
 
 # Assumed, not measured.
 MOST_DOUBT = math.log(WRONG["tracking"])  # of all ranges of one teammate: then this teammate is wrong
 LEAST_WRONG = 1e-6  # probability that a range is wrong, at least, in a ratio
 LEAST_SD_OF_CLOUD_M = 0.02  # of a cloud without spread
-FARTHEST = -4.6  # log of the prior, relative to its peak, at which 99 % of a normal distribution lie inside: a far mode is no tail of it
+FARTHEST = -4.6  # log of the prior, relative to its peak, at which 99 % of a normal distribution lie inside: a far mode is not part of its tail
 LEAST_FACTOR = -200.0  # log of the least weight that a meeting leaves
 
 

@@ -12,14 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Int32s, Ints
+from echostep.echoes.range_table import UNKNOWN, RangeTable
+from echostep.height.levels import UpperLevels
 from echostep.jit import kernel
-from echostep.localization.echoes.range_table import UNKNOWN, RangeTable
-from echostep.localization.height.levels import UpperLevels
 from echostep.walls.floor import CELL_M
 from echostep.walls.index import WallIndex, crosses_wall
 from echostep.walls.level_sheet import LevelSheet, connector_at, level_of, level_on_sheet
 
-OUTSIDE_M = 10.0  # of the ground about the floor on which a search goes on, assumed
+OUTSIDE_M = 10.0  # width of the ground about the floor that a search covers, assumed
 EAST_WALL, NORTH_WALL, CLOSED = 1, 2, 4  # bits of `barrier`
 NO_CONNECTOR = -1
 
@@ -31,7 +31,7 @@ Entries = np.ndarray[tuple[int, int], np.dtype[np.uint16]]
 class GridCells(NamedTuple):
     """Cells of CELL_M in rows of `columns` from (x0_m, y0_m) on; each array is (cells,) unless stated otherwise, all rows one after the other.
 
-    `barrier`: bits EAST_WALL, NORTH_WALL: a wall stands between the middles of the cell and of its neighbour; CLOSED: no trunk can be there (edge of
+    `barrier`: bits EAST_WALL, NORTH_WALL: a wall lies between the middles of the cell and of its neighbour; CLOSED: no trunk can be there (edge of
     the grid, air beside an upper level). `connector`: number of the connector that holds it. `level` (columns,): level of each column. `row`: its
     column of `expected` (SECTORS, floor), or UNKNOWN.
     """

@@ -12,8 +12,7 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.localization.grid.kernels import LevelFactors
-from echostep.localization.height.levels import (
+from echostep.height.levels import (
     UNKNOWN_LAG_M2,
     ClimbSettings,
     HeightChange,
@@ -22,8 +21,9 @@ from echostep.localization.height.levels import (
     pressure_cost,
     rise_cost,
 )
-from echostep.localization.limits import THREE_SD2
+from echostep.localization.grid.kernels import LevelFactors
 from echostep.localization.particles.start import Start
+from echostep.particles.limits import THREE_SD2
 from echostep.walls.floor import CELL_M
 from echostep.walls.level_sheet import LevelSheet, nearest_level
 

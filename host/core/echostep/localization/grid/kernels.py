@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Int32s, Ints
+from echostep.echoes.range_table import OUTSIDE_ENTRY, SECTORS, UNKNOWN
 from echostep.jit import inline_part, kernel, lean_kernel, lean_part
-from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, SECTORS, UNKNOWN
 from echostep.localization.grid.cells import CLOSED, EAST_WALL, NORTH_WALL, GridCells
 from echostep.walls.floor import CELL_M
 

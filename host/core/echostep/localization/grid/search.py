@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The hypothesis that the trunk is anywhere: a search on a grid, shown by particles that are drawn from it after each move.
 
-In: what a `Cloud` takes. Out: a `Cloud`, once the search has found the place. Owns the grid.
+In: the input of a `Cloud`. Out: a `Cloud`, once the search has found the place. Owns the grid.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from typing import ClassVar
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.echoes.likelihood import EchoModel
+from echostep.echoes.likelihood import EchoModel
+from echostep.height.levels import ClimbSettings, HeightChange
 from echostep.localization.grid.search_grid import SearchGrid
-from echostep.localization.height.levels import ClimbSettings, HeightChange
-from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.particles import Particles
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import CloudSettings
+from echostep.particles.arrays import Move, PingBatch
 from echostep.walls.level_sheet import LevelSheet
 
 # Weight outside of one place below which a search has found it, on one level, and on several, there after this length of search: exact likelihoods

@@ -15,16 +15,16 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.localization.echoes.likelihood import EchoModel
-from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, SECTORS, TablePing, TablePings, log_densities
-from echostep.localization.echoes.unplanned import PlacedPings, RangeMemory
+from echostep.echoes.likelihood import EchoModel
+from echostep.echoes.range_table import OUTSIDE_ENTRY, SECTORS, TablePing, TablePings, log_densities
+from echostep.echoes.unplanned import PlacedPings, RangeMemory
+from echostep.height.levels import HeightChange
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.heights import GridHeights
 from echostep.localization.grid.kernels import GridStates, halved, shift_and_weigh, spread, weigh_levels
-from echostep.localization.height.levels import HeightChange
-from echostep.localization.particle_arrays import DrawnPoses, Move, PingBatch
-from echostep.localization.particles.kernels import MovePiece, piece_of, systematic
 from echostep.localization.settings import UNPLANNED_DOOR
+from echostep.particles.arrays import DrawnPoses, Move, PingBatch
+from echostep.particles.kernels import MovePiece, piece_of, systematic
 from echostep.path import bend_of
 from echostep.walls.floor import CELL_M
 

@@ -12,16 +12,16 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Floats
-from echostep.localization.echoes.range_table import SECTORS
-from echostep.localization.echoes.unplanned import RangeMemory
+from echostep.echoes.range_table import SECTORS
+from echostep.echoes.unplanned import RangeMemory
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.heights import GridHeights
 from echostep.localization.grid.search_grid import SearchGrid
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.particles.kernels import systematic
-from echostep.localization.particles.start import ANY_LEVEL, STATED, TURN_AROUND_RAD, Start, allowed_floor
+from echostep.localization.particles.start import STATED, TURN_AROUND_RAD, Start, allowed_floor
 from echostep.localization.settings import FilterSettings
-from echostep.plan import Pose
+from echostep.particles.kernels import systematic
+from echostep.plan import ANY_LEVEL, Pose
 from echostep.walls.floor import CELL_M, Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
 

@@ -20,8 +20,9 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.echoes.likelihood import EchoModel
-from echostep.localization.height.levels import (
+from echostep.echoes.likelihood import EchoModel
+from echostep.echoes.reweighting import CloudModel, EchoMemory, MoveProgress, propagate_and_reweight
+from echostep.height.levels import (
     ClimbSettings,
     HeightArrays,
     HeightChange,
@@ -29,13 +30,12 @@ from echostep.localization.height.levels import (
     level_change_model,
     set_levels_by_pressure,
 )
-from echostep.localization.particle_arrays import DrawnPoses, Move, PingBatch
-from echostep.localization.particles.kernels import NOISE_BEND, effective_size, systematic
 from echostep.localization.particles.particles import GATHERED_REST, Particles
-from echostep.localization.particles.reweighting import CloudModel, EchoMemory, MoveProgress, propagate_and_reweight
 from echostep.localization.particles.sampling import kld_size, log_mode_weight, spread_evenly
-from echostep.localization.particles.start import Start, draw_poses
+from echostep.localization.particles.start import Start
 from echostep.localization.settings import CloudSettings
+from echostep.particles.arrays import DrawnPoses, Move, PingBatch
+from echostep.particles.kernels import NOISE_BEND, effective_size, systematic
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.index import NO_WALLS, WallIndex, crossings
@@ -62,11 +62,11 @@ def cloud_about(
     settings: CloudSettings, start: Start, walk_heading_rad: float, rng: np.random.Generator, sheet: LevelSheet | None = None,
     climbing: ClimbSettings | None = None, floor: Floor = NO_FLOOR, walls: WallIndex = NO_WALLS,
 ) -> Cloud:  # fmt: skip
-    """The cloud of a start. `walk_heading_rad`: the trunk's heading in the walk frame while it stands there; without `sheet` there is one level.
+    """The cloud of a start. `walk_heading_rad`: the trunk's heading in the walk frame at the start; without `sheet` there is one level.
 
     `floor`: for a start that is anywhere. `walls`: a start lies on one side of them.
     """
-    x_m, y_m, heading, log_weight = draw_poses(start, settings.largest, floor, sheet, rng, walls)
+    x_m, y_m, heading, log_weight = start.draw(settings.largest, floor, sheet, rng, walls)
     z_m = sheet.height_m[level_of(x_m, sheet)] if sheet else np.zeros(len(x_m))
     lag_m = np.full(len(x_m), 0.0 if start.air is None else start.air.zero_m)
     poses = DrawnPoses(x_m, y_m, heading - walk_heading_rad, z_m, lag_m)
@@ -199,7 +199,7 @@ class Cloud(Particles):
         self.resample_if_needed()
 
     def resample_if_needed(self, walls: WallIndex = NO_WALLS) -> None:
-        """Systematic resampling [Kitagawa 1996] when too few particles carry the weight; what roughens them leads through none of the walls.
+        """Systematic resampling [Kitagawa 1996] when too few particles carry the weight; roughening moves none of them through a wall.
 
         Until the cloud is gathered, the number of a mode's particles follows the square root of its weight, and they keep that weight: resampling
         alone would lose the lighter of two modes by chance.

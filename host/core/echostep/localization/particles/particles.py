@@ -11,12 +11,11 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.localization.height.levels import UNKNOWN_LAG_M2, ClimbSettings, HeightChange, drift_m
-from echostep.localization.limits import ROOM_M
-from echostep.localization.particle_arrays import DrawnPoses, ParticleArrays
+from echostep.height.levels import UNKNOWN_LAG_M2, Air, ClimbSettings, HeightChange, drift_m
 from echostep.localization.particles.places import LikelyPlace, hypotheses
-from echostep.localization.particles.start import Air
 from echostep.localization.settings import CloudSettings
+from echostep.particles.arrays import DrawnPoses, ParticleArrays
+from echostep.particles.limits import ROOM_M
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 # A cloud is gathered when less than this weight is farther than ROOM_M from its mean, assumed
@@ -26,7 +25,7 @@ GATHERED_REST = 1e-4
 class Particles:
     """Flat arrays of n particles on the sheet of levels; `log_weight` is normalised to a maximum of 0.
 
-    `carried`: arrays (n, ...) of what aids the filter, which each particle carries along.
+    `carried`: arrays (n, ...) of the filter's aids, resampled with the particles.
     """
 
     x_m: Floats
@@ -129,7 +128,7 @@ class Particles:
 
     @property
     def place_share(self) -> float:
-        """Weight of the likeliest place, on whatever level; 0 if none has enough to be listed."""
+        """Weight of the likeliest place, on any level; 0 if none has enough to be listed."""
         places = hypotheses(self.map_x_m, self.y_m, np.zeros(len(self.x_m), np.int64), self.turn_rad, self.weight)
         return places[0].probability if places else 0.0
 

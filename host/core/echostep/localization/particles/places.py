@@ -14,7 +14,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel, part
-from echostep.localization.limits import ROOM_M
+from echostep.particles.limits import ROOM_M
 
 # Assumed, not measured.
 MOST_PLACES = 5  # likely places that are listed

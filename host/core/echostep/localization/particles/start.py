@@ -12,28 +12,19 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.localization.height.levels import UNKNOWN_LAG_M2
+from echostep.height.levels import UNKNOWN_LAG_M2, Air
 from echostep.localization.settings import UNPLANNED_DOOR
-from echostep.plan import Pose
+from echostep.plan import ANY_LEVEL, Pose
 from echostep.walls.floor import Floor
 from echostep.walls.index import NO_WALLS, WallIndex, crossings
 from echostep.walls.level_sheet import LevelSheet, level_of
 
-ANY_LEVEL = -1  # level of a start that is not known
 # The place or the heading of a stated start is sometimes wrong: a tap beside it, a body that does not face the way the toes point. Assumed:
 STATED = 0.99  # probability that either is right: its spread is never all that is possible
 # Standard deviations of a wrong one besides the stated ones: a stride, a foot that is set down turned
 WIDE_SD_M, WIDE_SD_RAD = 0.9, math.radians(30.0)
 WIDE_SHARE = 0.07  # of the particles have either wrong: enough to be found by the first echoes
 TURN_AROUND_RAD = 1.5  # a heading with a greater standard deviation is drawn evenly from all
-
-
-@dataclass(frozen=True, slots=True)
-class Air:
-    """The height by pressure that one barometer shows at the plan's height 0, and its standard deviation (m): the weather, and its own error."""
-
-    zero_m: float
-    sd_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +65,33 @@ class Start:
         """Variance (m2) of the offset of the height by pressure."""
         return UNKNOWN_LAG_M2 if self.air is None else self.air.sd_m**2
 
+    def draw(
+        self, count: int, floor: Floor, sheet: LevelSheet | None, rng: np.random.Generator, walls: WallIndex = NO_WALLS
+    ) -> tuple[Floats, Floats, Floats, Floats]:
+        """x, y on the sheet (m), heading (rad) and log-weight, each (count,); behind a wall from a pose is as improbable as a way through it."""
+        if self.pose is None:
+            x, y, heading = _on_floor(allowed_floor(floor, self, sheet), count, rng)
+            return x, y, heading, np.zeros(count)
+        is_wide = rng.random((2, count)) < (
+            WIDE_SHARE if len(floor.x_m) else 0.0
+        )  # without walls nothing would correct it
+        pose, wrong, noise = self.pose, wide(self), rng.standard_normal((3, count))
+        sd_m = np.where(is_wide[0], wrong.sd_m, self.sd_m)
+        sd_rad = np.where(is_wide[1], wrong.heading_sd_rad, self.heading_sd_rad)
+        x, y = pose.x_m + sd_m * noise[0], pose.y_m + sd_m * noise[1]
+        heading = pose.heading_rad + sd_rad * noise[2]
+        if self.heading_sd_rad > TURN_AROUND_RAD:
+            heading = 2.0 * math.pi * rng.random(count)
+        east = np.full(count, pose.x_m)
+        if sheet is not None:
+            on_sheet = _levels(pose.level, count, sheet) * sheet.pitch_m
+            x, east = x + on_sheet, east + on_sheet
+        log_weight = np.where(
+            is_wide, math.log((1.0 - STATED) / WIDE_SHARE), math.log(STATED / (1.0 - WIDE_SHARE))
+        ).sum(0)
+        is_behind = crossings(east, np.full(count, pose.y_m), x, y, walls)
+        return x, y, heading, log_weight + UNPLANNED_DOOR * is_behind
+
     def __repr__(self) -> str:
         """The fields that are not the default."""
         given = [(f.name, getattr(self, f.name)) for f in fields(self) if getattr(self, f.name) is not f.default]
@@ -82,33 +100,9 @@ class Start:
 
 
 def wide(start: Start) -> Start:
-    """A start if what is stated is wrong: near its pose, if any."""
+    """The start if the stated one is wrong: near its pose, if any."""
     sd_m, sd_rad = math.hypot(start.sd_m, WIDE_SD_M), math.hypot(start.heading_sd_rad, WIDE_SD_RAD)
     return Start(near=start.pose, sd_m=sd_m, heading_sd_rad=sd_rad)
-
-
-def draw_poses(
-    start: Start, count: int, floor: Floor, sheet: LevelSheet | None, rng: np.random.Generator, walls: WallIndex = NO_WALLS
-) -> tuple[Floats, Floats, Floats, Floats]:  # fmt: skip
-    """x, y on the sheet (m), heading (rad) and log-weight, each (count,); behind a wall from a pose is as improbable as a way through it."""
-    if start.pose is None:
-        x, y, heading = _on_floor(allowed_floor(floor, start, sheet), count, rng)
-        return x, y, heading, np.zeros(count)
-    is_wide = rng.random((2, count)) < (WIDE_SHARE if len(floor.x_m) else 0.0)  # without walls nothing would correct it
-    pose, wrong, noise = start.pose, wide(start), rng.standard_normal((3, count))
-    sd_m = np.where(is_wide[0], wrong.sd_m, start.sd_m)
-    sd_rad = np.where(is_wide[1], wrong.heading_sd_rad, start.heading_sd_rad)
-    x, y = pose.x_m + sd_m * noise[0], pose.y_m + sd_m * noise[1]
-    heading = pose.heading_rad + sd_rad * noise[2]
-    if start.heading_sd_rad > TURN_AROUND_RAD:
-        heading = 2.0 * math.pi * rng.random(count)
-    east = np.full(count, pose.x_m)
-    if sheet is not None:
-        on_sheet = _levels(pose.level, count, sheet) * sheet.pitch_m
-        x, east = x + on_sheet, east + on_sheet
-    log_weight = np.where(is_wide, math.log((1.0 - STATED) / WIDE_SHARE), math.log(STATED / (1.0 - WIDE_SHARE))).sum(0)
-    is_behind = crossings(east, np.full(count, pose.y_m), x, y, walls)
-    return x, y, heading, log_weight + UNPLANNED_DOOR * is_behind
 
 
 def _levels(level: int, count: int, sheet: LevelSheet) -> Ints:

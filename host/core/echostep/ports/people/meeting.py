@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Meeting: another wearer is beside this one, as a chunk of the port `MEETING`, with the report of that wearer's tracker.
+"""Meeting: another wearer is next to this one, as a chunk of the port `MEETING`, with the report of that wearer's tracker.
 
 In: a tap or a radio range, and the position of a report. Out: the bytes of a chunk; a `MeetingMessage` from such bytes, which may be damaged or
 hostile. Owns the limits. The bytes are recorded like those of any port, so a replay has the same meetings in the same order.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the end of an MCAP file says about the bytes before it [MCAP format specification, mcap.dev/spec].
+"""Evidence at the end of an MCAP file about the bytes before it [MCAP format specification, mcap.dev/spec].
 
 In: the bytes of a file, possibly damaged. Out: whether its data section is as written, and the channels and schemas repeated after it. Owns
 nothing.
@@ -36,7 +36,7 @@ MAGIC_BITS = 8
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """`data_end`: offset of the data-end record, -1 if the footer does not tell; `summary`: opcode and body of the records after it.
+    """`data_end`: offset of the data-end record, -1 if the footer lacks it; `summary`: opcode and body of the records after it.
 
     `trusted`: the checksum of the summary is right.
     """

@@ -16,7 +16,7 @@ from echostep.ports.chunks import BOARD, FOOT, MTX
 
 @dataclass
 class FileDamage:
-    """What is wrong with one file, as far as it was read."""
+    """Damage of one file, as far as it was read."""
 
     altered: bool = False  # bytes do not match the checksum written with them
     skipped: int = 0  # bytes in no valid record, before a valid one
@@ -24,7 +24,7 @@ class FileDamage:
     first: int = 0  # offset of the first place
     tail: int = 0  # bytes after the last valid record
     unreadable_chunks: int = 0  # chunk records that cannot be decompressed, or hold anything but records
-    misplaced: int = 0  # messages that stand twice in the file, or not where they were written
+    misplaced: int = 0  # duplicated or displaced messages
     truncated: bool = False  # no end record: a walk's recorder was stopped in the middle
 
     def __bool__(self) -> bool:
@@ -40,7 +40,7 @@ class FileDamage:
         self.skipped += end - begin
 
     def sentences(self, ports: Collection[str], misnamed: Collection[str]) -> list[str]:
-        """A sentence for each kind of damage, and for what it may have hidden; none for a whole file."""
+        """A sentence for each kind of damage, with its possible consequences; none for an undamaged file."""
         in_places = f"in {self.places} places" if self.places > 1 else "in one place"
         tail = f", or its last {self.tail} bytes are damaged" if self.tail else ""
         facts = [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which messages of a damaged recording stand where they were written: blocks of a disk may appear twice, or in another's place.
+"""Which messages of a damaged recording are in their original place: blocks of a disk may be duplicated or displaced.
 
 In: the sequence numbers of messages in the order of the file; the recorder counts all its messages. Out: which of them to use. Owns the number of the
 newest message in its place, and the count of the others.

@@ -7,36 +7,17 @@ After power-on it sends WakeUp and measures with what it was set to unless the h
 
 from __future__ import annotations
 
-import math
 import struct
 from enum import Enum
 
-import numpy as np
-
-from echostep.arrays import Floats
 from echostep.xsens import MTDATA, FrameReader, MtSample, OutputFormat, encode_frame
-from echostep.xsens.mtdata import (
-    ACCEL,
-    AUXILIARY,
-    EULER,
-    FIXED_12_20,
-    GYRO,
-    MAG,
-    ORIENTATION,
-    ORIENTATION_MASK,
-    QUATERNION,
-    RAW,
-    RAW_BYTES,
-    SAMPLE_COUNTER,
-    STATUS,
-    TEMPERATURE,
-)  # fmt: skip
+from echostep.xsens.mtdata import ORIENTATION, QUATERNION, SAMPLE_COUNTER
+from echostep_simulation.devices.mtx_formats import pack
 
 FACTORY = OutputFormat(ORIENTATION, SAMPLE_COUNTER | QUATERNION)  # what an MTx is sold with [Xsens MT0100P, 5.2]
 WAKE_UP_S = 0.5
 DEVICE_ID = bytes.fromhex("00312345")
 PRODUCT, FIRMWARE = b"MTx-28A53G25".ljust(20), bytes((2, 8, 1))
-CELSIUS = 25.0
 ACCEPTED = {
     0x00: (0,),
     0x04: (0, 2),
@@ -155,40 +136,3 @@ class MtxDevice:
         if self.state is not DeviceState.MEASURING:
             return b""
         return encode_frame(MTDATA, pack(sample, self.output))
-
-
-def pack(sample: MtSample, output: OutputFormat) -> bytes:
-    """MTData payload of a measurement in any output format; what the sample does not hold is constant."""
-    counter = struct.pack(">H", sample.counter & 0xFFFF) if output.settings & SAMPLE_COUNTER else b""
-    if output.mode & RAW:
-        return bytes(RAW_BYTES) + counter
-    numbers = [CELSIUS] if output.mode & TEMPERATURE else []
-    for columns, vector in ((ACCEL, sample.accel), (GYRO, sample.gyro), (MAG, sample.mag)):
-        if columns in output.calibrated:
-            numbers += vector
-    if output.mode & ORIENTATION:
-        numbers += _orientation(sample, output.settings & ORIENTATION_MASK)
-    if output.settings & FIXED_12_20:
-        body = struct.pack(f">{len(numbers)}i", *(round(v * 2**20) for v in numbers))
-    else:
-        body = struct.pack(f">{len(numbers)}f", *numbers)
-    rest = output.length - len(body) - len(counter)
-    assert rest == 0 or output.mode & (AUXILIARY | STATUS)
-    return body + bytes(rest) + counter
-
-
-def _orientation(sample: MtSample, form: int) -> list[float]:
-    """Quaternion, roll pitch yaw in degrees, or the matrix column by column."""
-    if form == QUATERNION:
-        return list(sample.quaternion)
-    r = _rotation(sample.quaternion)
-    if form == EULER:
-        angles = (math.atan2(r[2, 1], r[2, 2]), -math.asin(max(-1.0, min(1.0, r[2, 0]))), math.atan2(r[1, 0], r[0, 0]))
-        return [math.degrees(angle) for angle in angles]
-    return list(map(float, r.T.ravel()))
-
-
-def _rotation(q: tuple[float, float, float, float]) -> Floats:
-    w, x, y, z = q
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross

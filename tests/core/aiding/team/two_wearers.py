@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""Two wearers who walk the same corridor, with what the first one tells of its beacons."""
+
+from __future__ import annotations
+
+import heapq
+import random
+from dataclasses import dataclass
+from functools import cache
+from operator import attrgetter
+
+import numpy as np
+
+from board_runs import ROOT
+from echostep.localization import Estimate, Start
+from echostep.plan import Pose, load_plan
+from echostep.ports.chunks import Chunk, portion_of
+from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon, TeamBeacons
+from echostep.tracker import Tracker
+from echostep_simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
+from echostep_simulation.devices.board import PythonBoard
+from echostep_simulation.scenario import START_NS, Scenario
+
+PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
+
+
+SEED = 5
+
+
+RUN = "0000beac"
+
+
+def told(*beacons: SharedBeacon, name: str = "kim") -> TeamBeacons:
+    return TeamBeacons(1, name, RUN, PLAN.digest, beacons)
+
+
+@dataclass
+class Two:
+    """Two wearers who walk the same corridor: the first one lays beacons, the second one hears them."""
+
+    beacons: tuple[SharedBeacon, ...]
+    true_places: list[tuple[float, float]]
+    chunks: list[Chunk]
+    start: Pose
+
+    def run(self, message: TeamBeacons | None, size: int = 5000) -> tuple[Tracker, list[Estimate]]:
+        """The second wearer, whose start is known to 1 m, with the message at the beginning."""
+        tracker = Tracker(PLAN, Start(self.start, 1.0), seed=SEED)
+        first = [] if message is None else [Chunk(TEAM_BEACONS, self.chunks[0].t_arrival_ns, message.encode())]
+        chunks, found, rng = first + self.chunks, [], random.Random(SEED)
+        while chunks:
+            cut = rng.randrange(1, size)
+            found += tracker.take(portion_of(chunks[:cut]))
+            chunks = chunks[cut:]
+        return tracker, found
+
+
+@cache
+def two_wearers() -> Two:
+    scenario = Scenario(PLAN, ((2.0, 7.5), (16.0, 7.5)), SEED, PythonBoard(seed=SEED))
+    truth = scenario.truth
+    places = lay_beacons(truth[:, 1:3], 5.0, np.random.default_rng(SEED))
+    arrival_ns = START_NS + np.rint(1e9 * truth[:, 0]).astype(np.int64)
+    world = BeaconWorld(places, PLAN.levels[0].walls)
+    said = gateway_chunks(world, truth[:, 0], truth[:, 1:3], arrival_ns, SEED)
+    chunks = list(heapq.merge(scenario.chunks(), said, key=attrgetter("t_arrival_ns")))
+    placing = Tracker(PLAN, scenario.start, seed=1)
+    placing.take(portion_of(chunks))
+    beacons = placing.own_beacons()
+    assert beacons is not None
+    return Two(beacons, [(x, y) for x, y, _ in places.tolist()], chunks, scenario.start)
