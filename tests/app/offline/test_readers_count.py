@@ -17,13 +17,13 @@ from echostep.recording import Decoder, read_capture
 from echostep.xsens import MTDATA, encode_frame
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.leg_csv import load_legs
+from echostep_app.offline.pressure_csv import load_pressures
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.recording.capture_summary import summary
 from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.contents import info
 from echostep_app.scorecard.track_columns import load_path
-from echostep_studies.barometer.pressure_csv import load_pressures
 from echostep_studies.simulation.rolling_foot import MANNERS, course, samples
 
 CAPTURES = ROOT / "tests/captures"

@@ -24,6 +24,7 @@ from echostep.tracker import Tracker
 from echostep.xsens.message import MessageReader
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.leg_csv import load_legs
+from echostep_app.offline.pressure_csv import load_pressures
 from echostep_app.page.requests import parse_request
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.ports.datagram_key import Opener, seal
@@ -34,7 +35,6 @@ from echostep_app.team.messages.report import decode
 from echostep_app.team.messages.report import encode as report_bytes
 from echostep_app.team.messages.shared_drawings import checked_drawing
 from echostep_simulation.devices.beacon_gateway import message
-from echostep_studies.barometer.pressure_csv import load_pressures
 from plan.imported_plans import write_seven_floors
 from team.team_reports import report
 from walks import DEMO, walk_chunks
