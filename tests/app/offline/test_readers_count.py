@@ -17,11 +17,11 @@ from echostep.recording import Decoder, read_capture
 from echostep.xsens import MTDATA, encode_frame
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.leg_csv import load_legs
+from echostep_app.offline.pressure_csv import load_pressures
 from echostep_app.recording.capture_summary import summary
 from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.contents import info
 from echostep_simulation.people.rolling_foot import MANNERS, course, samples
-from echostep_studies.barometer.pressure_csv import load_pressures
 
 CAPTURES = ROOT / "tests/captures"
 BOARD, MTX = ((CAPTURES / f"{name}.bin").read_bytes() for name in ("board", "mtx"))

@@ -29,6 +29,7 @@ from echostep.xsens.message import MessageReader
 from echostep.xsens.packets import read_packets
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.leg_csv import load_legs
+from echostep_app.offline.pressure_csv import load_pressures
 from echostep_app.page.requests import parse_request
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.ports.datagram_key import Opener, seal
@@ -40,7 +41,6 @@ from echostep_app.xsens.requests import project_requests
 from echostep_app.xsens.setup import MtxSetup
 from echostep_simulation.devices.beacon_gateway import message
 from echostep_simulation.devices.mtx_formats import pack
-from echostep_studies.barometer.pressure_csv import load_pressures
 from plan import test_plan_importer_imdf as imdf
 from team.team_reports import report
 from walks import DEMO, walk_chunks

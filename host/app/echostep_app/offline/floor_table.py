@@ -68,7 +68,9 @@ def find_levels(record: HeightRecord, name: str) -> Floats:
     Each stay is on a known level, whose height becomes the mean over its stays, or on a new one.
     """
     known, count, here = [0.0], [1], 0
-    for last, stay in pairwise(record.stays):
+    for (last, stay), gust in zip(pairwise(record.stays), record.gust[1:], strict=True):
+        if gust:
+            continue
         height_m = known[here] + stay.first_m - last.last_m
         here = int(np.argmin(np.abs(np.array(known) - height_m)))
         if abs(known[here] - height_m) > CLOSEST_M:

@@ -31,6 +31,7 @@ REST, REST_S = 2.0, 20.0  # log-weight that a rest on a landing costs, and the t
 BEYOND_M = 1.0  # above the highest level and below the lowest: there no landing is
 UNLIKELY, MOST = 15.0, 300  # hypotheses are dropped that cost so much more than the best; most that are kept
 NEGLIGIBLE_P = 1e-3
+UNCLEAR_M = 0.15  # from the middle between two levels: there the floor stays what it was
 SMOOTH_S = 2.0  # to either side, over which the height on the way is a median
 
 
@@ -119,7 +120,10 @@ def _way(record: HeightRecord, heights_m: Floats, hypothesis: Hypothesis) -> tup
     step_s = float(np.median(np.diff(record.t_s))) if len(record.t_s) > 1 else SMOOTH_S
     many = int(SMOOTH_S / step_s)
     smooth_m = np.median(sliding_window_view(np.pad(height_m, many, mode="edge"), 2 * many + 1), axis=1)
-    floor = np.searchsorted(0.5 * (heights_m[1:] + heights_m[:-1]), smooth_m)
+    middles_m = 0.5 * (heights_m[1:] + heights_m[:-1])
+    is_clear = np.abs(smooth_m[:, None] - middles_m).min(axis=1, initial=math.inf) > UNCLEAR_M
+    clear = np.maximum.accumulate(np.where(is_clear, np.arange(len(smooth_m)), 0))
+    floor = np.searchsorted(middles_m, smooth_m)[clear]
     for before, node in pairwise([nodes[0], *nodes]):
         last, stay = record.stays[before.stay], record.stays[node.stay]
         floor[stay.begin : stay.end] = node.level
@@ -130,8 +134,8 @@ def _way(record: HeightRecord, heights_m: Floats, hypothesis: Hypothesis) -> tup
 
 def _is_held(record: HeightRecord, last: Stay, stay: Stay) -> bool:
     """Whether the height between two stays on one level goes away from it in a gust."""
-    way_m = np.abs(record.height_m[last.end : stay.begin] - last.last_m)
+    way_m = np.abs(record.pressure_m[last.end : stay.begin] - record.pressure_m[last.end - 1])
     if not len(way_m):
         return False
     peak = last.end + int(way_m.argmax())
-    return record.is_gust(max(last.begin, last.end - NEAR), peak + 1, last.last_m, float(record.height_m[peak]))
+    return record.is_gust(slice(max(last.begin, last.end - NEAR), last.end), slice(peak, peak + 1))

@@ -25,7 +25,10 @@ BODY_HEAT = 0.5  # share of an excess above INDOORS_C that is the air's: body an
 # Assumed, tuned on simulated floors (seeds 200 to 209) and on the climbs of loruro/Barometer_STM32
 SEGMENT_S = 0.5
 QUIETEST_M, AIR_SD_M = 0.02, 0.1  # standard deviations: of a segment's noise, at least; of draughts in a height
-SMOOTH_M = 0.002  # steps between readings up to this are not quantization
+SMOOTH_PA, FINEST = (
+    0.02,
+    0.1,
+)  # steps between readings up to this are not quantization; the share of the steps that may be finer than it
 HALF_S = 3.0  # of the window, to either side, over which a speed is measured; longer where noise makes it uncertain
 STILL_M_S = 0.1  # below a slow climb of stairs, landings included
 STAY_M_S = 0.04  # of a whole stay; weather of 2 hPa/h makes 0.005
@@ -33,7 +36,7 @@ STAY_S, END_S = 8.0, 1.0  # shortest stay; the same at either end of a record
 LEVEL_S = 4.0  # at either end of a stay, over which its height is a median
 GAP_S = 5.0  # without a sample: a climb may be in it
 LIFT_M_S2 = 1.5  # highest acceleration of a lift [ISO 8100-32, typical: 0.8 to 1.2]
-EDGE = 0.4  # of the duration of a rise: the part between a tenth and nine tenths of it, and a margin for noise
+EDGE = 0.5  # of the duration of a rise: the part between a tenth and nine tenths of it
 NEAR = 8  # segments of the stays beside a way, in which a gust may begin or end
 GUST_M, GUST_S = 1.5, 15.0  # smallest gust that could be a storey; the longest that ends by itself
 
@@ -50,32 +53,32 @@ class Stay:
 
 @dataclass(frozen=True, slots=True)
 class HeightRecord:
-    """Times and heights above the start of segments (m,); `segment` (n,) of each sample; stays (k,), and whether a gust led to each."""
+    """Of segments (m,): times, heights by pressure and above the start. `segment` (n,) of each sample. Stays (k,), and whether a gust led there."""
 
     t_s: Floats
+    pressure_m: Floats
     height_m: Floats
     segment: Ints
     stays: tuple[Stay, ...]
-    gust: tuple[bool, ...]
+    gust: tuple[bool, ...] = ()
 
-    def is_gust(self, begin: int, end: int, from_m: float, to_m: float) -> bool:
-        """Whether the height between two segments goes between two heights faster than a lift, and does so once."""
-        rise_m = abs(to_m - from_m)
-        if rise_m < GUST_M:
+    def is_gust(self, before: slice, after: slice) -> bool:
+        """Whether the height by pressure goes from its median in `before` to that in `after` faster than a lift, and does so once."""
+        pressure_m = self.pressure_m[before.start : after.stop]
+        from_m, to_m = (float(np.median(self.pressure_m[part])) for part in (before, after))
+        if (rise_m := abs(to_m - from_m)) < GUST_M:
             return False
-        height_m, near_m = self.height_m[begin:end], max(0.1 * rise_m, 1.5 * AIR_SD_M)
-        leaves = np.flatnonzero(np.abs(height_m - from_m) <= near_m)
-        arrives = np.flatnonzero(np.abs(height_m - to_m) <= near_m)
-        if not len(leaves) or not len(arrives):
-            return False
-        duration_s = float(self.t_s[begin + arrives[0]] - self.t_s[begin + leaves[-1]])
+        near_m = max(0.1 * rise_m, 1.5 * AIR_SD_M)
+        leaves = np.flatnonzero(np.abs(pressure_m - from_m) <= near_m)[-1]
+        arrives = np.flatnonzero(np.abs(pressure_m - to_m) <= near_m)[0]
+        duration_s = float(self.t_s[before.start + arrives] - self.t_s[before.start + leaves])
         return 0.0 < duration_s < EDGE * 2.0 * math.sqrt(rise_m / LIFT_M_S2)
 
 
 def height_record(samples: Pressures) -> HeightRecord:
     """Heights and stays of a record; a record that never stays has two, its first and its last segment."""
     t_s, pressure_m, segment = _segments(samples)
-    sd_m = noise_m(pressure_m)
+    sd_m = max(noise_m(pressure_m), coarse_m(samples.pressure_pa))
     still = _stays(t_s, pressure_m, _is_slow(t_s, pressure_m, sd_m))
     height_m = _filtered(t_s, pressure_m, still, math.hypot(AIR_SD_M, sd_m))
     found = [_stay(t_s, height_m, begin, end) for begin, end in spans(still).tolist()]
@@ -83,7 +86,7 @@ def height_record(samples: Pressures) -> HeightRecord:
         found.insert(0, _stay(t_s, height_m, 0, 1))
     if found[-1].end < len(t_s):
         found.append(_stay(t_s, height_m, len(t_s) - 1, len(t_s)))
-    return _without_gusts(HeightRecord(t_s, height_m, segment, tuple(found), ()))
+    return _without_gusts(HeightRecord(t_s, pressure_m, height_m, segment, tuple(found)))
 
 
 def heights_by_pressure(samples: Pressures) -> Floats:
@@ -113,15 +116,21 @@ def _segments(samples: Pressures) -> tuple[Floats, Floats, Ints]:
     return np.bincount(segment, samples.t_s) / count, medians, segment
 
 
+def coarse_m(pressure_pa: Floats) -> float:
+    """Error of a height by pressures (n,) in coarse steps: half of a step."""
+    steps_pa = np.diff(np.unique(pressure_pa))
+    steps_pa = steps_pa[steps_pa > SMOOTH_PA]
+    metres = AIR_J_KG_K * (INDOORS_C + ZERO_C_K) / G0_M_S2
+    return 0.5 * metres * float(np.quantile(steps_pa, FINEST)) / float(pressure_pa[0]) if len(steps_pa) else 0.0
+
+
 def noise_m(height_m: Floats) -> float:
     """Standard deviation of a height (n,), robust: from the differences to the mean of both neighbours, which a steady climb leaves at zero.
 
-    Coarse steps, and errors that last for longer than a segment, as of a sensor that filters, count as noise.
+    Errors that last for longer than one height, as of a sensor that filters, show in the means of two.
     """
-    steps = np.diff(np.unique(height_m))
-    coarse_m = 0.5 * float(np.median(steps)) if len(steps := steps[steps > SMOOTH_M]) else 0.0
     pairs_m = height_m[: len(height_m) // 2 * 2].reshape(-1, 2).mean(axis=1)
-    return max(QUIETEST_M, coarse_m, _bend_m(height_m), math.sqrt(2.0) * _bend_m(pairs_m))
+    return max(QUIETEST_M, _bend_m(height_m), math.sqrt(2.0) * _bend_m(pairs_m))
 
 
 def _bend_m(height_m: Floats) -> float:
@@ -187,8 +196,11 @@ def _without_gusts(record: HeightRecord) -> HeightRecord:
     kept, gusts = [record.stays[0]], [False]
     for stay in record.stays[1:]:
         before = kept[-1]
-        near = max(before.begin, before.end - NEAR), min(stay.begin + NEAR, stay.end)
-        gust = record.is_gust(*near, before.last_m, stay.first_m)
+        ends = (
+            slice(max(before.begin, before.end - NEAR), before.end),
+            slice(stay.begin, min(stay.begin + NEAR, stay.end)),
+        )
+        gust = record.is_gust(*ends)
         if gust and before.end == 1:
             kept, gusts = [stay], [False]
         elif not gust or record.t_s[stay.end - 1] - record.t_s[stay.begin] > GUST_S or stay.end == len(record.t_s):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Floors by pressure, simulated: how often the right floor is named, and for how long a wrong one.
 
-In: seeds. Out: rows `floors/...`. A run is 20 minutes about five storeys under weather of 1 hPa/h (`simulation.people.vertical_day`,
-`simulation.world.air_pressure`).
+In: seeds. Out: rows `floors/...`. A run is 20 minutes about five storeys under weather of 1 hPa/h (`simulation.vertical_day`,
+`simulation.air_pressure`).
 
 The true floor is the storey nearest to the wearer: on stairs and in a lift it changes at the middle between two. Within a quarter of
 a metre of the middle both count as right (`floor_right`), because landings lie there; `strict_right` gives nothing away. Each floor is that of the
@@ -18,10 +18,11 @@ from typing import Literal
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints, spans
+from echostep_app.offline.floors import Floors, record_floors
+from echostep_app.offline.pressure_csv import Pressures
+from echostep_app.offline.stays import height_record
 from echostep_app.output.table import Table
 from echostep_simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
-from echostep_studies.barometer.altitude import Pressures
-from echostep_studies.barometer.floor_filter import Floors, smooth_floors
 from echostep_studies.frame.report import Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.air_pressure import Weather, device_temperatures, pressures
@@ -87,8 +88,8 @@ def _row(name: str, scene: FloorScene, seed: int) -> FloorRun:
     heights = np.array(STOREYS_M)
     away = np.abs(way.height_m[at][:, None] - heights)
     true = away.argmin(axis=1)
-    prior = np.eye(len(heights))[true[0]] if scene.known_start else None
-    return judge(smooth_floors(samples, heights, PRESSURE_NOISE_PA[scene.mode], prior), away, name, seed)
+    start = int(true[0]) if scene.known_start else None
+    return judge(record_floors(samples.t_s, height_record(samples), heights, start), away, name, seed)
 
 
 def _measured(

@@ -13,10 +13,10 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep_studies.barometer.altitude import Pressures, heights_above_start, noise_of
-from echostep_studies.barometer.floor_record import climbed_m, describe, find_storeys, noise_of_record, thinned, visits
-from echostep_studies.barometer.floors_command import record_floors
-from echostep_studies.barometer.pressure_csv import load_pressures
+from echostep_app.offline.floor_table import describe, find_levels, visits
+from echostep_app.offline.floors import record_floors
+from echostep_app.offline.pressure_csv import Pressures, load_pressures
+from echostep_app.offline.stays import coarse_m, height_record, heights_by_pressure, noise_m
 
 STOREYS = np.array([0.0, 3.5, 7.0])
 METRE_PA = 11.7
@@ -49,18 +49,27 @@ def record(
 def right(samples: Pressures, heights_m: Floats, storeys_m: Floats, start: int | None = None) -> float:
     """Share of samples on the right floor; within a quarter of a metre of the middle both are."""
     away = np.abs(heights_m[:, None] - storeys_m)
-    found = record_floors(samples, storeys_m, start)
+    found = record_floors(samples.t_s, height_record(samples), storeys_m, start)
     return float((away[np.arange(len(away)), found.floor] <= away.min(axis=1) + 0.5).mean())
+
+
+def levels(samples: Pressures) -> Floats:
+    return find_levels(height_record(samples), "")
+
+
+def heights(samples: Pressures) -> Floats:
+    """Above the start, at the samples."""
+    record = height_record(samples)
+    return record.height_m[record.segment]
 
 
 @pytest.mark.parametrize(("step_pa", "rate_hz"), [(4.0, 5.0), (10.0, 1.0), (10.0, 25.0)])
 def test_coarse_steps_are_no_floors(step_pa: float, rate_hz: float) -> None:
     way = walk(UP_AND_DOWN, rate_hz)
     samples = record(way, rate_hz, 0.3, step_pa)
-    few, _ = thinned(samples)
-    assert noise_of_record(samples, few) >= 0.5 * step_pa
+    assert METRE_PA * coarse_m(samples.pressure_pa) == pytest.approx(0.5 * step_pa, rel=0.1)
     assert right(samples, way, STOREYS) > 0.985
-    assert find_storeys(few, noise_of_record(samples, few))[-1] == pytest.approx(7.0, abs=0.4)
+    assert levels(samples)[-1] == pytest.approx(7.0, abs=0.4)
 
 
 def test_a_sensor_that_filters_is_not_more_exact() -> None:
@@ -69,14 +78,14 @@ def test_a_sensor_that_filters_is_not_more_exact() -> None:
     samples = record(way, 10.0, 0.0)
     lasting = np.convolve(np.random.default_rng(5).standard_normal(len(way) + 9), np.full(10, 10**-0.5), mode="valid")
     filtered = Pressures(samples.t_s, samples.pressure_pa + 3.0 * lasting)
-    assert noise_of(filtered.pressure_pa) < 2.0
-    assert noise_of_record(filtered, filtered) > 5.0
+    halves = heights_by_pressure(filtered)[:2230].reshape(-1, 5).mean(axis=1)  # of a second
+    assert METRE_PA * noise_m(halves) > 2.0
     assert right(filtered, way, STOREYS) > 0.98
 
 
 def test_white_noise_is_what_it_is() -> None:
     samples = record(walk(UP_AND_DOWN, 10.0), 10.0, 3.0)
-    assert noise_of_record(samples, samples) == pytest.approx(3.0, rel=0.25)
+    assert METRE_PA * noise_m(heights_by_pressure(samples)) == pytest.approx(3.0, rel=0.25)
 
 
 def silent(samples: Pressures, heights_m: Floats, from_s: float, to_s: float) -> tuple[Pressures, Floats]:
@@ -96,14 +105,13 @@ def test_a_silence_moves_nobody() -> None:
     way = np.full(5 * 900, 3.5)
     samples, kept = silent(record(way, 5.0), way, 100.0, 700.0)
     assert right(samples, kept, STOREYS, 1) == 1.0
-    assert abs(heights_above_start(samples, 2.0).height_m[-1]) < 2.0
+    assert abs(heights(samples)[-1]) < 2.0
 
 
 def test_without_storeys_a_rise_in_a_silence_is_seen() -> None:
     way = walk(UP_AND_DOWN, 5.0)
     samples, _ = silent(record(way, 5.0), way, 45.0, 100.0)
-    heights = heights_above_start(samples, 2.0)
-    assert heights.height_m[np.searchsorted(samples.t_s, 110.0)] == pytest.approx(7.0, abs=0.7)
+    assert heights(samples)[np.searchsorted(samples.t_s, 110.0)] == pytest.approx(7.0, abs=0.7)
 
 
 @pytest.mark.slow
@@ -120,30 +128,18 @@ def test_unequal_storeys_are_found(rate_hz: float, noise_pa: float) -> None:
         (0.0, 16.0),
         (0.0, 40.0),
     ]
-    samples = record(walk(legs, rate_hz), rate_hz, noise_pa)
-    few, _ = thinned(samples)
-    found = find_storeys(few, noise_of_record(samples, few))
-    assert found == pytest.approx([0.0, 5.0, 8.3, 14.9], abs=0.5)
+    assert levels(record(walk(legs, rate_hz), rate_hz, noise_pa)) == pytest.approx([0.0, 5.0, 8.3, 14.9], abs=0.5)
 
 
-def test_short_stays_are_storeys_too() -> None:
+def test_stays_of_twelve_seconds_are_storeys() -> None:
     legs = [
-        (0.0, 10.0),
-        (3.5, 9.0),
-        (3.5, 6.0),
-        (7.0, 9.0),
-        (7.0, 6.0),
-        (10.5, 9.0),
-        (10.5, 6.0),
-        (0.0, 9.0),
-        (0.0, 10.0),
-    ]
-    found = find_storeys(record(walk(legs, 5.0), 5.0), 2.0)
-    assert found == pytest.approx([0.0, 3.5, 7.0, 10.5], abs=0.4)
+        (0.0, 12.0), (3.5, 9.0), (3.5, 12.0), (7.0, 9.0), (7.0, 12.0), (10.5, 9.0), (10.5, 12.0), (0.0, 27.0), (0.0, 12.0),
+    ]  # fmt: skip
+    assert levels(record(walk(legs, 5.0), 5.0)) == pytest.approx([0.0, 3.5, 7.0, 10.5], abs=0.4)
 
 
 def test_one_way_without_a_stay_has_two_ends() -> None:
-    found = find_storeys(record(walk([(20.0, 0.5), (0.0, 70.0)], 2.0), 2.0), 2.0)
+    found = levels(record(walk([(20.0, 0.5), (0.0, 70.0)], 2.0), 2.0))
     assert found == pytest.approx([0.0, 20.0], abs=1.5)
 
 
@@ -151,7 +147,7 @@ def test_one_way_without_a_stay_has_two_ends() -> None:
 def test_weather_lifts_no_storey() -> None:
     """Half an hour on each floor while the pressure falls by 2 hPa an hour."""
     legs = [(0.0, 1800.0), (3.5, 14.0), (3.5, 1800.0), (0.0, 12.0), (0.0, 900.0)]
-    found = find_storeys(record(walk(legs, 1.0), 1.0, drift_pa_h=-200.0), 2.0)
+    found = levels(record(walk(legs, 1.0), 1.0, drift_pa_h=-200.0))
     assert found == pytest.approx([0.0, 3.5], abs=0.25)
 
 
@@ -159,12 +155,12 @@ def test_a_building_under_pressure_is_no_storey() -> None:
     samples = record(np.zeros(600), 1.0, 3.0, drift_pa_h=0.0)
     samples.pressure_pa[100:400] -= 25.0
     with pytest.raises(EchostepError, match="one storey only"):
-        find_storeys(samples, 3.0)
+        levels(samples)
 
 
 def test_a_storey_that_vanishes_is_told() -> None:
     with pytest.raises(EchostepError, match="one storey only"):
-        find_storeys(record(walk([(0.0, 90.0), (1.5, 9.0), (1.5, 90.0)], 5.0), 5.0), 2.0)
+        levels(record(walk([(0.0, 90.0), (1.5, 9.0), (1.5, 90.0)], 5.0), 5.0))
 
 
 def test_rows_with_the_time_of_the_row_before_are_skipped(tmp_path: Path) -> None:
@@ -196,14 +192,15 @@ def test_what_is_printed_agrees_with_the_rows(
     way: list[tuple[float, float]], storeys: int, floors: list[int], climbed: float, rate_hz: float
 ) -> None:
     """A visit of two seconds is no stay, but the way turned there; each printed span has one floor in every row, and the climbs add up."""
-    found = record_floors(record(walk(way, rate_hz), rate_hz), np.arange(0.0, 3.5 * storeys, 3.5))
-    visited = visits(found)
+    samples = record(walk(way, rate_hz), rate_hz)
+    above = height_record(samples)
+    found = record_floors(samples.t_s, above, np.arange(0.0, 3.5 * storeys, 3.5))
+    visited = visits(found, above)
     for visit in visited:
         rows = (found.t_s >= visit.from_s) & (found.t_s <= visit.to_s)
         assert set(found.floor[rows].tolist()) == {visit.floor}
     assert [visit.floor for visit in visited] == floors
-    assert climbed_m(found.heights_m, visited) == (climbed, climbed)
-    lines = describe(found).splitlines()
+    lines = describe(found, above).splitlines()
     assert f"climbed {climbed:.1f} m up, {climbed:.1f} m down" in lines[len(floors)]
 
 
@@ -217,14 +214,14 @@ def test_a_wrong_first_sample_makes_no_rise_and_hides_none(first_pa: float | Non
     pressure_pa = CLIMB_PA.copy()
     if first_pa:
         pressure_pa[0] = first_pa
-    height_m = heights_above_start(Pressures(T_S, pressure_pa), 1.5).height_m
+    height_m = heights(Pressures(T_S, pressure_pa))
     assert height_m[1400] - height_m[500] == pytest.approx(3.5, abs=0.3)
     assert height_m[-1] == pytest.approx(3.5, abs=0.3)
 
 
 def test_a_lift_from_the_first_sample_on_is_a_rise() -> None:
     pressure_pa = 101_325.0 * np.exp(-np.minimum(5.0 * T_S, 60.0) / 8434)
-    assert heights_above_start(Pressures(T_S, pressure_pa), 3.0).height_m[-1] == pytest.approx(60.0, abs=2.0)
+    assert heights(Pressures(T_S, pressure_pa))[-1] == pytest.approx(60.0, abs=2.0)
 
 
 @pytest.mark.parametrize(("wrong", "pa"), [(0, 0.0), (1, 68_500.0), (5, 118_000.0)])

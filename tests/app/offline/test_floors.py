@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Heights and floors from pressure: the filter, the record's file, the command, real climbs."""
+"""Heights and floors from pressure: stays, levels, the record's file, the command, real climbs."""
 
 from __future__ import annotations
 
 import datetime
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,20 +17,15 @@ from typer.testing import CliRunner
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep_app.cli import app
-from echostep_simulation.devices.board_sensors import Scp1000Model
-from echostep_studies.barometer.altitude import Pressures, heights_above_start, noise_of
-from echostep_studies.barometer.floor_filter import checked_heights, smooth_floors
-from echostep_studies.barometer.floor_record import find_storeys, stays
-from echostep_studies.barometer.floors_command import parse_heights, record_floors
-from echostep_studies.barometer.pressure_csv import load_pressures
-from echostep_studies.floors.study import judge, longest_s
-from echostep_studies.frame.recordings import DATA
-from echostep_studies.simulation.air_pressure import Weather, device_temperatures, pressures
-from echostep_studies.simulation.vertical_day import climb
-from needs_data import needs_data
+from echostep_app.offline.floor_table import checked_heights, find_levels, parse_heights, visits
+from echostep_app.offline.floors import Floors, record_floors
+from echostep_app.offline.pressure_csv import Pressures, load_pressures
+from echostep_app.offline.stays import height_record, heights_by_pressure, noise_m
+from needs_data import data_or_skip
 
 STOREYS = np.array([0.0, 3.5, 7.0])
-NOISE_PA = 3.0
+UNEVEN = np.array([0.0, 5.0, 8.5])
+METRE_PA = 11.8  # on the ground
 
 
 def pascals(height_m: Floats) -> Floats:
@@ -53,23 +47,28 @@ def stairs_up(rate_hz: float = 9.0, speed: float = 0.3) -> Floats:
     return np.concatenate([stand, np.linspace(0.0, 3.5, round(3.5 / speed * rate_hz)), stand + 3.5])
 
 
-def known(floor: int, count: int = 3) -> Floats:
-    return np.asarray(np.eye(count)[floor])
+def floors_of(samples: Pressures, heights_m: Floats, start: int | None = None) -> Floors:
+    return record_floors(samples.t_s, height_record(samples), heights_m, start)
+
+
+def heights_of(samples: Pressures) -> Floats:
+    """Heights above the start at the samples."""
+    record = height_record(samples)
+    return record.height_m[record.segment]
 
 
 @pytest.mark.long
 def test_standing_keeps_the_height_under_the_weather() -> None:
     t = np.arange(10_800) / 9.0
-    heights = heights_above_start(record(np.zeros(10_800), extra_pa=100.0 / 3600.0 * t), NOISE_PA)  # 2.8 m of weather
-    assert abs(heights.height_m[-1]) < 1.0
-    assert (heights.moving < 0.5).mean() > 0.99
+    assert abs(heights_of(record(np.zeros(10_800), extra_pa=100.0 / 3600.0 * t))[-1]) < 1.0  # of 2.8 m of weather
 
 
-def test_stairs_are_climbed_and_told_while_they_are() -> None:
-    way = stairs_up()
-    heights = heights_above_start(record(way), NOISE_PA)
-    assert heights.height_m[-1] - heights.height_m[300] == pytest.approx(3.5, abs=0.5)
-    assert np.median(heights.moving[60 * 9 + 45 : 60 * 9 + 100]) > 0.7
+def test_stairs_are_climbed_between_two_stays() -> None:
+    found = height_record(record(stairs_up()))
+    before, after = found.stays
+    assert after.first_m - before.last_m == pytest.approx(3.5, abs=0.3)
+    assert found.t_s[before.end - 1] == pytest.approx(60.0, abs=3.0)
+    assert found.t_s[after.begin] == pytest.approx(72.0, abs=3.0)
 
 
 @pytest.mark.parametrize("size_pa", [-50.0, -20.0, 20.0, 50.0])
@@ -79,15 +78,15 @@ def test_a_door_moves_nobody(size_pa: float, held_s: float) -> None:
     t = np.arange(n) / 9.0
     pulse = size_pa * ((t > 60.0) & (t < 60.0 + held_s))
     samples = record(np.full(n, 3.5), extra_pa=pulse)
-    found = smooth_floors(samples, STOREYS, NOISE_PA, known(1))
+    found = floors_of(samples, STOREYS, 1)
     assert (found.floor == 1).all()
-    assert abs(heights_above_start(samples, NOISE_PA).height_m[-1]) < 0.5
+    assert abs(heights_of(samples)[-1]) < 0.5
 
 
 def test_a_building_under_pressure_for_good_moves_nobody() -> None:
     n = 1200
     step = -25.0 * (np.arange(n) > 600)
-    found = smooth_floors(record(np.full(n, 3.5), extra_pa=step), STOREYS, NOISE_PA, known(1))
+    found = floors_of(record(np.full(n, 3.5), extra_pa=step), STOREYS, 1)
     assert (found.floor == 1).all()
 
 
@@ -95,91 +94,43 @@ def test_spikes_are_no_heights() -> None:
     way = stairs_up()
     samples = record(way)
     samples.pressure_pa[::97] += 400.0
-    found = smooth_floors(samples, STOREYS, NOISE_PA, known(0))
+    found = floors_of(samples, STOREYS, 0)
     right = found.floor == np.abs(way[:, None] - STOREYS).argmin(axis=1)
     assert right.mean() > 0.98
     assert found.floor[-1] == 1
 
 
 def test_an_unknown_start_is_uniform_unless_the_heights_tell() -> None:
-    uneven = np.array([0.0, 5.0, 8.5])
     way = np.concatenate([np.zeros(400), np.linspace(0.0, 5.0, 150), np.full(400, 5.0)])
-    unmoved = smooth_floors(record(way[:300]), uneven, NOISE_PA)
-    assert unmoved.probability[-1] == pytest.approx(np.full(3, 1 / 3), abs=0.05)
-    found = smooth_floors(record(way), uneven, NOISE_PA)
-    assert found.floor[-1] == 1
-    assert found.probability[-1, 1] > 0.9
+    unmoved = floors_of(record(way[:300]), UNEVEN)
+    assert (unmoved.floor == 0).all()
+    assert unmoved.probability[-1] == pytest.approx(1 / 3, abs=0.05)
+    found = floors_of(record(way), UNEVEN)
     assert (found.floor[:390] == 0).all()
+    assert found.floor[-1] == 1
+    assert found.probability[-1] > 0.9
 
 
 def test_the_range_of_floors_excludes_starts() -> None:
     way = np.concatenate([np.zeros(400), np.linspace(0.0, 7.0, 240), np.full(400, 7.0)])
-    back = smooth_floors(record(way), STOREYS, NOISE_PA)
-    assert back.probability[100, 0] > 0.9
-    assert back.probability[-1, 2] > 0.9
+    found = floors_of(record(way), STOREYS)
+    assert (found.floor[[100, -1]] == [0, 2]).all()
+    assert found.probability.min() > 0.9
 
 
 @settings(max_examples=15, deadline=None)
 @given(st.lists(st.tuples(st.floats(0.01, 60.0), st.floats(20_000.0, 120_000.0)), min_size=1, max_size=30))
 def test_any_pressures_have_finite_heights_and_probabilities(rows: list[tuple[float, float]]) -> None:
     samples = Pressures(np.cumsum([r[0] for r in rows]), np.array([r[1] for r in rows]))
-    heights, floors = heights_above_start(samples, NOISE_PA), smooth_floors(samples, STOREYS, NOISE_PA)
-    assert np.isfinite(heights.height_m).all()
-    assert floors.probability.sum(axis=1) == pytest.approx(np.ones(len(floors.t_s)), abs=1e-6)
+    found = floors_of(samples, STOREYS)
+    assert np.isfinite(found.height_m).all()
+    assert (found.probability > 0.9 / 3).all()
+    assert (found.probability < 1.0 + 1e-6).all()
 
 
 def test_noise_is_measured_on_a_record() -> None:
-    assert noise_of(record(stairs_up(), noise_pa=3.0).pressure_pa) == pytest.approx(3.0, rel=0.1)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("ways", ["stairs", "lift"])
-def test_a_simulated_quarter_of_an_hour(ways: str) -> None:
-    rng = np.random.default_rng(900)
-    heights = np.array([0.0, 3.5, 7.0, 10.5, 14.0])
-    way = climb(heights.tolist(), 900.0, rng, ways)  # type: ignore[arg-type]
-    air = pressures(way.t_s, way.height_m, way.in_shaft, Weather(), rng)
-    at = np.arange(0, len(air), 6)
-    samples = Pressures(
-        way.t_s[at], air[at] + 3.0 * rng.standard_normal(len(at)), device_temperatures(way.t_s[at], 21.0, rng)
-    )
-    away = np.abs(way.height_m[at][:, None] - heights)
-    found = smooth_floors(samples, heights, NOISE_PA, known(int(away[0].argmin()), 5))
-    score = judge(found, away, "", 1)
-    assert score.floor_right > 0.99
-    assert score.longest_wrong_s < 10.0
-
-
-def test_the_judge_counts() -> None:
-    t = np.arange(6.0)
-    assert longest_s(t, np.array([False, True, True, False, True, False])) == 2.0
-    assert longest_s(t, np.zeros(6, bool)) == 0.0
-    assert longest_s(t, np.array([False, False, False, False, True, True])) == 1.0
-
-
-def test_the_boards_barometer_is_carried_up() -> None:
-    rng = np.random.default_rng(3)
-    height = np.linspace(0.0, 10.0, 4000)
-    counts, _ = Scp1000Model(rng, "high-resolution").counts(height, 20.0, 4000)
-    assert (counts[:500].mean() - counts[-500:].mean()) / 4.0 == pytest.approx(8.75 * 12.0, rel=0.02)
-    told, _ = Scp1000Model(rng, "high-resolution").counts(height, 20.0, 4000, np.full(4000, 99_000.0))
-    assert told.mean() / 4.0 == pytest.approx(99_000.0, abs=0.2)
-    assert told.std() / 4.0 == pytest.approx(1.5, rel=0.1)
-
-
-def test_weather_does_what_it_says() -> None:
-    rng = np.random.default_rng(4)
-    t = np.arange(0.0, 3600.0, 0.1)
-    calm = Weather(wander_pa=0.0, doors_s=np.inf, fan_s=np.inf)
-    air = pressures(t, np.zeros(len(t)), np.zeros(len(t), bool), calm, rng)
-    assert air[-1] - air[0] == pytest.approx(100.0, abs=0.1)
-    doors = pressures(t, np.zeros(len(t)), np.zeros(len(t), bool), Weather(0.0, 0.0, 60.0, fan_s=np.inf), rng)
-    away = np.abs(doors - np.median(doors))
-    assert 20.0 < away.max() < 120.0
-    assert np.median(away) < 0.5
-    still = replace(calm, trend_pa_h=0.0)
-    column = pressures(np.array([0.0, 400.0]), np.array([0.0, 100.0]), np.zeros(2, bool), still, rng)
-    assert np.log(column[0] / column[1]) * 287.053 * (21.0 + 273.15) / 9.80665 == pytest.approx(100.0, abs=0.01)
+    samples = record(stairs_up(), noise_pa=3.0)
+    assert METRE_PA * noise_m(heights_by_pressure(samples)) == pytest.approx(3.0, rel=0.1)
 
 
 def write(path: Path, samples: Pressures, factor: float = 1.0, seconds: float = 1.0) -> Path:
@@ -205,23 +156,23 @@ def test_the_command_tells_floors_and_stays(tmp_path: Path) -> None:
     assert f"floors: {out}, picture: {picture}" in result.output
 
 
-@pytest.mark.slow
 def test_the_storeys_are_found() -> None:
     way = np.concatenate([stairs_up(), 3.5 + stairs_up()[540:], 7.0 - stairs_up()[540:], 3.5 - stairs_up()[540:]])
-    found = find_storeys(record(way), NOISE_PA)
-    assert found == pytest.approx([0.0, 3.5, 7.0], abs=0.3)
-    floors = record_floors(record(way), found)
-    assert [stay.floor for stay in stays(floors)] == [0, 1, 2, 1, 0]
-    with pytest.raises(EchostepError, match="one storey only"):
-        find_storeys(record(np.zeros(900)), NOISE_PA)
+    samples = record(way)
+    found = height_record(samples)
+    heights_m = find_levels(found, "")
+    assert heights_m == pytest.approx([0.0, 3.5, 7.0], abs=0.3)
+    floors = record_floors(samples.t_s, found, heights_m)
+    assert [visit.floor for visit in visits(floors, found)] == [0, 1, 2, 1, 0]
+    with pytest.raises(EchostepError, match=r"a\.csv: heights: the record shows one storey only"):
+        find_levels(height_record(record(np.zeros(900))), "a.csv")
 
 
 @pytest.mark.parametrize("rate_hz", [0.5, 2.0, 50.0])
 def test_any_rate(rate_hz: float) -> None:
     way = stairs_up(rate_hz)
-    found = record_floors(record(way, rate_hz, noise_pa=1.5), np.array([0.0, 3.5]))
-    away = np.abs(way[:, None] - np.array([0.0, 3.5]))
-    assert judge(found, away, "", 1).floor_right > 0.97
+    found = floors_of(record(way, rate_hz, noise_pa=1.5), np.array([0.0, 3.5]))
+    assert ((found.floor == (way > 1.75)) | (np.abs(way - 1.75) < 0.25)).mean() > 0.97
     assert len(found.t_s) == len(way)
 
 
@@ -297,24 +248,30 @@ def test_a_start_that_is_no_floor_is_refused(tmp_path: Path) -> None:
         assert isinstance(result.exception, EchostepError)
 
 
-def climbed(path: Path) -> float:
-    """Metres by the BMP180 of a log: its start and end are dated to the second, its rows come evenly."""
-    lines = path.read_text().splitlines()
+def climb(place: str) -> Pressures:
+    """The BMP180 of a log: its start and end are dated to the second, its rows come evenly."""
+    lines = (data_or_skip("baro") / f"{place}.log").read_text().splitlines()  # loruro/Barometer_STM32
     rows = [line.split(";") for line in lines if line[:1].isdigit() and line.count(";") == 2]
     t0, t1 = (
         datetime.datetime.strptime(line, "Date: %Y-%m-%d - %H:%M:%S") for line in lines if line.startswith("Date")
     )
     table = np.array(rows, float)
     t_s = np.arange(len(table)) * (t1 - t0).total_seconds() / len(table)
-    pressure, temperature = table[:, 1] / 10.0, table[:, 2] / 1000.0
-    found = heights_above_start(Pressures(t_s, pressure, temperature), noise_of(pressure))
-    return float(found.height_m[-1] - found.height_m[0])
+    return Pressures(t_s, table[:, 1] / 10.0, table[:, 2] / 1000.0)
 
 
-@needs_data("baro")  # loruro/Barometer_STM32
 @pytest.mark.parametrize(("place", "about_m"), [("kapitol", 41.2), ("b5", 31.15)])
 def test_real_stairs_are_as_high_up_as_down(place: str, about_m: float) -> None:
-    up, down = (climbed(DATA / f"baro/{way}_{place}.log") for way in ("up", "down"))
+    up, down = (heights_of(climb(f"{way}_{place}"))[-1] for way in ("up", "down"))
     print(f"{place}: {up:.2f} m up, {down:.2f} m down")
-    assert -down == pytest.approx(up, rel=0.03)
+    assert -down == pytest.approx(up, rel=0.015)
     assert up == pytest.approx(about_m, rel=0.03)
+
+
+@pytest.mark.parametrize(("place", "top_m", "floors"), [("kapitol", 41.2, 15), ("b5", 31.15, 10)])
+@pytest.mark.parametrize("way", ["up", "down"])
+def test_each_floor_of_real_stairs_is_passed_once_and_in_order(place: str, top_m: float, floors: int, way: str) -> None:
+    """Storeys evenly between the ground and the top; an unknown start is resolved by the whole climb."""
+    found = floors_of(climb(f"{way}_{place}"), np.linspace(0.0, top_m, floors))
+    passed = found.floor[np.flatnonzero(np.diff(found.floor, prepend=-1))]
+    assert passed.tolist() == list(range(floors) if way == "up" else reversed(range(floors)))
