@@ -42,7 +42,7 @@ print(twice(shapes.{name}(3.0)))
 
 PROBE = """
 from numpy import zeros
-from echostep.walls.polyline import along
+from echostep_app.plan.polyline import along
 assert along(zeros((2, 2)), 0.0) == (0.0, 0.0, 0.0)
 print(along._cache.cache_path)
 """

@@ -15,9 +15,10 @@ from typing import Annotated
 
 import typer
 
-from echostep.errors import EchostepError, IncompleteError, former_use, words_of
+from echostep.errors import EchostepError, IncompleteError, words_of
 from echostep.file_mode import share_files
 from echostep_app.commands import beacons, commander, files, hardware, plan, recordings, runs
+from echostep_app.commands.former import former_use
 from echostep_app.commands.studies import add_studies
 from echostep_app.extras import EXTRAS, lacks
 from echostep_app.interruption import end_by_signals, is_asked

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from board_runs import ROOT, Bench, needs_twin
 from echostep.board import messages as m
 from echostep.board.frames import encode
-from echostep.board.reports import BoardReports
-from echostep.board.subscription import SUBSCRIBE, BoardSubscription
+from echostep.board.reports import SUBSCRIBE, BoardReports
 from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.tracker import Tracker
 from echostep_app.board.faults.health import Severity, board_findings, expected_rates, gyro_celsius, rate_findings
+from echostep_app.board.subscription import BoardSubscription
 from echostep_app.commissioning.diagnosis import Diagnosis, judge_board
 from echostep_app.commissioning.probe import ProbeResult
 from echostep_app.output.terminal import findings

@@ -9,11 +9,12 @@ from pathlib import Path
 import pytest
 
 from command_line import echostep
-from echostep.errors import INSTEAD, EchostepError, former_use, has_left
+from echostep.errors import INSTEAD, EchostepError, has_left
 from echostep.plan import load_plan
 from echostep.recording import open_parts
 from echostep.settings import Settings, parse_settings
 from echostep.walk.recorded import tracker_of
+from echostep_app.commands.former import former_use
 from echostep_app.recording.recorder import Recorder
 from walks import DEMO, walk_chunks
 

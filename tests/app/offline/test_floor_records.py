@@ -13,10 +13,10 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep_app.offline.floor_table import describe, find_levels, visits
-from echostep_app.offline.floors import record_floors
-from echostep_app.offline.pressure_csv import Pressures, load_pressures
-from echostep_app.offline.stays import coarse_m, height_record, heights_by_pressure, noise_m
+from echostep_app.offline.floors.floor_table import describe, find_levels, visits
+from echostep_app.offline.floors.floors import record_floors
+from echostep_app.offline.floors.pressure_csv import Pressures, load_pressures
+from echostep_app.offline.floors.stays import coarse_m, height_record, heights_by_pressure, noise_m
 
 STOREYS = np.array([0.0, 3.5, 7.0])
 METRE_PA = 11.7

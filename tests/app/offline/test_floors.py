@@ -17,10 +17,10 @@ from typer.testing import CliRunner
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep_app.cli import app
-from echostep_app.offline.floor_table import checked_heights, find_levels, parse_heights, visits
-from echostep_app.offline.floors import Floors, record_floors
-from echostep_app.offline.pressure_csv import Pressures, load_pressures
-from echostep_app.offline.stays import height_record, heights_by_pressure, noise_m
+from echostep_app.offline.floors.floor_table import checked_heights, find_levels, parse_heights, visits
+from echostep_app.offline.floors.floors import Floors, record_floors
+from echostep_app.offline.floors.pressure_csv import Pressures, load_pressures
+from echostep_app.offline.floors.stays import height_record, heights_by_pressure, noise_m
 from needs_data import data_or_skip
 
 STOREYS = np.array([0.0, 3.5, 7.0])

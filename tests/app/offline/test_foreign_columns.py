@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 from command_line import echostep
 from echostep.errors import EchostepError
 from echostep_app.cli import app
+from echostep_app.offline.floors.pressure_csv import load_pressures
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.foreign_columns import LOGGERS, OWN, Naming, parse_naming, read_header
 from echostep_app.offline.leg_csv import load_legs, load_pair
-from echostep_app.offline.pressure_csv import load_pressures
 from foot.foot_walks import MANNERS, course, samples
 from needs_data import data_or_skip
 

@@ -15,9 +15,9 @@ from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
 from echostep.recording import Decoder, read_capture
 from echostep.xsens import MTDATA, encode_frame
+from echostep_app.offline.floors.pressure_csv import load_pressures
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.leg_csv import load_legs
-from echostep_app.offline.pressure_csv import load_pressures
 from echostep_app.recording.capture_summary import summary
 from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.contents import info

@@ -13,7 +13,7 @@ import pytest
 from board_runs import ROOT
 from echostep.board import messages as m
 from echostep.board.frames import encode
-from echostep.board.subscription import SUBSCRIBE
+from echostep.board.reports import SUBSCRIBE
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep_app.session.options import PortOptions

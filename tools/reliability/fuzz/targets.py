@@ -27,9 +27,9 @@ from echostep.xsens import MTDATA, MTDATA2, PROJECT, MtSample, MtxLimits, MtxRea
 from echostep.xsens.frames import MAX_LENGTH
 from echostep.xsens.message import MessageReader
 from echostep.xsens.packets import read_packets
+from echostep_app.offline.floors.pressure_csv import load_pressures
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.leg_csv import load_legs
-from echostep_app.offline.pressure_csv import load_pressures
 from echostep_app.page.requests import parse_request
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.ports.datagram_key import Opener, seal

@@ -19,10 +19,10 @@ from echostep.arrays import Floats
 from echostep.localization import Estimate, TrackStatus
 from echostep.path import MeasuredSegment, Odometer
 from echostep.tracker import Tracker
-from echostep.walls.polyline import nearest, turn_ahead, way_m
 from echostep_app.guidance.cue_list import CueList
 from echostep_app.guidance.cues import Cue, CueKind, Guide
 from echostep_app.guidance.own_way import OwnWay
+from echostep_app.plan.polyline import nearest, turn_ahead, way_m
 from echostep_app.plan.routing import Route, RoutePlace, Stretch
 
 # Of the way, after which a return has begun or is over: more than the steps of a search in one room

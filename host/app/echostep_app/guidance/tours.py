@@ -18,8 +18,8 @@ from shapely import Polygon
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan import Connector, Plan
-from echostep.walls.polyline import way_m
 from echostep_app.plan.cropping import is_clear
+from echostep_app.plan.polyline import way_m
 from echostep_app.plan.routing import Route, RoutePlace, Routes
 from echostep_simulation.people.walker import Waypoint
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from echostep.foot.steps import Track
-    from echostep_app.offline.floors import Floors
+    from echostep_app.offline.floors.floors import Floors
 
 PARTIAL_COLOUR = "#999999"
 MOST_POINTS = 5000  # about, of a curve

@@ -18,8 +18,8 @@ from echostep.errors import EchostepError
 from echostep.jit import kernel, part
 from echostep.plan import Plan
 from echostep.walls.near_walls import mark_near_walls
-from echostep.walls.polyline import way_m
 from echostep_app.plan.cropping import is_clear
+from echostep_app.plan.polyline import way_m
 
 # All assumed:
 CELL_M = 0.15  # side of a grid cell

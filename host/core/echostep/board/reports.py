@@ -9,6 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from echostep.board import messages
+from echostep.board.messages import Reports
+
+OPTIONAL = Reports.BOARD_HEALTH | Reports.PARTS | Reports.MOTION | Reports.MAGNETIC | Reports.FOOT
+SUBSCRIBE = messages.Subscribe(OPTIONAL)  # what a run asks a board for
 
 
 @dataclass(slots=True)

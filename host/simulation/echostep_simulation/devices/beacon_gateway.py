@@ -14,13 +14,13 @@ from dataclasses import dataclass
 from operator import attrgetter
 
 import numpy as np
+from shapely import LineString
 
 from echostep.arrays import Floats, Ints
 from echostep.board.frames import encode
 from echostep.board.messages import Beacon
 from echostep.plan import Plan
 from echostep.ports.chunks import GATEWAY, Chunk
-from echostep.walls.polyline import along, way_m
 from echostep_simulation.scenario import START_NS, Scenario
 from echostep_simulation.world.beacon_ground import OUTLIER_M
 
@@ -44,8 +44,11 @@ class BeaconWorld:
 
 def lay_beacons(path_m: Floats, spacing_m: float, rng: np.random.Generator) -> Floats:
     """Beacons (b, 3) dropped along a path (k, 2), `spacing_m` apart, each with a random orientation."""
-    count = max(int(way_m(path_m) / spacing_m), 1)
-    places = np.array([(*along(path_m, spacing_m * k)[:2], rng.uniform(-math.pi, math.pi)) for k in range(count)])
+    line = LineString(path_m)
+    count = max(int(line.length / spacing_m), 1)
+    places = np.array(
+        [(*line.interpolate(spacing_m * k).coords[0], rng.uniform(-math.pi, math.pi)) for k in range(count)]
+    )
     places[:, :2] += ASIDE_M * rng.uniform(-1.0, 1.0, (count, 2))
     return places
 

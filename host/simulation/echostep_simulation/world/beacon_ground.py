@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from shapely import LineString
 
 from echostep.arrays import Bools, Floats
 from echostep.jit import kernel
-from echostep.walls.polyline import along, way_m
 
 OUTLIER_M = 3.0  # added to a range [Fischer 2008, 4.1.1]
 
@@ -76,11 +76,12 @@ class BeaconGround(NamedTuple):
 def ground(settings: GroundSettings, rng: np.random.Generator) -> BeaconGround:
     """A ground with beacons and sources along a random trail."""
     trail = draw_trail(rng)
-    total = way_m(trail)
+    line = LineString(trail)
+    total = line.length
     count = max(int(total / settings.spacing_m) + 1, 2)
     dropped = np.empty((count, 3))
     for k, s in enumerate(np.linspace(0.0, total, count).tolist()):
-        x, y, _ = along(trail, s)
+        x, y = line.interpolate(s).coords[0]
         dropped[k] = x, y, rng.uniform(-math.pi, math.pi)
     dropped[:, :2] += ASIDE_M * rng.standard_normal((count, 2))
     believed = dropped.copy()
@@ -120,7 +121,7 @@ def _sources(settings: GroundSettings, trail: Floats, rng: np.random.Generator) 
     """Sources (s, 4) at random places along the trail."""
     sources = np.empty((settings.sources, 4))
     for k in range(settings.sources):
-        x, y, _ = along(trail, rng.uniform(*SOURCE_SHARE) * way_m(trail))
+        x, y = LineString(trail).interpolate(rng.uniform(*SOURCE_SHARE), normalized=True).coords[0]
         aside = rng.uniform(-settings.source_aside_m, settings.source_aside_m, 2)
         sources[k] = (
             x + aside[0], y + aside[1], rng.uniform(*settings.source_radius_m),

@@ -14,9 +14,9 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.beacons.step import mean_place
 from echostep.jit import part
-from echostep.walls.polyline import nearest, turn_ahead
 from echostep_app.guidance.contact import Contact, allowed_silence, update_contact
 from echostep_app.guidance.cues import GuidanceSettings
+from echostep_app.plan.polyline import nearest, turn_ahead
 from echostep_studies.fischer2008.beacon_cloud import BeaconCloud
 from echostep_studies.fischer2008.learnt_trail import believed_trail, span_near_heard
 from echostep_studies.fischer2008.paper_fusion import Fusion, note_reliable

@@ -15,7 +15,7 @@ import numpy as np
 from echostep.arrays import Bools, Floats
 from echostep.beacons.beliefs import X, Y
 from echostep.jit import kernel, part
-from echostep.walls.polyline import along, way_m
+from echostep_app.plan.polyline import along, way_m
 from echostep_simulation.world.beacon_ground import BeaconGround
 from echostep_studies.fischer2008.beacon_cloud import BeaconCloud, update_by_ultrasound
 from echostep_studies.fischer2008.walker import STEP_M, WALKER, GuidedWalker, dead_reckon

@@ -16,8 +16,8 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.beacons.model import BeaconSettings
 from echostep.jit import kernel, part
-from echostep.walls.polyline import along, way_m
 from echostep_app.guidance.contact import CONTACT, Contact, start_contact
+from echostep_app.plan.polyline import along, way_m
 from echostep_simulation.world.beacon_ground import BeaconGround
 from echostep_studies.fischer2008.beacon_cloud import BeaconCloud, new_cloud, set_beacons, update_by_ultrasound
 from echostep_studies.fischer2008.guidance import Advice, advise_by_cloud, advise_by_fusion, note_contact

@@ -18,9 +18,9 @@ from typing import Literal
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints, spans
-from echostep_app.offline.floors import Floors, record_floors
-from echostep_app.offline.pressure_csv import Pressures
-from echostep_app.offline.stays import height_record
+from echostep_app.offline.floors.floors import Floors, record_floors
+from echostep_app.offline.floors.pressure_csv import Pressures
+from echostep_app.offline.floors.stays import height_record
 from echostep_app.output.table import Table
 from echostep_simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
 from echostep_studies.frame.report import Row, rows_by_name

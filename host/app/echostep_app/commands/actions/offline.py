@@ -19,8 +19,10 @@ from echostep.offline.imu_csv import Imu, describe_track, own_track, write_foot_
 from echostep.recording import Decoder, as_json, read_capture
 from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import OutputFormats
-from echostep_app.offline.floor_table import describe, find_levels, parse_heights, write_floors
-from echostep_app.offline.floors import record_floors
+from echostep_app.offline.floors.floor_table import describe, find_levels, parse_heights, write_floors
+from echostep_app.offline.floors.floors import record_floors
+from echostep_app.offline.floors.pressure_csv import load_pressures
+from echostep_app.offline.floors.stays import height_record
 from echostep_app.offline.foot_files import load_foot, refuse_glide
 from echostep_app.offline.foreign_columns import OWN, Naming
 from echostep_app.offline.importing import Beside, import_imu
@@ -34,8 +36,6 @@ from echostep_app.offline.leg_track import (
     track_default,
     write_leg_track,
 )
-from echostep_app.offline.pressure_csv import load_pressures
-from echostep_app.offline.stays import height_record
 from echostep_app.output.offline_plots import draw_floors, draw_foot, draw_legs
 from echostep_app.printing.console import console
 from echostep_app.printing.lines import complain

@@ -16,8 +16,8 @@ import numpy as np
 
 from echostep.localization import Estimate
 from echostep.plan import Plan
-from echostep.walls.polyline import along, way_m
 from echostep_app.guidance.cues import Cue, CueKind, Guide
+from echostep_app.plan.polyline import along, way_m
 from echostep_app.plan.routing import Route, RoutePlace, Routes
 
 SEARCH_INTERVAL_S = 5.0  # shortest time between two searches for a route, in data time

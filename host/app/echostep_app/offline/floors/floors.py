@@ -21,7 +21,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from echostep.arrays import Floats, Ints
 from echostep.localization import ClimbSettings, drift_m, level_change_model, pressure_cost
-from echostep_app.offline.stays import AIR_SD_M, NEAR, HeightRecord, Stay
+from echostep_app.offline.floors.stays import AIR_SD_M, NEAR, HeightRecord, Stay
 
 CLIMBING = ClimbSettings()
 TIED = 0.9  # of the best floor's probability: then the lowest of them is named

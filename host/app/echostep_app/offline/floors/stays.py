@@ -17,7 +17,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints, spans
 from echostep.localization import ClimbSettings, HeightChange, RelativeHeight
-from echostep_app.offline.pressure_csv import COLDEST_C, WARMEST_C, Pressures
+from echostep_app.offline.floors.pressure_csv import COLDEST_C, WARMEST_C, Pressures
 
 AIR_J_KG_K, G0_M_S2, ZERO_C_K = 287.053, 9.80665, 273.15
 INDOORS_C = 20.0

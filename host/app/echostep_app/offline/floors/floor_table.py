@@ -16,8 +16,8 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.file_mode import claim
-from echostep_app.offline.floors import CLIMBING, Floors
-from echostep_app.offline.stays import HeightRecord
+from echostep_app.offline.floors.floors import CLIMBING, Floors
+from echostep_app.offline.floors.stays import HeightRecord
 from echostep_app.printing.lines import as_error
 
 COLUMNS = ("t_s", "floor", "probability", "height_m")
