@@ -13,6 +13,7 @@ from board_runs import Bench, needs_twin, quiet_rows
 from echostep.board import messages as m
 from echostep.board.reports import BoardReports
 from echostep_app.board.faults.health import board_findings
+from firmware.findings import findings_of
 from firmware.test_twin_kit_2026 import extended_rows
 
 pytestmark = needs_twin
@@ -156,7 +157,7 @@ def test_a_part_that_fails_is_named_and_comes_back(bench: Bench, failure: Failur
     assert [name for name, count in before.items() if silent[name] < 0.75 * count] == [failure.measures]
     assert not silent[failure.measures]
     assert failure.cause in causes(bench, failure.measures)
-    assert any(text.startswith(failure.words) for text in bench.all_findings)
+    assert any(text.startswith(failure.words) for text in findings_of(bench))
     bench.fault(failure.switch.partition("=")[0] + "=ok")
     run(4_500 if failure.measures == "pressure" else 3_000)
     assert measured(run(1_000))[failure.measures] >= 0.9 * before[failure.measures]
@@ -169,7 +170,7 @@ def test_a_part_that_is_wrong_from_the_start_is_named(bench: Bench, failure: Fai
     run(2_500)
     assert not measured(bench.messages)[failure.measures]
     assert failure.cause is None or failure.cause in causes(bench, failure.measures)
-    assert any(text.startswith(failure.words) for text in bench.all_findings)
+    assert any(text.startswith(failure.words) for text in findings_of(bench))
     bench.fault(failure.switch.partition("=")[0] + "=ok")
     run(4_500)
     assert measured(run(1_000))[failure.measures]

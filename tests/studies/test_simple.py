@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from command_line import echostep
+from echostep.echoes.likelihood import echo_model
 from echostep.errors import EchostepError
-from echostep.localization import echo_model
 from echostep.path import MeasuredSegment, PathSegment
 from echostep_studies.bench.walks import SimulatedWalk
 from echostep_studies.echoes.placing import grid_table, place

@@ -31,7 +31,7 @@ from snapshots import expect
 DEMO = Path(str(resources.files("echostep"))) / "plans/demo.json"
 
 
-def flat(walls: Sequence[Sequence[float]], **fields: Any) -> Plan:
+def flat(walls: Sequence[Any], **fields: Any) -> Plan:
     return house([{"name": "ground", "walls": walls} | fields])
 
 

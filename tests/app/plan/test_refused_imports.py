@@ -7,6 +7,7 @@ import json
 import re
 import zipfile
 from collections.abc import Mapping
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -120,9 +121,7 @@ def test_files_of_a_format(tmp_path: Path, kind: str) -> None:
         path = tmp_path / f"a.{kind}"
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
         hints = Hints(scale_m=0.02) if kind == "png" else Hints()
-        said[f"{kind}: {case}"] = re.sub(
-            FOREIGN, r"\1", refusal(lambda path=path, hints=hints: import_plan(path, hints))
-        )
+        said[f"{kind}: {case}"] = re.sub(FOREIGN, r"\1", refusal(partial(import_plan, path, hints)))
     expect("plan import refused", said, FOLDER=tmp_path, FORMATS=FORMATS)
 
 

@@ -12,16 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.localization import (
-    STATED,
-    Building,
-    CloudSettings,
-    Estimate,
-    FilterSettings,
-    MapFilter,
-    Start,
-    TrackStatus,
-)
+from echostep.localization import Building, CloudSettings, Estimate, FilterSettings, MapFilter, Start, TrackStatus
 from echostep.localization.belief import (
     ANOTHER_M,
     BY_CHANCE,
@@ -35,7 +26,7 @@ from echostep.localization.belief import (
 )
 from echostep.localization.grid.search import Search
 from echostep.localization.particles.cloud import Cloud, cloud_about
-from echostep.localization.particles.start import wide
+from echostep.localization.particles.start import STATED, wide
 from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.particles.limits import SURE
 from echostep.path import MeasuredSegment, PathSegment

@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from echostep.localization import CloudSettings, Estimate, Right, Start, TrackStatus, estimate_of
+from echostep.localization import CloudSettings, Estimate, Start, TrackStatus
+from echostep.localization.cloud_estimate import Right, estimate_of
 from echostep.localization.particles.cloud import cloud_about
 from echostep.particles.limits import RISK
 from echostep.plan import ANY_LEVEL, Pose

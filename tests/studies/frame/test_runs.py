@@ -198,18 +198,17 @@ def test_each_entry_point_leads_into_the_wheel(wheel: zipfile.ZipFile) -> None:
     points.read_string(wheel.read(name).decode())
     found = {group: dict(points[group]) for group in points.sections()}
     assert set(found) == {studies.GROUP, profiles.GROUP}
-    assert set(found[studies.GROUP]) == set(studies.NAMES)
+    assert set(found[studies.GROUP]) == {studies.NAME}
     assert set(found[profiles.GROUP]) == {"foot.fischer2008", "legs.lee2010"}
     modules = [point.split(":")[0] for group in found.values() for point in group.values()]
     assert {f"{module.replace('.', '/')}.py" for module in modules} <= set(wheel.namelist())
 
 
-@pytest.mark.parametrize("name", studies.NAMES)
-def test_without_the_distribution_a_command_says_how_to_get_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_distribution_a_command_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(studies, "entry_points", lambda **_: ())
     alone_app = typer.Typer()
     studies.add_studies(alone_app)
-    words = name, "girard2011", "--runs", "1"
+    words = studies.NAME, "girard2011", "--runs", "1"
     alone, asked = (CliRunner().invoke(alone_app, given) for given in (words[:1], words))
     assert "pip install echostep-studies" in alone.output
     assert isinstance(asked.exception, EchostepError)

@@ -17,9 +17,10 @@ from echostep.aiding.team.meeting import WRONG, Meeting, covariance
 from echostep.aiding.team.meeting_memory import MOST_NAMES, PLACE_M, RENEWED_M, MeetingMemory
 from echostep.aiding.team.meetings import best_omega, information, places_at, weigh
 from echostep.arrays import Floats
-from echostep.localization import STATED, Building, CloudSettings, Start
+from echostep.localization import Building, CloudSettings, Start
 from echostep.localization.belief import Belief
 from echostep.localization.particles.cloud import Cloud, cloud_about
+from echostep.localization.particles.start import STATED
 from echostep.path import Odometer, PathSegment
 from echostep.plan import Plan, Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of

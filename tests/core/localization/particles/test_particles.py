@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.echoes.likelihood import EchoSettings, echo_density, echo_model
-from echostep.localization import CloudSettings, Start, TrackStatus, estimate_of
+from echostep.localization import CloudSettings, Start, TrackStatus
+from echostep.localization.cloud_estimate import estimate_of
 from echostep.localization.particles.cloud import BENDS, Cloud, cloud_about
 from echostep.particles.arrays import Move, PingBatch
 from echostep.particles.ellipse import ellipse95

@@ -10,11 +10,11 @@ import pytest
 
 from echostep.echoes.likelihood import EchoSettings, echo_model
 from echostep.echoes.unplanned import RangeMemory
-from echostep.localization import STATED, Building, FilterSettings, Start
+from echostep.localization import Building, FilterSettings, Start
 from echostep.localization.grid.search_grid import MOST_STATES, SearchGrid
 from echostep.localization.grid.start import NEAR_SHARE, grid_of
 from echostep.localization.map_filter import NEAR_SD_M
-from echostep.localization.particles.start import WIDE_SHARE
+from echostep.localization.particles.start import STATED, WIDE_SHARE
 from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.particles.arrays import Move, PingBatch
 from echostep.plan import ANY_LEVEL, Pose

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from echostep.arrays import Floats, Ints
-from echostep.localization import ClimbSettings, drift_m, level_change_model, pressure_cost
+from echostep.height.levels import ClimbSettings, drift_m, level_change_model, pressure_cost
 from echostep_app.offline.floors.stays import AIR_SD_M, NEAR, HeightRecord, Stay
 
 CLIMBING = ClimbSettings()

@@ -16,7 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints, spans
-from echostep.localization import ClimbSettings, HeightChange, RelativeHeight
+from echostep.height.height_filter import RelativeHeight
+from echostep.height.levels import ClimbSettings, HeightChange
 from echostep_app.offline.floors.pressure_csv import COLDEST_C, WARMEST_C, Pressures
 
 AIR_J_KG_K, G0_M_S2, ZERO_C_K = 287.053, 9.80665, 273.15
@@ -28,7 +29,7 @@ QUIETEST_M, AIR_SD_M = 0.02, 0.1  # standard deviations: of a segment's noise, a
 SMOOTH_PA, FINEST = (
     0.02,
     0.1,
-)  # steps between readings up to this are not quantization; the share of the steps that may be finer than it
+)  # steps between readings up to this are no quantization; share of the steps that may be finer
 HALF_S = 3.0  # of the window, to either side, over which a speed is measured; longer where noise makes it uncertain
 STILL_M_S = 0.1  # below a slow climb of stairs, landings included
 STAY_M_S = 0.04  # of a whole stay; weather of 2 hPa/h makes 0.005
@@ -69,8 +70,10 @@ class HeightRecord:
         if (rise_m := abs(to_m - from_m)) < GUST_M:
             return False
         near_m = max(0.1 * rise_m, 1.5 * AIR_SD_M)
-        leaves = np.flatnonzero(np.abs(pressure_m - from_m) <= near_m)[-1]
-        arrives = np.flatnonzero(np.abs(pressure_m - to_m) <= near_m)[0]
+        leaving, arriving = (np.flatnonzero(np.abs(pressure_m - level) <= near_m) for level in (from_m, to_m))
+        if not len(leaving) or not len(arriving):  # no segment is near such a median: the height only passes through
+            return False
+        leaves, arrives = leaving[-1], arriving[0]
         duration_s = float(self.t_s[before.start + arrives] - self.t_s[before.start + leaves])
         return 0.0 < duration_s < EDGE * 2.0 * math.sqrt(rise_m / LIFT_M_S2)
 
