@@ -4,8 +4,7 @@
 In: samples of thigh, calf and belt, with the compass where it was read, in blocks. Out: `PathSegment`s, as from the foot. Owns the estimators of
 strides and heading, and the latest headings.
 
-Lengths come from `strides`, directions from `heading`, in a walk frame of their own: its x axis is the compass's, or without a compass the wearer's
-first heading.
+Lengths come from `strides`, directions from `heading`, in a walk frame of their own: its x axis is the compass's, or else the first heading.
 """
 
 from __future__ import annotations

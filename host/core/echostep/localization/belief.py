@@ -157,8 +157,8 @@ class Belief:
         self._log_odds += log_here - log_there
 
     def weigh_heights(self, log_means: list[float]) -> None:
-        """Multiply the clouds by the mean factors of their heights, given as logarithms, relative to the greatest: they carry no information about
-        the plan.
+        """Multiply the clouds by the mean factors of their heights, given as logarithms, relative to the greatest: they carry no evidence on the
+        plan.
         """
         for each, log_mean in zip(self.clouds, log_means, strict=True):
             each.log_weight += log_mean - max(log_means)

@@ -6,7 +6,6 @@ generator that it is given. Only the filter's kernels go from the walk frame to 
 
 A particle is (x, y) on the sheet of levels, `turn` = rotation walk -> map, `scale` = true length / measured length, `veer` = turn of the path on a
 metre that the wearer has not made. In a building of several levels it also has a height `z` and an offset `lag` of the height by pressure.
-Weights are logarithms.
 """
 
 from __future__ import annotations
@@ -142,10 +141,7 @@ class Cloud(Particles):
         return Evidence(log_evidence, log_passed)
 
     def change_levels(self, move: Move, change: HeightChange) -> float:
-        """Update heights and levels after a move, reweight by them, and resample when too few particles carry the weight.
-
-        Returns the log of the mean factor of the weights.
-        """
+        """Update heights and levels after a move, reweight by them, and resample if needed. Returns the log of the mean factor of the weights."""
         if self.sheet is None:
             return 0.0
         self._drift(change)
