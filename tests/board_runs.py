@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader, encode
-from echostep.board.subscription import SUBSCRIBE
+from echostep.board.reports import SUBSCRIBE
 from echostep_simulation.devices.board import BoardProcess
 from echostep_simulation.stimulus import NO_SYNC, ROW
 from layers import needs

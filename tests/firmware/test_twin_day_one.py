@@ -8,8 +8,7 @@ import pytest
 
 from board_runs import ROOT, Bench, needs_twin
 from echostep.board import messages as m
-from echostep.board.reports import BoardReports
-from echostep.board.subscription import SUBSCRIBE_ELECTRICAL
+from echostep.board.reports import SUBSCRIBE_ELECTRICAL, BoardReports
 from echostep_app.board.faults.electrical import electrical_findings, level_line
 from echostep_app.board.faults.health import Finding, board_findings
 from echostep_app.commissioning.diagnosis import _echo_findings

@@ -8,8 +8,7 @@ import pytest
 
 from board_runs import Bench, kinds, needs_twin
 from echostep.board import messages as m
-from echostep.board.reports import BoardReports
-from echostep.board.subscription import SUBSCRIBE
+from echostep.board.reports import SUBSCRIBE, BoardReports
 from echostep_app.board.faults.health import board_findings
 from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC
 from firmware.findings import findings_of

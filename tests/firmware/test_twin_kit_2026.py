@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from board_runs import ELF, TWIN, Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
-from echostep.board.reports import BoardReports
-from echostep.board.subscription import SUBSCRIBE
+from echostep.board.reports import SUBSCRIBE, BoardReports
 from echostep_app.board.faults.findings import part_text_of
 from echostep_app.board.faults.health import board_findings, gyro_celsius
 from echostep_simulation.devices.board import BoardProcess

@@ -10,8 +10,7 @@ import pytest
 
 from board_runs import Bench, needs_twin, pings
 from echostep.board import messages as m
-from echostep.board.reports import BoardReports
-from echostep.board.subscription import SUBSCRIBE_ELECTRICAL
+from echostep.board.reports import SUBSCRIBE_ELECTRICAL, BoardReports
 from echostep_app.board.faults.electrical import electrical_findings
 from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC
 from firmware.findings import findings_of

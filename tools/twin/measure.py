@@ -20,7 +20,7 @@ from rich.progress import track
 from echostep.arrays import Floats
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader, encode
-from echostep.board.subscription import SUBSCRIBE as USUAL
+from echostep.board.reports import SUBSCRIBE as USUAL
 from echostep_simulation.devices.board import BoardProcess
 from echostep_simulation.kits import Kit
 from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW

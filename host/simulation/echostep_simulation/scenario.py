@@ -17,7 +17,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.board.frames import encode
 from echostep.board.messages import Configure
-from echostep.board.subscription import SUBSCRIBE
+from echostep.board.reports import SUBSCRIBE
 from echostep.plan import Plan, Pose
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep_simulation.devices.board import Board, PythonBoard

@@ -8,9 +8,9 @@ import pytest
 from board_runs import Bench, needs_twin
 from echostep.board import messages as m
 from echostep.board.frames import encode
-from echostep.board.reports import BoardReports
-from echostep.board.subscription import SUBSCRIBE, BoardSubscription
+from echostep.board.reports import SUBSCRIBE, BoardReports
 from echostep_app.board.faults.health import board_findings
+from echostep_app.board.subscription import BoardSubscription
 from echostep_app.commissioning.diagnosis import Diagnosis, judge_board
 from echostep_app.commissioning.probe import ProbeResult
 

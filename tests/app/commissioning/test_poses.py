@@ -27,7 +27,7 @@ from echostep.board import messages as m
 from echostep.board.calibration import ICM20649_M_S2, ImuSettings
 from echostep.board.foot_board import FootBoardReader
 from echostep.board.frames import encode
-from echostep.board.subscription import SUBSCRIBE
+from echostep.board.reports import SUBSCRIBE
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import Settings, parse_settings

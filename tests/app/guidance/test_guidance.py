@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from echostep.errors import EchostepError
 from echostep.localization import Estimate, TrackStatus
 from echostep.plan import Connector, Level, Plan, load_plan
-from echostep.walls.polyline import along, nearest, way_m
+from echostep.walls.polyline import along, way_m
+from echostep_app.guidance.ahead import nearest
 from echostep_app.guidance.cues import NEVER_KNOWN, CueKind, GuidanceSettings, Guide, arrow_sign, describe_cue
 from echostep_app.plan.routing import BODY_M, Route, RoutePlace, Routes, Stretch
 

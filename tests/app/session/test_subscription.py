@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 from echostep.board import messages as m
 from echostep.board.frames import encode
-from echostep.board.subscription import SUBSCRIBE
+from echostep.board.reports import SUBSCRIBE
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep_app.session.runs.live import _with_subscription
 

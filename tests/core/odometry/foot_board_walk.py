@@ -11,7 +11,7 @@ import numpy as np
 
 from board_runs import ELF, ROOT, TWIN
 from echostep.board.frames import encode
-from echostep.board.subscription import SUBSCRIBE
+from echostep.board.reports import SUBSCRIBE
 from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk
 from echostep_simulation.devices.board import BoardProcess

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 
 from echostep.board.messages import GYROS_INVALID, SCHEMA_HASH, Gyro, Healthy, Identity, Outcome, Part, Ranger, SelfTest
 from echostep.board.reports import BoardReports
-from echostep.board.subscription import knows_subscriptions
 from echostep.ports.chunks import BOARD, MTX
 from echostep.timing.timeline import TICK_S, MtxTiming
 from echostep_app.board.faults.electrical import electrical_findings, level_line
@@ -27,6 +26,7 @@ from echostep_app.board.faults.health import (
     gyro_celsius,
     rate_findings,
 )
+from echostep_app.board.subscription import knows_subscriptions
 from echostep_app.commissioning.probe import Drift, ProbeResult, drift_of
 from echostep_app.xsens.setup import force_range_g
 

@@ -33,13 +33,13 @@ from echostep.board.messages import (
     SelfTest,
     Sync,
 )
-from echostep.board.reports import BoardReports
-from echostep.board.subscription import SUBSCRIBE_ELECTRICAL, BoardSubscription
+from echostep.board.reports import SUBSCRIBE_ELECTRICAL, BoardReports
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep.timing.timeline import TICKS_PER_S, MtxTiming
 from echostep.xsens import MtxReader
 from echostep.xsens.reader import warm_up
+from echostep_app.board.subscription import BoardSubscription
 from echostep_app.ports.arrival_clock import now_s as clock_s
 from echostep_app.ports.serial_ports import SerialPorts
 from echostep_app.recording.device import LISTENED_BYTES

@@ -17,7 +17,8 @@ import numpy as np
 from echostep.angles import wrap
 from echostep.errors import EchostepError
 from echostep.localization import Estimate
-from echostep.walls.polyline import along, nearest, turn_ahead, way_m
+from echostep.walls.polyline import along, way_m
+from echostep_app.guidance.ahead import nearest, turn_ahead
 from echostep_app.guidance.contact import CONTACT, allowed_silence, start_contact, update_contact
 from echostep_app.plan.routing import Route, RoutePlace, Stretch
 

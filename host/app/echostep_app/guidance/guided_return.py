@@ -19,7 +19,8 @@ from echostep.arrays import Floats
 from echostep.localization import Estimate, TrackStatus
 from echostep.path import MeasuredSegment, Odometer
 from echostep.tracker import Tracker
-from echostep.walls.polyline import nearest, turn_ahead, way_m
+from echostep.walls.polyline import way_m
+from echostep_app.guidance.ahead import nearest, turn_ahead
 from echostep_app.guidance.cue_list import CueList
 from echostep_app.guidance.cues import Cue, CueKind, Guide
 from echostep_app.guidance.own_way import OwnWay

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The board's reports about itself.
+"""The board's reports about itself, and the requests for the optional ones.
 
 In: the board's messages. Out: `BoardReports`. Owns the newest reports and the previous status.
 """
@@ -9,6 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from echostep.board import messages
+from echostep.board.messages import Reports, Subscribe
+
+SUBSCRIBE = Subscribe(Reports.BOARD_HEALTH | Reports.PARTS | Reports.MOTION | Reports.MAGNETIC | Reports.FOOT)
+SUBSCRIBE_ELECTRICAL = Subscribe(SUBSCRIBE.reports | Reports.ELECTRICAL | Reports.LOOP)  # for `echostep doctor`
 
 
 @dataclass(slots=True)

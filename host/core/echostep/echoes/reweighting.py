@@ -15,14 +15,7 @@ from echostep.arrays import Floats
 from echostep.echoes.likelihood import SURE_COS, EchoModel, outlier_density, planned_density
 from echostep.jit import inline_part, kernel, lean_kernel
 from echostep.particles.arrays import Move, ParticleArrays, PingBatch
-from echostep.particles.kernels import (
-    SegmentArrays,
-    begin_segment,
-    effective_size,
-    end_segment,
-    piece_of,
-    propagate,
-)
+from echostep.particles.kernels import SegmentArrays, begin_segment, effective_size, end_segment, piece_of, propagate
 from echostep.walls.echo_sources import MOST_SOURCES, Limits, Receiver, SourceList, first_sources
 from echostep.walls.index import WallIndex
 

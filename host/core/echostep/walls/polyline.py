@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Polylines (k, 2) in metres: length, the point at a distance along them, the nearest point.
+"""Polylines (k, 2) in metres: their length, and the point at a distance along them.
 
-In: polylines, points. Out: lengths, points, distances. Used by guidance, routing and simulation. Owns nothing.
-The turn to a point ahead on a path follows [Fischer 2008, Figure 8]: `Guide` and the study of guided returns call the same kernel.
+In: polylines, distances. Out: lengths, points. Owns nothing.
 """
 
 from __future__ import annotations
@@ -37,33 +36,3 @@ def along(line: Floats, s_m: float) -> tuple[float, float, float]:
             break
         rest -= length
     return x, y, heading
-
-
-@kernel
-def nearest(line: Floats, x: float, y: float, from_m: float, to_m: float) -> tuple[float, float]:
-    """Distance along a polyline (k, 2) of the point nearest to (x, y), and that point's distance from (x, y).
-
-    Only points between the distances `from_m` and `to_m` along the polyline count.
-    """
-    best_s, best = from_m, np.inf
-    begin = 0.0
-    for k in range(len(line) - 1):
-        dx, dy = line[k + 1, 0] - line[k, 0], line[k + 1, 1] - line[k, 1]
-        length = math.hypot(dx, dy)
-        if length > 0.0 and begin <= to_m and begin + length >= from_m:
-            s = ((x - line[k, 0]) * dx + (y - line[k, 1]) * dy) / length
-            s = min(max(s, 0.0, from_m - begin), length, to_m - begin)
-            off = math.hypot(line[k, 0] + s / length * dx - x, line[k, 1] + s / length * dy - y)
-            if off < best:
-                best_s, best = begin + s, off
-        begin += length
-    if best == np.inf:
-        best = math.hypot(line[0, 0] - x, line[0, 1] - y)
-    return best_s, best
-
-
-@kernel
-def turn_ahead(path: Floats, s_m: float, x: float, y: float, heading_rad: float) -> float:
-    """Turn (rad) from a heading at (x, y) to the point at the length `s_m` along a path (k, 2)."""
-    to_x, to_y, _ = along(path, s_m)
-    return math.atan2(to_y - y, to_x - x) - heading_rad

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from echostep.board.calibration import ICM20649_M_S2, ICM20649_RAD_S
 from echostep.board.frames import encode
-from echostep.board.subscription import SUBSCRIBE
+from echostep.board.reports import SUBSCRIBE
 from echostep.ports.chunks import FOOT, Chunk
 from echostep_simulation.devices.board import Board
 from echostep_simulation.devices.mtx import means, specific_force_and_rate

@@ -14,7 +14,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.beacons.step import mean_place
 from echostep.jit import part
-from echostep.walls.polyline import nearest, turn_ahead
+from echostep_app.guidance.ahead import nearest, turn_ahead
 from echostep_app.guidance.contact import Contact, allowed_silence, update_contact
 from echostep_app.guidance.cues import GuidanceSettings
 from echostep_studies.fischer2008.beacon_cloud import BeaconCloud

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from echostep.board.frames import BoardReader, StaleFirmwareError, encode
 from echostep.board.messages import Identify
-from echostep.board.subscription import SUBSCRIBE, BoardSubscription
+from echostep.board.reports import SUBSCRIBE
 from echostep.errors import EchostepError
 from echostep.localization import Start
 from echostep.plan import Plan
@@ -26,6 +26,7 @@ from echostep.settings import Settings, parse_settings, read_settings
 from echostep.timing.timeline import MtxTiming
 from echostep.tracker import Tracker
 from echostep.xsens.reader import warm_up
+from echostep_app.board.subscription import BoardSubscription
 from echostep_app.interruption import holding_signals, is_asked
 from echostep_app.kernel_parts import SEARCH
 from echostep_app.ports.arrival_clock import SleepWatch, now_ns

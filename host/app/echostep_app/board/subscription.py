@@ -7,10 +7,8 @@ port was reopened, must be asked again; a board with older firmware would count 
 
 from __future__ import annotations
 
-from echostep.board.messages import BoardHealth, Identity, Message, Reports, Subscribe
+from echostep.board.messages import BoardHealth, Identity, Message
 
-SUBSCRIBE = Subscribe(Reports.BOARD_HEALTH | Reports.PARTS | Reports.MOTION | Reports.MAGNETIC | Reports.FOOT)
-SUBSCRIBE_ELECTRICAL = Subscribe(SUBSCRIBE.reports | Reports.ELECTRICAL | Reports.LOOP)  # for `echostep doctor`
 FIRST_VERSION = (1, 2)  # of the firmware that knows `Subscribe`
 
 
