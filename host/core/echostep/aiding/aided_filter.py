@@ -58,8 +58,8 @@ class AidedFilter(MapFilter):
         """Reweight the clouds by the place of a teammate next to the wearer, and choose the tracked one.
 
         Agreement raises the cloud's probability to at most the meeting's: both may stem from one source. A contradiction moves a doubted cloud, a
-        believed one only when a second teammate contradicts too and that is likelier. A radio range beyond PLACE_M moves nothing; two ranges to
-        beacons can begin a search.
+        believed one only when a second teammate contradicts too and that is likelier. A radio range beyond PLACE_M moves nothing; two can begin a
+        search.
         """
         area_m2 = self.building.floor.area_m2
         refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._refusal(meeting)

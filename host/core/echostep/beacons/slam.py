@@ -57,7 +57,7 @@ class BeaconHealth(NamedTuple):
 
     `each` (b, 4): IN_PLACE, running probability that the beacon was not moved; MEASUREMENTS; TIMES_MOVED, how often it was found moved; SUSPECT, 1
     from then on until it has a new place or fits the old one again. `all` (2,): CLOUD_FIT, the same probability over all beacons; RECOVERIES. `known`
-    (b,): has beliefs.
+    (b,).
     """
 
     each: Floats

@@ -241,8 +241,8 @@ def _loss(turn_rad: float, half_rad: float) -> float:
 class UsablePings:
     """Pings of nearly one view have correlated errors: each counts by the change of the view since the ping before, up to `own` on `correlation_m`.
 
-    The axis within a turn is uncertain, so its pings count less, and the remainder is deferred to the first ping after it. A ranger counts from its
-    first echo on.
+    The axis within a turn is uncertain, so its pings count less, and the rest is deferred to the first ping after it. A ranger counts from its first
+    echo on.
     """
 
     def __init__(self, background: Background, echo: EchoSettings, blur_m: float = 0.0) -> None:

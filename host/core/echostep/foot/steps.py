@@ -44,8 +44,8 @@ class Step:
 
     `heading_rad` is its yaw after the step. The covariance holds for a known yaw before the step; `heading_sd_rad` is the growth of the yaw's error:
     its square is the growth of the variance. The sum of all moves is the position. `toe_rad` is the angle from the yaw to the direction of the toe,
-    as known so far; None until the foot has tipped enough to estimate it. `excess`: the specific force at rest over gravity, less 1. `unrest`: above
-    1 it is no foot.
+    as known so far; None until the foot has tipped enough to estimate it. `excess`: the specific force at rest over gravity, less 1. `unrest`: >1: no
+    foot.
     """
 
     t_start_s: float

@@ -7,8 +7,7 @@ the filter's state: heading, gyro bias, and the compass errors from the wearer's
 Hard and soft iron that moves with a compass adds the error A + B sin h + C cos h + D sin 2h + E cos 2h to its heading h [National
 Geospatial-Intelligence Agency 2004, Handbook of Magnetic Compass Adjustment]. A depends on the mounting of the device and cannot be separated from
 the heading itself: it is left at 0. Iron of the building adds errors of about 7 degrees that vary by place and stay similar for some metres.
-Therefore one reading has a small weight, and readings that turn while the gyro does not are rejected. `foot.magnetometer` does the same in three
-axes.
+Therefore one reading has a small weight, and readings that turn while the gyro does not are rejected. So does `foot.magnetometer`.
 """
 
 from __future__ import annotations

@@ -67,8 +67,7 @@ def read_ending(file: Octets) -> Ending:
 def checksum_matches(file: Octets, data_end: int) -> bool | None:
     """Whether the bytes before the data-end record at this offset are those that were written; None without a checksum.
 
-    Checksums that differ in one bit match: that bit of the stored one was flipped. A single flipped bit before it has this effect only 512 MB away,
-    the period of CRC-32.
+    Checksums that differ in one bit match: that bit of the stored one was flipped. A single flipped bit before it does so only 512 MB away (CRC-32).
     """
     body = data_end + HEAD_SIZE
     expected = int.from_bytes(file[body : body + DATA_END_SIZE].tobytes(), "little")
