@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Angles of thigh, shank and trunk on a regular grid, integrated from gyro samples.
 
-In: time and rates of thigh, shank and belt, at 50 to 500 Hz. Out: angles since the first sample, every 1 / GRID_HZ. Owns the grid and the counts of
-samples.
+In: time and rates of thigh, shank and belt, at 50 to 500 Hz. Out: angles since the first sample, every 1 / GRID_HZ. Owns grid and counts.
 """
 
 from __future__ import annotations

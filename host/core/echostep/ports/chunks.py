@@ -52,10 +52,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class PortBytes:
-    """All bytes of one port in a portion, joined in `received`.
-
-    Chunk k of the port is row `row[k]` of the portion and ends before byte `end[k]` of `received`.
-    """
+    """Bytes of one port in a portion, joined. Chunk k of the port is row `row[k]` of the portion and ends before byte `end[k]`."""
 
     received: bytes
     row: Ints
