@@ -124,8 +124,8 @@ def test_a_port_that_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     with pseudo_terminal() as (_, port):
         (finding,) = ports.access_findings("board", port)
         owner = f"{Path(port).owner()}:{Path(port).group()}"
-        said = {"no right to open it": re.sub(r"-aG \w+", "-aG GROUP", str(finding))}
-        expect("doctor", said, PORT=port, OWNER=owner)
+        refused = {"no right to open it": re.sub(r"-aG \w+", "-aG GROUP", str(finding))}
+        expect("doctor", refused, PORT=port, OWNER=owner)
 
 
 @pytest.mark.slow

@@ -7,8 +7,9 @@ import importlib
 import io
 import math
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -95,7 +96,7 @@ def test_poses_parts_and_settings_that_cannot_be() -> None:
     still, turning = np.tile([0.0, 0.0, G], (300, 1)), np.zeros((300, 3))
     turned = np.linspace(0.0, 0.2, 300)[:, None]
     slowly = G * np.hstack([np.sin(turned), np.zeros_like(turned), np.cos(turned)])
-    refused = {
+    refused: dict[str, Callable[[], object]] = {
         "too few poses": lambda: fit_errors(poses[:5], G, 24.0),
         "a pose that was there": lambda: check_unlike(lying(SIDES[2], np.zeros(3), np.ones(3), rng), poses[:5]),
         "poses of a ring": lambda: fit_errors(ring, G, 24.0),
@@ -109,7 +110,7 @@ def test_poses_parts_and_settings_that_cannot_be() -> None:
         "no part answers": lambda: measure_poses(lambda _: [ProbeResult()], console()),
     }
     for line in ("scale_x = 0.0", "offset_y_m_s2 = 20.0", "bias_z_rad_s = -3.0"):
-        refused[f"settings: {line}"] = lambda line=line: parse_settings(f"[foot_imu]\n{line}\n", "x")
+        refused[f"settings: {line}"] = partial(parse_settings, f"[foot_imu]\n{line}\n", "x")
     expect("calibrate accelerometers", {case: refusal(fit) for case, fit in refused.items()}, within=0.1)
 
 

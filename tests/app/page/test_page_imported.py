@@ -44,7 +44,7 @@ def from_ifc(folder: Path) -> Plan:
 FORMATS: dict[str, Callable[[Path], Plan]] = {
     "DXF": from_dxf,
     "IMDF": lambda folder: import_plan(imdf.folder(folder / "mall", imdf.files())),
-    "OSM": lambda folder: osm.imported(folder, osm.HOUSE, "house.osm"),
+    "OSM": lambda folder: osm.imported(folder, osm.HOUSE),
     "IFC": from_ifc,
     "GeoJSON": lambda folder: import_plan(write_seven_floors(folder / "office")),
     "edited": lambda _: seven_floors(),

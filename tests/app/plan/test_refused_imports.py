@@ -7,6 +7,7 @@ import json
 import re
 import zipfile
 from collections.abc import Mapping
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -109,7 +110,7 @@ FOREIGN = r"(not JSON|not XML|not an IFC file|not a DXF drawing|not a zip file|c
 
 def of_import(path: Path, hints: Hints | None = None) -> str:
     """The sentence, without a library's words behind it."""
-    return re.sub(FOREIGN, r"\1", refusal(lambda: import_plan(path, hints or Hints())))
+    return re.sub(FOREIGN, r"\1", refusal(partial(import_plan, path, hints or Hints())))
 
 
 @pytest.mark.parametrize("kind", FILES)
@@ -183,7 +184,7 @@ def test_formats_that_are_not_read_and_pictures_without_a_scale_name_the_next_st
         path = tmp_path / f"plan{suffix.upper()}"
         path.write_bytes(b"x")
         said[f"format {suffix}"] = of_import(path)
-        assert refusal(lambda path=path: open_plan(path)) == said[f"format {suffix}"]
+        assert refusal(partial(open_plan, path)) == said[f"format {suffix}"]
     for suffix in PICTURES:
         path = tmp_path / f"a{suffix}"
         Image.fromarray(np.zeros((40, 40), dtype=bool)).save(path)
