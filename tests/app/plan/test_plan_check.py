@@ -51,16 +51,21 @@ def door(x: float = 0.0, y: float = 0.0) -> dict[str, Any]:
 
 ROOM = {"name": "A", "at": [2, 1]}
 UP = {"name": "up", "at": [3, 2]}
-SHUT = [*box(), [1, 0, 2, 0]]
+SHUT: list[list[float]] = [*box(), [1, 0, 2, 0]]
 WIDE: list[list[float]] = [[0, 0, 1, 0], [3, 0, 4, 0], *box()[2:]]
-HALF_OPEN = [*box(0, 0, 8), [4, 0, 4, 1], [4, 1.9, 4, 3]]
+HALF_OPEN: list[list[float]] = [*box(0, 0, 8), [4, 0, 4, 1], [4, 1.9, 4, 3]]
 TWO_ROOMS = [ROOM, {"name": "B", "at": [6, 1]}]
 APART = {"rooms": [ROOM, {"name": "B", "at": [12, 1]}], "doors": [door(), door(10)]}
 STAIRS = {"kind": "stairs", "name": "S", "levels": [0, 1], "outline": [[0.5, 0.5], [1.5, 0.5], [1.5, 1.5], [0.5, 1.5]]}
 STOREY = {"walls": box(), "doors": [door()], "rooms": [ROOM]}
 TWO = [{"name": name, **STOREY} for name in "gh"]
-AROUND_STAIRS = [[0.4, 0.4, 1.6, 0.4], [1.6, 0.4, 1.6, 1.6], [1.6, 1.6, 0.4, 1.6], [0.4, 1.6, 0.4, 0.4]]
-AJAR = [*AROUND_STAIRS[:2], [1.6, 1.6, 1.4, 1.6], [0.6, 1.6, 0.4, 1.6], AROUND_STAIRS[3]]
+AROUND_STAIRS: list[list[float]] = [
+    [0.4, 0.4, 1.6, 0.4],
+    [1.6, 0.4, 1.6, 1.6],
+    [1.6, 1.6, 0.4, 1.6],
+    [0.4, 1.6, 0.4, 0.4],
+]
+AJAR: list[list[float]] = [*AROUND_STAIRS[:2], [1.6, 1.6, 1.4, 1.6], [0.6, 1.6, 0.4, 1.6], AROUND_STAIRS[3]]
 SPLIT = {"name": "g", "walls": box(), "doors": [door()], "rooms": [ROOM, {"name": "B", "at": [3, 1]}]}
 
 
@@ -72,7 +77,7 @@ def in_metres(height_m: float) -> Plan:
 
 def meeting(y: float) -> Plan:
     """The wall in the east begins at this y."""
-    return flat([*box()[:2], [4, y, 4, 3], *box()[3:]], doors=[door()])
+    return flat(box()[:2] + [[4.0, y, 4.0, 3.0]] + box()[3:], doors=[door()])
 
 
 def over(walls: list[list[float]], **upper: Any) -> Plan:
@@ -105,12 +110,12 @@ FAULTY = {
     "an open room": flat(WIDE, rooms=[ROOM]),
     "a room without walls": flat([], rooms=[ROOM]),
     "a hole in the east": flat([[0, 0, 4, 0], [4, 0, 4, 2.6], [4, 3, 0, 3], [0, 3, 0, 0]], rooms=[ROOM]),
-    "a closed gap": flat([*HALF_OPEN, [4, 1, 4, 1.9]], rooms=TWO_ROOMS),
+    "a closed gap": flat([*HALF_OPEN, [4.0, 1.0, 4.0, 1.9]], rooms=TWO_ROOMS),
     "walls that almost meet": meeting(0.04),
     "overlapping walls": flat([[0, 0, 5, 0], [4, 0, 9, 0], [5, 0, 5, 3]]),
     "a wall twice": flat([[0, 0, 5, 0], [5, 0, 0, 0]]),
     "a window over a wall": flat([[0, 0, 5, 0]], windows=[[1, 0, 2, 0]]),
-    "a closed house": flat([*box(), *box(10), [11, 0, 12, 0]], **APART | {"doors": [door()]}),
+    "a closed house": flat([*box(), *box(10), [11.0, 0.0, 12.0, 0.0]], **APART | {"doors": [door()]}),
     "a start outside": house([{"walls": SHUT, "rooms": [ROOM]}], start={"x": 9, "y": 2, "heading_deg": 0}),
     "a start in a wall": house([STOREY], start={"x": 4.0, "y": 2, "heading_deg": 0}),
     "a door on the moon": flat(box(), doors=[door(), {"line": [10, 1, 11, 1], "name": "moon"}]),
