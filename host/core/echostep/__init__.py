@@ -2,7 +2,8 @@
 """Indoor pedestrian tracking from a foot-mounted MTx, two ultrasonic rangers and the building's plan.
 
 `replay(recording, plan)` tracks a recorded walk, `read_capture(path)` yields the messages of captured bytes, `Tracker` turns bytes into position
-estimates; `plan`, `foot` and `xsens` are useful alone. These names, loaded when first used, are the public API.
+estimates; `plan`, `foot` and `xsens` are useful alone. These names are the public API. Each is loaded when first used, so that importing echostep
+costs nothing.
 """
 
 from __future__ import annotations

@@ -3,7 +3,8 @@
 
 In: a path that is about to be written. Out: a file of mode 0600 there. Owns the answer to `--share`.
 
-A recording shows where a person was, second by second. The process's umask stays as it is: the same process writes compiled kernels for all users.
+A recording shows where a person was, second by second. The process's umask stays as it is: compiled kernels, which other users of an installation
+read, are written meanwhile.
 """
 
 from __future__ import annotations

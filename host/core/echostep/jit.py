@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """How kernels are compiled: the only place that configures numba.
 
-In: functions. Out: the same, compiled when first called and cached in the folder that `kernel_cache` names; commands are notified. Owns the options.
+In: functions. Out: the same, compiled when first called and cached in the folder that `kernel_cache` names; the commands are notified of each. Owns
+the options.
 
 A *kernel* is called from Python; a *part* is called by kernels and other parts alone. A part has no wrapper for Python, which is a fifth of the work
 of compiling, and none of its versions is made for one constant: numba makes them while it still takes `k = 0` before a loop for the type of `k`.

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Where compiled kernels are kept: a folder for each state of the sources that they are made from.
 
-In: the file of a module of this package, or of another package whose kernels call those of this one. Out: a folder for numba's cache. Owns them.
+In: the file of a module of this package, or of another package whose kernels call those of this one. Out: a folder for numba's cache. Owns the
+folders and their names.
 
 numba compares the kernel's own file only. After an update in place it would run a kernel although a callee in another file has changed, and it fails
 on a NamedTuple that has been renamed, for it unpickles the whole index before it compares. So the name of the folder holds a digest of the module and

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The map filter with its aids: the readings of radio beacons on each segment, and meetings with teammates between segments.
 
-In: the input of a `MapFilter`, `BeaconReading`s, `Meeting`s. Out: `Estimate`s; the effect of each meeting. Owns beacon map and times of meetings.
+In: the input of a `MapFilter`, `BeaconReading`s, `Meeting`s. Out: `Estimate`s; the effect of each meeting. Owns the beacon map, and the times of
+meetings.
 """
 
 from __future__ import annotations
@@ -58,8 +59,8 @@ class AidedFilter(MapFilter):
         """Reweight the clouds by the place of a teammate next to the wearer, and choose the tracked one.
 
         Agreement raises the cloud's probability to at most the meeting's: both may stem from one source. A contradiction moves a doubted cloud, a
-        believed one only when a second teammate contradicts too and that is likelier. A radio range beyond PLACE_M moves nothing; two can begin a
-        search.
+        believed one only when a second teammate contradicts too and that is likelier. A radio range beyond PLACE_M moves nothing; ranges to two
+        teammates' beacons can begin a search.
         """
         area_m2 = self.building.floor.area_m2
         refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._refusal(meeting)

@@ -70,7 +70,10 @@ class BeaconMap:
     def update(
         self, cloud: Cloud, segment: PathSegment, readings: Sequence[BeaconReading], plan_supports: bool = False
     ) -> None:
-        """Reweight the cloud, at the end of a segment, by the readings on it. `plan_supports`: whether echoes confirm the cloud by the plan."""
+        """Reweight the cloud, which is at the end of a segment, by the readings on this segment.
+
+        `plan_supports`: whether echoes confirm the cloud by the plan.
+        """
         if not self._is_of(cloud):
             self._begin_anew(cloud)
         length = math.hypot(segment.dx_m, segment.dy_m)

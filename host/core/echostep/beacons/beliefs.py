@@ -23,7 +23,8 @@ XX, XY, X_AXIS, YY, Y_AXIS, AXIS_AXIS = 0, 1, 2, 3, 4, 5  # stored terms of the 
 class BeaconBeliefs(NamedTuple):
     """Beliefs of n particles about b beacons.
 
-    `mean` (n, b, 3): X, Y, AXIS. `cov` (n, b, 6): XX to AXIS_AXIS. `doubt` (n, b): odds that the beacon was moved, relative to a new one.
+    `mean` (n, b, 3): X, Y, AXIS. `cov` (n, b, 6): XX to AXIS_AXIS. `doubt` (n, b): odds that the beacon was moved, relative to one that has
+    just been placed.
     """
 
     mean: Floats

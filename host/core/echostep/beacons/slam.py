@@ -57,7 +57,7 @@ class BeaconHealth(NamedTuple):
 
     `each` (b, 4): IN_PLACE, running probability that the beacon was not moved; MEASUREMENTS; TIMES_MOVED, how often it was found moved; SUSPECT, 1
     from then on until it has a new place or fits the old one again. `all` (2,): CLOUD_FIT, the same probability over all beacons; RECOVERIES. `known`
-    (b,).
+    (b,): whether the beacon has beliefs.
     """
 
     each: Floats
@@ -77,7 +77,10 @@ def update_by_measurement(
     particles: ParticleArrays, beliefs: BeaconBeliefs, health: BeaconHealth, measurement: BeaconMeasurement,
     model: BeaconModel, walls: WallIndex, rng: np.random.Generator,
 ) -> float:  # fmt: skip
-    """Update by one measurement of a known beacon; notices a moved beacon and a wrong cloud. Returns the effective size after it."""
+    """Update particles, beliefs and health by one measurement of a known beacon.
+
+    Notices a beacon that was moved, and a cloud that is wrong. Returns the effective size after it.
+    """
     fit, size = reweight(particles, beliefs, measurement, model, walls)
     each, together = health.each[measurement.slot], health.all
     each[MEASUREMENTS] += 1.0

@@ -34,7 +34,10 @@ LOCATED_SD_M = 0.4  # of a place found by `locate_beacon`, about the cloud's own
 
 
 class Waiting(NamedTuple):
-    """Readings of b beacons without a place: `rows` (b, MOST_READINGS, 4), a ring for `locate_beacon`; `taken` (b,), rows written so far."""
+    """Readings of b beacons that wait for a place.
+
+    `rows` (b, MOST_READINGS, 4): a ring of rows for `locate_beacon`; `taken` (b,): rows written so far.
+    """
 
     rows: Floats
     taken: Ints
@@ -58,7 +61,10 @@ def update_by_reading(
     particles: ParticleArrays, beacons: Beacons, measurement: BeaconMeasurement, model: BeaconModel, walls: WallIndex,
     plan_supports: bool, rng: np.random.Generator,
 ) -> float:  # fmt: skip
-    """Place the beacon, or update by its reading; returns the effective size after it. `plan_supports`: echoes confirm the cloud by the plan."""
+    """Place the beacon, or update particles and beliefs by its reading; returns the effective size after it.
+
+    `plan_supports`: whether echoes confirm the cloud by the plan.
+    """
     beliefs, health, waiting = beacons
     k, size = measurement.slot, float(len(particles.x_m))
     if health.known[k]:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Board frames, sans-I/O: bytes in any split -> messages, and messages -> bytes.
 
-In: bytes from the board's USB port. Out: frames as columns (`Frames`), and as messages (`echostep.messages`). Owns unfinished frame and counters.
+In: bytes from the board's USB port. Out: frames as columns (`Frames`), and as messages (`echostep.messages`). Owns the unfinished frame and the
+counters.
 
     payload = id (1) | sequence (2) | body | checksum (2)      frame = COBS of the payload | 00      [protocol/README.md]
 """

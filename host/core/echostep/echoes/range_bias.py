@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The bias that the ranges of both rangers have in common, learnt where the plan supports the place.
 
-In: pings, their places by the mean of a cloud, its covariance, the walls. Out: `MeasuredSegment`s without bias. Owns its mean and variance.
+In: pings, their places by the mean of a cloud, its covariance, the walls. Out: `MeasuredSegment`s without the bias. Owns its mean and
+variance.
 
 Half of the variance of a range's error is taken to stay with the ranger [SRF02: which wavefront crosses the threshold, 3-4 cm; Robot Electronics,
 sonar FAQ]. The density without a plan adapts to the biased distance of a continuing wall; the plan states the true one. So an excess of both rangers,

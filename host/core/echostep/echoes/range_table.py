@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Table of the expected range at each place of the floor and in each direction, for a search of the building.
 
-In: walls, their floor. Out: `RangeTable`; `log_densities` of a ping by its entries; the pings of a search. Owns nothing.
+In: walls, their floor. Out: `RangeTable`; `log_densities` of a ping by its entries, instead of a trace; the pings that
+a search takes. Owns nothing.
 
 A cell of the floor has one row, a sector of the ranger's axis one column. A ranger's cone is wide, so its range changes little within a sector of 15
 degrees; within a cell of 25 cm it changes by as much as the cell is wide, which is in TABLE_SD_M. An entry is an expected range and the probability

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Reweighting by pings, where each was triggered on the way.
 
-In: `ParticleArrays`, a `Move` with its `PingBatch`, the walls. Out: the same arrays, changed; how well the cloud predicted the pings. Owns nothing.
+In: `ParticleArrays`, a `Move` with its `PingBatch`, the walls. Out: the same arrays, changed in place; how well the cloud predicted the pings.
+Owns nothing.
 """
 
 from __future__ import annotations
@@ -15,7 +16,14 @@ from echostep.arrays import Floats
 from echostep.echoes.likelihood import SURE_COS, EchoModel, outlier_density, planned_density
 from echostep.jit import inline_part, kernel, lean_kernel
 from echostep.particles.arrays import Move, ParticleArrays, PingBatch
-from echostep.particles.kernels import SegmentArrays, begin_segment, effective_size, end_segment, piece_of, propagate
+from echostep.particles.kernels import (
+    SegmentArrays,
+    begin_segment,
+    effective_size,
+    end_segment,
+    piece_of,
+    propagate,
+)
 from echostep.walls.echo_sources import MOST_SOURCES, Limits, Receiver, SourceList, first_sources
 from echostep.walls.index import WallIndex
 
@@ -123,7 +131,8 @@ def reweight_by_ping(
 
     `hidden` (n,): of this ranger, the probability that the particle's view is hidden, so that the plan gives no information. Along the path it
     returns to `model.hidden` within `model.hidden_m`; the ping corrects it. Densities of ranges are raised to the ping's power, for successive errors
-    are alike; probabilities of the view and of an outlier are not. Returns log of mean likelihood before, effective size and greatest weight after.
+    are alike; probabilities of the view and of an outlier are not. Returns the log of the mean likelihood before, the effective size after, and the
+    greatest weight after.
     """
     x, y, turn, _, _ = particles
     weight, cos, sin = arrays

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Which pings count, and their density for an unknown pose: that of a wearer anywhere in the building, or predicted by the last echoes.
+"""Which pings count, and their density if nothing is known about the pose: as received by a wearer anywhere in the building,
+or as predicted by the last echoes.
 
 In: walls, their floor, `MeasuredSegment`s in order of time. Out: `Background`: log-density by range; `PingBatch` and the pings'
 densities without a plan. Owns the views of both rangers, each the line in the walk frame that it detected last, or none, and the length of the path.
@@ -241,8 +242,8 @@ def _loss(turn_rad: float, half_rad: float) -> float:
 class UsablePings:
     """Pings of nearly one view have correlated errors: each counts by the change of the view since the ping before, up to `own` on `correlation_m`.
 
-    The axis within a turn is uncertain, so its pings count less, and the rest is deferred to the first ping after it. A ranger counts from its first
-    echo on.
+    The axis within a turn is uncertain, so its pings count less, and the remainder is deferred to the first ping after it. A ranger counts from its
+    first echo on: until then it may not work.
     """
 
     def __init__(self, background: Background, echo: EchoSettings, blur_m: float = 0.0) -> None:

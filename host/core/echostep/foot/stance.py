@@ -248,7 +248,10 @@ def clear_rest(sums: ZaruSums) -> None:
 
 @lean_part
 def zero_angular_rate_update(nav: Nav, sums: ZaruSums, dt: float, gyro0: Floats, gyro1: Floats) -> bool:
-    """Zero-angular-rate update of the gyro bias after each half second of rest; whether one was made. `gyro0`, `gyro1` (3,): at the ends of `dt`."""
+    """Zero-angular-rate update of the gyro bias after each half second of rest; returns whether there was one.
+
+    `gyro0`, `gyro1` (3,): rates at the beginning and the end of `dt`.
+    """
     for i in range(3):
         sums.part[i] += 0.5 * dt * (gyro0[i] + gyro1[i])
     sums.part_s[0] += dt

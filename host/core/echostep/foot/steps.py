@@ -42,10 +42,10 @@ class Stance:
 class Step:
     """The foot left at `t_start_s`, landed at `t_end_s` and moved by `move_m` (walk frame) with `covariance` (3, 3) m2.
 
-    `heading_rad` is its yaw after the step. The covariance holds for a known yaw before the step; `heading_sd_rad` is the growth of the yaw's error:
-    its square is the growth of the variance. The sum of all moves is the position. `toe_rad` is the angle from the yaw to the direction of the toe,
-    as known so far; None until the foot has tipped enough to estimate it. `excess`: the specific force at rest over gravity, less 1. `unrest`: >1: no
-    foot.
+    `heading_rad` is its yaw after the step. The covariance holds for a known yaw before the step; `heading_sd_rad` is the growth of the yaw's
+    error: its square is the growth of the variance. The sum of all moves is the position. `toe_rad` is the angle from the yaw to the direction of the
+    toe, as known so far; None until the foot has tipped enough to estimate it. `excess`: the specific force at rest over gravity, less 1. `unrest`:
+    above 1 the sensor is on no foot.
     """
 
     t_start_s: float
@@ -173,7 +173,10 @@ class Foot:
         return FootCounts(*(int(self._zupt[name][0]) for name in FootCounts.__slots__))
 
     def feed(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None = None) -> list[Step | Stance]:
-        """Events of samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s, mag (n, 3) in any unit; ValueError for other shapes."""
+        """Events of samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s, mag (n, 3) of any unit, body frame.
+
+        Raises ValueError for other shapes.
+        """
         return self._run(t_s, accel, gyro, mag, np.empty((0, zupt_state.ROW_SIZE)))
 
     def track(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None = None) -> FootEvents:

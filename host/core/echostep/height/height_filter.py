@@ -5,8 +5,8 @@ In: heights by pressure with the time between them, the foot's rises. Out: the h
 states: the height and its rate; the height and the lag of the height by pressure behind it, a random walk.
 
 The median of a segment's heights is robust, but belongs to the middle: a quarter of a second old, and 0.25 m behind in a lift at 1 m/s. A rate that
-changes slowly (a lift takes more than a second to start) carries many heights to the end: simulated rides of 3.5 m with an SCP1000 have an rms error
-of 0.16 (not 0.23) m.
+changes slowly (a lift takes more than a second to start) carries many heights to the end: simulated rides of 3.5 m with an SCP1000 have a root mean
+square error of 0.16 m, not of 0.23 m.
 """
 
 from __future__ import annotations

@@ -54,7 +54,8 @@ class ClimbSettings:
     """Standard deviations in metres, and a limit.
 
     `flat_sd_m`: rise of the foot after a stride on a level, with door sills. `landing_sd_m`: between a particle's height and the level it enters.
-    `drift_m`: random walk of the height by pressure in a second, from weather, doors and fans. `unlikely`: most log-weight that each costs.
+    `drift_m`: random walk of the height by pressure in a second, from weather, doors and fans. `unlikely`: most log-weight that each of the three
+    can cost.
     """
 
     flat_sd_m: float = 0.06

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Angles of thigh, shank and trunk on a regular grid, integrated from gyro samples.
 
-In: time and rates of thigh, shank and belt, at 50 to 500 Hz. Out: angles since the first sample, every 1 / GRID_HZ. Owns grid and counts.
+In: time and rates of thigh, shank and belt, at 50 to 500 Hz. Out: angles since the first sample, every 1 / GRID_HZ. Owns the grid and the counts of
+samples.
 """
 
 from __future__ import annotations

@@ -7,7 +7,8 @@ the filter's state: heading, gyro bias, and the compass errors from the wearer's
 Hard and soft iron that moves with a compass adds the error A + B sin h + C cos h + D sin 2h + E cos 2h to its heading h [National
 Geospatial-Intelligence Agency 2004, Handbook of Magnetic Compass Adjustment]. A depends on the mounting of the device and cannot be separated from
 the heading itself: it is left at 0. Iron of the building adds errors of about 7 degrees that vary by place and stay similar for some metres.
-Therefore one reading has a small weight, and readings that turn while the gyro does not are rejected. So does `foot.magnetometer`.
+Therefore one reading has a small weight, and readings that turn while the gyro does not are rejected. `foot.magnetometer` applies the same
+principle to a field of three axes.
 """
 
 from __future__ import annotations
@@ -112,7 +113,10 @@ class Heading:
         self._bins: deque[float] = deque(maxlen=CALM_BINS)  # mean rates of the last bins in which the legs stand
 
     def feed(self, t_s: Floats, rate_rad_s: Floats, compass_rad: Floats, still: Bools | None = None) -> Floats:
-        """(n, 2) heading (not wrapped) and its sd after samples (n,); compass NaN where not read. `still` (n,): whether the legs stand."""
+        """(n, 2) heading (not wrapped) and its standard deviation after samples (n,); compass NaN where it was not read.
+
+        `still` (n,): whether the legs stand.
+        """
         headings = np.empty((len(t_s), 2))
         rests = np.zeros(len(t_s), np.bool_) if still is None else still
         samples = zip(t_s.tolist(), rate_rad_s.tolist(), compass_rad.tolist(), rests.tolist(), strict=True)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Angles of thigh and shank against the vertical: the integrated rates, less the gyros' errors, from a level that gyros do not measure.
 
-In: the grid of integrated rates, signs, moments of standing, beginnings and ends of strides. Out: angles between two grid indices. Owns both.
+In: the grid of integrated rates, signs, moments of standing, beginnings and ends of strides. Out: angles between two grid indices. Owns the
+gyros' errors and the level.
 
-Gyros do not measure the angles at one moment: a Kalman filter, `SwingAngles`, estimates them from standing and from means over strides.
+Gyros do not measure the angles at one moment: a Kalman filter, `SwingAngles`, estimates them from the angles while standing and their mean
+over a stride.
 """
 
 from __future__ import annotations

@@ -2,10 +2,12 @@
 """Strides from two gyros on one leg: the travel of the hips, stride by stride.
 
 In: time, pitch rates of thigh and shank, either sign, and of the belt, 50 to 500 Hz. Out: `Stride`s in order of time. Owns the bout under way.
-`leg_angles` gives the angles, `kinematics` the travel of the hips over a stance, `swing_detection` swings and signs, `edges` both ends.
+`leg_angles` gives the angles, `kinematics` the travel of the hips over a stance, `swing_detection` the swings and the sign of each gyro, `edges` the
+first and the last swing.
 
 A stride goes from mid swing to mid swing. Before the first and after the last mid swing the hips move over the standing foot; these edges are
-reported, too. A gyro does not measure the vertical (`level`). Its bias is its rate at rest, and the change of its angle over a stride (`gyro_bias`).
+reported, too. A gyro does not measure the vertical (`level`). Its bias is its rate at rest, and the change of its angle over a stride, less
+the leak from a turn (`gyro_bias`).
 
 Two gyros in the sagittal plane of one leg do not give the length of strides sideways, backward or in place, or of crawling: these are flagged, their
 length is 0, and their standard deviation covers the possible length.

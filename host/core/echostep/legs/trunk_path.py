@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The trunk's path from the gyros of one leg and the belt, and the compass.
 
-In: samples of thigh, calf and belt, with the compass where it was read, in blocks. Out: `PathSegment`s, as from the foot. Owns the estimators.
+In: samples of thigh, calf and belt, with the compass where it was read, in blocks. Out: `PathSegment`s, as from the foot. Owns the estimators of
+strides and heading, and the latest headings.
 
-Lengths come from `strides`, directions from `heading`, in a walk frame of their own: its x axis is the compass's, or else the first heading.
+Lengths come from `strides`, directions from `heading`, in a walk frame of their own: its x axis is the compass's, or without a compass the wearer's
+first heading.
 """
 
 from __future__ import annotations
@@ -133,7 +135,10 @@ class LegPath:
         return PathSegment(t0, t1, 0.0, 0.0, self.heading_rad(t0), self.heading_rad(t1), 0.0, 0.0, self.steps)
 
     def _direction(self, t0: float, t1: float) -> tuple[float, float]:
-        """Mean of (cos, sin) of the headings from t0 to t1: displacement per metre; a curve shortens it, the pelvis' rotation to and fro does not."""
+        """Mean of (cos, sin) of the headings from t0 to t1: displacement per metre at an even pace, shorter than 1 in a curve.
+
+        The rotation of the pelvis to and fro does not count as a curve.
+        """
         times, headings = (np.array(column) for column in zip(*self._headings, strict=True))
         within = headings[(times >= t0) & (times <= t1)]
         if not len(within):

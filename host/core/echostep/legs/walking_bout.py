@@ -35,7 +35,10 @@ SETTING_OFF = 0.25  # speed over the pace when the first foot leaves the floor [
 
 @dataclass(slots=True)
 class Bout:
-    """A walk under way, in grid indices: `begin`, `stood` before it, mid swings `peaks`; from `cycle` (samples) on: of the newest stride."""
+    """A walk under way, in grid indices: `begin`, whether it begins with standing, `peaks`: its mid swings.
+
+    The fields from `cycle` (grid samples) on belong to the newest stride.
+    """
 
     begin: int
     stood: bool

@@ -157,7 +157,9 @@ class Belief:
         self._log_odds += log_here - log_there
 
     def weigh_heights(self, log_means: list[float]) -> None:
-        """Multiply the clouds by the mean factors of their heights, given as logarithms, relative to the greatest: no evidence on the plan."""
+        """Multiply the clouds by the mean factors of their heights, given as logarithms, relative to the greatest: they carry no information about
+        the plan.
+        """
         for each, log_mean in zip(self.clouds, log_means, strict=True):
             each.log_weight += log_mean - max(log_means)
 
@@ -167,7 +169,10 @@ class Belief:
             self._move(each, share)
 
     def begin_search(self, cloud: Search, log_pings: float) -> None:
-        """Let a cloud search elsewhere, in place of an earlier search; `log_pings`: log of its density of its path over the one without a plan."""
+        """Let a cloud search elsewhere; `log_pings`: log of its density of the path that it has searched over the density without a plan.
+
+        It replaces an earlier search that has found nothing.
+        """
         self.searches_begun += 1
         if self.search is not None:
             self._move(self.search, 1.0)

@@ -96,7 +96,8 @@ class Estimate:
     def claims_place(self) -> bool:
         """Whether the position may be named, drawn or sent: it is not lost, and the mean of several places lies in one of them.
 
-        The one rule for page, terminal, reports, TAK, maps and the summary of a run. Without a plan only the page differs: it draws the path's end.
+        The one rule for page, terminal, reports, TAK, maps and the summary of a run. Without a plan only the page differs: it draws the end of the
+        path.
         """
         places = self.hypotheses
         return self.status is not TrackStatus.LOST and (not places or any(map(self._lies_in, places)))

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""The last metres of the path, for a second pass: levels of a building are often alike, and a range table cannot discriminate them.
+"""The last metres of the path, for a second pass: levels of a building are often alike, and a search by the range table
+cannot discriminate between them.
 
 In: moves with their pings and changes of height; a cloud that has just been found. Out: the same cloud, after the pass. Owns the moves.
 
-The range table has half of the information of the echoes. So where levels are alike, the exact filter processes the same path again, on every level.
+The range table has half of the information of the echoes. So where levels are alike, the exact filter processes the same path a second time, from its
+beginning on every level.
 """
 
 from __future__ import annotations

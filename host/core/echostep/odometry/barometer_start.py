@@ -4,7 +4,8 @@
 In: times and heights of the board's barometer, restarts of the board. Out: for each height how often the heights have begun again; heights before a
 new beginning are unrelated to heights after it. Owns the newest reading, and the number of readings since the last beginning.
 
-A BMP280 gave 68500 Pa, its reset value, before its first conversion [finitespace/BME280, issue 59]; a height of 3 km, which hides all storeys.
+A BMP280 gave 68500 Pa, its reset value, before its first conversion [finitespace/BME280, issue 59]; this is a height of 3 km, against which no storey
+is resolved for the rest of the walk.
 """
 
 from __future__ import annotations

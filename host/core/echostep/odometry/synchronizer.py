@@ -181,7 +181,10 @@ def _measured(segment: PathSegment, measurements: Records, ahead_rad: float) -> 
 def _pop_ready(
     s: _State, waiting: Records, new: _NewPings, segments: _WaitingSegments, progress: _Progress, popped: _Popped
 ) -> int:
-    """Add the pings of each message, pop every complete segment, report dropouts. Fills `popped`; returns the number of both in it."""
+    """Message by message: add its pings, pop every segment that is complete, report a dropout.
+
+    Fills `popped`; returns the number of segments and dropouts in it.
+    """
     count = next_ping = next_segment = pings = 0
     for message_index in range(len(progress.board_s)):
         while next_ping < len(new.message_index) and new.message_index[next_ping] == message_index:

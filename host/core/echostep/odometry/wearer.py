@@ -34,7 +34,10 @@ class AlarmReason(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """An alarm: `since_s`: time of its cause (last motion, fall, call) or of its end; `mayday_s`: time at which a question becomes a mayday."""
+    """An alarm: `number` of this run; `since_s`: time of the last motion, of the fall, of the call for help, or of its end.
+
+    `mayday_s`: time at which a question becomes a mayday.
+    """
 
     kind: AlarmKind
     reason: AlarmReason

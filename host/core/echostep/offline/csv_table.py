@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """One reader for CSV files of samples: named columns of numbers, in any of three dialects.
 
-In: a text file of any origin, whose first line names the columns, separated by comma, or by semicolon or tab (then also with decimal commas). Out:
-`CsvTable` with the wanted columns, NaN where there is no number; ValueError for a file that is not such a table, or too long a line. Owns nothing.
+In: a text file of any origin, whose first line names the columns, separated by comma, or by semicolon or tab (then also with decimal commas).
+Out: `CsvTable` with the wanted columns, NaN where there is no number; ValueError for a file that is not such a table, or a line that is too long.
+Owns nothing.
 """
 
 from __future__ import annotations

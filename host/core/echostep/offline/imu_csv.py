@@ -34,7 +34,10 @@ TRACK_COLUMNS = ("t_s", "x", "y", "z", "heading_rad", "stance")
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """`t_s` (n,), `accel` m/s2, `gyro` rad/s, `mag` in any unit or None (n, 3), NaN for a missing number. `notes`: findings, a line each."""
+    """`t_s` (n,), `accel` (n, 3) m/s2, `gyro` (n, 3) rad/s, `mag` (n, 3) of any unit or None, NaN where it has no number.
+
+    `notes`: findings and corrections, a line each.
+    """
 
     t_s: Floats
     accel: Floats

@@ -46,9 +46,10 @@ class Move(NamedTuple):
 class PingBatch(NamedTuple):
     """k pings on a move: share of the move at the trigger (ascending), axis of the ranger in the walk frame, range (0: none), power.
 
-    `power`: share of independent information in the ping, the power of its densities. `ranger`: 0 left, 1 right. `travel_m`: length of the path since
-    this ranger's previous ping. `stray`: probability of a second reflection where nothing answers. `missed`: odds that a silent ping missed its echo,
-    0 for an echo, and `alike`: density of a range that is like the one before, `unplanned`: density without any plan, to the power.
+    `power`: share of independent information in the ping, the power of its densities. `ranger`: 0 left, 1 right. `travel_m`: length of
+    the path since this ranger's previous ping. `stray`: probability of a second reflection where nothing answers. `missed`: odds that a silent
+    ping missed its echo, 0 for an echo, and `alike`: density of a range that is like the one before, `unplanned`: density without any plan, to
+    the power (all four: `echoes.unplanned`).
     """
 
     share: Floats

@@ -25,7 +25,10 @@ class Ellipse(NamedTuple):
 
 
 def in_ellipse95(error_m: Floats, covariance_m2: Floats) -> Bools:
-    """Whether errors (..., 2) lie in the 95 % ellipses of covariances (..., 3: xx, xy, yy); without an area only the centre does, with NaN none."""
+    """Whether errors (..., 2) lie in the 95 % ellipses of covariances (..., 3: xx, xy, yy); in an ellipse without area, only its centre does.
+
+    False where a covariance is NaN.
+    """
     (dx, dy), (xx, xy, yy) = np.moveaxis(error_m, -1, 0), np.moveaxis(covariance_m2, -1, 0)
     determinant = xx * yy - xy**2
     inside = yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy <= CHI2_95 * determinant

@@ -166,7 +166,10 @@ class Georeference:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A building. `digest`: SHA-256 of the file. `uncertainty_m`: standard deviation of the walls' positions, None if unknown."""
+    """A building; a notebook shows it as a picture.
+
+    `digest`: SHA-256 of the file. `uncertainty_m`: standard deviation of the walls' positions, None if unknown.
+    """
 
     name: str
     levels: tuple[Level, ...]

@@ -52,7 +52,10 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class PortBytes:
-    """Bytes of one port in a portion, joined. Chunk k of the port is row `row[k]` of the portion and ends before byte `end[k]`."""
+    """All bytes of one port in a portion, joined in `received`.
+
+    Chunk k of the port is row `row[k]` of the portion and ends before byte `end[k]` of `received`.
+    """
 
     received: bytes
     row: Ints

@@ -26,7 +26,10 @@ class ImuSamples(NamedTuple):
 
 
 class SampleCounter:
-    """Numbers samples by their times from the first on. `left_out`: samples within the same period as the one before, which are dropped."""
+    """Numbers samples by their times, from the first sample on: a gap in the times is a gap in the counter.
+
+    `left_out`: samples within the same period as the one before, which are dropped.
+    """
 
     def __init__(self, rate_hz: float) -> None:
         self._rate_hz = rate_hz

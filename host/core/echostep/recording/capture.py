@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Captured bytes -> messages.
 
-In: a file: bytes of the board's port, bytes of an MT's port (Xbus), or a recording (.mcap). Out: messages, each valid frame of an MT. Owns nothing.
+In: a file: bytes of the board's port, bytes of an MT's port (Xbus), or a recording (.mcap). Out: messages in order, one for each valid frame of
+an MT. Owns nothing.
 """
 
 from __future__ import annotations

@@ -145,8 +145,8 @@ def _height(x: Floats, y: Floats, hull: Ints, pivot: float) -> float:
 def most_probable_slope(x: Floats, y: Floats, hull: Ints, pivot: float, weight: float) -> float:
     """Slope that maximises weight * (height at the pivot of the line touching the hull from below) - slope^2 / (2 DRIFT_SD^2).
 
-    The height at the pivot of a line through vertex x is y - slope * (x - pivot). So each vertex has its best slope between its two edges'; the best
-    wins.
+    The height at the pivot of a line through vertex x is y - slope * (x - pivot). So each vertex has its own best slope, limited to the slopes of
+    its two edges; the best vertex wins.
     """
     best_gain, best_slope, low = -np.inf, 0.0, -1.0
     for k in range(len(hull)):

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Assignment of SyncOut edges to MTx samples, which gives the time of each sample.
 
-In: edges that the board has timed; sample counters with their time by arrival. Out: times of samples. The caller keeps `SyncEdges`.
+In: edges that the board has timed; sample counters with their time by arrival. Out: times of samples. Owns nothing: the caller keeps the
+`SyncEdges`.
 
 The MTx gives one edge per sample, so counter - edge count is a constant offset (mod 65536), which is unknown at first. Each sample votes for the
 offset of the edge nearest to its time by arrival. An offset with more than half of the last `VOTES` votes is locked. Then the time of a sample is

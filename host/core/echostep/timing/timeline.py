@@ -177,7 +177,10 @@ def _board_time(board: DeviceClock, edges: SyncEdges, ticks: int, t_arrival_ns: 
 def _mtx_time(
     board: DeviceClock, mtx: DeviceClock, edges: SyncEdges, counter: int, t_arrival_ns: int, latency_s: float
 ) -> float:
-    """`t_s` of an MTx sample, later than the one before; NaN for an impossible counter unless it is confirmed several times in a row."""
+    """`t_s` of an MTx sample, later than the one before; NaN for an impossible counter.
+
+    Only samples that are far behind several times in a row are believed: the newest time was wrong.
+    """
     restarts = mtx.restarts
     device_s = clocks.read(mtx, counter, t_arrival_ns, False, not board.started)
     if np.isnan(device_s):

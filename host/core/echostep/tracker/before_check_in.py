@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The filter before a check-in, kept with all measurements since, so that the check-in can be undone.
 
-In: the tracker's state at a check-in, then each measured segment with its beacon readings and meetings. Out: the same state, and these segments. Owns
-the segments. After an undo the filter processes them as if there had been no check-in: the estimates then equal those without it, bit for bit.
+In: the tracker's state at a check-in, then each measured segment with its beacon readings and meetings. Out: the same state, and these segments.
+Owns the segments. After an undo the filter processes them as if there had been no check-in: the estimates from then on are those of a run
+without it, bit for bit.
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ MOST_KEPT = 2000  # segments: several times as many as a person walks in that ti
 
 @dataclass(slots=True)
 class BeforeCheckIn:
-    """Filter, check-in, estimate and generator's state before a check-in. `since`: segments with their readings and meetings."""
+    """State before a check-in: filter, newest check-in, newest estimate, state of the random generator.
+
+    `since`: segments with their readings and meetings.
+    """
 
     filter: AidedFilter | None
     check_in: CheckIn | None

@@ -28,9 +28,10 @@ class TrackerState:
 
     `last_segment` belongs to `estimate`; `pending_segments` follow it and wait for their pings. `right`: probability that the wearer is where the
     cloud is, NaN before the first segment; `searches`: the whole building is searched. `beacon_numbers`: by slot. `beacon_heard_s`: time of the
-    newest reading that the filter used. `waits_for_start`: neither a start nor a check-in is known yet. `undoable`: number of the check-in that can
-    be undone. `alarm`: the wearer's, None while all is well. `met`: the newest meeting with a teammate; `meetings`: their number by name of the
-    effect. `team_beacons`: beacons placed by each teammate; `team_beacon_messages`: numbers of good and bad ones.
+    newest reading that the filter used. `waits_for_start`: neither a start nor a check-in is known yet.
+    `undoable`: number of the check-in that can be undone. `alarm`: the wearer's, None while all is well. `met`: the newest meeting with a teammate;
+    `meetings`: their number by name of the effect. `team_beacons`: beacons placed by each teammate; `team_beacon_messages`: number of
+    messages believed, and bad.
     """
 
     estimate: Estimate | None

@@ -261,7 +261,10 @@ class Tracker:
         readings: list[BeaconReading],
         meetings: list[TimedMeeting],
     ) -> tuple[Estimate, list[MeetingEffect]]:
-        """Reweight by meetings, propagate by the segment, reweight by pings and readings; the estimate, and the effect of each meeting."""
+        """Localization: reweight by meetings, propagate by the segment, reweight by its pings and beacon readings.
+
+        Returns the estimate at its end, and the effect of each meeting.
+        """
         tracked.set_ranger_model(echo_of(self._ranger_part, self.settings.echo))
         effects = [tracked.meet(on_the_way(meeting, measured.segment, t_s)) for t_s, meeting in meetings]
         return tracked.update(measured, readings), effects

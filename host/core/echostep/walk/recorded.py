@@ -59,7 +59,10 @@ def tracker_of(
     settings: Settings | Path | str | None = None,
     seed: int | None = None,
 ) -> Tracker:
-    """A tracker with the recorded start, settings (or a TOML file) and seed unless given. Raises EchostepError for a damaged one."""
+    """A tracker with the recorded start, settings and seed unless they are given; settings also as a TOML file.
+
+    Raises EchostepError when one of them is missing or damaged.
+    """
     metadata, path = recording.metadata, recording.path
     if not isinstance(settings, Settings):
         text = metadata.get("settings_toml", "") if settings is None else read_settings(settings)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """`echostep.replay`: a recorded walk tracked again, for programs and notebooks.
 
-In: a recording, its plan. Out: `Walk`: the estimates, as a table of numpy or pandas, and as a picture. Owns nothing. As `echostep replay`.
+In: a recording, its plan. Out: `Walk`: the estimates, as a table of numpy or pandas, and as a picture. Owns nothing. The stages and the estimates
+are those of `echostep replay`.
 """
 
 from __future__ import annotations
@@ -94,7 +95,8 @@ def replay(
 ) -> Walk:
     """Track a recording, in one file or in parts, on a plan, or without one (None).
 
-    Start, settings (also a TOML file) and seed are the recorded ones unless given. Raises EchostepError for a file without estimates.
+    Start, settings (also a TOML file) and seed are the recorded ones unless given. Raises EchostepError when a file cannot be read, and for a
+    recording without estimates.
 
     >>> import echostep
     >>> echostep.replay("walk.mcap", "demo.json", seed=7)

@@ -184,7 +184,7 @@ def echo_sources(
     """Unhidden echo sources within half a cone of CONE_RAD and EAR_REACH_M, nearest first, at most MOST_SOURCES; their number.
 
     WALL: foot of the perpendicular on a wall. CORNER: inside of a corner that is about square, where two reflections send sound back. EDGE: any other
-    end.
+    place where a wall ends or walls turn.
     """
     receiver = Receiver(px, py, math.cos(axis_rad), math.sin(axis_rad))
     sources = SourceList(distance_m, off_axis_rad, kind)

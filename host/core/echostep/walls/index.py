@@ -87,7 +87,10 @@ def no_sources(columns: int) -> SourceTable:
 
 
 def build_index(walls: Floats, slant_rad: float = 0.0) -> WallIndex:
-    """Index of walls (n, 4) of finite length, without tiles; raises EchostepError for a plan too wide for its tiles."""
+    """Index of walls (n, 4), no tile tabulated yet; raises EchostepError for a plan too wide for its tiles.
+
+    Walls without length or with a coordinate that is not finite are left out.
+    """
     walls = np.ascontiguousarray(walls, dtype=np.float64).reshape(-1, 4)
     with np.errstate(invalid="ignore", over="ignore"):
         length = np.hypot(walls[:, 2] - walls[:, 0], walls[:, 3] - walls[:, 1])

@@ -76,7 +76,10 @@ def tile_faces(corners: Floats, near: Int32s, walls: Floats, slant: float) -> So
 def _face_screens(
     w: int, near: Int32s, walls: Floats, strip: Strip, slant: float, screens: Int32s, spans: Floats
 ) -> tuple[int, int]:
-    """Walls that may lie between wall w and the tile, into `screens`, spans that they cover, into `spans`; the number of each."""
+    """Walls that may stand between wall w and a place in the tile, into `screens`, and spans covered by those between all of both, into `spans`.
+
+    Returns the number of each.
+    """
     x, y, tx, ty, s0, s1, low, high = strip
     nearest = max(low, -high, 0.0)
     count, covering = 0, 0

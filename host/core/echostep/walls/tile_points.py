@@ -35,7 +35,8 @@ class Wedge(NamedTuple):
 def tile_points(corners: Floats, near: Int32s, index: WallIndex) -> SourceTable:
     """Ends of the walls of `near` within EAR_REACH_M of a tile: a row for each sector in which an end is a corner or an edge, with its screens.
 
-    While they are collected, rows have two more columns: bearing from the tile, its spread. All sectors of one end have the same screens.
+    While they are collected, rows have two more columns: bearing from the tile, its spread. All sectors of one end have the
+    same screens, which are copied.
     """
     points, starts = np.empty((8, POINT + 2)), np.zeros(9, np.int32)
     screens, used, count = np.empty(256, np.int32), 0, 0

@@ -126,7 +126,8 @@ def copy_payloads(stream: Octets, begin: Ints, length: int) -> Octets:
 def _find_frames(stream: Octets, ended: bool, longest: int, rows: Ints, tally: Ints) -> tuple[int, int]:
     """Fill `rows` (n, 5) with the columns `_BUS` to `_CERTAIN`; returns the number of frames, and where the unfinished frame begins.
 
-    After a rejected frame the search continues one byte later. By running sums a checksum is two look-ups, so noise costs no more than frames.
+    After a rejected frame the search continues one byte later. Running sums make each checksum two look-ups, so noise full of preambles costs no more
+    than frames.
     """
     size, sums = len(stream), _running_sums(stream)
     count, begin, certain = 0, 0, 0

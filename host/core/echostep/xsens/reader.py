@@ -69,21 +69,21 @@ class MtxCounts:
     `bad_counter`: samples whose counter jumped while the next one did not follow it. `other_device`: samples of devices that are not followed.
     """
 
-    good: int = 0  # up to `lost` in the order of the gates' tally
+    good: int = 0
     other_device: int = 0
-    incomplete: int = 0
-    not_finite: int = 0
-    bad_quaternion: int = 0
-    out_of_range: int = 0
-    repeated: int = 0
-    bad_counter: int = 0
-    lost: int = 0
     skipped_bytes: int = 0
     bad_checksum: int = 0
     bad_length: int = 0
+    incomplete: int = 0
+    bad_quaternion: int = 0
+    not_finite: int = 0
+    out_of_range: int = 0
+    repeated: int = 0
+    bad_counter: int = 0
     other_messages: int = 0
     wake_ups: int = 0
     device_errors: int = 0
+    lost: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,8 +118,24 @@ class MtxReader:
     @property
     def counts(self) -> MtxCounts:
         """Counts since the start."""
-        bytes_, rest = self._frames.counts, (self._bad_length, self._other, self._wake_ups, self._errors)
-        return MtxCounts(*self._tally.tolist(), bytes_.skipped_bytes, bytes_.bad_checksum, *rest)
+        tally = self._tally.tolist()
+        return MtxCounts(
+            good=tally[gates.GOOD],
+            other_device=tally[gates.OTHER_DEVICE],
+            skipped_bytes=self._frames.counts.skipped_bytes,
+            bad_checksum=self._frames.counts.bad_checksum,
+            bad_length=self._bad_length,
+            incomplete=tally[gates.INCOMPLETE],
+            bad_quaternion=tally[gates.BAD_QUATERNION],
+            not_finite=tally[gates.NOT_FINITE],
+            out_of_range=tally[gates.OUT_OF_RANGE],
+            repeated=tally[gates.REPEATED],
+            bad_counter=tally[gates.BAD_COUNTER],
+            other_messages=self._other,
+            wake_ups=self._wake_ups,
+            device_errors=self._errors,
+            lost=tally[gates.LOST],
+        )
 
     @property
     def pending(self) -> int:
@@ -148,8 +164,15 @@ class MtxReader:
         passed, waits = apply_gates(messages, self._limits, self._state, self._tally)
         self._waiting = messages.at(np.arange(waits, waits + 1)) if waits >= 0 else gates.NO_MESSAGES
         values, counter, _, _, end = messages if passed.all() else messages.at(np.flatnonzero(passed))
-        columns = (mt.ACCEL, mt.GYRO, mt.MAG, mt.ATTITUDE, mt.CELSIUS)
-        return MtBatch(counter, *(values[:, column] for column in columns), end)
+        return MtBatch(
+            counter,
+            values[:, mt.ACCEL],
+            values[:, mt.GYRO],
+            values[:, mt.MAG],
+            values[:, mt.ATTITUDE],
+            values[:, mt.CELSIUS],
+            end,
+        )
 
     def _decode(self, frames: MtFrames) -> Messages:
         """Values of all measurement messages in order; other messages are counted."""

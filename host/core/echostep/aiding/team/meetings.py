@@ -15,7 +15,8 @@ not known, so the two are fused by covariance intersection [Julier and Uhlmann 1
 Correlations], which is consistent for any: the inverse covariance becomes omega A + (1 - omega) B, A of the cloud, B of the meeting. Particles carry
 the prior already, so their weights are multiplied by (meeting / prior)^(1 - omega), the prior taken as a normal distribution. omega minimises the
 determinant; a cloud with more information than the meeting in every direction has omega = 1 and stays bit-identical. A coarse cloud, which is spread
-over the building, has no information that could be the teammate's: there the meeting is a likelihood, whether or not it fits.
+over the building, has no information that could be the teammate's: there the meeting is a likelihood, and the cloud is reweighted even if it fits
+badly.
 """
 
 from __future__ import annotations

@@ -211,7 +211,10 @@ def _add(at: int, w: float, scratch: Weights, touched: Int32s, found: int) -> in
 
 @lean_kernel
 def weigh_levels(states: GridStates, factor: LevelFactors, cells: GridCells) -> tuple[float, float]:
-    """Reweight each state by its level and connector, and move it to the level reached; the greatest weight, and the mean factor."""
+    """Multiply each state by the factor of its level and connector, and move it to the level it has reached.
+
+    Returns the greatest weight, and the mean factor of the weights.
+    """
     cell, weight = states.cell, states.weight
     top, before, after = 0.0, 0.0, 0.0
     for k in range(len(cell)):

@@ -151,7 +151,10 @@ class SearchGrid:
         return log_mean
 
     def change_levels(self, change: HeightChange, lag_variance: float) -> tuple[float, float]:
-        """Reweight by a change of height, and move states between levels; the variance of the pressure's offset, the log of the mean factor."""
+        """Weigh by a change of height, and move states that have reached another level.
+
+        Returns the variance of the height by pressure's offset, and the log of the mean factor of the weights.
+        """
         if self._heights is None:
             return lag_variance, 0.0
         factors, lag_variance = self._heights.update(change, lag_variance)

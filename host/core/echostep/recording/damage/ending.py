@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Evidence at the end of an MCAP file about the bytes before it [MCAP format specification, mcap.dev/spec].
 
-In: the bytes of a file, possibly damaged. Out: whether its data section is as written, and the channels and schemas after it. Owns nothing.
+In: the bytes of a file, possibly damaged. Out: whether its data section is as written, and the channels and schemas repeated after it. Owns
+nothing.
 
 A closed file ends like this; both checksums are CRC-32:
 
@@ -35,7 +36,10 @@ MAGIC_BITS = 8
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """Offset of the data-end record (-1: none), opcode and body of the records after it, and whether the summary's checksum is right."""
+    """`data_end`: offset of the data-end record, -1 if the footer lacks it; `summary`: opcode and body of the records after it.
+
+    `trusted`: the checksum of the summary is right.
+    """
 
     data_end: int = -1
     summary: tuple[tuple[int, bytes], ...] = ()
@@ -67,7 +71,8 @@ def read_ending(file: Octets) -> Ending:
 def checksum_matches(file: Octets, data_end: int) -> bool | None:
     """Whether the bytes before the data-end record at this offset are those that were written; None without a checksum.
 
-    Checksums that differ in one bit match: that bit of the stored one was flipped. A single flipped bit before it does so only 512 MB away (CRC-32).
+    Checksums that differ in one bit match: that bit of the stored one was flipped. A single flipped bit before it has this effect only at a distance
+    of 512 MB, the period of CRC-32.
     """
     body = data_end + HEAD_SIZE
     expected = int.from_bytes(file[body : body + DATA_END_SIZE].tobytes(), "little")

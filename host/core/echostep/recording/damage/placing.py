@@ -4,8 +4,9 @@
 In: the sequence numbers of messages in the order of the file; the recorder counts all its messages. Out: which of them to use. Owns the number of the
 newest message in its place, and the count of the others.
 
-The longest increasing subsequence is in its place [Schensted 1961]: of two exchanged blocks both are dropped, and nothing between them; of a block
-written twice, the second copy. A single number that does not fit its neighbours is damaged: its message is used.
+The longest increasing subsequence is in its place [Schensted 1961]: of two exchanged blocks both are dropped, and nothing between
+them; of a block written twice, the second copy. A single number that does not fit between its neighbours is a damaged number: its message
+is used.
 """
 
 from __future__ import annotations
