@@ -43,6 +43,7 @@ INSTEAD: dict[str, str] = {
     "calibrate --mtx": LEARNT_BIAS,
     "calibrate --plan": LEARNT_BIAS,
     "calibrate rangers": LEARNT_BIAS,
+    "[cloud] start_veer_sd_deg": "feet do not veer, and a robot's wheels are calibrated before its path is tracked",
     "[ranger] learn": LEARNT_BIAS,
     "map --plan": "a walk is drawn by itself; echostep plan edit mends a plan",
     "--plan wearer:": "echostep map WALK.mcap -o plan.json draws that wearer's recording, and --plan plan.json takes it",

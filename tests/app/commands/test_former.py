@@ -33,15 +33,15 @@ def test_a_former_use_ends_with_the_sentence_that_names_its_substitute(use: str)
 @pytest.mark.parametrize("use", SETTINGS)
 def test_a_former_setting_is_refused_in_a_file_and_passed_over_in_a_recording(use: str, tmp_path: Path) -> None:
     section, name = use.split()
-    text = f"{section}\n{name} = 1\n\n[cloud]\nsize = 300\n"
+    text = f"{section}\n{name} = 1\n\n[gait]\nfoot_left_m = 0.05\n"
     with pytest.raises(EchostepError, match=re.escape(f"me.toml: {has_left(use)}")):
         parse_settings(text, "me.toml")
     with Recorder(tmp_path / "walk.mcap", {"settings_toml": text}) as recorder:
         for chunk in walk_chunks(1.0):
             recorder.write(chunk)
     settings = tracker_of(open_parts([tmp_path / "walk.mcap"]), load_plan(DEMO)).settings
-    assert settings.cloud.size == 300
-    assert settings.ranger == Settings().ranger
+    assert settings.gait.foot_left_m == 0.05
+    assert (settings.ranger, settings.cloud) == (Settings().ranger, Settings().cloud)
 
 
 def test_a_command_line_of_today_is_no_former_use(monkeypatch: pytest.MonkeyPatch) -> None:
