@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The errors that end a command with one line for the user.
 
-In: nothing. Out: `EchostepError`, `IncompleteError`; any error in words; one sentence about a use of what has left. Owns the table of what serves
-instead.
+In: nothing. Out: `EchostepError`, `IncompleteError`; any error in words; a sentence about a use of what has left. Owns what serves instead.
 """
 
 from __future__ import annotations
