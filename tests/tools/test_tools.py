@@ -80,11 +80,11 @@ def test_mutated_inputs_go_on_where_they_stopped(
     monkeypatch.setattr(host, "LOG", tmp_path / "host.jsonl")
     monkeypatch.setattr(host, "SHARD_S", 0.1)
     for shard in (1, 2):
-        assert start("reliability.fuzz.host", "--seconds", 0.2, "--targets", "person", "drawing") == 0
+        assert start("reliability.fuzz.host", "--seconds", 0.2, "--targets", "person", "mqtt") == 0
         assert f"host, shard {shard}:" in capsys.readouterr().out
     runs = [json.loads(line) for line in (tmp_path / "host.jsonl").read_text().splitlines()]
     assert [run["shard"] for run in runs] == [1, 2]
-    assert all(run["executions"]["drawing"] > 10 for run in runs)
+    assert all(run["executions"]["mqtt"] > 10 for run in runs)
 
 
 @needs_twin

@@ -173,7 +173,7 @@ def test_its_place_on_a_map(tmp_path: Path, schema: Schema, unit_m: float, at: t
 def test_a_map_that_cannot_be_is_asked_about(tmp_path: Path, name: str) -> None:
     plan, report = imported(mapped("IFC4", name), tmp_path)
     assert plan.georeference is None
-    assert any("its map conversion" in doubt and "two known points" in doubt for doubt in report.doubts)
+    assert any("its map conversion" in doubt and "georeference by hand" in doubt for doubt in report.doubts)
 
 
 def imported(model: Model, folder: Path) -> tuple[Plan, ImportReport]:

@@ -34,7 +34,6 @@ READERS = {
     "session/runs/live.py": "how old the kept place is",
     "session/team/feeds.py": "when an order was understood, and that it is not yesterday's; the name of a drawing",
     "team/inbox.py": "when a message came, to compare the sender's clock",
-    "team/mesh/mesh.py": "when a report was sent",
     "team/outbox.py": "when a report was sent",
 }
 
