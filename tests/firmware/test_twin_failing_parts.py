@@ -191,15 +191,8 @@ def test_parts_may_be_swapped_in_mid_walk_and_survive_a_reset(bench: Bench, kind
         for switch in plugged.format(part).split():
             bench.fault(switch)
         run(5_000)
-        assert sorted(measured(run(1_000))) == [
-            "belt",
-            "calf",
-            "compass",
-            "pressure",
-            "ranger_left",
-            "ranger_right",
-            "thigh",
-        ]
+        everything = {"belt", "calf", "compass", "pressure", "ranger_left", "ranger_right", "thigh"}
+        assert set(measured(run(1_000))) == everything
         assert part.upper() in {m.Part(value).name for value in bench.parts[1:9]}
         bench.fault("reset=watchdog")
         bench.subscribe()
