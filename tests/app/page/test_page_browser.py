@@ -132,6 +132,21 @@ def test_two_fingers_zoom_and_rotate(browser: Any) -> None:
         assert until(lambda: view() == wanted), view()
 
 
+def test_a_quick_stroke_does_not_swallow_the_next_tap(browser: Any) -> None:
+    mailbox = Mailbox(PLAN, "test", replay=False)
+    with PageServer(mailbox, LOCAL) as server:
+        mailbox.publish(scene())
+        page = looking(browser, server.url, "bright")
+        finger, box = page.context.new_cdp_session(page), page.locator("#map").bounding_box()
+        for k in range(4):
+            place = {"x": box["x"] + 80 + 60 * k, "y": box["y"] + 160}
+            finger.send("Input.dispatchTouchEvent", {"type": "touchMove" if k else "touchStart", "touchPoints": [place]})
+        finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        before = page.evaluate("echostep.view.scale")
+        page.tap("#closer")
+        wait_for(page, f"echostep.view.scale > {before}")
+
+
 @pytest.mark.long
 def test_a_replay_plays_stops_and_seeks(browser: Any, tmp_path: Path) -> None:
     start, chunks = demo_walk(beacons=False)

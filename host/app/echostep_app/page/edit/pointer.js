@@ -11,7 +11,9 @@ export class Pointer {
     map.addEventListener('pointerup', (e) => this.up(e));
     map.addEventListener('pointercancel', (e) => { this.drop(e); actions.cancel(); });
     map.addEventListener('contextmenu', (e) => e.preventDefault());
-    map.addEventListener('touchend', (e) => e.cancelable && e.preventDefault()); // else a dialog that a tap opens is clicked by the same tap
+    const keep = (e) => e.cancelable && e.preventDefault();
+    map.addEventListener('touchmove', keep, { passive: false }); // else a quick stroke goes on as a scroll, which swallows the next tap on a button
+    map.addEventListener('touchend', keep); // else a dialog that a tap opens is clicked by the same tap
     map.addEventListener('wheel', (e) => {
       e.preventDefault();
       view.grip(this.pixel(e), this.pixel(e), Math.exp(-e.deltaY * (e.deltaMode ? 20 : 1) * 0.0015));

@@ -13,6 +13,7 @@ export class Gestures {
     map.addEventListener('pointermove', (e) => this.move(e));
     map.addEventListener('pointerup', (e) => this.up(e));
     map.addEventListener('pointercancel', (e) => this.drop(e));
+    map.addEventListener('touchmove', (e) => e.cancelable && e.preventDefault(), { passive: false });  // else a quick stroke goes on as a scroll, which swallows the next tap on a button
     map.addEventListener('wheel', (e) => this.wheel(e), { passive: false });
     map.addEventListener('contextmenu', (e) => e.preventDefault());
     map.addEventListener('keydown', (e) => this.key(e));
