@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The part of the package's metadata that depends on where the project is published: links, and the page that PyPI shows.
+"""What hatchling asks: the metadata that depends on where the project is published, and what the app's wheel holds beside it.
 
 In: the environment variable ECHOSTEP_URL, the public address of the repository (`make wheel URL=...`), and README.md beside this file. Out: `urls`
 and `readme` of the metadata. Without an address there are no links, and README.md is taken as it is. Owns nothing.
@@ -12,6 +12,7 @@ import re
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 FOLDER = "host"  # of this file in the repository
@@ -49,3 +50,12 @@ class PublishedMetadata(MetadataHookInterface):
         text = Path(self.root, "../README.md").read_text(encoding="utf-8")
         metadata["urls"] = links(url) if url else {}
         metadata["readme"] = {"content-type": "text/markdown", "text": absolute(text, url) if url else text}
+
+
+class RingOfTheSimulation(BuildHookInterface):
+    """The app's wheel holds the ring of the simulation, too; an editable install must not copy it, or the copy would hide the source."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Add the folder to a standard wheel."""
+        if version == "standard":
+            build_data["force_include"]["../simulation/echostep_simulation"] = "echostep_simulation"
