@@ -7,7 +7,7 @@ In: a plan, waypoints, a seed, a board or two. Out: the chunks of both ports in 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
@@ -26,7 +26,7 @@ from echostep_simulation.devices.foot_board import FootBoardPort, foot_rng
 from echostep_simulation.devices.kit_2026 import Kit2026Sensors
 from echostep_simulation.devices.mtx import MtxModel, stream
 from echostep_simulation.kits import Kit
-from echostep_simulation.people.walker import Person, Waypoint, walk
+from echostep_simulation.people.walker import Person, Walk, Waypoint, walk
 from echostep_simulation.stimulus import TEMPERATURE_C, BoardSensors
 from echostep_simulation.world.magnetic_field import MagneticField
 
@@ -47,15 +47,15 @@ class Scenario:
         self, plan: Plan, waypoints: Sequence[Waypoint], seed: int, board: Board,
         person: Person | None = None, model: MtxModel | None = None, configure: Configure | None = None,
         kit: Kit = Kit.PAPERS, foot_board: Board | None = None, worn: WornGyro | None = None,
-        celsius: float = TEMPERATURE_C,
+        celsius: float = TEMPERATURE_C, befalls: Callable[[Walk], Walk] = lambda walk: walk,
     ) -> None:  # fmt: skip
         """`configure` is sent to the board before it starts; `foot_board` is the one on the foot, instead of an MTx.
 
-        `worn`: how the belt's gyro is worn, perfectly by default; of the papers' kit. `celsius`: of the air.
+        `worn`: how the belt's gyro is worn, perfectly by default; of the papers' kit. `celsius`: of the air. `befalls`: what else moves the wearer.
         """
         streams = [np.random.default_rng([seed, k]) for k in range(3, 7)]
         magnetism = MagneticField(streams[3])
-        self.walk = walk(waypoints, person or Person(), streams[0])
+        self.walk = befalls(walk(waypoints, person or Person(), streams[0]))
         self.mtx = stream(self.walk, model or MtxModel(), streams[1], magnetism)
         kind = partial(Kit2026Sensors if kit is Kit.OF_2026 else partial(BoardSensors, worn=worn), celsius=celsius)
         self.sensors: BoardSensors | Kit2026Sensors = kind(self.walk, plan.levels, self.mtx.t_s, streams[2], magnetism)

@@ -232,6 +232,14 @@ STUDIES = (
         lambda _request, given: _of("simple.study").simple_study(given["rows"]),
     ),
     StudyCommand(
+        "doubt",
+        OURS,
+        "A sensor that lies, a wearer who is carried or pushed, rangers that die: for how long it is still called tracking (simulated).",
+        "minutes",
+        _usual("doubt", 20, "Walks of each row.", _rows("carried*")),
+        lambda _request, given: _of("doubt.study").doubt_study(given["rows"]),
+    ),
+    StudyCommand(
         "operation",
         OURS,
         "Three storeys in every manner of moving, a battery changed on the way, scored by ISO/IEC 18305 (simulated).",
