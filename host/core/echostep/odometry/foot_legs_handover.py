@@ -10,6 +10,7 @@ The foot's path is several times as accurate, so the foot is active while its sa
                         decides whether leg gyros are worn at all. If so, the legs are active.
     foot comes back     its segments wait for a straight stride, where foot and trunk point the same way, and for the legs to reach its time. Then the
                         foot is active again, rotated to the legs' heading there.
+    foot lies still     and the leg swings: the sensor is not worn, and counts as silent since it stood. The legs go on from there.
 """
 
 from __future__ import annotations
@@ -36,6 +37,9 @@ BRIDGE_M_S, BRIDGE_M = 0.4, 1.5  # standard deviation of an unobserved gap: per 
 BRIEF_S = 1.0  # a longer gap counts as unobserved
 STRAIGHT_M, STRAIGHT_RAD = 0.5, math.radians(20.0)  # a straight stride is longer and turns less
 CATCH_UP_S = 4.0  # longest time for which the foot's segments wait for the legs
+# Mean rates of thigh and calf (rad/s) in walking, and of a leg that stands: each with an exponential density. Tenths of a second that are alike;
+# log-odds before any sample of a stand that its sensor is not worn
+SWINGS_RAD_S, STANDS_RAD_S, ALIKE, NOT_WORN = 2.0, 0.3, 5.0, math.log(1e-4)
 
 
 class FootLegsHandover:
@@ -53,6 +57,7 @@ class FootLegsHandover:
         self._leg_scale = 1.0
         self._compared_m = (0.0, 0.0)  # path measured by both, foot and legs, over all dropouts
         self._foot_seen = False
+        self._log_odds = NOT_WORN  # of a sensor that is not worn, in this stand
         self._step = 0  # of the last segment
         self._step_base: int | None = 0  # added to the active source's own count; None until its next segment
 
@@ -61,9 +66,16 @@ class FootLegsHandover:
         """Time of the newest leg sample while the legs are active, else minus infinity."""
         return float(self._kept_blocks[-1].t_s[-1]) if self._leg_path is not None else -math.inf
 
+    @property
+    def is_foot_worn(self) -> bool:
+        """False while the foot stands and the leg swings."""
+        return self._log_odds < 0.0
+
     def add_foot_segments(self, segments: list[PathSegment]) -> list[PathSegment]:
         """Segments of the foot's path, in the foot's frame."""
         self._foot_seen = self._foot_seen or bool(segments)
+        if not self.is_foot_worn:
+            return []
         if self._leg_path is not None:
             self._returned += segments
             return self._return_to_foot()
@@ -72,17 +84,34 @@ class FootLegsHandover:
             self._kept_segments.popleft()
         return [self._append(segment, self._foot_turn_rad) for segment in segments]
 
-    def add_leg_block(self, block: GyroBlock, foot_newest_s: float) -> list[PathSegment]:
+    def add_leg_block(self, block: GyroBlock, foot_newest_s: float, *, foot_stands: bool = False) -> list[PathSegment]:
         """A block of leg samples; `foot_newest_s`: time of the foot's newest sample, NaN before the first."""
-        now_s = float(block.t_s[-1])
+        now_s, was_worn = float(block.t_s[-1]), self.is_foot_worn
+        is_silent = not now_s - foot_newest_s < SILENT_S  # true before the first sample, too
+        self._compare(block, foot_stands=foot_stands and not is_silent)
         self._kept_blocks.append(block)
         while self._kept_blocks[0].t_s[-1] < now_s - KEPT_S:
             self._kept_blocks.popleft()
         if self._leg_path is not None:
             return self._append_leg_segments(self._leg_path.feed(block)) + self._return_to_foot()
-        if now_s - foot_newest_s < SILENT_S:
+        if was_worn and not self.is_foot_worn:
+            self._go_back()
+        elif not is_silent and self.is_foot_worn:
             return []
         return self._switch_to_legs()
+
+    def _compare(self, block: GyroBlock, *, foot_stands: bool) -> None:
+        """Update the odds that the sensor which stands is not worn; a foot that moves is."""
+        rate = 0.5 * float(abs(block.thigh).mean() + abs(block.calf).mean())
+        gain = math.log(STANDS_RAD_S / SWINGS_RAD_S) + rate * (1.0 / STANDS_RAD_S - 1.0 / SWINGS_RAD_S)
+        gain = gain / ALIKE if rate < math.inf else 0.0  # not a number: no leg gyro
+        self._log_odds = max(self._log_odds + gain, NOT_WORN) if foot_stands else NOT_WORN
+
+    def _go_back(self) -> None:
+        """Take the foot's path back to where its last stand began."""
+        while self._kept_segments and self._kept_segments[-1].dx_m == self._kept_segments[-1].dy_m == 0.0:
+            self._kept_segments.pop()
+        self._covered_s = self._kept_segments[-1].t1_s if self._kept_segments else self._covered_s
 
     def _switch_to_legs(self) -> list[PathSegment]:
         """Process the kept leg samples; the legs become active if leg gyros are worn."""

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from echostep.arrays import Floats, Ints
+from echostep.arrays import Bools, Floats, Ints
 from echostep.board import messages
 from echostep.board.air import Air
 from echostep.board.calibration import GyroSettings, Imus, RangerSettings, heights, ranges, six_axes
@@ -100,6 +100,7 @@ class FrontEnd:
         self._gyro_blocks = GyroBlocks(gyro or GyroSettings(), errors.belt)
         self._barometer = BarometerStart()
         self._synchronizer = Synchronizer(math.radians(ranger.ahead_deg))
+        self._foot_stands = False  # by its newest sample
         self._unknown_ports = 0
         self._bad_times = 0
 
@@ -156,9 +157,11 @@ class FrontEnd:
             self.watch.add_legs(message_index, block)
         self._watch_belt(frames, times)
         # Foot: its samples -> segments of the trunk's path.
-        foot_segments = self._track_foot(samples, leg_blocks, times)
+        stands = np.full(len(times.mtx_newest_s), self._foot_stands)
+        foot_segments = self._track_foot(samples, leg_blocks, times, stands)
+        self._foot_stands = bool(stands[-1])
         # Handover: segments of foot and legs -> segments of one path.
-        observed_s = self._merge_paths(foot_segments, leg_blocks, times)
+        observed_s = self._merge_paths(foot_segments, leg_blocks, times, stands)
         self.watch.settle()
         # Synchronize: segments and pings -> segments with their pings.
         return self._synchronizer.pop_ready(times.board_newest_s, times.mtx_newest_s, observed_s)
@@ -241,9 +244,12 @@ class FrontEnd:
         return part
 
     def _track_foot(
-        self, samples: FootSamples, leg_blocks: list[tuple[int, GyroBlock]], times: Times
+        self, samples: FootSamples, leg_blocks: list[tuple[int, GyroBlock]], times: Times, stands: Bools
     ) -> list[tuple[int, list[PathSegment]]]:
-        """Segments from the foot odometry, each group with the index of the message that completed it; the belt's gyro corrects their headings."""
+        """Segments from the foot odometry, each group with the index of the message that completed it; the belt's gyro corrects their headings.
+
+        `stands` (n,), by message: whether the foot stands; as before these messages, and made anew.
+        """
         completed: list[tuple[int, list[PathSegment]]] = []
         blocks = deque(leg_blocks)
         timed = np.flatnonzero(~np.isnan(times.mtx_s))
@@ -253,6 +259,8 @@ class FrontEnd:
         t_s, message_index = times.mtx_s[timed], times.mtx_message_index[timed]
         self.watch.add_foot(t_s, samples.gyro[timed], samples.accel[timed], message_index)
         foot = self.foot.track(t_s, samples.accel[timed], samples.gyro[timed], samples.mag[timed])
+        newest = np.searchsorted(message_index, np.arange(len(stands)), side="right")
+        stands[:] = np.concatenate([stands[-1:], foot.stance])[newest]
         begin = 0
         for event, sample_index in zip(foot.events, foot.sample_index.tolist(), strict=True):
             completed += self._standing_segments(foot, t_s, message_index, begin, sample_index)
@@ -287,14 +295,14 @@ class FrontEnd:
         ]
 
     def _merge_paths(
-        self, foot_segments: list[tuple[int, list[PathSegment]]], leg_blocks: list[tuple[int, GyroBlock]], times: Times
-    ) -> Floats:
+        self, foot_segments: list[tuple[int, list[PathSegment]]], leg_blocks: list[tuple[int, GyroBlock]], times: Times, stands: Bools
+    ) -> Floats:  # fmt: skip
         """Merge foot and legs into one path, message by message, and hand its segments to the synchronizer.
 
         Returns, for each message (n,), the time up to which foot or legs have been observed.
         """
         count, next_segment = len(times.mtx_newest_s), 0
-        block_index, legs_s = [0], [self.handover.legs_observed_s]
+        block_index, legs_s, worn = [0], [self.handover.legs_observed_s], [self.handover.is_foot_worn]
         for message_index, block in [*leg_blocks, (count, None)]:
             while next_segment < len(foot_segments) and (
                 foot_segments[next_segment][0] < message_index or block is None
@@ -303,11 +311,16 @@ class FrontEnd:
                 self._pass_on(foot_index, self.handover.add_foot_segments(segments))
                 next_segment += 1
             if block is not None:
-                segments = self.handover.add_leg_block(block, float(times.mtx_newest_s[message_index]))
+                segments = self.handover.add_leg_block(
+                    block, float(times.mtx_newest_s[message_index]), foot_stands=bool(stands[message_index])
+                )
                 self._synchronizer.add_segments(message_index, segments)
             block_index.append(message_index)
             legs_s.append(self.handover.legs_observed_s)
-        return np.fmax(times.mtx_newest_s, np.repeat(legs_s[:-1], np.diff(block_index)))
+            worn.append(self.handover.is_foot_worn)
+        lengths = np.diff(block_index)
+        foot_s = np.where(np.repeat(worn[:-1], lengths), times.mtx_newest_s, -np.inf)
+        return np.fmax(foot_s, np.repeat(legs_s[:-1], lengths))
 
     def _pass_on(self, message_index: int, segments: list[PathSegment]) -> None:
         """Hand segments of the one path to the synchronizer and to the watch of the wearer."""
