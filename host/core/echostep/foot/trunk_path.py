@@ -33,6 +33,8 @@ STRAIGHT_STEP_RAD = math.radians(15.0)  # largest turn of such a step
 FORWARD_RAD = math.radians(45.0)  # largest angle of a forward step to the toe
 KNOWN_SCALE_SD = 0.01  # in which any foot's lengths differ: `CloudSettings.start_scale_sd`
 TOE_MEMORY = 20  # steps that the mean of the toe angle remembers
+# Longest time without a stance in any step; log-likelihood ratio of a foot that stays off the floor, carried or laid over the other knee. Assumed
+ALOFT_S, ALOFT = 1.5, 8.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +60,8 @@ class TrunkPath:
         self._rests_s: deque[float] = deque(maxlen=RUN_MEMORY)
         self._toe = ToeAngle()
         self.steps = 0
+        self._stood_s = math.inf  # last moment of a stance
+        self._is_aloft = False
         self.doubts: list[str] = []  # of the newest step
         self._scale_sd = KNOWN_SCALE_SD
 
@@ -66,6 +70,8 @@ class TrunkPath:
         if self._anchor is None and len(t_s):
             heading = float(foot_heading_rad[0]) + self._toe.angle_rad
             self._anchor = (float(t_s[0]), *self._trunk_xy(heading), heading)
+        if len(t_s):
+            self._stood_s, self._is_aloft = float(t_s[-1]), False
         segments: list[tuple[int, PathSegment]] = []
         until_s = t_s - self._half_s()
         while self._anchor is not None:
@@ -74,6 +80,19 @@ class TrunkPath:
                 break
             self._rests_s.clear()
             segments.append((sample_index, self._standing_segment(float(until_s[sample_index]))))
+        return segments
+
+    def add_flight(self, t_s: Floats) -> list[tuple[int, PathSegment]]:
+        """Segments of a foot that is off the floor at all times `t_s` (n,), from ALOFT_S on, each with the index of the sample that completes it."""
+        segments: list[tuple[int, PathSegment]] = []
+        while self._anchor is not None:
+            due_s = max(self._stood_s + ALOFT_S, self._anchor[0] + STANDING_PIECE_S)
+            sample_index = int(np.searchsorted(t_s, due_s))
+            if sample_index == len(t_s):
+                break
+            aloft = replace(self._standing_segment(due_s), moved_log_ratio=0.0 if self._is_aloft else ALOFT)
+            self._is_aloft = True
+            segments.append((sample_index, aloft))
         return segments
 
     def add_stance(self, stance: Stance) -> list[PathSegment]:
@@ -103,7 +122,12 @@ class TrunkPath:
         rise_sd = math.sqrt(max(float(step.covariance[2][2]), 0.0))
         before, self._scale_sd = self._scale_sd, max(self._scale_sd, step.scale_sd)
         growth = math.sqrt(self._scale_sd**2 - before**2)
-        return [replace(segment, rise_m=float(step.move_m[2]), rise_sd_m=rise_sd, scale_sd=growth)]
+        is_aloft = step.t_end_s - step.t_start_s > ALOFT_S and not self._is_aloft
+        return [
+            replace(
+                segment, rise_m=float(step.move_m[2]), rise_sd_m=rise_sd, scale_sd=growth, moved_log_ratio=ALOFT * is_aloft
+            )
+        ]
 
     def _moving_segment(self, t_s: float, heading: float, sd_m: float, turn_sd_rad: float) -> PathSegment:
         """The segment from the last anchor to a new one over the foot; without a last anchor, an empty segment of one second."""

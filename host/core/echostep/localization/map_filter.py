@@ -29,6 +29,7 @@ from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, 
 from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.localization.particles.start import STATED, Start, wide
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
+from echostep.localization.unmeasured import UnmeasuredWay
 from echostep.localization.window import RecentWay
 from echostep.particles.arrays import Move, PingBatch
 from echostep.particles.kernels import systematic
@@ -66,7 +67,7 @@ class MapFilter:
         self.belief = Belief(cloud, prior, PLAN_FITS if building.has_walls else 1.0)
         self._crossed = CrossedWalls()
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
-        self._gaps = Gaps()
+        self._gaps, self._unmeasured = Gaps(), UnmeasuredWay()
         self._way = RecentWay(wide(start), walk_heading_rad)  # since the last gap
         self._riding = RidingHeight(HEIGHT_SD_M)
         self._barometer_starts = 0  # before the last height by pressure
@@ -112,6 +113,8 @@ class MapFilter:
 
     def update(self, measured: MeasuredSegment) -> Estimate:
         """Propagate along a segment, reweight by its pings and height change, and resample; returns the estimate at its end."""
+        # 0. The trunk may have moved though no step was measured.
+        measured = self._unmeasured.weighed(measured)
         segment, belief = measured.segment, self.belief
         # 1. Kind of the last gap: a pause, a way that was not observed, rangers that were silent.
         gap = self._gaps.ended(measured)
@@ -119,11 +122,10 @@ class MapFilter:
         change = self._height_change(measured)
         # 3. A way that was not observed scatters each hypothesis.
         if segment.unobserved:
-            self._scatter(segment, change, is_long=gap is Gap.UNOBSERVED)
+            self._scatter(segment, change)
         # 4. After a gap the wearer may be elsewhere: a rest, a ride in a lift, a walk.
         if gap is not None:
-            if gap is not Gap.UNOBSERVED:
-                belief.leave(UNOBSERVED_DOUBT)
+            belief.leave(UNOBSERVED_DOUBT)
             self._search_beside(self.cloud.air, segment.heading1_rad)
         # 5. Along an observed way each hypothesis moves, and is weighed by pings, walls and heights.
         # 6. The hypotheses are compared, and the rangers' bias is learnt from the likeliest.
@@ -211,12 +213,10 @@ class MapFilter:
             self._height.update(change)
         return change
 
-    def _scatter(self, segment: PathSegment, change: HeightChange, *, is_long: bool) -> None:
+    def _scatter(self, segment: PathSegment, change: HeightChange) -> None:
         """Spread the hypotheses over an unobserved segment, straight through the building."""
         for each in self.belief.clouds:
             each.cloud.scatter(move_of(segment), change)
-        if is_long:
-            self.belief.leave(UNOBSERVED_DOUBT)
         self._way.clear()
 
     def _follow(self, measured: MeasuredSegment, change: HeightChange) -> tuple[Move, PingBatch]:
@@ -303,7 +303,8 @@ class MapFilter:
         hidden_sd_m = HIDDEN_SD_M * self.cloud.hidden_share
         map_sd_m = self._map_sd_m()
         sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M, map_sd_m)
-        right = Right(belief.right, belief.probability(belief.search))
+        stood = 1.0 - self._unmeasured.probability
+        right = Right(stood * belief.right, stood * belief.probability(belief.search))
         search = belief.search.cloud if belief.search else None
         new = estimate_of(
             self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, self.building.elsewhere, search,

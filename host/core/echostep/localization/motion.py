@@ -55,6 +55,7 @@ class Gaps:
 
     def __init__(self) -> None:
         self.pause_s = 0.0  # between the last two segments
+        self._unobserved_s = 0.0  # of the last segments
         self._end_s = math.inf  # of the last segment
         self._ping_s = math.inf  # of the last ping
         self._since_ping = Odometer()
@@ -66,7 +67,11 @@ class Gaps:
         self._end_s = segment.t1_s
         is_mute = self._is_mute(measured)
         if segment.unobserved:
-            return Gap.UNOBSERVED if segment.t1_s - segment.t0_s > LONG_S else None
+            self._unobserved_s += segment.t1_s - segment.t0_s
+            return None
+        unobserved_s, self._unobserved_s = self._unobserved_s, 0.0
+        if unobserved_s > LONG_S:
+            return Gap.UNOBSERVED
         if self.pause_s > PAUSE_S:
             return Gap.PAUSE
         return Gap.MUTE if is_mute else None

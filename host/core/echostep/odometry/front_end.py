@@ -288,11 +288,10 @@ class FrontEnd:
         """Segments of a standing trunk from the samples [begin, end) between two events."""
         if self.alignment.waiting:
             return []
-        still = begin + np.flatnonzero(foot.stance[begin:end])
-        return [
-            (int(message_index[still[k]]), [segment])
-            for k, segment in self.path.add_standing(t_s[still], foot.heading_rad[still])
-        ]
+        still, aloft = (begin + np.flatnonzero(foot.stance[begin:end] == stands) for stands in (True, False))
+        pieces = [(still[k], segment) for k, segment in self.path.add_standing(t_s[still], foot.heading_rad[still])]
+        pieces += [(aloft[k], segment) for k, segment in self.path.add_flight(t_s[aloft])]
+        return [(int(message_index[k]), [segment]) for k, segment in pieces]
 
     def _merge_paths(
         self, foot_segments: list[tuple[int, list[PathSegment]]], leg_blocks: list[tuple[int, GyroBlock]], times: Times, stands: Bools
