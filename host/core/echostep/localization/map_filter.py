@@ -25,7 +25,7 @@ from echostep.localization.estimate import Estimate
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.search import Search
 from echostep.localization.grid.start import grid_about, grid_of, is_unknown
-from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, move_of
+from echostep.localization.motion import HEIGHT_SD_M, LONG_S, Gap, Gaps, height_change, move_of
 from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.localization.particles.start import STATED, Start, wide
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
@@ -117,7 +117,7 @@ class MapFilter:
         measured = self._unmeasured.weighed(measured)
         segment, belief = measured.segment, self.belief
         # 1. Kind of the last gap: a pause, a way that was not observed, rangers that were silent.
-        gap = self._gaps.ended(measured)
+        gap = self._gaps.ended(measured, has_moved=self._unmeasured.has_moved)
         # 2. How the height has changed, by the foot and by pressure.
         change = self._height_change(measured)
         # 3. A way that was not observed scatters each hypothesis.
@@ -125,7 +125,8 @@ class MapFilter:
             self._scatter(segment, change)
         # 4. After a gap the wearer may be elsewhere: a rest, a ride in a lift, a walk.
         if gap is not None:
-            belief.leave(UNOBSERVED_DOUBT)
+            away = 1.0 - LONG_S / self._gaps.unobserved_s if gap is Gap.UNOBSERVED else 0.0
+            belief.leave(max(UNOBSERVED_DOUBT, away))
             self._search_beside(self.cloud.air, segment.heading1_rad)
         # 5. Along an observed way each hypothesis moves, and is weighed by pings, walls and heights.
         # 6. The hypotheses are compared, and the rangers' bias is learnt from the likeliest.

@@ -23,6 +23,7 @@ from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 BEGINS_PER_S, UNSEEN_PER_S = 1e-4, 0.02
 PRIOR = 1e-4  # that it begins with the stand
 BASE_S = 1.0  # of a stand, in which the rangers hear what is there
+MOST_M = 3.0  # standard deviation per axis of a way that a cloud follows
 ALIKE_M = 0.15  # error of an echo, sway and a slight turn of the body
 # Log-likelihood ratios of half a second of a ranger: moved / stood
 AS_BEFORE = math.log(0.8 / 0.95)  # a wall goes on
@@ -47,6 +48,9 @@ class UnmeasuredWay:
     def weighed(self, measured: MeasuredSegment) -> MeasuredSegment:
         """Update the probability; the segment, or one that was not observed where the trunk has probably moved."""
         segment = measured.segment
+        if segment.sd_m > MOST_M:  # says nothing: a foot in the air for long
+            segment = replace(segment, dx_m=0.0, dy_m=0.0, sd_m=MOST_M)
+            measured = replace(measured, segment=segment)
         before, self._step = self._step, segment.step
         if (segment.unobserved or segment.step != before) and not segment.moved_log_ratio:
             self._begin_anew(segment.t1_s)
@@ -63,7 +67,12 @@ class UnmeasuredWay:
                 log_ratio += self._compared(k, float(np.median(ranges)), segment.t1_s - self._begin_s < BASE_S)
         odds = math.exp(min(log_ratio, 50.0)) * begun / (1.0 - begun)
         self.probability = min(max(odds / (1.0 + odds), PRIOR), 1.0 - PRIOR)
-        return replace(measured, segment=self._spread(segment)) if self.probability > PROBABLE else measured
+        return replace(measured, segment=self._spread(segment)) if self.has_moved else measured
+
+    @property
+    def has_moved(self) -> bool:
+        """Whether the trunk has probably moved since the last measured step."""
+        return self.probability > PROBABLE
 
     def _compared(self, ranger: int, range_m: float, is_base: bool) -> float:
         """Log-likelihood ratio of what a ranger hears in a piece of the stand."""
@@ -79,8 +88,12 @@ class UnmeasuredWay:
         return FARTHER if range_m > max(base) else NEARER
 
     def _spread(self, segment: PathSegment) -> PathSegment:
-        """A way that may have been walked at any speed up to a walker's, since the stand began."""
-        before_s, after_s = self._spread_s - self._begin_s, segment.t1_s - self._begin_s
+        """A way that may have been walked at any speed up to a walker's, since the stand began; beyond MOST_M the building is searched."""
+        before_m, after_m = (
+            min(WALKER_M_S * (t_s - self._begin_s), MOST_M) for t_s in (self._spread_s, segment.t1_s)
+        )
+        sd_m = math.sqrt(after_m**2 - before_m**2)
+        if sd_m <= UNOBSERVED_SD_M:
+            return segment
         self._spread_s = segment.t1_s
-        sd_m = WALKER_M_S * math.sqrt(after_s**2 - before_s**2)
-        return replace(segment, sd_m=max(sd_m, segment.sd_m, 1.01 * UNOBSERVED_SD_M))
+        return replace(segment, sd_m=math.hypot(sd_m, segment.sd_m))
