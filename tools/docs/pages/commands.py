@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
+from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import Any, get_args, get_type_hints
 
@@ -17,24 +19,28 @@ import typer.models
 from docs.pages import MADE
 from echostep_app.cli import app
 
+HEAD = f"""# Commands
+{MADE}
+`echostep COMMAND --help` prints the same. A mistake ends with one line and exit status 2. A run that was done to its end, but whose recording
+lacks something (a full disk), ends with one line and exit status 1.
+"""
+TABLE = "| | default | |\n|---|---|---|\n"
+
 
 def page() -> str:
-    """Every command with its arguments and options."""
-    parts = [
-        "# Commands\n",
-        MADE,
-        "`echostep COMMAND --help` says the same. A mistake ends with one line and exit status 2. A run that was done to its "
-        "end, but whose recording lacks something (a full disk), ends with one line and exit status 1.\n",
-    ]
-    for name, call in sorted(commands("echostep", app)):
+    """Every command with its arguments and options; a row that three or more commands have alike is written once, at the end."""
+    calls = sorted(commands("echostep", app))
+    rows = {name: list(_rows(call)) for name, call in calls}
+    counts = Counter(row for several in rows.values() for row in several)
+    common = [row for row, count in counts.items() if count >= 3 and row.startswith("| `-")]
+    parts = [HEAD]
+    for name, call in calls:
         parts.append(f"## {name}\n\n{inspect.cleandoc(call.__doc__ or '')}\n")
-        hints = get_type_hints(call, include_extras=True)
-        rows = [
-            _row(name, hints[name], parameter.default) for name, parameter in inspect.signature(call).parameters.items()
-        ]
-        if rows:
-            parts.append("| | default | |\n|---|---|---|\n" + "".join(rows))
-    return "\n".join(parts)
+        if own := [row for row in rows[name] if row not in common]:
+            parts.append(TABLE + "".join(own))
+        if shared := re.findall(r"`-[^`]+`", "".join(row.split(" | ")[0] for row in rows[name] if row in common)):
+            parts.append(f"[Common](#common-options): {', '.join(shared)}.\n")
+    return "\n".join([*parts, "## Common options\n", TABLE + "".join(common)])
 
 
 def commands(name: str, group: typer.Typer) -> Iterator[tuple[str, Callable[..., Any]]]:
@@ -47,6 +53,12 @@ def commands(name: str, group: typer.Typer) -> Iterator[tuple[str, Callable[...,
             yield from commands(f"{name} {sub.name}" if isinstance(sub.name, str) else name, sub.typer_instance)
 
 
+def _rows(call: Callable[..., Any]) -> Iterator[str]:
+    hints = get_type_hints(call, include_extras=True)
+    for name, parameter in inspect.signature(call).parameters.items():
+        yield _row(name, hints[name], parameter.default)
+
+
 def _row(name: str, hint: Any, default: Any) -> str:
     """A row of the table: a parameter's syntax, default and meaning."""
     plain, info = (hint.__origin__, hint.__metadata__[0]) if hasattr(hint, "__metadata__") else (hint, None)
@@ -55,13 +67,13 @@ def _row(name: str, hint: Any, default: Any) -> str:
     else:
         given = (
             (info.default, *(info.param_decls or ())) if info else ()
-        )  # in Annotated[], the first name stands where a default would
-        declared = [name for d in given if isinstance(d, str) and d.startswith("-") for name in d.split("/")]
+        )  # in Annotated[], the first name takes the place of a default
+        declared = [option for d in given if isinstance(d, str) and d.startswith("-") for option in d.split("/")]
         flag = plain is bool or bool in get_args(plain)
         value = "" if flag else f" `{(info.metavar if info else None) or 'VALUE'}`"
         written = ", ".join(f"`{d}`" for d in declared or [f"--{name.replace('_', '-')}"]) + value
-    text = " ".join(((info.help if info else None) or "").split()).replace("|", "\\|")
-    return f"| {written} | {_default(default)} | {text} |\n"
+    text = " ".join(((info.help if info else None) or "").split())
+    return "| {} | {} | {} |\n".format(*(cell.replace("|", "\\|") for cell in (written, _default(default), text)))
 
 
 def _default(value: Any) -> str:
