@@ -47,8 +47,7 @@ def _table(message: Message) -> list[str]:
 
 
 def _meaning(field: Field) -> str:
-    text = field.doc
-    if text == "as above":  # its values too
+    if (text := field.doc) == "as above":  # its values too
         return text
     for kind, names in (("", field.enum), ("bits: ", field.flags)):
         if names:
