@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A report of distress with what a commander needs for help: place, time since, nearest stairs, nearest wearers; and the errand that sends one.
+"""A report of distress with a commander's data for help: place, time since, nearest stairs, nearest wearers; and the errand that sends one.
 
 In: members of the team, the plan. Out: `ShownDistress`: plain data, whose field names are keys of the page's JSON; `Errand`s. Owns nothing.
 Distances are straight, for a list that is made twice a second; the sent wearer's page finds the way.

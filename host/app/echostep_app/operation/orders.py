@@ -57,7 +57,7 @@ def order_notes(board: MarkBoard, m: Member) -> list[str]:
 
 
 def order_news(before: MarkBoard, board: MarkBoard, m: Member) -> list[str]:
-    """What a message has changed for a member, in words for its history."""
+    """The changes by a message for a member, in words for its history."""
     news = []
     for kind in (EVERYBODY, NOTE):
         old, new = (one.order_to(kind, m.report.team, m.report.name) for one in (before, board))

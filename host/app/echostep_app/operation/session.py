@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The session of one commander's page.
 
-In: a WebSocket, the feed. Out: frames. Owns what this page has been sent, and which wearer it has chosen. A frame, little-endian:
+In: a WebSocket, the feed. Out: frames. Owns the state sent to this page, and its chosen wearer. A frame, little-endian:
 
     u32         length of the JSON header, padded with spaces to a multiple of four
     bytes       the header (`TableHeader`)

@@ -41,7 +41,7 @@ def port_of(foot: str | None) -> str | None:
 
 
 class LineFoot:
-    """Listens to the ports until the rate of the samples is known; raises EchostepError that says what came instead."""
+    """Listens to the ports until the rate of the samples is known; raises EchostepError with the received data."""
 
     def __init__(self, ports: SerialPorts, foot: str) -> None:
         self._foot, self._reader = foot, LineReader()
@@ -63,14 +63,14 @@ class LineFoot:
         return text
 
     def with_samples(self, chunks: Iterable[Chunk | None]) -> Iterator[Chunk | None]:
-        """The same chunks, each of lines followed by those of its samples."""
+        """The same chunks, each of lines followed by its samples'."""
         for chunk in chunks:
             yield chunk
             if chunk is not None and chunk.port == LINES:
                 yield from self._chunks.of(self._reader.feed(chunk.data), chunk.t_arrival_ns)
 
     def report(self) -> str:
-        """What was read, in words."""
+        """The lines read, in words."""
         return (
             f"foot in lines: {self.rate_hz:g} Hz; {self._reader.unreadable} lines were no sample, {self._chunks.left_out} samples came within "
             f"the period of another, the device's clock was set {self._chunks.jumps} times"
