@@ -26,7 +26,7 @@ ON_DUTY = (MemberState.TRACKING, MemberState.UNCERTAIN)  # states of wearers who
 
 @dataclass(frozen=True, slots=True)
 class ShownRescuer:
-    """A wearer who can be sent: how far away, in words. `sent`: this is under way, and by whom; empty: it is not."""
+    """A wearer who can be sent: the distance in words. `sent`: this is under way, and by whom; empty: it is not."""
 
     id: int
     name: str

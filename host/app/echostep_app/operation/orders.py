@@ -19,7 +19,7 @@ NEWER_S = 1e-3  # by which an order or errand is newer than the one that it repl
 
 @dataclass(frozen=True, slots=True)
 class ShownOrder:
-    """The order to everybody. `understood` wearers of `of` have said so; `missing`: names of the others. The names are keys of the page's JSON."""
+    """The order to everybody. `understood` of `of` wearers confirmed it; `missing`: names of the others. The names are keys of the page's JSON."""
 
     text: str
     by: str

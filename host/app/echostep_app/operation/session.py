@@ -43,7 +43,7 @@ RECORDED = "Not accepted: this is a recorded operation."
 class TableHeader:
     """One moment. `seq`: the page returns it when the frame is drawn. `list`, `marks`, `crews`, `log`: None when the page has them already.
 
-    `trail_from` 0: trails begin anew. `details`, `distress`: of the chosen wearer. `play`: state of a replay. The field names are keys of the JSON.
+    `trail_from` 0: trails restart. `details`, `distress`: of the chosen wearer. `play`: state of a replay. The field names are keys of the JSON.
     """
 
     seq: int

@@ -16,7 +16,7 @@ MOST_ANSWERS = 1000  # of which the oldest is forgotten first: hours of a person
 
 
 class Exchange:
-    """`run`: a random name of this run. `note_alive`: the run works; `rest`: from now on nothing new is expected of it."""
+    """`run`: a random name of this run. `note_alive`: the run works; `rest`: nothing new is expected any more."""
 
     def __init__(self) -> None:
         self.run = secrets.token_hex(4)

@@ -52,7 +52,7 @@ class LineFoot:
         self._reader, self._chunks = LineReader(), LineChunks(self.rate_hz)
 
     def settings(self, text: str, origin: str) -> str:
-        """The settings of the run: those given, whose rate must fit, or those of a foot IMU alone."""
+        """The settings of the run: the given ones, whose rate must fit, or a foot IMU's."""
         if not text:
             return imu_settings(self.rate_hz)
         given = parse_settings(text, origin).mtx.rate_hz

@@ -98,7 +98,7 @@ class Errand(msgspec.Struct, frozen=True):
 
     @property
     def words(self) -> str:
-        """For the wearer who is sent there."""
+        """The errand for its wearer."""
         return f"{self.by} sends you to {self.to}, in distress{f': {self.where}' if self.where else ''}"
 
 
