@@ -47,9 +47,9 @@ def _table(message: Message) -> list[str]:
 
 
 def _meaning(field: Field) -> str:
-    text = field.doc
-    if field.enum:
-        text += "; " + ", ".join(f"{k} = {name}" for k, name in enumerate(field.enum))
-    if field.flags:
-        text += "; bits: " + ", ".join(f"{k} = {name}" for k, name in enumerate(field.flags))
+    if (text := field.doc) == "as above":  # its values too
+        return text
+    for kind, names in (("", field.enum), ("bits: ", field.flags)):
+        if names:
+            text += f"; {kind}" + ", ".join(f"{k} = {name}" for k, name in enumerate(names))
     return text if field.invalid is None else f"{text}; {field.invalid} = not measured"

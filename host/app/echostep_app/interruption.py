@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What ends a run from outside: Ctrl-C, SIGTERM, SIGQUIT, and a terminal that is closed (SIGHUP).
+"""Signals that end a run: Ctrl-C, SIGTERM, SIGQUIT, and a terminal that is closed (SIGHUP).
 
 In: signals. Out: one KeyboardInterrupt, after which the run writes its files. Owns the handlers, and whether a signal has come. A second Ctrl-C ends
 at once. Waiting for a condition (`wait_for`) ends with a signal, too.
@@ -29,7 +29,7 @@ ENDS = [signal.SIGTERM, *filter(None, (HANGUP, getattr(signal, "SIGQUIT", None))
 
 
 def end_by_signals() -> None:
-    """Handle the signals; a SIGHUP that this process was told to ignore (nohup) stays ignored."""
+    """Handle the signals; a SIGHUP that this process ignores (nohup) stays ignored."""
     _asked.clear()
     signal.signal(signal.SIGINT, _end)
     for number in ENDS:

@@ -8,65 +8,65 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Iterator
-from typing import Any, get_args, get_type_hints
+import re
+from collections import Counter
+from collections.abc import Iterator
+from itertools import chain
+from typing import Any
 
-import typer
-import typer.models
+import typer.main
 
 from docs.pages import MADE
 from echostep_app.cli import app
 
+HEAD = f"""# Commands
+{MADE}
+`echostep COMMAND --help` prints the same. A mistake ends with one line and exit status 2. A run that was done to its end, but whose recording
+lacks something (a full disk), ends with one line and exit status 1.
+"""
+COMMON = "## Common options\n\nNAME is the last word of the command.\n"
+TABLE = "| | default | |\n|---|---|---|\n"
+
 
 def page() -> str:
-    """Every command with its arguments and options."""
-    parts = [
-        "# Commands\n",
-        MADE,
-        "`echostep COMMAND --help` says the same. A mistake ends with one line and exit status 2. A run that was done to its "
-        "end, but whose recording lacks something (a full disk), ends with one line and exit status 1.\n",
-    ]
-    for name, call in sorted(commands("echostep", app)):
-        parts.append(f"## {name}\n\n{inspect.cleandoc(call.__doc__ or '')}\n")
-        hints = get_type_hints(call, include_extras=True)
-        rows = [
-            _row(name, hints[name], parameter.default) for name, parameter in inspect.signature(call).parameters.items()
-        ]
-        if rows:
-            parts.append("| | default | |\n|---|---|---|\n" + "".join(rows))
-    return "\n".join(parts)
+    """Every command with its arguments and options; a row that several commands have alike is written once, at the end."""
+    tree = sorted(commands("echostep", typer.main.get_command(app)))
+    rows = {name: [_row(each, f"out/{name.rpartition(' ')[2]}") for each in command.params] for name, command in tree}
+    counts = Counter(chain(*rows.values()))
+    common: dict[str, str] = {}  # by the option's longest name: the row that most commands have
+    for row in sorted(counts, key=lambda row: (counts[row], len(row)), reverse=True):
+        if counts[row] > 1 and (options := _options(row)):
+            common.setdefault(max(options, key=len), row)
+    parts = [HEAD]
+    for name, command in tree:
+        parts.append(f"## {name}\n\n{inspect.cleandoc(command.callback.__doc__ or '')}\n")
+        if own := "".join(row for row in rows[name] if row not in common.values()):
+            parts.append(TABLE + own.replace("out/NAME", f"out/{name.rpartition(' ')[2]}"))
+        if shared := ", ".join(chain(*(_options(row) for row in rows[name] if row in common.values()))):
+            parts.append(f"[Common](#common-options): {shared}.\n")
+    return "\n".join([*parts, COMMON, TABLE + "".join(sorted(common.values()))])
 
 
-def commands(name: str, group: typer.Typer) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """The function behind each command, by its full name."""
-    for command in group.registered_commands:
-        if command.callback is not None and not command.hidden:
-            yield f"{name} {command.name or command.callback.__name__.replace('_', '-')}", command.callback
-    for sub in group.registered_groups:
-        if sub.typer_instance is not None:
-            yield from commands(f"{name} {sub.name}" if isinstance(sub.name, str) else name, sub.typer_instance)
+def commands(name: str, command: Any) -> Iterator[tuple[str, Any]]:
+    """Each command by its full name."""
+    for word, below in getattr(command, "commands", {}).items():
+        yield from commands(f"{name} {word}", below)
+    if not hasattr(command, "commands") and not command.hidden:
+        yield name, command
 
 
-def _row(name: str, hint: Any, default: Any) -> str:
+def _row(parameter: Any, folder: str) -> str:
     """A row of the table: a parameter's syntax, default and meaning."""
-    plain, info = (hint.__origin__, hint.__metadata__[0]) if hasattr(hint, "__metadata__") else (hint, None)
-    if isinstance(info, typer.models.ArgumentInfo):
-        written = f"`{info.metavar or name.upper()}`"
-    else:
-        given = (
-            (info.default, *(info.param_decls or ())) if info else ()
-        )  # in Annotated[], the first name stands where a default would
-        declared = [name for d in given if isinstance(d, str) and d.startswith("-") for name in d.split("/")]
-        flag = plain is bool or bool in get_args(plain)
-        value = "" if flag else f" `{(info.metavar if info else None) or 'VALUE'}`"
-        written = ", ".join(f"`{d}`" for d in declared or [f"--{name.replace('_', '-')}"]) + value
-    text = " ".join(((info.help if info else None) or "").split()).replace("|", "\\|")
-    return f"| {written} | {_default(default)} | {text} |\n"
+    written = f"`{parameter.metavar or parameter.name.upper()}`"
+    if parameter.param_type_name == "option":
+        value = "" if parameter.is_flag else f" `{parameter.metavar or 'VALUE'}`"
+        written = ", ".join(f"`{name}`" for name in (*parameter.opts, *parameter.secondary_opts)) + value
+    default = getattr(parameter.default, "value", parameter.default)
+    absent = default is None or default is False or default in ("", math.inf)
+    shown = "required" if parameter.required else "" if absent else f"`{default}`".replace(folder, "out/NAME")
+    text = " ".join((parameter.help or "").split())
+    return "| {} | {} | {} |\n".format(*(cell.replace("|", "\\|") for cell in (written, shown, text)))
 
 
-def _default(value: Any) -> str:
-    if value is inspect.Parameter.empty:
-        return "required"
-    if value is None or value is False or value == "" or (isinstance(value, float) and math.isinf(value)):
-        return ""
-    return f"`{value}`"
+def _options(row: str) -> list[str]:
+    return re.findall(r"`-[^`]+`", row.partition(" | ")[0])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Command lines that use what has left: answered with the sentence of the one table, `echostep.errors.INSTEAD`.
+"""Command lines with removed commands or options: answered by the table `echostep.errors.INSTEAD`.
 
 In: the words of a command line. Out: a sentence; empty for a command line of today. Owns nothing.
 """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Groups of options that several commands share: tracking, ports, output.
 
-In: options as the command line parsed them. Out: dataclasses that make from them what the runs take. Owns the groups; a command takes a group as one
+In: options as the command line parsed them. Out: dataclasses that make the arguments of the runs. Owns the groups; a command takes a group as one
 parameter, and `with_groups` gives it the options.
 """
 

@@ -42,7 +42,7 @@ MEASUREMENTS = (  # the headings of firmware/bench.md
 
 
 def write(board: str | None, foot: str | None, seconds: float, out: Path, schedule: Schedule | None = None) -> str:
-    """Examine the boards, while the rangers fire by `schedule`, and write the report; returns where it is and what to do with it."""
+    """Examine the boards, while the rangers fire by `schedule`, and write the report; returns its path and the next step in words."""
     report = examine(board, None, seconds, foot, electrical=True, schedule=schedule)
     if not report.probed:
         raise EchostepError(str(report.findings[0]) if report.findings else "no board has answered")

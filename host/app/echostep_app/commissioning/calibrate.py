@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`echostep calibrate`: biases of the gyros, mounting, compass and leg scale, and the accelerometers, written as settings.
 
-In: the board's port, while the wearer stands still, turns and walks as asked; for the accelerometers both boards' ports, while the parts lie still.
+In: the board's port, while the wearer rests, turns and walks as asked; for the accelerometers both boards' ports, while the parts lie still.
 Out: a settings file (TOML) for `--settings`, whose other sections are kept. Owns the instructions to the wearer; `probe` reads the ports,
 `fitting` and `poses` compute the values.
 """
@@ -88,7 +88,7 @@ PARTS = (
 
 
 def calibrate(ports: Ports, names: list[str], wearer: Wearer, out: Path, console: Console) -> None:
-    """Instruct, measure, fit and write, part by part; raises EchostepError with what to repeat. Parts finished before it are kept."""
+    """Instruct, measure, fit and write, part by part; raises EchostepError with the remedy. Parts finished before it are kept."""
     parts = _chosen_parts(names)
     _check_wearer(wearer)
     ports = Ports(*find_boards(list_seen(), ports.board, ports.foot))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The diagnosis of a board and an MTx from a few seconds of their bytes: lines of facts, and findings.
 
-In: `ProbeResult`. Out: a `Diagnosis`. Owns nothing; `board.health` interprets what the board reports about itself.
+In: `ProbeResult`. Out: a `Diagnosis`. Owns nothing; `board.health` interprets the board's own reports.
 """
 
 from __future__ import annotations

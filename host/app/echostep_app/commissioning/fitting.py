@@ -79,7 +79,7 @@ def _bearings_by_field(probed: ProbeResult, belt: ImuSettings | None) -> tuple[F
 
 
 def still_bias(t_s: Floats, rate: Floats) -> tuple[float, float]:
-    """Bias and noise (sd), rad/s, of a gyro that was at rest for most of the time; raises ValueError with what to repeat."""
+    """Bias and noise (sd), rad/s, of a gyro that was at rest for most of the time; raises ValueError with the remedy."""
     valid = np.isfinite(rate)
     if valid.sum() < LEAST_READINGS:
         raise ValueError("it gave no values: run echostep doctor")
@@ -119,7 +119,7 @@ def fit_gyros(probed: ProbeResult) -> Fit:
 
 
 def doubt(values: dict[str, Values]) -> str:
-    """Why fitted values are implausible for a part or a person, and what to repeat; empty if they are plausible."""
+    """Why fitted values are implausible for a part or a person, and the remedy; empty if they are plausible."""
     for name in GYROS:
         bias = math.degrees(values.get("gyro", {}).get(f"{name}_bias_rad_s", 0.0))
         if abs(bias) > USUAL_BIAS_DEG_S:

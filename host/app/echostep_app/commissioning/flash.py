@@ -46,7 +46,7 @@ PRESS = "press its reset button (Pro Micro: twice, quickly) and run this again w
 
 
 def flash(port: str | None, hex_file: Path | None, console: Console) -> None:
-    """Write the firmware and wait for its first message; raises EchostepError with what to do."""
+    """Write the firmware and wait for its first message; raises EchostepError with the remedy."""
     avrdude = shutil.which("avrdude")
     if avrdude is None:
         raise EchostepError("avrdude is not installed: sudo apt install avrdude (macOS: brew install avrdude)")
@@ -96,7 +96,7 @@ def check_hex(path: Path) -> int:
 
 
 def check_digest(path: Path) -> str:
-    """SHA-256 of a file; raises EchostepError when it differs from the one that the build wrote beside the file, if any."""
+    """SHA-256 of a file; raises EchostepError when it differs from the one that the build wrote for the file, if any."""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     beside = path.with_name(f"{path.name}.sha256")
     if beside.exists() and (expected := beside.read_text(errors="replace").partition(" ")[0].strip()) != digest:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Errors of an accelerometer and of its gyros from a part that lay still in several poses.
 
-In: forces and rates of each pose, in the part's axes. Out: `ImuSettings`; ValueError says in words what to repeat. Owns nothing.
+In: forces and rates of each pose, in the part's axes. Out: `ImuSettings`; ValueError with the remedy. Owns nothing.
 
 At rest the true force has one size in every pose: with the right offset and scale of each axis the measured means lie on a sphere of that
 radius, by least squares [Lotters et al. 1998, Procedure for in-use calibration of triaxial accelerometers]. No pose has to be level or known.

@@ -32,7 +32,7 @@ Listen = Callable[[str], list[ProbeResult]]  # results of each board, while this
 
 
 class Lying(NamedTuple):
-    """What one part measured while it lay: forces (n, 3) m/s2, rates (n, 3) rad/s, and its temperature."""
+    """Measurements of one part at rest: forces (n, 3) m/s2, rates (n, 3) rad/s, and its temperature."""
 
     forces: Floats
     rates: Floats
@@ -67,7 +67,7 @@ def _settled(probed: ProbeResult, kind: type[Motion | Foot]) -> Bools:
 
 
 def measure_poses(listen: Listen, console: Console) -> dict[str, ImuSettings]:
-    """Errors of each part, by place; raises EchostepError with what to repeat."""
+    """Errors of each part, by place; raises EchostepError with the remedy."""
     poses: dict[str, list[RestPose]] = {}
     celsius: dict[str, list[float]] = {}
     for number in range(1, POSES + 1):

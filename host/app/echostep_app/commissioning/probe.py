@@ -58,7 +58,7 @@ LEAST_RATE_S = 1.0  # for rates
 
 @dataclass(slots=True)
 class ProbeResult:
-    """What was received in `seconds`. `ticks`: times of the board's messages by kind, unwrapped, counted from the first message.
+    """Data received in `seconds`. `ticks`: times of the board's messages by kind, unwrapped, counted from the first message.
 
     `replies` to clock queries are (sent_s, arrived_s, ticks).
     """

@@ -5,7 +5,7 @@ In: when and where the place was last known (a beacon measured), the present pla
 of a `Contact` record. `Guide` and the study of guided returns call the same kernels.
 
 After a silence guidance leads back to where the place was last known. Without a measurement there either, it leads onward for twice as long, since
-reception does not improve while the wearer stands still.
+reception does not improve while the wearer waits.
 """
 
 from __future__ import annotations

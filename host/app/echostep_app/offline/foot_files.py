@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A foot IMU's recording as other programs keep it: a table, a folder or zip of tables, a MAT file, an MVNX file.
 
-In: a path. Out: `Imu`, or an EchostepError that names the file and what it lacks, or that it glided. Owns nothing.
+In: a path. Out: `Imu`, or an EchostepError that names the file and its fault (gliding, too). Owns nothing.
 
 MAT: the names of github.com/utiasSTARS/pyshoe and of its published recordings. MVNX: sensorFreeAcceleration is without gravity and
 in the global frame, as sensorOrientation gives it [MVN User Manual, MVNX]. Folders: UNITS.md, and CROSSPLATFORM.md for the signs of iOS, of

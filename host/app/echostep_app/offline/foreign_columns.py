@@ -2,7 +2,7 @@
 """Columns of CSV files as other programs name them, and their units.
 
 In: the first lines of a file, `--columns` and `--units`. Out: `Header`: the columns by this project's names, with the factors to SI units; an error
-for names and units that are not known, with the options that would read them where the titles tell. Owns the table of the loggers that are
+for names and units that are not known, with the options that would read them, if the titles allow. Owns the table of the loggers that are
 recognised without options.
 
 Sources of the table: NGIMU: short_walk.csv of github.com/xioTechnologies/Gait-Tracking. x-IMU3: Inertial.csv in the examples of

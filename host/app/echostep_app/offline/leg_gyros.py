@@ -33,7 +33,7 @@ class Mounting:
 
     @property
     def clear(self) -> bool:
-        """Whether one axis stands out, as in a walk."""
+        """Whether one axis dominates, as in a walk."""
         return self.ratio > CLEAR_RATIO
 
 

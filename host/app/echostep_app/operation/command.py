@@ -2,7 +2,7 @@
 """`echostep command`: follow a team on one plan, on a page and on the terminal.
 
 In: a plan, a broker's URL. Out: the page, a table on the terminal, a recording, the roster as JSON. Owns the loop: it empties the
-inbox, records what it held, and shows the scene 30 times a second, and draws the table four times.
+inbox, records the messages, and shows the scene 30 times a second, and draws the table four times.
 After a new connection, the restorer sends what the commanders share again where the broker has lost it.
 """
 

@@ -36,7 +36,7 @@ class CrewLog:
         self._add(after.unix_s, *what, f"{after.air_min:g}", *minutes, after.by)
 
     def add_note(self, note: Order) -> None:
-        """Add what a commander wrote."""
+        """Add a commander's note."""
         self._add(note.unix_s, "", "", f"note: {note.text}", "", "", "", note.by)
 
     def _add(self, unix_s: float, *cells: str) -> None:

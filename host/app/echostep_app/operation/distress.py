@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A report of distress with what a commander needs for help: place, time since, nearest stairs, nearest wearers; and the errand that sends one.
+"""A report of distress with a commander's data for help: place, time since, nearest stairs, nearest wearers; and the errand that sends one.
 
 In: members of the team, the plan. Out: `ShownDistress`: plain data, whose field names are keys of the page's JSON; `Errand`s. Owns nothing.
 Distances are straight, for a list that is made twice a second; the sent wearer's page finds the way.
@@ -26,7 +26,7 @@ ON_DUTY = (MemberState.TRACKING, MemberState.UNCERTAIN)  # states of wearers who
 
 @dataclass(frozen=True, slots=True)
 class ShownRescuer:
-    """A wearer who can be sent: how far away, in words. `sent`: this is under way, and by whom; empty: it is not."""
+    """A wearer who can be sent: the distance in words. `sent`: this is under way, and by whom; empty: it is not."""
 
     id: int
     name: str

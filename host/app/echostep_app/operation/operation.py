@@ -84,7 +84,7 @@ class _Followed:
 
 
 class Operation:
-    """`receive` takes what an inbox held; `scene` gives the present moment."""
+    """`receive` takes an inbox's messages; `scene` gives the present moment."""
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
@@ -206,7 +206,7 @@ class Operation:
             return tuple(self._board.messages)
 
     def take_answers(self) -> list[tuple[str, bytes]]:
-        """Messages for the broker, which keeps older ones of what the commanders share; each is given once."""
+        """Messages for a broker with an older shared state of the commanders; each is given once."""
         with self._lock:
             answers = list(self._board.answers)
             self._board.answers.clear()
@@ -252,7 +252,7 @@ class Operation:
             return shown_details(number, m, self.plan, now_s, history, self.roster.duplicates(now_s))
 
     def distress(self, number: int, now_s: float) -> ShownDistress | None:
-        """What a commander needs of one in distress; None of others."""
+        """The commander's data of one in distress; None of others."""
         with self._lock:
             m = self._member(number, now_s)
             return shown_distress(m, self._numbered(now_s), self.plan, now_s, self._board) if m else None

@@ -19,7 +19,7 @@ NEWER_S = 1e-3  # by which an order or errand is newer than the one that it repl
 
 @dataclass(frozen=True, slots=True)
 class ShownOrder:
-    """The order to everybody. `understood` wearers of `of` have said so; `missing`: names of the others. The names are keys of the page's JSON."""
+    """The order to everybody. `understood` of `of` wearers confirmed it; `missing`: names of the others. The names are keys of the page's JSON."""
 
     text: str
     by: str
@@ -57,7 +57,7 @@ def order_notes(board: MarkBoard, m: Member) -> list[str]:
 
 
 def order_news(before: MarkBoard, board: MarkBoard, m: Member) -> list[str]:
-    """What a message has changed for a member, in words for its history."""
+    """The changes by a message for a member, in words for its history."""
     news = []
     for kind in (EVERYBODY, NOTE):
         old, new = (one.order_to(kind, m.report.team, m.report.name) for one in (before, board))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The session of one commander's page.
 
-In: a WebSocket, the feed. Out: frames. Owns what this page has been sent, and which wearer it has chosen. A frame, little-endian:
+In: a WebSocket, the feed. Out: frames. Owns the state sent to this page, and its chosen wearer. A frame, little-endian:
 
     u32         length of the JSON header, padded with spaces to a multiple of four
     bytes       the header (`TableHeader`)
@@ -43,7 +43,7 @@ RECORDED = "Not accepted: this is a recorded operation."
 class TableHeader:
     """One moment. `seq`: the page returns it when the frame is drawn. `list`, `marks`, `crews`, `log`: None when the page has them already.
 
-    `trail_from` 0: trails begin anew. `details`, `distress`: of the chosen wearer. `play`: state of a replay. The field names are keys of the JSON.
+    `trail_from` 0: trails restart. `details`, `distress`: of the chosen wearer. `play`: state of a replay. The field names are keys of the JSON.
     """
 
     seq: int

@@ -65,7 +65,7 @@ class ShownFact:
 
 @dataclass(frozen=True, slots=True)
 class ShownDetails:
-    """What is known of one wearer. `history`: the newest event first."""
+    """The data of one wearer. `history`: the newest event first."""
 
     id: int
     facts: tuple[ShownFact, ...]
@@ -99,7 +99,7 @@ def alarm_key(m: Member) -> AlarmKey | None:
 
 
 def shown_shared(board: MarkBoard, plan: Plan, unix_s: float) -> Shared:
-    """What the commanders share: marks on this plan, crews, and the notes of this operation, the newest first."""
+    """The commanders' shared state: marks on this plan, crews, and the notes of this operation, the newest first."""
     marks = (
         ShownMark(m.id, m.mark, m.x_m, m.y_m, m.level, m.by)
         for m in board.marks.values()
@@ -190,7 +190,7 @@ def current_alarm_words(m: Member, now_s: float) -> str:
 
 
 def tilt_words(tilt_deg: float) -> str:
-    """The trunk's tilt: upright (4°), bent (40°), lying (85°); the limits are those of `wearer/falls.py`."""
+    """The trunk's tilt: upright (4°), bent (40°), lying (85°); the limits are in `wearer/falls.py`."""
     tilt_rad = math.radians(tilt_deg)
     posture = "upright" if tilt_rad < UPRIGHT_RAD else "lying" if tilt_rad > LYING_RAD else "bent"
     return f"{posture} ({tilt_deg:.0f}°)"

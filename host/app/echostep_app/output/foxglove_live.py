@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The derived messages of a run, live, to Foxglove and other viewers of its WebSocket protocol.
 
-In: derived messages. Out: the same channels, schemas and bodies as in a recording [Foxglove, ws-protocol], to each viewer. Owns the server, which is
-that of Foxglove's SDK.
+In: derived messages. Out: the same channels, schemas and bodies as in a recording [Foxglove, ws-protocol], to each viewer. Owns the server,
+by Foxglove's SDK.
 A viewer that comes late gets plan and track at the next message: the newest version of each drawn thing is kept. A viewer that is too slow loses its
 oldest messages; nothing waits for the server.
 """

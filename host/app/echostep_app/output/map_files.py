@@ -57,7 +57,7 @@ INSERT INTO gpkg_spatial_ref_sys VALUES ('WGS 84', {WGS84}, 'EPSG', {WGS84}, '{_
 
 @dataclass(frozen=True, slots=True)
 class TrackOnPlan:
-    """What is exported; `moments`: time of day of each estimate, empty where it was not recorded."""
+    """The exported track; `moments`: time of day of each estimate, empty where it was not recorded."""
 
     estimates: list[Estimate]
     plan: Plan

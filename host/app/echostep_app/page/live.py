@@ -53,7 +53,7 @@ MOST_KEPT = 2000  # particles in each scene of a replay
 class LivePage:
     """Call `note_arrival` and `publish` for each portion; `pop_check_ins` gives the pages' check-ins as bytes of chunks.
 
-    `mailbox`: what all pages of this run are told, and what they have said.
+    `mailbox`: the messages to and from all pages of this run.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class LivePage:
             self.mailbox.set_goal(RoutePlace(x_m, y_m, level), text)
 
     def announce(self, text: str) -> None:
-        """Show what the run is doing, until its first bytes."""
+        """Show the run's activity, until its first bytes."""
         if not self._replay:
             self.mailbox.publish(replace(self._scene, status_text=text))
 

@@ -169,7 +169,7 @@ class Mailbox:
         self._announce()
 
     def add(self, waiting: queue.Queue[T], item: T) -> bool:
-        """Queue what a page has said; False when it is refused: in a replay, or with a full queue."""
+        """Queue a page's message; False when it is refused: in a replay, or with a full queue."""
         if self.replay:
             return False
         try:
@@ -184,7 +184,7 @@ class Mailbox:
 
 
 def popped(waiting: queue.Queue[T]) -> Iterator[T]:
-    """Remove and yield what is queued; never waits."""
+    """Remove and yield the queued items; never waits."""
     while True:
         try:
             yield waiting.get_nowait()

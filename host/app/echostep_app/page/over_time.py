@@ -62,7 +62,7 @@ class OverTime:
         self._row_s = scene.t_s
 
     def note(self, scene: PageScene) -> None:
-        """Note what has changed since the scene before; scenes between two estimates count too."""
+        """Note the changes since the scene before; scenes between two estimates count too."""
         if scene.estimate is None:
             return
         before, self._last = self._last, scene

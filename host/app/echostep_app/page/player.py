@@ -16,7 +16,7 @@ MOST_S = 1.0  # by which the position moves at once, at normal speed: a page tha
 
 
 class Tape(Protocol):
-    """What is recorded, in order of time."""
+    """A recording in order of time."""
 
     @property
     def span_s(self) -> tuple[float, float] | None:

@@ -284,7 +284,7 @@ def over_time(run: OverTime, begin: int) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class FrameParts:
-    """The parts of a frame beside its scene, for one page.
+    """The parts of a frame without its scene, for one page.
 
     `where`, `heading`: of the estimate in words; it claims a place if `placed`. `places`: its hypotheses in a sentence. `trail`: float32 rows x,
     y, level, the first numbered `trail_from`.

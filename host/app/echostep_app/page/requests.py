@@ -35,11 +35,11 @@ class Entered(EnteredPlace, frozen=True, tag_field="kind", tag="check_in"):
 
 
 class Consider(EnteredPlace, frozen=True, tag_field="kind", tag="consider"):
-    """Say what a check-in would do, without making it."""
+    """Preview a check-in, without making it."""
 
 
 class Met(msgspec.Struct, frozen=True, tag_field="kind", tag="met"):
-    """The wearer stands beside a teammate of this name."""
+    """The wearer has met a teammate of this name."""
 
     name: Annotated[str, Meta(min_length=1, max_length=MOST_NAME)]
 

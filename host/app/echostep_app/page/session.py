@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The session of one wearer's page: sends scenes, takes requests.
 
-In: a WebSocket, the mailbox. Out: frames. Owns what this page has been sent and its position in a replay.
+In: a WebSocket, the mailbox. Out: frames. Owns the state sent to this page and its position in a replay.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""State that all pages of a run share beside the mailbox.
+"""State that all pages of a run share, except the mailbox.
 
 In: a plan. Out: `Shared`. Owns the counts over pages.
 """

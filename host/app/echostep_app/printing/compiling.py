@@ -2,7 +2,7 @@
 """Progress of compiling the kernels: once on a computer, at the first start, for a minute or two.
 
 In: each kernel that no cache has (`jit`). Out: one line on standard error, on a terminal; or a count for the progress that is shown already. Owns
-what is called then.
+the callback.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ class PeopleConsole(Console):
     """A console that moves its own cursor, and lets no text do so."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """The segments; those of text as they are shown."""
+        """The segments; text as it is shown."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else Segment(shown(segment.text), segment.style)
 

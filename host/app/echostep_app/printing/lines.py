@@ -45,7 +45,7 @@ def moment(unix_s: float) -> str:
 
 @contextmanager
 def as_error(words: str, remedy: str = "") -> Iterator[None]:
-    """An OSError of the block becomes an EchostepError: these words, the system's, what to do."""
+    """An OSError of the block becomes an EchostepError: these words, the system's, the remedy."""
     try:
         yield
     except OSError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A text stream to people that never raises: what cannot be written is dropped, and the reason is kept.
+"""A text stream to people that never raises: unwritable text is dropped, and the reason is kept.
 
 In: texts; standard output or standard error. Out: their bytes. Owns the unwritten text and, once no write may wait, a thread.
 

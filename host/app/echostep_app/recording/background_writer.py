@@ -78,7 +78,7 @@ class BackgroundWriter:
                 self._lock.wait(min(left_s, WRITE_S))
 
     def close(self) -> None:
-        """Write the rest of the buffer and close the file; a notice tells how many bytes the disk refused, and that it refused to close."""
+        """Write the rest of the buffer and close the file; a notice states the number of refused bytes, and a failed close."""
         with self._lock:
             self._closing = True
             self._lock.notify_all()

@@ -55,7 +55,7 @@ def _is_of_foot(frames: Frames) -> bool:
 
 
 def wrong_device(name: str, other: str, urls: Mapping[str, str]) -> str:
-    """What to do when the port `name` has the device `other`."""
+    """The remedy when the port `name` has the device `other`."""
     what = f"{urls[name]} is {DEVICES[other]}, not {DEVICES[name]}"
     if other not in urls:
         return f"{what}: name its port with --{other} {urls[name]}, and the other device's with --{name}"

@@ -106,7 +106,7 @@ class Recorder:
         return self._file.is_whole and not self.lost_chunks
 
     def check_whole(self) -> None:
-        """Raises IncompleteError when the closed recording lacks something; `notices` tell why."""
+        """Raises IncompleteError when the closed recording lacks something; `notices` say why."""
         if not self.is_whole:
             raise IncompleteError(f"{self.path}: the recording is not whole; all else was done")
 

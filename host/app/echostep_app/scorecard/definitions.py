@@ -3,7 +3,7 @@
 
 In: a `Scorecard`. Out: rows of text for tables. Owns the order of the metrics.
 
-The clauses are from the standard's public table of contents [NIST, ISO/IEC 18305:2016 table of contents]; its text was not at hand, so each row
+The clauses are from the standard's public table of contents [NIST, ISO/IEC 18305:2016 table of contents]; its text was not available, so each row
 states what is computed.
 """
 
@@ -91,7 +91,7 @@ METRICS: tuple[Metric, ...] = (
 
 
 def notes(card: Scorecard) -> list[str]:
-    """Remarks beside the figures."""
+    """Remarks on the figures."""
     notes = [f"{card.track}: {card.points} points in {card.span_s:.1f} s"]
     if not card.evaal_knows_floors:
         notes.append("No floor is stated by both files: the EvAAL score takes all points as on the right floor.")

@@ -2,7 +2,7 @@
 """Statistics of errors.
 
 In: errors (n,) in metres. Out: `ErrorStatistics`. Owns nothing. A percentile is linear between the order statistics [Hyndman and Fan 1996,
-definition 7]; a standard deviation is of the errors at hand, divided by n.
+definition 7]; a standard deviation is of these errors, divided by n.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The taps of a recorded walk as its truth: the places that the wearer tapped on the page, against a track that has not been told of them.
+"""The taps of a recorded walk as its truth: the places that the wearer tapped on the page, against a track computed without them.
 
 In: a recording with check-ins, the plan on which they were tapped. Out: `TappedWalk`. Owns the rule which check-ins reach the tracker: the one that
 it waits for as its start, which is then no truth, and no other. In the live run each tap has corrected the tracker, so the live estimates after a tap
@@ -30,7 +30,7 @@ from echostep_app.scorecard.track_columns import ScoredPath, track_of
 
 
 class TappedWalk(NamedTuple):
-    """The track of a walk, its taps as surveyed points on the same clock, what was compared in words, and the damage of the recording."""
+    """The track of a walk, its taps as surveyed points on the same clock, the comparison in words, and the damage of the recording."""
 
     track: ScoredPath
     truth: ScoredPath

@@ -72,7 +72,7 @@ def recorded_truth(recording: Recording, plan: Plan | None) -> ScoredPath | None
 
 
 def truth_field(truth: ScoredPath, samples_s: Floats, name: str) -> tuple[dict[str, str], str]:
-    """The metadata that carry a true path beside samples at these times (n,) of the file `name`, and the same in words; raises EchostepError."""
+    """The metadata that carry a true path with samples at these times (n,) of the file `name`, and the same in words; raises EchostepError."""
     begin_s, end_s = samples_s[0], samples_s[-1]
     within = (truth.t_s > begin_s - GAP_S) & (truth.t_s < end_s + GAP_S)
     if not within.any():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The last place of a live run, kept beside its recording, and a run that begins there (`--start last`).
+"""The last place of a live run, kept with its recording, and a run that begins there (`--start last`).
 
 In: estimates of a run; the file of an earlier one, the plan, the board. Out: `last.json` in the output folder; a `Start`, with words about it. Owns
 the file. A run that ends without notice, as with an empty battery, has kept the place of KEPT_S ago or less.
@@ -75,7 +75,7 @@ class PlaceKeeper:
 
 
 def read_kept(folder: Path) -> Kept:
-    """What the last run in a folder kept; raises EchostepError where there is nothing, DamagedPlaceError where it is damaged."""
+    """The last run's place in a folder; raises EchostepError where there is nothing, DamagedPlaceError where it is damaged."""
     path = folder / FILE
     try:
         with path.open("rb") as file:

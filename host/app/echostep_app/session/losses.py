@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How much of a walk was lost, and why, which ports fell silent, and what a replay did not use of a recording: for the last lines of a run.
+"""How much of a walk was lost, and why, which ports fell silent, and unused parts of a replayed recording: for the last lines of a run.
 
 In: the tracker's estimates as they are published, its counts, portions, a recording that was read to its end. Out: sentences. Owns the time spent
 in each condition, the first and the newest arrival of each port.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A new recording, and the text fields that it holds beside the bytes: what a replay needs, and what its reader may want to know.
+"""A new recording, and its text fields: the inputs of a replay, and notes for its reader.
 
-In: plan, start, seed, settings; what the command line gave. Out: fields by name; a start, or EchostepError for one that cannot be. Owns nothing.
+In: plan, start, seed, settings; command line arguments. Out: fields by name; a start, or EchostepError for one that cannot be. Owns nothing.
 `walk.recorded` reads the fields.
 """
 

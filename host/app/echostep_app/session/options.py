@@ -37,7 +37,7 @@ class OutputOptions:
 
 @dataclass(frozen=True, slots=True)
 class TrackingOptions:
-    """What the tracker is made from. A value of None is replaced by that of the plan, of the recording, or by the default."""
+    """Inputs of the tracker. None is replaced by the value of the plan, of the recording, or by the default."""
 
     plan_path: Path | None  # None: tracked without a plan
     start: str | None = None  # as given: X,Y,DEG[,LEVEL], a room, or ?

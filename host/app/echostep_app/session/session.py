@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One tracked run: the tracker, and everything that shows, publishes, guides or records what it estimates.
+"""One tracked run: the tracker, and everything that shows, publishes, guides by or records its estimates.
 
 In: a tracker, portions of chunks. Out: estimates to the views, the page, the commander and the recording; result files at the end.
 Owns the estimates, the page and the connection to the commander while the run lasts.
@@ -145,7 +145,7 @@ class Session:
             page.wait_for_page()
 
     def prepare(self, *more: Part) -> None:
-        """Compile what is not compiled yet, before the first bytes come: what tracks, and more."""
+        """Compile missing kernels, before the first bytes come: the tracker's, and more."""
         text = "Preparing; the first time on a computer its kernels are compiled, which takes half a minute"
         if self.page:
             self.page.announce(f"{text[0].lower()}{text[1:]}")
@@ -154,7 +154,7 @@ class Session:
             self.tracker.warm_up()
 
     def show_truth(self, truth: ScoredPath | None) -> None:
-        """Show the true position beside the estimate, on the page, and compare with it at the end."""
+        """Show the true position and the estimate, on the page, and compare with it at the end."""
         self._truth = truth
         if self.page:
             self.page.truth = TruePath.of(truth, self.tracker.plan)

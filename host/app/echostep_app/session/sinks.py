@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Where the estimates of a run go: page, commander, team, recording and viewers, terminal.
 
-In: portions, each after the tracker has taken it, with its estimates. Out: calls of what shows, sends or records them. Owns nothing: `Session` opens
+In: portions, each after the tracker has taken it, with its estimates. Out: calls that show, send or record them. Owns nothing: `Session` opens
 and closes what the sinks write to.
 """
 
@@ -71,7 +71,7 @@ def teammate_sink(teammates: TeammateFeed, tracker: Tracker, page: LivePage | No
 
 
 def mark_sink(marks: MarkFeed, page: LivePage) -> Sink:
-    """For the page: the commanders' marks and orders, and the way to the one in distress to whom the wearer is sent; from it: what is understood."""
+    """For the page: the commanders' marks and orders, and the way to a wearer in distress; from it: understood orders."""
 
     def take(_: Portion, __: list[Estimate]) -> None:
         if (news := marks.news()) is not None:

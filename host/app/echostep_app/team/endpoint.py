@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The URL of a broker or of a TAK receiver, parsed into an `Endpoint`.
 
-In: a URL. Out: an `Endpoint`. Owns nothing. Errors name the URL without its password, and what to do.
+In: a URL. Out: an `Endpoint`. Owns nothing. Errors name the URL without its password, and the remedy.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Faults of a connection in words, with what to do.
+"""Faults of a connection in words, with remedies.
 
 In: errors of sockets and of TLS. Out: one sentence. Owns nothing.
 """

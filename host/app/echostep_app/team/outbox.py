@@ -42,7 +42,7 @@ CLOSING_S = 3.0  # for sending the last reports at the end
 
 
 class Delivery(StrEnum):
-    """What became of a report: the receiver said that it has it; it went out; it did not go out, and a newer one may."""
+    """The fate of a report: acknowledged by the receiver; sent; not sent, and a newer one may be."""
 
     ACKNOWLEDGED = "acknowledged"
     SENT = "sent"

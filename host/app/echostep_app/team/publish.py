@@ -226,7 +226,7 @@ def reported_alarm(watch: WearerWatch, now_s: float) -> ReportedAlarm | None:
 
 
 def reported_tilt_deg(watch: AlarmWatch, now_s: float) -> float | None:
-    """The trunk's tilt in whole degrees; None where the belt does not tell."""
+    """The trunk's tilt in whole degrees; None if the belt has none."""
     tilt_rad = watch.trunk_tilt_rad(now_s)
     return None if math.isnan(tilt_rad) else float(round(math.degrees(tilt_rad)))
 

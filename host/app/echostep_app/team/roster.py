@@ -113,7 +113,7 @@ class Roster:
         self._presence: dict[tuple[str, str, str], str] = {}
 
     def copy(self) -> Roster:
-        """A roster of the same state that changes by itself."""
+        """An independent copy of the roster."""
         made = Roster()
         made.rejected, made.received = self.rejected.copy(), self.received
         made._members = {key: replace(m, notes=m.notes.copy()) for key, m in self._members.items()}

@@ -2,7 +2,7 @@
 """TLS to brokers and TAK servers.
 
 In: an endpoint with its files, PEM or PKCS #12 (.p12, .pfx, as TAK servers hand them out). Out: a context that always verifies the server's
-certificate and name; EchostepError that names the file and what to do. Owns nothing. PKCS #12 needs the package cryptography (extra `pkcs12`), which
+certificate and name; EchostepError that names the file and the remedy. Owns nothing. PKCS #12 needs the package cryptography (extra `pkcs12`), which
 reads the old ciphers too (RC2, 3DES) that OpenSSL 3 reads with `-legacy` alone.
 """
 

@@ -39,7 +39,7 @@ class SteadyStatus:
 
 
 def running_note(segment: PathSegment | None, estimate: Estimate | None) -> str:
-    """That the foot runs, with the 95 % radius of a position that may be named; empty while it walks or stands, or is not worn."""
+    """That the foot runs, with the 95 % radius of a position that may be named; empty while it walks or rests, or is not worn."""
     if segment is None or estimate is None or not segment.running:
         return ""
     if not estimate.claims_place:

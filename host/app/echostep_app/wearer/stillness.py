@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Stillness: since when the wearer has not moved, from the sensors themselves and not from the track.
+"""Stillness: since when the wearer has not moved, by the sensors and not by the track.
 
 In: samples of the foot's MTx and of the leg gyros, with their times. Out: windows, with or without motion. Owns the extremes of the unfinished ones.
 A window of half a second has motion when the range of a channel (largest less smallest sample) exceeds its limit: so a slow bias, gravity and the

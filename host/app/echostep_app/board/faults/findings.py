@@ -28,7 +28,7 @@ class Severity(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One problem: the part that has it, what is wrong, and the remedy."""
+    """One problem: the part, its fault, and the remedy."""
 
     severity: Severity
     subject: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What commands do that track nothing live; the commands themselves are declared beside this folder.
+"""The work of commands that track nothing live; the parent folder declares the commands.
 
 In: options of a command. Out: files, tables, an error in one line. Owns nothing.
 """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`echostep map`: the plan of a building from a recorded walk.
 
-In: a recording. Out: plan.json, a picture, what was found in words. Owns nothing.
+In: a recording. Out: plan.json, a picture, a summary in words. Owns nothing.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def _start_of(recording: Recording) -> Pose:
 
 
 def described(mapped: Mapped, plan: Plan) -> list[str]:
-    """What was drawn, in words."""
+    """The drawing in words."""
     walls = np.concatenate([level.heard for level in plan.levels])
     doors = [door for level in plan.levels for door in level.doors]
     length_m = _length_m(walls)

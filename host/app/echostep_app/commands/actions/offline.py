@@ -171,7 +171,7 @@ def floors(
 
 
 def decode(path: Path, mode: str | None = None, settings: str | None = None) -> None:
-    """Print a capture as JSON lines; tell on stderr, in sentences, what it held. `mode`, `settings`: of legacy data, where they are known."""
+    """Print a capture as JSON lines, and its contents in sentences on stderr. `mode`, `settings`: of legacy data, where they are known."""
     formats = OutputFormats(_bits("--output-mode", mode, 0xFFFF), _bits("--output-settings", settings, 0xFFFF_FFFF))
     decoder = Decoder(mt=MessageReader(formats))
     for message in read_capture(path, decoder):

@@ -33,7 +33,7 @@ from echostep_app.session.options import TrackingOptions
 
 
 class Compared(NamedTuple):
-    """The name of the truth, each track with its true path, and sentences about what was read."""
+    """The name of the truth, each track with its true path, and notes about the files."""
 
     truth: str
     pairs: list[tuple[ScoredPath, ScoredPath]]

@@ -2,7 +2,7 @@
 """Loop closures: a stretch of the path is where an older one was.
 
 In: a graph solved so far. Out: `Closure`s with their odds. Owns the limits. The posterior of a shift is the graph's own uncertainty times the match
-of the stretch's fragments with all older ones, beside the hypothesis that the place is new; a closure carries the information of this posterior
+of the stretch's fragments with all older ones, against the hypothesis of a new place; a closure carries the information of this posterior
 beyond the graph's, along the axes that have any: in a corridor only across it. It ties the stretch to the passage that detected the matched
 walls.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pieces of walls beside the path: lines that touch the circles of successive echoes.
+"""Pieces of walls along the path: lines that touch the circles of successive echoes.
 
 In: pings with their places by odometry. Out: `Fragments`. Owns the limits. A smooth wall answers from the foot of the perpendicular, whatever the
 ranger's axis within its cone [Kuc and Siegel 1987]: so the range r at p is the distance of the wall, n p + r = rho for its unit normal n, and

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The path of a walk as nodes of a graph: one where each segment that moves or turns ends, and the pings beside them.
+"""The path of a walk as nodes of a graph: one where each segment that moves or turns ends, and the pings between.
 
 In: `MeasuredSegment`s in order of time. Out: `Nodes`, `Pings`. Owns nothing. Frame: walk.
 """

@@ -39,7 +39,7 @@ ALONG_RAD = 2.0 * ALONG_SD_RAD  # of a piece from the course of the path, within
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of the distance of each from the places beside it.
+    """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of the distance of each from nearby places.
 
     `doubtful` (d, 4), `doubtful_sd_m` (d,): the same of short walls that no second passage confirmed, and of walls whose place in the building is
     not known well enough. `place_sd` (p, 3): x, y of pieces of both, and the standard deviation per axis of their place in the building. `paths_m`:
@@ -148,7 +148,7 @@ def _is_of_a_person(run: Run, lines: Lines, heard: _Heard, of: Ints) -> bool:
 
 
 def _is_confirmed(lines: Lines, run: Run, heard: _Heard, of: Ints) -> bool:
-    """Whether a second passage detected a piece, or it is longer than what a person leaves."""
+    """Whether a second passage detected a piece, or it is longer than a person's."""
     if run.high_m - run.low_m >= (LONE_M if lines.aligned[run.line] else LONE_ASKEW_M):
         return True
     return _passages(heard.way_m[_own(lines, run, heard, of)]) > 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where along its line a wall stands: cells that echoes came from, and cells through which a ranger detected something farther.
+"""The extent of a wall along its line: cells that echoes came from, and cells through which a ranger detected something farther.
 
 In: lines, pings at their corrected places. Out: counts by line and cell. Owns the sensor's inverse model: a smooth wall answers from the foot of the
 perpendicular, so one ping is evidence about one cell of each line within its cone.
@@ -99,9 +99,9 @@ def _add_crossings(lines: Lines, path_m: Floats, cells: Cells) -> None:
 
 
 def add_sights(lines: Lines, poses: Floats, range_m: Floats, straight: Bools, cells: Cells) -> None:
-    """Cells of lines through which a ranger has seen are open, a door's width about the middle of what it saw.
+    """Cells of lines through which a ranger has seen are open, a door's width about the middle of the view.
 
-    Beside a door the edges of its jambs answer within FITS_M of the wall's distance: only a few pings through its middle tell it from a wall.
+    At a door the edges of its jambs answer within FITS_M of the wall's distance: only few pings through its middle differ from a wall's.
     """
     half = round(0.5 * DOOR_M / CELL_M)
     for line in range(len(cells.size)):

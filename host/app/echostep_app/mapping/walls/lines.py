@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The straight lines on which walls stand: both faces of a thin wall, and pieces of one wall that were never joined, are one line.
+"""The straight lines of walls: both faces of a thin wall, and pieces of one wall that were never joined, are one line.
 
 In: walls of the solved graph with their fragments. Out: `Lines`. Owns the limits.
 """

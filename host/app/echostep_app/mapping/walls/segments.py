@@ -97,7 +97,7 @@ def segments_of(lines: Lines, runs: list[Run], cells: Cells) -> Floats:
 
 
 def meets(lines: Lines, runs: list[Run], i: int) -> bool:
-    """Whether run i reaches another wall as it stands: a corner or a junction."""
+    """Whether run i reaches another wall unextended: a corner or a junction."""
     low, high = runs[i].low_m - MEETS_M, runs[i].high_m + MEETS_M
     crossings = (_crossing(lines, runs, i, j) for j in range(len(runs)) if runs[j].high_m - runs[j].low_m > LONG_M)
     return any(c is not None and c[1] and low < c[0] < high for c in crossings)
@@ -122,7 +122,7 @@ def _crossing(lines: Lines, runs: list[Run], i: int, j: int) -> tuple[float, boo
 def _end(end_m: float, way: float, crossings: list[tuple[float, bool]], passed: Floats, first_m: float) -> float:
     """The end moved outward to the nearest crossing within reach that no ping passed on the way, or inward to one that it hardly exceeds.
 
-    A wall that stands there is preferred to one that would have to be extended, when both cross nearly there: two walls on nearly one line.
+    A wall that reaches there is preferred to one that would have to be extended, when both cross nearly there: two walls on nearly one line.
     """
     best, best_m = end_m, math.inf
     for c, stands in crossings:

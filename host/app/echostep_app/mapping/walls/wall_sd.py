@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""How well drawn walls are known against the path beside them.
+"""Uncertainty of drawn walls against the nearby path.
 
 In: a solved graph, the pieces of lines that are walls, pings. Out: a standard deviation of each. Owns the number of places used. The standard
-deviation is not of a wall's place on the map but of its distance from the places beside it, over all passages: a drawing that is turned or
+deviation is not of a wall's place on the map but of its distance from nearby places, over all passages: a drawing that is turned or
 shifted as a whole serves a person as well as another, one whose passages do not fit together is worse.
 """
 
@@ -25,7 +25,7 @@ PLACES = 4
 
 
 def wall_sds(graph: Graph, pings: Pings, poses: Floats, lines: Lines, runs: list[Run], of: Ints) -> Floats:
-    """Standard deviation (n,) of each run: root mean square over its distances from the places beside it, combined with its line's own.
+    """Standard deviation (n,) of each run: root mean square over its distances from nearby places, combined with its line's own.
 
     `poses` (k, 3): corrected place and axis of each ping; `of` (k,): the line that explains it.
     """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Heights of floors as text and from a record; the floors of a record as CSV and in words.
 
-In: text, `HeightRecord`, `Floors`. Out: heights, a CSV file, visits and what was climbed. Owns nothing.
+In: text, `HeightRecord`, `Floors`. Out: heights, a CSV file, visits and climbs. Owns nothing.
 """
 
 from __future__ import annotations

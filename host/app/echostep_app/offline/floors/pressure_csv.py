@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A recorded barometer as a CSV file: samples checked and read.
 
-In: columns `t_s,pressure_pa[,temperature_c]`, 0.5 to 50 Hz. Out: `Pressures` with notes on what was mended, or an EchostepError that names file,
+In: columns `t_s,pressure_pa[,temperature_c]`, 0.5 to 50 Hz. Out: `Pressures` with notes on repairs, or an EchostepError that names file,
 line and field. Owns nothing.
 """
 

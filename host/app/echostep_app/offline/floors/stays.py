@@ -3,7 +3,7 @@
 
 In: `Pressures`. Out: `HeightRecord`: heights of segments of half a second, `Stay`s. Owns the limits between standing, climbing and a gust.
 
-On level ground nothing rises: there the filter is told of a rise of zero, and takes a change of pressure for weather. On the way it is told nothing.
+On level ground nothing rises: there the filter gets a rise of zero, and takes a change of pressure for weather. On the way it gets no rise.
 Level ground is found by the speed of the height by pressure over some seconds, and as a whole stay hardly climbs. A door or a fan changes the
 pressure sooner than a lift could: a rise of d from rest takes 2 sqrt(d / a).
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An operation on file: what is recorded of it, and its replay.
+"""An operation on file: its recording and its replay.
 
 In: messages with their times of arrival; a file. Out: the file; the operation at any time. Owns the file that it writes.
 """

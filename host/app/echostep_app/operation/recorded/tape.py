@@ -38,7 +38,7 @@ class Keyframe:
 
 
 class Reader:
-    """Reads a file on from a keyframe: `advance` brings `operation`, at first that of the keyframe, to a later time."""
+    """Reads a file on from a keyframe: `advance` brings `operation`, at first the keyframe's, to a later time."""
 
     def __init__(self, path: Path, keyframe: Keyframe) -> None:
         self.operation = keyframe.operation

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Echo lines: the last measured range of each ranger, beside the range that the plan predicts.
+"""Echo lines: the last measured range of each ranger, and the range that the plan predicts.
 
 In: a measured segment, the estimate at its end, the walls. Out: `EchoLine`s in the map frame. Owns nothing. It reads only wall tiles that the filter
 has already loaded.

@@ -29,7 +29,7 @@ Points = tuple[tuple[float, float], ...]  # (x, y) in map metres
 
 @dataclass(frozen=True, slots=True)
 class ShownGuidance:
-    """What the wearer should do. The field names are keys of the frame's JSON.
+    """The present instruction. The field names are keys of the frame's JSON.
 
     `kind`: a `CueKind`, `LOOKING` or `NO_ROUTE`. `arrow_rad`: direction to walk, counter-clockwise from the heading; None: no arrow is drawn.
     `left_m`: length of the remaining route; None where it does not help. `path`: the remaining route on the estimate's level. `spoken`: the last

@@ -53,7 +53,7 @@ class PlaceNumbers:
 
 
 def numbered(estimate: Estimate, numbers: Sequence[int]) -> list[tuple[int, LikelyPlace]]:
-    """The places that are shown with their numbers, in the order of these; without numbers those of their rank."""
+    """The places that are shown with their numbers, in the order of these; without numbers by their rank."""
     shown = shown_places(estimate)
     known = numbers if len(numbers) == len(shown) else range(1, len(shown) + 1)
     return sorted(zip(known, shown, strict=True), key=lambda pair: pair[0])

@@ -47,7 +47,7 @@ class StreamRateMeter:
         self._unused = 0  # messages of the MTx that are not samples, when its samples were last counted
 
     def measure(self, tracker: Tracker, t_ns: int, fault: str = "") -> StreamRates:
-        """Rates and counts at `t_ns` of the arrival clock, which must not go back; `fault`: what is wrong with the run's output."""
+        """Rates and counts at `t_ns` of the arrival clock, which must not go back; `fault`: of the run's output."""
         streams = tracker.streams
         board, mtx, status = streams.board, streams.mtx, streams.status
         mtx_hz, pings_hz = self._rates_hz(mtx.good, streams.pings, t_ns)

@@ -44,7 +44,7 @@ class AccessControl:
     def __init__(
         self, app: ASGIApp, token: str | None, connections: Connections, tell: Callable[[str], None] | None = None
     ) -> None:
-        """`tell` gets a sentence on a page that is refused because of its address."""
+        """`tell` gets a sentence on a page refused by its address."""
         self.refused = 0
         self._tell = tell
         self._told: set[str] = set()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a run and its pages tell each other beside the scenes: that the run is alive, and what came of each request.
+"""Messages between a run and its pages other than scenes: signs of life of the run, and answers to requests.
 
 In: signs of life of the run; requests with an identity, which a page sends again until it has the answer. Out: the age of the run's last sign of
 life; the answer, the same one however often the request comes. Owns the answers. The run's thread writes one number, the server's thread reads it.
@@ -16,7 +16,7 @@ MOST_ANSWERS = 1000  # of which the oldest is forgotten first: hours of a person
 
 
 class Exchange:
-    """`run`: a random name of this run. `note_alive`: the run works; `rest`: from now on nothing new is expected of it."""
+    """`run`: a random name of this run. `note_alive`: the run works; `rest`: nothing new is expected any more."""
 
     def __init__(self) -> None:
         self.run = secrets.token_hex(4)
@@ -24,7 +24,7 @@ class Exchange:
         self._answers: OrderedDict[str, str] = OrderedDict()
 
     def note_alive(self) -> None:
-        """The run has just taken what came."""
+        """The run has just taken its input."""
         self._alive_s = time.monotonic()
 
     def rest(self) -> None:

@@ -15,7 +15,7 @@ class ImportReport:
 
     `units`: the units, and how they were decided. `layers`: names of the layers used, by kind of element. `left_out`: number of elements that did not
     become a part of the plan, by a description ("LINE on A-FURN"). `doubts`: sentences for the person who imports, the gravest first.
-    `doors_remedy`: what to do about rooms without doors in this format.
+    `doors_remedy`: the remedy for rooms without doors in this format.
     """
 
     units: str = ""

@@ -55,7 +55,7 @@ class DemoOptions:
     """`board_command` starts the program that plays the board; `guide` adds beacons and guidance to the end of the walk.
 
     `plan_path` None: the demo's plan. `speed`: times real time; None: `WATCHED_SPEED` on a terminal, else as fast as it can.
-    `kit`: the parts on the board; those of 2026 need the real firmware in the simulator. `celsius`: of the air.
+    `kit`: the parts on the board; 2026's need the real firmware in the simulator. `celsius`: of the air.
     """
 
     seed: int

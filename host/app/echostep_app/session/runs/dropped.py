@@ -51,7 +51,7 @@ class Drop:
 
 
 class DroppedFiles:
-    """`open_file` takes a file and says what is missing; once there is a recording with a plan, `drops` has a new `Drop`."""
+    """`open_file` takes a file and names missing ones; once there is a recording with a plan, `drops` has a new `Drop`."""
 
     def __init__(self) -> None:
         self.drops: queue.Queue[Drop] = queue.Queue()

@@ -41,7 +41,7 @@ def port_of(foot: str | None) -> str | None:
 
 
 class LineFoot:
-    """Listens to the ports until the rate of the samples is known; raises EchostepError that says what came instead."""
+    """Listens to the ports until the rate of the samples is known; raises EchostepError with the received data."""
 
     def __init__(self, ports: SerialPorts, foot: str) -> None:
         self._foot, self._reader = foot, LineReader()
@@ -52,7 +52,7 @@ class LineFoot:
         self._reader, self._chunks = LineReader(), LineChunks(self.rate_hz)
 
     def settings(self, text: str, origin: str) -> str:
-        """The settings of the run: those given, whose rate must fit, or those of a foot IMU alone."""
+        """The settings of the run: the given ones, whose rate must fit, or a foot IMU's."""
         if not text:
             return imu_settings(self.rate_hz)
         given = parse_settings(text, origin).mtx.rate_hz
@@ -63,14 +63,14 @@ class LineFoot:
         return text
 
     def with_samples(self, chunks: Iterable[Chunk | None]) -> Iterator[Chunk | None]:
-        """The same chunks, each of lines followed by those of its samples."""
+        """The same chunks, each of lines followed by its samples'."""
         for chunk in chunks:
             yield chunk
             if chunk is not None and chunk.port == LINES:
                 yield from self._chunks.of(self._reader.feed(chunk.data), chunk.t_arrival_ns)
 
     def report(self) -> str:
-        """What was read, in words."""
+        """The lines read, in words."""
         return (
             f"foot in lines: {self.rate_hz:g} Hz; {self._reader.unreadable} lines were no sample, {self._chunks.left_out} samples came within "
             f"the period of another, the device's clock was set {self._chunks.jumps} times"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Whether each port has the device that its option names, by what comes from it: at the start, and whenever a port was opened again.
+"""Whether each port has the device that its option names, by its bytes: at the start, and whenever a port was opened again.
 
 In: chunks of live ports. Out: the same chunks, under the name of the device that sent them; EchostepError that names ports which are swapped at the
 start. Owns the first bytes of each port.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a run reads beside the teammates who can be met: the newest place of one wearer; the commanders' marks, acknowledgements, errands.
+"""A run's other input from the team: the newest place of one wearer; the commanders' marks, acknowledgements, errands.
 
 In: the team subscription. Out: payloads of chunks of the port `TEAM`, at most one a second; marks on this plan, when they change; names of
 commanders; an errand, when it is new. Owns the roster of received reports, and the board of received marks.
@@ -120,7 +120,7 @@ class MarkFeed:
         return ack.by if ack else None
 
     def new_errand(self) -> Errand | None:
-        """To whom a commander has sent this wearer on this plan, as of the last call of `news`; each errand is given once."""
+        """The errand of this wearer on this plan by a commander, as of the last call of `news`; each errand is given once."""
         errand = self._board.errands.get(self._key)
         if errand is None or errand == self._errand or errand.plan_sha256 != self._plan_sha256:
             return None
@@ -137,7 +137,7 @@ class MarkFeed:
         )  # fmt: skip
 
     def understand(self, identity: str) -> None:
-        """The wearer has understood the order of this identity: the commanders are told; one that holds no longer is ignored."""
+        """The wearer has understood the order of this identity: the commanders get a receipt; an expired one is ignored."""
         team, name, _ = self._key
         kind = identity.partition(" ")[0]
         found = self._board.order_to(kind, team, name)

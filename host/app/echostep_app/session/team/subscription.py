@@ -22,7 +22,7 @@ LOOK_S = 0.5  # between two looks of a reader at what has come; assumed
 
 
 class TeamSubscription:
-    """`add` readers, then `open`; `look` passes on what has come. Messages that no reader gets are counted in `rejected`."""
+    """`add` readers, then `open`; `look` passes on new messages. Messages that no reader gets are counted in `rejected`."""
 
     def __init__(self, broker: Endpoint, print_line: Callable[[str], None]) -> None:
         """`print_line` gets a line for each break of the connection, in another thread."""

@@ -98,7 +98,7 @@ class Errand(msgspec.Struct, frozen=True):
 
     @property
     def words(self) -> str:
-        """For the wearer who is sent there."""
+        """The errand for its wearer."""
         return f"{self.by} sends you to {self.to}, in distress{f': {self.where}' if self.where else ''}"
 
 
@@ -133,7 +133,7 @@ def is_shared(topic: str | None) -> bool:
 
 
 class MarkBoard:
-    """`receive` takes messages; `marks`, `acks`, `errands`, `orders`, `receipts`, `crews` and `log` are what they amount to.
+    """`receive` takes messages; `marks`, `acks`, `errands`, `orders`, `receipts`, `crews` and `log` are the result.
 
     `removed`: marks that were there; `answers`: messages for the broker, which keeps older ones.
     """
@@ -165,7 +165,7 @@ class MarkBoard:
         self.answers: deque[tuple[str, bytes]] = deque(maxlen=MOST_ANSWERS)
 
     def copy(self) -> MarkBoard:
-        """A board of the same state that changes by itself."""
+        """An independent copy of the board."""
         made = MarkBoard()
         made.marks, made.removed = dict(self.marks), dict(self.removed)
         for own, other in zip(made._kept, self._kept, strict=True):

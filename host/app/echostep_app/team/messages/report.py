@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The report that a tracker sends to its commander, as JSON.
 
-In: a `Report`, or the bytes of a payload from an untrusted sender. Out: the bytes, or the `Report`. Owns nothing. The limits of each field
-stand beside it; the JSON Schema is generated from them (`schema`), and `decode` rejects values outside them.
+In: a `Report`, or the bytes of a payload from an untrusted sender. Out: the bytes, or the `Report`. Owns nothing. The limits are in
+each field; the JSON Schema is generated from them (`schema`), and `decode` rejects values outside them.
 """
 
 from __future__ import annotations

@@ -103,7 +103,7 @@ def _refusal(endpoint: Endpoint, reason: str) -> str:
 
 
 def user_words(endpoint: Endpoint) -> str:
-    """As whom a client connects."""
+    """A client's user in words."""
     return f"user {endpoint.user}" if endpoint.user else "a client without a user name"
 
 

@@ -131,7 +131,7 @@ def _layer_of(entity: Any) -> str:
 
 
 def _is_invisible(entity: Any) -> bool:
-    """Whether an entity is hidden by itself; False for an unknown kind."""
+    """Whether an entity itself is hidden; False for an unknown kind."""
     from ezdxf.lldxf.const import DXFError
 
     try:

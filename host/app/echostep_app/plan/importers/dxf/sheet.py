@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One drawing file, its entities sorted by what their layers mean, and its scale.
+"""One drawing file, its entities sorted by the kind of their layers, and its scale.
 
 In: a file, hints. Out: `Sheet`. Owns when a drawing is refused for its layers.
 """

@@ -34,7 +34,7 @@ Box = tuple[float, float, float, float]
 
 
 def in_order(names: Sequence[str]) -> list[str]:
-    """The storeys' names from the lowest; as they are where one does not tell its storey."""
+    """The storeys' names from the lowest; unchanged where one does not name its storey."""
     told = [_storey(name.casefold()) for name in names]
     return list(names) if None in told else [name for _, name in sorted(zip(told, names, strict=True))]
 
@@ -122,7 +122,7 @@ def bounds_of(walls: Sequence[LineString]) -> Box:
 
 
 def alignment(walls: Sequence[LineString], below: Sequence[LineString]) -> tuple[float, float]:
-    """The move (m) that lays walls best over those of the level below: in x and in y separately, by the correlation of their length profiles."""
+    """The move (m) that fits walls best to the level below: in x and in y separately, by the correlation of their length profiles."""
     return _shift(walls, below, 0), _shift(walls, below, 1)
 
 
