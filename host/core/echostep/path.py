@@ -76,8 +76,7 @@ class PathSegment:
     `sd_m`: standard deviation of the move per axis. `turn_sd_rad`: growth of the yaw's standard deviation. `step`: steps so far.
     `anchor_sd_m`: standard deviation of each end per axis, the same at both. `rise_m`: height gained by the foot, with its standard deviation,
     infinite if no foot measured it. `scale_sd`: growth of the standard deviation of the scale that all lengths share. `belt`: of a foot's step.
-    `running`: the foot rests too briefly for a walk. `moved_log_ratio`: of a segment without a step, log-likelihood ratio of the foot's samples that
-    the trunk moved nevertheless.
+    `running`: the foot rests too briefly for a walk. `aloft`: it has been off the floor for longer than a step takes.
     """
 
     t0_s: float
@@ -95,7 +94,7 @@ class PathSegment:
     scale_sd: float = 0.0
     belt: BeltEvidence | None = None
     running: bool = False
-    moved_log_ratio: float = 0.0
+    aloft: bool = False
 
     @property
     def unobserved(self) -> bool:

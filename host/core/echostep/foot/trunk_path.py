@@ -33,8 +33,7 @@ STRAIGHT_STEP_RAD = math.radians(15.0)  # largest turn of such a step
 FORWARD_RAD = math.radians(45.0)  # largest angle of a forward step to the toe
 KNOWN_SCALE_SD = 0.01  # in which any foot's lengths differ: `CloudSettings.start_scale_sd`
 TOE_MEMORY = 20  # steps that the mean of the toe angle remembers
-# Longest time without a stance in any step; log-likelihood ratio of a foot that stays off the floor, carried or laid over the other knee. Assumed
-ALOFT_S, ALOFT = 1.5, 8.0
+ALOFT_S = 1.5  # assumed: no step is without a stance for longer, but one over an obstacle
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +60,6 @@ class TrunkPath:
         self._toe = ToeAngle()
         self.steps = 0
         self._stood_s = math.inf  # last moment of a stance
-        self._is_aloft = False
         self.doubts: list[str] = []  # of the newest step
         self._scale_sd = KNOWN_SCALE_SD
 
@@ -71,7 +69,7 @@ class TrunkPath:
             heading = float(foot_heading_rad[0]) + self._toe.angle_rad
             self._anchor = (float(t_s[0]), *self._trunk_xy(heading), heading)
         if len(t_s):
-            self._stood_s, self._is_aloft = float(t_s[-1]), False
+            self._stood_s = float(t_s[-1])
         segments: list[tuple[int, PathSegment]] = []
         until_s = t_s - self._half_s()
         while self._anchor is not None:
@@ -90,9 +88,7 @@ class TrunkPath:
             sample_index = int(np.searchsorted(t_s, due_s))
             if sample_index == len(t_s):
                 break
-            aloft = replace(self._standing_segment(due_s), moved_log_ratio=0.0 if self._is_aloft else ALOFT)
-            self._is_aloft = True
-            segments.append((sample_index, aloft))
+            segments.append((sample_index, replace(self._standing_segment(due_s), aloft=True)))
         return segments
 
     def add_stance(self, stance: Stance) -> list[PathSegment]:
@@ -120,14 +116,10 @@ class TrunkPath:
             step.t_end_s + self._half_s(), heading, math.sqrt(max(variance, 0.0)), step.heading_sd_rad
         )
         rise_sd = math.sqrt(max(float(step.covariance[2][2]), 0.0))
-        before, self._scale_sd = self._scale_sd, max(self._scale_sd, step.scale_sd)
+        aloft = step.t_end_s - step.t_start_s > ALOFT_S  # its length, and so the scale, says little
+        before, self._scale_sd = self._scale_sd, max(self._scale_sd, 0.0 if aloft else step.scale_sd)
         growth = math.sqrt(self._scale_sd**2 - before**2)
-        is_aloft = step.t_end_s - step.t_start_s > ALOFT_S and not self._is_aloft
-        return [
-            replace(
-                segment, rise_m=float(step.move_m[2]), rise_sd_m=rise_sd, scale_sd=growth, moved_log_ratio=ALOFT * is_aloft
-            )
-        ]
+        return [replace(segment, rise_m=float(step.move_m[2]), rise_sd_m=rise_sd, scale_sd=growth, aloft=aloft)]
 
     def _moving_segment(self, t_s: float, heading: float, sd_m: float, turn_sd_rad: float) -> PathSegment:
         """The segment from the last anchor to a new one over the foot; without a last anchor, an empty segment of one second."""

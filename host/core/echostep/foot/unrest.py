@@ -49,8 +49,6 @@ def judge(s: ZuptState, span_s: float) -> None:
 
 
 @lean_part
-def judge_flight(s: ZuptState) -> None:
-    """A sensor that did not rest for longer than any swing lasts is judged at once."""
-    if s.flight_s > LONGEST_FLIGHT_S:
-        s.unrest = max(s.unrest, s.flight_s / LONGEST_FLIGHT_S)
-        s.judged = max(s.judged, FEWEST)
+def of_flight(flight_s: float) -> float:
+    """The unrest of a sensor that did not rest for longer than any swing lasts, 0 of one that did."""
+    return flight_s / LONGEST_FLIGHT_S if flight_s > LONGEST_FLIGHT_S else 0.0

@@ -290,7 +290,6 @@ def _begin_stance(s: ZuptState, nav: Nav, begin_s: float, events: Floats, event_
     s.rest_yaw_rad = ins.heading(nav)
     s.stance_tilt[0], s.stance_tilt[1], s.stance_tilt[2] = mounting.tilt(nav)
     if s.walking:
-        unrest.judge_flight(s)
         _write_step(s, nav, events[event_count])
         event_count += 1
     s.walking = 1
@@ -312,7 +311,7 @@ def _write_step(s: ZuptState, nav: Nav, row: Floats) -> None:
     row[out.TOE] = mounting.toe(s.tilt_square, s.tilt_cube)
     offset = ins.dot(ins.rotation(nav.attitude)[2], nav.accel_bias)
     row[out.EXCESS] = offset / ins.GRAVITY_M_S2 if abs(offset) > nav.noise.offset else 0.0
-    row[out.UNREST] = s.unrest if s.judged >= unrest.FEWEST else 0.0
+    row[out.UNREST] = max(s.unrest if s.judged >= unrest.FEWEST else 0.0, unrest.of_flight(s.flight_s))
     for i in range(3):
         s.tilt_square[i] *= mounting.MEMORY
         s.tilt_cube[i] *= mounting.MEMORY

@@ -4,8 +4,8 @@
 In: `MeasuredSegment`s in order of time. Out: the same; where the rival wins, as segments that were not observed. Owns its odds in this stand, and what
 each ranger heard at its begin.
 
-One hypothesis, one update: per second it may begin, `PathSegment.moved_log_ratio` is what the foot's own samples say, and each ranger compares what it
-hears with what it heard when the stand began. A passer-by is nearer and goes again; a way along a wall changes nothing; what is farther than before
+One hypothesis, one update: per second it may begin; a foot that is off the floor for longer than a step takes is carried, or laid over the other knee;
+each ranger compares what it hears with what it heard when the stand began. A passer-by is nearer and goes again; a way along a wall changes nothing; what is farther than before
 was not there. A wearer whose rangers have fallen silent has no witness, so his claim decays with time.
 """
 
@@ -25,6 +25,7 @@ PRIOR = 1e-4  # that it begins with the stand
 BASE_S = 1.0  # of a stand, in which the rangers hear what is there
 MOST_M = 3.0  # standard deviation per axis of a way that a cloud follows
 ALIKE_M = 0.15  # error of an echo, sway and a slight turn of the body
+ALOFT = 8.0  # log-likelihood ratio of a foot that stays off the floor
 # Log-likelihood ratios of half a second of a ranger: moved / stood
 AS_BEFORE = math.log(0.8 / 0.95)  # a wall goes on
 NEARER = math.log(0.2 / 0.12)  # a passer-by, a cupboard
@@ -44,15 +45,13 @@ class UnmeasuredWay:
         self._begin_s = self._spread_s = t_s  # of the stand; up to which the trunk has been spread
         self._base: tuple[list[float], list[float]] = ([], [])
         self._last = [math.nan, math.nan]
+        self._is_aloft = False
 
     def weighed(self, measured: MeasuredSegment) -> MeasuredSegment:
         """Update the probability; the segment, or one that was not observed where the trunk has probably moved."""
         segment = measured.segment
-        if segment.sd_m > MOST_M:  # says nothing: a foot in the air for long
-            segment = replace(segment, dx_m=0.0, dy_m=0.0, sd_m=MOST_M)
-            measured = replace(measured, segment=segment)
         before, self._step = self._step, segment.step
-        if (segment.unobserved or segment.step != before) and not segment.moved_log_ratio:
+        if (segment.unobserved or segment.step != before) and not segment.aloft:
             self._begin_anew(segment.t1_s)
             return measured
         self._begin_s, self._spread_s = min(self._begin_s, segment.t0_s), min(self._spread_s, segment.t0_s)
@@ -61,11 +60,12 @@ class UnmeasuredWay:
         self._has_heard = self._has_heard or speaks
         per_s = UNSEEN_PER_S if self._has_heard and not speaks else BEGINS_PER_S
         begun = self.probability + (1.0 - self.probability) * -math.expm1(-per_s * (segment.t1_s - segment.t0_s))
-        log_ratio = segment.moved_log_ratio
+        log_ratio = ALOFT if segment.aloft and not self._is_aloft else 0.0
+        self._is_aloft = segment.aloft and segment.step == before
         for k, ranges in enumerate(heard):
             if len(ranges):
                 log_ratio += self._compared(k, float(np.median(ranges)), segment.t1_s - self._begin_s < BASE_S)
-        odds = math.exp(min(log_ratio, 50.0)) * begun / (1.0 - begun)
+        odds = math.exp(log_ratio) * begun / (1.0 - begun)
         self.probability = min(max(odds / (1.0 + odds), PRIOR), 1.0 - PRIOR)
         return replace(measured, segment=self._spread(segment)) if self.has_moved else measured
 
@@ -88,12 +88,10 @@ class UnmeasuredWay:
         return FARTHER if range_m > max(base) else NEARER
 
     def _spread(self, segment: PathSegment) -> PathSegment:
-        """A way that may have been walked at any speed up to a walker's, since the stand began; beyond MOST_M the building is searched."""
-        before_m, after_m = (
-            min(WALKER_M_S * (t_s - self._begin_s), MOST_M) for t_s in (self._spread_s, segment.t1_s)
-        )
+        """Any way up to a walker's speed since the stand began, whatever the foot measured; beyond MOST_M the building is searched."""
+        before_m, after_m = (min(WALKER_M_S * (t_s - self._begin_s), MOST_M) for t_s in (self._spread_s, segment.t1_s))
         sd_m = math.sqrt(after_m**2 - before_m**2)
         if sd_m <= UNOBSERVED_SD_M:
-            return segment
+            return replace(segment, dx_m=0.0, dy_m=0.0, sd_m=0.0)
         self._spread_s = segment.t1_s
-        return replace(segment, sd_m=math.hypot(sd_m, segment.sd_m))
+        return replace(segment, dx_m=0.0, dy_m=0.0, sd_m=sd_m)
