@@ -25,11 +25,11 @@ from echostep.localization.estimate import Estimate
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.search import Search
 from echostep.localization.grid.start import grid_about, grid_of, is_unknown
-from echostep.localization.motion import HEIGHT_SD_M, LONG_S, Gap, Gaps, height_change, move_of
+from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, move_of
 from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.localization.particles.start import STATED, Start, wide
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
-from echostep.localization.unmeasured import UnmeasuredWay
+from echostep.localization.unmeasured import FOLLOWED_S, UnmeasuredWay
 from echostep.localization.window import RecentWay
 from echostep.particles.arrays import Move, PingBatch
 from echostep.particles.kernels import systematic
@@ -117,16 +117,16 @@ class MapFilter:
         measured = self._unmeasured.weighed(measured)
         segment, belief = measured.segment, self.belief
         # 1. Kind of the last gap: a pause, a way that was not observed, rangers that were silent.
-        gap = self._gaps.ended(measured, has_moved=self._unmeasured.has_moved)
+        gap, moved_s = self._gaps.ended(measured), self._unmeasured.ended_s
         # 2. How the height has changed, by the foot and by pressure.
         change = self._height_change(measured)
         # 3. A way that was not observed scatters each hypothesis.
         if segment.unobserved:
-            self._scatter(segment, change)
+            self._scatter(segment, change, is_long=gap is Gap.UNOBSERVED)
         # 4. After a gap the wearer may be elsewhere: a rest, a ride in a lift, a walk.
-        if gap is not None:
-            away = 1.0 - LONG_S / self._gaps.unobserved_s if gap is Gap.UNOBSERVED else 0.0
-            belief.leave(max(UNOBSERVED_DOUBT, away))
+        if gap is not None or moved_s > FOLLOWED_S:
+            if gap is not Gap.UNOBSERVED:
+                belief.leave(max(UNOBSERVED_DOUBT, 1.0 - FOLLOWED_S / moved_s if moved_s else 0.0))
             self._search_beside(self.cloud.air, segment.heading1_rad)
         # 5. Along an observed way each hypothesis moves, and is weighed by pings, walls and heights.
         # 6. The hypotheses are compared, and the rangers' bias is learnt from the likeliest.
@@ -214,10 +214,12 @@ class MapFilter:
             self._height.update(change)
         return change
 
-    def _scatter(self, segment: PathSegment, change: HeightChange) -> None:
+    def _scatter(self, segment: PathSegment, change: HeightChange, *, is_long: bool) -> None:
         """Spread the hypotheses over an unobserved segment, straight through the building."""
         for each in self.belief.clouds:
             each.cloud.scatter(move_of(segment), change)
+        if is_long:
+            self.belief.leave(UNOBSERVED_DOUBT)
         self._way.clear()
 
     def _follow(self, measured: MeasuredSegment, change: HeightChange) -> tuple[Move, PingBatch]:

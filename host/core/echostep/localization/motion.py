@@ -55,23 +55,18 @@ class Gaps:
 
     def __init__(self) -> None:
         self.pause_s = 0.0  # between the last two segments
-        self.unobserved_s = self._unobserved_s = 0.0  # before this segment; up to the newest
         self._end_s = math.inf  # of the last segment
         self._ping_s = math.inf  # of the last ping
         self._since_ping = Odometer()
 
-    def ended(self, measured: MeasuredSegment, *, has_moved: bool = False) -> Gap | None:
-        """The gap that this segment ends, or that is known by its end; `has_moved`: the trunk has, though no step was measured."""
+    def ended(self, measured: MeasuredSegment) -> Gap | None:
+        """The gap that this segment ends, or that is known by its end."""
         segment = measured.segment
         self.pause_s = max(segment.t0_s - self._end_s, 0.0)
         self._end_s = segment.t1_s
         is_mute = self._is_mute(measured)
-        if segment.unobserved or has_moved:
-            self._unobserved_s += segment.t1_s - segment.t0_s
-            return None
-        self.unobserved_s, self._unobserved_s = self._unobserved_s, 0.0
-        if self.unobserved_s > LONG_S:
-            return Gap.UNOBSERVED
+        if segment.unobserved:
+            return Gap.UNOBSERVED if segment.t1_s - segment.t0_s > LONG_S else None
         if self.pause_s > PAUSE_S:
             return Gap.PAUSE
         return Gap.MUTE if is_mute else None

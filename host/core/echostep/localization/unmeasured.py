@@ -23,10 +23,11 @@ from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 BEGINS_PER_S, UNSEEN_PER_S = 1e-4, 0.02
 PRIOR = 1e-4  # that it begins with the stand
 BASE_S = 1.0  # of a stand, in which the rangers hear what is there
-MOST_M = 3.0  # standard deviation per axis of a way that a cloud follows
+FOLLOWED_S = 2.0  # of such a way that a cloud follows; after a longer one the building is searched
 ALIKE_M = 0.15  # error of an echo, sway and a slight turn of the body
-ALOFT = 8.0  # log-likelihood ratio of a foot that stays off the floor
-# Log-likelihood ratios of half a second of a ranger: moved / stood
+# Log-likelihood ratios, moved / stood: of a foot that stays off the floor, of a step
+ALOFT, STEPPED = 8.0, -4.0
+# Of half a second of a ranger
 AS_BEFORE = math.log(0.8 / 0.95)  # a wall goes on
 NEARER = math.log(0.2 / 0.12)  # a passer-by, a cupboard
 FARTHER = math.log(0.2 / 0.03)  # a door that somebody opens, a corner
@@ -36,49 +37,59 @@ class UnmeasuredWay:
     """Call `weighed` with every segment."""
 
     def __init__(self) -> None:
-        self._has_heard, self._step = False, 0
-        self._begin_anew(math.inf)
-
-    def _begin_anew(self, t_s: float) -> None:
-        """A step was measured: what was, is over."""
         self.probability = PRIOR
-        self._begin_s = self._spread_s = t_s  # of the stand; up to which the trunk has been spread
-        self._base: tuple[list[float], list[float]] = ([], [])
-        self._last = [math.nan, math.nan]
-        self._is_aloft = False
-
-    def weighed(self, measured: MeasuredSegment) -> MeasuredSegment:
-        """Update the probability; the segment, or one that was not observed where the trunk has probably moved."""
-        segment = measured.segment
-        before, self._step = self._step, segment.step
-        if (segment.unobserved or segment.step != before) and not segment.aloft:
-            self._begin_anew(segment.t1_s)
-            return measured
-        self._begin_s, self._spread_s = min(self._begin_s, segment.t0_s), min(self._spread_s, segment.t0_s)
-        heard = [measured.range_m[(measured.ranger == k) & (measured.range_m > 0.0)] for k in (0, 1)]
-        speaks = any(len(ranges) for ranges in heard)
-        self._has_heard = self._has_heard or speaks
-        per_s = UNSEEN_PER_S if self._has_heard and not speaks else BEGINS_PER_S
-        begun = self.probability + (1.0 - self.probability) * -math.expm1(-per_s * (segment.t1_s - segment.t0_s))
-        log_ratio = ALOFT if segment.aloft and not self._is_aloft else 0.0
-        self._is_aloft = segment.aloft and segment.step == before
-        for k, ranges in enumerate(heard):
-            if len(ranges):
-                log_ratio += self._compared(k, float(np.median(ranges)), segment.t1_s - self._begin_s < BASE_S)
-        odds = math.exp(log_ratio) * begun / (1.0 - begun)
-        self.probability = min(max(odds / (1.0 + odds), PRIOR), 1.0 - PRIOR)
-        return replace(measured, segment=self._spread(segment)) if self.has_moved else measured
+        self.ended_s = 0.0  # duration of the way that ended with the newest segment; 0: none ended
+        self._has_heard, self._is_aloft, self._step = False, False, 0
+        self._begin_s = self._spread_s = math.inf  # of the stand; up to which the trunk has been spread
+        self._look_anew(math.inf)
 
     @property
     def has_moved(self) -> bool:
         """Whether the trunk has probably moved since the last measured step."""
         return self.probability > PROBABLE
 
-    def _compared(self, ranger: int, range_m: float, is_base: bool) -> float:
+    def weighed(self, measured: MeasuredSegment) -> MeasuredSegment:
+        """Update the probability; the segment, or one that was not observed where the trunk has probably moved."""
+        segment, had_moved = measured.segment, self.has_moved
+        is_step, self._step = segment.step != self._step or segment.unobserved, segment.step
+        odds = math.exp(self._log_ratio(measured, is_step=is_step)) * self._begun(measured)
+        self.probability = min(max(odds / (1.0 + odds), PRIOR), 1.0 - PRIOR)
+        self.ended_s = segment.t0_s - self._begin_s if had_moved and not self.has_moved else 0.0
+        if is_step and not self.has_moved:
+            self._begin_s = self._spread_s = segment.t1_s
+        return replace(measured, segment=self._spread(segment)) if self.has_moved else measured
+
+    def _begun(self, measured: MeasuredSegment) -> float:
+        """Odds that such a way has begun by the end of a segment, before its evidence."""
+        segment, heard = measured.segment, bool((measured.range_m > 0.0).any())
+        self._has_heard = self._has_heard or heard
+        per_s = UNSEEN_PER_S if self._has_heard and not heard else BEGINS_PER_S
+        stood = (1.0 - self.probability) * math.exp(-per_s * (segment.t1_s - segment.t0_s))
+        return (1.0 - stood) / stood
+
+    def _log_ratio(self, measured: MeasuredSegment, *, is_step: bool) -> float:
+        """Log-likelihood ratio of a segment: by the foot, or if it stands, by the rangers."""
+        segment, was_aloft, self._is_aloft = measured.segment, self._is_aloft, measured.segment.aloft and not is_step
+        if is_step:
+            self._look_anew(segment.t1_s)
+            return STEPPED if not segment.aloft else 0.0 if was_aloft else ALOFT
+        ratio = ALOFT if segment.aloft and not was_aloft else 0.0
+        for k in (0, 1):
+            ranges = measured.range_m[(measured.ranger == k) & (measured.range_m > 0.0)]
+            if len(ranges):
+                ratio += self._compared(k, float(np.median(ranges)), segment.t1_s)
+        return ratio
+
+    def _look_anew(self, t_s: float) -> None:
+        """From here on the rangers hear something else."""
+        self._base: tuple[list[float], list[float]] = ([], [])
+        self._last, self._base_s = [math.nan, math.nan], t_s + BASE_S
+
+    def _compared(self, ranger: int, range_m: float, t_s: float) -> float:
         """Log-likelihood ratio of what a ranger hears in a piece of the stand."""
         base, last_m = self._base[ranger], self._last[ranger]
         self._last[ranger] = range_m
-        if is_base or not base:
+        if t_s < self._base_s or not base:
             base.append(range_m)
             return 0.0
         if min(abs(range_m - b) for b in base) < ALIKE_M:
@@ -88,9 +99,10 @@ class UnmeasuredWay:
         return FARTHER if range_m > max(base) else NEARER
 
     def _spread(self, segment: PathSegment) -> PathSegment:
-        """Any way up to a walker's speed since the stand began, whatever the foot measured; beyond MOST_M the building is searched."""
-        before_m, after_m = (min(WALKER_M_S * (t_s - self._begin_s), MOST_M) for t_s in (self._spread_s, segment.t1_s))
-        sd_m = math.sqrt(after_m**2 - before_m**2)
+        """Any way up to a walker's speed since the stand began, whatever the foot measured; beyond FOLLOWED_S the building is searched."""
+        self._begin_s, self._spread_s = min(self._begin_s, segment.t0_s), min(self._spread_s, segment.t0_s)
+        before_s, after_s = (min(t_s - self._begin_s, FOLLOWED_S) for t_s in (self._spread_s, segment.t1_s))
+        sd_m = WALKER_M_S * math.sqrt(after_s**2 - before_s**2)
         if sd_m <= UNOBSERVED_SD_M:
             return replace(segment, dx_m=0.0, dy_m=0.0, sd_m=0.0)
         self._spread_s = segment.t1_s
