@@ -13,7 +13,7 @@ import pytest
 
 from board_runs import ROOT
 from echostep.localization import Estimate, TrackStatus
-from echostep.localization.motion import LONG_S, MUTE_S, PAUSE_S, Gap, Gaps
+from echostep.localization.motion import LONG_S, PAUSE_S, Gap, Gaps
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 from echostep.plan import load_plan
 from echostep.tracker import Tracker
@@ -48,21 +48,6 @@ def test_a_pause_is_one_that_nothing_covers(pause_s: float, gap: Gap | None) -> 
 def test_a_long_unobserved_segment_is_a_gap(span_s: float, gap: Gap | None) -> None:
     silent = segment(0.5, 0.5 + span_s, sd_m=2.0 * UNOBSERVED_SD_M)
     assert found(segment(0.0, 0.5), silent, segment(0.5 + span_s, 1.0 + span_s)) == [None, gap, None]
-
-
-@pytest.mark.parametrize(("mute_s", "gap"), [(0.9 * MUTE_S, None), (1.1 * MUTE_S, Gap.MUTE)])
-def test_standing_without_a_ping_is_a_gap_and_walking_is_not(mute_s: float, gap: Gap | None) -> None:
-    end_s = 0.5 + mute_s
-    for length_m, expected in ((0.0, gap), (10.0, None)):
-        mute = segment(0.5, end_s, length_m=length_m, pings=0)
-        assert found(segment(0.0, 0.5), mute, segment(end_s, end_s + 0.5)) == [None, expected, None]
-
-
-def test_standing_without_a_ping_is_told_once_until_the_next_ping() -> None:
-    standing = [segment(k, k + 1.0, length_m=0.0, pings=0) for k in range(1, 40)]
-    gaps = found(segment(0.0, 1.0), *standing, segment(40.0, 41.0))
-    assert gaps.index(Gap.MUTE) == MUTE_S + 1  # known while it lasts, not after it
-    assert gaps.count(Gap.MUTE) == 1
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,7 @@ from echostep.xsens import (
 )
 from echostep.xsens.frames import LONGEST
 from echostep.xsens.mtdata import ACCEL, ATTITUDE, CELSIUS, GYRO, MAG, decode_mtdata
+from echostep.xsens.reader import HELD
 from echostep_simulation.devices.mtx_formats import pack
 
 
@@ -33,8 +34,9 @@ def sample(counter: int, gyro_x: float = 0.1) -> MtSample:
     return MtSample(counter, (0.5, -0.25, 9.75), (gyro_x, 0.0, -1.5), (0.5, 0.0, -0.875), (1.0, 0.0, 0.0, 0.0))
 
 
-def frame(counter: int, gyro_x: float = 0.125) -> bytes:
-    return encode_frame(MTDATA, pack_mtdata(sample(counter, gyro_x)))
+def frame(counter: int, gyro_x: float | None = None) -> bytes:
+    """No two in a row are equal, unless `gyro_x` is."""
+    return encode_frame(MTDATA, pack_mtdata(sample(counter, 0.125 * (counter % 2 + 1) if gyro_x is None else gyro_x)))
 
 
 def test_the_frame_is_the_one_of_the_manual() -> None:
@@ -313,6 +315,15 @@ def test_every_world_becomes_the_map(
 def test_ninety_seconds_are_one_batch() -> None:
     batch = MtxReader().feed_batch(b"".join(frame(n) for n in range(9_000)))
     assert len(batch.counter) == 9_000
+
+
+@pytest.mark.parametrize("split", [1, 7, 59, 10_000])
+def test_a_sample_that_repeats_while_its_counter_goes_on_is_none(split: int) -> None:
+    stream = b"".join(frame(n, 0.5 if 20 <= n < 50 else None) for n in range(60))
+    reader = MtxReader()
+    found = [s.counter for k in range(0, len(stream), split) for s in reader.feed(stream[k : k + split])]
+    assert found == [*range(20 + HELD), *range(50, 60)]
+    assert (reader.counts.repeated, reader.counts.good) == (30 - HELD, 30 + HELD)
 
 
 def test_noise_full_of_preambles_costs_no_more() -> None:

@@ -29,7 +29,7 @@ from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, 
 from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.localization.particles.start import STATED, Start, wide
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
-from echostep.localization.unmeasured import FOLLOWED_S, UnmeasuredWay
+from echostep.localization.unmeasured import UnmeasuredWay
 from echostep.localization.window import RecentWay
 from echostep.particles.arrays import Move, PingBatch
 from echostep.particles.kernels import systematic
@@ -44,6 +44,7 @@ EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate: no plan 
 HIDDEN_SD_M = 0.15
 BY_DEFINITION = 1.0 - 1e-6  # without a plan: the map begins where the walk began, and no echo can contradict that
 NEAR_SD_M = 2.0  # standard deviation of a place that was believed before a gap, per axis; assumed
+LEFT = 0.1  # probability that the trunk has left its place in a stand, from which on the building is searched
 UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, assumed
 
 
@@ -117,16 +118,16 @@ class MapFilter:
         measured = self._unmeasured.weighed(measured)
         segment, belief = measured.segment, self.belief
         # 1. Kind of the last gap: a pause, a way that was not observed, rangers that were silent.
-        gap, moved_s = self._gaps.ended(measured), self._unmeasured.ended_s
+        gap, away = self._gaps.ended(measured), self._unmeasured.away
         # 2. How the height has changed, by the foot and by pressure.
         change = self._height_change(measured)
         # 3. A way that was not observed scatters each hypothesis.
         if segment.unobserved:
             self._scatter(segment, change, is_long=gap is Gap.UNOBSERVED)
         # 4. After a gap the wearer may be elsewhere: a rest, a ride in a lift, a walk.
-        if gap is not None or moved_s > FOLLOWED_S:
+        if gap is not None or away > LEFT:
             if gap is not Gap.UNOBSERVED:
-                belief.leave(max(UNOBSERVED_DOUBT, 1.0 - FOLLOWED_S / moved_s if moved_s else 0.0))
+                belief.leave(max(UNOBSERVED_DOUBT, away))
             self._search_beside(self.cloud.air, segment.heading1_rad)
         # 5. Along an observed way each hypothesis moves, and is weighed by pings, walls and heights.
         # 6. The hypotheses are compared, and the rangers' bias is learnt from the likeliest.

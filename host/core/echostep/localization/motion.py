@@ -2,7 +2,7 @@
 """From a measured segment of the path: its move, its change of height, and gaps after which the wearer may be elsewhere.
 
 In: `MeasuredSegment`s in order of time. Out: `Move`, `HeightChange`, the kind of gap that ends with a segment. Owns the errors of the path that the
-segment does not state, and the times of the last segment and of the last ping.
+segment does not state, and the time of the last segment.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from statistics import median
 
 from echostep.height.levels import HeightChange
 from echostep.particles.arrays import Move
-from echostep.path import MeasuredSegment, Odometer, PathSegment
+from echostep.path import MeasuredSegment, PathSegment
 
 BESIDE_M = 0.05  # of the trunk from a foot on the floor: half of a step's width of 10 cm
 HEIGHT_SD_M = 0.3  # of one height by pressure: an SCP1000 in its fast mode, a little worse than in its data sheet
@@ -22,8 +22,6 @@ AIR_SD_M = 0.1  # of a height by pressure that more samples do not reduce: draug
 # Assumed, not measured.
 PAUSE_S = 1.0  # between two segments: nothing was received
 LONG_S = 5.0  # of an unobserved segment: a walk out of the room
-MUTE_S = 10.0  # of standing without a ping after earlier pings: rangers measure at rest, too
-STANDING_M = 0.5  # path that still counts as standing
 
 
 def move_of(segment: PathSegment) -> Move:
@@ -43,11 +41,10 @@ def height_change(measured: MeasuredSegment, riding_m: float) -> HeightChange:
 
 
 class Gap(Enum):
-    """`PAUSE`: nothing came; `UNOBSERVED`: the foot was silent for a long time; `MUTE`: the foot stood and no ranger measured."""
+    """`PAUSE`: nothing came; `UNOBSERVED`: the foot was silent for a long time."""
 
     PAUSE = auto()
     UNOBSERVED = auto()
-    MUTE = auto()
 
 
 class Gaps:
@@ -56,30 +53,12 @@ class Gaps:
     def __init__(self) -> None:
         self.pause_s = 0.0  # between the last two segments
         self._end_s = math.inf  # of the last segment
-        self._ping_s = math.inf  # of the last ping
-        self._since_ping = Odometer()
 
     def ended(self, measured: MeasuredSegment) -> Gap | None:
         """The gap that this segment ends, or that is known by its end."""
         segment = measured.segment
         self.pause_s = max(segment.t0_s - self._end_s, 0.0)
         self._end_s = segment.t1_s
-        is_mute = self._is_mute(measured)
         if segment.unobserved:
             return Gap.UNOBSERVED if segment.t1_s - segment.t0_s > LONG_S else None
-        if self.pause_s > PAUSE_S:
-            return Gap.PAUSE
-        return Gap.MUTE if is_mute else None
-
-    def _is_mute(self, measured: MeasuredSegment) -> bool:
-        """Whether the foot has stood for MUTE_S without a ping; true once until the next ping."""
-        segment = measured.segment
-        if len(measured.t_s):
-            is_mute = self._since_ping.path_m < STANDING_M and measured.t_s[0] - self._ping_s > MUTE_S
-            self._ping_s, self._since_ping = float(measured.t_s[-1]), Odometer()
-            return is_mute
-        self._since_ping.add(math.hypot(segment.dx_m, segment.dy_m))
-        is_mute = self._since_ping.path_m < STANDING_M and segment.t1_s - self._ping_s > MUTE_S
-        if is_mute:
-            self._ping_s = math.inf
-        return is_mute
+        return Gap.PAUSE if self.pause_s > PAUSE_S else None

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
 """The rival of every stand: the trunk moved, and no step was measured. Carried, pushed, ridden, or a foot's sensor that lies.
 
-In: `MeasuredSegment`s in order of time. Out: the same; where the rival wins, as segments that were not observed. Owns its odds in this stand, and what
-each ranger heard at its begin.
+In: `MeasuredSegment`s in order of time. Out: the same; where the rival wins, as segments that were not observed. Owns its odds, and what each ranger
+heard when the stand began.
 
-One hypothesis, one update: per second it may begin; a foot that is off the floor for longer than a step takes is carried, or laid over the other knee;
-each ranger compares what it hears with what it heard when the stand began. A passer-by is nearer and goes again; a way along a wall changes nothing; what is farther than before
-was not there. A wearer whose rangers have fallen silent has no witness, so his claim decays with time.
+One hypothesis, one update: it may begin in any second; a foot that is off the floor for longer than a step takes is carried, or laid over the other
+knee; each ranger compares what it hears with what it heard when the stand began. A passer-by is nearer and goes again; a way along a wall changes
+nothing. A wearer whose rangers have fallen silent has no witness, so his claim decays with time.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ BEGINS_PER_S, UNSEEN_PER_S = 1e-4, 0.02
 PRIOR = 1e-4  # that it begins with the stand
 BASE_S = 1.0  # of a stand, in which the rangers hear what is there
 FOLLOWED_S = 2.0  # of such a way that a cloud follows; after a longer one the building is searched
+STEP_M, STEP_RAD = 0.2, 0.35  # of a step that is no shuffle: its way, or its turn
 ALIKE_M = 0.15  # error of an echo, sway and a slight turn of the body
 # Log-likelihood ratios, moved / stood: of a foot that stays off the floor, of a step
 ALOFT, STEPPED = 8.0, -4.0
@@ -38,7 +39,8 @@ class UnmeasuredWay:
 
     def __init__(self) -> None:
         self.probability = PRIOR
-        self.ended_s = 0.0  # duration of the way that ended with the newest segment; 0: none ended
+        # Probability that the trunk has left where the cloud follows it; 0 unless a stand ends with the newest segment
+        self.away = 0.0
         self._has_heard, self._is_aloft, self._step = False, False, 0
         self._begin_s = self._spread_s = math.inf  # of the stand; up to which the trunk has been spread
         self._look_anew(math.inf)
@@ -50,12 +52,13 @@ class UnmeasuredWay:
 
     def weighed(self, measured: MeasuredSegment) -> MeasuredSegment:
         """Update the probability; the segment, or one that was not observed where the trunk has probably moved."""
-        segment, had_moved = measured.segment, self.has_moved
+        segment, before = measured.segment, self.probability
         is_step, self._step = segment.step != self._step or segment.unobserved, segment.step
         odds = math.exp(self._log_ratio(measured, is_step=is_step)) * self._begun(measured)
         self.probability = min(max(odds / (1.0 + odds), PRIOR), 1.0 - PRIOR)
-        self.ended_s = segment.t0_s - self._begin_s if had_moved and not self.has_moved else 0.0
+        self.away, stood_s = 0.0, segment.t0_s - self._begin_s
         if is_step and not self.has_moved:
+            self.away = before * (1.0 - FOLLOWED_S / stood_s) if stood_s > FOLLOWED_S else 0.0
             self._begin_s = self._spread_s = segment.t1_s
         return replace(measured, segment=self._spread(segment)) if self.has_moved else measured
 
@@ -70,9 +73,11 @@ class UnmeasuredWay:
     def _log_ratio(self, measured: MeasuredSegment, *, is_step: bool) -> float:
         """Log-likelihood ratio of a segment: by the foot, or if it stands, by the rangers."""
         segment, was_aloft, self._is_aloft = measured.segment, self._is_aloft, measured.segment.aloft and not is_step
-        if is_step:
+        if is_step or segment.unobserved:
             self._look_anew(segment.t1_s)
-            return STEPPED if not segment.aloft else 0.0 if was_aloft else ALOFT
+            if not segment.aloft:
+                is_long = math.hypot(segment.dx_m, segment.dy_m) > STEP_M or abs(segment.turn_rad) > STEP_RAD
+                return STEPPED if is_long else 0.0
         ratio = ALOFT if segment.aloft and not was_aloft else 0.0
         for k in (0, 1):
             ranges = measured.range_m[(measured.ranger == k) & (measured.range_m > 0.0)]

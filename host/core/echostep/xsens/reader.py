@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.arrays import Floats, Ints
+from echostep.arrays import Bools, Floats, Ints
 from echostep.xsens import gates
 from echostep.xsens import mtdata as mt
 from echostep.xsens.frames import (
@@ -31,6 +31,8 @@ from echostep.xsens.gates import Messages, apply_gates, joined
 from echostep.xsens.mtdata import Decoded, OutputFormat, decode_mtdata, pack_mtdata
 from echostep.xsens.mtdata2 import decode_mtdata2, find_packets
 from echostep.xsens.sample import MtSample
+
+HELD = 10  # equal samples in a row, which coarse digits may give at rest; assumed
 
 
 class MtBatch(NamedTuple):
@@ -113,6 +115,7 @@ class MtxReader:
         self._tally = np.zeros(gates.LOST + 1, np.int64)
         self._state = np.array([-1, -1, -1, 0])
         self._waiting = gates.NO_MESSAGES  # a sample whose counter jumped; one at most
+        self._last, self._alike = np.full((1, 6), np.nan), 0  # the newest sample, and how many before it were equal
         self._bad_length = self._other = self._wake_ups = self._errors = 0
 
     @property
@@ -164,6 +167,8 @@ class MtxReader:
         passed, waits = apply_gates(messages, self._limits, self._state, self._tally)
         self._waiting = messages.at(np.arange(waits, waits + 1)) if waits >= 0 else gates.NO_MESSAGES
         values, counter, _, _, end = messages if passed.all() else messages.at(np.flatnonzero(passed))
+        fresh = self._fresh(values)
+        values, counter, end = (values, counter, end) if fresh.all() else (values[fresh], counter[fresh], end[fresh])
         return MtBatch(
             counter,
             values[:, mt.ACCEL],
@@ -173,6 +178,20 @@ class MtxReader:
             values[:, mt.CELSIUS],
             end,
         )
+
+    def _fresh(self, values: Floats) -> Bools:
+        """Whether each sample (n,) is one: a sensor has noise, so one that gives equal values for longer than HELD samples has stopped."""
+        measured = np.vstack([self._last, values[:, mt.ACCEL.start : mt.GYRO.stop]])
+        changed = (measured[1:] != measured[:-1]).any(1)
+        index = np.arange(len(changed))
+        alike = index - np.maximum.accumulate(np.where(changed, index, -1 - self._alike))
+        if len(index):
+            self._last, self._alike = measured[-1:], int(alike[-1])
+        fresh: Bools = alike < HELD
+        held = len(fresh) - int(fresh.sum())
+        self._tally[gates.GOOD] -= held
+        self._tally[gates.REPEATED] += held
+        return fresh
 
     def _decode(self, frames: MtFrames) -> Messages:
         """Values of all measurement messages in order; other messages are counted."""

@@ -68,18 +68,30 @@ def _within(t_s: Floats, span_s: Span) -> Bools:
 
 def repeating(chunks: Sequence[Chunk], span_s: Span) -> list[Chunk]:
     """The MTx repeats one sample while its counter goes on."""
-    begin_ns, kept, changed = START_NS + int(1e9 * span_s[0]), b"", []
+    pieces = [chunk.data for chunk in chunks if chunk.port == MTX]
+    sent, earlier = b"".join(pieces), sum(len(c.data) for c in chunks if c.port == MTX and _since_s(c, span_s) < 0.0)
+    length = HEADER + sent[HEADER - 1] + 1
+    frames = [sent[k : k + length] for k in range(0, len(sent), length)]
+    first = earlier // length + 1
+    kept = frames[first][HEADER:-COUNTER]
+    frames[first:] = [encode_frame(MTDATA, kept + frame[-COUNTER:-1]) for frame in frames[first:]]
+    left = memoryview(b"".join(frames))
+    changed = []
     for chunk in chunks:
-        if chunk.port == MTX and chunk.t_arrival_ns >= begin_ns:
-            kept = kept or chunk.data[HEADER:-COUNTER]
-            chunk = replace(chunk, data=encode_frame(MTDATA, kept + chunk.data[-COUNTER:-1]))
+        if chunk.port == MTX:
+            chunk, left = replace(chunk, data=bytes(left[: len(chunk.data)])), left[len(chunk.data) :]
         changed.append(chunk)
     return changed
 
 
 def loose_plug(chunks: Sequence[Chunk], span_s: Span) -> list[Chunk]:
     """Every 12 s from the begin of the span on the MTx's bytes are missing, for 1 to 5 s in turn."""
-    return [c for c in chunks if c.port != MTX or not _is_loose(1e-9 * (c.t_arrival_ns - START_NS) - span_s[0])]
+    return [c for c in chunks if c.port != MTX or not _is_loose(_since_s(c, span_s))]
+
+
+def _since_s(chunk: Chunk, span_s: Span) -> float:
+    """Time of arrival since the span began."""
+    return 1e-9 * (chunk.t_arrival_ns - START_NS) - span_s[0]
 
 
 def _is_loose(since_s: float) -> bool:
