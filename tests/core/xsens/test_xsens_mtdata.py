@@ -126,7 +126,7 @@ def test_batches_do_not_depend_on_the_cuts(kinds: list[int], flips: list[tuple[i
 
 
 def test_a_batch_holds_what_was_sent_and_where() -> None:
-    batch = MtxReader().feed_batch(b"\x00" + frame(3) + encode_frame(0x12, b"1") + frame(4, 0.5))
+    batch = MtxReader().feed_batch(b"\x00" + frame(3, 0.125) + encode_frame(0x12, b"1") + frame(4, 0.5))
     assert batch.counter.tolist() == [3, 4]
     assert batch.end.tolist() == [60, 60 + 6 + 59]
     assert batch.gyro.tolist() == [[0.125, 0.0, -1.5], [0.5, 0.0, -1.5]]
